@@ -1,0 +1,195 @@
+//! One time step in memory: [`RawParticles`] as a reader found them, [`ParticleFrame`] as the
+//! renderer wants them (finite, f32, relative to the sequence's origin).
+
+use glam::{DVec3, Vec3};
+
+use crate::{Attribute, AttributeData};
+
+/// Positions in the precision of the file, world units.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Positions {
+    /// Single precision, as most simulations write.
+    F32(Vec<Vec3>),
+    /// Double precision; shape is kept by subtracting an origin before rounding.
+    F64(Vec<DVec3>),
+}
+
+impl Positions {
+    /// Particle count.
+    pub fn len(&self) -> usize {
+        match self {
+            Self::F32(v) => v.len(),
+            Self::F64(v) => v.len(),
+        }
+    }
+
+    /// True if there are none.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Position `index` in f64.
+    ///
+    /// # Panics
+    /// If `index` is out of range.
+    pub fn get(&self, index: usize) -> DVec3 {
+        match self {
+            Self::F32(v) => v[index].as_dvec3(),
+            Self::F64(v) => v[index],
+        }
+    }
+}
+
+/// What a reader returns: everything of one step, unfiltered, in file order.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RawParticles {
+    /// Positions in the precision of the file.
+    pub positions: Positions,
+    /// Everything else that is numeric and per particle; each holds exactly one value group a
+    /// particle.
+    pub attributes: Vec<Attribute>,
+    /// Simulation time, if the file tells.
+    pub time: Option<f64>,
+    /// Step number written inside the file (LAMMPS `TIMESTEP`), if any.
+    pub step: Option<i64>,
+}
+
+/// Sphere radii in scene units.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Radius {
+    /// All particles alike.
+    Common(f32),
+    /// One each, in particle order.
+    PerParticle(Vec<f32>),
+}
+
+/// The particles of one time step, ready to build a tree over: every position finite.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ParticleFrame {
+    /// Positions relative to `origin`, scene units.
+    pub positions: Vec<Vec3>,
+    /// World position of the zero of `positions`; one for a whole sequence.
+    pub origin: DVec3,
+    /// Radii if the file carries them (an attribute named `radius`, `pscale`, or half a
+    /// `diameter`); `None` means: estimate from the spacing.
+    pub radius: Option<Radius>,
+    /// Attributes in particle order.
+    pub attributes: Vec<Attribute>,
+    /// Simulation time, if known.
+    pub time: Option<f64>,
+    /// Particles left out because a coordinate was NaN or infinite.
+    pub dropped: u64,
+    /// File-order index of each kept particle; `None` when nothing was dropped (then it is `i`).
+    pub file_index: Option<Vec<u32>>,
+}
+
+impl ParticleFrame {
+    /// Drops particles with a non-finite coordinate (counted), subtracts `origin` in f64 and
+    /// rounds to f32.
+    pub fn from_raw(raw: RawParticles, origin: DVec3) -> Self {
+        let RawParticles {
+            positions,
+            mut attributes,
+            time,
+            step: _,
+        } = raw;
+        let relative = relative_positions(positions, origin);
+        let keep: Vec<bool> = relative.iter().map(|p| p.is_finite()).collect();
+        let kept = keep.iter().filter(|k| **k).count();
+        let dropped = (relative.len() - kept) as u64;
+        if dropped == 0 {
+            let radius = find_radius(&attributes);
+            return Self {
+                positions: relative,
+                origin,
+                radius,
+                attributes,
+                time,
+                dropped,
+                file_index: None,
+            };
+        }
+        for attribute in &mut attributes {
+            attribute.data.retain_particles(attribute.components, &keep);
+        }
+        let mut positions = Vec::with_capacity(kept);
+        let mut file_index = Vec::with_capacity(kept);
+        for (index, position) in relative.into_iter().enumerate() {
+            if keep[index] {
+                positions.push(position);
+                file_index.push(u32::try_from(index).unwrap_or(u32::MAX));
+            }
+        }
+        let radius = find_radius(&attributes);
+        Self {
+            positions,
+            origin,
+            radius,
+            attributes,
+            time,
+            dropped,
+            file_index: Some(file_index),
+        }
+    }
+
+    /// The attribute called `name`, exactly or failing that without regard to case.
+    pub fn attribute(&self, name: &str) -> Option<&Attribute> {
+        let exact = self.attributes.iter().find(|a| a.name == name);
+        exact.or_else(|| {
+            self.attributes
+                .iter()
+                .find(|a| a.name.eq_ignore_ascii_case(name))
+        })
+    }
+
+    /// Particle count (kept, finite).
+    pub fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    /// True if there are no particles; such a frame is valid and shows the background.
+    pub fn is_empty(&self) -> bool {
+        self.positions.is_empty()
+    }
+}
+
+/// An f64 too large for f32 becomes infinite here and is dropped by the caller.
+fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
+    match positions {
+        Positions::F32(v) if origin == DVec3::ZERO => v,
+        Positions::F32(mut v) => {
+            for p in &mut v {
+                *p = (p.as_dvec3() - origin).as_vec3();
+            }
+            v
+        }
+        Positions::F64(v) => v.into_iter().map(|p| (p - origin).as_vec3()).collect(),
+    }
+}
+
+/// Radii by the names that simulations and Houdini use.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "radii are f32 in the renderer"
+)]
+fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
+    let named = |wanted: &str| {
+        attributes.iter().find(|a| {
+            a.components == 1
+                && a.name.eq_ignore_ascii_case(wanted)
+                && matches!(a.data, AttributeData::F32(_) | AttributeData::F64(_))
+        })
+    };
+    let (attribute, scale) = named("radius")
+        .map(|a| (a, 1.0))
+        .or_else(|| named("pscale").map(|a| (a, 1.0)))
+        .or_else(|| named("diameter").map(|a| (a, 0.5)))?;
+    let radii: Vec<f32> = (0..attribute.count())
+        .map(|i| (attribute.data.get_f64(i) * scale) as f32)
+        .collect();
+    match radii.first() {
+        Some(first) if radii.iter().all(|r| r == first) => Some(Radius::Common(*first)),
+        Some(_) => Some(Radius::PerParticle(radii)),
+        None => None,
+    }
+}

@@ -1,0 +1,1 @@
+//! Seeded particle sets to measure with.

@@ -1,0 +1,25 @@
+//! Bytes to particles and back: readers for what simulations write, the native frame file, and
+//! the sequence of files that makes an animation.
+//!
+//! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
+//! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
+//! them. Arrows never point the other way.
+#![deny(unsafe_code)]
+
+mod attribute;
+mod error;
+mod frame;
+mod scalar;
+
+pub mod detect;
+pub mod generate;
+pub mod native;
+pub mod read;
+pub mod sequence;
+pub mod stats;
+pub mod write;
+
+pub use attribute::{Attribute, AttributeData};
+pub use error::{FrameError, ParseError};
+pub use frame::{ParticleFrame, Positions, Radius, RawParticles};
+pub use scalar::{Endian, ScalarType};

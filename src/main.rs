@@ -1,0 +1,3 @@
+//! The `spherule` command.
+
+fn main() {}

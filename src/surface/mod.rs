@@ -1,0 +1,48 @@
+//! What rays meet. The renderer knows only [`Surface`]: a hit is a distance, a normal, and a
+//! particle to take attributes from, whatever made it (spheres now; connected media and smooth
+//! isosurfaces have room here).
+
+use glam::Vec3;
+
+use crate::ray::Ray;
+
+pub mod spheres;
+
+/// One meeting of a ray with the surface.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct SurfaceHit {
+    /// Distance along the ray.
+    pub t: f32,
+    /// The point, put back onto the surface so that it is exact to a few ulps.
+    pub point: Vec3,
+    /// Outward unit normal; the ray enters the body if it points against the ray.
+    pub normal: Vec3,
+    /// Index of the particle in the frame.
+    pub particle: u32,
+    /// Length to step along the normal (either side) so that the next ray does not meet the same
+    /// place again.
+    pub offset: f32,
+}
+
+/// A place where a shadow ray passes through the surface of a transmissive body.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Crossing {
+    /// Distance along the ray.
+    pub t: f32,
+    /// Absolute cosine between ray and normal.
+    pub cosine: f32,
+}
+
+/// Anything a ray can meet. Answers do not depend on threads or on the accelerator.
+pub trait Surface: Sync {
+    /// The nearest meeting with distance in `ray.t_min..ray.t_max`; equal distances go to the
+    /// lower particle index.
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit>;
+
+    /// Whether anything at all lies in `ray.t_min..ray.t_max`.
+    fn occluded(&self, ray: &Ray) -> bool;
+
+    /// Replaces `crossings` by all meetings in `ray.t_min..ray.t_max`, both entering and leaving,
+    /// in order of distance (equal distances: lower particle index first).
+    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>);
+}

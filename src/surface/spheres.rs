@@ -1,0 +1,1 @@
+//! Opaque or transmissive spheres, each a body of its own.
