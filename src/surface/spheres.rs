@@ -1,1 +1,83 @@
-//! Opaque or transmissive spheres, each a body of its own.
+//! Opaque or transmissive spheres, each a body of its own, found through a [`WideTree`].
+
+use std::cell::RefCell;
+
+use glam::Vec3;
+
+use super::{Crossing, Surface, SurfaceHit};
+use crate::accel::traverse::TreeCrossing;
+use crate::accel::wide::WideTree;
+use crate::ray::Ray;
+
+/// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
+/// was put back onto its sphere, small enough not to be seen.
+const OFFSET_OF_RADIUS: f32 = 1e-4;
+/// Step off the surface in units of the rounding of the largest coordinate involved.
+const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
+
+/// The spheres of a tree.
+#[derive(Debug, Clone, Copy)]
+pub struct SphereSurface<'a> {
+    tree: &'a WideTree,
+}
+
+impl<'a> SphereSurface<'a> {
+    /// The spheres of `tree`.
+    pub fn new(tree: &'a WideTree) -> Self {
+        Self { tree }
+    }
+}
+
+impl Surface for SphereSurface<'_> {
+    #[inline]
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+        let hit = self.tree.nearest(ray)?;
+        let (center, radius) = self.tree.sphere(hit.slot);
+        let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
+        let point = center + normal * radius;
+        let largest = point
+            .abs()
+            .max_element()
+            .max(ray.origin.abs().max_element());
+        Some(SurfaceHit {
+            t: hit.t,
+            point,
+            normal,
+            particle: self.tree.particle(hit.slot),
+            offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
+        })
+    }
+
+    #[inline]
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.tree.any_hit(ray)
+    }
+
+    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
+        thread_local! {
+            /// Shadow rays of a thread follow one another: one buffer serves them all.
+            static FOUND: RefCell<Vec<TreeCrossing>> = const { RefCell::new(Vec::new()) };
+        }
+        FOUND.with_borrow_mut(|found| {
+            self.tree.crossings(ray, found);
+            crossings.clear();
+            crossings.extend(found.iter().map(|crossing| {
+                let (center, radius) = self.tree.sphere(crossing.slot);
+                let normal = outward(ray.at(crossing.t) - center, radius, ray.direction);
+                Crossing {
+                    t: crossing.t,
+                    cosine: normal.dot(ray.direction).abs(),
+                }
+            }));
+        });
+    }
+}
+
+/// Unit vector along `from_center`; against the ray for a sphere too small to have a direction.
+fn outward(from_center: Vec3, radius: f32, direction: Vec3) -> Vec3 {
+    if radius > 0.0 {
+        from_center.try_normalize().unwrap_or(-direction)
+    } else {
+        -direction
+    }
+}

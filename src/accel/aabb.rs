@@ -1,0 +1,73 @@
+//! Axis-aligned boxes.
+
+use glam::Vec3;
+
+/// An axis-aligned box; empty when `min > max` on any axis.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Aabb {
+    /// Lower corner.
+    pub min: Vec3,
+    /// Upper corner.
+    pub max: Vec3,
+}
+
+impl Aabb {
+    /// The box that holds nothing.
+    pub const EMPTY: Self = Self {
+        min: Vec3::INFINITY,
+        max: Vec3::NEG_INFINITY,
+    };
+
+    /// The smallest box around `points`.
+    pub fn around(points: &[Vec3]) -> Self {
+        points.iter().fold(Self::EMPTY, |b, p| b.extend(*p))
+    }
+
+    /// This box grown to hold `point`.
+    #[must_use]
+    pub fn extend(self, point: Vec3) -> Self {
+        Self {
+            min: self.min.min(point),
+            max: self.max.max(point),
+        }
+    }
+
+    /// The smallest box around both.
+    #[must_use]
+    pub fn union(self, other: Self) -> Self {
+        Self {
+            min: self.min.min(other.min),
+            max: self.max.max(other.max),
+        }
+    }
+
+    /// This box grown by `length` on every side.
+    #[must_use]
+    pub fn padded(self, length: f32) -> Self {
+        Self {
+            min: self.min - length,
+            max: self.max + length,
+        }
+    }
+
+    /// True if it holds nothing.
+    pub fn is_empty(&self) -> bool {
+        self.min.cmpgt(self.max).any()
+    }
+
+    /// Edge lengths; zero for the empty box.
+    pub fn size(&self) -> Vec3 {
+        (self.max - self.min).max(Vec3::ZERO)
+    }
+
+    /// True if `other` lies inside, borders included.
+    pub fn contains(&self, other: &Self) -> bool {
+        self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
+    }
+
+    /// Surface area in f64, so that sums over many boxes keep their digits.
+    pub fn area(&self) -> f64 {
+        let s = self.size().as_dvec3();
+        2.0 * (s.x * s.y + s.y * s.z + s.z * s.x)
+    }
+}

@@ -1,0 +1,69 @@
+//! Blocks of 16 particles: at once the unit of storage, the leaf of the tree and what one SIMD
+//! test takes.
+
+use bytemuck::{Pod, Zeroable};
+use glam::Vec3;
+
+use super::Aabb;
+
+/// Particles in a block. 16 fills one AVX-512 register; 8 traced 15-22 % slower, 32 about equal.
+pub const BLOCK_SIZE: usize = 16;
+
+/// Centres of 16 particles, one array per axis. The unused lanes of a last block repeat its last
+/// particle.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct Block {
+    /// x of each particle.
+    pub x: [f32; BLOCK_SIZE],
+    /// y of each particle.
+    pub y: [f32; BLOCK_SIZE],
+    /// z of each particle.
+    pub z: [f32; BLOCK_SIZE],
+}
+
+/// Radii of the particles of a block, where they differ.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub struct BlockRadii(pub [f32; BLOCK_SIZE]);
+
+impl Block {
+    /// Turns a block whose memory still holds 16 consecutive points into one array per axis.
+    pub(super) fn transpose_points(&mut self) {
+        let points: [Vec3; BLOCK_SIZE] = bytemuck::cast(*self);
+        for (lane, p) in points.iter().enumerate() {
+            self.x[lane] = p.x;
+            self.y[lane] = p.y;
+            self.z[lane] = p.z;
+        }
+    }
+
+    /// Centre of the particle in `lane`.
+    pub fn center(&self, lane: usize) -> Vec3 {
+        Vec3::new(self.x[lane], self.y[lane], self.z[lane])
+    }
+
+    /// Box of the centres.
+    pub fn bounds(&self) -> Aabb {
+        let min = |v: &[f32; BLOCK_SIZE]| v.iter().fold(f32::INFINITY, |a, b| a.min(*b));
+        let max = |v: &[f32; BLOCK_SIZE]| v.iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b));
+        Aabb {
+            min: Vec3::new(min(&self.x), min(&self.y), min(&self.z)),
+            max: Vec3::new(max(&self.x), max(&self.y), max(&self.z)),
+        }
+    }
+
+    /// Box of the spheres.
+    pub fn sphere_bounds(&self, radii: &BlockRadii) -> Aabb {
+        (0..BLOCK_SIZE).fold(Aabb::EMPTY, |b, lane| {
+            let center = self.center(lane);
+            b.union(
+                Aabb {
+                    min: center,
+                    max: center,
+                }
+                .padded(radii.0[lane]),
+            )
+        })
+    }
+}

@@ -1,0 +1,158 @@
+//! The 64-byte node: eight child boxes in one cache line, quantised to 8 bits a plane in the frame
+//! of the node (after Ylitie, Karras & Laine 2017, without their child pointers).
+
+use bytemuck::{Pod, Zeroable};
+
+use super::Aabb;
+
+/// Children of a node.
+pub(super) const WIDTH: usize = 8;
+
+/// Eight quantised child boxes. Plane `q` of axis `a` lies at `origin[a] + q * 2^(exponent[a]-127)`.
+#[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
+#[repr(C, align(64))]
+pub(super) struct Node {
+    /// Lower corner of the node's own box.
+    pub(super) origin: [f32; 3],
+    /// Biased power of two of the quantisation step, per axis.
+    pub(super) exponent: [u8; 3],
+    /// Children in use; they are the first ones.
+    pub(super) child_count: u8,
+    /// Per axis: the eight lower planes, then the eight upper ones.
+    pub(super) planes: [[[u8; WIDTH]; 2]; 3],
+}
+
+impl Node {
+    /// Encloses up to eight `children`; every quantised box holds its child.
+    pub(super) fn enclosing(children: &[Aabb]) -> Self {
+        debug_assert!(!children.is_empty() && children.len() <= WIDTH);
+        let own = children.iter().fold(Aabb::EMPTY, |b, c| b.union(*c));
+        let mut node = Self::zeroed();
+        node.origin = own.min.to_array();
+        #[expect(clippy::cast_possible_truncation, reason = "at most eight children")]
+        {
+            node.child_count = children.len() as u8;
+        }
+        for axis in 0..3 {
+            let exponent = step_exponent(own.min[axis], own.max[axis]);
+            node.exponent[axis] = exponent;
+            // A power of two: its inverse is exact.
+            let inverse = 1.0 / decode_step(exponent);
+            for (slot, child) in children.iter().enumerate() {
+                let [lower, upper] = &mut node.planes[axis];
+                lower[slot] = plane_below(own.min[axis], inverse, child.min[axis]);
+                upper[slot] = plane_above(own.min[axis], inverse, child.max[axis]);
+            }
+        }
+        node
+    }
+
+    /// Lower and upper plane of child `slot` on `axis`, exact.
+    fn interval(&self, slot: usize, axis: usize) -> [f64; 2] {
+        let step = decode_step(self.exponent[axis]);
+        [0, 1].map(|side| plane_at(self.origin[axis], step, self.planes[axis][side][slot]))
+    }
+
+    /// Whether `bounds` lies inside the quantised box of child `slot`.
+    pub(super) fn child_holds(&self, slot: usize, bounds: &Aabb) -> bool {
+        (0..3).all(|axis| {
+            let [lower, upper] = self.interval(slot, axis);
+            lower <= f64::from(bounds.min[axis]) && f64::from(bounds.max[axis]) <= upper
+        })
+    }
+}
+
+/// The quantisation step that a stored exponent stands for.
+fn decode_step(exponent: u8) -> f64 {
+    f64::from(f32::from_bits(u32::from(exponent) << 23))
+}
+
+/// Place of a plane. In f64, where it is exact for all but absurd spreads; rays, who see it in f32,
+/// allow for their rounding.
+fn plane_at(origin: f32, step: f64, plane: u8) -> f64 {
+    f64::from(origin) + f64::from(plane) * step
+}
+
+/// Smallest power of two whose 255th multiple reaches from `min` to `max`.
+fn step_exponent(min: f32, max: f32) -> u8 {
+    let step = (f64::from(max) - f64::from(min)) / 255.0;
+    let bits = step.to_bits();
+    let has_fraction = i64::from(bits & ((1 << 52) - 1) != 0);
+    let biased = (bits >> 52) as i64 - 1023 + 127 + has_fraction;
+    // 1 is the smallest normal number, which also serves a box without extent.
+    let mut exponent = biased.clamp(1, 254) as u8;
+    while exponent < 254 && plane_at(min, decode_step(exponent), 255) < f64::from(max) {
+        exponent += 1;
+    }
+    exponent
+}
+
+/// The highest plane at or below `value`, which is at or above `origin`.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "truncation is the floor of a number that is not negative; saturates at 255"
+)]
+fn plane_below(origin: f32, inverse_step: f64, value: f32) -> u8 {
+    ((f64::from(value) - f64::from(origin)) * inverse_step) as u8
+}
+
+/// The lowest plane at or above `value`, which is at or above `origin`.
+fn plane_above(origin: f32, inverse_step: f64, value: f32) -> u8 {
+    let exact = (f64::from(value) - f64::from(origin)) * inverse_step;
+    let below = plane_below(origin, inverse_step, value);
+    below.saturating_add(u8::from(f64::from(below) < exact))
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn a_node_is_one_cache_line() {
+        assert_eq!(size_of::<Node>(), 64);
+        assert_eq!(align_of::<Node>(), 64);
+    }
+
+    #[test]
+    fn children_without_extent_are_held_exactly() {
+        let point = Aabb {
+            min: Vec3::splat(1e4),
+            max: Vec3::splat(1e4),
+        };
+        let node = Node::enclosing(&[point; 8]);
+        assert!(node.child_holds(7, &point));
+        let [lower, upper] = node.interval(7, 0);
+        assert!(upper - lower < 1e-30, "{lower} {upper}");
+    }
+
+    proptest! {
+        #[test]
+        fn every_quantised_box_holds_its_child(
+            corners in prop::collection::vec(
+                (prop::array::uniform3(-1e4_f32..1e4), prop::array::uniform3(0.0_f32..100.0)),
+                1..=8,
+            ),
+            scale in prop::sample::select(vec![1e-20_f32, 1e-4, 1.0, 1e4, 1e20]),
+        ) {
+            let boxes: Vec<Aabb> = corners
+                .iter()
+                .map(|(min, size)| {
+                    let min = Vec3::from_array(*min) * scale;
+                    Aabb { min, max: min + Vec3::from_array(*size) * scale }
+                })
+                .collect();
+            let node = Node::enclosing(&boxes);
+            for (slot, child) in boxes.iter().enumerate() {
+                prop_assert!(
+                    node.child_holds(slot, child),
+                    "child {slot} {child:?} sticks out of {:?}",
+                    [0, 1, 2].map(|axis| node.interval(slot, axis))
+                );
+            }
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! First half of the curve sort: a parallel, stable scatter of the particles into the cells of the
+//! top levels of the curve (one pass of a most-significant-digit radix sort).
+//!
+//! The keys are the positions themselves: they are computed where they are needed and never stored,
+//! so the only large memory is the destination. Stable means that the result does not depend on
+//! how many threads took part.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::curve::TopCells;
+
+/// Wanted particles a cell: large enough to amortise the cell, small enough for the L2 cache.
+const CELL_TARGET: usize = 4096;
+
+/// Where the particles of each cell are.
+#[derive(Debug, Default)]
+pub(super) struct Cells {
+    /// First particle of each cell, and the particle count at the end.
+    pub(super) starts: Vec<usize>,
+}
+
+impl Cells {
+    /// Levels for `count` particles: the fewest that bring an even spread near the target.
+    pub(super) fn levels_for(count: usize) -> u32 {
+        let mut levels = 0;
+        while levels < TopCells::MAX_LEVELS && (count >> (3 * levels)) > 8 * CELL_TARGET {
+            levels += 1;
+        }
+        levels
+    }
+}
+
+/// Scatters `centers` into `points`, and their indices into `indices` unless that is empty.
+///
+/// # Panics
+/// If `points` (or a non-empty `indices`) is shorter than `centers`.
+pub(super) fn scatter(
+    centers: &[Vec3],
+    top: &TopCells,
+    points: &mut [Vec3],
+    indices: &mut [u32],
+) -> Cells {
+    let cell_count = top.len();
+    let threads = rayon::current_num_threads();
+    let chunk_len = centers.len().div_ceil(4 * threads).max(16 * 1024);
+    let counts: Vec<Vec<u32>> = centers
+        .par_chunks(chunk_len)
+        .map(|chunk| count(chunk, top))
+        .collect();
+    let starts = cell_starts(&counts, cell_count);
+    let point_parts = split_by_cell(&mut points[..centers.len()], &counts, cell_count);
+    let index_parts = if indices.is_empty() {
+        point_parts.iter().map(|_| Vec::new()).collect()
+    } else {
+        split_by_cell(&mut indices[..centers.len()], &counts, cell_count)
+    };
+    centers
+        .par_chunks(chunk_len)
+        .zip(point_parts)
+        .zip(index_parts)
+        .enumerate()
+        .for_each(|(chunk_number, ((chunk, mut points), mut indices))| {
+            let first = chunk_number * chunk_len;
+            let mut filled = vec![0_usize; cell_count];
+            for (offset, center) in chunk.iter().enumerate() {
+                let cell = top.cell_of(*center);
+                let slot = filled[cell];
+                filled[cell] += 1;
+                points[cell][slot] = *center;
+                if let Some(part) = indices.get_mut(cell) {
+                    part[slot] = index_u32(first + offset);
+                }
+            }
+        });
+    Cells { starts }
+}
+
+/// A particle index as stored.
+pub(super) fn index_u32(index: usize) -> u32 {
+    u32::try_from(index).expect("a frame holds fewer than 2^32 particles, checked by the builder")
+}
+
+fn count(chunk: &[Vec3], top: &TopCells) -> Vec<u32> {
+    let mut counts = vec![0; top.len()];
+    for center in chunk {
+        counts[top.cell_of(*center)] += 1;
+    }
+    counts
+}
+
+fn cell_starts(counts: &[Vec<u32>], cell_count: usize) -> Vec<usize> {
+    let mut starts = Vec::with_capacity(cell_count + 1);
+    let mut next = 0;
+    starts.push(0);
+    for cell in 0..cell_count {
+        next += counts.iter().map(|c| c[cell] as usize).sum::<usize>();
+        starts.push(next);
+    }
+    starts
+}
+
+/// Cuts `whole`, which is ordered by cell and within a cell by chunk, into one slice per chunk and
+/// cell, and hands each chunk its slices.
+fn split_by_cell<'a, T>(
+    mut whole: &'a mut [T],
+    counts: &[Vec<u32>],
+    cell_count: usize,
+) -> Vec<Vec<&'a mut [T]>> {
+    let mut parts: Vec<Vec<&mut [T]>> = counts
+        .iter()
+        .map(|_| Vec::with_capacity(cell_count))
+        .collect();
+    for cell in 0..cell_count {
+        for (chunk_parts, chunk_counts) in parts.iter_mut().zip(counts) {
+            let (part, rest) = whole.split_at_mut(chunk_counts[cell] as usize);
+            chunk_parts.push(part);
+            whole = rest;
+        }
+    }
+    parts
+}

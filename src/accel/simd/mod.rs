@@ -1,0 +1,161 @@
+//! The tests of nodes and blocks in the instructions that the machine has.
+//!
+//! The level is found at run time, once per tree, so that a default build is fast everywhere. All
+//! levels with fused multiply-add give the same results to the bit; the portable one may differ in
+//! the last.
+
+use super::block::{Block, BlockRadii};
+use super::node::{Node, WIDTH};
+use super::traverse::{self, BlockCrossings, TreeCrossing, TreeHit};
+use super::wide::WideTree;
+use crate::ray::Ray;
+
+mod portable;
+#[cfg(target_arch = "x86_64")]
+mod x86;
+
+/// Instructions to trace with.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum SimdLevel {
+    /// Whatever the compiler makes of plain loops.
+    Portable,
+    /// 256-bit AVX2 with fused multiply-add.
+    Avx2,
+    /// 512-bit AVX-512 F, BW, DQ, VL.
+    Avx512,
+}
+
+impl Default for SimdLevel {
+    fn default() -> Self {
+        Self::best()
+    }
+}
+
+impl SimdLevel {
+    /// All levels, slowest first.
+    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+
+    /// The best level of this machine.
+    pub fn best() -> Self {
+        Self::ALL
+            .into_iter()
+            .rev()
+            .find(|level| level.is_supported())
+            .unwrap_or(Self::Portable)
+    }
+
+    /// Whether this machine has the instructions.
+    pub fn is_supported(self) -> bool {
+        match self {
+            Self::Portable => true,
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => x86::has_avx2(),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => x86::has_avx512(),
+            #[cfg(not(target_arch = "x86_64"))]
+            Self::Avx2 | Self::Avx512 => false,
+        }
+    }
+
+    /// Itself where supported, else the best level.
+    #[must_use]
+    pub fn or_best(self) -> Self {
+        if self.is_supported() {
+            self
+        } else {
+            Self::best()
+        }
+    }
+
+    /// Name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Portable => "portable",
+            Self::Avx2 => "avx2",
+            Self::Avx512 => "avx512",
+        }
+    }
+}
+
+/// Slack of the slab test, as a fraction of the larger terms: covers the rounding of planes,
+/// inverses and products (about five roundings of 2^-24), so that no sphere is lost at a box's edge.
+const SLAB_SLACK: f32 = 1e-6;
+/// Directions are kept this far from zero in the slab test, so that their inverses are finite.
+const MIN_DIRECTION: f32 = 1e-7;
+
+/// What a traversal needs of the machine.
+pub(super) trait Kernel: Copy {
+    /// A ray with what all tests need of it.
+    type Ray;
+
+    /// Prepares `ray` for spheres of a common `radius` (0 where boxes hold the spheres).
+    fn prepare(self, ray: &Ray, radius: f32) -> Self::Ray;
+
+    /// Tests the children of `node` up to distance `limit`. Puts a key for each child that the ray
+    /// enters into `keys`, in slot order, and returns their number. A key is the bits of the
+    /// distance of entry, the low three replaced by the child's slot.
+    fn test_node(self, ray: &Self::Ray, node: &Node, limit: f32, keys: &mut [u32; WIDTH]) -> usize;
+
+    /// The smallest distance in `t_min..=limit` at which the ray crosses a sphere of `block`, and the
+    /// lanes that have it. `radii` where they differ.
+    fn nearest_in_block(
+        self,
+        ray: &Self::Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> Option<(f32, u32)>;
+
+    /// Whether the ray crosses any sphere of `block` within `t_min..=limit`.
+    fn any_in_block(
+        self,
+        ray: &Self::Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> bool;
+
+    /// Both crossings of each sphere with the whole line of the ray.
+    fn all_in_block(
+        self,
+        ray: &Self::Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+    ) -> BlockCrossings;
+
+    /// Asks for a node's memory ahead of time.
+    fn prefetch_node(self, node: &Node);
+
+    /// Asks for a block's memory ahead of time.
+    fn prefetch_block(self, block: &Block);
+}
+
+pub(super) fn nearest(tree: &WideTree, ray: &Ray) -> Option<TreeHit> {
+    #[cfg(target_arch = "x86_64")]
+    match tree.simd {
+        SimdLevel::Avx512 => return x86::nearest_avx512(tree, ray),
+        SimdLevel::Avx2 => return x86::nearest_avx2(tree, ray),
+        SimdLevel::Portable => {}
+    }
+    traverse::nearest(portable::Portable, tree, ray)
+}
+
+pub(super) fn any_hit(tree: &WideTree, ray: &Ray) -> bool {
+    #[cfg(target_arch = "x86_64")]
+    match tree.simd {
+        SimdLevel::Avx512 => return x86::any_hit_avx512(tree, ray),
+        SimdLevel::Avx2 => return x86::any_hit_avx2(tree, ray),
+        SimdLevel::Portable => {}
+    }
+    traverse::any_hit(portable::Portable, tree, ray)
+}
+
+pub(super) fn crossings(tree: &WideTree, ray: &Ray, found: &mut Vec<TreeCrossing>) {
+    #[cfg(target_arch = "x86_64")]
+    match tree.simd {
+        SimdLevel::Avx512 => return x86::crossings_avx512(tree, ray, found),
+        SimdLevel::Avx2 => return x86::crossings_avx2(tree, ray, found),
+        SimdLevel::Portable => {}
+    }
+    traverse::crossings(portable::Portable, tree, ray, found);
+}

@@ -1,0 +1,170 @@
+//! Plain loops over lanes, for machines without a kernel of their own and as the readable statement
+//! of what the others do.
+
+use glam::Vec3;
+
+use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
+use super::super::node::{Node, WIDTH};
+use super::super::traverse::BlockCrossings;
+use super::{Kernel, MIN_DIRECTION, SLAB_SLACK};
+use crate::ray::Ray;
+
+/// See the module.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Portable;
+
+/// A ray with the constants of its tests.
+pub(super) struct PreparedRay {
+    ray: Ray,
+    inverse: Vec3,
+    radius: f32,
+}
+
+/// Inverse direction with every component finite.
+pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
+    direction
+        .map(|d| {
+            if d.abs() < MIN_DIRECTION {
+                MIN_DIRECTION.copysign(d)
+            } else {
+                d
+            }
+        })
+        .recip()
+}
+
+impl PreparedRay {
+    /// Squared radius of the sphere in `lane`.
+    fn radius_squared(&self, radii: Option<&BlockRadii>, lane: usize) -> f32 {
+        let radius = radii.map_or(self.radius, |r| r.0[lane]);
+        radius * radius
+    }
+
+    /// Half chord and distance of the chord's middle for each lane; the half chord is NaN where
+    /// the line misses. The distance of the line from the centre is taken from the difference
+    /// vector (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection").
+    fn chords(&self, block: &Block, radii: Option<&BlockRadii>) -> [(f32, f32); BLOCK_SIZE] {
+        std::array::from_fn(|lane| {
+            let to_center = block.center(lane) - self.ray.origin;
+            let middle = to_center.dot(self.ray.direction);
+            let across = to_center - self.ray.direction * middle;
+            let discriminant = self.radius_squared(radii, lane) - across.length_squared();
+            (middle, discriminant.sqrt())
+        })
+    }
+
+    /// The crossing that counts for each lane, or NaN.
+    fn distances(&self, block: &Block, radii: Option<&BlockRadii>) -> [f32; BLOCK_SIZE] {
+        self.chords(block, radii).map(|(middle, half)| {
+            let near = middle - half;
+            if near >= self.ray.t_min {
+                near
+            } else {
+                middle + half
+            }
+        })
+    }
+}
+
+impl Kernel for Portable {
+    type Ray = PreparedRay;
+
+    fn prepare(self, ray: &Ray, radius: f32) -> PreparedRay {
+        PreparedRay {
+            ray: *ray,
+            inverse: finite_inverse(ray.direction),
+            radius,
+        }
+    }
+
+    fn test_node(
+        self,
+        ray: &PreparedRay,
+        node: &Node,
+        limit: f32,
+        keys: &mut [u32; WIDTH],
+    ) -> usize {
+        let mut near = [ray.ray.t_min.max(0.0); WIDTH];
+        let mut far = [limit; WIDTH];
+        for axis in 0..3 {
+            let inverse = ray.inverse[axis];
+            let step = f32::from_bits(u32::from(node.exponent[axis]) << 23) * inverse;
+            let base = (node.origin[axis] - ray.ray.origin[axis]) * inverse;
+            let slack = (base.abs() + 255.0 * step.abs()) * SLAB_SLACK + ray.radius * inverse.abs();
+            let side = usize::from(inverse < 0.0);
+            for slot in 0..WIDTH {
+                let enter = f32::from(node.planes[axis][side][slot]) * step + (base - slack);
+                let leave = f32::from(node.planes[axis][1 - side][slot]) * step + (base + slack);
+                near[slot] = near[slot].max(enter);
+                far[slot] = far[slot].min(leave);
+            }
+        }
+        let mut found = 0;
+        for slot in 0..usize::from(node.child_count).min(WIDTH) {
+            if near[slot] <= far[slot] {
+                #[expect(clippy::cast_possible_truncation, reason = "slots are under eight")]
+                {
+                    keys[found] = (near[slot].to_bits() & !7) | slot as u32;
+                }
+                found += 1;
+            }
+        }
+        found
+    }
+
+    fn nearest_in_block(
+        self,
+        ray: &PreparedRay,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> Option<(f32, u32)> {
+        let mut best = limit;
+        let mut lanes = 0;
+        for (lane, t) in ray.distances(block, radii).into_iter().enumerate() {
+            if t >= ray.ray.t_min && t <= best {
+                lanes = if t < best { 0 } else { lanes };
+                best = t;
+                lanes |= 1 << lane;
+            }
+        }
+        (lanes != 0).then_some((best, lanes))
+    }
+
+    fn any_in_block(
+        self,
+        ray: &PreparedRay,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> bool {
+        let distances = ray.distances(block, radii);
+        distances.iter().any(|t| *t >= ray.ray.t_min && *t <= limit)
+    }
+
+    fn all_in_block(
+        self,
+        ray: &PreparedRay,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+    ) -> BlockCrossings {
+        let chords = ray.chords(block, radii);
+        let mut found = BlockCrossings {
+            lanes: 0,
+            near: [0.0; BLOCK_SIZE],
+            far: [0.0; BLOCK_SIZE],
+        };
+        for (lane, (middle, half)) in chords.into_iter().enumerate() {
+            if half >= 0.0 {
+                found.lanes |= 1 << lane;
+                found.near[lane] = middle - half;
+                found.far[lane] = middle + half;
+            }
+        }
+        found
+    }
+
+    fn prefetch_node(self, _node: &Node) {}
+
+    fn prefetch_block(self, _block: &Block) {}
+}

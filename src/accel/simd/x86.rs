@@ -1,0 +1,616 @@
+//! Hand-written AVX2 and AVX-512 tests, and the traversals compiled with them.
+//!
+//! The traits' methods are inlined into the functions at the end, which carry the target features;
+//! those are only called after the machine was asked.
+#![expect(unsafe_code, reason = "intrinsics; every block says why it is sound")]
+
+use std::arch::x86_64::*;
+
+use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
+use super::super::node::{Node, WIDTH};
+use super::super::traverse::{self, BlockCrossings, TreeCrossing, TreeHit};
+use super::super::wide::WideTree;
+use super::portable::finite_inverse;
+use super::{Kernel, SLAB_SLACK, SimdLevel};
+use crate::ray::Ray;
+
+pub(super) fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+}
+
+pub(super) fn has_avx512() -> bool {
+    has_avx2()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+}
+
+/// What the slab test needs of a ray: one lane per axis, the fourth unused.
+#[derive(Clone, Copy)]
+struct SlabRay {
+    origin: __m128,
+    inverse: __m128,
+    /// Distance that the common radius adds on either side, per axis.
+    reach: __m128,
+    t_min: f32,
+}
+
+/// Step, base and slack of a node's planes as distances along the ray, per axis.
+struct SlabNode {
+    step: __m128,
+    base: __m128,
+    slack: __m128,
+}
+
+impl SlabRay {
+    #[inline(always)]
+    fn new(ray: &Ray, radius: f32) -> Self {
+        let inverse = finite_inverse(ray.direction);
+        let reach = inverse.abs() * radius;
+        // SAFETY: SSE2 is part of x86-64.
+        unsafe {
+            Self {
+                origin: _mm_setr_ps(ray.origin.x, ray.origin.y, ray.origin.z, 0.0),
+                inverse: _mm_setr_ps(inverse.x, inverse.y, inverse.z, 1.0),
+                reach: _mm_setr_ps(reach.x, reach.y, reach.z, 0.0),
+                t_min: ray.t_min.max(0.0),
+            }
+        }
+    }
+
+    #[inline(always)]
+    fn enter(&self, node: &Node) -> SlabNode {
+        // SAFETY: SSE4.1 and FMA are there, or no kernel here would run. The 16 bytes read from the
+        // node's start are its origin, exponents and count: within its 64 bytes.
+        unsafe {
+            let head = _mm_load_si128(std::ptr::from_ref(node).cast());
+            let origin = _mm_castsi128_ps(head);
+            let exponents = _mm_cvtepu8_epi32(_mm_srli_si128::<12>(head));
+            let scale = _mm_castsi128_ps(_mm_slli_epi32::<23>(exponents));
+            let step = _mm_mul_ps(scale, self.inverse);
+            let base = _mm_mul_ps(_mm_sub_ps(origin, self.origin), self.inverse);
+            let magnitude = _mm_fmadd_ps(absolute(step), _mm_set1_ps(255.0), absolute(base));
+            let slack = _mm_fmadd_ps(magnitude, _mm_set1_ps(SLAB_SLACK), self.reach);
+            SlabNode { step, base, slack }
+        }
+    }
+}
+
+/// # Safety
+/// None beyond x86-64; unsafe as intrinsics outside a target feature are.
+#[inline(always)]
+unsafe fn absolute(v: __m128) -> __m128 {
+    // SAFETY: SSE2 is part of x86-64.
+    unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), v) }
+}
+
+/// 256-bit kernel.
+#[derive(Debug, Clone, Copy)]
+struct Avx2;
+
+struct Avx2Ray {
+    ray: Ray,
+    slab: SlabRay,
+    /// Which side's planes come first, per axis: 1 where the direction is negative.
+    near_side: [usize; 3],
+    radius_squared: f32,
+}
+
+impl Avx2Ray {
+    /// Middle of the chord and discriminant for lanes `half * 8 .. half * 8 + 8`.
+    ///
+    /// # Safety
+    /// The caller's machine has AVX2 and FMA.
+    #[inline(always)]
+    unsafe fn chords(
+        &self,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        half: usize,
+    ) -> (__m256, __m256) {
+        let o = self.ray.origin;
+        let d = self.ray.direction;
+        // SAFETY: AVX2 and FMA by contract; the loads are of lanes 0..8 or 8..16 of 16.
+        unsafe {
+            let load = |v: &[f32; BLOCK_SIZE]| _mm256_load_ps(v.as_ptr().add(half * 8));
+            let cx = _mm256_sub_ps(load(&block.x), _mm256_set1_ps(o.x));
+            let cy = _mm256_sub_ps(load(&block.y), _mm256_set1_ps(o.y));
+            let cz = _mm256_sub_ps(load(&block.z), _mm256_set1_ps(o.z));
+            let (dx, dy, dz) = (
+                _mm256_set1_ps(d.x),
+                _mm256_set1_ps(d.y),
+                _mm256_set1_ps(d.z),
+            );
+            let middle = _mm256_fmadd_ps(cz, dz, _mm256_fmadd_ps(cy, dy, _mm256_mul_ps(cx, dx)));
+            let ax = _mm256_fnmadd_ps(middle, dx, cx);
+            let ay = _mm256_fnmadd_ps(middle, dy, cy);
+            let az = _mm256_fnmadd_ps(middle, dz, cz);
+            let across = _mm256_fmadd_ps(az, az, _mm256_fmadd_ps(ay, ay, _mm256_mul_ps(ax, ax)));
+            let squared = match radii {
+                Some(radii) => {
+                    let r = load(&radii.0);
+                    _mm256_mul_ps(r, r)
+                }
+                None => _mm256_set1_ps(self.radius_squared),
+            };
+            (middle, _mm256_sub_ps(squared, across))
+        }
+    }
+
+    /// The crossing that counts, and the lanes where it lies in `t_min..=limit`.
+    ///
+    /// # Safety
+    /// The caller's machine has AVX2 and FMA.
+    #[inline(always)]
+    unsafe fn distances(
+        &self,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        half: usize,
+        limit: f32,
+    ) -> (__m256, u32) {
+        // SAFETY: AVX2 and FMA by contract.
+        unsafe {
+            let (middle, discriminant) = self.chords(block, radii, half);
+            let zero = _mm256_setzero_ps();
+            let hit = _mm256_cmp_ps::<_CMP_GE_OQ>(discriminant, zero);
+            if _mm256_movemask_ps(hit) == 0 {
+                return (zero, 0);
+            }
+            let chord = _mm256_sqrt_ps(_mm256_max_ps(discriminant, zero));
+            let t_min = _mm256_set1_ps(self.ray.t_min);
+            let near = _mm256_sub_ps(middle, chord);
+            let far = _mm256_add_ps(middle, chord);
+            let ahead = _mm256_cmp_ps::<_CMP_GE_OQ>(near, t_min);
+            let t = _mm256_blendv_ps(far, near, ahead);
+            let after = _mm256_cmp_ps::<_CMP_GE_OQ>(t, t_min);
+            let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, _mm256_set1_ps(limit));
+            let valid = _mm256_and_ps(hit, _mm256_and_ps(after, before));
+            (t, _mm256_movemask_ps(valid).cast_unsigned())
+        }
+    }
+}
+
+impl Kernel for Avx2 {
+    type Ray = Avx2Ray;
+
+    #[inline(always)]
+    fn prepare(self, ray: &Ray, radius: f32) -> Avx2Ray {
+        Avx2Ray {
+            ray: *ray,
+            slab: SlabRay::new(ray, radius),
+            near_side: ray
+                .direction
+                .to_array()
+                .map(|d| usize::from(d.is_sign_negative())),
+            radius_squared: radius * radius,
+        }
+    }
+
+    #[inline(always)]
+    fn test_node(self, ray: &Avx2Ray, node: &Node, limit: f32, keys: &mut [u32; WIDTH]) -> usize {
+        // SAFETY: this kernel is only used inside functions with AVX2 and FMA. Plane loads are of
+        // eight bytes out of arrays of eight.
+        unsafe {
+            let slab = ray.slab.enter(node);
+            let low = _mm_sub_ps(slab.base, slab.slack);
+            let high = _mm_add_ps(slab.base, slab.slack);
+            let mut near = _mm256_set1_ps(ray.slab.t_min);
+            let mut far = _mm256_set1_ps(limit);
+            macro_rules! axis {
+                ($axis:literal, $lanes:literal) => {
+                    let side = ray.near_side[$axis];
+                    let step = spread::<$lanes>(slab.step);
+                    let enter = planes(&node.planes[$axis][side]);
+                    let leave = planes(&node.planes[$axis][1 - side]);
+                    let enter = _mm256_fmadd_ps(enter, step, spread::<$lanes>(low));
+                    let leave = _mm256_fmadd_ps(leave, step, spread::<$lanes>(high));
+                    // A NaN (planes beyond the range of f32) yields the second operand: no bound.
+                    near = _mm256_max_ps(enter, near);
+                    far = _mm256_min_ps(leave, far);
+                };
+            }
+            axis!(0, 0x00);
+            axis!(1, 0x55);
+            axis!(2, 0xaa);
+            let entered = _mm256_cmp_ps::<_CMP_LE_OQ>(near, far);
+            let used = (1_u32 << node.child_count) - 1;
+            let mut mask = _mm256_movemask_ps(entered).cast_unsigned() & used;
+            let mut distances = [0.0_f32; WIDTH];
+            _mm256_storeu_ps(distances.as_mut_ptr(), near);
+            let mut found = 0;
+            while mask != 0 {
+                let slot = mask.trailing_zeros();
+                mask &= mask - 1;
+                keys[found & 7] = (distances[slot as usize & 7].to_bits() & !7) | slot;
+                found += 1;
+            }
+            found
+        }
+    }
+
+    #[inline(always)]
+    fn nearest_in_block(
+        self,
+        ray: &Avx2Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> Option<(f32, u32)> {
+        // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
+        unsafe {
+            let (t_low, lanes_low) = ray.distances(block, radii, 0, limit);
+            let (t_high, lanes_high) = ray.distances(block, radii, 1, limit);
+            let mut lanes = lanes_low | (lanes_high << 8);
+            if lanes == 0 {
+                return None;
+            }
+            let mut t = [0.0_f32; BLOCK_SIZE];
+            _mm256_storeu_ps(t.as_mut_ptr(), t_low);
+            _mm256_storeu_ps(t.as_mut_ptr().add(8), t_high);
+            let (mut best, mut tied) = (f32::INFINITY, 0);
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros();
+                lanes &= lanes - 1;
+                let distance = t[lane as usize & 15];
+                if distance <= best {
+                    tied = if distance < best { 0 } else { tied } | (1 << lane);
+                    best = distance;
+                }
+            }
+            Some((best, tied))
+        }
+    }
+
+    #[inline(always)]
+    fn any_in_block(
+        self,
+        ray: &Avx2Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> bool {
+        // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
+        unsafe {
+            ray.distances(block, radii, 0, limit).1 != 0
+                || ray.distances(block, radii, 1, limit).1 != 0
+        }
+    }
+
+    #[inline(always)]
+    fn all_in_block(
+        self,
+        ray: &Avx2Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+    ) -> BlockCrossings {
+        let mut found = BlockCrossings {
+            lanes: 0,
+            near: [0.0; BLOCK_SIZE],
+            far: [0.0; BLOCK_SIZE],
+        };
+        for half in 0..2 {
+            // SAFETY: this kernel is only used inside functions with AVX2 and FMA; stores go to
+            // lanes 0..8 or 8..16 of 16.
+            unsafe {
+                let (middle, discriminant) = ray.chords(block, radii, half);
+                let zero = _mm256_setzero_ps();
+                let hit = _mm256_cmp_ps::<_CMP_GE_OQ>(discriminant, zero);
+                let chord = _mm256_sqrt_ps(_mm256_max_ps(discriminant, zero));
+                found.lanes |= _mm256_movemask_ps(hit).cast_unsigned() << (half * 8);
+                let near = found.near.as_mut_ptr().add(half * 8);
+                let far = found.far.as_mut_ptr().add(half * 8);
+                _mm256_storeu_ps(near, _mm256_sub_ps(middle, chord));
+                _mm256_storeu_ps(far, _mm256_add_ps(middle, chord));
+            }
+        }
+        found
+    }
+
+    #[inline(always)]
+    fn prefetch_node(self, node: &Node) {
+        prefetch_line(node, 0);
+    }
+
+    #[inline(always)]
+    fn prefetch_block(self, block: &Block) {
+        (0..3).for_each(|line| prefetch_line(block, line));
+    }
+}
+
+/// Eight planes as floats.
+///
+/// # Safety
+/// The caller's machine has AVX2.
+#[inline(always)]
+unsafe fn planes(bytes: &[u8; WIDTH]) -> __m256 {
+    // SAFETY: eight bytes are read from an array of eight; AVX2 by contract.
+    unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.as_ptr().cast()))) }
+}
+
+/// One lane (chosen by `SHUFFLE`) in all eight.
+///
+/// # Safety
+/// The caller's machine has AVX2.
+#[inline(always)]
+unsafe fn spread<const SHUFFLE: i32>(v: __m128) -> __m256 {
+    // SAFETY: AVX2 by contract.
+    unsafe {
+        let lane = _mm_shuffle_ps::<SHUFFLE>(v, v);
+        _mm256_insertf128_ps::<1>(_mm256_castps128_ps256(lane), lane)
+    }
+}
+
+#[inline(always)]
+fn prefetch_line<T>(value: &T, line: usize) {
+    // SAFETY: a prefetch never faults, whatever the address; the cast keeps within or just past
+    // `value`, by wrapping arithmetic.
+    unsafe {
+        let address = std::ptr::from_ref(value)
+            .cast::<i8>()
+            .wrapping_add(64 * line);
+        _mm_prefetch::<_MM_HINT_T0>(address);
+    }
+}
+
+/// 512-bit kernel.
+#[derive(Debug, Clone, Copy)]
+struct Avx512;
+
+struct Avx512Ray {
+    ray: Ray,
+    slab: SlabRay,
+    /// Byte orders that bring the planes entered first into the lower half, per axis.
+    order: [__m128i; 3],
+    radius_squared: f32,
+}
+
+impl Avx512Ray {
+    /// Middle of the chord and discriminant of all lanes.
+    ///
+    /// # Safety
+    /// The caller's machine has AVX-512 F.
+    #[inline(always)]
+    unsafe fn chords(&self, block: &Block, radii: Option<&BlockRadii>) -> (__m512, __m512) {
+        let o = self.ray.origin;
+        let d = self.ray.direction;
+        // SAFETY: AVX-512 by contract; the loads are of arrays of 16 aligned to 64 bytes.
+        unsafe {
+            let cx = _mm512_sub_ps(_mm512_load_ps(block.x.as_ptr()), _mm512_set1_ps(o.x));
+            let cy = _mm512_sub_ps(_mm512_load_ps(block.y.as_ptr()), _mm512_set1_ps(o.y));
+            let cz = _mm512_sub_ps(_mm512_load_ps(block.z.as_ptr()), _mm512_set1_ps(o.z));
+            let (dx, dy, dz) = (
+                _mm512_set1_ps(d.x),
+                _mm512_set1_ps(d.y),
+                _mm512_set1_ps(d.z),
+            );
+            let middle = _mm512_fmadd_ps(cz, dz, _mm512_fmadd_ps(cy, dy, _mm512_mul_ps(cx, dx)));
+            let ax = _mm512_fnmadd_ps(middle, dx, cx);
+            let ay = _mm512_fnmadd_ps(middle, dy, cy);
+            let az = _mm512_fnmadd_ps(middle, dz, cz);
+            let across = _mm512_fmadd_ps(az, az, _mm512_fmadd_ps(ay, ay, _mm512_mul_ps(ax, ax)));
+            let squared = match radii {
+                Some(radii) => {
+                    let r = _mm512_load_ps(radii.0.as_ptr());
+                    _mm512_mul_ps(r, r)
+                }
+                None => _mm512_set1_ps(self.radius_squared),
+            };
+            (middle, _mm512_sub_ps(squared, across))
+        }
+    }
+
+    /// The crossing that counts, and the lanes where it lies in `t_min..=limit`.
+    ///
+    /// # Safety
+    /// The caller's machine has AVX-512 F.
+    #[inline(always)]
+    unsafe fn distances(
+        &self,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> (__m512, __mmask16) {
+        // SAFETY: AVX-512 by contract.
+        unsafe {
+            let (middle, discriminant) = self.chords(block, radii);
+            let zero = _mm512_setzero_ps();
+            let hit = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(discriminant, zero);
+            if hit == 0 {
+                return (zero, 0);
+            }
+            let chord = _mm512_sqrt_ps(_mm512_max_ps(discriminant, zero));
+            let t_min = _mm512_set1_ps(self.ray.t_min);
+            let near = _mm512_sub_ps(middle, chord);
+            let far = _mm512_add_ps(middle, chord);
+            let ahead = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(near, t_min);
+            let t = _mm512_mask_blend_ps(ahead, far, near);
+            let after = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(hit, t, t_min);
+            let before = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(after, t, _mm512_set1_ps(limit));
+            (t, before)
+        }
+    }
+}
+
+impl Kernel for Avx512 {
+    type Ray = Avx512Ray;
+
+    #[inline(always)]
+    fn prepare(self, ray: &Ray, radius: f32) -> Avx512Ray {
+        let order = ray.direction.to_array().map(|d| {
+            // SAFETY: SSE2 is part of x86-64.
+            unsafe {
+                if d.is_sign_negative() {
+                    _mm_setr_epi8(8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7)
+                } else {
+                    _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+                }
+            }
+        });
+        Avx512Ray {
+            ray: *ray,
+            slab: SlabRay::new(ray, radius),
+            order,
+            radius_squared: radius * radius,
+        }
+    }
+
+    /// Both sides of an axis in one register: the planes entered in the lower half, those left
+    /// negated in the upper, so that one maximum serves both.
+    #[inline(always)]
+    fn test_node(self, ray: &Avx512Ray, node: &Node, limit: f32, keys: &mut [u32; WIDTH]) -> usize {
+        // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL. Plane
+        // loads are of sixteen bytes out of two arrays of eight in a row; the store fills `keys`.
+        unsafe {
+            let slab = ray.slab.enter(node);
+            let upper = _mm512_castsi512_ps(_mm512_inserti64x4::<1>(
+                _mm512_setzero_si512(),
+                _mm256_set1_epi32(i32::MIN),
+            ));
+            let start = _mm512_castps256_ps512(_mm256_set1_ps(ray.slab.t_min));
+            let mut bound = _mm512_insertf32x8::<1>(start, _mm256_set1_ps(-limit));
+            macro_rules! axis {
+                ($axis:literal) => {
+                    let lane = _mm512_set1_epi32($axis);
+                    let pick = |v: __m128| _mm512_permutexvar_ps(lane, _mm512_castps128_ps512(v));
+                    let step = _mm512_xor_ps(pick(slab.step), upper);
+                    let base = _mm512_xor_ps(pick(slab.base), upper);
+                    let base = _mm512_sub_ps(base, pick(slab.slack));
+                    let bytes = _mm_loadu_si128(node.planes[$axis].as_ptr().cast());
+                    let bytes = _mm_shuffle_epi8(bytes, ray.order[$axis]);
+                    let plane = _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes));
+                    // A NaN (planes beyond the range of f32) yields the second operand: no bound.
+                    bound = _mm512_max_ps(_mm512_fmadd_ps(plane, step, base), bound);
+                };
+            }
+            axis!(0);
+            axis!(1);
+            axis!(2);
+            let near = _mm512_castps512_ps256(bound);
+            let far = _mm256_xor_ps(_mm512_extractf32x8_ps::<1>(bound), _mm256_set1_ps(-0.0));
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "eight children, eight bits"
+            )]
+            let used = ((1_u32 << node.child_count) - 1) as u8;
+            let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, near, far);
+            let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+            let bits = _mm256_and_si256(_mm256_castps_si256(near), _mm256_set1_epi32(!7));
+            let packed = _mm256_maskz_compress_epi32(mask, _mm256_or_si256(bits, slots));
+            _mm256_storeu_si256(keys.as_mut_ptr().cast(), packed);
+            mask.count_ones() as usize
+        }
+    }
+
+    #[inline(always)]
+    fn nearest_in_block(
+        self,
+        ray: &Avx512Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> Option<(f32, u32)> {
+        // SAFETY: this kernel is only used inside functions with AVX-512.
+        unsafe {
+            let (t, lanes) = ray.distances(block, radii, limit);
+            if lanes == 0 {
+                return None;
+            }
+            let best = _mm512_mask_reduce_min_ps(lanes, t);
+            let tied = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(lanes, t, _mm512_set1_ps(best));
+            Some((best, u32::from(tied)))
+        }
+    }
+
+    #[inline(always)]
+    fn any_in_block(
+        self,
+        ray: &Avx512Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> bool {
+        // SAFETY: this kernel is only used inside functions with AVX-512.
+        unsafe { ray.distances(block, radii, limit).1 != 0 }
+    }
+
+    #[inline(always)]
+    fn all_in_block(
+        self,
+        ray: &Avx512Ray,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+    ) -> BlockCrossings {
+        let mut found = BlockCrossings {
+            lanes: 0,
+            near: [0.0; BLOCK_SIZE],
+            far: [0.0; BLOCK_SIZE],
+        };
+        // SAFETY: this kernel is only used inside functions with AVX-512; stores fill arrays of 16.
+        unsafe {
+            let (middle, discriminant) = ray.chords(block, radii);
+            let zero = _mm512_setzero_ps();
+            let hit = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(discriminant, zero);
+            let chord = _mm512_sqrt_ps(_mm512_max_ps(discriminant, zero));
+            found.lanes = u32::from(hit);
+            _mm512_storeu_ps(found.near.as_mut_ptr(), _mm512_sub_ps(middle, chord));
+            _mm512_storeu_ps(found.far.as_mut_ptr(), _mm512_add_ps(middle, chord));
+        }
+        found
+    }
+
+    #[inline(always)]
+    fn prefetch_node(self, node: &Node) {
+        prefetch_line(node, 0);
+    }
+
+    #[inline(always)]
+    fn prefetch_block(self, block: &Block) {
+        (0..3).for_each(|line| prefetch_line(block, line));
+    }
+}
+
+/// A traversal compiled for a level, behind a safe function that trusts the tree's level.
+macro_rules! compiled {
+    ($safe:ident, $inner:ident, $kernel:expr, $level:expr, $features:literal,
+     $run:path, ($($arg:ident: $ty:ty),*), $out:ty) => {
+        pub(super) fn $safe(tree: &WideTree, $($arg: $ty),*) -> $out {
+            #[target_feature(enable = $features)]
+            fn $inner(tree: &WideTree, $($arg: $ty),*) -> $out {
+                $run($kernel, tree, $($arg),*)
+            }
+            debug_assert_eq!(tree.simd, $level);
+            // SAFETY: a tree only gets a level that the machine was asked for (`or_best`).
+            unsafe { $inner(tree, $($arg),*) }
+        }
+    };
+}
+
+macro_rules! compiled_traversals {
+    ($kernel:expr, $level:expr, $features:literal, $nearest:ident, $any:ident, $all:ident) => {
+        compiled!($nearest, inner, $kernel, $level, $features,
+            traverse::nearest, (ray: &Ray), Option<TreeHit>);
+        compiled!($any, inner, $kernel, $level, $features,
+            traverse::any_hit, (ray: &Ray), bool);
+        compiled!($all, inner, $kernel, $level, $features,
+            traverse::crossings, (ray: &Ray, found: &mut Vec<TreeCrossing>), ());
+    };
+}
+
+compiled_traversals!(
+    Avx2,
+    SimdLevel::Avx2,
+    "avx2,fma",
+    nearest_avx2,
+    any_hit_avx2,
+    crossings_avx2
+);
+compiled_traversals!(
+    Avx512,
+    SimdLevel::Avx512,
+    "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl",
+    nearest_avx512,
+    any_hit_avx512,
+    crossings_avx512
+);

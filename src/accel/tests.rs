@@ -1,0 +1,344 @@
+//! Every structure against brute force in f64, on random and awkward scenes.
+#![expect(clippy::cast_possible_truncation, reason = "test scenes are small")]
+
+use glam::{DVec3, Vec3};
+use proptest::prelude::*;
+
+use super::lbvh::Lbvh;
+use super::simd::SimdLevel;
+use super::{BuildSettings, SphereRadius, Spheres};
+use crate::ray::Ray;
+
+/// A scene that owns its numbers.
+#[derive(Debug, Clone)]
+struct Scene {
+    name: &'static str,
+    centers: Vec<Vec3>,
+    radii: Vec<f32>,
+}
+
+impl Scene {
+    fn common(name: &'static str, centers: Vec<Vec3>, radius: f32) -> Self {
+        Self {
+            name,
+            centers,
+            radii: vec![radius],
+        }
+    }
+
+    fn spheres(&self) -> Spheres<'_> {
+        let radius = match self.radii[..] {
+            [one] => SphereRadius::Common(one),
+            _ => SphereRadius::Each(&self.radii),
+        };
+        Spheres {
+            centers: &self.centers,
+            radius,
+        }
+    }
+
+    fn radius(&self, particle: usize) -> f32 {
+        if self.radii.len() == 1 {
+            self.radii[0]
+        } else {
+            self.radii[particle]
+        }
+    }
+
+    fn typical_radius(&self) -> f32 {
+        self.radii.iter().sum::<f32>() / self.radii.len() as f32
+    }
+}
+
+/// A small generator: tests must not change with a crate's version.
+struct Random(u64);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        ((z ^ (z >> 31)) >> 40) as f32 * (1.0 / 16_777_216.0)
+    }
+
+    fn point(&mut self) -> Vec3 {
+        Vec3::new(self.next(), self.next(), self.next())
+    }
+}
+
+fn random_points(count: usize, seed: u64) -> Vec<Vec3> {
+    let mut random = Random(seed);
+    (0..count).map(|_| random.point() * 2.0 - 1.0).collect()
+}
+
+fn awkward_scenes() -> Vec<Scene> {
+    let cloud = random_points(3000, 1);
+    let far = cloud
+        .iter()
+        .map(|p| *p + Vec3::new(1e4, -1e4, 1e4))
+        .collect();
+    let flat = cloud.iter().map(|p| p.with_z(0.0)).collect();
+    let mut escaped = cloud.clone();
+    escaped.push(Vec3::new(1e6, 0.0, 0.0));
+    let mut absurd = cloud.clone();
+    absurd.push(Vec3::splat(3e37));
+    let lattice = (0..4096)
+        .map(|i| Vec3::new((i % 16) as f32, (i / 16 % 16) as f32, (i / 256) as f32))
+        .collect();
+    let mut random = Random(7);
+    let radii = (0..3000)
+        .map(|_| 10.0_f32.powf(-5.0 + 4.0 * random.next()))
+        .collect();
+    let mut clustered = random_points(2000, 3);
+    clustered.extend(random_points(2000, 4).iter().map(|p| *p * 1e-4 + 0.5));
+    vec![
+        Scene::common("none", Vec::new(), 0.1),
+        Scene::common("one", vec![Vec3::new(0.1, 0.2, 0.3)], 0.5),
+        Scene::common("coincident", vec![Vec3::splat(0.25); 100], 0.5),
+        Scene::common("flat", flat, 0.02),
+        Scene::common("far away", far, 0.05),
+        Scene::common("one escaped", escaped, 0.05),
+        Scene::common("one absurd", absurd, 0.05),
+        Scene::common("lattice", lattice, 0.5),
+        Scene::common("overlapping", cloud.clone(), 0.4),
+        Scene::common("tiny", cloud.clone(), 1e-4),
+        Scene::common("clustered", clustered, 1e-3),
+        Scene {
+            name: "radii of their own",
+            centers: cloud,
+            radii,
+        },
+        Scene {
+            name: "tiny next to huge",
+            centers: random_points(40, 9),
+            radii: (0..40)
+                .map(|i| if i % 8 == 0 { 30.0 } else { 1e-3 })
+                .collect(),
+        },
+    ]
+}
+
+/// Rays from outside and from inside the scene, some along the axes, many at particles.
+fn rays(scene: &Scene, count: usize, seed: u64) -> Vec<Ray> {
+    let mut random = Random(seed);
+    let targets = if scene.centers.is_empty() {
+        vec![Vec3::ZERO]
+    } else {
+        scene.centers.clone()
+    };
+    let radius = scene.typical_radius();
+    (0..count)
+        .map(|i| {
+            let target = targets[(random.next() * targets.len() as f32) as usize % targets.len()];
+            let aim = target + (random.point() * 2.0 - 1.0) * radius * 1.5;
+            let reach = if i % 3 == 0 { radius * 4.0 } else { 5.0 };
+            let mut away = (random.point() * 2.0 - 1.0).normalize_or(Vec3::X);
+            if i % 7 == 0 {
+                away = [Vec3::X, -Vec3::Y, Vec3::Z][i / 7 % 3];
+            }
+            let origin = aim + away * reach;
+            Ray::new(origin, (aim - origin).normalize_or(Vec3::X))
+        })
+        .collect()
+}
+
+/// Crossings of one sphere in f64, and how near the ray is to touching without crossing.
+fn exact(ray: &Ray, center: Vec3, radius: f32) -> (Vec<f64>, f64) {
+    let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
+    let d = d.normalize();
+    let to_center: DVec3 = center.as_dvec3() - o;
+    let middle = to_center.dot(d);
+    let across = (to_center - d * middle).length();
+    let radius = f64::from(radius);
+    let graze = (across - radius).abs();
+    if across > radius {
+        return (Vec::new(), graze);
+    }
+    let half = (radius * radius - across * across).sqrt();
+    (vec![middle - half, middle + half], graze)
+}
+
+#[track_caller]
+fn check(scene: &Scene, ray_count: usize) {
+    for keep_indices in [true, false] {
+        let mut lbvh = Lbvh::new();
+        let settings = BuildSettings { keep_indices };
+        let report = lbvh.build(&scene.spheres(), &settings);
+        assert_eq!(report.particles, scene.centers.len() as u64);
+        lbvh.tree().validate(&scene.spheres()).expect(scene.name);
+        for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+            lbvh.tree_mut().set_simd(level);
+            for ray in rays(scene, ray_count, 11) {
+                check_ray(scene, &lbvh, &ray, keep_indices, level);
+            }
+        }
+    }
+}
+
+/// The distances where f32 and f64 may differ: rounding of coordinates of this size, which a grazing
+/// ray turns into the root of it.
+fn check_ray(scene: &Scene, lbvh: &Lbvh, ray: &Ray, indexed: bool, level: SimdLevel) {
+    let tree = lbvh.tree();
+    let mut nearest: Option<(f64, usize)> = None;
+    let mut doubtful = false;
+    let mut certain_crossings = 0;
+    for (i, center) in scene.centers.iter().enumerate() {
+        let radius = scene.radius(i);
+        let (found, graze) = exact(ray, *center, radius);
+        let size = (*center - ray.origin).abs().max_element().max(radius);
+        let rounding = f64::from(size) * 1e-6 + f64::from(center.abs().max_element()) * 2e-7;
+        if graze < rounding || found.iter().any(|t| t.abs() < 2.0 * rounding) {
+            doubtful = true;
+        }
+        for t in found.into_iter().filter(|t| *t >= 0.0) {
+            certain_crossings += 1;
+            if nearest.is_none_or(|(best, _)| t < best) {
+                nearest = Some((t, i));
+            }
+        }
+    }
+    if doubtful {
+        return;
+    }
+    let hit = tree.nearest(ray);
+    let what = format!("{} {level:?} indexed {indexed} {ray:?}", scene.name);
+    assert_eq!(
+        hit.is_some(),
+        nearest.is_some(),
+        "{what}: {hit:?} {nearest:?}"
+    );
+    assert_eq!(tree.any_hit(ray), nearest.is_some(), "{what}");
+    let (Some(hit), Some((t, particle))) = (hit, nearest) else {
+        return;
+    };
+    let (_, radius) = tree.sphere(hit.slot);
+    let scale = t
+        .max(f64::from(radius))
+        .max(f64::from(ray.origin.abs().max_element()) * 0.1);
+    assert!(
+        (f64::from(hit.t) - t).abs() < 1e-3 * scale.min(f64::from(radius)) + 1e-5 * scale,
+        "{what}: {} should be {t}",
+        hit.t
+    );
+    if indexed && scene.name == "coincident" {
+        assert_eq!(
+            tree.particle(hit.slot),
+            0,
+            "{what}: equal distances go to the lower index"
+        );
+    } else if indexed {
+        let found = tree.particle(hit.slot) as usize;
+        let (other, _) = exact(ray, scene.centers[found], scene.radius(found));
+        assert!(
+            found == particle || other.iter().any(|o| (o - t).abs() < 1e-4 * scale),
+            "{what}: particle {found} should be {particle}"
+        );
+    }
+    let mut crossings = Vec::new();
+    tree.crossings(ray, &mut crossings);
+    assert_eq!(crossings.len(), certain_crossings, "{what}");
+    assert_eq!(crossings[0].t, hit.t, "{what}");
+    assert!(crossings.is_sorted_by(|a, b| a.t <= b.t), "{what}");
+    let beyond = Ray {
+        t_max: hit.t,
+        ..*ray
+    };
+    assert!(!tree.any_hit(&beyond), "{what}: t_max is exclusive");
+}
+
+#[test]
+fn awkward_scenes_match_brute_force() {
+    for scene in awkward_scenes() {
+        check(&scene, 300);
+    }
+}
+
+#[test]
+fn levels_with_fused_multiply_add_agree_to_the_bit() {
+    let fused = [SimdLevel::Avx2, SimdLevel::Avx512];
+    if !fused.iter().all(|level| level.is_supported()) {
+        return;
+    }
+    for scene in awkward_scenes() {
+        let mut lbvh = Lbvh::new();
+        lbvh.build(&scene.spheres(), &BuildSettings::default());
+        for ray in rays(&scene, 2000, 5) {
+            let [a, b] = fused.map(|level| {
+                lbvh.tree_mut().set_simd(level);
+                lbvh.tree().nearest(&ray)
+            });
+            assert_eq!(a, b, "{} {ray:?}", scene.name);
+        }
+    }
+}
+
+#[test]
+fn trees_do_not_depend_on_threads() {
+    let scene = Scene::common("cloud", random_points(100_000, 2), 0.01);
+    let build = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .expect("threads");
+        pool.install(|| {
+            let mut lbvh = Lbvh::new();
+            let report = lbvh.build(&scene.spheres(), &BuildSettings::default());
+            (
+                lbvh.tree().nodes.clone(),
+                lbvh.tree().indices.clone(),
+                report.sah_cost.to_bits(),
+            )
+        })
+    };
+    let one = build(1);
+    for threads in [2, 3, 8] {
+        assert!(one == build(threads), "{threads} threads");
+    }
+}
+
+#[test]
+fn a_builder_forgets_the_last_frame() {
+    let mut lbvh = Lbvh::new();
+    for scene in awkward_scenes() {
+        lbvh.build(&scene.spheres(), &BuildSettings::default());
+        lbvh.tree().validate(&scene.spheres()).expect(scene.name);
+        let fresh = {
+            let mut fresh = Lbvh::new();
+            fresh.build(&scene.spheres(), &BuildSettings::default());
+            fresh.tree().nodes.clone()
+        };
+        assert!(lbvh.tree().nodes == fresh, "{}", scene.name);
+    }
+}
+
+#[test]
+fn a_crowded_cell_is_sorted_by_all_threads() {
+    let mut centers = random_points(300_000, 8);
+    centers.iter_mut().skip(10).for_each(|p| *p *= 1e-3);
+    let scene = Scene::common("crowded", centers, 1e-5);
+    let mut lbvh = Lbvh::new();
+    lbvh.build(&scene.spheres(), &BuildSettings::default());
+    lbvh.tree().validate(&scene.spheres()).expect("sound");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn random_scenes_match_brute_force(
+        count in 0_usize..200,
+        seed in any::<u64>(),
+        radius in prop::sample::select(vec![1e-3_f32, 0.05, 0.3]),
+        scale in prop::sample::select(vec![1e-4_f32, 1.0, 1e4]),
+        own in any::<bool>(),
+    ) {
+        let centers: Vec<Vec3> = random_points(count, seed).iter().map(|p| *p * scale).collect();
+        let mut random = Random(seed ^ 1);
+        let radii = if own && count > 1 {
+            (0..count).map(|_| radius * scale * (0.1 + random.next())).collect()
+        } else {
+            vec![radius * scale]
+        };
+        check(&Scene { name: "random", centers, radii }, 20);
+    }
+}

@@ -1,0 +1,291 @@
+//! The one traversal: how a ray finds spheres in a [`WideTree`], whatever built it and whatever
+//! instructions test nodes and blocks.
+
+use super::block::BLOCK_SIZE;
+use super::node::WIDTH;
+use super::simd::{self, Kernel};
+use super::wide::{MAX_LEVELS, WideTree};
+use crate::ray::Ray;
+
+/// A ray's meeting with a sphere of the tree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreeHit {
+    /// Distance along the ray.
+    pub t: f32,
+    /// Place of the particle in tree order.
+    pub slot: u32,
+}
+
+/// Where a ray passes through the surface of a sphere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct TreeCrossing {
+    /// Distance along the ray.
+    pub t: f32,
+    /// Place of the particle in tree order.
+    pub slot: u32,
+}
+
+impl WideTree {
+    /// The nearest crossing of a sphere's surface (entering, or leaving when the ray starts inside)
+    /// with `t` in `ray.t_min..ray.t_max`. Equal distances go to the lower particle index.
+    pub fn nearest(&self, ray: &Ray) -> Option<TreeHit> {
+        simd::nearest(self, ray)
+    }
+
+    /// Whether any sphere's surface crosses the ray within `ray.t_min..ray.t_max`.
+    pub fn any_hit(&self, ray: &Ray) -> bool {
+        simd::any_hit(self, ray)
+    }
+
+    /// Replaces `crossings` by every crossing within `ray.t_min..ray.t_max`, by distance; equal
+    /// distances by particle index.
+    pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
+        crossings.clear();
+        simd::crossings(self, ray, crossings);
+        crossings.sort_unstable_by(|a, b| {
+            a.t.total_cmp(&b.t)
+                .then_with(|| self.tie_order(a.slot, b.slot))
+        });
+    }
+
+    /// Who comes first of two particles hit at the same distance: the lower index in the frame, or
+    /// where indices were not kept, the lower centre (so that it never depends on the structure).
+    #[cold]
+    fn tie_order(&self, a: u32, b: u32) -> std::cmp::Ordering {
+        if !self.indices.is_empty() {
+            return self.particle(a).cmp(&self.particle(b));
+        }
+        let center = |slot| self.sphere(slot).0;
+        let (a, b) = (center(a), center(b));
+        a.x.total_cmp(&b.x)
+            .then(a.y.total_cmp(&b.y))
+            .then(a.z.total_cmp(&b.z))
+    }
+}
+
+/// Every level can leave all children but one on the stack.
+const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
+/// Bits of a stack code below the level.
+const INDEX_BITS: u32 = 28;
+
+/// A node or block still to visit.
+#[derive(Clone, Copy, Default)]
+struct Pending {
+    /// Distance at which the ray enters its box, rounded down.
+    t: f32,
+    /// Level in the upper bits, number in the level below.
+    code: u32,
+}
+
+/// Visits the blocks whose boxes the ray enters before `limit`, nearest boxes first. `visit` gets
+/// each block's number and the limit, and returns the new limit; negative ends the walk.
+#[inline(always)]
+fn walk<K: Kernel>(
+    kernel: K,
+    tree: &WideTree,
+    ray: &K::Ray,
+    mut limit: f32,
+    mut visit: impl FnMut(usize, f32) -> f32,
+) {
+    #[expect(clippy::cast_possible_truncation, reason = "ten levels at most")]
+    let levels = tree.level_starts.len() as u32;
+    if levels == 0 {
+        return;
+    }
+    let mut stack = [Pending::default(); STACK_SIZE];
+    let mut depth = 0;
+    let mut current = Pending::default();
+    loop {
+        let level = current.code >> INDEX_BITS;
+        let index = (current.code & ((1 << INDEX_BITS) - 1)) as usize;
+        if level == levels {
+            limit = visit(index, limit);
+            if limit < 0.0 {
+                return;
+            }
+        } else {
+            let node = &tree.nodes[tree.level_starts[level as usize] as usize + index];
+            let mut keys = [0; WIDTH];
+            let mut found = kernel.test_node(ray, node, limit, &mut keys);
+            if found > 0 {
+                let first = index * WIDTH;
+                #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^28 blocks")]
+                let child = |key: u32| Pending {
+                    t: f32::from_bits(key),
+                    code: ((level + 1) << INDEX_BITS) | (first as u32 + (key & 7)),
+                };
+                prefetch(kernel, tree, level + 1, levels, first, &keys[..found]);
+                sort_descending(&mut keys[..found]);
+                found -= 1;
+                for key in &keys[..found] {
+                    stack[depth] = child(*key);
+                    depth += 1;
+                }
+                current = child(keys[found]);
+                continue;
+            }
+        }
+        loop {
+            if depth == 0 {
+                return;
+            }
+            depth -= 1;
+            if stack[depth].t <= limit {
+                current = stack[depth];
+                break;
+            }
+        }
+    }
+}
+
+/// Asks for the memory of the children that will be visited, well before they are.
+#[inline(always)]
+fn prefetch<K: Kernel>(
+    kernel: K,
+    tree: &WideTree,
+    level: u32,
+    levels: u32,
+    first: usize,
+    keys: &[u32],
+) {
+    for key in keys {
+        let child = first + (key & 7) as usize;
+        if level == levels {
+            kernel.prefetch_block(&tree.blocks[child]);
+        } else {
+            kernel.prefetch_node(&tree.nodes[tree.level_starts[level as usize] as usize + child]);
+        }
+    }
+}
+
+/// Insertion sort: two or three keys are usual, eight the most. Keys are the bits of distances that
+/// are not negative, which order like integers.
+#[inline(always)]
+fn sort_descending(keys: &mut [u32]) {
+    for i in 1..keys.len() {
+        let key = keys[i];
+        let mut j = i;
+        while j > 0 && keys[j - 1] < key {
+            keys[j] = keys[j - 1];
+            j -= 1;
+        }
+        keys[j] = key;
+    }
+}
+
+#[inline(always)]
+pub(super) fn nearest<K: Kernel>(kernel: K, tree: &WideTree, ray: &Ray) -> Option<TreeHit> {
+    let prepared = kernel.prepare(ray, tree.radius);
+    let mut best: Option<TreeHit> = None;
+    // The end is exclusive for the ray and inclusive for ties.
+    walk(
+        kernel,
+        tree,
+        &prepared,
+        ray.t_max.next_down(),
+        |block, limit| {
+            let Some((t, lanes)) = kernel.nearest_in_block(
+                &prepared,
+                &tree.blocks[block],
+                tree.radii.get(block),
+                limit,
+            ) else {
+                return limit;
+            };
+            let slot = first_of_tied(tree, block, lanes);
+            match &best {
+                Some(held) if held.t == t && tree.tie_order(held.slot, slot).is_le() => {}
+                _ => best = Some(TreeHit { t, slot }),
+            }
+            t
+        },
+    );
+    best
+}
+
+/// The slot among the `lanes` of `block` that wins at equal distance.
+#[inline(always)]
+fn first_of_tied(tree: &WideTree, block: usize, lanes: u32) -> u32 {
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "slots are counted in 32 bits"
+    )]
+    let first = (block * BLOCK_SIZE) as u32;
+    let mut slot = first + lanes.trailing_zeros();
+    let mut others = lanes & (lanes - 1);
+    while others != 0 {
+        let other = first + others.trailing_zeros();
+        if tree.tie_order(other, slot).is_lt() {
+            slot = other;
+        }
+        others &= others - 1;
+    }
+    slot
+}
+
+#[inline(always)]
+pub(super) fn any_hit<K: Kernel>(kernel: K, tree: &WideTree, ray: &Ray) -> bool {
+    let prepared = kernel.prepare(ray, tree.radius);
+    let mut found = false;
+    walk(
+        kernel,
+        tree,
+        &prepared,
+        ray.t_max.next_down(),
+        |block, limit| {
+            found =
+                kernel.any_in_block(&prepared, &tree.blocks[block], tree.radii.get(block), limit);
+            if found { -1.0 } else { limit }
+        },
+    );
+    found
+}
+
+#[inline(always)]
+pub(super) fn crossings<K: Kernel>(
+    kernel: K,
+    tree: &WideTree,
+    ray: &Ray,
+    crossings: &mut Vec<TreeCrossing>,
+) {
+    let prepared = kernel.prepare(ray, tree.radius);
+    walk(
+        kernel,
+        tree,
+        &prepared,
+        ray.t_max.next_down(),
+        |block, limit| {
+            let found = kernel.all_in_block(&prepared, &tree.blocks[block], tree.radii.get(block));
+            let mut lanes = found.lanes;
+            while lanes != 0 {
+                let lane = lanes.trailing_zeros() as usize;
+                lanes &= lanes - 1;
+                let slot = block * BLOCK_SIZE + lane;
+                if slot >= tree.count {
+                    break;
+                }
+                #[expect(
+                    clippy::cast_possible_truncation,
+                    reason = "slots are counted in 32 bits"
+                )]
+                let slot = slot as u32;
+                for t in [found.near[lane], found.far[lane]] {
+                    if t >= ray.t_min && t < ray.t_max {
+                        crossings.push(TreeCrossing { t, slot });
+                    }
+                }
+            }
+            limit
+        },
+    );
+}
+
+/// Both crossings of each sphere of a block with the line of a ray.
+pub(super) struct BlockCrossings {
+    /// Lanes whose sphere the line meets.
+    pub(super) lanes: u32,
+    /// Distance of the first crossing.
+    pub(super) near: [f32; BLOCK_SIZE],
+    /// Distance of the second.
+    pub(super) far: [f32; BLOCK_SIZE],
+}

@@ -1,0 +1,257 @@
+//! The tree that every builder ends with: implicit levels of 8-wide nodes over blocks.
+//!
+//! Child `c` of node `i` on one level is node `8 i + c` on the next, and the children of the last
+//! level are the blocks themselves: no pointers. With one radius for all, boxes bound the centres
+//! and the radius is added per ray; with radii of their own, boxes hold the spheres.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::block::{BLOCK_SIZE, Block, BlockRadii};
+use super::node::{Node, WIDTH};
+use super::simd::SimdLevel;
+use super::{Aabb, BuildReport, Phase};
+
+/// Node levels at most: 8^10 blocks of 16 are more particles than 32 bits count.
+pub(super) const MAX_LEVELS: usize = 10;
+
+/// A tree over spheres. See [`WideTree::nearest`] and its neighbours.
+#[derive(Debug, Default)]
+pub struct WideTree {
+    pub(super) nodes: Vec<Node>,
+    /// Number of the first node of each level in `nodes`, root level first.
+    pub(super) level_starts: Vec<u32>,
+    pub(super) blocks: Vec<Block>,
+    /// Empty when the radius is common.
+    pub(super) radii: Vec<BlockRadii>,
+    /// The common radius, or 0.
+    pub(super) radius: f32,
+    /// Index in the frame of the particle in each lane; empty when not kept.
+    pub(super) indices: Vec<u32>,
+    pub(super) count: usize,
+    pub(super) bounds: Aabb,
+    pub(super) simd: SimdLevel,
+}
+
+impl Default for Aabb {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
+impl WideTree {
+    /// Box of the spheres; empty without particles.
+    pub fn bounds(&self) -> Aabb {
+        self.bounds
+    }
+
+    /// Particles.
+    pub fn len(&self) -> usize {
+        self.count
+    }
+
+    /// True if there is nothing to hit.
+    pub fn is_empty(&self) -> bool {
+        self.count == 0
+    }
+
+    /// The instruction set that rays are traced with.
+    pub fn simd(&self) -> SimdLevel {
+        self.simd
+    }
+
+    /// Traces with `level` from now on, or with the best the machine has if it lacks that.
+    pub fn set_simd(&mut self, level: SimdLevel) {
+        self.simd = level.or_best();
+    }
+
+    /// Index in the frame of the particle in `slot` (tree order), or the slot itself when the way
+    /// back was not kept.
+    pub fn particle(&self, slot: u32) -> u32 {
+        self.indices.get(slot as usize).copied().unwrap_or(slot)
+    }
+
+    /// Centre and radius of the particle in `slot`.
+    pub fn sphere(&self, slot: u32) -> (Vec3, f32) {
+        let (block, lane) = (slot as usize / BLOCK_SIZE, slot as usize % BLOCK_SIZE);
+        let radius = self.radii.get(block).map_or(self.radius, |r| r.0[lane]);
+        (self.blocks[block].center(lane), radius)
+    }
+
+    /// Makes room for `count` particles; what was there is gone, memory stays.
+    pub(super) fn reset(&mut self, count: usize, radius: Option<f32>, indexed: bool) {
+        let blocks = count.div_ceil(BLOCK_SIZE);
+        self.count = count;
+        self.radius = radius.unwrap_or(0.0);
+        self.blocks.resize(blocks, bytemuck::Zeroable::zeroed());
+        self.radii.clear();
+        if radius.is_none() {
+            self.radii.resize(blocks, bytemuck::Zeroable::zeroed());
+        }
+        let lanes = if indexed { blocks * BLOCK_SIZE } else { 0 };
+        self.indices.resize(lanes, 0);
+        self.simd = self.simd.or_best();
+    }
+
+    /// The memory of the blocks as plain points, and the indices: what builders sort in.
+    pub(super) fn points_mut(&mut self) -> (&mut [Vec3], &mut [u32]) {
+        (
+            bytemuck::cast_slice_mut(&mut self.blocks),
+            &mut self.indices,
+        )
+    }
+
+    /// Brings the radii of the frame into tree order, by the indices.
+    pub(super) fn gather_radii(&mut self, radii: &[f32]) {
+        self.radii
+            .par_iter_mut()
+            .zip(self.indices.par_chunks(BLOCK_SIZE))
+            .for_each(|(block, indices)| {
+                for (radius, index) in block.0.iter_mut().zip(indices) {
+                    *radius = radii[*index as usize];
+                }
+            });
+    }
+
+    pub(super) fn drop_indices(&mut self) {
+        self.indices = Vec::new();
+    }
+
+    /// Turns sorted points into blocks and builds all levels over them. Returns the SAH cost.
+    pub(super) fn finish(&mut self, center_bounds: Aabb) -> f64 {
+        self.blocks
+            .par_iter_mut()
+            .with_min_len(256)
+            .for_each(Block::transpose_points);
+        let counts = level_counts(self.blocks.len());
+        self.level_starts.clear();
+        let mut total = 0_usize;
+        for count in &counts {
+            self.level_starts.push(super::partition::index_u32(total));
+            total += count;
+        }
+        self.nodes.resize(total, bytemuck::Zeroable::zeroed());
+        let (mut boxes, mut areas) = (Vec::new(), 0.0);
+        let mut rest = &mut self.nodes[..];
+        for (depth, count) in counts.iter().enumerate().rev() {
+            let (upper, level) = rest.split_at_mut(rest.len() - count);
+            rest = upper;
+            let below = std::mem::take(&mut boxes);
+            let children = if depth + 1 == counts.len() {
+                Children::Blocks(&self.blocks, &self.radii)
+            } else {
+                Children::Nodes(&below)
+            };
+            let (level_boxes, child_areas) = build_level(level, &children, self.radius);
+            boxes = level_boxes;
+            areas += child_areas;
+        }
+        self.bounds = match boxes.first() {
+            Some(root) => root.padded(self.radius),
+            None => center_bounds,
+        };
+        let root_area = self.bounds.area();
+        if root_area > 0.0 {
+            1.0 + areas / root_area
+        } else {
+            1.0
+        }
+    }
+
+    /// The report of the build that just ended.
+    pub(super) fn report(
+        &self,
+        structure: &'static str,
+        order: &'static str,
+        sah_cost: f64,
+        phases: Vec<Phase>,
+    ) -> BuildReport {
+        let position_bytes =
+            size_of_val(&self.blocks[..]) as u64 + size_of_val(&self.radii[..]) as u64;
+        let structure_bytes =
+            size_of_val(&self.nodes[..]) as u64 + size_of_val(&self.indices[..]) as u64;
+        // Sorting happens in the memory of the result; beside it there are boxes of the lowest
+        // level and what one cell per thread needs.
+        let boxes = self.blocks.len().div_ceil(WIDTH) as u64 * size_of::<Aabb>() as u64;
+        BuildReport {
+            structure,
+            order,
+            total: phases.iter().map(|p| p.time).sum(),
+            phases,
+            particles: self.count as u64,
+            nodes: self.nodes.len() as u64,
+            leaves: self.blocks.len() as u64,
+            depth: super::partition::index_u32(self.level_starts.len()),
+            sah_cost,
+            position_bytes,
+            structure_bytes,
+            peak_bytes: position_bytes + structure_bytes + boxes,
+            simd: self.simd.name(),
+        }
+    }
+}
+
+/// What the nodes of a level enclose.
+enum Children<'a> {
+    Blocks(&'a [Block], &'a [BlockRadii]),
+    Nodes(&'a [Aabb]),
+}
+
+impl Children<'_> {
+    fn bounds(&self, index: usize) -> Option<Aabb> {
+        match self {
+            Self::Blocks(blocks, radii) => {
+                let block = blocks.get(index)?;
+                Some(match radii.get(index) {
+                    Some(radii) => block.sphere_bounds(radii),
+                    None => block.bounds(),
+                })
+            }
+            Self::Nodes(boxes) => boxes.get(index).copied(),
+        }
+    }
+}
+
+/// Nodes of each level, root level first; empty without blocks.
+fn level_counts(blocks: usize) -> Vec<usize> {
+    let mut counts = Vec::new();
+    let mut count = blocks;
+    while count > 1 || (count == 1 && counts.is_empty()) {
+        count = count.div_ceil(WIDTH);
+        counts.push(count);
+    }
+    counts.reverse();
+    counts
+}
+
+/// Fills `level`; returns the box of each node and the summed area of the children.
+fn build_level(level: &mut [Node], children: &Children, radius: f32) -> (Vec<Aabb>, f64) {
+    // Areas are summed by runs of a fixed length, so that the sum does not depend on the threads.
+    const RUN: usize = 1024;
+    let mut boxes = vec![Aabb::EMPTY; level.len()];
+    let areas: Vec<f64> = level
+        .par_chunks_mut(RUN)
+        .zip(boxes.par_chunks_mut(RUN))
+        .enumerate()
+        .map(|(run, (nodes, boxes))| {
+            let mut area = 0.0;
+            for (offset, (node, own)) in nodes.iter_mut().zip(boxes).enumerate() {
+                let first = (run * RUN + offset) * WIDTH;
+                let mut bounds = [Aabb::EMPTY; WIDTH];
+                let mut used = 0;
+                while let Some(child) = (used < WIDTH)
+                    .then(|| children.bounds(first + used))
+                    .flatten()
+                {
+                    area += child.padded(radius).area();
+                    *own = own.union(child);
+                    bounds[used] = child;
+                    used += 1;
+                }
+                *node = Node::enclosing(&bounds[..used]);
+            }
+            area
+        })
+        .collect();
+    (boxes, areas.iter().sum())
+}
