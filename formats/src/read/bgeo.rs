@@ -1,13 +1,253 @@
-//! Reader module; see [`crate::read`].
-use super::Step;
-use crate::{ParseError, RawParticles};
+//! BGEO version 5, Houdini's "classic" binary geometry, as partio writes it for most SPH codes.
+//!
+//! Big-endian throughout: a header of 41 bytes, attribute definitions, then one record a point.
+//! Reading stops after the points; groups, primitives and detail attributes carry no particles, and
+//! writers disagree about them. Newer Houdini containers share the extension only and are refused by
+//! name. Gzip around the file is undone by the caller. Layout after partio's `BGEO.cpp`.
 
-/// The time steps that `bytes` hold.
+use super::Step;
+use super::columns::{self, Column, Lane};
+use crate::{AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType};
+
+#[cfg(test)]
+mod tests;
+
+/// Bytes before the attribute definitions.
+const HEADER: usize = 41;
+/// The only version with this layout that writers still produce.
+const VERSION: i32 = 5;
+/// x, y, z and w, before the attributes of a record.
+const POSITION_BYTES: usize = 16;
+/// Widest attribute listed for a file without points.
+const MAX_EMPTY_COMPONENTS: usize = 16;
+/// Column of the homogeneous coordinate, taken out again after decoding.
+const W: &str = "w of P";
+
+/// The time steps that `bytes` hold: one.
+///
+/// # Errors
+/// [`ParseError::Unsupported`] for other kinds of geometry files, [`ParseError::Malformed`] for
+/// anything else that is not classic BGEO.
 pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    check_kind(bytes)?;
     Ok(vec![Step::whole(bytes.len())])
 }
 
-/// Reads one of the [`steps`].
-pub fn read(_bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
-    Err(ParseError::unsupported("this reader is not written yet"))
+/// Reads all points with all their attributes, under the names of the file.
+///
+/// Floats and vectors become f32, integers and indices of indexed strings i32. Positions are divided
+/// by their homogeneous coordinate unless it is 0 or 1.
+///
+/// # Errors
+/// As [`steps`]; [`ParseError::Malformed`] if the definitions or points do not fit the file, and
+/// [`ParseError::Unsupported`] for point attributes of type string.
+pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
+    check_kind(bytes)?;
+    let mut cursor = Cursor { bytes, at: 9 };
+    let count = cursor.count("points")?;
+    cursor.at = 25;
+    let definition_count = cursor.count("point attributes")?;
+    cursor.at = HEADER;
+    let mut definitions = Vec::new();
+    for _ in 0..definition_count {
+        definitions.push(cursor.definition()?);
+    }
+    let mut stride = POSITION_BYTES;
+    for definition in &definitions {
+        // At most 65535 components in each, and each took bytes of the file: no overflow.
+        stride += definition.components * 4;
+    }
+    let start = cursor.at;
+    if count == 0 {
+        // Without points nothing bounds the width that a corrupt definition may claim.
+        definitions.retain(|d| d.components <= MAX_EMPTY_COMPONENTS);
+    }
+    columns::check_room(start, count, stride, bytes.len())?;
+    let particles = columns::particles(
+        bytes,
+        count,
+        vec![column("P", ScalarType::F32, 3, start, stride)],
+        attribute_columns(definitions, start, stride),
+    )?;
+    Ok(divide_by_w(particles))
+}
+
+/// Tells classic BGEO of version 5 from its relatives.
+fn check_kind(bytes: &[u8]) -> Result<(), ParseError> {
+    const CLASSIC: &str = "save as classic bgeo (.bhclassic) from houdini";
+    let relatives: [(&[u8], &str); 5] = [
+        (
+            b"\x7fNSJ",
+            "houdini's binary json geometry, not bgeo version 5",
+        ),
+        (b"scf1", "blosc-compressed geometry (.bgeo.sc)"),
+        (b"PGEOMETRY", "the text form of classic geometry (.geo)"),
+        (
+            b"[",
+            "houdini's text json geometry (.geo), not bgeo version 5",
+        ),
+        (b"bgeo", "an older houdini geometry file"),
+    ];
+    for (magic, what) in relatives {
+        if bytes.starts_with(magic) {
+            return Err(ParseError::unsupported(format!("{what}: {CLASSIC}")));
+        }
+    }
+    if !bytes.starts_with(b"BgeoV") {
+        return Err(ParseError::malformed(
+            0,
+            "no bgeo file: it does not begin with BgeoV",
+        ));
+    }
+    let mut cursor = Cursor { bytes, at: 5 };
+    match cursor.i32("the version")? {
+        VERSION => Ok(()),
+        other => Err(ParseError::unsupported(format!(
+            "bgeo version {other}, only version {VERSION} is read: {CLASSIC}"
+        ))),
+    }
+}
+
+/// One point attribute of the header.
+struct Definition {
+    name: String,
+    components: usize,
+    scalar: ScalarType,
+}
+
+fn column(
+    name: impl Into<String>,
+    scalar: ScalarType,
+    components: usize,
+    start: usize,
+    stride: usize,
+) -> Column {
+    let lanes = (0..components)
+        .map(|c| Lane {
+            start: start + 4 * c,
+            stride,
+        })
+        .collect();
+    Column {
+        name: name.into(),
+        scalar,
+        endian: Endian::Big,
+        lanes,
+    }
+}
+
+/// w first, then the attributes in the order of the file.
+fn attribute_columns(definitions: Vec<Definition>, start: usize, stride: usize) -> Vec<Column> {
+    let mut at = start + POSITION_BYTES;
+    let mut columns = vec![column(W, ScalarType::F32, 1, at - 4, stride)];
+    for Definition {
+        name,
+        components,
+        scalar,
+    } in definitions
+    {
+        columns.push(column(name, scalar, components, at, stride));
+        at += 4 * components;
+    }
+    columns
+}
+
+/// Takes the column of w out again and applies it.
+fn divide_by_w(mut particles: RawParticles) -> RawParticles {
+    let w = particles.attributes.remove(0);
+    debug_assert_eq!(w.name, W);
+    if let (AttributeData::F32(w), Positions::F32(positions)) = (w.data, &mut particles.positions) {
+        for (position, w) in positions.iter_mut().zip(w) {
+            if w != 1.0 && w != 0.0 {
+                *position /= w;
+            }
+        }
+    }
+    particles
+}
+
+/// Walks the header; every step is checked against the end of the file.
+struct Cursor<'a> {
+    bytes: &'a [u8],
+    at: usize,
+}
+
+impl Cursor<'_> {
+    fn take(&mut self, len: usize, what: &str) -> Result<&[u8], ParseError> {
+        let end = self.at.checked_add(len);
+        let taken = end.and_then(|end| self.bytes.get(self.at..end));
+        let Some(taken) = taken else {
+            return Err(ParseError::malformed(
+                self.at,
+                format!("file ends within {what}"),
+            ));
+        };
+        self.at += len;
+        Ok(taken)
+    }
+
+    fn array<const N: usize>(&mut self, what: &str) -> Result<[u8; N], ParseError> {
+        let taken = self.take(N, what)?;
+        Ok(*taken.first_chunk().expect("take gave N bytes"))
+    }
+
+    fn i32(&mut self, what: &str) -> Result<i32, ParseError> {
+        self.array(what).map(i32::from_be_bytes)
+    }
+
+    fn u16(&mut self, what: &str) -> Result<usize, ParseError> {
+        self.array(what).map(u16::from_be_bytes).map(usize::from)
+    }
+
+    fn count(&mut self, what: &str) -> Result<usize, ParseError> {
+        let at = self.at;
+        let count = self.i32(what)?;
+        usize::try_from(count)
+            .map_err(|_| ParseError::malformed(at, format!("the number of {what} is {count}")))
+    }
+
+    fn definition(&mut self) -> Result<Definition, ParseError> {
+        const WHAT: &str = "a point attribute definition";
+        let name_len = self.u16(WHAT)?;
+        let name = String::from_utf8_lossy(self.take(name_len, WHAT)?).into_owned();
+        let components = self.u16(WHAT)?;
+        let at = self.at;
+        let kind = self.i32(WHAT)?;
+        let scalar = match kind {
+            0 | 5 => ScalarType::F32,
+            1 | 4 => ScalarType::I32,
+            2 => {
+                return Err(ParseError::unsupported(format!(
+                    "point attribute `{name}` is of type string: delete it or make it an indexed \
+                     string before saving"
+                )));
+            }
+            _ => {
+                return Err(ParseError::malformed(
+                    at,
+                    format!("point attribute `{name}` has the unknown type {kind}"),
+                ));
+            }
+        };
+        if kind == 4 {
+            self.skip_strings()?;
+        } else {
+            self.take(4 * components, "the default values of a point attribute")?;
+        }
+        Ok(Definition {
+            name,
+            components,
+            scalar,
+        })
+    }
+
+    /// The table of an indexed string; points hold indices into it.
+    fn skip_strings(&mut self) -> Result<(), ParseError> {
+        const WHAT: &str = "the strings of a point attribute";
+        for _ in 0..self.count(WHAT)? {
+            let len = self.u16(WHAT)?;
+            self.take(len, WHAT)?;
+        }
+        Ok(())
+    }
 }

@@ -8,7 +8,10 @@
 use std::ops::Range;
 
 pub mod bgeo;
+mod columns;
 pub mod csv;
+#[cfg(test)]
+mod damage;
 pub mod lammps;
 pub mod npy;
 pub mod ply;
