@@ -1,0 +1,165 @@
+//! Finds the vertex records behind the header: skips the elements before them, and repacks them when
+//! they are text or have lists in between, so that every record has the same size.
+
+use std::borrow::Cow;
+
+use super::ascii;
+use super::header::{Element, Encoding, Header};
+use crate::read::columns::check_room;
+use crate::{Endian, ParseError, ScalarType};
+
+/// Vertex records of one size: the scalar properties, packed, in the order of the header.
+pub(super) struct Records<'a> {
+    /// What holds them; the file itself if nothing had to be repacked.
+    pub(super) bytes: Cow<'a, [u8]>,
+    /// First byte of the first record.
+    pub(super) start: usize,
+    /// Bytes a record.
+    pub(super) stride: usize,
+}
+
+/// The records of `vertices`, an element of `header`. Text becomes little-endian numbers.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the file ends early or holds text that is no number.
+pub(super) fn vertex_records<'a>(
+    bytes: &'a [u8],
+    header: &Header,
+    vertices: &Element,
+) -> Result<Records<'a>, ParseError> {
+    let before = header
+        .elements
+        .iter()
+        .take_while(|e| !std::ptr::eq(*e, vertices));
+    let stride = vertices.scalar_bytes();
+    let packed = match header.encoding {
+        Encoding::Ascii => {
+            let mut text = ascii::Text::new(bytes, header.body);
+            for element in before {
+                text.skip(element)?;
+            }
+            text.pack(vertices)?
+        }
+        Encoding::Binary(endian) => {
+            let mut at = header.body;
+            for element in before {
+                at = skip(bytes, at, element, endian)?;
+            }
+            check_room(at, vertices.count, vertices.least_bytes(), bytes.len())?;
+            if !vertices.has_lists() {
+                return Ok(Records {
+                    bytes: Cow::Borrowed(bytes),
+                    start: at,
+                    stride,
+                });
+            }
+            pack(bytes, at, vertices, endian)?
+        }
+    };
+    Ok(Records {
+        bytes: Cow::Owned(packed),
+        start: 0,
+        stride,
+    })
+}
+
+/// The byte after all records of `element`, which begin at `at`.
+fn skip(
+    bytes: &[u8],
+    mut at: usize,
+    element: &Element,
+    endian: Endian,
+) -> Result<usize, ParseError> {
+    let least = element.least_bytes();
+    let fits = element
+        .count
+        .checked_mul(least)
+        .is_some_and(|need| need <= bytes.len().saturating_sub(at));
+    if !fits {
+        return Err(ParseError::malformed(
+            at,
+            format!(
+                "{} records of element {} do not fit the file",
+                element.count, element.name
+            ),
+        ));
+    }
+    if !element.has_lists() {
+        return Ok(at + element.count * least);
+    }
+    for _ in 0..element.count {
+        at = walk(bytes, at, element, endian, |_| {})?;
+    }
+    Ok(at)
+}
+
+/// Copies the scalars of records with lists.
+fn pack(
+    bytes: &[u8],
+    mut at: usize,
+    vertices: &Element,
+    endian: Endian,
+) -> Result<Vec<u8>, ParseError> {
+    let mut packed = Vec::with_capacity(vertices.count * vertices.scalar_bytes());
+    for _ in 0..vertices.count {
+        at = walk(bytes, at, vertices, endian, |scalar| {
+            packed.extend_from_slice(scalar);
+        })?;
+    }
+    Ok(packed)
+}
+
+/// Goes through one record, showing each scalar, and returns the byte after it.
+fn walk(
+    bytes: &[u8],
+    mut at: usize,
+    element: &Element,
+    endian: Endian,
+    mut show: impl FnMut(&[u8]),
+) -> Result<usize, ParseError> {
+    let cut =
+        |at: usize| ParseError::malformed(at, format!("file ends within element {}", element.name));
+    for property in &element.properties {
+        let stored = property.length.unwrap_or(property.scalar);
+        let number = bytes
+            .get(at..)
+            .and_then(|rest| rest.get(..stored.size()))
+            .ok_or_else(|| cut(at))?;
+        if property.length.is_some() {
+            let items = list_length(number, stored, endian).ok_or_else(|| {
+                ParseError::malformed(
+                    at,
+                    format!("list {} has a negative or absurd length", property.name),
+                )
+            })?;
+            let list = items.checked_mul(property.scalar.size());
+            at = list
+                .and_then(|list| list.checked_add(at + stored.size()))
+                .filter(|end| *end <= bytes.len())
+                .ok_or_else(|| cut(at))?;
+        } else {
+            show(number);
+            at += stored.size();
+        }
+    }
+    Ok(at)
+}
+
+/// Reads the item count, without allocating as `ScalarType::decode` would.
+fn list_length(number: &[u8], stored: ScalarType, endian: Endian) -> Option<usize> {
+    let mut wide = [0; 8];
+    let used = wide.get_mut(..number.len())?;
+    used.copy_from_slice(number);
+    if endian == Endian::Big {
+        used.reverse();
+    }
+    let signed = matches!(
+        stored,
+        ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64
+    );
+    let negative = used.last().is_some_and(|top| *top >= 0x80);
+    if signed && negative {
+        return None;
+    }
+    usize::try_from(u64::from_le_bytes(wide)).ok()
+}

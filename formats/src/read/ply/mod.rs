@@ -1,0 +1,102 @@
+//! PLY point clouds: ascii and binary of both byte orders, any order of properties.
+//!
+//! `header` reads the text on top, `body` finds (or repacks) the vertex records, and the shared
+//! column reader decodes them. Meshes are refused: their vertices are a surface, not particles.
+//! Follows Greg Turk's 1994 description and what Blender, Open3D and `CloudCompare` write beyond it.
+
+mod ascii;
+mod body;
+mod header;
+#[cfg(test)]
+mod tests;
+
+use self::body::Records;
+use self::header::{Element, Encoding, Header};
+use super::Step;
+use super::columns::{self, Column, Lane};
+use crate::{Endian, ParseError, RawParticles};
+
+/// The time steps that `bytes` hold: one.
+///
+/// # Errors
+/// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
+/// without vertices.
+pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    let header = Header::parse(bytes)?;
+    vertices(&header)?;
+    Ok(vec![Step::whole(bytes.len())])
+}
+
+/// Reads the vertices with all their scalar properties as attributes.
+///
+/// `vx vy vz` become `velocity`, `nx ny nz` `normal`, `red green blue [alpha]` `color`; a leading
+/// `scalar_` is dropped from names; list properties are skipped. Positions are f64 if a coordinate is
+/// `double` (or a 32-bit integer), else f32.
+///
+/// # Errors
+/// As [`steps`]; [`ParseError::Malformed`] if the data does not match the header.
+pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
+    let header = Header::parse(bytes)?;
+    let vertices = vertices(&header)?;
+    let records = body::vertex_records(bytes, &header, vertices)?;
+    let endian = match header.encoding {
+        Encoding::Ascii => Endian::Little,
+        Encoding::Binary(endian) => endian,
+    };
+    let mut properties = vertex_columns(vertices, &records, endian);
+    let mut axes = Vec::with_capacity(3);
+    for axis in ["x", "y", "z"] {
+        let Some(index) = properties.iter().position(|c| is_named(c, axis)) else {
+            return Err(ParseError::unsupported(format!(
+                "ply vertices have no property {axis}: export points with x, y and z"
+            )));
+        };
+        axes.push(properties.remove(index));
+    }
+    let attributes = columns::group_vectors(properties);
+    columns::particles(&records.bytes, vertices.count, axes, attributes)
+}
+
+fn is_named(column: &Column, name: &str) -> bool {
+    column.name.eq_ignore_ascii_case(name)
+}
+
+/// The element that holds the particles.
+fn vertices(header: &Header) -> Result<&Element, ParseError> {
+    let faces = ["face", "tristrips"]
+        .iter()
+        .find_map(|name| header.element(name).filter(|e| e.count > 0));
+    if let Some(faces) = faces {
+        return Err(ParseError::unsupported(format!(
+            "a mesh with {} faces, not particles: export points only",
+            faces.count
+        )));
+    }
+    header.element("vertex").ok_or_else(|| {
+        let names: Vec<&str> = header.elements.iter().map(|e| e.name.as_str()).collect();
+        ParseError::unsupported(format!(
+            "ply without a vertex element, it has [{}]: export points as vertices",
+            names.join(", ")
+        ))
+    })
+}
+
+/// One column for each scalar property, in the order of the header.
+fn vertex_columns(vertices: &Element, records: &Records<'_>, endian: Endian) -> Vec<Column> {
+    let mut offset = records.start;
+    let mut columns = Vec::with_capacity(vertices.properties.len());
+    for property in vertices.properties.iter().filter(|p| p.length.is_none()) {
+        let name = property.name.strip_prefix("scalar_");
+        columns.push(Column {
+            name: name.unwrap_or(&property.name).to_owned(),
+            scalar: property.scalar,
+            endian,
+            lanes: vec![Lane {
+                start: offset,
+                stride: records.stride,
+            }],
+        });
+        offset += property.scalar.size();
+    }
+    columns
+}
