@@ -1,0 +1,198 @@
+//! The subset of Python literals that NPY headers are written in: strings, integers, booleans,
+//! `None`, tuples, lists and dictionaries.
+
+use crate::ParseError;
+
+/// Deeper nesting than any real dtype; it bounds the recursion.
+const MAX_DEPTH: usize = 32;
+
+/// A parsed literal.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Value {
+    /// `'text'` or `"text"`.
+    Text(String),
+    /// `12`, `-1` or `12L`.
+    Integer(i128),
+    /// `True`, `False`.
+    Bool(bool),
+    /// `None`.
+    None,
+    /// A tuple or a list; headers use both for the same things.
+    Sequence(Vec<Value>),
+    /// `{key: value, ...}` in order of appearance.
+    Dict(Vec<(Value, Value)>),
+}
+
+/// Parses one literal; white space may follow it. `base` is the offset of `text` in the file.
+///
+/// # Errors
+/// [`ParseError::Malformed`] at the character that does not fit.
+pub(super) fn parse(text: &str, base: usize) -> Result<Value, ParseError> {
+    let mut parser = Parser { text, at: 0, base };
+    let value = parser.value(0)?;
+    parser.skip_space();
+    if parser.at < text.len() {
+        return Err(parser.error("the end of the npy header"));
+    }
+    Ok(value)
+}
+
+struct Parser<'a> {
+    text: &'a str,
+    at: usize,
+    base: usize,
+}
+
+impl Parser<'_> {
+    fn error(&self, expected: &str) -> ParseError {
+        let found: String = self.rest().chars().take(20).collect();
+        ParseError::malformed(
+            self.base + self.at,
+            format!("npy header: expected {expected}, found `{found}`"),
+        )
+    }
+
+    fn rest(&self) -> &str {
+        self.text.get(self.at..).unwrap_or_default()
+    }
+
+    fn peek(&self) -> Option<u8> {
+        self.text.as_bytes().get(self.at).copied()
+    }
+
+    fn skip_space(&mut self) {
+        while self.peek().is_some_and(|b| b.is_ascii_whitespace()) {
+            self.at += 1;
+        }
+    }
+
+    /// Takes `token` if it comes next.
+    fn eat(&mut self, token: &str) -> bool {
+        let found = self.rest().starts_with(token);
+        if found {
+            self.at += token.len();
+        }
+        found
+    }
+
+    fn value(&mut self, depth: usize) -> Result<Value, ParseError> {
+        if depth > MAX_DEPTH {
+            return Err(self.error("less nesting"));
+        }
+        self.skip_space();
+        match self.peek() {
+            Some(b'(') => self.sequence(b')', depth),
+            Some(b'[') => self.sequence(b']', depth),
+            Some(b'{') => self.dict(depth),
+            Some(b'-' | b'0'..=b'9') => self.integer(),
+            _ if self.eat("True") => Ok(Value::Bool(true)),
+            _ if self.eat("False") => Ok(Value::Bool(false)),
+            _ if self.eat("None") => Ok(Value::None),
+            // Python 2 marks strings as unicode or bytes.
+            Some(b'u' | b'b' | b'\'' | b'"') => self.string().map(Value::Text),
+            _ => Err(self.error("a value")),
+        }
+    }
+
+    fn sequence(&mut self, close: u8, depth: usize) -> Result<Value, ParseError> {
+        self.at += 1;
+        let mut items = Vec::new();
+        loop {
+            self.skip_space();
+            if self.peek() == Some(close) {
+                self.at += 1;
+                return Ok(Value::Sequence(items));
+            }
+            items.push(self.value(depth + 1)?);
+            self.separator(close)?;
+        }
+    }
+
+    fn dict(&mut self, depth: usize) -> Result<Value, ParseError> {
+        self.at += 1;
+        let mut entries = Vec::new();
+        loop {
+            self.skip_space();
+            if self.eat("}") {
+                return Ok(Value::Dict(entries));
+            }
+            let key = self.value(depth + 1)?;
+            self.skip_space();
+            if !self.eat(":") {
+                return Err(self.error("`:`"));
+            }
+            let value = self.value(depth + 1)?;
+            entries.push((key, value));
+            self.separator(b'}')?;
+        }
+    }
+
+    /// A comma, or the closing bracket (which stays).
+    fn separator(&mut self, close: u8) -> Result<(), ParseError> {
+        self.skip_space();
+        if self.eat(",") || self.peek() == Some(close) {
+            Ok(())
+        } else {
+            Err(self.error("`,` or a closing bracket"))
+        }
+    }
+
+    fn integer(&mut self) -> Result<Value, ParseError> {
+        let digits_from = usize::from(self.peek() == Some(b'-'));
+        let digits = self.rest().bytes().skip(digits_from);
+        let len = digits_from + digits.take_while(u8::is_ascii_digit).count();
+        let number = self.rest().get(..len).and_then(|n| n.parse().ok());
+        let number = number.ok_or_else(|| self.error("an integer"))?;
+        self.at += len;
+        // Python 2 wrote long integers as `2000L`.
+        self.eat("L");
+        Ok(Value::Integer(number))
+    }
+
+    fn string(&mut self) -> Result<String, ParseError> {
+        if matches!(self.peek(), Some(b'u' | b'b')) {
+            self.at += 1;
+        }
+        let quote = match self.peek() {
+            Some(b'\'') => '\'',
+            Some(b'"') => '"',
+            _ => return Err(self.error("a string")),
+        };
+        self.at += 1;
+        let mut text = String::new();
+        while let Some(c) = self.next_char() {
+            match c {
+                _ if c == quote => return Ok(text),
+                '\\' => text.push(self.escape()?),
+                _ => text.push(c),
+            }
+        }
+        Err(self.error("the end of a string"))
+    }
+
+    fn next_char(&mut self) -> Option<char> {
+        let c = self.rest().chars().next()?;
+        self.at += c.len_utf8();
+        Some(c)
+    }
+
+    fn escape(&mut self) -> Result<char, ParseError> {
+        let digits = match self.next_char() {
+            Some('n') => return Ok('\n'),
+            Some('t') => return Ok('\t'),
+            Some('r') => return Ok('\r'),
+            Some(c @ ('\\' | '\'' | '"')) => return Ok(c),
+            Some('x') => 2,
+            Some('u') => 4,
+            Some('U') => 8,
+            _ => return Err(self.error("a known escape")),
+        };
+        let code = self.rest().get(..digits);
+        let c = code
+            .and_then(|code| u32::from_str_radix(code, 16).ok())
+            .and_then(char::from_u32)
+            .ok_or_else(|| self.error("hexadecimal digits of a character"))?;
+        self.at += digits;
+        Ok(c)
+    }
+}

@@ -1,0 +1,81 @@
+//! Arrays saved by numpy: NPY (one array) and NPZ (a zip of them).
+//!
+//! `header` says what an array is, `layout` where its particles are, `archive` looks
+//! through an NPZ; the
+//! shared column reader decodes. Nothing is ever unpickled: a pickle is a program. The header parser
+//! is our own because `npyz` allocates what a damaged header asks for and brings a parser generator
+//! and big integers with it for one dictionary. After NEP 1 and `numpy/lib/format.py`.
+
+mod archive;
+mod dtype;
+mod header;
+mod layout;
+mod literal;
+mod member;
+#[cfg(test)]
+mod tests;
+
+use self::header::Header;
+use self::layout::Layout;
+use super::Step;
+use super::columns;
+use crate::{ParseError, RawParticles};
+
+/// The time steps that `bytes` hold: as many as the first dimension of (frames, N, 3), else one.
+///
+/// # Errors
+/// [`ParseError::Malformed`] for damaged files; [`ParseError::Unsupported`] for pickled objects and
+/// for arrays that are no positions, saying what to save instead.
+pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    if archive::is_zip(bytes) {
+        return archive::Archive::open(bytes)?.steps();
+    }
+    let header = Header::parse(bytes)?;
+    header.check_items(bytes.len())?;
+    Ok(layout_steps(&Layout::of(&header)?, bytes.len()))
+}
+
+/// Reads one of the [`steps`].
+///
+/// Positions keep their precision; two coordinates lie in the plane z = 0. Numeric fields of a
+/// structured array, and numeric members of an archive with one entry a particle, become attributes.
+///
+/// # Errors
+/// As [`steps`]; [`ParseError::Malformed`] if there is no such step.
+pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    if archive::is_zip(bytes) {
+        return archive::Archive::open(bytes)?.read(step.index);
+    }
+    let header = Header::parse(bytes)?;
+    read_array(bytes, &header, step.index)
+}
+
+/// The particles of one array in step `frame`.
+fn read_array(bytes: &[u8], header: &Header, frame: usize) -> Result<RawParticles, ParseError> {
+    header.check_items(bytes.len())?;
+    let layout = Layout::of(header)?;
+    check_frame(&layout, frame)?;
+    let columns = layout.columns(header, frame)?;
+    columns::particles(bytes, layout.count, columns.axes, columns.attributes)
+}
+
+fn check_frame(layout: &Layout, frame: usize) -> Result<(), ParseError> {
+    let frames = layout.frames.unwrap_or(1);
+    if frame < frames {
+        return Ok(());
+    }
+    Err(ParseError::malformed(
+        0,
+        format!("step {frame} is not among the {frames} of the file"),
+    ))
+}
+
+/// All steps share one header, so each spans the whole file.
+fn layout_steps(layout: &Layout, len: usize) -> Vec<Step> {
+    (0..layout.frames.unwrap_or(1))
+        .map(|index| Step {
+            index,
+            ..Step::whole(len)
+        })
+        .collect()
+}
