@@ -1,3 +1,5 @@
+//! Real BGEO files, and ones made by hand for what these do not have.
+
 use proptest::prelude::*;
 
 use super::*;

@@ -1,10 +1,9 @@
 //! Arrays saved by numpy: NPY (one array) and NPZ (a zip of them).
 //!
-//! `header` says what an array is, `layout` where its particles are, `archive` looks
-//! through an NPZ; the
-//! shared column reader decodes. Nothing is ever unpickled: a pickle is a program. The header parser
-//! is our own because `npyz` allocates what a damaged header asks for and brings a parser generator
-//! and big integers with it for one dictionary. After NEP 1 and `numpy/lib/format.py`.
+//! `header` says what an array is, `layout` where its particles are, `archive` looks through an NPZ;
+//! the shared column reader decodes. Nothing is ever unpickled: a pickle is a program. The header
+//! parser is our own because `npyz` allocates what a damaged header asks for and brings a parser
+//! generator and big integers with it for one dictionary. After NEP 1 and `numpy/lib/format.py`.
 
 mod archive;
 mod dtype;
