@@ -1,0 +1,224 @@
+//! Numbers written as text, for the ASCII variants of both VTK formats: free-form, any number a
+//! line, with the odd spellings of NaN and infinity that C libraries print.
+
+use crate::{AttributeData, ParseError, ScalarType};
+
+/// Parses `count` numbers of type `scalar` from `text` beginning at byte `at`; returns them and the
+/// byte after the last.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if there are fewer, or one is no number of that type; nothing is
+/// allocated for a count that the text cannot hold.
+pub(in crate::read) fn parse_values(
+    text: &[u8],
+    at: usize,
+    count: usize,
+    scalar: ScalarType,
+) -> Result<(AttributeData, usize), ParseError> {
+    let rest = text.get(at..).unwrap_or_default();
+    // A number takes a digit and a separator at least.
+    if count > rest.len().div_ceil(2) {
+        return Err(too_few(at, count, rest.len()));
+    }
+    macro_rules! parse {
+        ($variant:ident, $ty:ty) => {{
+            let (values, end) = parse_tokens::<$ty>(text, at, count)?;
+            (AttributeData::$variant(values), end)
+        }};
+    }
+    Ok(match scalar {
+        ScalarType::I8 => parse!(I8, i8),
+        ScalarType::U8 => parse!(U8, u8),
+        ScalarType::I16 => parse!(I16, i16),
+        ScalarType::U16 => parse!(U16, u16),
+        ScalarType::I32 => parse!(I32, i32),
+        ScalarType::U32 => parse!(U32, u32),
+        ScalarType::I64 => parse!(I64, i64),
+        ScalarType::U64 => parse!(U64, u64),
+        ScalarType::F32 => parse!(F32, f32),
+        ScalarType::F64 => parse!(F64, f64),
+    })
+}
+
+/// The byte after the next `count` words from `at` on, whatever they are.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if there are fewer.
+pub(in crate::read) fn skip_words(
+    text: &[u8],
+    at: usize,
+    count: usize,
+) -> Result<usize, ParseError> {
+    let left = text.len().saturating_sub(at);
+    if count > left.div_ceil(2) {
+        return Err(too_few(at, count, left));
+    }
+    let mut words = Words { text, at };
+    for done in 0..count {
+        if words.next().is_none() {
+            return Err(ends_after(text.len(), done, count));
+        }
+    }
+    Ok(words.at)
+}
+
+fn too_few(at: usize, count: usize, left: usize) -> ParseError {
+    ParseError::malformed(at, format!("{count} numbers wanted, {left} bytes are left"))
+}
+
+fn ends_after(at: usize, done: usize, count: usize) -> ParseError {
+    ParseError::malformed(
+        at,
+        format!("{count} numbers wanted, the text ends after {done}"),
+    )
+}
+
+/// Words with a position: after each, `at` is the byte behind it.
+struct Words<'a> {
+    text: &'a [u8],
+    at: usize,
+}
+
+impl<'a> Iterator for Words<'a> {
+    type Item = &'a [u8];
+
+    fn next(&mut self) -> Option<&'a [u8]> {
+        let rest = self.text.get(self.at..)?;
+        let start = rest.iter().position(|b| !b.is_ascii_whitespace())?;
+        let word = rest.get(start..)?;
+        let length = word
+            .iter()
+            .position(u8::is_ascii_whitespace)
+            .unwrap_or(word.len());
+        self.at += start + length;
+        word.get(..length)
+    }
+}
+
+fn parse_tokens<T: Number>(
+    text: &[u8],
+    at: usize,
+    count: usize,
+) -> Result<(Vec<T>, usize), ParseError> {
+    let mut words = Words { text, at };
+    let mut values = Vec::with_capacity(count);
+    while values.len() < count {
+        let Some(word) = words.next() else {
+            return Err(ends_after(text.len(), values.len(), count));
+        };
+        let parsed = std::str::from_utf8(word).ok().and_then(T::parse);
+        let Some(value) = parsed else {
+            let shown = word.get(..24).unwrap_or(word).escape_ascii();
+            return Err(ParseError::malformed(
+                words.at - word.len(),
+                format!("`{shown}` is no {}", T::NAME),
+            ));
+        };
+        values.push(value);
+    }
+    Ok((values, words.at))
+}
+
+trait Number: Sized {
+    const NAME: &str;
+    fn parse(word: &str) -> Option<Self>;
+}
+
+impl Number for f32 {
+    const NAME: &str = "f32";
+    fn parse(word: &str) -> Option<Self> {
+        #[expect(clippy::cast_possible_truncation, reason = "rounds to the asked type")]
+        word.parse()
+            .ok()
+            .or_else(|| odd_float(word).map(|v| v as f32))
+    }
+}
+
+impl Number for f64 {
+    const NAME: &str = "f64";
+    fn parse(word: &str) -> Option<Self> {
+        word.parse().ok().or_else(|| odd_float(word))
+    }
+}
+
+macro_rules! integer_number {
+    ($($ty:ty),*) => {$(
+        impl Number for $ty {
+            const NAME: &str = stringify!($ty);
+            fn parse(word: &str) -> Option<Self> {
+                word.parse().ok().or_else(|| integer_as_float(word)?.try_into().ok())
+            }
+        }
+    )*};
+}
+integer_number!(i8, u8, i16, u16, i32, u32, i64, u64);
+
+/// Integers that a writer printed as floats: `12.0`, `1e6`.
+fn integer_as_float(word: &str) -> Option<i64> {
+    // Up to here every integer is exact in f64.
+    const EXACT: f64 = 9_007_199_254_740_992.0;
+    let value: f64 = word.parse().ok()?;
+    #[expect(clippy::cast_possible_truncation, reason = "whole and within 2^53")]
+    (value.fract() == 0.0 && value.abs() <= EXACT).then_some(value as i64)
+}
+
+/// Spellings beyond Rust's: `-1.#IND`, `1.#QNAN`, `1.#INF` and `nan(ind)` of Microsoft's C library,
+/// `1.0D+00` of Fortran.
+fn odd_float(word: &str) -> Option<f64> {
+    let lower = word.to_ascii_lowercase();
+    let negative = lower.starts_with('-');
+    if lower.contains("#inf") {
+        return Some(if negative {
+            f64::NEG_INFINITY
+        } else {
+            f64::INFINITY
+        });
+    }
+    if ["#ind", "#qnan", "#snan", "nan("]
+        .iter()
+        .any(|m| lower.contains(m))
+    {
+        return Some(f64::NAN);
+    }
+    lower
+        .contains('d')
+        .then(|| lower.replace('d', "e").parse().ok())?
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn odd_spellings_are_numbers() {
+        let text = b"nan -inf -1.#IND 1.#INF -1.#INF00 -nan(ind) 1.5D+01 Infinity";
+        let (data, end) = parse_values(text, 0, 8, ScalarType::F32).unwrap();
+        let AttributeData::F32(v) = data else {
+            panic!("not f32")
+        };
+        assert!(v[0].is_nan() && v[2].is_nan() && v[5].is_nan());
+        assert_eq!(
+            (v[1], v[3], v[4]),
+            (f32::NEG_INFINITY, f32::INFINITY, f32::NEG_INFINITY)
+        );
+        assert_eq!((v[6], v[7]), (15.0, f32::INFINITY));
+        assert_eq!(end, text.len());
+    }
+
+    #[test]
+    fn integers_stay_exact_and_in_range() {
+        let (data, _) = parse_values(b"18446744073709551615 12.0", 0, 2, ScalarType::U64).unwrap();
+        assert_eq!(data, AttributeData::U64(vec![u64::MAX, 12]));
+        assert!(parse_values(b"256", 0, 1, ScalarType::U8).is_err());
+        assert!(parse_values(b"-1", 0, 1, ScalarType::U32).is_err());
+        assert!(parse_values(b"1.5", 0, 1, ScalarType::I32).is_err());
+    }
+
+    #[test]
+    fn counts_beyond_the_text_are_refused_at_once() {
+        assert!(parse_values(b"1 2 3", 0, usize::MAX, ScalarType::F64).is_err());
+        assert!(parse_values(b"1  2 ", 0, 3, ScalarType::F64).is_err());
+        assert!(skip_words(b"1 2 3", 0, usize::MAX).is_err());
+        assert_eq!(skip_words(b"1 2 3", 0, 2), Ok(3));
+    }
+}

@@ -1,0 +1,257 @@
+//! The numbers behind a keyword line: what the type names mean and how many bytes they take, in
+//! ASCII and in (always big-endian) binary.
+
+use super::ascii::{parse_values, skip_words};
+use super::cursor::{Cursor, shown};
+use super::keywords::is_section_start;
+use crate::{AttributeData, Endian, ParseError, ScalarType};
+
+/// How the file stores numbers; line 3 of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Encoding {
+    Ascii,
+    Binary,
+}
+
+/// A type name of the format.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Stored {
+    /// The same size everywhere.
+    Scalar(ScalarType),
+    /// Size in binary files differs by writer: the usual type, then the other.
+    Either(ScalarType, ScalarType),
+    /// Eight to a byte in binary files.
+    Bit,
+    /// Text, one a line or with binary lengths; never a particle attribute here.
+    Text,
+}
+
+impl Stored {
+    /// The type called `name` in whatever case.
+    pub(super) fn parse(name: &[u8]) -> Option<Self> {
+        use ScalarType::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
+        let name = name.to_ascii_lowercase();
+        Some(match name.as_slice() {
+            b"bit" => Self::Bit,
+            b"char" | b"signed_char" | b"vtktypeint8" => Self::Scalar(I8),
+            b"unsigned_char" | b"vtktypeuint8" => Self::Scalar(U8),
+            b"short" | b"vtktypeint16" => Self::Scalar(I16),
+            b"unsigned_short" | b"vtktypeuint16" => Self::Scalar(U16),
+            b"int" | b"vtktypeint32" => Self::Scalar(I32),
+            b"unsigned_int" | b"vtktypeuint32" => Self::Scalar(U32),
+            b"float" | b"vtktypefloat32" => Self::Scalar(F32),
+            b"double" | b"vtktypefloat64" => Self::Scalar(F64),
+            b"vtktypeint64" | b"long_long" => Self::Scalar(I64),
+            b"vtktypeuint64" | b"unsigned_long_long" => Self::Scalar(U64),
+            // Written on Windows, `long` has 4 bytes.
+            b"long" => Self::Either(I64, I32),
+            b"unsigned_long" => Self::Either(U64, U32),
+            // 8 bytes in memory, but VTK writes `int`.
+            b"vtkidtype" => Self::Either(I32, I64),
+            b"string" | b"utf8_string" => Self::Text,
+            _ => return None,
+        })
+    }
+}
+
+/// Parses a type name.
+///
+/// # Errors
+/// Malformed, naming it, if there is no such type.
+pub(super) fn stored_type(at: usize, name: &[u8]) -> Result<Stored, ParseError> {
+    Stored::parse(name)
+        .ok_or_else(|| ParseError::malformed(at, format!("`{}` is no type of VTK", shown(name))))
+}
+
+/// `tuples * components`, checked.
+pub(super) fn value_count(
+    at: usize,
+    tuples: usize,
+    components: usize,
+) -> Result<usize, ParseError> {
+    tuples.checked_mul(components).ok_or_else(|| {
+        ParseError::malformed(at, format!("{tuples} tuples of {components} are too many"))
+    })
+}
+
+/// Reads `count` numbers at the cursor. `what` names them in errors.
+///
+/// # Errors
+/// Malformed if the file is too short for them or a text is no number; Unsupported for text.
+pub(super) fn read_values(
+    cursor: &mut Cursor<'_>,
+    encoding: Encoding,
+    stored: Stored,
+    count: usize,
+    what: &str,
+) -> Result<AttributeData, ParseError> {
+    if encoding == Encoding::Ascii {
+        let scalar = match stored {
+            Stored::Scalar(scalar) => scalar,
+            Stored::Either(ScalarType::U64 | ScalarType::U32, _) => ScalarType::U64,
+            Stored::Either(..) => ScalarType::I64,
+            Stored::Bit => ScalarType::U8,
+            Stored::Text => return Err(text_is_no_number(what)),
+        };
+        let (data, end) = parse_values(cursor.bytes(), cursor.at(), count, scalar)?;
+        cursor.go_to(end);
+        return Ok(data);
+    }
+    let scalar = match stored {
+        Stored::Scalar(scalar) => scalar,
+        Stored::Either(usual, other) => likelier(cursor, usual, other, count),
+        Stored::Bit => return read_bits(cursor, count, what),
+        Stored::Text => return Err(text_is_no_number(what)),
+    };
+    let at = cursor.at();
+    let bytes = take_numbers(cursor, scalar, count, what)?;
+    scalar
+        .decode(Endian::Big, bytes)
+        .map_err(|error| match error {
+            ParseError::Malformed { what, .. } => ParseError::malformed(at, what),
+            other => other,
+        })
+}
+
+/// Moves the cursor behind `count` values without keeping them.
+///
+/// # Errors
+/// Malformed if the file is too short for them.
+pub(super) fn skip_values(
+    cursor: &mut Cursor<'_>,
+    encoding: Encoding,
+    stored: Stored,
+    count: usize,
+    what: &str,
+) -> Result<(), ParseError> {
+    if stored == Stored::Text {
+        return skip_texts(cursor, encoding, count, what);
+    }
+    if encoding == Encoding::Ascii {
+        let end = skip_words(cursor.bytes(), cursor.at(), count)?;
+        cursor.go_to(end);
+        return Ok(());
+    }
+    let scalar = match stored {
+        Stored::Scalar(scalar) => scalar,
+        Stored::Either(usual, other) => likelier(cursor, usual, other, count),
+        Stored::Bit | Stored::Text => {
+            return read_bit_bytes(cursor, count, what).map(|_| ());
+        }
+    };
+    take_numbers(cursor, scalar, count, what).map(|_| ())
+}
+
+/// The type of the two after whose payload the file goes on sensibly; the usual one in doubt.
+fn likelier(cursor: &Cursor<'_>, usual: ScalarType, other: ScalarType, count: usize) -> ScalarType {
+    let goes_on = |scalar: ScalarType| {
+        let mut ahead = cursor.clone();
+        let skipped = count.checked_mul(scalar.size()).and_then(|n| ahead.take(n));
+        skipped.is_some()
+            && match ahead.keyword_line() {
+                Ok(Some(line)) => is_section_start(&line),
+                Ok(None) => true,
+                Err(_) => false,
+            }
+    };
+    if !goes_on(usual) && goes_on(other) {
+        other
+    } else {
+        usual
+    }
+}
+
+fn take_numbers<'a>(
+    cursor: &mut Cursor<'a>,
+    scalar: ScalarType,
+    count: usize,
+    what: &str,
+) -> Result<&'a [u8], ParseError> {
+    let bytes = count.checked_mul(scalar.size());
+    bytes.and_then(|bytes| cursor.take(bytes)).ok_or_else(|| {
+        ParseError::malformed(
+            cursor.at(),
+            format!(
+                "{what}: {count} numbers of type {} need {} bytes, {} are left",
+                scalar.name(),
+                count as u128 * scalar.size() as u128,
+                cursor.rest().len()
+            ),
+        )
+    })
+}
+
+fn read_bit_bytes<'a>(
+    cursor: &mut Cursor<'a>,
+    count: usize,
+    what: &str,
+) -> Result<&'a [u8], ParseError> {
+    let bytes = count.div_ceil(8);
+    cursor.take(bytes).ok_or_else(|| {
+        ParseError::malformed(
+            cursor.at(),
+            format!(
+                "{what}: {count} bits need {bytes} bytes, {} are left",
+                cursor.rest().len()
+            ),
+        )
+    })
+}
+
+/// Bits as bytes of 0 or 1; the first is the highest of its byte.
+fn read_bits(
+    cursor: &mut Cursor<'_>,
+    count: usize,
+    what: &str,
+) -> Result<AttributeData, ParseError> {
+    let packed = read_bit_bytes(cursor, count, what)?;
+    let mut bits = Vec::with_capacity(count);
+    for byte in packed {
+        bits.extend((0..8).rev().map(|shift| byte >> shift & 1));
+    }
+    bits.truncate(count);
+    Ok(AttributeData::U8(bits))
+}
+
+/// Strings: a line each, or in binary a length of 1, 2, 4 or 8 bytes (told by the two highest bits)
+/// and the text.
+fn skip_texts(
+    cursor: &mut Cursor<'_>,
+    encoding: Encoding,
+    count: usize,
+    what: &str,
+) -> Result<(), ParseError> {
+    for done in 0..count {
+        let skipped = match encoding {
+            Encoding::Ascii => cursor.line()?.map(|_| ()),
+            Encoding::Binary => skip_binary_text(cursor),
+        };
+        if skipped.is_none() {
+            return Err(ParseError::malformed(
+                cursor.at(),
+                format!("{what}: the file ends after {done} of {count} strings"),
+            ));
+        }
+    }
+    Ok(())
+}
+
+fn skip_binary_text(cursor: &mut Cursor<'_>) -> Option<()> {
+    let first = *cursor.rest().first()?;
+    let width = match first >> 6 {
+        3 => 1,
+        2 => 2,
+        1 => 4,
+        _ => 8,
+    };
+    let mut length = 0_u64;
+    for (index, byte) in cursor.take(width)?.iter().enumerate() {
+        let byte = if index == 0 { byte & 0x3f } else { *byte };
+        length = length << 8 | u64::from(byte);
+    }
+    cursor.take(usize::try_from(length).ok()?).map(|_| ())
+}
+
+fn text_is_no_number(what: &str) -> ParseError {
+    ParseError::unsupported(format!("{what} is of type string; write it as numbers"))
+}

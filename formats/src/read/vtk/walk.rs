@@ -1,0 +1,327 @@
+//! The walk through a legacy file, from keyword line to keyword line, and what it finds.
+
+use super::MOST_COMPONENTS;
+use super::attributes::{Header, count, field_array, keyword_array};
+use super::cursor::{Cursor, Line, shown};
+use super::keywords::{is_keyword, is_section_start, is_time_name, parse_version};
+use super::payload::{Encoding, Stored, read_values, skip_values, stored_type, value_count};
+use super::positions::positions;
+use crate::{Attribute, ParseError, Positions};
+
+/// How far to walk.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Until {
+    Points,
+    End,
+}
+
+/// What attributes at this place belong to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Section {
+    /// The dataset itself: time and the like, any length.
+    Dataset,
+    /// Particles, this many.
+    Points(usize),
+    /// Cells, this many; of no interest.
+    Cells(usize),
+}
+
+/// The walk through the file and what it has found so far.
+pub(super) struct Walker<'a> {
+    cursor: Cursor<'a>,
+    encoding: Encoding,
+    major: u32,
+    section: Section,
+    dataset_named: bool,
+    /// Components of the array just passed: METADATA may name each on a line.
+    components: usize,
+    pub(super) positions: Option<Positions>,
+    pub(super) attributes: Vec<Attribute>,
+    pub(super) time: Option<f64>,
+}
+
+impl<'a> Walker<'a> {
+    /// Reads the first three lines.
+    pub(super) fn begin(bytes: &'a [u8]) -> Result<Self, ParseError> {
+        let mut cursor = Cursor::new(bytes);
+        let ended = || ParseError::malformed(bytes.len(), "the file ends inside its header");
+        let first = cursor.line()?.ok_or_else(ended)?;
+        let major = parse_version(&first)?;
+        let _title = cursor.line()?.ok_or_else(ended)?;
+        let kind = cursor.keyword_line()?.ok_or_else(ended)?;
+        let encoding = if kind.starts_with("BINARY") {
+            Encoding::Binary
+        } else if kind.starts_with("ASCII") {
+            Encoding::Ascii
+        } else {
+            return Err(ParseError::malformed(
+                kind.at,
+                format!("line 3 is `{}`, not ASCII or BINARY", kind.shown()),
+            ));
+        };
+        Ok(Self {
+            cursor,
+            encoding,
+            major,
+            section: Section::Dataset,
+            dataset_named: false,
+            components: 1,
+            positions: None,
+            attributes: Vec::new(),
+            time: None,
+        })
+    }
+
+    pub(super) fn walk(&mut self, until: Until) -> Result<(), ParseError> {
+        while let Some(line) = self.cursor.keyword_line()? {
+            let keyword = line.first_word().to_ascii_uppercase();
+            match keyword.as_slice() {
+                b"DATASET" => self.dataset(&line)?,
+                b"POINTS" if until == Until::Points => return Ok(()),
+                b"POINTS" => self.points(&line)?,
+                b"CELLS" | b"VERTICES" | b"LINES" | b"POLYGONS" | b"TRIANGLE_STRIPS" => {
+                    self.cells(&line)?;
+                }
+                b"CELL_TYPES" => {
+                    let types = count(&line, line.words().get(1))?;
+                    self.skip(&line, "int", types)?;
+                }
+                b"POINT_DATA" => self.point_data(&line)?,
+                b"CELL_DATA" => {
+                    self.section = Section::Cells(count(&line, line.words().get(1))?);
+                }
+                b"FIELD" => self.field(&line)?,
+                b"METADATA" => self.metadata()?,
+                b"LOOKUP_TABLE" => self.lookup_table(&line)?,
+                _ => self.attribute(&line)?,
+            }
+        }
+        Ok(())
+    }
+
+    fn dataset(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        let words = line.words();
+        let kind = words
+            .get(1)
+            .copied()
+            .unwrap_or_default()
+            .to_ascii_uppercase();
+        match kind.as_slice() {
+            b"POLYDATA" | b"UNSTRUCTURED_GRID" => {
+                self.dataset_named = true;
+                Ok(())
+            }
+            b"STRUCTURED_POINTS" | b"STRUCTURED_GRID" | b"RECTILINEAR_GRID" | b"IMAGE_DATA"
+            | b"FIELD" | b"TABLE" | b"TREE" | b"DIRECTED_GRAPH" | b"UNDIRECTED_GRAPH" => {
+                Err(ParseError::unsupported(format!(
+                    "DATASET {} holds no particles; write POLYDATA or UNSTRUCTURED_GRID",
+                    shown(&kind)
+                )))
+            }
+            _ => Err(ParseError::malformed(
+                line.at,
+                format!("`{}` is no DATASET of VTK", line.shown()),
+            )),
+        }
+    }
+
+    fn points(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        if !self.dataset_named {
+            return Err(ParseError::malformed(line.at, "POINTS before DATASET"));
+        }
+        if self.positions.is_some() {
+            return Err(ParseError::malformed(line.at, "POINTS for the second time"));
+        }
+        let words = line.words();
+        let particles = count(line, words.get(1))?;
+        let name = words.get(2).copied().unwrap_or_default();
+        let stored = stored_type(line.at, name)?;
+        let numbers = value_count(line.at, particles, 3)?;
+        let data = read_values(&mut self.cursor, self.encoding, stored, numbers, "POINTS")?;
+        self.positions = Some(positions(data));
+        self.components = 3;
+        Ok(())
+    }
+
+    fn point_data(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        let stated = count(line, line.words().get(1))?;
+        match self.positions.as_ref().map(Positions::len) {
+            Some(particles) if particles == stated => {
+                self.section = Section::Points(particles);
+                Ok(())
+            }
+            Some(particles) => Err(ParseError::malformed(
+                line.at,
+                format!("POINT_DATA for {stated} points, POINTS has {particles}"),
+            )),
+            None => Err(ParseError::malformed(line.at, "POINT_DATA before POINTS")),
+        }
+    }
+
+    /// Cells of any kind. Up to version 4.2 the second number counts integers; from 5.0 on the two
+    /// numbers are the lengths of an OFFSETS and a CONNECTIVITY array.
+    fn cells(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        let words = line.words();
+        let first = count(line, words.get(1))?;
+        let second = count(line, words.get(2))?;
+        let mut ahead = self.cursor.clone();
+        let split = self.major >= 5
+            && ahead
+                .keyword_line()?
+                .is_some_and(|next| next.starts_with("OFFSETS"));
+        if !split {
+            return self.skip(line, "int", second);
+        }
+        for (keyword, values) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
+            let next = self.cursor.keyword_line()?;
+            let Some(next) = next.filter(|next| next.starts_with(keyword)) else {
+                return Err(ParseError::malformed(
+                    self.cursor.at(),
+                    format!("{keyword} is missing after `{}`", line.shown()),
+                ));
+            };
+            let words = next.words();
+            let name = words.get(1).copied().unwrap_or_default();
+            let stored = stored_type(next.at, name)?;
+            skip_values(&mut self.cursor, self.encoding, stored, values, keyword)?;
+            if self.next_is("METADATA") {
+                self.components = 1;
+                self.cursor.keyword_line()?;
+                self.metadata()?;
+            }
+        }
+        Ok(())
+    }
+
+    fn skip(&mut self, line: &Line<'_>, name: &str, values: usize) -> Result<(), ParseError> {
+        let stored = stored_type(line.at, name.as_bytes())?;
+        let what = line.shown();
+        self.components = 1;
+        skip_values(&mut self.cursor, self.encoding, stored, values, &what)
+    }
+
+    /// `LOOKUP_TABLE name size`: RGBA, bytes in binary.
+    fn lookup_table(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        let words = line.words();
+        let colors = count(line, words.last())?;
+        let values = value_count(line.at, colors, 4)?;
+        self.skip(line, "unsigned_char", values)
+    }
+
+    /// `FIELD name k` and its arrays. Fewer than `k` may follow: SPlisHSPlasH counts arrays that
+    /// it does not write.
+    fn field(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        let arrays = count(line, line.words().last())?;
+        let mut done = 0;
+        while done < arrays {
+            let before = self.cursor.clone();
+            let Some(next) = self.cursor.keyword_line()? else {
+                return Ok(());
+            };
+            if let Some(header) = field_array(&next) {
+                self.array(&next, header)?;
+            } else if next.starts_with("METADATA") {
+                self.metadata()?;
+                continue;
+            } else if is_keyword(next.first_word()) {
+                self.cursor = before;
+                return Ok(());
+            } else if !next.starts_with("NULL_ARRAY") {
+                return Err(ParseError::malformed(
+                    next.at,
+                    format!("`{}` is no array of a FIELD", next.shown()),
+                ));
+            }
+            done += 1;
+        }
+        Ok(())
+    }
+
+    fn attribute(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+        match keyword_array(line, &mut self.cursor, self.encoding)? {
+            Some(header) => self.array(line, header),
+            None => Err(ParseError::malformed(
+                line.at,
+                format!("`{}` where a keyword should be", line.shown()),
+            )),
+        }
+    }
+
+    /// Takes the payload of one array and keeps it if it is numeric and per particle.
+    fn array(&mut self, line: &Line<'_>, header: Header) -> Result<(), ParseError> {
+        let Header {
+            name,
+            components,
+            tuples,
+            stored,
+        } = header;
+        let particles = self.positions.as_ref().map(Positions::len);
+        // Some writers leave POINT_DATA out; outside a FIELD that is what they mean.
+        let section = match self.section {
+            Section::Points(n) | Section::Cells(n) => Some(n),
+            Section::Dataset => particles,
+        };
+        let Some(tuples) = tuples.or(section) else {
+            return Err(ParseError::malformed(
+                line.at,
+                format!("`{}` before POINTS", line.shown()),
+            ));
+        };
+        let is_ours = match self.section {
+            Section::Points(n) => n == tuples,
+            Section::Cells(_) => false,
+            Section::Dataset => is_keyword(line.first_word()) && particles == Some(tuples),
+        };
+        let values = value_count(line.at, tuples, components)?;
+        if components > MOST_COMPONENTS {
+            return Err(ParseError::malformed(
+                line.at,
+                format!("{components} components are too many"),
+            ));
+        }
+        self.components = components;
+        let what = line.shown();
+        let is_time = self.section == Section::Dataset && values == 1 && is_time_name(&name);
+        if stored == Stored::Text || components == 0 || !(is_ours || is_time) {
+            return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
+        }
+        let data = read_values(&mut self.cursor, self.encoding, stored, values, &what)?;
+        if is_time {
+            self.time = Some(data.get_f64(0));
+        } else {
+            self.attributes.push(Attribute {
+                name,
+                components,
+                data,
+            });
+        }
+        Ok(())
+    }
+
+    /// Skips a METADATA block. An unnamed component has an empty line of its own, so the first
+    /// empty line need not be the end; what follows it always begins with a known keyword or an
+    /// array of the FIELD.
+    fn metadata(&mut self) -> Result<(), ParseError> {
+        loop {
+            let before = self.cursor.clone();
+            let Some(line) = self.cursor.line()? else {
+                return Ok(());
+            };
+            if line.starts_with("COMPONENT_NAMES") {
+                for _ in 0..self.components {
+                    if self.cursor.line()?.is_none() {
+                        return Ok(());
+                    }
+                }
+            } else if is_section_start(&line) {
+                self.cursor = before;
+                return Ok(());
+            }
+        }
+    }
+
+    fn next_is(&self, keyword: &str) -> bool {
+        let next = self.cursor.clone().keyword_line();
+        matches!(next, Ok(Some(line)) if line.starts_with(keyword))
+    }
+}

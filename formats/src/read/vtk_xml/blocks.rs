@@ -1,0 +1,264 @@
+//! The bytes of one array: length or block headers, base64 and its padding, compressed blocks.
+//!
+//! Without a compressor an array is one integer (its length in bytes) and the data; in base64 both
+//! are one run of characters from VTK and two from pyvisfile. With one it is the number of blocks,
+//! the block size, the size of the last block, the compressed size of each, and the blocks; in
+//! base64 the header is a run of its own.
+
+use std::borrow::Cow;
+
+use base64::Engine;
+use base64::alphabet;
+use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
+use rayon::prelude::*;
+
+use super::compressor::Compressor;
+use crate::Endian;
+
+/// Padding may be missing at the end of a run; bits beyond the last byte do not matter.
+const BASE64: GeneralPurpose = GeneralPurpose::new(
+    &alphabet::STANDARD,
+    GeneralPurposeConfig::new()
+        .with_decode_padding_mode(DecodePaddingMode::Indifferent)
+        .with_decode_allow_trailing_bits(true),
+);
+
+/// How arrays are stored; attributes of the root element.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Encoding {
+    pub(super) endian: Endian,
+    pub(super) header: HeaderType,
+    pub(super) compressor: Option<Compressor>,
+}
+
+/// The integers in headers.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum HeaderType {
+    U32,
+    U64,
+}
+
+impl HeaderType {
+    const fn size(self) -> usize {
+        match self {
+            Self::U32 => 4,
+            Self::U64 => 8,
+        }
+    }
+}
+
+/// Bytes or characters that begin with the header of an array and go on at least to its end.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Source<'a> {
+    Raw(&'a [u8]),
+    Base64(&'a [u8]),
+}
+
+impl<'a> Source<'a> {
+    /// The next `count` bytes, encoded as one run, and the source behind them.
+    fn run(self, count: usize) -> Result<(Cow<'a, [u8]>, Self), String> {
+        match self {
+            Self::Raw(bytes) => match bytes.split_at_checked(count) {
+                Some((run, rest)) => Ok((Cow::Borrowed(run), Self::Raw(rest))),
+                None => Err(format!("{count} bytes needed, {} are left", bytes.len())),
+            },
+            Self::Base64(chars) => {
+                let (mut bytes, rest) = decode_run(chars, count)?;
+                bytes.truncate(count);
+                Ok((Cow::Owned(bytes), Self::Base64(rest)))
+            }
+        }
+    }
+
+    /// The length header of `header` bytes, and where its data are.
+    fn length_and_data(self, header: usize) -> Result<(Cow<'a, [u8]>, DataRun<'a>), String> {
+        match self {
+            Self::Raw(_) => {
+                let (length, behind) = self.run(header)?;
+                Ok((length, DataRun::New(behind)))
+            }
+            Self::Base64(chars) => {
+                let (length, rest) = decode_run(chars, header)?;
+                // Padding that ends exactly with the header ends the run; one byte of data in the
+                // same run can give padding too, but of another length.
+                let data = if length.len() == header {
+                    DataRun::New(Self::Base64(rest))
+                } else {
+                    DataRun::Same(self)
+                };
+                Ok((Cow::Owned(length), data))
+            }
+        }
+    }
+}
+
+/// Decodes the characters that hold `count` bytes, up to two bytes more; and what follows them.
+fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), String> {
+    let wanted = count.div_ceil(3).checked_mul(4);
+    let wanted = wanted.ok_or_else(|| format!("{count} bytes are too many"))?;
+    let (run, rest) = take_chars(chars, wanted);
+    let bytes = BASE64
+        .decode(run)
+        .map_err(|error| format!("bad base64: {error}"))?;
+    if bytes.len() < count {
+        return Err(format!("{count} bytes needed, {} are left", bytes.len()));
+    }
+    Ok((bytes, rest))
+}
+
+/// Where data without a compressor are.
+enum DataRun<'a> {
+    /// In a run of their own (or raw).
+    New(Source<'a>),
+    /// Behind the header in the run that begins here.
+    Same(Source<'a>),
+}
+
+/// Up to `count` characters that are not white space (fewer at the end), and the rest.
+fn take_chars(chars: &[u8], count: usize) -> (Cow<'_, [u8]>, &[u8]) {
+    let chars = chars.trim_ascii_start();
+    let near = chars.get(..count).unwrap_or(chars.trim_ascii_end());
+    if !near.iter().any(u8::is_ascii_whitespace) {
+        return (
+            Cow::Borrowed(near),
+            chars.get(near.len()..).unwrap_or_default(),
+        );
+    }
+    let mut taken = Vec::with_capacity(near.len());
+    let mut used = 0;
+    for byte in chars {
+        if taken.len() == count {
+            break;
+        }
+        used += 1;
+        if !byte.is_ascii_whitespace() {
+            taken.push(*byte);
+        }
+    }
+    (Cow::Owned(taken), chars.get(used..).unwrap_or_default())
+}
+
+/// The `need` bytes of an array, borrowed if the file holds them as they are.
+///
+/// # Errors
+/// What is wrong: the header states another length, the source is too short, or a block is damaged.
+/// Nothing is allocated that the bytes at hand could not fill.
+pub(super) fn payload<'a>(
+    source: Source<'a>,
+    encoding: Encoding,
+    need: usize,
+) -> Result<Cow<'a, [u8]>, String> {
+    match encoding.compressor {
+        None => plain(source, encoding, need),
+        Some(compressor) => compressed(source, encoding, compressor, need),
+    }
+}
+
+fn plain<'a>(source: Source<'a>, encoding: Encoding, need: usize) -> Result<Cow<'a, [u8]>, String> {
+    let header = encoding.header.size();
+    let (length, data) = source.length_and_data(header)?;
+    let stated = integers(&length, encoding).next().unwrap_or(0);
+    if stated != need as u64 {
+        return Err(format!("{need} bytes needed, the header says {stated}"));
+    }
+    match data {
+        DataRun::New(source) => Ok(source.run(need)?.0),
+        DataRun::Same(source) => {
+            let whole = need.checked_add(header);
+            let whole = whole.ok_or_else(|| format!("{need} bytes are too many"))?;
+            let mut bytes = source.run(whole)?.0.into_owned();
+            bytes.drain(..header);
+            Ok(Cow::Owned(bytes))
+        }
+    }
+}
+
+fn compressed<'a>(
+    source: Source<'a>,
+    encoding: Encoding,
+    compressor: Compressor,
+    need: usize,
+) -> Result<Cow<'a, [u8]>, String> {
+    let size = encoding.header.size();
+    let (first, _) = source.run(size)?;
+    let blocks = integers(&first, encoding).next().unwrap_or(0);
+    if blocks == 0 {
+        // Some writers leave out the other two integers then.
+        return match need {
+            0 => Ok(Cow::Borrowed(&[])),
+            _ => Err(format!("{need} bytes needed, there are no blocks")),
+        };
+    }
+    let header = usize::try_from(blocks)
+        .ok()
+        .and_then(|n| n.checked_add(3)?.checked_mul(size))
+        .ok_or_else(|| format!("{blocks} blocks are too many"))?;
+    let (header, data) = source.run(header)?;
+    inflate(&header, data, encoding, compressor, need)
+}
+
+/// Decompresses all blocks, in parallel, once their sizes have been found to add up.
+fn inflate<'a>(
+    header: &[u8],
+    data: Source<'a>,
+    encoding: Encoding,
+    compressor: Compressor,
+    need: usize,
+) -> Result<Cow<'a, [u8]>, String> {
+    let mut header = integers(header, encoding);
+    let (_, block_size, last) = (header.next(), header.next(), header.next());
+    let block_size = block_size.unwrap_or(0);
+    let compressed_sizes: Vec<usize> = header
+        .map(|n| usize::try_from(n).unwrap_or(usize::MAX))
+        .collect();
+    // VTK writes 0 for a full last block, meshio the full size.
+    let last = last.filter(|n| *n != 0).unwrap_or(block_size);
+    let full_blocks = compressed_sizes.len().saturating_sub(1) as u64;
+    let total = full_blocks
+        .checked_mul(block_size)
+        .and_then(|full| full.checked_add(last));
+    if total != Some(need as u64) || last > block_size || block_size == 0 {
+        return Err(format!(
+            "{need} bytes needed, the header says {full_blocks} blocks of {block_size} and one of \
+             {last}"
+        ));
+    }
+    let block_size = usize::try_from(block_size).unwrap_or(usize::MAX).min(need);
+    let compressed_total = compressed_sizes
+        .iter()
+        .try_fold(0_usize, |sum, n| sum.checked_add(*n));
+    let compressed_total = compressed_total.ok_or("the block sizes overflow")?;
+    let (data, _) = data.run(compressed_total)?;
+    let mut blocks = Vec::with_capacity(compressed_sizes.len());
+    let mut rest: &[u8] = &data;
+    let mut left = need;
+    for size in compressed_sizes {
+        let (block, behind) = rest.split_at_checked(size).ok_or("a block is cut short")?;
+        let output = block_size.min(left);
+        if output > compressor.most_output(size) {
+            return Err(format!("{size} compressed bytes cannot hold {output}"));
+        }
+        blocks.push(block);
+        rest = behind;
+        left -= output;
+    }
+    let mut output = vec![0; need];
+    output
+        .par_chunks_mut(block_size)
+        .zip(blocks)
+        .try_for_each(|(chunk, block)| compressor.decompress(block, chunk))?;
+    Ok(Cow::Owned(output))
+}
+
+/// The integers of a header.
+fn integers(bytes: &[u8], encoding: Encoding) -> impl Iterator<Item = u64> + '_ {
+    bytes
+        .chunks_exact(encoding.header.size())
+        .map(move |chunk| {
+            let fold = |value: u64, byte: &u8| value << 8 | u64::from(*byte);
+            match encoding.endian {
+                Endian::Big => chunk.iter().fold(0, fold),
+                Endian::Little => chunk.iter().rev().fold(0, fold),
+            }
+        })
+}

@@ -1,0 +1,335 @@
+//! The XML part of the file: which arrays there are, of what type, and where their bytes lie. What
+//! the bytes say is left to [`super::blocks`].
+//!
+//! Raw appended data makes the file invalid XML (it holds `<`, `&` and NUL), so the file is cut
+//! before `<AppendedData` and only the part in front meets the XML parser.
+
+use std::borrow::Cow;
+
+use quick_xml::XmlVersion;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::reader::Reader;
+
+use super::blocks::{Encoding, HeaderType};
+use super::compressor::Compressor;
+use crate::{Endian, ParseError};
+
+/// What the XML says.
+#[derive(Debug)]
+pub(super) struct Document<'a> {
+    pub(super) encoding: Encoding,
+    /// Arrays of the dataset as a whole: the time.
+    pub(super) fields: Vec<Array<'a>>,
+    pub(super) pieces: Vec<Piece<'a>>,
+}
+
+/// One part of the particles.
+#[derive(Debug)]
+pub(super) struct Piece<'a> {
+    pub(super) points: usize,
+    pub(super) coordinates: Option<Array<'a>>,
+    pub(super) point_data: Vec<Array<'a>>,
+}
+
+/// One `<DataArray>`.
+#[derive(Debug)]
+pub(super) struct Array<'a> {
+    /// Byte where its tag ends.
+    pub(super) at: usize,
+    pub(super) name: String,
+    pub(super) type_name: String,
+    pub(super) components: Option<usize>,
+    pub(super) tuples: Option<usize>,
+    pub(super) place: Place<'a>,
+}
+
+/// Where the numbers of an array are.
+#[derive(Debug)]
+pub(super) enum Place<'a> {
+    /// As text inside the element.
+    Ascii(Text<'a>),
+    /// As base64 inside the element.
+    Inline(Text<'a>),
+    /// In the appended data, this far behind the underscore.
+    Appended(usize),
+}
+
+/// Text of an element, without that of its children.
+#[derive(Debug, Default)]
+pub(super) struct Text<'a> {
+    pub(super) at: usize,
+    pub(super) text: Cow<'a, str>,
+}
+
+/// Elements that matter; what an element means depends on its parent.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Tag {
+    Root,
+    Dataset,
+    Piece,
+    Points,
+    PointData,
+    FieldData,
+    Array,
+    Other,
+}
+
+/// How far to parse.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Until {
+    FirstPiece,
+    End,
+}
+
+impl<'a> Document<'a> {
+    /// Parses `head`, the XML in front of the appended data. `is_cut` says that appended data
+    /// follow, so that open elements at the end are right.
+    pub(super) fn parse(head: &'a str, is_cut: bool, until: Until) -> Result<Self, ParseError> {
+        let mut parser = Parser {
+            document: None,
+            path: Vec::new(),
+        };
+        let mut reader = Reader::from_str(head);
+        let mut is_closed = false;
+        loop {
+            let event = reader.read_event();
+            let at = usize::try_from(reader.buffer_position()).unwrap_or(usize::MAX);
+            match event {
+                Ok(Event::Start(start)) => {
+                    let tag = parser.open(&start, at)?;
+                    if tag == Tag::Piece && until == Until::FirstPiece {
+                        break;
+                    }
+                    parser.path.push(tag);
+                }
+                Ok(Event::Empty(start)) => {
+                    parser.open(&start, at)?;
+                }
+                Ok(Event::End(_)) => {
+                    is_closed |= parser.path.pop() == Some(Tag::Root);
+                }
+                Ok(Event::Text(text)) => parser.text(text.into_inner(), at),
+                Ok(Event::CData(text)) => parser.text(text.into_inner(), at),
+                Ok(Event::Eof) if is_cut || is_closed => break,
+                Ok(Event::Eof) => {
+                    return Err(ParseError::malformed(
+                        head.len(),
+                        "the file ends before </VTKFile>; it may still be being written",
+                    ));
+                }
+                Ok(_) => {}
+                Err(error) => return Err(bad_xml(at, &error)),
+            }
+        }
+        parser
+            .document
+            .ok_or_else(|| ParseError::malformed(0, "no <VTKFile> element"))
+    }
+}
+
+struct Parser<'a> {
+    document: Option<Document<'a>>,
+    path: Vec<Tag>,
+}
+
+impl<'a> Parser<'a> {
+    /// Takes note of an element that begins and says what it is.
+    fn open(&mut self, start: &BytesStart<'_>, at: usize) -> Result<Tag, ParseError> {
+        let name = start.local_name();
+        let name: &str = name.as_ref();
+        let Some(document) = &mut self.document else {
+            if name != "VTKFile" {
+                return Err(ParseError::malformed(
+                    at,
+                    format!("the root element is <{}>, not <VTKFile>", short(name)),
+                ));
+            }
+            self.document = Some(Document {
+                encoding: root(start, at)?,
+                fields: Vec::new(),
+                pieces: Vec::new(),
+            });
+            return Ok(Tag::Root);
+        };
+        let parent = self.path.last().copied();
+        let tag = match (parent, name) {
+            (Some(Tag::Root | Tag::Dataset | Tag::Piece), "FieldData") => Tag::FieldData,
+            (Some(Tag::Root), _) => Tag::Dataset,
+            (Some(Tag::Dataset), "Piece") => Tag::Piece,
+            (Some(Tag::Piece), "Points") => Tag::Points,
+            (Some(Tag::Piece), "PointData") => Tag::PointData,
+            (Some(Tag::Points | Tag::PointData | Tag::FieldData), "DataArray" | "Array") => {
+                Tag::Array
+            }
+            _ => Tag::Other,
+        };
+        if tag == Tag::Piece {
+            document.pieces.push(Piece {
+                points: required_count(start, at, "NumberOfPoints")?,
+                coordinates: None,
+                point_data: Vec::new(),
+            });
+        }
+        if tag == Tag::Array {
+            let array = array(start, at)?;
+            match (parent, document.pieces.last_mut()) {
+                (Some(Tag::FieldData), _) => document.fields.push(array),
+                (Some(Tag::PointData), Some(piece)) => piece.point_data.push(array),
+                // The first array is the points, whatever its name.
+                (Some(Tag::Points), Some(piece)) if piece.coordinates.is_none() => {
+                    piece.coordinates = Some(array);
+                }
+                _ => return Ok(Tag::Other),
+            }
+        }
+        Ok(tag)
+    }
+
+    /// Adds text to the array that is open, if it is the innermost element.
+    fn text(&mut self, text: Cow<'a, str>, end: usize) {
+        let mut path = self.path.iter().rev();
+        if path.next() != Some(&Tag::Array) || text.trim_ascii().is_empty() {
+            return;
+        }
+        let Some(document) = &mut self.document else {
+            return;
+        };
+        let array = match (path.next(), document.pieces.last_mut()) {
+            (Some(Tag::FieldData), _) => document.fields.last_mut(),
+            (Some(Tag::PointData), Some(piece)) => piece.point_data.last_mut(),
+            (Some(Tag::Points), Some(piece)) => piece.coordinates.as_mut(),
+            _ => None,
+        };
+        let Some(Place::Ascii(place) | Place::Inline(place)) = array.map(|a| &mut a.place) else {
+            return;
+        };
+        if place.text.is_empty() {
+            place.at = end.saturating_sub(text.len());
+            place.text = text;
+        } else {
+            let joined = place.text.to_mut();
+            joined.push(' ');
+            joined.push_str(&text);
+        }
+    }
+}
+
+/// Checks the root element and reads how arrays are encoded.
+fn root(start: &BytesStart<'_>, at: usize) -> Result<Encoding, ParseError> {
+    let kind = attribute(start, at, "type")?.unwrap_or_default();
+    match kind.as_str() {
+        "UnstructuredGrid" | "PolyData" => {}
+        "PUnstructuredGrid" | "PPolyData" => {
+            return Err(ParseError::unsupported(format!(
+                "{kind} only lists the pieces of a time step; give the .vtu or .vtp files instead"
+            )));
+        }
+        "Collection"
+        | "vtkMultiBlockDataSet"
+        | "vtkPartitionedDataSet"
+        | "vtkPartitionedDataSetCollection"
+        | "vtkHierarchicalBoxDataSet" => {
+            return Err(ParseError::unsupported(format!(
+                "{kind} only lists other files; give the .vtu or .vtp files instead"
+            )));
+        }
+        _ => {
+            return Err(ParseError::unsupported(format!(
+                "VTKFile of type `{}` holds no particles; write UnstructuredGrid (.vtu) or \
+                 PolyData (.vtp)",
+                short(&kind)
+            )));
+        }
+    }
+    let endian = match attribute(start, at, "byte_order")?.as_deref() {
+        Some("BigEndian") => Endian::Big,
+        _ => Endian::Little,
+    };
+    let header = match attribute(start, at, "header_type")?.as_deref() {
+        None | Some("UInt32" | "") => HeaderType::U32,
+        Some("UInt64") => HeaderType::U64,
+        Some(other) => {
+            return Err(ParseError::malformed(
+                at,
+                format!("header_type `{}` is not UInt32 or UInt64", short(other)),
+            ));
+        }
+    };
+    let compressor = match attribute(start, at, "compressor")?.as_deref() {
+        None | Some("") => None,
+        Some(name) => Some(Compressor::from_name(name)?),
+    };
+    Ok(Encoding {
+        endian,
+        header,
+        compressor,
+    })
+}
+
+fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<Array<'a>, ParseError> {
+    let format = attribute(start, at, "format")?.unwrap_or_default();
+    let place = match format.to_ascii_lowercase().as_str() {
+        "ascii" | "" => Place::Ascii(Text::default()),
+        "binary" => Place::Inline(Text::default()),
+        "appended" => Place::Appended(required_count(start, at, "offset")?),
+        _ => {
+            return Err(ParseError::malformed(
+                at,
+                format!(
+                    "format `{}` is not ascii, binary or appended",
+                    short(&format)
+                ),
+            ));
+        }
+    };
+    Ok(Array {
+        at,
+        name: attribute(start, at, "Name")?.unwrap_or_default(),
+        type_name: attribute(start, at, "type")?.unwrap_or_default(),
+        components: optional_count(start, at, "NumberOfComponents")?,
+        tuples: optional_count(start, at, "NumberOfTuples")?,
+        place,
+    })
+}
+
+fn attribute(start: &BytesStart<'_>, at: usize, name: &str) -> Result<Option<String>, ParseError> {
+    let found = start.try_get_attribute(name);
+    let Some(found) = found.map_err(|error| bad_xml(at, &error))? else {
+        return Ok(None);
+    };
+    let value = found.normalized_value(XmlVersion::Implicit1_0);
+    value
+        .map(|v| Some(v.trim().to_owned()))
+        .map_err(|error| bad_xml(at, &error))
+}
+
+fn optional_count(
+    start: &BytesStart<'_>,
+    at: usize,
+    name: &str,
+) -> Result<Option<usize>, ParseError> {
+    match attribute(start, at, name)? {
+        None => Ok(None),
+        Some(value) if value.is_empty() => Ok(None),
+        Some(value) => value.parse().map(Some).map_err(|_| {
+            ParseError::malformed(at, format!("{name}=\"{}\" is no count", short(&value)))
+        }),
+    }
+}
+
+fn required_count(start: &BytesStart<'_>, at: usize, name: &str) -> Result<usize, ParseError> {
+    optional_count(start, at, name)?
+        .ok_or_else(|| ParseError::malformed(at, format!("an element without {name}")))
+}
+
+fn bad_xml(at: usize, error: &dyn std::fmt::Display) -> ParseError {
+    ParseError::malformed(at, format!("bad XML: {error}"))
+}
+
+/// A name from the file, short enough for a message.
+pub(super) fn short(name: &str) -> String {
+    name.chars()
+        .take(40)
+        .flat_map(char::escape_default)
+        .collect()
+}

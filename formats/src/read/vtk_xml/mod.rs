@@ -1,0 +1,199 @@
+//! XML VTK (`.vtu`, `.vtp`): the points of UnstructuredGrid and PolyData with all numeric point
+//! data, from any number of pieces, in every encoding that VTK, meshio and pyvisfile write.
+//!
+//! `document` reads the XML, `appended` finds the blob behind it, `blocks` gets the bytes of
+//! an array out of either, `compressor` unpacks them, `merge` puts pieces together. Files that
+//! only list other files (`.pvtu`, `.vtm`, `.pvd`) and grids are refused by name. Layout after "VTK
+//! File Formats" (the VTK user's guide) and after files of VTK 9, ParaView, meshio and PySPH.
+
+mod appended;
+mod blocks;
+mod compressor;
+mod document;
+mod merge;
+#[cfg(test)]
+mod tests;
+
+use super::Step;
+use super::vtk::{MOST_COMPONENTS, parse_values};
+use crate::{AttributeData, Endian, ParseError, RawParticles, ScalarType};
+use appended::Appended;
+use blocks::{Encoding, Source, payload};
+use document::{Array, Document, Place, Until, short};
+
+/// The one time step that `bytes` hold, with the time if a `TimeValue` before the pieces tells it.
+/// A damaged file is reported by [`read`], not here.
+///
+/// # Errors
+/// None at present.
+pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    let mut step = Step::whole(bytes.len());
+    step.time = parse(bytes, Until::FirstPiece, |document, appended| {
+        Ok(time(&document, appended))
+    })
+    .unwrap_or_default();
+    Ok(vec![step])
+}
+
+/// Reads the particles of a `.vtu` or `.vtp` file. Attributes that not all pieces have, with one
+/// type, are left out.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the file is cut short or breaks the format,
+/// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
+pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
+    parse(bytes, Until::End, |document, appended| {
+        Ok(RawParticles {
+            positions: merge::positions(&document, appended)?,
+            attributes: merge::attributes(&document, appended)?,
+            time: time(&document, appended),
+            step: None,
+        })
+    })
+}
+
+/// Cuts the file, parses the XML in front and hands both parts on.
+fn parse<T>(
+    bytes: &[u8],
+    until: Until,
+    then: impl FnOnce(Document<'_>, Option<Appended<'_>>) -> Result<T, ParseError>,
+) -> Result<T, ParseError> {
+    let cut = appended::find(bytes);
+    let head = bytes.get(..cut.unwrap_or(bytes.len())).unwrap_or_default();
+    // Names in another encoding than UTF-8 are no reason to refuse the numbers.
+    let head = String::from_utf8_lossy(head);
+    let document = Document::parse(&head, cut.is_some(), until)?;
+    check_total(&document, bytes.len())?;
+    let appended = cut.map(|tag| Appended::parse(bytes, tag)).transpose()?;
+    then(document, appended)
+}
+
+/// Refuses particle counts that no file of this length can hold; pieces that share their bytes
+/// would get past the check of each array.
+fn check_total(document: &Document<'_>, file: usize) -> Result<(), ParseError> {
+    let most = match document.encoding.compressor {
+        Some(compressor) => compressor.most_output(file),
+        None => file,
+    };
+    let total = document
+        .pieces
+        .iter()
+        .try_fold(0_usize, |sum, piece| sum.checked_add(piece.points));
+    // A coordinate takes a byte at least.
+    match total.and_then(|n| n.checked_mul(3)) {
+        Some(bytes) if bytes <= most => Ok(()),
+        _ => Err(ParseError::malformed(
+            0,
+            format!("the pieces state more particles than a file of {file} bytes can hold"),
+        )),
+    }
+}
+
+/// The simulation time, if a field tells one. It is extra: a damaged field costs only the time.
+fn time(document: &Document<'_>, appended: Option<Appended<'_>>) -> Option<f64> {
+    let is_time = |array: &&Array<'_>| {
+        ["TimeValue", "TIME"]
+            .iter()
+            .any(|name| array.name.eq_ignore_ascii_case(name))
+    };
+    let array = document.fields.iter().find(is_time)?;
+    let count = array
+        .tuples
+        .unwrap_or(1)
+        .checked_mul(array.components.unwrap_or(1))?;
+    let data = values(array, document.encoding, appended, count).ok()??;
+    (!data.is_empty()).then(|| data.get_f64(0))
+}
+
+/// Type names; `None` for strings and other things that are no numbers.
+fn scalar_type(name: &str) -> Option<ScalarType> {
+    Some(match name.to_ascii_lowercase().as_str() {
+        "int8" => ScalarType::I8,
+        "uint8" => ScalarType::U8,
+        "int16" => ScalarType::I16,
+        "uint16" => ScalarType::U16,
+        "int32" => ScalarType::I32,
+        "uint32" => ScalarType::U32,
+        "int64" => ScalarType::I64,
+        "uint64" => ScalarType::U64,
+        "float32" => ScalarType::F32,
+        "float64" => ScalarType::F64,
+        _ => return None,
+    })
+}
+
+/// The `count` numbers of an array; `None` if it does not hold numbers.
+///
+/// # Errors
+/// Malformed, naming the array, if there are not exactly that many.
+fn values(
+    array: &Array<'_>,
+    encoding: Encoding,
+    appended: Option<Appended<'_>>,
+    count: usize,
+) -> Result<Option<AttributeData>, ParseError> {
+    let Some(scalar) = scalar_type(&array.type_name) else {
+        return Ok(None);
+    };
+    if count == 0 {
+        return scalar.decode(Endian::Little, &[]).map(Some);
+    }
+    let fault = |at: usize, what: String| {
+        ParseError::malformed(at, format!("array `{}`: {what}", short(&array.name)))
+    };
+    let need = count.checked_mul(scalar.size());
+    let need = need.ok_or_else(|| fault(array.at, format!("{count} numbers are too many")))?;
+    let (at, source) = match &array.place {
+        Place::Ascii(text) => {
+            let bytes = text.text.as_bytes();
+            let (data, end) =
+                parse_values(bytes, 0, count, scalar).map_err(|error| match error {
+                    ParseError::Malformed { at, what } => fault(
+                        text.at.saturating_add(usize::try_from(at).unwrap_or(0)),
+                        what,
+                    ),
+                    other @ ParseError::Unsupported { .. } => other,
+                })?;
+            let rest = bytes.get(end..).unwrap_or_default();
+            if !rest.trim_ascii().is_empty() {
+                return Err(fault(text.at + end, format!("more than {count} numbers")));
+            }
+            return Ok(Some(data));
+        }
+        Place::Inline(text) => (text.at, Source::Base64(text.text.as_bytes())),
+        Place::Appended(offset) => {
+            let Some(appended) = appended else {
+                return Err(fault(array.at, "the file has no <AppendedData>".to_owned()));
+            };
+            let Some(from) = appended.blob.get(*offset..) else {
+                let length = appended.blob.len();
+                return Err(fault(
+                    array.at,
+                    format!("offset {offset} is beyond the {length} bytes appended"),
+                ));
+            };
+            let source = if appended.is_base64 {
+                Source::Base64(from)
+            } else {
+                Source::Raw(from)
+            };
+            (appended.at + offset, source)
+        }
+    };
+    let bytes = payload(source, encoding, need).map_err(|what| fault(at, what))?;
+    let data = scalar.decode(encoding.endian, &bytes);
+    data.map(Some).map_err(|error| fault(at, error.to_string()))
+}
+
+/// `points * components`, checked.
+fn value_count(array: &Array<'_>, points: usize, components: usize) -> Result<usize, ParseError> {
+    points
+        .checked_mul(components)
+        .filter(|_| components <= MOST_COMPONENTS)
+        .ok_or_else(|| {
+            ParseError::malformed(
+                array.at,
+                format!("{points} points of {components} components are too many"),
+            )
+        })
+}
