@@ -33,7 +33,7 @@ pub(super) fn is_section_start(line: &Line<'_>) -> bool {
 
 /// True for the first word of a line that begins a part of the file.
 pub(super) fn is_keyword(word: &[u8]) -> bool {
-    const KEYWORDS: [&str; 23] = [
+    const KEYWORDS: [&str; 25] = [
         "DATASET",
         "POINTS",
         "CELLS",
@@ -57,9 +57,12 @@ pub(super) fn is_keyword(word: &[u8]) -> bool {
         "TEXTURE_COORDINATES",
         "GLOBAL_IDS",
         "PEDIGREE_IDS",
+        "EDGE_FLAGS",
+        "METADATA",
     ];
-    let known = |k: &str| word.eq_ignore_ascii_case(k.as_bytes());
-    KEYWORDS.iter().any(|k| known(k)) || known("METADATA") || known("EDGE_FLAGS")
+    KEYWORDS
+        .iter()
+        .any(|keyword| word.eq_ignore_ascii_case(keyword.as_bytes()))
 }
 
 /// True for the names under which a FIELD holds the simulation time.

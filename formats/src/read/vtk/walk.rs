@@ -164,12 +164,7 @@ impl<'a> Walker<'a> {
         let words = line.words();
         let first = count(line, words.get(1))?;
         let second = count(line, words.get(2))?;
-        let mut ahead = self.cursor.clone();
-        let split = self.major >= 5
-            && ahead
-                .keyword_line()?
-                .is_some_and(|next| next.starts_with("OFFSETS"));
-        if !split {
+        if self.major < 5 || !self.next_is("OFFSETS") {
             return self.skip(line, "int", second);
         }
         for (keyword, values) in [("OFFSETS", first), ("CONNECTIVITY", second)] {

@@ -213,3 +213,19 @@ fn what_holds_no_particles_is_refused_by_name() {
         Err(ParseError::Unsupported { .. })
     ));
 }
+
+#[test]
+fn old_cells_may_stand_in_a_new_file() {
+    let cells = vec![0_i32; 20_000];
+    let found = good(
+        &Made::new("5.1")
+            .three_points("POLYDATA")
+            .text("VERTICES 1 20000\n")
+            .ints(cells)
+            .text("POINT_DATA 3\nSCALARS id int\n")
+            .ints([1, 2, 3])
+            .0,
+    );
+    nasty_points(&found);
+    assert_eq!(names(&found), ["id"]);
+}

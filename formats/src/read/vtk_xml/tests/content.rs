@@ -121,3 +121,22 @@ fn lists_and_grids_are_refused_with_a_remedy() {
     malformed(b"");
     malformed(b"<VTKFile type=\"PolyData\"><PolyData>");
 }
+
+#[test]
+fn foreign_text_around_the_numbers_does_not_matter() {
+    let mut file = b"\xef\xbb\xbf<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\r\n".to_vec();
+    file.extend(
+        b"<!DOCTYPE x>\r\n<VTKFile type='UnstructuredGrid' byte_order='LittleEndian'>\r\n\
+        <UnstructuredGrid><Piece NumberOfPoints=' 1 '><PointData>\
+        <DataArray type='int16' Name='H\xf6he' format='ascii'><!-- \xfc -->5</DataArray></PointData>\
+        <Points><DataArray type='Float32' Name='' format='ascii'>1\r\n2<!-- ! -->3</DataArray></Points>\
+        </Piece></UnstructuredGrid></VTKFile>",
+    );
+    let found = good(&file);
+    assert_eq!(
+        found.positions,
+        Positions::F32(vec![Vec3::new(1.0, 2.0, 3.0)])
+    );
+    assert_eq!(found.attributes[0].name, "H\u{fffd}he");
+    assert_eq!(found.attributes[0].data, AttributeData::I16(vec![5]));
+}
