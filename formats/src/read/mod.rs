@@ -15,6 +15,10 @@ mod damage;
 pub mod lammps;
 pub mod npy;
 pub mod ply;
+mod table;
+mod text;
+#[cfg(test)]
+mod text_samples;
 pub mod vtk;
 pub mod vtk_xml;
 pub mod xyz;

@@ -1,0 +1,137 @@
+//! Separated tables: CSV of ParaView, DualSPHysics, spreadsheets and scripts, with or without a
+//! line of column names, and bare point lists.
+//!
+//! [`layout`] finds separator, names and first row; [`names`] finds positions and vectors among the
+//! names; [`super::table`] parses the rows.
+
+use super::Step;
+use super::table::{CUT_SHORT, Numbers, OnText, Place, Table, Target};
+use crate::{ParseError, RawParticles};
+
+mod layout;
+mod names;
+
+use layout::Layout;
+
+/// What some editors put before UTF-8 text.
+pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
+
+/// The one time step that `bytes` hold, with the time if a line before the names tells it.
+///
+/// # Errors
+/// [`ParseError::Unsupported`] for UTF-16; other faults are left to [`read`].
+pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    let time = match Layout::find(bytes) {
+        Ok(layout) => layout.time,
+        Err(error @ ParseError::Unsupported { .. }) => return Err(error),
+        Err(_) => None,
+    };
+    Ok(vec![Step {
+        time,
+        ..Step::whole(bytes.len())
+    }])
+}
+
+/// Reads the table. Columns of integers become i64, of other numbers f64; columns with text are
+/// left out; an empty cell is NaN. Columns such as `Vel.x`, `Vel.y`, `Vel.z` or `velocity:0..2`
+/// become one attribute by their common name. Without names the first three columns are the
+/// positions.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if there are no positions among the columns, a row has another
+/// number of cells, or a position is no number; [`ParseError::Unsupported`] for UTF-16.
+pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    if bytes.len() < step.span.end {
+        let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
+        return Err(ParseError::malformed(bytes.len(), what));
+    }
+    let layout = Layout::find(bytes)?;
+    let (fields, targets) = match &layout.names {
+        Some(names) => named_columns(names).ok_or_else(|| layout.no_positions(names))?,
+        None => numbered_columns(layout.columns),
+    };
+    let table = Table {
+        bytes,
+        span: layout.rows,
+        dialect: layout.dialect,
+        fields,
+        targets,
+    };
+    let (positions, attributes) = table.particles()?;
+    Ok(RawParticles {
+        positions,
+        attributes,
+        time: layout.time,
+        step: None,
+    })
+}
+
+/// True if a line of `bytes` names positions.
+pub(super) fn finds_columns(bytes: &[u8]) -> bool {
+    Layout::find(bytes)
+        .is_ok_and(|layout| layout.names.is_some_and(|n| names::position(&n).is_some()))
+}
+
+type Columns = (Vec<Option<Place>>, Vec<Target>);
+
+/// Where the columns called `names` go; `None` if no positions are among them.
+fn named_columns(names: &[String]) -> Option<Columns> {
+    let axes = names::position(names)?;
+    let mut fields: Vec<Option<Place>> = vec![None; names.len()];
+    let mut targets = vec![Target::positions()];
+    let mut assign = |column: usize, target, component| {
+        if let Some(field) = fields.get_mut(column) {
+            *field = Some(Place { target, component });
+        }
+    };
+    for (component, column) in axes.into_iter().enumerate() {
+        if let Some(column) = column {
+            assign(column, 0, component);
+        }
+    }
+    for group in names::attributes(names, axes) {
+        for (component, column) in group.columns.iter().enumerate() {
+            assign(*column, targets.len(), component);
+        }
+        targets.push(Target::attribute(
+            group.name.clone(),
+            group.columns.len(),
+            numbers_of(&group),
+            OnText::LeaveOut,
+        ));
+    }
+    Some((fields, targets))
+}
+
+/// Vectors and radii are real, even if all of a file happen to be integers.
+fn numbers_of(group: &names::Group) -> Numbers {
+    let is_length = ["radius", "diameter", "pscale"]
+        .iter()
+        .any(|name| group.name.eq_ignore_ascii_case(name));
+    if group.columns.len() > 1 || is_length {
+        Numbers::Real
+    } else {
+        Numbers::WholeIfAll
+    }
+}
+
+/// Positions in the first three of `columns` columns, then `column_4`...
+fn numbered_columns(columns: usize) -> Columns {
+    let place = |target, component| Some(Place { target, component });
+    let mut fields = vec![place(0, 0), place(0, 1), place(0, 2)];
+    let mut targets = vec![Target::positions()];
+    for column in 4..=columns {
+        fields.push(place(targets.len(), 0));
+        let name = format!("column_{column}");
+        targets.push(Target::attribute(
+            name,
+            1,
+            Numbers::WholeIfAll,
+            OnText::LeaveOut,
+        ));
+    }
+    (fields, targets)
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,363 @@
+//! Rows of numbers in text to typed columns: in parallel pieces, in file order.
+//!
+//! A format's own module finds out where the rows are and what their fields mean ([`Table`]); here
+//! is only the loop over lines and fields. Splitting is by hand and not by crate `csv` because the
+//! same loop has to serve runs of blanks, decimal commas and comments, cut a file into pieces at
+//! newlines, and name the byte of a fault.
+
+use std::ops::Range;
+
+use memchr::memchr;
+use rayon::prelude::*;
+
+use super::text::{self, Line, Lines};
+use crate::{Attribute, ParseError, Positions};
+
+mod cells;
+mod values;
+
+pub(super) use cells::cells;
+use cells::is_blank;
+pub(super) use values::Values;
+
+/// What to say of a line that ends where the file does.
+pub(super) const CUT_SHORT: &str = "the file is cut short, perhaps still being written";
+
+/// What stands between two fields.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Separator {
+    /// Any run of blanks and tabs.
+    Blanks,
+    /// One byte, each time; a field may be empty, quoted, and padded with blanks.
+    Byte(u8),
+}
+
+/// How numbers are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Decimal {
+    /// `1.5`
+    Point,
+    /// `1,5` or `1.5`
+    Comma,
+}
+
+/// Lines that are no rows, beside blank ones.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Comments {
+    /// There are none.
+    None,
+    /// What begins with `#` or `//`.
+    HashOrSlashes,
+}
+
+/// What to do with more fields in a row than the table has.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Surplus {
+    /// Pass over them.
+    Ignored,
+    /// They may only be empty (a separator at the end of each line).
+    Empty,
+}
+
+/// How one row is written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Dialect {
+    /// What stands between two fields.
+    pub(super) separator: Separator,
+    /// How numbers are written.
+    pub(super) decimal: Decimal,
+    /// Lines to pass over.
+    pub(super) comments: Comments,
+    /// What to do with more fields than expected.
+    pub(super) surplus: Surplus,
+}
+
+/// The type that a target's numbers get.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Numbers {
+    /// f64 whatever they are.
+    Real,
+    /// i64 as long as every one of the file is an integer, else f64.
+    WholeIfAll,
+}
+
+/// What to do if a field is no number.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum OnText {
+    /// The file is damaged.
+    Fault,
+    /// The column is text; leave it out.
+    LeaveOut,
+}
+
+/// An array to fill: one or more numbers a row.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Target {
+    /// Name of the attribute that it becomes.
+    pub(super) name: String,
+    /// Numbers a row.
+    pub(super) components: usize,
+    /// Their type.
+    pub(super) numbers: Numbers,
+    /// What to do with text.
+    pub(super) on_text: OnText,
+}
+
+impl Target {
+    /// An attribute of `components` numbers a row.
+    pub(super) fn attribute(
+        name: impl Into<String>,
+        components: usize,
+        numbers: Numbers,
+        on_text: OnText,
+    ) -> Self {
+        Self {
+            name: name.into(),
+            components,
+            numbers,
+            on_text,
+        }
+    }
+
+    /// The positions: three f64 a row. Components that no field fills stay 0 (2D runs).
+    pub(super) fn positions() -> Self {
+        Self {
+            name: String::new(),
+            components: 3,
+            numbers: Numbers::Real,
+            on_text: OnText::Fault,
+        }
+    }
+}
+
+/// Where a field goes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Place {
+    /// Index of the target.
+    pub(super) target: usize,
+    /// Which of its numbers.
+    pub(super) component: usize,
+}
+
+/// Rows to parse.
+#[derive(Debug)]
+pub(super) struct Table<'a> {
+    /// The file.
+    pub(super) bytes: &'a [u8],
+    /// The bytes that hold the rows.
+    pub(super) span: Range<usize>,
+    /// How a row is written.
+    pub(super) dialect: Dialect,
+    /// Where each field of a row goes; `None` passes over it. A row has at least that many fields.
+    pub(super) fields: Vec<Option<Place>>,
+    /// The arrays to fill.
+    pub(super) targets: Vec<Target>,
+}
+
+/// Bytes that one thread parses in one go; large enough to hide the cost of a task.
+const PIECE: usize = 1 << 20;
+
+impl Table<'_> {
+    /// Parses all rows; the values are in the order of the targets, each `components` times the
+    /// number of rows long.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] at the first field (in file order) that has no place or does not
+    /// fit, whatever the number of threads.
+    pub(super) fn parse(&self) -> Result<Vec<Values>, ParseError> {
+        let pieces: Vec<Result<Vec<Values>, ParseError>> = pieces(self.bytes, self.span.clone())
+            .into_par_iter()
+            .map(|piece| self.parse_piece(piece))
+            .collect();
+        let mut by_target: Vec<Vec<Values>> = self.targets.iter().map(|_| Vec::new()).collect();
+        for piece in pieces {
+            for (target, values) in by_target.iter_mut().zip(piece?) {
+                target.push(values);
+            }
+        }
+        let joined = self.targets.iter().zip(by_target);
+        Ok(joined
+            .map(|(target, pieces)| values::merge(target.numbers, pieces))
+            .collect())
+    }
+
+    /// [`Self::parse`] with target 0 taken for the positions and the rest for attributes.
+    ///
+    /// # Errors
+    /// As [`Self::parse`].
+    pub(super) fn particles(self) -> Result<(Positions, Vec<Attribute>), ParseError> {
+        let mut values = self.parse()?.into_iter();
+        let positions = values
+            .next()
+            .map_or(Positions::F64(Vec::new()), Values::into_positions);
+        let attributes = self.targets.into_iter().skip(1).zip(values);
+        let attributes = attributes
+            .filter_map(|(target, values)| {
+                Some(Attribute {
+                    name: target.name,
+                    components: target.components,
+                    data: values.into_data()?,
+                })
+            })
+            .collect();
+        Ok((positions, attributes))
+    }
+
+    fn parse_piece(&self, piece: Range<usize>) -> Result<Vec<Values>, ParseError> {
+        let bytes = self.bytes.get(piece.clone()).unwrap_or_default();
+        let newlines = memchr::memchr_iter(b'\n', bytes).count();
+        // A field takes two bytes with what follows it, save empty ones.
+        let rows = newlines.min(bytes.len() / (2 * self.fields.len()).max(1)) + 1;
+        let mut values: Vec<Values> = self
+            .targets
+            .iter()
+            .map(|target| match target.numbers {
+                Numbers::Real => Values::Real(Vec::with_capacity(rows * target.components)),
+                Numbers::WholeIfAll => Values::Whole(Vec::with_capacity(rows * target.components)),
+            })
+            .collect();
+        for line in Lines::new(self.bytes, piece) {
+            if line.is_blank() || self.dialect.comments.include(line.text) {
+                continue;
+            }
+            for (target, values) in self.targets.iter().zip(&mut values) {
+                values.add_row(target.components);
+            }
+            match self.dialect.separator {
+                Separator::Blanks => self.row_of_words(line, &mut values)?,
+                Separator::Byte(b) => self.row_of_cells(line, b, &mut values)?,
+            }
+        }
+        Ok(values)
+    }
+
+    fn row_of_words(&self, line: Line<'_>, values: &mut [Values]) -> Result<(), ParseError> {
+        let text = line.text;
+        let mut found = 0;
+        let mut at = 0;
+        loop {
+            while at < text.len() && is_blank(text[at]) {
+                at += 1;
+            }
+            if at == text.len() {
+                break;
+            }
+            let start = at;
+            while at < text.len() && !is_blank(text[at]) {
+                at += 1;
+            }
+            if found == self.fields.len() {
+                match self.dialect.surplus {
+                    Surplus::Ignored => return Ok(()),
+                    Surplus::Empty => return Err(self.surplus(line.at + start)),
+                }
+            }
+            self.store(found, &text[start..at], line.at + start, values)?;
+            found += 1;
+        }
+        self.check_count(line, found)
+    }
+
+    fn row_of_cells(
+        &self,
+        line: Line<'_>,
+        separator: u8,
+        values: &mut [Values],
+    ) -> Result<(), ParseError> {
+        let mut found = 0;
+        for cell in cells(line.text, separator) {
+            let at = line.at + cell.at;
+            if found < self.fields.len() {
+                self.store(found, cell.text, at, values)?;
+                found += 1;
+            } else if self.dialect.surplus == Surplus::Ignored {
+                return Ok(());
+            } else if !cell.text.is_empty() {
+                return Err(self.surplus(at));
+            }
+        }
+        self.check_count(line, found)
+    }
+
+    #[inline]
+    fn store(
+        &self,
+        field: usize,
+        token: &[u8],
+        at: usize,
+        values: &mut [Values],
+    ) -> Result<(), ParseError> {
+        let Some(place) = self.fields[field] else {
+            return Ok(());
+        };
+        let Target {
+            components,
+            on_text,
+            ..
+        } = self.targets[place.target];
+        let from_end = components - place.component;
+        if values[place.target].set(from_end, token, self.dialect.decimal) {
+            return Ok(());
+        }
+        if on_text == OnText::LeaveOut {
+            values[place.target] = Values::Text;
+            return Ok(());
+        }
+        let column = field + 1;
+        let what = format!("column {column} has {}, not a number", text::shown(token));
+        Err(ParseError::malformed(at, self.with_cause(at, what)))
+    }
+
+    fn check_count(&self, line: Line<'_>, found: usize) -> Result<(), ParseError> {
+        if found >= self.fields.len() {
+            return Ok(());
+        }
+        let what = format!("line has {found} of {} columns", self.fields.len());
+        Err(ParseError::malformed(
+            line.at,
+            self.with_cause(line.at, what),
+        ))
+    }
+
+    fn surplus(&self, at: usize) -> ParseError {
+        ParseError::malformed(
+            at,
+            format!("line has more than {} columns", self.fields.len()),
+        )
+    }
+
+    /// Adds the likely cause if the fault at byte `at` is in an unfinished last line.
+    fn with_cause(&self, at: usize, what: String) -> String {
+        let rest = self.bytes.get(at..).unwrap_or_default();
+        if memchr(b'\n', rest).is_none() {
+            format!("{what}: {CUT_SHORT}")
+        } else {
+            what
+        }
+    }
+}
+
+impl Comments {
+    /// True if the line `text` is a comment.
+    pub(super) fn include(self, text: &[u8]) -> bool {
+        let text = text.trim_ascii_start();
+        self == Self::HashOrSlashes && (text.starts_with(b"#") || text.starts_with(b"//"))
+    }
+}
+
+/// Cuts `span` into pieces of about [`PIECE`] bytes that end with a newline.
+fn pieces(bytes: &[u8], span: Range<usize>) -> Vec<Range<usize>> {
+    let end = span.end.min(bytes.len());
+    let mut start = span.start.min(end);
+    let mut pieces = Vec::with_capacity((end - start) / PIECE + 1);
+    while start < end {
+        let wanted = (start + PIECE).min(end);
+        let cut = memchr(b'\n', &bytes[wanted..end]).map_or(end, |newline| wanted + newline + 1);
+        pieces.push(start..cut);
+        start = cut;
+    }
+    pieces
+}
+
+#[cfg(test)]
+mod tests;

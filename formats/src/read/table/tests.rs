@@ -1,0 +1,169 @@
+use super::*;
+use crate::AttributeData;
+use glam::DVec3;
+
+const WORDS: Dialect = Dialect {
+    separator: Separator::Blanks,
+    decimal: Decimal::Point,
+    comments: Comments::None,
+    surplus: Surplus::Empty,
+};
+
+fn scalar(numbers: Numbers, on_text: OnText) -> Target {
+    Target::attribute("a", 1, numbers, on_text)
+}
+
+/// A table of one column for each of `targets`.
+fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<Target>) -> Table<'_> {
+    let place = |target| {
+        Some(Place {
+            target,
+            component: 0,
+        })
+    };
+    Table {
+        bytes,
+        span: 0..bytes.len(),
+        dialect,
+        fields: (0..targets.len()).map(place).collect(),
+        targets,
+    }
+}
+
+#[test]
+fn fields_go_where_they_belong() {
+    let bytes = b"7 3 1 2\n\n  8\t6 4 5 \r\n";
+    let place = |target, component| Some(Place { target, component });
+    let table = Table {
+        bytes,
+        span: 0..bytes.len(),
+        dialect: WORDS,
+        fields: vec![place(1, 0), place(0, 2), place(0, 0), place(0, 1)],
+        targets: vec![
+            Target::positions(),
+            scalar(Numbers::WholeIfAll, OnText::Fault),
+        ],
+    };
+    let mut values = table.parse().unwrap();
+    assert_eq!(values.pop(), Some(Values::Whole(vec![7, 8])));
+    assert_eq!(
+        values.pop().unwrap().into_positions(),
+        Positions::F64(vec![DVec3::new(1., 2., 3.), DVec3::new(4., 5., 6.)])
+    );
+}
+
+#[test]
+fn whole_numbers_give_way_to_fractions_and_text() {
+    let whole = || scalar(Numbers::WholeIfAll, OnText::LeaveOut);
+    let parse = |text: &str| {
+        let mut values = columns(text.as_bytes(), WORDS, vec![whole()])
+            .parse()
+            .unwrap();
+        values.pop().unwrap()
+    };
+    let big = "9007199254740993";
+    assert_eq!(parse(big), Values::Whole(vec![9_007_199_254_740_993]));
+    assert_eq!(parse("1\n2.5\n3"), Values::Real(vec![1., 2.5, 3.]));
+    assert_eq!(parse("1\nx\n3"), Values::Text);
+    assert_eq!(parse(""), Values::Whole(vec![]));
+}
+
+#[test]
+fn many_pieces_are_joined_in_order() {
+    let rows = 400_000_u32;
+    let mut text = String::new();
+    for i in 0..rows {
+        text.push_str(&format!("{i} {}\n", f64::from(i) * 0.5));
+    }
+    assert!(text.len() > 3 * PIECE);
+    let targets = vec![
+        scalar(Numbers::WholeIfAll, OnText::Fault),
+        scalar(Numbers::WholeIfAll, OnText::Fault),
+    ];
+    let values = columns(text.as_bytes(), WORDS, targets).parse().unwrap();
+    let ids = (0..rows).map(i64::from).collect();
+    let halves = (0..rows).map(|i| f64::from(i) * 0.5).collect();
+    assert_eq!(values, [Values::Whole(ids), Values::Real(halves)]);
+}
+
+#[test]
+fn the_first_fault_is_reported() {
+    let mut text = "1\n".repeat(PIECE);
+    text.replace_range(10..11, "x");
+    text.replace_range(PIECE + 100..PIECE + 101, "y");
+    let table = columns(
+        text.as_bytes(),
+        WORDS,
+        vec![scalar(Numbers::Real, OnText::Fault)],
+    );
+    let error = table.parse().unwrap_err().to_string();
+    assert_eq!(error, "byte 10: column 1 has \"x\", not a number");
+}
+
+#[test]
+fn an_unfinished_last_line_is_called_so() {
+    let two = || {
+        vec![
+            scalar(Numbers::Real, OnText::Fault),
+            scalar(Numbers::Real, OnText::Fault),
+        ]
+    };
+    let error = |text: &str| {
+        let table = columns(text.as_bytes(), WORDS, two());
+        table.parse().unwrap_err().to_string()
+    };
+    let cut = "the file is cut short, perhaps still being written";
+    assert_eq!(
+        error("1 2\n3"),
+        format!("byte 4: line has 1 of 2 columns: {cut}")
+    );
+    assert_eq!(
+        error("1 2\n3 -"),
+        format!("byte 6: column 2 has \"-\", not a number: {cut}")
+    );
+    assert_eq!(error("1\n3 4\n"), "byte 0: line has 1 of 2 columns");
+    assert_eq!(error("1 2 3\n"), "byte 4: line has more than 2 columns");
+}
+
+#[test]
+fn cells_are_trimmed_and_unquoted() {
+    let split = |line: &'static str, separator| {
+        let found: Vec<_> = cells(line.as_bytes(), separator)
+            .map(|c| (c.at, std::str::from_utf8(c.text).unwrap()))
+            .collect();
+        found
+    };
+    assert_eq!(
+        split(" a ; b;;", b';'),
+        [(1, "a"), (5, "b"), (7, ""), (8, "")]
+    );
+    assert_eq!(
+        split(r#""x, y" ,"z",1"#, b','),
+        [(1, "x, y"), (9, "z"), (12, "1")]
+    );
+    assert_eq!(split(r#""a""b",c"#, b','), [(1, r#"a""b"#), (7, "c")]);
+    assert_eq!(split(r#""open,c"#, b','), [(0, r#""open"#), (6, "c")]);
+    assert_eq!(split("a\t b\t", b'\t'), [(0, "a"), (3, "b"), (5, "")]);
+    assert_eq!(split("", b','), [(0, "")]);
+}
+
+#[test]
+fn empty_cells_are_nan_and_commas_may_be_points() {
+    let dialect = Dialect {
+        separator: Separator::Byte(b';'),
+        decimal: Decimal::Comma,
+        comments: Comments::HashOrSlashes,
+        surplus: Surplus::Empty,
+    };
+    let targets = vec![
+        scalar(Numbers::Real, OnText::Fault),
+        scalar(Numbers::WholeIfAll, OnText::LeaveOut),
+    ];
+    let text = b"# 1;2\n1,5;2;\n // 3\n;3;;\n";
+    let values = columns(text, dialect, targets).parse().unwrap();
+    let [Values::Real(a), b] = &values[..] else {
+        panic!("{values:?}")
+    };
+    assert!(a[0] == 1.5 && a[1].is_nan() && a.len() == 2);
+    assert_eq!(b.clone().into_data(), Some(AttributeData::I64(vec![2, 3])));
+}
