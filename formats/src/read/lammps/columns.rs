@@ -1,0 +1,140 @@
+//! What the columns named on the `ITEM: ATOMS` line are.
+
+use super::bounds::Bounds;
+use super::header::Header;
+use crate::ParseError;
+use crate::read::table::{Numbers, OnText, Place, Target};
+use crate::read::text;
+
+/// Names of position columns, the wanted first, and whether they are fractions of the box.
+/// Positions in the box come before unwrapped ones, which leave it.
+const POSITIONS: [([&str; 3], bool); 4] = [
+    (["x", "y", "z"], false),
+    (["xu", "yu", "zu"], false),
+    (["xs", "ys", "zs"], true),
+    (["xsu", "ysu", "zsu"], true),
+];
+
+/// Columns that together are a vector.
+const VECTORS: [([&str; 3], &str); 2] = [
+    (["vx", "vy", "vz"], "velocity"),
+    (["fx", "fy", "fz"], "force"),
+];
+
+/// Columns of integers that must stay exact.
+const WHOLE: [&str; 3] = ["id", "type", "mol"];
+
+/// Columns of text, even if all of it happens to look like numbers.
+const TEXT: [&str; 2] = ["element", "typelabel"];
+
+/// The plan for the rows of a step.
+#[derive(Debug)]
+pub(super) struct Columns {
+    /// Where each column goes.
+    pub(super) fields: Vec<Option<Place>>,
+    /// The arrays to fill, positions first.
+    pub(super) targets: Vec<Target>,
+    /// The box that the positions are fractions of, if they are.
+    pub(super) scaled_by: Option<Bounds>,
+}
+
+impl Columns {
+    /// Plans for the columns of `header`; those that are no numbers in `first_row` are left out.
+    pub(super) fn find(header: &Header<'_>, first_row: Option<&[u8]>) -> Result<Self, ParseError> {
+        let column = |name: &str| header.names.iter().position(|n| *n == name.as_bytes());
+        let (axes, scaled) = position_columns(column).ok_or_else(|| no_positions(header))?;
+        let scaled_by = match (scaled, header.bounds) {
+            (false, _) => None,
+            (true, Some(bounds)) => Some(bounds),
+            (true, None) => {
+                let what = "scaled positions, but no ITEM: BOX BOUNDS before";
+                return Err(ParseError::malformed(header.names_at, what));
+            }
+        };
+        let mut plan = Self {
+            fields: vec![None; header.names.len()],
+            targets: vec![Target::positions()],
+            scaled_by,
+        };
+        for (component, column) in axes.into_iter().enumerate() {
+            plan.assign(column, 0, component);
+        }
+        plan.add_attributes(header, column, first_row);
+        Ok(plan)
+    }
+
+    fn assign(&mut self, column: Option<usize>, target: usize, component: usize) {
+        if let Some(field) = column.and_then(|column| self.fields.get_mut(column)) {
+            *field = Some(Place { target, component });
+        }
+    }
+
+    fn add_attributes(
+        &mut self,
+        header: &Header<'_>,
+        column: impl Fn(&str) -> Option<usize>,
+        first_row: Option<&[u8]>,
+    ) {
+        let first_row: Vec<&[u8]> = first_row.map(text::words).into_iter().flatten().collect();
+        let is_text = |index: usize| {
+            let cell = first_row.get(index);
+            cell.is_some_and(|cell| text::number(cell).is_none())
+        };
+        for (index, name) in header.names.iter().enumerate() {
+            let name = String::from_utf8_lossy(name);
+            let taken = self.fields.get(index).is_some_and(Option::is_some);
+            if taken || TEXT.contains(&&*name) || is_text(index) {
+                continue;
+            }
+            let target = self.targets.len();
+            let vector = VECTORS.iter().find(|(names, _)| names.contains(&&*name));
+            let columns = vector.map(|(names, _)| names.map(&column));
+            if let (Some((_, vector)), Some([Some(x), Some(y), Some(z)])) = (vector, columns)
+                && [x, y, z].contains(&index)
+                && ![x, y, z].into_iter().any(is_text)
+            {
+                self.targets.push(real(vector, 3));
+                for (component, column) in [x, y, z].into_iter().enumerate() {
+                    self.assign(Some(column), target, component);
+                }
+                continue;
+            }
+            self.targets.push(if WHOLE.contains(&&*name) {
+                Target::attribute(name, 1, Numbers::WholeIfAll, OnText::Fault)
+            } else {
+                real(&name, 1)
+            });
+            self.assign(Some(index), target, 0);
+        }
+    }
+}
+
+fn real(name: &str, components: usize) -> Target {
+    Target::attribute(name, components, Numbers::Real, OnText::Fault)
+}
+
+/// The columns of x, y and z, and whether they are scaled. A 2D run may do without z.
+fn position_columns(column: impl Fn(&str) -> Option<usize>) -> Option<([Option<usize>; 3], bool)> {
+    let found = POSITIONS.map(|(names, scaled)| (names.map(&column), scaled));
+    let solid = found
+        .iter()
+        .find(|(axes, _)| axes.iter().all(Option::is_some));
+    let flat = found
+        .iter()
+        .find(|(axes, scaled)| !scaled && axes[0].is_some() && axes[1].is_some());
+    solid.or(flat).copied()
+}
+
+fn no_positions(header: &Header<'_>) -> ParseError {
+    let names: Vec<_> = header
+        .names
+        .iter()
+        .take(8)
+        .map(|n| text::shown(n))
+        .collect();
+    let what = format!(
+        "no positions among the columns {}: dump x y z, xu yu zu, xs ys zs or xsu ysu zsu",
+        names.join(", ")
+    );
+    ParseError::malformed(header.names_at, what)
+}
