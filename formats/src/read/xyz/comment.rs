@@ -1,0 +1,102 @@
+//! The comment line of molecular text: the `key=value` pairs of extended XYZ, and the step that
+//! LAMMPS writes there.
+
+/// The value of `key` (any case) in the `key=value` pairs of `comment`. Values may be in quotes or
+/// braces and have blanks then.
+pub(super) fn value<'a>(comment: &'a [u8], key: &str) -> Option<&'a [u8]> {
+    let mut rest = comment;
+    loop {
+        rest = rest.trim_ascii_start();
+        if rest.is_empty() {
+            return None;
+        }
+        let (name, after) = item(rest, b"=");
+        let Some(after) = after.trim_ascii_start().strip_prefix(b"=") else {
+            rest = after; // a word without a value
+            continue;
+        };
+        let (found, after) = item(after.trim_ascii_start(), b"");
+        if name.eq_ignore_ascii_case(key.as_bytes()) {
+            return Some(found);
+        }
+        rest = after;
+    }
+}
+
+/// The quoted or bare item that `text` begins with, and what follows. A bare one ends at a blank
+/// or at one of `ends`, and takes at least one byte.
+fn item<'a>(text: &'a [u8], ends: &[u8]) -> (&'a [u8], &'a [u8]) {
+    let closing = match text.first() {
+        Some(b'"') => Some(b'"'),
+        Some(b'\'') => Some(b'\''),
+        Some(b'{') => Some(b'}'),
+        Some(b'[') => Some(b']'),
+        _ => None,
+    };
+    if let Some(closing) = closing
+        && let Some(end) = closed_at(text, closing)
+    {
+        return (&text[1..end], &text[end + 1..]);
+    }
+    let end = text
+        .iter()
+        .position(|b| b.is_ascii_whitespace() || ends.contains(b))
+        .unwrap_or(text.len());
+    // A stray `=` must not stop the walk.
+    let next = end.max(usize::from(end == 0 && !ends.is_empty()));
+    (&text[..end], &text[next.min(text.len())..])
+}
+
+/// Where the item that begins at 0 ends; a backslash protects what follows it.
+fn closed_at(text: &[u8], closing: u8) -> Option<usize> {
+    let mut at = 1;
+    while let Some(byte) = text.get(at) {
+        match byte {
+            b'\\' => at += 2,
+            b if *b == closing => return Some(at),
+            _ => at += 1,
+        }
+    }
+    None
+}
+
+/// The number in `Atoms. Timestep: 1000`, as LAMMPS' `dump xyz` writes it.
+pub(super) fn lammps_step(comment: &[u8]) -> Option<&[u8]> {
+    let comment = comment.trim_ascii();
+    let rest = comment.strip_prefix(b"Atoms.")?.trim_ascii_start();
+    Some(rest.strip_prefix(b"Timestep:")?.trim_ascii())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_by_key() {
+        let comment = br#"Lattice="5 0 0  0 5 0  0 0 5" energy = -1.5 flag pbc='T T F' v={1 2} note="say \"x=1\"" Time=0.5"#;
+        let text = |key| value(comment, key).map(|v| std::str::from_utf8(v).unwrap());
+        assert_eq!(text("lattice"), Some("5 0 0  0 5 0  0 0 5"));
+        assert_eq!(text("energy"), Some("-1.5"));
+        assert_eq!(text("pbc"), Some("T T F"));
+        assert_eq!(text("v"), Some("1 2"));
+        assert_eq!(text("time"), Some("0.5"));
+        assert_eq!(text("flag"), None);
+        assert_eq!(text("x"), None);
+    }
+
+    #[test]
+    fn odd_comments_end() {
+        for comment in [
+            "", "=", "= =", "a=", "\"", "a=\"b", "==a=1", "{", "a = ", "'", "\\",
+        ] {
+            assert_eq!(value(comment.as_bytes(), "nothing"), None, "{comment}");
+        }
+    }
+
+    #[test]
+    fn step_of_lammps() {
+        let found = lammps_step(b"Atoms. Timestep: 1200");
+        assert_eq!(found, Some(&b"1200"[..]));
+        assert_eq!(lammps_step(b"Atoms"), None);
+    }
+}

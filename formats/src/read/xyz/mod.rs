@@ -1,0 +1,200 @@
+//! `.xyz`: three unrelated formats under one extension, told apart by [`kind`].
+//!
+//! Raw triples of f32 as splashsurf reads and writes them; molecular text with its extended form
+//! (the columns named in the comment line); and bare text with a point a line, which is read as a
+//! table ([`super::csv`]).
+
+use glam::Vec3;
+
+use super::table::CUT_SHORT;
+use super::text::{self, Lines};
+use super::{Step, csv};
+use crate::{ParseError, Positions, RawParticles};
+
+mod comment;
+mod molecular;
+
+/// Which of the formats.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// Little-endian f32 triples without a header.
+    Raw,
+    /// Frames of a count, a comment, and a line for each atom.
+    Molecular,
+    /// A point a line.
+    Bare,
+}
+
+/// Bytes to look at; that many bytes of floats are never all printable.
+const WINDOW: usize = 4096;
+
+/// Bytes of a particle in a raw file.
+const TRIPLE: usize = 12;
+
+/// A file of so few particles may be raw although all bytes are printable.
+const FEW: usize = 4 * TRIPLE;
+
+/// Tells which format `bytes` are. An empty file is raw, with no particles.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if they are none: binary, but no whole number of triples, or text in
+/// which neither a count and atoms nor rows of numbers are found.
+pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
+    if bytes.is_empty() {
+        return Ok(Kind::Raw);
+    }
+    let start = text_start(bytes);
+    if let Some(at) = first_binary(bytes) {
+        return if bytes.len().is_multiple_of(TRIPLE) {
+            Ok(Kind::Raw)
+        } else {
+            let what = format!(
+                "neither raw f32 triples ({} bytes are no multiple of {TRIPLE}) nor text (this byte is {:#04x})",
+                bytes.len(),
+                bytes.get(at).copied().unwrap_or_default()
+            );
+            Err(ParseError::malformed(at, what))
+        };
+    }
+    let mut lines = Lines::new(bytes, start..bytes.len());
+    let first = lines.next();
+    let count = first.and_then(|line| text::integer(line.text.trim_ascii()));
+    if let Some(count @ 0..) = count {
+        return molecular_kind(count, lines);
+    }
+    if first_row_has_numbers(bytes, start) || csv::finds_columns(bytes) {
+        return Ok(Kind::Bare);
+    }
+    if bytes.len() <= FEW && bytes.len().is_multiple_of(TRIPLE) {
+        return Ok(Kind::Raw);
+    }
+    let what = format!(
+        "text, but {} is neither a particle count nor a row of numbers",
+        text::shown(first.map_or(b"", |line| line.text))
+    );
+    Err(ParseError::malformed(start, what))
+}
+
+/// The time steps that `bytes` hold: one for each frame of molecular text. A last one that is cut
+/// short is listed, so that reading it can say so.
+///
+/// # Errors
+/// As [`kind`].
+pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    Ok(match kind(bytes)? {
+        Kind::Raw => vec![Step::whole(bytes.len())],
+        Kind::Molecular => molecular::steps(bytes, text_start(bytes)),
+        Kind::Bare => csv::steps(bytes)?,
+    })
+}
+
+/// Reads one of the [`steps`].
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the step is cut short or breaks its format.
+pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    if bytes.len() < step.span.end {
+        let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
+        return Err(ParseError::malformed(bytes.len(), what));
+    }
+    match kind(bytes)? {
+        Kind::Raw => Ok(raw(bytes)),
+        Kind::Molecular => molecular::read(bytes, step.span.clone()),
+        Kind::Bare => csv::read(bytes, step),
+    }
+}
+
+fn raw(bytes: &[u8]) -> RawParticles {
+    let (triples, _) = bytes.as_chunks::<TRIPLE>();
+    let positions = triples
+        .iter()
+        .map(|triple| {
+            let (axes, _) = triple.as_chunks::<4>();
+            Vec3::from_array(std::array::from_fn(|axis| f32::from_le_bytes(axes[axis])))
+        })
+        .collect();
+    RawParticles {
+        positions: Positions::F32(positions),
+        attributes: Vec::new(),
+        time: None,
+        step: None,
+    }
+}
+
+/// Offset of the text behind a byte order mark.
+fn text_start(bytes: &[u8]) -> usize {
+    if bytes.starts_with(csv::BYTE_ORDER_MARK) {
+        csv::BYTE_ORDER_MARK.len()
+    } else {
+        0
+    }
+}
+
+/// Offset of the first byte at the head of the file that text does not have. Comments may be any
+/// UTF-8: lines after `#` or `//`, and the second line if the first is a count.
+fn first_binary(bytes: &[u8]) -> Option<usize> {
+    let start = text_start(bytes);
+    let end = bytes.len().min(WINDOW);
+    let is_text = |b: &u8| matches!(b, b'\t' | b'\n' | b'\r' | b' '..=b'~');
+    let mut counted = false;
+    for (number, line) in Lines::new(bytes, start..end).enumerate() {
+        if number == 0 {
+            counted = text::integer(line.text.trim_ascii()).is_some();
+        }
+        let is_comment =
+            counted && number == 1 || line.text.starts_with(b"#") || line.text.starts_with(b"//");
+        if is_comment && is_utf8_text(line.text) {
+            continue;
+        }
+        // The line end is text; a carriage return before it, too.
+        if let Some(at) = line.text.iter().position(|b| !is_text(b)) {
+            return Some(line.at + at);
+        }
+    }
+    None
+}
+
+/// True if `text` is UTF-8, perhaps cut inside its last character, without control characters.
+fn is_utf8_text(text: &[u8]) -> bool {
+    let whole = match std::str::from_utf8(text) {
+        Ok(_) => true,
+        Err(error) => error.error_len().is_none(),
+    };
+    whole && text.iter().all(|b| *b >= b' ' || *b == b'\t')
+}
+
+/// With a count in the first line, the third decides; if the file ends before, it is cut short.
+fn molecular_kind(count: i64, mut lines: Lines<'_>) -> Result<Kind, ParseError> {
+    let comment = lines.next();
+    let extended = comment.is_some_and(|line| comment::value(line.text, "Properties").is_some());
+    let Some(third) = lines.next() else {
+        return Ok(Kind::Molecular);
+    };
+    let fields = text::words(third.text).take(4).count();
+    if count == 0 || extended || fields >= 4 || lines.is_at_end() {
+        return Ok(Kind::Molecular);
+    }
+    let what = format!(
+        "after a count and a comment an atom has an element and x y z, not {}",
+        text::shown(third.text)
+    );
+    Err(ParseError::malformed(third.at, what))
+}
+
+/// True if the first line that is no comment has three numbers.
+fn first_row_has_numbers(bytes: &[u8], start: usize) -> bool {
+    let mut lines = Lines::new(bytes, start..bytes.len());
+    let row = lines.find(|line| {
+        let text = line.text.trim_ascii();
+        !text.is_empty() && !text.starts_with(b"#") && !text.starts_with(b"//")
+    });
+    let numbers = row.into_iter().flat_map(|line| {
+        line.text
+            .split(|b| b" \t,;".contains(b))
+            .filter(|word| text::number(word).is_some())
+    });
+    numbers.take(3).count() == 3
+}
+
+#[cfg(test)]
+mod tests;

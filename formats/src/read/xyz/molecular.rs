@@ -1,0 +1,218 @@
+//! Molecular text: frames of a count, a comment, and a line for each atom, one after another.
+
+use std::ops::Range;
+
+use super::comment;
+use crate::read::Step;
+use crate::read::table::{
+    CUT_SHORT, Comments, Decimal, Dialect, Numbers, OnText, Place, Separator, Surplus, Table,
+    Target,
+};
+use crate::read::text::{self, Line, Lines};
+use crate::{ParseError, RawParticles};
+
+/// The frames from byte `start` on. Where a count should be and is not, the rest of the file is
+/// one last step, so that reading it can say so.
+pub(super) fn steps(bytes: &[u8], start: usize) -> Vec<Step> {
+    let mut steps = Vec::new();
+    let mut lines = Lines::new(bytes, start..bytes.len());
+    while let Some(line) = lines.next() {
+        if line.is_blank() {
+            continue;
+        }
+        let mut step = Step {
+            index: steps.len(),
+            span: line.at..bytes.len(),
+            number: None,
+            time: None,
+        };
+        if let Ok(count) = count(line) {
+            if let Some(comment) = lines.next() {
+                step.number = number(comment);
+                step.time = time(comment);
+            }
+            lines.pass(count);
+            step.span.end = lines.at();
+            steps.push(step);
+        } else {
+            steps.push(step);
+            break;
+        }
+    }
+    steps
+}
+
+/// Reads the frame in `span`.
+pub(super) fn read(bytes: &[u8], span: Range<usize>) -> Result<RawParticles, ParseError> {
+    let mut lines = Lines::new(bytes, span);
+    let too_short = |at, what: String| ParseError::malformed(at, format!("{what}: {CUT_SHORT}"));
+    let Some(first) = lines.find(|line| !line.is_blank()) else {
+        return Err(too_short(lines.at(), "no particle count".into()));
+    };
+    let count = count(first)?;
+    let Some(comment) = lines.next() else {
+        return Err(too_short(lines.at(), "no comment after the count".into()));
+    };
+    let start = lines.at();
+    let found = lines.pass(count);
+    if found < count {
+        let what = format!("{count} particles announced, {found} lines follow");
+        return Err(too_short(first.at, what));
+    }
+    let rows = start..lines.at();
+    let (fields, targets) = match comment::value(comment.text, "Properties") {
+        Some(properties) => extended_columns(properties, comment.at, rows.len())?,
+        None => plain_columns(bytes, &rows)?,
+    };
+    let table = Table {
+        bytes,
+        span: rows,
+        dialect: DIALECT,
+        fields,
+        targets,
+    };
+    let (positions, attributes) = table.particles()?;
+    if positions.len() != count {
+        let what = format!(
+            "{count} particles announced, {} found: blank lines between them",
+            positions.len()
+        );
+        return Err(ParseError::malformed(first.at, what));
+    }
+    Ok(RawParticles {
+        positions,
+        attributes,
+        time: time(comment),
+        step: number(comment),
+    })
+}
+
+/// People append remarks to atoms, so more columns than the first atom has are no fault.
+const DIALECT: Dialect = Dialect {
+    separator: Separator::Blanks,
+    decimal: Decimal::Point,
+    comments: Comments::None,
+    surplus: Surplus::Ignored,
+};
+
+fn count(line: Line<'_>) -> Result<usize, ParseError> {
+    let token = line.text.trim_ascii();
+    let count = text::integer(token).and_then(|count| usize::try_from(count).ok());
+    count.ok_or_else(|| {
+        let what = format!("{} is no particle count", text::shown(token));
+        ParseError::malformed(line.at, what)
+    })
+}
+
+fn time(comment: Line<'_>) -> Option<f64> {
+    text::number(comment::value(comment.text, "Time")?.trim_ascii())
+}
+
+fn number(comment: Line<'_>) -> Option<i64> {
+    let step = comment::lammps_step(comment.text)
+        .or_else(|| comment::value(comment.text, "Step"))
+        .or_else(|| comment::value(comment.text, "Timestep"))?;
+    text::integer(step.trim_ascii())
+}
+
+type Columns = (Vec<Option<Place>>, Vec<Target>);
+
+/// The columns of plain text by the first atom: element (an attribute `type` if it is a number in
+/// every line), x, y, z, and `column_5`... for what follows.
+fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseError> {
+    let mut targets = vec![
+        Target::positions(),
+        Target::attribute("type", 1, Numbers::WholeIfAll, OnText::LeaveOut),
+    ];
+    let place = |target, component| Some(Place { target, component });
+    let mut fields = vec![place(1, 0), place(0, 0), place(0, 1), place(0, 2)];
+    let Some(first) = Lines::new(bytes, rows.clone()).find(|line| !line.is_blank()) else {
+        return Ok((fields, targets));
+    };
+    let columns = text::words(first.text).count();
+    if columns < 4 {
+        let what = format!(
+            "an atom has an element and x y z, not {}",
+            text::shown(first.text)
+        );
+        return Err(ParseError::malformed(first.at, what));
+    }
+    for column in 5..=columns {
+        fields.push(place(targets.len(), 0));
+        let name = format!("column_{column}");
+        targets.push(Target::attribute(
+            name,
+            1,
+            Numbers::WholeIfAll,
+            OnText::LeaveOut,
+        ));
+    }
+    Ok((fields, targets))
+}
+
+/// The columns by `name:type:count` triples, for atoms in `size` bytes.
+fn extended_columns(properties: &[u8], at: usize, size: usize) -> Result<Columns, ParseError> {
+    let malformed = |what: String| ParseError::malformed(at, what);
+    let mut targets = vec![Target::positions()];
+    let mut fields = Vec::new();
+    let mut positioned = false;
+    let parts: Vec<&[u8]> = properties.split(|b| *b == b':').collect();
+    let (triples, rest) = parts.as_chunks::<3>();
+    if !rest.is_empty() {
+        return Err(malformed(
+            "Properties are no name:type:count triples".into(),
+        ));
+    }
+    for [name, kind, count] in triples {
+        let components = text::integer(count).and_then(|count| usize::try_from(count).ok());
+        let shown = text::shown(name);
+        let Some(components @ 1..) = components else {
+            let count = text::shown(count);
+            return Err(malformed(format!("property {shown} has {count} columns")));
+        };
+        // A column takes two bytes, its separator included; without atoms none is looked at.
+        if size > 0 && fields.len().saturating_add(components) > size / 2 + 1 {
+            let what = format!("property {shown} has {components} columns, the atoms {size} bytes");
+            return Err(malformed(what));
+        }
+        let columns = if size > 0 { components } else { 0 };
+        let target = if is_position(name) && !positioned {
+            if !matches!(components, 2 | 3) || !kind.eq_ignore_ascii_case(b"R") {
+                return Err(malformed(format!("property {shown} is no position")));
+            }
+            positioned = true;
+            Some(0)
+        } else {
+            attribute(name, kind, components).map(|attribute| {
+                targets.push(attribute);
+                targets.len() - 1
+            })
+        };
+        fields
+            .extend((0..columns).map(|component| target.map(|target| Place { target, component })));
+    }
+    if !positioned {
+        return Err(malformed("Properties name no positions (pos:R:3)".into()));
+    }
+    Ok((fields, targets))
+}
+
+fn is_position(name: &[u8]) -> bool {
+    ["pos", "position", "positions", "coordinates"]
+        .iter()
+        .any(|known| name.eq_ignore_ascii_case(known.as_bytes()))
+}
+
+/// The array for a property. Text and truth values have none, save a species given as a number.
+fn attribute(name: &[u8], kind: &[u8], components: usize) -> Option<Target> {
+    let shown = String::from_utf8_lossy(name);
+    match kind {
+        b"R" | b"r" => Some((shown, Numbers::Real, OnText::Fault)),
+        b"I" | b"i" => Some((shown, Numbers::WholeIfAll, OnText::Fault)),
+        b"S" | b"s" if components == 1 && name.eq_ignore_ascii_case(b"species") => {
+            Some(("type".into(), Numbers::WholeIfAll, OnText::LeaveOut))
+        }
+        _ => None,
+    }
+    .map(|(name, numbers, on_text)| Target::attribute(name, components, numbers, on_text))
+}
