@@ -36,6 +36,9 @@ const SEPARATORS: [Separator; 4] = [
 const SAMPLE_LINES: usize = 200;
 const SAMPLE_BYTES: usize = 1 << 20;
 
+/// Lines of numbers that may come before the names.
+const LINES_OF_FACTS: usize = 32;
+
 impl Layout {
     /// Finds the table.
     ///
@@ -106,15 +109,18 @@ impl<'a> Search<'a> {
             if names::position(&names).is_some() {
                 return Ok(self.layout(Some(names), cells.len(), line.at, lines.at()..end));
             }
-            let is_number = |cell: &&[u8]| number(cell, self.dialect.decimal).is_some();
-            if cells.len() >= 3 && cells.iter().filter(|cell| is_number(cell)).count() >= 3 {
-                return self.first_row(&cells, at..end);
+            let is_number = |cell: &&&[u8]| number(cell, self.dialect.decimal).is_some();
+            if cells.iter().filter(is_number).count() >= 3 {
+                if !self.names_follow(lines.clone()) {
+                    return self.first_row(&cells, at..end);
+                }
+                self.note_time(&cells);
+                continue;
             }
             if cells.len() >= 3 {
                 self.candidate = Some(line);
             } else if let [name, value] = &cells[..]
-                && name.len() >= 4
-                && name[..4].eq_ignore_ascii_case(b"time")
+                && is_time(name)
             {
                 self.time = number(value, self.dialect.decimal);
             }
@@ -126,6 +132,29 @@ impl<'a> Search<'a> {
         }
         let what = "no row of 3 or more numbers and no line of column names";
         Err(ParseError::malformed(lines.at(), what))
+    }
+
+    /// True if positions are named soon: then the numbers so far belong to a table of facts about
+    /// the run, as DualSPHysics may put before the particles.
+    fn names_follow(&self, lines: Lines<'_>) -> bool {
+        lines
+            .take(LINES_OF_FACTS)
+            .filter(|line| !self.dialect.comments.include(line.text))
+            .any(|line| {
+                names::position(&clean(&split(line.text, self.dialect.separator))).is_some()
+            })
+    }
+
+    /// Takes the time from a row of facts.
+    fn note_time(&mut self, facts: &[&[u8]]) {
+        let Some(line) = self.candidate.take() else {
+            return;
+        };
+        let names = split(line.text, self.dialect.separator);
+        let time = names.iter().zip(facts).find(|(name, _)| is_time(name));
+        if let Some((_, time)) = time {
+            self.time = number(time, self.dialect.decimal);
+        }
     }
 
     /// A row of numbers: the names are in a comment, or in a line without positions (which is an
@@ -259,6 +288,11 @@ fn split(line: &[u8], separator: Separator) -> Vec<&[u8]> {
         found.pop();
     }
     found
+}
+
+fn is_time(name: &[u8]) -> bool {
+    name.get(..4)
+        .is_some_and(|start| start.eq_ignore_ascii_case(b"time"))
 }
 
 fn clean(cells: &[&[u8]]) -> Vec<String> {

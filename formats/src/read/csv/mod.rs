@@ -1,8 +1,8 @@
 //! Separated tables: CSV of ParaView, DualSPHysics, spreadsheets and scripts, with or without a
 //! line of column names, and bare point lists.
 //!
-//! [`layout`] finds separator, names and first row; [`names`] finds positions and vectors among the
-//! names; [`super::table`] parses the rows.
+//! `layout` finds separator, names and first row; `names` finds positions and vectors among the
+//! names; `read::table` parses the rows.
 
 use super::Step;
 use super::table::{CUT_SHORT, Numbers, OnText, Place, Table, Target};

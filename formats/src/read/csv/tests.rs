@@ -90,6 +90,15 @@ fn the_same_table_written_in_many_ways() {
 }
 
 #[test]
+fn facts_before_the_names() {
+    let text = "Part;Time [s];Np;Nbound;\n7;0.25;2;0;\n\nPos.x [m];Pos.y [m];Pos.z [m];Idp;\n1;2;3;8;\n4;5;6;9;\n";
+    let particles = only(text);
+    assert_eq!(f64_positions(&particles), TWO);
+    assert_eq!(whole(&particles, "Idp"), [8, 9]);
+    assert_eq!(particles.time, Some(0.25));
+}
+
+#[test]
 fn decimal_commas_need_another_separator() {
     let particles = only("x;y;z;h\n1,5;-2,25;3,0E1;0,125\n0,5;1;2;3\n");
     let expected = [DVec3::new(1.5, -2.25, 30.), DVec3::new(0.5, 1., 2.)];

@@ -72,7 +72,7 @@ impl Values {
         }
     }
 
-    /// The numbers of [`Target::positions`].
+    /// The numbers of [`super::Target::positions`].
     pub(in crate::read) fn into_positions(self) -> Positions {
         let Self::Real(v) = self else {
             return Positions::F64(Vec::new());

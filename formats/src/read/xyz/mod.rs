@@ -49,7 +49,7 @@ pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
             Ok(Kind::Raw)
         } else {
             let what = format!(
-                "neither raw f32 triples ({} bytes are no multiple of {TRIPLE}) nor text (this byte is {:#04x})",
+                "neither raw f32 triples ({} bytes are no multiple of {TRIPLE}; perhaps still being written) nor text (this byte is {:#04x})",
                 bytes.len(),
                 bytes.get(at).copied().unwrap_or_default()
             );
