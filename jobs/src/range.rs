@@ -1,0 +1,454 @@
+//! Frame ranges as people and render engines write them: `7`, `1-10`, `1-10x2`, `10-1x-3`,
+//! `-5--2`, `1-5:2`, `1-10y2`, and lists of these with commas.
+//!
+//! The notation is Fileseq's (`x` is a step, `y` is what a step leaves out), except that `:` is a
+//! step as in Open Job Description. A range is never expanded in memory: `0-9000000000000000000`
+//! costs as much as `7`.
+
+use std::fmt;
+use std::str::FromStr;
+
+use serde::{Deserialize, Serialize};
+
+/// One or more frames, in the order in which they were asked for; never empty.
+#[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(try_from = "String", into = "String")]
+pub struct FrameRange {
+    parts: Vec<Part>,
+}
+
+/// Why a text is no frame range.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("frame range `{text}`: character {at}: {what}")]
+pub struct RangeError {
+    /// The whole text.
+    pub text: String,
+    /// Where, in characters from 1.
+    pub at: usize,
+    /// What is wrong there.
+    pub what: String,
+}
+
+/// `first-last` by `step`, whose sign points from `first` to `last`; with `fill`, the frames
+/// that the step leaves out. Holds at least one frame.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+struct Part {
+    first: i64,
+    last: i64,
+    step: i64,
+    fill: bool,
+}
+
+impl FrameRange {
+    /// Frames in the order they were written, each once, found one at a time.
+    pub fn iter(&self) -> impl Iterator<Item = i64> + '_ {
+        self.parts
+            .iter()
+            .enumerate()
+            .flat_map(move |(index, part)| {
+                let earlier = &self.parts[..index];
+                part.iter()
+                    .filter(move |frame| !earlier.iter().any(|p| p.contains(*frame)))
+            })
+    }
+
+    /// Whether `frame` is one of them; costs as many steps as there are commas.
+    pub fn contains(&self, frame: i64) -> bool {
+        self.parts.iter().any(|part| part.contains(frame))
+    }
+
+    /// Whether there is more than one frame.
+    pub fn has_several(&self) -> bool {
+        self.iter().nth(1).is_some()
+    }
+
+    /// Those of the `available` frames that are in the range, in the range's order, each once.
+    /// The cost follows `available`, not the size of the range.
+    pub fn select(&self, available: &[i64]) -> Vec<i64> {
+        let mut found: Vec<(usize, u64, i64)> = available
+            .iter()
+            .filter_map(|&frame| {
+                let part = self.parts.iter().position(|p| p.contains(frame))?;
+                Some((part, self.parts[part].first.abs_diff(frame), frame))
+            })
+            .collect();
+        found.sort_unstable();
+        found.dedup();
+        found.into_iter().map(|(_, _, frame)| frame).collect()
+    }
+
+    /// The shortest-looking ascending range with exactly these frames: `1-3,7-15x4`. None if
+    /// there are no frames.
+    pub fn from_frames(frames: impl IntoIterator<Item = i64>) -> Option<Self> {
+        let mut frames: Vec<i64> = frames.into_iter().collect();
+        frames.sort_unstable();
+        frames.dedup();
+        let mut parts = Vec::new();
+        let mut rest = frames.as_slice();
+        while let [first, tail @ ..] = rest {
+            let run = even_run(rest);
+            match run {
+                Some((step, count)) => {
+                    parts.push(Part {
+                        first: *first,
+                        last: rest[count - 1],
+                        step,
+                        fill: false,
+                    });
+                    rest = &rest[count..];
+                }
+                None => {
+                    parts.push(Part::single(*first));
+                    rest = tail;
+                }
+            }
+        }
+        (!parts.is_empty()).then_some(Self { parts })
+    }
+}
+
+/// Step and length of the evenly spaced run that `frames` (ascending) begins with, if it is worth
+/// writing as one: two neighbours, or three with a step.
+fn even_run(frames: &[i64]) -> Option<(i64, usize)> {
+    let step = frames.get(1)?.checked_sub(*frames.first()?)?;
+    let pairs = frames
+        .windows(2)
+        .take_while(|pair| pair[1].checked_sub(pair[0]) == Some(step))
+        .count();
+    (step == 1 || pairs >= 2).then_some((step, pairs + 1))
+}
+
+impl Part {
+    const fn single(frame: i64) -> Self {
+        Self {
+            first: frame,
+            last: frame,
+            step: 1,
+            fill: false,
+        }
+    }
+
+    fn contains(&self, frame: i64) -> bool {
+        let inside = (self.first.min(self.last)..=self.first.max(self.last)).contains(&frame);
+        let on_step = self
+            .first
+            .abs_diff(frame)
+            .is_multiple_of(self.step.unsigned_abs());
+        inside && on_step != self.fill
+    }
+
+    fn iter(self) -> impl Iterator<Item = i64> {
+        let stride = if self.fill {
+            self.step.signum()
+        } else {
+            self.step
+        };
+        std::iter::successors(Some(self.first), move |frame| frame.checked_add(stride))
+            .take_while(move |frame| {
+                if stride > 0 {
+                    *frame <= self.last
+                } else {
+                    *frame >= self.last
+                }
+            })
+            .filter(move |frame| self.contains(*frame))
+    }
+}
+
+impl fmt::Display for Part {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}", self.first)?;
+        if self.first != self.last {
+            write!(f, "-{}", self.last)?;
+        }
+        match (self.fill, self.step) {
+            (true, step) => write!(f, "y{step}"),
+            (false, 1 | -1) => Ok(()),
+            (false, step) => write!(f, "x{step}"),
+        }
+    }
+}
+
+impl fmt::Display for FrameRange {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        for (index, part) in self.parts.iter().enumerate() {
+            if index > 0 {
+                f.write_str(",")?;
+            }
+            part.fmt(f)?;
+        }
+        Ok(())
+    }
+}
+
+impl FromStr for FrameRange {
+    type Err = RangeError;
+
+    fn from_str(text: &str) -> Result<Self, RangeError> {
+        let mut scanner = Scanner {
+            text,
+            chars: text.chars().collect(),
+            at: 0,
+        };
+        let mut parts = vec![scanner.part()?];
+        while scanner.eat(',') {
+            parts.push(scanner.part()?);
+        }
+        match scanner.peek() {
+            None => Ok(Self { parts }),
+            Some(other) => Err(scanner.error(
+                scanner.at,
+                format!("`{other}` has no place here, as in `1-10`, `1-10x2` or `7,9,20`"),
+            )),
+        }
+    }
+}
+
+impl TryFrom<String> for FrameRange {
+    type Error = RangeError;
+
+    fn try_from(text: String) -> Result<Self, RangeError> {
+        text.parse()
+    }
+}
+
+impl From<FrameRange> for String {
+    fn from(range: FrameRange) -> Self {
+        range.to_string()
+    }
+}
+
+struct Scanner<'a> {
+    text: &'a str,
+    chars: Vec<char>,
+    at: usize,
+}
+
+impl Scanner<'_> {
+    fn error(&self, at: usize, what: impl Into<String>) -> RangeError {
+        RangeError {
+            text: self.text.to_owned(),
+            at: at + 1,
+            what: what.into(),
+        }
+    }
+
+    /// The next character that is no blank.
+    fn peek(&mut self) -> Option<char> {
+        while self.chars.get(self.at).is_some_and(|c| c.is_whitespace()) {
+            self.at += 1;
+        }
+        self.chars.get(self.at).copied()
+    }
+
+    fn eat(&mut self, wanted: char) -> bool {
+        let found = self.peek() == Some(wanted);
+        self.at += usize::from(found);
+        found
+    }
+
+    fn number(&mut self) -> Result<i64, RangeError> {
+        let _ = self.peek();
+        let start = self.at;
+        let sign = usize::from(self.chars.get(start) == Some(&'-'));
+        let digits = self.chars[start + sign..]
+            .iter()
+            .take_while(|c| c.is_ascii_digit())
+            .count();
+        if digits == 0 {
+            return Err(match self.chars.get(start) {
+                None => self.error(start, "a frame number is missing"),
+                Some(c) => self.error(start, format!("a frame number is wanted, not `{c}`")),
+            });
+        }
+        self.at = start + sign + digits;
+        let word: String = self.chars[start..self.at].iter().collect();
+        word.parse()
+            .map_err(|_| self.error(start, format!("{word} does not fit in 64 bits")))
+    }
+
+    fn part(&mut self) -> Result<Part, RangeError> {
+        let first = self.number()?;
+        if !self.eat('-') {
+            return Ok(Part::single(first));
+        }
+        let last = self.number()?;
+        let fill = match self.peek() {
+            Some('x' | ':') => false,
+            Some('y') => true,
+            _ => {
+                return Ok(Part {
+                    step: if last < first { -1 } else { 1 },
+                    last,
+                    ..Part::single(first)
+                });
+            }
+        };
+        self.at += 1;
+        let _ = self.peek();
+        let at = self.at;
+        let step = self.number()?;
+        self.stepped(first, last, step, fill, at)
+    }
+
+    fn stepped(
+        &self,
+        first: i64,
+        last: i64,
+        step: i64,
+        fill: bool,
+        at: usize,
+    ) -> Result<Part, RangeError> {
+        if step == 0 {
+            return Err(self.error(at, "a step of 0 never arrives"));
+        }
+        if step < 0 && first < last {
+            return Err(self.error(at, format!("a step of {step} leads away from {last}")));
+        }
+        if fill && (step.unsigned_abs() == 1 || first == last) {
+            return Err(self.error(at, format!("`y{step}` leaves no frame here")));
+        }
+        if first == last {
+            return Ok(Part::single(first));
+        }
+        // `10-1x3` counts down just as `10-1` does.
+        let step = if last < first && step > 0 {
+            -step
+        } else {
+            step
+        };
+        Ok(Part {
+            first,
+            last,
+            step,
+            fill,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn frames(text: &str) -> Vec<i64> {
+        text.parse::<FrameRange>().unwrap().iter().collect()
+    }
+
+    #[track_caller]
+    fn refused(text: &str, at: usize, what: &str) {
+        let error = text.parse::<FrameRange>().unwrap_err();
+        assert_eq!(error.at, at, "{error}");
+        assert!(error.what.contains(what), "{error}");
+    }
+
+    #[test]
+    fn forms() {
+        assert_eq!(frames("7"), [7]);
+        assert_eq!(frames("1-1"), [1]);
+        assert_eq!(frames("1-4"), [1, 2, 3, 4]);
+        assert_eq!(frames("4-1"), [4, 3, 2, 1]);
+        assert_eq!(frames("1-10x2"), [1, 3, 5, 7, 9]);
+        assert_eq!(frames("1-5:2"), [1, 3, 5]);
+        assert_eq!(frames("1-10y2"), [2, 4, 6, 8, 10]);
+        assert_eq!(frames("10-1x-3"), [10, 7, 4, 1]);
+        assert_eq!(frames("10-1x3"), [10, 7, 4, 1]);
+        assert_eq!(frames("-5--2"), [-5, -4, -3, -2]);
+        assert_eq!(frames("-2-2:2"), [-2, 0, 2]);
+        assert_eq!(frames("7,9,20"), [7, 9, 20]);
+        assert_eq!(frames(" 1 - 3 , 8 "), [1, 2, 3, 8]);
+        assert_eq!(frames("1-5,3-7,4"), [1, 2, 3, 4, 5, 6, 7]);
+    }
+
+    #[test]
+    fn errors_name_the_place() {
+        refused("", 1, "missing");
+        refused("1-", 3, "missing");
+        refused("1-5,", 5, "missing");
+        refused("1-10z2", 5, "`z`");
+        refused("1-10x0", 6, "never");
+        refused("1-10x-3", 6, "away");
+        refused("1-10y1", 6, "no frame");
+        refused("a", 1, "not `a`");
+        refused("1-99999999999999999999", 3, "64 bits");
+        refused("1 0", 3, "`0`");
+        refused("--3", 1, "frame number");
+    }
+
+    #[test]
+    fn huge_ranges_stay_small() {
+        let all = format!("{}-{}", i64::MIN, i64::MAX);
+        let all: FrameRange = all.parse().unwrap();
+        assert!(all.contains(0) && all.contains(i64::MAX) && all.has_several());
+        assert_eq!(
+            all.iter().take(2).collect::<Vec<_>>(),
+            [i64::MIN, i64::MIN + 1]
+        );
+        assert_eq!(all.select(&[5, -1, 5]), [-1, 5]);
+        let top = format!("{}-{}x5", i64::MAX - 7, i64::MAX);
+        assert_eq!(frames(&top), [i64::MAX - 7, i64::MAX - 2]);
+    }
+
+    #[test]
+    fn select_keeps_the_order_asked_for() {
+        let range: FrameRange = "20,10-1x-3".parse().unwrap();
+        assert_eq!(range.select(&[1, 2, 4, 10, 20, 30]), [20, 10, 4, 1]);
+    }
+
+    #[test]
+    fn frames_become_a_short_range() {
+        let text = |f: &[i64]| {
+            FrameRange::from_frames(f.iter().copied())
+                .unwrap()
+                .to_string()
+        };
+        assert_eq!(text(&[3, 1, 2, 7, 11, 15]), "1-3,7-15x4");
+        assert_eq!(text(&[1, 2]), "1-2");
+        assert_eq!(text(&[1, 5]), "1,5");
+        assert_eq!(
+            text(&[i64::MIN, i64::MAX]),
+            format!("{},{}", i64::MIN, i64::MAX)
+        );
+        assert_eq!(FrameRange::from_frames([]), None);
+    }
+
+    fn any_part() -> impl Strategy<Value = String> {
+        (-60i64..60, -60i64..60, 2i64..9, 0..4).prop_map(|(a, b, step, form)| {
+            let b = if form == 3 && a == b { b + 1 } else { b };
+            match form {
+                0 => format!("{a}"),
+                1 => format!("{a}-{b}"),
+                2 => format!("{a}-{b}x{step}"),
+                _ => format!("{a}-{b}y{step}"),
+            }
+        })
+    }
+
+    proptest! {
+        #[test]
+        fn display_parses_back(parts in prop::collection::vec(any_part(), 1..5)) {
+            let range: FrameRange = parts.join(",").parse().unwrap();
+            let again: FrameRange = range.to_string().parse().unwrap();
+            prop_assert_eq!(&range, &again);
+            let listed: Vec<i64> = range.iter().collect();
+            for frame in -70..70 {
+                prop_assert_eq!(range.contains(frame), listed.contains(&frame));
+            }
+            let everything: Vec<i64> = (-70..70).collect();
+            prop_assert_eq!(range.select(&everything), listed);
+        }
+
+        #[test]
+        fn from_frames_is_exact(mut frames in prop::collection::vec(-40i64..40, 1..30)) {
+            let range = FrameRange::from_frames(frames.iter().copied()).unwrap();
+            frames.sort_unstable();
+            frames.dedup();
+            prop_assert_eq!(range.iter().collect::<Vec<_>>(), frames);
+        }
+
+        #[test]
+        fn any_text_is_answered(text in "[-0-9xy:, a]{0,12}") {
+            let _ = text.parse::<FrameRange>();
+        }
+    }
+}
