@@ -4,4 +4,30 @@
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
 //! them. Arrows never point the other way.
+//!
+//! A job lives in one directory. The *plan* ([`Plan`]) says which frames there are and under which
+//! settings; it is written once and again only when frames are added. The *ledger* ([`Ledger`])
+//! only grows: one line for each frame that was finished or failed. Outputs are published whole
+//! ([`Publisher`]) before their line is written, so a kill at any moment loses at most the frames
+//! in hand.
 #![deny(unsafe_code)]
+
+mod error;
+mod fingerprint;
+mod interrupt;
+mod job;
+mod ledger;
+mod plan;
+mod publish;
+mod range;
+mod state;
+
+pub use error::{InputChange, JobError, SettingChange};
+pub use fingerprint::{Fingerprint, compare_settings, settings_hash};
+pub use interrupt::{Interrupt, InterruptLevel};
+pub use job::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode};
+pub use ledger::{Entry, Ledger, OutputFile, Status};
+pub use plan::{PLAN_FILE, Plan, PlannedFrame, PlannedInput};
+pub use publish::{Publisher, publish, publish_with};
+pub use range::{FrameRange, RangeError};
+pub use state::{FrameState, JobState, Summary};

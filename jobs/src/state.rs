@@ -1,0 +1,124 @@
+//! How a job stands: plan and ledger together with what is really on the disk.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use crate::{Entry, Ledger, OutputFile, Plan, Status};
+
+/// How a frame stands.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FrameState {
+    /// Not tried yet.
+    Pending,
+    /// Tried and failed; the reason is in its ledger entry.
+    Failed,
+    /// Was done, but an output is missing or has another length now.
+    Lost,
+    /// Done, and its outputs are there.
+    Done,
+}
+
+/// How many frames stand how.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Summary {
+    /// Frames looked at.
+    pub total: usize,
+    /// Done, outputs in place.
+    pub done: usize,
+    /// Not tried, or lost.
+    pub pending: usize,
+    /// Done once, but with outputs gone; part of `pending`. Ascending.
+    pub lost: Vec<i64>,
+    /// Failed. Ascending.
+    pub failed: Vec<i64>,
+}
+
+/// A job as it stands on disk.
+#[derive(Debug, Clone)]
+pub struct JobState {
+    pub(crate) dir: PathBuf,
+    pub(crate) plan: Plan,
+    pub(crate) ledger: Ledger,
+    pub(crate) states: BTreeMap<i64, FrameState>,
+}
+
+impl JobState {
+    pub(crate) fn new(dir: &Path, plan: Plan, ledger: Ledger) -> Self {
+        let states = plan
+            .frames()
+            .iter()
+            .map(|f| (f.number, frame_state(dir, ledger.entry(f.number))))
+            .collect();
+        Self {
+            dir: dir.to_owned(),
+            plan,
+            ledger,
+            states,
+        }
+    }
+
+    /// The directory of the job.
+    pub fn dir(&self) -> &Path {
+        &self.dir
+    }
+
+    /// The plan.
+    pub const fn plan(&self) -> &Plan {
+        &self.plan
+    }
+
+    /// The ledgers of all workers, merged.
+    pub const fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// How `frame` stands; None if it is not in the plan.
+    pub fn frame_state(&self, frame: i64) -> Option<FrameState> {
+        self.states.get(&frame).copied()
+    }
+
+    /// How all frames of the plan stand.
+    pub fn summary(&self) -> Summary {
+        self.summary_of(self.states.keys().copied())
+    }
+
+    /// How these frames stand; those not in the plan are left out.
+    pub fn summary_of(&self, frames: impl IntoIterator<Item = i64>) -> Summary {
+        let mut summary = Summary::default();
+        for frame in frames {
+            let Some(state) = self.frame_state(frame) else {
+                continue;
+            };
+            summary.total += 1;
+            match state {
+                FrameState::Done => summary.done += 1,
+                FrameState::Failed => summary.failed.push(frame),
+                FrameState::Pending => summary.pending += 1,
+                FrameState::Lost => {
+                    summary.pending += 1;
+                    summary.lost.push(frame);
+                }
+            }
+        }
+        summary.lost.sort_unstable();
+        summary.failed.sort_unstable();
+        summary
+    }
+
+    pub(crate) fn is_done(&self, frame: i64) -> bool {
+        self.frame_state(frame) == Some(FrameState::Done)
+    }
+}
+
+fn frame_state(dir: &Path, entry: Option<&Entry>) -> FrameState {
+    let in_place = |file: &OutputFile| {
+        fs::metadata(dir.join(&file.path)).is_ok_and(|m| m.is_file() && m.len() == file.len)
+    };
+    match entry {
+        None => FrameState::Pending,
+        Some(entry) if entry.status == Status::Failed => FrameState::Failed,
+        Some(entry) if entry.outputs.iter().all(in_place) => FrameState::Done,
+        Some(_) => FrameState::Lost,
+    }
+}
