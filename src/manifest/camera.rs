@@ -1,0 +1,216 @@
+//! `[camera]`: where the picture is taken from. World coordinates.
+
+use super::named;
+use super::reader::{Field, Section};
+use super::write::Entries;
+
+named! {
+    /// How the camera is placed.
+    CameraMode {
+        /// Framed on the bounds of the whole sequence.
+        Auto = "auto",
+        /// At `eye`, looking at `look_at`.
+        Fixed = "fixed",
+        /// As auto, going around by `degrees_per_frame`.
+        Turntable = "turntable",
+        /// Between the `[[camera.key]]` of the nearest frames.
+        Keys = "keys",
+    }
+}
+
+/// `[camera]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Camera {
+    /// How it is placed. Not given, it is fixed if there is an eye, by keys if there are keys, and
+    /// auto otherwise.
+    pub mode: CameraMode,
+    /// Where it is. Always there if the mode is fixed.
+    pub eye: Option<[f64; 3]>,
+    /// What is in the middle of the picture. Always there if the mode is fixed.
+    pub look_at: Option<[f64; 3]>,
+    /// What is up in the picture; None is `input.up`.
+    pub up: Option<[f64; 3]>,
+    /// Vertical field of view, degrees.
+    pub fov: f64,
+    /// Degrees around the up axis, for auto and turntable (there, of frame 0); None is a good one.
+    pub azimuth: Option<f64>,
+    /// Degrees above the horizon, for auto and turntable; None is a good one.
+    pub elevation: Option<f64>,
+    /// How far a turntable turns from a frame to the next.
+    pub degrees_per_frame: f64,
+    /// `[[camera.key]]`, ascending by frame.
+    pub keys: Vec<CameraKey>,
+}
+
+/// One place that the camera passes through.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CameraKey {
+    /// Frame at which it is there.
+    pub frame: i64,
+    /// Where it is.
+    pub eye: [f64; 3],
+    /// What is in the middle of the picture.
+    pub look_at: [f64; 3],
+    /// Vertical field of view, degrees; None is `camera.fov`.
+    pub fov: Option<f64>,
+}
+
+impl Default for Camera {
+    fn default() -> Self {
+        Self {
+            mode: CameraMode::Auto,
+            eye: None,
+            look_at: None,
+            up: None,
+            fov: 45.0,
+            azimuth: None,
+            elevation: None,
+            degrees_per_frame: 1.0,
+            keys: Vec::new(),
+        }
+    }
+}
+
+fn fov(field: &Field<'_>) -> Option<f64> {
+    field.number("degrees between 0 and 180", |v| 0.0 < v && v < 180.0)
+}
+
+impl Camera {
+    pub(super) fn read(mut section: Section<'_>) -> Self {
+        let default = Self::default();
+        let mode = section.optional("mode", |f| f.choice(CameraMode::ALL));
+        let mut camera = Self {
+            mode: CameraMode::Auto,
+            eye: section.optional("eye", Field::point),
+            look_at: section.optional("look_at", Field::point),
+            up: section.optional("up", Field::direction),
+            fov: section.value("fov", default.fov, fov),
+            azimuth: section.optional("azimuth", |f| f.number("degrees", |_| true)),
+            elevation: section.optional("elevation", |f| {
+                f.number("degrees from -90 to 90", |v| v.abs() <= 90.0)
+            }),
+            degrees_per_frame: section.value("degrees_per_frame", default.degrees_per_frame, |f| {
+                f.number("degrees", |_| true)
+            }),
+            keys: section
+                .sections("key")
+                .into_iter()
+                .filter_map(CameraKey::read)
+                .collect(),
+        };
+        camera.keys.sort_by_key(|k| k.frame);
+        camera.mode = mode.unwrap_or(if camera.eye.is_some() {
+            CameraMode::Fixed
+        } else if camera.keys.is_empty() {
+            CameraMode::Auto
+        } else {
+            CameraMode::Keys
+        });
+        camera.check(&section);
+        section.finish();
+        camera
+    }
+
+    fn check(&self, section: &Section<'_>) {
+        if self.mode == CameraMode::Fixed {
+            for key in ["eye", "look_at"] {
+                if section.lacks(key) {
+                    section.missing(key, "a fixed camera needs it, as [5.0, 5.0, 0.0]");
+                }
+            }
+            if let (Some(eye), Some(look_at)) = (self.eye, self.look_at) {
+                if eye == look_at {
+                    section.wrong("look_at", "is where the eye is; they must differ");
+                } else if self.up.is_some_and(|up| are_parallel(up, eye, look_at)) {
+                    section.wrong("up", "points along the view; it must not");
+                }
+            }
+        }
+        if self.mode == CameraMode::Keys && section.lacks("key") {
+            section.missing("key", "mode = \"keys\" needs at least one [[camera.key]]");
+        }
+        if self.keys.is_sorted_by(|a, b| a.frame < b.frame) {
+            return;
+        }
+        section.wrong("key", "two keys have the same frame");
+    }
+
+    pub(super) fn entries(&self, out: &mut Entries) {
+        out.section("camera");
+        out.put("mode", &self.mode, "auto | fixed | turntable | keys");
+        out.maybe(
+            "eye",
+            self.eye.as_ref(),
+            "[0.0, 0.0, 0.0]",
+            "fixed: where the camera is",
+        );
+        out.maybe(
+            "look_at",
+            self.look_at.as_ref(),
+            "[5.0, 5.0, 0.0]",
+            "fixed: the middle of the picture",
+        );
+        out.maybe(
+            "up",
+            self.up.as_ref(),
+            "[0.0, 0.0, 1.0]",
+            "default: input.up",
+        );
+        out.put("fov", &self.fov, "vertical, degrees");
+        out.maybe(
+            "azimuth",
+            self.azimuth.as_ref(),
+            "30.0",
+            "auto, turntable: degrees around up",
+        );
+        out.maybe(
+            "elevation",
+            self.elevation.as_ref(),
+            "20.0",
+            "auto, turntable: degrees above the horizon",
+        );
+        out.put(
+            "degrees_per_frame",
+            &self.degrees_per_frame,
+            "turntable: how fast it turns",
+        );
+        for (index, key) in self.keys.iter().enumerate() {
+            out.item("camera.key", index);
+            out.put("frame", &key.frame, "the camera is there at this frame");
+            out.put("eye", &key.eye, "where");
+            out.put("look_at", &key.look_at, "the middle of the picture");
+            out.maybe("fov", key.fov.as_ref(), "45.0", "default: camera.fov");
+        }
+    }
+}
+
+impl CameraKey {
+    fn read(mut section: Section<'_>) -> Option<Self> {
+        let frame = section.optional("frame", |f| f.or_wants(f.as_integer(), "a frame number"));
+        let eye = section.optional("eye", Field::point);
+        let look_at = section.optional("look_at", Field::point);
+        let fov = section.optional("fov", fov);
+        for key in ["frame", "eye", "look_at"] {
+            if section.lacks(key) {
+                section.missing(key, "each [[camera.key]] needs frame, eye and look_at");
+            }
+        }
+        if eye.is_some() && eye == look_at {
+            section.wrong("look_at", "is where the eye is; they must differ");
+        }
+        section.finish();
+        Some(Self {
+            frame: frame?,
+            eye: eye?,
+            look_at: look_at?,
+            fov,
+        })
+    }
+}
+
+/// Whether `up` leaves no upright picture of `look_at` from `eye`.
+fn are_parallel(up: [f64; 3], eye: [f64; 3], look_at: [f64; 3]) -> bool {
+    let up = glam::DVec3::from(up).normalize_or_zero();
+    let view = (glam::DVec3::from(look_at) - glam::DVec3::from(eye)).normalize_or_zero();
+    up.cross(view).length() < 1e-9
+}

@@ -1,0 +1,149 @@
+//! Colours: plain ones, and those that an attribute of the particles gives through a map.
+
+use super::named;
+use super::reader::{Field, Section, narrow};
+use super::write::Toml;
+
+named! {
+    /// Colour maps by name; the renderer knows what they look like.
+    ColorMap {
+        /// Dark violet to yellow, even in lightness.
+        Viridis = "viridis",
+        /// The rainbow, evened out.
+        Turbo = "turbo",
+        /// Blue to yellow through red.
+        Plasma = "plasma",
+        /// Black to pale yellow through red.
+        Inferno = "inferno",
+        /// Black to pale pink through violet.
+        Magma = "magma",
+        /// Blue to yellow, the same to colour-blind eyes.
+        Cividis = "cividis",
+        /// Blue to red through white, for values around a middle.
+        Coolwarm = "coolwarm",
+        /// Black to white.
+        Gray = "gray",
+    }
+}
+
+/// Where a particle's colour comes from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum ColorSetting {
+    /// Linear RGB, the same for all.
+    Rgb([f32; 3]),
+    /// An attribute through a map; vectors by their length.
+    Attribute {
+        /// Name of the attribute.
+        attribute: String,
+        /// The map.
+        map: ColorMap,
+        /// Values at the two ends of the map; None is what the whole sequence has.
+        range: Option<[f64; 2]>,
+    },
+}
+
+/// What rays see that meet nothing. Linear RGB.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Background {
+    /// One colour.
+    Plain([f32; 3]),
+    /// From straight down to straight up.
+    Gradient {
+        /// Straight down.
+        bottom: [f32; 3],
+        /// Straight up.
+        top: [f32; 3],
+    },
+}
+
+/// Linear RGB: three numbers from 0.
+pub(super) fn rgb(field: &Field<'_>) -> Option<[f32; 3]> {
+    field.or_wants(as_rgb(field), "three numbers from 0, as [0.6, 0.7, 0.9]")
+}
+
+fn as_rgb(field: &Field<'_>) -> Option<[f32; 3]> {
+    let color = field.as_numbers::<3>()?.map(narrow);
+    let holds = |c: &f32| c.is_finite() && *c >= 0.0;
+    color.iter().all(holds).then_some(color)
+}
+
+impl ColorSetting {
+    pub(super) fn read(field: &Field<'_>) -> Option<Self> {
+        if !field.is_table() {
+            let rgb = as_rgb(field).map(Self::Rgb);
+            return field.or_wants(
+                rgb,
+                "three numbers from 0, as [0.6, 0.7, 0.9], or { attribute = \"velocity\", map = \"viridis\" }",
+            );
+        }
+        let mut section = field.section()?;
+        let attribute = section.optional("attribute", Field::name);
+        let map = section.value("map", ColorMap::Viridis, |f| f.choice(ColorMap::ALL));
+        let range = section.optional("range", |f| {
+            let range = f.as_numbers::<2>().filter(|[low, high]| low < high);
+            f.or_wants(range, "two rising numbers, as [0.0, 4.0]")
+        });
+        if section.lacks("attribute") {
+            section.missing("attribute", "the name of an attribute, as \"velocity\"");
+        }
+        section.finish();
+        Some(Self::Attribute {
+            attribute: attribute?,
+            map,
+            range,
+        })
+    }
+}
+
+impl Toml for ColorSetting {
+    fn toml(&self) -> String {
+        match self {
+            Self::Rgb(rgb) => rgb.toml(),
+            Self::Attribute {
+                attribute,
+                map,
+                range,
+            } => {
+                let range = range.map_or(String::new(), |r| format!(", range = {}", r.toml()));
+                let (attribute, map) = (attribute.toml(), map.toml());
+                format!("{{ attribute = {attribute}, map = {map}{range} }}")
+            }
+        }
+    }
+}
+
+impl Background {
+    pub(super) fn read(field: &Field<'_>) -> Option<Self> {
+        if !field.is_table() {
+            let plain = as_rgb(field).map(Self::Plain);
+            return field.or_wants(
+                plain,
+                "three numbers from 0, as [0.1, 0.1, 0.1], or { bottom = [...], top = [...] }",
+            );
+        }
+        let mut section: Section<'_> = field.section()?;
+        let bottom = section.optional("bottom", rgb);
+        let top = section.optional("top", rgb);
+        for key in ["bottom", "top"] {
+            if section.lacks(key) {
+                section.missing(key, "three numbers from 0, as [0.1, 0.1, 0.1]");
+            }
+        }
+        section.finish();
+        Some(Self::Gradient {
+            bottom: bottom?,
+            top: top?,
+        })
+    }
+}
+
+impl Toml for Background {
+    fn toml(&self) -> String {
+        match self {
+            Self::Plain(rgb) => rgb.toml(),
+            Self::Gradient { bottom, top } => {
+                format!("{{ bottom = {}, top = {} }}", bottom.toml(), top.toml())
+            }
+        }
+    }
+}

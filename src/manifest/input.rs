@@ -1,0 +1,221 @@
+//! `[input]`: which particles, and what they mean.
+
+use spherule_jobs::FrameRange;
+
+use super::named;
+use super::reader::{Field, Section};
+use super::write::{Entries, Toml};
+
+named! {
+    /// Which axis of the simulation points up.
+    UpAxis {
+        /// +x
+        X = "x",
+        /// +y
+        Y = "y",
+        /// +z
+        Z = "z",
+        /// -x
+        NegX = "-x",
+        /// -y
+        NegY = "-y",
+        /// -z
+        NegZ = "-z",
+    }
+}
+
+impl UpAxis {
+    /// As a unit vector.
+    pub const fn vector(self) -> [f64; 3] {
+        match self {
+            Self::X => [1.0, 0.0, 0.0],
+            Self::Y => [0.0, 1.0, 0.0],
+            Self::Z => [0.0, 0.0, 1.0],
+            Self::NegX => [-1.0, 0.0, 0.0],
+            Self::NegY => [0.0, -1.0, 0.0],
+            Self::NegZ => [0.0, 0.0, -1.0],
+        }
+    }
+}
+
+/// How large particles are.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RadiusSetting {
+    /// As the file has it, else estimated from the spacing.
+    Auto,
+    /// The same for all, world units.
+    Length(f64),
+    /// From an attribute.
+    Attribute {
+        /// Its name.
+        attribute: String,
+        /// What it is multiplied by: 0.5 for a diameter.
+        scale: f64,
+    },
+}
+
+/// `[input]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Input {
+    /// One directory or pattern, or files; relative to the manifest. Never empty.
+    pub path: Vec<String>,
+    /// Which frames; None is all.
+    pub frames: Option<FrameRange>,
+    /// Names of the parts of a file (sets, blocks) to keep; None is all.
+    pub parts: Option<Vec<String>>,
+    /// How large particles are.
+    pub radius: RadiusSetting,
+    /// Which axis points up.
+    pub up: UpAxis,
+}
+
+impl Input {
+    /// All of `path`, with the defaults.
+    pub fn new(path: impl Into<String>) -> Self {
+        Self {
+            path: vec![path.into()],
+            frames: None,
+            parts: None,
+            radius: RadiusSetting::Auto,
+            up: UpAxis::Z,
+        }
+    }
+
+    pub(super) fn read(mut section: Section<'_>) -> Self {
+        let path = section.optional("path", read_path);
+        if section.lacks("path") {
+            section.missing(
+                "path",
+                "a directory, a pattern as \"dump.#.vtk\", or a list of files",
+            );
+        }
+        let input = Self {
+            path: path.unwrap_or_default(),
+            frames: section.value("frames", None, read_frames),
+            parts: section.optional("parts", |f| names(f, "a list of names, as [\"fluid\"]")),
+            radius: section.value("radius", RadiusSetting::Auto, RadiusSetting::read),
+            up: section.value("up", UpAxis::Z, |f| f.choice(UpAxis::ALL)),
+        };
+        section.finish();
+        input
+    }
+
+    pub(super) fn entries(&self, out: &mut Entries) {
+        out.section("input");
+        let path = match self.path.as_slice() {
+            [one] => one.toml(),
+            many => many.toml(),
+        };
+        out.put(
+            "path",
+            &Raw(path),
+            "a directory, a pattern (#, %04d, *), or a list of files",
+        );
+        let frames = self
+            .frames
+            .as_ref()
+            .map_or("all".to_owned(), ToString::to_string);
+        out.put(
+            "frames",
+            &frames,
+            "all, or a range: 7 | 1-10 | 1-10x2 | 1-5,8",
+        );
+        // More frames of the same job are not another job.
+        out.depends_on(None);
+        out.maybe(
+            "parts",
+            self.parts.as_ref(),
+            "[\"fluid\"]",
+            "sets or blocks to keep; default: all",
+        );
+        out.put(
+            "radius",
+            &self.radius,
+            "a length, auto, or { attribute = \"radius\", scale = 1.0 }",
+        );
+        out.put("up", &self.up, "x | y | z | -x | -y | -z");
+    }
+}
+
+/// TOML as it is.
+struct Raw(String);
+
+impl Toml for Raw {
+    fn toml(&self) -> String {
+        self.0.clone()
+    }
+}
+
+fn read_path(field: &Field<'_>) -> Option<Vec<String>> {
+    if field.items().is_some() {
+        names(field, "a directory, a pattern, or a list of files")
+    } else {
+        Some(vec![field.name()?])
+    }
+}
+
+/// A list of names that is not empty.
+fn names(field: &Field<'_>, what: &str) -> Option<Vec<String>> {
+    let items = field.or_wants(field.items().filter(|i| !i.is_empty()), what)?;
+    items.iter().map(Field::name).collect()
+}
+
+#[expect(
+    clippy::option_option,
+    reason = "the outer one is a problem, the inner one is `all`"
+)]
+fn read_frames(field: &Field<'_>) -> Option<Option<FrameRange>> {
+    let text = match (field.as_text(), field.as_integer()) {
+        (Some("all"), _) => return Some(None),
+        (Some(text), _) => text.to_owned(),
+        (None, Some(frame)) => frame.to_string(),
+        (None, None) => {
+            field.wants("\"all\" or a frame range, as \"1-10\"");
+            return None;
+        }
+    };
+    match text.parse() {
+        Ok(range) => Some(Some(range)),
+        Err(e) => {
+            field.fail(&e.to_string());
+            None
+        }
+    }
+}
+
+impl RadiusSetting {
+    fn read(field: &Field<'_>) -> Option<Self> {
+        if field.as_text() == Some("auto") {
+            return Some(Self::Auto);
+        }
+        if !field.is_table() {
+            let length = field.as_number().filter(|v| *v > 0.0).map(Self::Length);
+            return field.or_wants(
+                length,
+                "a length above 0, \"auto\", or { attribute = \"radius\", scale = 1.0 }",
+            );
+        }
+        let mut section = field.section()?;
+        let attribute = section.optional("attribute", Field::name);
+        let scale = section.value("scale", 1.0, |f| f.number("a number above 0", |v| v > 0.0));
+        if section.lacks("attribute") {
+            section.missing("attribute", "the name of an attribute, as \"radius\"");
+        }
+        section.finish();
+        let attribute = attribute?;
+        Some(Self::Attribute { attribute, scale })
+    }
+}
+
+impl Toml for RadiusSetting {
+    fn toml(&self) -> String {
+        match self {
+            Self::Auto => "auto".toml(),
+            Self::Length(length) => length.toml(),
+            Self::Attribute { attribute, scale } => {
+                let (attribute, scale) = (attribute.toml(), scale.toml());
+                format!("{{ attribute = {attribute}, scale = {scale} }}")
+            }
+        }
+    }
+}

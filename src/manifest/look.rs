@@ -1,0 +1,267 @@
+//! `[image]`, `[render]` and `[material]`: how large, how traced, and made of what.
+
+use super::color::{Background, ColorSetting, rgb};
+use super::named;
+use super::reader::{Field, Section};
+use super::write::{Entries, Toml};
+
+const MAX_SIDE: u32 = 65_536;
+const MAX_SAMPLES: u32 = 65_536;
+const MAX_DEPTH: u32 = 64;
+
+/// `[image]`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Image {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Samples a pixel.
+    pub samples: u32,
+}
+
+named! {
+    /// How particles are ordered for tracing. The picture is the same.
+    Accelerator {
+        /// The renderer's choice.
+        Auto = "auto",
+        /// Along a space-filling curve: the fastest build.
+        Lbvh = "lbvh",
+        /// By median splits: the fastest to trace.
+        Kdtree = "kdtree",
+        /// By locally ordered clustering.
+        Bvh = "bvh",
+        /// By the surface area heuristic with spatial splits.
+        Sbvh = "sbvh",
+    }
+}
+
+/// Those that are built so far.
+const ACCELERATORS: &[Accelerator] = &[Accelerator::Auto, Accelerator::Lbvh];
+
+/// Where the ground is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum GroundHeight {
+    /// Just under the particles of the whole sequence.
+    Auto,
+    /// Along `input.up`, world units.
+    At(f64),
+}
+
+/// `[render]`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Render {
+    /// How particles are ordered for tracing.
+    pub accelerator: Accelerator,
+    /// Reflections and refractions in a row.
+    pub max_depth: u32,
+    /// What rays see that meet nothing.
+    pub background: Background,
+    /// Whether there is a ground that takes shadows.
+    pub ground: bool,
+    /// Where it is.
+    pub ground_height: GroundHeight,
+    /// Linear RGB.
+    pub ground_color: [f32; 3],
+}
+
+/// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Material {
+    /// The particles' colour.
+    pub color: ColorSetting,
+    /// Weight of light from everywhere.
+    pub ambient: f32,
+    /// Weight of light that is scattered.
+    pub diffuse: f32,
+    /// Weight of highlights.
+    pub specular: f32,
+    /// Exponent of highlights.
+    pub shininess: f32,
+    /// Index of refraction.
+    pub ior: f32,
+    /// Weight of what is mirrored, 0 to 1, times what Fresnel says.
+    pub reflection: f32,
+    /// Weight of what shows through, 0 to 1; 0 is opaque.
+    pub transmission: f32,
+}
+
+impl Default for Image {
+    fn default() -> Self {
+        Self {
+            width: 1920,
+            height: 1080,
+            samples: 16,
+        }
+    }
+}
+
+impl Default for Render {
+    fn default() -> Self {
+        Self {
+            accelerator: Accelerator::Auto,
+            max_depth: 3,
+            background: Background::Plain([0.05, 0.06, 0.08]),
+            ground: false,
+            ground_height: GroundHeight::Auto,
+            ground_color: [0.25, 0.25, 0.25],
+        }
+    }
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self {
+            color: ColorSetting::Rgb([0.6, 0.7, 0.9]),
+            ambient: 0.1,
+            diffuse: 0.7,
+            specular: 0.2,
+            shininess: 32.0,
+            ior: 1.33,
+            reflection: 1.0,
+            transmission: 0.0,
+        }
+    }
+}
+
+impl Image {
+    pub(super) fn read(mut section: Section<'_>) -> Self {
+        let default = Self::default();
+        let image = Self {
+            width: section.value("width", default.width, |f| f.count(1, MAX_SIDE)),
+            height: section.value("height", default.height, |f| f.count(1, MAX_SIDE)),
+            samples: section.value("samples", default.samples, |f| f.count(1, MAX_SAMPLES)),
+        };
+        section.finish();
+        image
+    }
+
+    pub(super) fn entries(&self, out: &mut Entries) {
+        out.section("image");
+        out.put("width", &self.width, "pixels");
+        out.put("height", &self.height, "pixels");
+        out.put("samples", &self.samples, "per pixel");
+    }
+}
+
+impl Render {
+    pub(super) fn read(mut section: Section<'_>) -> Self {
+        let default = Self::default();
+        let render = Self {
+            accelerator: section.value("accelerator", default.accelerator, read_accelerator),
+            max_depth: section.value("max_depth", default.max_depth, |f| f.count(0, MAX_DEPTH)),
+            background: section.value("background", default.background, Background::read),
+            ground: section.value("ground", default.ground, Field::bool),
+            ground_height: section.value("ground_height", default.ground_height, |f| {
+                if f.as_text() == Some("auto") {
+                    return Some(GroundHeight::Auto);
+                }
+                f.number("a height or \"auto\"", |_| true)
+                    .map(GroundHeight::At)
+            }),
+            ground_color: section.value("ground_color", default.ground_color, rgb),
+        };
+        section.finish();
+        render
+    }
+
+    pub(super) fn entries(&self, out: &mut Entries) {
+        out.section("render");
+        out.put(
+            "accelerator",
+            &self.accelerator,
+            "auto | lbvh; the picture is the same",
+        );
+        out.depends_on(None);
+        out.put(
+            "max_depth",
+            &self.max_depth,
+            "reflections and refractions in a row",
+        );
+        out.put(
+            "background",
+            &self.background,
+            "linear RGB, or { bottom = [...], top = [...] }",
+        );
+        out.put(
+            "ground",
+            &self.ground,
+            "a plane under the particles that takes shadows",
+        );
+        out.put(
+            "ground_height",
+            &self.ground_height,
+            "auto, or a height along input.up",
+        );
+        out.put("ground_color", &self.ground_color, "linear RGB");
+    }
+}
+
+fn read_accelerator(field: &Field<'_>) -> Option<Accelerator> {
+    let accelerator = field.choice(Accelerator::ALL)?;
+    if !ACCELERATORS.contains(&accelerator) {
+        let built: Vec<&str> = ACCELERATORS.iter().map(|a| a.name()).collect();
+        let name = accelerator.name();
+        field.fail(&format!(
+            "{name} is not in this version; {} are",
+            built.join(" and ")
+        ));
+        return None;
+    }
+    Some(accelerator)
+}
+
+impl Toml for GroundHeight {
+    fn toml(&self) -> String {
+        match self {
+            Self::Auto => "auto".toml(),
+            Self::At(height) => height.toml(),
+        }
+    }
+}
+
+impl Material {
+    pub(super) fn read(mut section: Section<'_>) -> Self {
+        let default = Self::default();
+        let from_0 = |f: &Field<'_>| f.number32("a number from 0", |v| v >= 0.0);
+        let above_0 = |f: &Field<'_>| f.number32("a number above 0", |v| v > 0.0);
+        let weight =
+            |f: &Field<'_>| f.number32("a number from 0 to 1", |v| (0.0..=1.0).contains(&v));
+        let material = Self {
+            color: section.value("color", default.color, ColorSetting::read),
+            ambient: section.value("ambient", default.ambient, from_0),
+            diffuse: section.value("diffuse", default.diffuse, from_0),
+            specular: section.value("specular", default.specular, from_0),
+            shininess: section.value("shininess", default.shininess, above_0),
+            ior: section.value("ior", default.ior, above_0),
+            reflection: section.value("reflection", default.reflection, weight),
+            transmission: section.value("transmission", default.transmission, weight),
+        };
+        section.finish();
+        material
+    }
+
+    pub(super) fn entries(&self, out: &mut Entries) {
+        out.section("material");
+        out.put(
+            "color",
+            &self.color,
+            "linear RGB, or { attribute = \"velocity\", map = \"viridis\", range = [0.0, 4.0] }",
+        );
+        out.put("ambient", &self.ambient, "light from everywhere");
+        out.put("diffuse", &self.diffuse, "scattered light");
+        out.put("specular", &self.specular, "highlights");
+        out.put("shininess", &self.shininess, "exponent of highlights");
+        out.put("ior", &self.ior, "index of refraction; water is 1.33");
+        out.put(
+            "reflection",
+            &self.reflection,
+            "0 to 1, times the Fresnel term",
+        );
+        out.put(
+            "transmission",
+            &self.transmission,
+            "0 (opaque) to 1, times the rest of the Fresnel term",
+        );
+    }
+}

@@ -1,0 +1,285 @@
+//! The manifest: everything a job is, typed, with the defaults, read from TOML.
+//!
+//! A manifest may be laid over by options of the command line ([`Override`]). Everything wrong
+//! with it is told at once, each with line and column (or the option) and key. What "auto" turns
+//! into is left to others.
+
+use std::fmt;
+use std::path::Path;
+
+use reader::{Problem, Problems, Section};
+use tree::{Node, Place};
+use write::Entries;
+
+mod camera;
+mod color;
+mod input;
+mod light;
+mod look;
+mod output;
+mod pattern;
+mod reader;
+mod rebase;
+#[cfg(test)]
+mod tests;
+mod tree;
+mod write;
+
+pub use camera::{Camera, CameraKey, CameraMode};
+pub use color::{Background, ColorMap, ColorSetting};
+pub use input::{Input, RadiusSetting, UpAxis};
+pub use light::{Falloff, Light, LightKind};
+pub use look::{Accelerator, GroundHeight, Image, Material, Render};
+pub use output::{Channel, Compression, Output};
+pub use pattern::OutputPattern;
+pub use tree::Override;
+
+/// An enum whose variants have the names that users type.
+macro_rules! named {
+    ($(#[$meta:meta])* $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $text:literal,)+ }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name {
+            $($(#[$variant_meta])* $variant,)+
+        }
+
+        impl $name {
+            /// All, with the names that users type.
+            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
+
+            /// As users type it.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)+
+                }
+            }
+        }
+
+        impl $crate::manifest::write::Toml for $name {
+            fn toml(&self) -> String {
+                $crate::manifest::write::Toml::toml(self.name())
+            }
+        }
+    };
+}
+use named;
+
+/// See the module.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Manifest {
+    /// Which particles.
+    pub input: Input,
+    /// From where.
+    pub camera: Camera,
+    /// How large.
+    pub image: Image,
+    /// How traced.
+    pub render: Render,
+    /// Made of what.
+    pub material: Material,
+    /// In which light; with none, a key light and a soft fill are placed by the camera.
+    pub lights: Vec<Light>,
+    /// Into which images.
+    pub output: Output,
+}
+
+/// Everything that is wrong with a manifest, a line each.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ManifestError {
+    lines: Vec<String>,
+}
+
+impl ManifestError {
+    /// One message for each thing that is wrong, in the order of the file.
+    pub fn messages(&self) -> &[String] {
+        &self.lines
+    }
+}
+
+impl fmt::Display for ManifestError {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.lines.join("\n"))
+    }
+}
+
+impl std::error::Error for ManifestError {}
+
+impl Manifest {
+    /// The defaults for the particles at `path`.
+    pub fn new(path: impl Into<String>) -> Self {
+        Self {
+            input: Input::new(path),
+            camera: Camera::default(),
+            image: Image::default(),
+            render: Render::default(),
+            material: Material::default(),
+            lights: Vec::new(),
+            output: Output::default(),
+        }
+    }
+
+    /// Reads a manifest. `path` is for messages only.
+    ///
+    /// # Errors
+    /// It is no TOML, or has unknown keys or values that will not do.
+    pub fn parse(text: &str, path: &Path) -> Result<Self, ManifestError> {
+        Self::parse_with(text, path, Vec::new())
+    }
+
+    /// Reads a manifest with `overrides` laid over it in order. The text may be empty if they
+    /// give all that is needed (`input.path`).
+    ///
+    /// # Errors
+    /// As [`Manifest::parse`]; what comes from an override is told by its name.
+    pub fn parse_with(
+        text: &str,
+        path: &Path,
+        overrides: Vec<Override>,
+    ) -> Result<Self, ManifestError> {
+        let problems = Problems::default();
+        let mut tree = Node::parse(text).map_err(|(place, what)| {
+            let key = String::new();
+            told(vec![Problem { place, key, what }], text, path)
+        })?;
+        for overlay in overrides {
+            if let Err(problem) = tree.lay_over(overlay) {
+                problems.borrow_mut().push(problem);
+            }
+        }
+        let manifest = Self::read(Section::root(&tree, &problems));
+        let problems = problems.into_inner();
+        if problems.is_empty() {
+            Ok(manifest)
+        } else {
+            Err(told(problems, text, path))
+        }
+    }
+
+    fn read(mut root: Section<'_>) -> Self {
+        let manifest = Self {
+            input: Input::read(root.section("input")),
+            camera: Camera::read(root.section("camera")),
+            image: Image::read(root.section("image")),
+            render: Render::read(root.section("render")),
+            material: Material::read(root.section("material")),
+            lights: root
+                .sections("light")
+                .into_iter()
+                .filter_map(Light::read)
+                .collect(),
+            output: Output::read(root.section("output")),
+        };
+        let several = manifest
+            .input
+            .frames
+            .as_ref()
+            .is_some_and(|f| f.has_several());
+        if several && !manifest.output.path.has_number() {
+            root.section("output").wrong("path", NEEDS_NUMBER);
+        }
+        root.finish();
+        manifest
+    }
+
+    /// Whether each of `frame_count` frames gets an image of its own.
+    ///
+    /// # Errors
+    /// There are several frames, but the output's name has no number.
+    pub fn check_frame_count(&self, frame_count: usize) -> Result<(), ManifestError> {
+        if frame_count > 1 && !self.output.path.has_number() {
+            return Err(ManifestError {
+                lines: vec![format!(
+                    "output.path: {} for {frame_count} frames: {NEEDS_NUMBER}",
+                    self.output.path
+                )],
+            });
+        }
+        Ok(())
+    }
+
+    /// What is up in the picture, unless the camera says otherwise. Of any length but 0.
+    pub fn up(&self) -> [f64; 3] {
+        self.camera.up.unwrap_or(self.input.up.vector())
+    }
+
+    /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
+    /// order. Left out: frames, accelerator, and the directory of the images.
+    ///
+    /// `input.path` is among them: bring paths into one form by [`Manifest::rebase`] first.
+    pub fn settings(&self) -> Vec<(String, String)> {
+        self.entries().settings()
+    }
+
+    /// A complete manifest with every key, commented, that reads back equal.
+    pub fn to_commented_toml(&self) -> String {
+        let mut text = String::from(
+            "# A spherule job. Paths are relative to this file; lengths are those of the simulation.\n",
+        );
+        text.push_str(&self.entries().file());
+        if self.lights.is_empty() {
+            text.push_str(AUTO_LIGHTS);
+        }
+        text
+    }
+
+    fn entries(&self) -> Entries {
+        let mut out = Entries::default();
+        self.input.entries(&mut out);
+        self.camera.entries(&mut out);
+        self.image.entries(&mut out);
+        self.render.entries(&mut out);
+        self.material.entries(&mut out);
+        self.output.entries(&mut out);
+        for (index, light) in self.lights.iter().enumerate() {
+            light.entries(index, &mut out);
+        }
+        out
+    }
+}
+
+const NEEDS_NUMBER: &str =
+    "several frames would get the same name; put #### into it, as in frame.####.exr";
+
+const AUTO_LIGHTS: &str = r#"
+# Without [[light]], a key light and a soft fill are placed by the camera.
+# [[light]]
+# type = "point"                          # point | directional
+# position = [0.0, 0.0, 10.0]             # directional: direction = [0.0, 0.0, -1.0], the way it travels
+# falloff = "none"                        # none | inverse-square
+# color = [1.0, 1.0, 1.0]                 # linear RGB
+# intensity = 1.0                         # factor on the colour
+"#;
+
+/// Every key outside lists.
+fn known_keys() -> Vec<String> {
+    Manifest::new("").entries().keys()
+}
+
+/// In the order of the file; options come first, as what is asked for last.
+fn told(mut problems: Vec<Problem>, text: &str, path: &Path) -> ManifestError {
+    problems.sort_by_key(|p| match p.place {
+        Place::Option(_) => 0,
+        Place::Byte(at) => at + 1,
+        Place::Nowhere => usize::MAX,
+    });
+    let told = |problem: &Problem| {
+        let place = match &problem.place {
+            Place::Option(shown) => shown.clone(),
+            Place::Nowhere => path.display().to_string(),
+            Place::Byte(at) => {
+                let before = text.get(..*at).unwrap_or(text);
+                let line = before.matches('\n').count() + 1;
+                let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+                format!("{}: line {line}, column {column}", path.display())
+            }
+        };
+        if problem.key.is_empty() {
+            format!("{place}: {}", problem.what)
+        } else {
+            format!("{place}: {}: {}", problem.key, problem.what)
+        }
+    };
+    ManifestError {
+        lines: problems.iter().map(told).collect(),
+    }
+}

@@ -1,0 +1,187 @@
+//! Names of images: `out/frame.####.exr` or `out/frame.%04d.exr`, and the paths that come of it.
+
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// An output path with room for the frame's number. Its length in `#` (or `%0Nd`) is the least
+/// number of digits; larger numbers take more.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputPattern {
+    text: String,
+    /// Directory and beginning of the name, up to the number.
+    before: String,
+    after: String,
+    /// None if the name has no number.
+    digits: Option<usize>,
+}
+
+impl OutputPattern {
+    /// Parses a pattern for EXR files.
+    ///
+    /// # Errors
+    /// It does not end in `.exr`, names no file, has a number in a directory's name or several
+    /// numbers, or an unknown `%`.
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let is_exr = Path::new(text)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+        if !is_exr {
+            return Err("must end in .exr, as in out/frame.####.exr".to_owned());
+        }
+        let name_at = text.rfind(std::path::is_separator).map_or(0, |i| i + 1);
+        let (dir, name) = text.split_at(name_at);
+        if find_number(dir)?.is_some() {
+            return Err("the frame number belongs into the file's name, not a directory's".into());
+        }
+        let Some((start, end, digits)) = find_number(name)? else {
+            return Ok(Self {
+                text: text.to_owned(),
+                before: text.to_owned(),
+                after: String::new(),
+                digits: None,
+            });
+        };
+        let after = &name[end..];
+        if find_number(after)?.is_some() {
+            return Err("has room for two numbers; one is wanted, as in frame.####.exr".into());
+        }
+        Ok(Self {
+            text: text.to_owned(),
+            before: format!("{dir}{}", &name[..start]),
+            after: after.to_owned(),
+            digits: Some(digits),
+        })
+    }
+
+    /// As it was written.
+    pub fn as_str(&self) -> &str {
+        &self.text
+    }
+
+    /// Whether frames get names of their own.
+    pub const fn has_number(&self) -> bool {
+        self.digits.is_some()
+    }
+
+    /// The directory part; empty for a bare name.
+    pub fn dir(&self) -> &Path {
+        Path::new(&self.text).parent().unwrap_or(Path::new(""))
+    }
+
+    /// The file's name, still with the room for the number.
+    pub fn file_name(&self) -> &str {
+        let name_at = self
+            .text
+            .rfind(std::path::is_separator)
+            .map_or(0, |i| i + 1);
+        &self.text[name_at..]
+    }
+
+    /// The image of `frame`. A negative number keeps its sign before the padded digits.
+    pub fn path_for(&self, frame: i64) -> PathBuf {
+        let Some(digits) = self.digits else {
+            return PathBuf::from(&self.text);
+        };
+        let sign = if frame < 0 { "-" } else { "" };
+        let number = frame.unsigned_abs();
+        PathBuf::from(format!(
+            "{}{sign}{number:0digits$}{}",
+            self.before, self.after
+        ))
+    }
+
+    /// The preview of `frame`: the image's path with `.png`.
+    pub fn preview_path_for(&self, frame: i64) -> PathBuf {
+        self.path_for(frame).with_extension("png")
+    }
+}
+
+impl fmt::Display for OutputPattern {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.text)
+    }
+}
+
+/// Start, end and digits of the first room for a number.
+fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
+    let Some(start) = text.find(['#', '%']) else {
+        return Ok(None);
+    };
+    let rest = &text[start..];
+    if rest.starts_with('#') {
+        let digits = rest.bytes().take_while(|b| *b == b'#').count();
+        return Ok(Some((start, start + digits, digits)));
+    }
+    let unknown = || format!("`{rest}` is no frame number; use #### or %04d");
+    let width = rest[1..].find('d').ok_or_else(unknown)?;
+    let digits = match &rest[1..=width] {
+        "" => 1,
+        padded => padded
+            .strip_prefix('0')
+            .filter(|n| n.len() <= 2 && n.bytes().all(|b| b.is_ascii_digit()))
+            .and_then(|n| n.parse().ok())
+            .ok_or_else(unknown)?,
+    };
+    Ok(Some((start, start + width + 2, digits)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn path(pattern: &str, frame: i64, wanted: &str) {
+        let pattern = OutputPattern::parse(pattern).unwrap();
+        assert_eq!(pattern.path_for(frame), Path::new(wanted));
+    }
+
+    #[test]
+    fn numbers_are_padded_and_never_cut() {
+        path("out/frame.####.exr", 7, "out/frame.0007.exr");
+        path("out/frame.####.exr", 123_456, "out/frame.123456.exr");
+        path("out/frame.####.exr", -7, "out/frame.-0007.exr");
+        path(
+            "out/frame.####.exr",
+            i64::MIN,
+            "out/frame.-9223372036854775808.exr",
+        );
+        path("f#.exr", 12, "f12.exr");
+        path("%04d.exr", 12, "0012.exr");
+        path("a.%d.b.EXR", 12, "a.12.b.EXR");
+        path("/x/ä_%012d.exr", 12, "/x/ä_000000000012.exr");
+        path("still.exr", 12, "still.exr");
+    }
+
+    #[test]
+    fn parts() {
+        let pattern = OutputPattern::parse("a/b/f.####.exr").unwrap();
+        assert_eq!(pattern.dir(), Path::new("a/b"));
+        assert_eq!(pattern.file_name(), "f.####.exr");
+        assert!(pattern.has_number());
+        assert_eq!(pattern.preview_path_for(3), Path::new("a/b/f.0003.png"));
+        let still = OutputPattern::parse("still.exr").unwrap();
+        assert!(!still.has_number());
+        assert_eq!(still.dir(), Path::new(""));
+    }
+
+    #[track_caller]
+    fn refused(pattern: &str, what: &str) {
+        let error = OutputPattern::parse(pattern).unwrap_err();
+        assert!(error.contains(what), "{error}");
+    }
+
+    #[test]
+    fn refusals() {
+        refused("", ".exr");
+        refused("out/", ".exr");
+        refused("out/.exr", ".exr");
+        refused("a.####.png", ".exr");
+        refused("####/a.exr", "directory");
+        refused("a.##.##.exr", "two numbers");
+        refused("a.##.%04d.exr", "two numbers");
+        refused("a.%s.exr", "%04d");
+        refused("a.%4d.exr", "%04d");
+        refused("a.%0-4d.exr", "%04d");
+        refused("a.%099999d.exr", "%04d");
+    }
+}

@@ -1,0 +1,437 @@
+use super::*;
+use proptest::prelude::*;
+
+/// The example of the design, as users find it in the documentation.
+const EXAMPLE: &str = r#"
+[input]
+path = "ParticleData_Fluid_#.vtk"   # a directory, a pattern, or a list of files
+frames = "1-17"                     # default: all
+radius = "auto"                     # a length, "auto", or { attribute = "radius", scale = 1.0 }
+up = "y"
+
+[camera]
+mode = "fixed"                      # auto | fixed | turntable | keys
+eye = [0.0, 0.0, 0.0]
+look_at = [5.0, 5.0, 0.0]
+up = [0.0, 0.0, 1.0]
+fov = 45.0                          # vertical, degrees
+
+[image]
+width = 1920
+height = 1080
+samples = 16                        # per pixel
+
+[render]
+accelerator = "auto"                # auto | lbvh | kdtree | bvh | sbvh
+max_depth = 3
+background = [0.05, 0.06, 0.08]     # linear RGB, or { bottom = [...], top = [...] }
+ground = false
+
+[material]                          # eq. 4.1-4.3
+color = [0.6, 0.7, 0.9]             # or { attribute = "velocity", map = "viridis", range = [0.0, 4.0] }; vectors by magnitude
+ambient = 0.1
+diffuse = 0.7
+specular = 0.2
+shininess = 32.0
+ior = 1.33
+reflection = 1.0
+transmission = 0.0
+
+[[light]]
+type = "point"                      # point | directional
+position = [0.0, 0.0, 10.0]
+color = [1.0, 1.0, 1.0]
+intensity = 1.0                     # no distance falloff unless falloff = "inverse-square"
+
+[output]
+path = "out/frame.####.exr"
+channels = ["RGBA", "Z", "N", "id"]
+compression = "zip"
+preview = true                      # PNG beside each image
+"#;
+
+fn path() -> &'static Path {
+    Path::new("job.toml")
+}
+
+fn parse(text: &str) -> Manifest {
+    Manifest::parse(text, path()).unwrap()
+}
+
+fn with_sets(sets: &[&str]) -> Result<Manifest, ManifestError> {
+    let sets = sets.iter().map(|s| Override::parse(s).unwrap()).collect();
+    Manifest::parse_with(EXAMPLE, path(), sets)
+}
+
+/// `section` added to a good manifest must be refused with exactly one message, which has all of
+/// `parts`.
+#[track_caller]
+fn refused(section: &str, parts: &[&str]) {
+    let text = format!("input.path = \"data\"\n{section}");
+    let error = Manifest::parse(&text, path()).unwrap_err();
+    assert_eq!(error.messages().len(), 1, "{error}");
+    for part in parts {
+        assert!(error.to_string().contains(part), "{error}");
+    }
+}
+
+#[test]
+fn the_example_reads() {
+    let manifest = parse(EXAMPLE);
+    let mut wanted = Manifest::new("ParticleData_Fluid_#.vtk");
+    wanted.input.frames = Some("1-17".parse().unwrap());
+    wanted.input.up = UpAxis::Y;
+    wanted.camera.mode = CameraMode::Fixed;
+    wanted.camera.eye = Some([0.0; 3]);
+    wanted.camera.look_at = Some([5.0, 5.0, 0.0]);
+    wanted.camera.up = Some([0.0, 0.0, 1.0]);
+    wanted.lights = vec![Light {
+        kind: LightKind::Point {
+            position: [0.0, 0.0, 10.0],
+            falloff: Falloff::None,
+        },
+        color: [1.0; 3],
+        intensity: 1.0,
+    }];
+    assert_eq!(manifest, wanted);
+    assert_eq!(manifest.up(), [0.0, 0.0, 1.0]);
+}
+
+#[test]
+fn a_path_is_enough() {
+    assert_eq!(parse("[input]\npath = \"data\""), Manifest::new("data"));
+    let overlay = Override::new("input.path", "5", "INPUT").unwrap();
+    let manifest = Manifest::parse_with("", path(), vec![overlay]).unwrap();
+    assert_eq!(manifest, Manifest::new("5"));
+    assert_eq!(manifest.up(), [0.0, 0.0, 1.0]);
+    let error = Manifest::parse("", path()).unwrap_err().to_string();
+    assert!(
+        error.starts_with("job.toml: input.path: is missing"),
+        "{error}"
+    );
+}
+
+#[test]
+fn unknown_keys_name_the_nearest() {
+    refused(
+        "[render]\nmax_dept = 5",
+        &[
+            "job.toml: line 3, column 1: render.max_dept: unknown key; did you mean `render.max_depth`?",
+        ],
+    );
+    refused("[renderer]\n", &["did you mean `render`?"]);
+    refused(
+        "[material]\ncolour = [1,1,1]",
+        &["did you mean `material.color`?"],
+    );
+    refused("[render]\nsamples = 4", &["did you mean `image.samples`?"]);
+    refused(
+        "[image]\nqqqqq = 4",
+        &["known here: width, height, samples"],
+    );
+    refused(
+        "samples = 4",
+        &["job.toml: line 2, column 1: samples: unknown key here; did you mean `image.samples`?"],
+    );
+    refused(
+        "[[light]]\ntype = \"directional\"\ndirection = [0,0,1]\nposition = [0,0,1]",
+        &["light.0.position: unknown"],
+    );
+}
+
+#[test]
+fn wrong_types_say_what_is_wanted() {
+    refused(
+        "[image]\nwidth = \"wide\"",
+        &[
+            "line 3, column 9: image.width: wants a whole number from 1 to 65536, not the text \"wide\"",
+        ],
+    );
+    refused("[image]\nwidth = 0", &["image.width", "not 0"]);
+    refused("[image]\nsamples = 0", &["image.samples", "from 1"]);
+    refused("[image]\nheight = -5", &["image.height", "not -5"]);
+    refused("[image]\nheight = 10.5", &["image.height", "whole"]);
+    refused(
+        "[render]\nground = 1",
+        &["render.ground: wants true or false, not 1"],
+    );
+    refused(
+        "[render]\nbackground = [1, 2]",
+        &["render.background", "a list of 2"],
+    );
+    refused(
+        "[render]\nbackground = { bottom = [0,0,0] }",
+        &["render.background.top: is missing"],
+    );
+    refused(
+        "[render]\naccelerator = \"kdtree\"",
+        &["kdtree is not in this version; auto and lbvh are"],
+    );
+    refused("[render]\naccelerator = \"lbhv\"", &["did you mean lbvh?"]);
+    refused(
+        "[render]\nground_height = inf",
+        &["render.ground_height", "height or"],
+    );
+    refused(
+        "[material]\ncolor = [0.1, -0.2, 0.3]",
+        &["material.color", "from 0"],
+    );
+    refused("[material]\ncolor = [0.1, nan, 0.3]", &["material.color"]);
+    refused("[material]\ncolor = [0.1, 1e39, 0.3]", &["material.color"]);
+    refused(
+        "[material]\ncolor = { map = \"viridis\" }",
+        &["material.color.attribute: is missing"],
+    );
+    refused(
+        "[material]\ncolor = { attribute = \"v\", map = \"virids\" }",
+        &["did you mean viridis?"],
+    );
+    refused(
+        "[material]\ncolor = { attribute = \"v\", range = [4, 0] }",
+        &["two rising numbers"],
+    );
+    refused("[material]\nreflection = 1.5", &["from 0 to 1"]);
+    refused("[camera]\nfov = 180", &["camera.fov"]);
+    refused(
+        "[camera]\nmode = \"fixed\"\neye = [1,2,3]",
+        &["camera.look_at: is missing"],
+    );
+    refused(
+        "[camera]\neye = [1,2,3]\nlook_at = [1,2,3]",
+        &["camera.look_at: is where"],
+    );
+    refused(
+        "[camera]\neye = [0,0,0]\nlook_at = [0,0,3]\nup = [0,0,1]",
+        &["line 5", "camera.up: points along"],
+    );
+    refused("[camera]\nup = [0,0,0]", &["camera.up", "not all 0"]);
+    refused("[camera]\nmode = \"keys\"", &["camera.key: is missing"]);
+    refused(
+        "[light]\ntype = \"point\"",
+        &["light: wants a list of tables, as [[light]]"],
+    );
+    refused("[[light]]\n", &["light.0.type: is missing"]);
+    refused(
+        "[[light]]\ntype = \"point\"",
+        &["light.0.position: is missing"],
+    );
+    refused("[output]\npath = \"x.png\"", &["output.path", ".exr"]);
+    refused("[output]\nchannels = []", &["output.channels"]);
+    refused(
+        "[output]\nchannels = [\"RGBA\", \"z\"]",
+        &["output.channels.1", "did you mean Z?"],
+    );
+    refused("[output]\nchannels = [\"Z\", \"Z\"]", &["Z is there twice"]);
+    refused("[output]\nfps = 0", &["output.fps"]);
+    refused(
+        "[output]\ncompression = 3",
+        &["one of none, rle, zip, zips, piz, not 3"],
+    );
+    refused("render = 3", &["render: wants a table, not 3"]);
+}
+
+#[test]
+fn input_is_checked() {
+    let refused = |text: &str, part: &str| {
+        let error = Manifest::parse(text, path()).unwrap_err();
+        assert_eq!(error.messages().len(), 1, "{error}");
+        assert!(error.to_string().contains(part), "{error}");
+    };
+    refused("[input]\npath = \"\"", "input.path: wants a name");
+    refused("[input]\npath = []", "input.path: wants a directory");
+    refused("[input]\npath = [\"a\", 3]", "input.path.1");
+    refused(
+        "[input]\npath = \"a\"\nradius = 0",
+        "input.radius: wants a length above 0",
+    );
+    refused(
+        "[input]\npath = \"a\"\nradius = { scale = 2 }",
+        "input.radius.attribute: is missing",
+    );
+    refused("[input]\npath = \"a\"\nframes = \"1-z\"", "character 3");
+    refused(
+        "[input]\npath = \"a\"\nframes = \"1-3\"\n[output]\npath = \"a.exr\"",
+        "line 5, column 1: output.path: several frames",
+    );
+    let manifest = parse("[input]\npath = [\"a\", \"b\"]\nframes = 7\nradius = 2");
+    assert_eq!(manifest.input.path, ["a", "b"]);
+    assert_eq!(manifest.input.frames, Some("7".parse().unwrap()));
+    assert_eq!(manifest.input.radius, RadiusSetting::Length(2.0));
+    let one = parse("[input]\npath = \"a\"\nframes = \"3\"\n[output]\npath = \"a.exr\"");
+    assert!(one.check_frame_count(1).is_ok());
+    assert!(
+        one.check_frame_count(2)
+            .unwrap_err()
+            .to_string()
+            .contains("####")
+    );
+}
+
+#[test]
+fn no_toml_names_the_place() {
+    let error = Manifest::parse("[input]\npath = \n", path())
+        .unwrap_err()
+        .to_string();
+    assert!(error.starts_with("job.toml: line 2, column "), "{error}");
+    let error = Manifest::parse("a = 1\na = 2", path())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("line 2"), "{error}");
+}
+
+#[test]
+fn everything_wrong_is_told_at_once() {
+    let error = Manifest::parse("[image]\nwidth = 0\n[render]\nx = 1\n", path()).unwrap_err();
+    let messages = error.messages();
+    assert_eq!(messages.len(), 3, "{error}");
+    assert!(messages[0].contains("image.width"));
+    assert!(messages[1].contains("render.x"));
+    assert!(messages[2].contains("input.path"));
+}
+
+#[test]
+fn sets_lie_over_the_file() {
+    let manifest = with_sets(&[
+        "render.max_depth=5",
+        "camera.mode = turntable",
+        "input.frames=1-3x2",
+        "output.path=a=b.####.exr",
+        "material.color={ attribute = \"velocity\", map = \"turbo\" }",
+        "light.0.intensity=2",
+        "input.parts=[\"fluid\"]",
+    ])
+    .unwrap();
+    assert_eq!(manifest.render.max_depth, 5);
+    assert_eq!(manifest.camera.mode, CameraMode::Turntable);
+    assert_eq!(manifest.input.frames, Some("1-3x2".parse().unwrap()));
+    assert_eq!(manifest.output.path.as_str(), "a=b.####.exr");
+    assert_eq!(
+        manifest.material.color,
+        ColorSetting::Attribute {
+            attribute: "velocity".to_owned(),
+            map: ColorMap::Turbo,
+            range: None
+        }
+    );
+    assert_eq!(manifest.lights[0].intensity, 2.0);
+    assert_eq!(manifest.input.parts, Some(vec!["fluid".to_owned()]));
+}
+
+#[test]
+fn sets_that_will_not_do() {
+    let wrong = |set: &str, part: &str| {
+        let error = with_sets(&[set]).unwrap_err().to_string();
+        assert!(error.contains(part), "{error}");
+    };
+    wrong(
+        "render.max_dept=5",
+        "--set render.max_dept=5: render.max_dept: unknown key; did you mean `render.max_depth`?",
+    );
+    wrong(
+        "image.width=wide",
+        "--set image.width=wide: image.width: wants",
+    );
+    wrong("image.width.x=1", "image.width.x: what is above it");
+    wrong("light.1.intensity=1", "light.1: the list has no such item");
+    for (set, part) in [
+        ("a", "no `=`"),
+        ("a..b=1", "dotted key"),
+        ("=1", "dotted key"),
+        ("a=[1", "--set a=[1: "),
+    ] {
+        let error = Override::parse(set).unwrap_err();
+        assert!(error.contains(part), "{error}");
+    }
+}
+
+#[test]
+fn settings_are_what_images_depend_on() {
+    let base = parse(EXAMPLE).settings();
+    let same = [
+        "input.frames=1-20",
+        "render.accelerator=lbvh",
+        "output.path=elsewhere/frame.####.exr",
+    ];
+    for set in same {
+        assert_eq!(with_sets(&[set]).unwrap().settings(), base, "{set}");
+    }
+    let other = with_sets(&["render.max_depth=5"]).unwrap().settings();
+    let changes = spherule_jobs::compare_settings(&base, &other);
+    assert_eq!(changes.len(), 1);
+    assert_eq!(changes[0].to_string(), "render.max_depth: 3 -> 5");
+    for set in [
+        "output.path=out/f.####.exr",
+        "input.path=other",
+        "light.0.intensity=2",
+        "output.fps=25",
+    ] {
+        assert_eq!(
+            spherule_jobs::compare_settings(&base, &with_sets(&[set]).unwrap().settings()).len(),
+            1,
+            "{set}"
+        );
+    }
+}
+
+#[test]
+fn commented_file_reads_back_and_shows_every_key() {
+    let plain = Manifest::new("a \"quoted\"\\path\n#.vtk");
+    let text = plain.to_commented_toml();
+    assert_eq!(parse(&text), plain);
+    for key in known_keys() {
+        let name = key.rsplit('.').next().unwrap();
+        assert!(text.contains(&format!("{name} = ")), "{key}\n{text}");
+    }
+    assert_eq!(parse(&parse(EXAMPLE).to_commented_toml()), parse(EXAMPLE));
+    // What is shown as a comment must be right too.
+    let uncommented: String = text
+        .lines()
+        .map(|l| {
+            l.strip_prefix("# ")
+                .filter(|l| l.contains(" = ") || l.starts_with("[["))
+                .unwrap_or(l)
+        })
+        .map(|l| format!("{l}\n"))
+        .collect();
+    let all = parse(&uncommented);
+    assert_eq!(all.lights.len(), 1);
+    assert_eq!(all.output.fps, Some(24.0));
+    assert_eq!(parse(&all.to_commented_toml()), all);
+}
+
+#[test]
+fn lists_of_everything_read_back() {
+    let text = r#"
+input = { path = ["a", "b"], radius = { attribute = "d", scale = 0.5 }, up = "-y" }
+camera.key = [{ frame = 9, eye = [1,2,3], look_at = [0,0,0], fov = 30 }, { frame = -1, eye = [1,1,1], look_at = [0,0,0] }]
+render = { background = { bottom = [0,0,0], top = [1,1,1] }, ground = true, ground_height = -2 }
+material.color = { attribute = "velocity", map = "coolwarm", range = [-1, 1] }
+light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", position = [1,1,1], falloff = "inverse-square" }]
+"#;
+    let manifest = parse(text);
+    assert_eq!(manifest.camera.mode, CameraMode::Keys);
+    assert_eq!(manifest.camera.keys[0].frame, -1);
+    assert_eq!(manifest.render.ground_height, GroundHeight::At(-2.0));
+    assert_eq!(parse(&manifest.to_commented_toml()), manifest);
+}
+
+proptest! {
+    #[test]
+    fn numbers_read_back_to_the_bit(
+        wide in prop::array::uniform3(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL),
+        narrow in prop::num::f32::POSITIVE | prop::num::f32::SUBNORMAL,
+        path in "[^\\PC]{1,8}x",
+    ) {
+        let narrow = narrow.abs().min(f32::MAX);
+        let mut manifest = Manifest::new(path);
+        manifest.camera.mode = CameraMode::Auto;
+        manifest.camera.eye = Some(wide);
+        manifest.material.color = ColorSetting::Rgb([narrow; 3]);
+        prop_assert_eq!(&parse(&manifest.to_commented_toml()), &manifest);
+    }
+
+    #[test]
+    fn any_text_is_answered(text in "[a-z\\[\\]=.\"0-9{}, \n#]{0,60}") {
+        let _ = Manifest::parse(&text, path());
+    }
+}

@@ -1,0 +1,224 @@
+//! A manifest as a tree of values that know where they came from: a place in the file, or an
+//! option of the command line that was laid over it.
+
+use std::collections::BTreeMap;
+
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+use super::Problem;
+
+/// Where a value was written.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) enum Place {
+    /// Byte in the file.
+    Byte(usize),
+    /// The option as the user typed it.
+    Option(String),
+    /// It is missing.
+    Nowhere,
+}
+
+#[derive(Debug, Clone)]
+pub(super) struct Node {
+    pub(super) kind: Kind,
+    pub(super) place: Place,
+}
+
+#[derive(Debug, Clone)]
+pub(super) enum Kind {
+    Text(String),
+    Integer(i64),
+    Float(f64),
+    Bool(bool),
+    Array(Vec<Node>),
+    /// Values under their keys, with the place of each key.
+    Table(BTreeMap<String, (Place, Node)>),
+    /// Dates, and integers beyond 64 bits.
+    Other,
+}
+
+/// One value laid over the manifest, as by `--set render.max_depth=5`.
+#[derive(Debug, Clone)]
+pub struct Override {
+    keys: Vec<String>,
+    node: Node,
+}
+
+impl Override {
+    /// Parses `render.max_depth=5`: a dotted key and a TOML value; a value that is no TOML is
+    /// taken as text, so that quotes are not needed.
+    ///
+    /// # Errors
+    /// There is no `=`, a key is empty, or a list, table or quoted text is not finished.
+    pub fn parse(assignment: &str) -> Result<Self, String> {
+        let shown = format!("--set {assignment}");
+        let Some((key, value)) = assignment.split_once('=') else {
+            return Err(format!("{shown}: no `=`, as in render.max_depth=5"));
+        };
+        let keys = split_key(key).map_err(|e| format!("{shown}: {e}"))?;
+        let place = Place::Option(shown.clone());
+        let value = value.trim();
+        let kind = match DeValue::parse(value) {
+            Ok(parsed) => match Node::from_toml(parsed, &|_| place.clone()).kind {
+                Kind::Other => Kind::Text(value.to_owned()),
+                kind => kind,
+            },
+            Err(e) if value.starts_with(['[', '{', '"', '\'']) => {
+                return Err(format!("{shown}: {}", e.message()));
+            }
+            Err(_) => Kind::Text(value.to_owned()),
+        };
+        Ok(Self {
+            keys,
+            node: Node { kind, place },
+        })
+    }
+
+    /// Lays `value` over the dotted `key`; `shown` is what messages call it: `--output`.
+    ///
+    /// # Errors
+    /// A part of the key is empty.
+    pub fn new(key: &str, value: impl Into<toml::Value>, shown: &str) -> Result<Self, String> {
+        let place = Place::Option(shown.to_owned());
+        Ok(Self {
+            keys: split_key(key).map_err(|e| format!("{shown}: {e}"))?,
+            node: Node::from_value(value.into(), &place),
+        })
+    }
+}
+
+fn split_key(key: &str) -> Result<Vec<String>, String> {
+    let keys: Vec<String> = key.split('.').map(|k| k.trim().to_owned()).collect();
+    if keys.iter().any(String::is_empty) {
+        return Err(format!("`{key}` is no dotted key, as render.max_depth is"));
+    }
+    Ok(keys)
+}
+
+impl Node {
+    /// Parses a whole file.
+    pub(super) fn parse(text: &str) -> Result<Self, (Place, String)> {
+        match DeTable::parse(text) {
+            Ok(table) => {
+                let place = Place::Byte(table.span().start);
+                let kind = Kind::from_table(table.into_inner(), &Place::Byte);
+                Ok(Self { kind, place })
+            }
+            Err(e) => Err((
+                e.span().map_or(Place::Nowhere, |s| Place::Byte(s.start)),
+                e.message().to_owned(),
+            )),
+        }
+    }
+
+    fn from_toml(value: Spanned<DeValue<'_>>, place: &dyn Fn(usize) -> Place) -> Self {
+        let at = place(value.span().start);
+        let kind = match value.into_inner() {
+            DeValue::String(text) => Kind::Text(text.into_owned()),
+            DeValue::Integer(i) => match i64::from_str_radix(i.as_str(), i.radix()) {
+                Ok(i) => Kind::Integer(i),
+                Err(_) => Kind::Other,
+            },
+            DeValue::Float(f) => f.as_str().parse().map_or(Kind::Other, Kind::Float),
+            DeValue::Boolean(b) => Kind::Bool(b),
+            DeValue::Datetime(_) => Kind::Other,
+            DeValue::Array(items) => Kind::Array(
+                items
+                    .into_iter()
+                    .map(|item| Self::from_toml(item, place))
+                    .collect(),
+            ),
+            DeValue::Table(table) => Kind::from_table(table, place),
+        };
+        Self { kind, place: at }
+    }
+
+    fn from_value(value: toml::Value, place: &Place) -> Self {
+        let kind = match value {
+            toml::Value::String(text) => Kind::Text(text),
+            toml::Value::Integer(i) => Kind::Integer(i),
+            toml::Value::Float(f) => Kind::Float(f),
+            toml::Value::Boolean(b) => Kind::Bool(b),
+            toml::Value::Datetime(_) => Kind::Other,
+            toml::Value::Array(items) => Kind::Array(
+                items
+                    .into_iter()
+                    .map(|item| Self::from_value(item, place))
+                    .collect(),
+            ),
+            toml::Value::Table(table) => Kind::Table(
+                table
+                    .into_iter()
+                    .map(|(key, value)| (key, (place.clone(), Self::from_value(value, place))))
+                    .collect(),
+            ),
+        };
+        Self {
+            kind,
+            place: place.clone(),
+        }
+    }
+
+    /// Lays `overlay` over this tree, making tables on the way; `light.0.intensity` reaches into
+    /// a list.
+    pub(super) fn lay_over(&mut self, overlay: Override) -> Result<(), Problem> {
+        let problem = |at: usize, what: &str| Problem {
+            place: overlay.node.place.clone(),
+            key: overlay.keys[..=at].join("."),
+            what: what.to_owned(),
+        };
+        let mut node = self;
+        for (at, key) in overlay.keys.iter().enumerate() {
+            node = match &mut node.kind {
+                Kind::Table(table) => {
+                    let place = &overlay.node.place;
+                    let empty = Self {
+                        kind: Kind::Table(BTreeMap::new()),
+                        place: place.clone(),
+                    };
+                    let entry = table.entry(key.clone()).or_insert((place.clone(), empty));
+                    &mut entry.1
+                }
+                Kind::Array(items) => {
+                    let index = key.parse::<usize>().ok();
+                    let Some(item) = index.and_then(|i| items.get_mut(i)) else {
+                        return Err(problem(at, "the list has no such item; they count from 0"));
+                    };
+                    item
+                }
+                _ => return Err(problem(at, "what is above it is a plain value")),
+            };
+        }
+        *node = overlay.node;
+        Ok(())
+    }
+
+    /// What a user would call this value.
+    pub(super) fn describe(&self) -> String {
+        match &self.kind {
+            Kind::Text(text) => format!("the text {text:?}"),
+            Kind::Integer(i) => i.to_string(),
+            Kind::Float(f) => format!("{f:?}"),
+            Kind::Bool(b) => b.to_string(),
+            Kind::Array(items) => format!("a list of {}", items.len()),
+            Kind::Table(_) => "a table".to_owned(),
+            Kind::Other => "a date or a huge number".to_owned(),
+        }
+    }
+}
+
+impl Kind {
+    fn from_table(table: DeTable<'_>, place: &dyn Fn(usize) -> Place) -> Self {
+        Self::Table(
+            table
+                .into_iter()
+                .map(|(key, value)| {
+                    let at = place(key.span().start);
+                    let node = Node::from_toml(value, place);
+                    (key.into_inner().into_owned(), (at, node))
+                })
+                .collect(),
+        )
+    }
+}
