@@ -1,1 +1,413 @@
 //! Which format a file is: by content first, by name second.
+//!
+//! Extensions lie (`.vtk` is text or binary, `.xyz` is three unrelated things, partio gzips
+//! `.bgeo`), so magic bytes decide and the name only breaks ties. Files that are known but not
+//! read get an error that says what to do instead ([`mod@self::foreign`]). Gzip is taken off
+//! before, by [`crate::open`]; the readers themselves live in [`crate::read`].
+
+use std::path::Path;
+
+use crate::read::{self, Step};
+use crate::{ParseError, RawParticles, native};
+
+mod foreign;
+
+/// The bytes that detection looks at; more may be given, less is fine for short files.
+pub const HEAD_LEN: usize = 4096;
+
+/// A format that this crate reads.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
+pub enum Format {
+    /// Our native frame file.
+    Spf,
+    /// Legacy VTK, text or binary.
+    VtkLegacy,
+    /// XML VTK: `.vtu` and `.vtp`.
+    VtkXml,
+    /// Classic BGEO version 5, as partio writes it.
+    Bgeo,
+    /// PLY, text or binary.
+    Ply,
+    /// Raw f32 triples, molecular text, or bare text: the reader tells them apart.
+    Xyz,
+    /// LAMMPS text dump.
+    Lammps,
+    /// One numpy array.
+    Npy,
+    /// A ZIP of numpy arrays.
+    Npz,
+    /// Separated columns with a line of names.
+    Csv,
+}
+
+impl Format {
+    /// Every format.
+    pub const ALL: [Self; 10] = [
+        Self::Spf,
+        Self::VtkLegacy,
+        Self::VtkXml,
+        Self::Bgeo,
+        Self::Ply,
+        Self::Xyz,
+        Self::Lammps,
+        Self::Npy,
+        Self::Npz,
+        Self::Csv,
+    ];
+
+    /// Name in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Spf => "spf",
+            Self::VtkLegacy => "vtk",
+            Self::VtkXml => "vtk-xml",
+            Self::Bgeo => "bgeo",
+            Self::Ply => "ply",
+            Self::Xyz => "xyz",
+            Self::Lammps => "lammps",
+            Self::Npy => "npy",
+            Self::Npz => "npz",
+            Self::Csv => "csv",
+        }
+    }
+
+    /// What the file's name promises, `.gz` left out; `None` for names that say nothing.
+    pub fn by_name(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let name = strip_gz(&name);
+        let (stem, extension) = name.rsplit_once('.')?;
+        Some(match extension {
+            "spf" => Self::Spf,
+            "vtk" => Self::VtkLegacy,
+            "vtu" | "vtp" => Self::VtkXml,
+            "bgeo" | "bhclassic" => Self::Bgeo,
+            "ply" => Self::Ply,
+            "xyz" | "extxyz" => Self::Xyz,
+            "lammps" | "lammpstrj" | "dump" => Self::Lammps,
+            "npy" => Self::Npy,
+            "npz" => Self::Npz,
+            "csv" | "tsv" => Self::Csv,
+            // `dump.250`, `dump.drop.250`: LAMMPS names without an extension.
+            _ if is_digits(extension) && (stem == "dump" || stem.starts_with("dump.")) => {
+                Self::Lammps
+            }
+            _ => return None,
+        })
+    }
+
+    /// True if one file of this format may hold several time steps.
+    pub const fn may_hold_many_steps(self) -> bool {
+        matches!(self, Self::Xyz | Self::Lammps | Self::Npy | Self::Npz)
+    }
+
+    /// The format of an uncompressed file that begins with `bytes` (all of it, or at least
+    /// [`HEAD_LEN`] of it) and is called `path`.
+    ///
+    /// # Errors
+    /// [`ParseError::Unsupported`] for a known format that is not read, with what to do;
+    /// [`ParseError::Malformed`] for an empty file (but not `.xyz`: that is zero raw particles),
+    /// for content that is not what its name promises, and for content that nothing knows.
+    pub fn detect(bytes: &[u8], path: &Path) -> Result<Self, ParseError> {
+        let named = Self::by_name(path);
+        if bytes.is_empty() {
+            return match named {
+                Some(Self::Xyz) => Ok(Self::Xyz),
+                _ => Err(ParseError::malformed(
+                    0,
+                    "the file is empty; perhaps it is still being written",
+                )),
+            };
+        }
+        let head = &bytes[..bytes.len().min(HEAD_LEN)];
+        if let Some(format) = by_magic(head)? {
+            return Ok(format);
+        }
+        // Two or three bytes of raw floats may look like any short magic.
+        let shortest = if named == Some(Self::Xyz) { 4 } else { 0 };
+        foreign::refuse(head, path, shortest)?;
+        match named {
+            Some(Self::Xyz) => Ok(Self::Xyz),
+            Some(Self::Csv) if is_text(head) => Ok(Self::Csv),
+            Some(format) => Err(ParseError::malformed(
+                0,
+                format!(
+                    "named like a {} file, but does not begin like one: {}",
+                    format.name(),
+                    opening(head)
+                ),
+            )),
+            None => sniff_text(head).ok_or_else(|| {
+                ParseError::malformed(
+                    0,
+                    format!(
+                        "no particle format begins with {}; read are {}",
+                        opening(head),
+                        Self::ALL.map(Self::name).join(", ")
+                    ),
+                )
+            }),
+        }
+    }
+
+    /// The time steps that the whole uncompressed file `bytes` holds.
+    ///
+    /// # Errors
+    /// What the reader of the format says.
+    pub fn steps(self, bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+        match self {
+            Self::Spf => native::steps(bytes),
+            Self::VtkLegacy => read::vtk::steps(bytes),
+            Self::VtkXml => read::vtk_xml::steps(bytes),
+            Self::Bgeo => read::bgeo::steps(bytes),
+            Self::Ply => read::ply::steps(bytes),
+            Self::Xyz => read::xyz::steps(bytes),
+            Self::Lammps => read::lammps::steps(bytes),
+            Self::Npy | Self::Npz => read::npy::steps(bytes),
+            Self::Csv => read::csv::steps(bytes),
+        }
+    }
+
+    /// Reads one of the [`Self::steps`] of `bytes`.
+    ///
+    /// # Errors
+    /// What the reader of the format says.
+    pub fn read(self, bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+        match self {
+            Self::Spf => native::read(bytes, step),
+            Self::VtkLegacy => read::vtk::read(bytes, step),
+            Self::VtkXml => read::vtk_xml::read(bytes, step),
+            Self::Bgeo => read::bgeo::read(bytes, step),
+            Self::Ply => read::ply::read(bytes, step),
+            Self::Xyz => read::xyz::read(bytes, step),
+            Self::Lammps => read::lammps::read(bytes, step),
+            Self::Npy | Self::Npz => read::npy::read(bytes, step),
+            Self::Csv => read::csv::read(bytes, step),
+        }
+    }
+}
+
+/// `name` without a final `.gz` (given in lower case).
+pub(crate) fn strip_gz(name: &str) -> &str {
+    name.strip_suffix(".gz").unwrap_or(name)
+}
+
+pub(crate) fn is_digits(text: &str) -> bool {
+    !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit())
+}
+
+/// Formats that announce themselves. XML needs a look at the root element.
+fn by_magic(head: &[u8]) -> Result<Option<Format>, ParseError> {
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    Ok(Some(match head {
+        _ if head.starts_with(native::MAGIC) => Format::Spf,
+        _ if starts_ignoring_case(text, b"# vtk DataFile") => Format::VtkLegacy,
+        _ if head.starts_with(b"BgeoV") => Format::Bgeo,
+        _ if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") => Format::Ply,
+        _ if head.starts_with(b"\x93NUMPY") => Format::Npy,
+        _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => Format::Npz,
+        _ if text.trim_ascii_start().starts_with(b"ITEM:") => Format::Lammps,
+        _ if text.trim_ascii_start().starts_with(b"<") => return vtk_xml_kind(text),
+        _ => return Ok(None),
+    }))
+}
+
+/// Tells particle files from collections and grids by the `type` of the root element.
+fn vtk_xml_kind(head: &[u8]) -> Result<Option<Format>, ParseError> {
+    let head = String::from_utf8_lossy(head);
+    let Some((_, root)) = head.split_once("<VTKFile") else {
+        return Ok(None);
+    };
+    let root = root.split_once('>').map_or(root, |(root, _)| root);
+    let kind = ["type=\"", "type='"].iter().find_map(|key| {
+        // `header_type=` ends the same way, so a blank must come before.
+        let at = root
+            .match_indices(key)
+            .find(|(at, _)| root[..*at].ends_with(char::is_whitespace))?
+            .0;
+        root[at + key.len()..].split(['"', '\'']).next()
+    });
+    match kind {
+        Some("UnstructuredGrid" | "PolyData") => Ok(Some(Format::VtkXml)),
+        Some("Collection") => Err(ParseError::unsupported(
+            "a ParaView collection (.pvd), which only lists other files; give those files",
+        )),
+        Some("PUnstructuredGrid" | "PPolyData") => Err(ParseError::unsupported(
+            "a parallel VTK index (.pvtu, .pvtp), which only lists its pieces; give the pieces",
+        )),
+        Some(kind) if kind.contains("MultiBlock") || kind.contains("PartitionedDataSet") => {
+            Err(ParseError::unsupported(
+                "a VTK multi-block index (.vtm), which only lists its blocks; give the blocks",
+            ))
+        }
+        Some(kind) => Err(ParseError::unsupported(format!(
+            "a VTK file of type {kind} holds no particles; save as UnstructuredGrid or PolyData"
+        ))),
+        // The reader says what is wrong with the root element.
+        None => Ok(Some(Format::VtkXml)),
+    }
+}
+
+/// Decides for text that no name explains: columns with names or separators are CSV, a count
+/// or bare numbers are XYZ.
+fn sniff_text(head: &[u8]) -> Option<Format> {
+    if !is_text(head) {
+        return None;
+    }
+    let text = String::from_utf8_lossy(head);
+    let mut lines = text
+        .trim_start_matches('\u{feff}')
+        .lines()
+        .map(str::trim)
+        .filter(|l| !l.is_empty() && !l.starts_with('#') && !l.starts_with("//"));
+    let first = lines.next()?;
+    if is_digits(first) {
+        return Some(Format::Xyz);
+    }
+    if has_numbers(first) {
+        let separated = first.contains([',', ';', '\t']);
+        return Some(if separated { Format::Csv } else { Format::Xyz });
+    }
+    // A line of names, or free lines before it: numbers must follow soon.
+    lines.take(8).any(has_numbers).then_some(Format::Csv)
+}
+
+/// True if `line` is three or more numbers and nothing else (an empty last cell aside).
+fn has_numbers(line: &str) -> bool {
+    let cells = || {
+        line.split([',', ';', '\t', ' '])
+            .map(|cell| cell.trim().trim_matches('"'))
+            .filter(|cell| !cell.is_empty())
+    };
+    cells().all(|cell| cell.parse::<f64>().is_ok()) && cells().nth(2).is_some()
+}
+
+/// True if `head` is UTF-8 (a character cut off by the end aside) without control characters.
+fn is_text(head: &[u8]) -> bool {
+    let whole = match std::str::from_utf8(head) {
+        Ok(_) => true,
+        Err(e) => e.error_len().is_none() && head.len() >= HEAD_LEN - 3,
+    };
+    whole
+        && head
+            .iter()
+            .all(|b| *b >= 32 && *b != 127 || matches!(b, b'\t' | b'\n' | b'\r'))
+}
+
+fn starts_ignoring_case(bytes: &[u8], prefix: &[u8]) -> bool {
+    bytes
+        .get(..prefix.len())
+        .is_some_and(|start| start.eq_ignore_ascii_case(prefix))
+}
+
+/// The first bytes for a message: as text where printable, else in hex.
+fn opening(head: &[u8]) -> String {
+    let start = &head[..head.len().min(8)];
+    if start.iter().all(|b| (32..127).contains(b)) {
+        format!("`{}`", String::from_utf8_lossy(start))
+    } else {
+        let hex: Vec<String> = start.iter().map(|b| format!("{b:02x}")).collect();
+        format!("bytes {}", hex.join(" "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn detect(name: &str, bytes: &[u8]) -> Format {
+        Format::detect(bytes, Path::new(name)).expect("a known format")
+    }
+
+    #[track_caller]
+    fn refused(name: &str, bytes: &[u8], words: &str) {
+        let error = Format::detect(bytes, Path::new(name)).expect_err("not readable");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+
+    #[test]
+    fn content_goes_before_the_name() {
+        assert_eq!(
+            detect("a.ply", b"# vtk DataFile Version 4.2\nx\n"),
+            Format::VtkLegacy
+        );
+        assert_eq!(detect("a.vtk", b"ply\nformat ascii 1.0\n"), Format::Ply);
+        assert_eq!(detect("a", b"BgeoV\0\0\0\x05"), Format::Bgeo);
+        assert_eq!(detect("a.txt", b"ITEM: TIMESTEP\n0\n"), Format::Lammps);
+        assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), Format::Npy);
+        assert_eq!(detect("a.zip", b"PK\x03\x04"), Format::Npz);
+        let vtu = b"<?xml version=\"1.0\"?>\n<VTKFile header_type=\"UInt64\" type=\"PolyData\">";
+        assert_eq!(detect("a.vtk", vtu), Format::VtkXml);
+    }
+
+    #[test]
+    fn text_is_sniffed() {
+        assert_eq!(detect("a.xyz", b"3\n\nH 0 0 0\n"), Format::Xyz);
+        assert_eq!(detect("a.xyz", &[0, 1, 2, 3]), Format::Xyz);
+        assert_eq!(detect("a.xyz", b"\xff\xfe\x80\x3f"), Format::Xyz);
+        assert_eq!(detect("a.xyz", b""), Format::Xyz);
+        assert_eq!(detect("a.txt", b"3\n\nH 0 0 0\n"), Format::Xyz);
+        assert_eq!(detect("a.dat", b"# x y z\n0 1 2\n3 4 5\n"), Format::Xyz);
+        assert_eq!(detect("a.txt", b"0,1,2\n3,4,5\n"), Format::Csv);
+        assert_eq!(
+            detect("a.dat", b"Pos.x [m];Pos.y [m];Pos.z [m];\n0;1;2;\n"),
+            Format::Csv
+        );
+        assert_eq!(detect("a.csv", b"\xef\xbb\xbfx,y,z\n"), Format::Csv);
+        refused(
+            "README.txt",
+            b"these are\nsome words\n",
+            "no particle format",
+        );
+        refused("a.dat", &[0, 1, 2, 3], "bytes 00 01 02 03");
+    }
+
+    #[test]
+    fn a_name_that_lies_is_told() {
+        refused("a.bgeo", b"hello world", "named like a bgeo file");
+        refused("a.vtk", b"", "still being written");
+        refused("a.csv", &[0, 159, 146], "named like a csv file");
+    }
+
+    #[test]
+    fn known_foreign_files_say_what_to_do() {
+        let collection = b"<VTKFile type=\"Collection\" version=\"0.1\">";
+        refused("a.pvd", collection, "give those files");
+        refused(
+            "a.pvtu",
+            b"<VTKFile type='PUnstructuredGrid'>",
+            "give the pieces",
+        );
+        refused(
+            "a.vtm",
+            b"<VTKFile type=\"vtkMultiBlockDataSet\">",
+            "give the blocks",
+        );
+        refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
+        refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
+        refused("a.abc", b"Ogawa\0", "Alembic");
+        refused("a.bgeo", b"\x7fNSJ", "bhclassic");
+        refused("a.bgeo", b"[\n\t\"fileversion\",\"19.5\"", "bhclassic");
+        refused("a.bgeo.sc", b"scf1", "bhclassic");
+        refused("a.geo", b"PGEOMETRY V5\n", "bgeo");
+        refused("a.pdb", b"\x9e\x02\0\0\x01\0", "PDB");
+        refused("a.zst", b"\x28\xb5\x2f\xfd", "zstd");
+        refused("dump.bin", &[0; 64], "LAMMPS binary");
+        refused("other.bin", &[0; 64], "no particle format");
+        refused("a.vdb", b" BDV\0\0\0\0", "OpenVDB");
+        refused("a.nc", b"CDF\x01", "NetCDF");
+        refused("a.png", b"\x89PNG\r\n", "image");
+        refused("a.exr", b"\x76\x2f\x31\x01", "image");
+        refused("a.gz", b"\x1f\x8b\x08", "gzip inside gzip");
+    }
+
+    #[test]
+    fn names_say_what_they_can() {
+        let by_name = |name: &str| Format::by_name(Path::new(name));
+        assert_eq!(by_name("x/dump.drop.1200.lammps.gz"), Some(Format::Lammps));
+        assert_eq!(by_name("dump.250"), Some(Format::Lammps));
+        assert_eq!(by_name("A_7.VTK"), Some(Format::VtkLegacy));
+        assert_eq!(by_name("notes.12"), None);
+        assert_eq!(by_name("README"), None);
+    }
+}

@@ -14,6 +14,7 @@ mod scalar;
 pub mod detect;
 pub mod generate;
 pub mod native;
+pub mod open;
 pub mod read;
 pub mod sequence;
 pub mod stats;
