@@ -47,6 +47,8 @@ macro_rules! with_values {
     };
 }
 
+pub(crate) use with_values;
+
 impl AttributeData {
     /// Number of scalars.
     pub fn len(&self) -> usize {

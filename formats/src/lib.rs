@@ -9,6 +9,7 @@
 mod attribute;
 mod error;
 mod frame;
+mod origin;
 mod scalar;
 
 pub mod detect;
@@ -23,4 +24,7 @@ pub mod write;
 pub use attribute::{Attribute, AttributeData};
 pub use error::{FrameError, ParseError};
 pub use frame::{ParticleFrame, Positions, Radius, RawParticles};
+pub use open::FrameFile;
+pub use origin::choose_origin;
 pub use scalar::{Endian, ScalarType};
+pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput};

@@ -1,1 +1,0 @@
-//! Which files are which frame.

@@ -1,0 +1,311 @@
+//! Names to frames, from the names alone.
+//!
+//! Files whose names differ in numbers only form a *run*. In a run the frame number is the first
+//! number that differs between all files; a second one that varies along (a particle count) is
+//! ignored. If no number does, but two vary (`Fluid_<object>_<frame>`), the last is the frame and
+//! the others split the run. Runs that share at least half of the frame numbers of the smaller
+//! one are *parts* of one group (`Fluid_7` with `Oil_7`); others are another sequence.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::path::PathBuf;
+
+use super::error::{GroupSummary, SequenceError, counted};
+use super::name::Name;
+
+/// Files that make one sequence, sorted by number, then part.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Group {
+    pub files: Vec<GroupFile>,
+    /// One name for each part.
+    pub parts: Vec<String>,
+}
+
+/// One file with its place in the sequence as far as the name tells.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct GroupFile {
+    pub path: PathBuf,
+    pub part: u32,
+    /// `None` if the name has no number.
+    pub number: Option<i64>,
+}
+
+/// Names that differ in numbers only, with the column that counts frames.
+#[derive(Debug, Clone)]
+struct Run {
+    names: Vec<Name>,
+    column: Option<usize>,
+    /// Columns that vary along with the frame.
+    free: Vec<usize>,
+}
+
+impl Run {
+    fn numbers(&self) -> BTreeSet<i64> {
+        self.names.iter().filter_map(|n| self.number(n)).collect()
+    }
+
+    fn number(&self, name: &Name) -> Option<i64> {
+        self.column.and_then(|c| name.numbers.get(c).copied())
+    }
+
+    fn pattern(&self) -> String {
+        self.names
+            .first()
+            .map(|n| n.pattern(self.column, &self.free))
+            .unwrap_or_default()
+    }
+}
+
+/// Runs that share frame numbers.
+#[derive(Debug, Default)]
+struct Candidate {
+    runs: Vec<Run>,
+    numbers: BTreeSet<i64>,
+}
+
+impl Candidate {
+    fn frames(&self) -> usize {
+        self.numbers.len().max(1)
+    }
+
+    fn summary(&self) -> GroupSummary {
+        let patterns: Vec<String> = self.runs.iter().map(Run::pattern).collect();
+        GroupSummary {
+            pattern: common_pattern(&patterns),
+            frames: self.frames(),
+            files: self.runs.iter().map(|r| r.names.len()).sum(),
+        }
+    }
+}
+
+/// The one sequence among the `names` of a directory, or of those that fit a pattern.
+///
+/// A sequence with at least four times the frames of every other one is taken and the others
+/// are noted; so are single files without a number beside numbered ones. Anything closer is
+/// [`SequenceError::Ambiguous`]: rendering the wrong half of a directory would be worse.
+pub(super) fn pick(
+    directory: &std::path::Path,
+    names: Vec<Name>,
+    notes: &mut Vec<String>,
+) -> Result<Group, SequenceError> {
+    const CLEARLY_MORE: usize = 4;
+    let mut by_extension = BTreeMap::<String, Vec<Name>>::new();
+    for name in names {
+        by_extension
+            .entry(name.extension.clone())
+            .or_default()
+            .push(name);
+    }
+    let mut candidates: Vec<Candidate> = by_extension.into_values().flat_map(candidates).collect();
+    let weight = |c: &Candidate| (!c.numbers.is_empty(), c.frames());
+    candidates.sort_by_key(|c| std::cmp::Reverse(weight(c)));
+    let Some((first, others)) = candidates.split_first() else {
+        return Err(SequenceError::NoInput);
+    };
+    let is_minor = |c: &Candidate| {
+        let unnumbered = c.numbers.is_empty() && !first.numbers.is_empty();
+        unnumbered || c.frames() * CLEARLY_MORE <= first.frames()
+    };
+    if !others.iter().all(is_minor) {
+        return Err(SequenceError::Ambiguous {
+            path: directory.to_owned(),
+            groups: candidates.iter().map(Candidate::summary).collect(),
+        });
+    }
+    for other in others.iter().map(Candidate::summary) {
+        notes.push(format!(
+            "`{}` ({}) is left out",
+            other.pattern,
+            counted(&other)
+        ));
+    }
+    into_group(candidates.swap_remove(0))
+}
+
+/// The sequence that listed files make: parts if they share frame numbers, else by number, else
+/// in the order given. Nothing is left out.
+pub(super) fn listed(names: Vec<Name>, notes: &mut Vec<String>) -> Result<Group, SequenceError> {
+    let order: Vec<PathBuf> = names.iter().map(|n| n.path.clone()).collect();
+    let mut candidates = candidates(names);
+    if candidates.len() == 1 && (order.len() == 1 || !candidates[0].numbers.is_empty()) {
+        return into_group(candidates.swap_remove(0));
+    }
+    let numbered: BTreeMap<i64, PathBuf> = candidates
+        .iter()
+        .flat_map(|c| &c.runs)
+        .flat_map(|run| {
+            run.names
+                .iter()
+                .filter_map(|n| run.number(n).map(|number| (number, n.path.clone())))
+        })
+        .collect();
+    let files: Vec<(i64, PathBuf)> = if numbered.len() == order.len() {
+        numbered.into_iter().collect()
+    } else {
+        notes.push(
+            "the names do not number the files: frames are numbered from 0 in the order given"
+                .to_owned(),
+        );
+        (0..).zip(order).collect()
+    };
+    let files = files.into_iter().map(|(number, path)| GroupFile {
+        path,
+        part: 0,
+        number: Some(number),
+    });
+    Ok(Group {
+        files: files.collect(),
+        parts: vec![String::new()],
+    })
+}
+
+/// Runs of `names`, joined where they share frame numbers.
+fn candidates(names: Vec<Name>) -> Vec<Candidate> {
+    let mut by_text = BTreeMap::<Vec<String>, Vec<Name>>::new();
+    for name in names {
+        by_text.entry(name.literals.clone()).or_default().push(name);
+    }
+    let mut runs: Vec<Run> = by_text.into_values().flat_map(runs).collect();
+    runs.sort_by_key(|run| std::cmp::Reverse(run.names.len()));
+    let mut candidates: Vec<Candidate> = Vec::new();
+    for run in runs {
+        let numbers = run.numbers();
+        let home = candidates.iter_mut().find(|c| {
+            let shared = c.numbers.intersection(&numbers).count();
+            shared > 0 && shared * 2 >= numbers.len().min(c.numbers.len())
+        });
+        match home {
+            Some(candidate) => {
+                candidate.numbers.extend(numbers);
+                candidate.runs.push(run);
+            }
+            None => candidates.push(Candidate {
+                runs: vec![run],
+                numbers,
+            }),
+        }
+    }
+    candidates
+}
+
+/// Finds the frame column of names that differ in numbers only, see the module's head.
+fn runs(names: Vec<Name>) -> Vec<Run> {
+    let given = names.first().and_then(|n| n.frame_column);
+    let columns = names.first().map_or(0, |n| n.numbers.len());
+    let values =
+        |column: usize| -> BTreeSet<i64> { names.iter().map(|n| n.numbers[column]).collect() };
+    let varying: Vec<usize> = (0..columns).filter(|c| values(*c).len() > 1).collect();
+    let distinct = |column: usize| values(column).len() == names.len();
+    let column = given
+        .or_else(|| varying.iter().copied().find(|c| distinct(*c)))
+        .or_else(|| varying.last().copied())
+        .or_else(|| names.first().and_then(Name::lone_column));
+    let free: Vec<usize> = varying.into_iter().filter(|c| Some(*c) != column).collect();
+    if free.is_empty() || column.is_some_and(distinct) {
+        return vec![Run {
+            names,
+            column,
+            free,
+        }];
+    }
+    let mut split = BTreeMap::<Vec<i64>, Vec<Name>>::new();
+    for name in names {
+        let key = free.iter().map(|c| name.numbers[*c]).collect();
+        split.entry(key).or_default().push(name);
+    }
+    let run = |names| Run {
+        names,
+        column,
+        free: Vec::new(),
+    };
+    split.into_values().map(run).collect()
+}
+
+fn into_group(candidate: Candidate) -> Result<Group, SequenceError> {
+    let mut runs = candidate.runs;
+    runs.sort_by_cached_key(Run::pattern);
+    let patterns: Vec<String> = runs.iter().map(Run::pattern).collect();
+    let mut files: Vec<GroupFile> = Vec::new();
+    for (part, run) in (0..).zip(&runs) {
+        files.extend(run.names.iter().map(|name| GroupFile {
+            path: name.path.clone(),
+            part,
+            number: run.number(name),
+        }));
+    }
+    files.sort_by(|a, b| (a.number, a.part, &a.path).cmp(&(b.number, b.part, &b.path)));
+    for pair in files.windows(2) {
+        if let [a, b] = pair
+            && a.number == b.number
+            && a.part == b.part
+        {
+            return Err(SequenceError::Duplicate {
+                number: a.number.unwrap_or(0),
+                first: a.path.clone(),
+                second: b.path.clone(),
+            });
+        }
+    }
+    Ok(Group {
+        files,
+        parts: part_names(&patterns),
+    })
+}
+
+/// What tells the patterns apart: `Fluid` and `Oil` of `ParticleData_Fluid_#.vtk` and
+/// `ParticleData_Oil_#.vtk`. The whole pattern where nothing short does.
+fn part_names(patterns: &[String]) -> Vec<String> {
+    if patterns.len() < 2 {
+        return vec![String::new(); patterns.len()];
+    }
+    let (start, end) = common_ends(patterns);
+    let middle = |p: &String| p[start..p.len() - end].trim_matches(SEPARATORS).to_owned();
+    let names: Vec<String> = patterns.iter().map(middle).collect();
+    let distinct: BTreeSet<&String> = names.iter().collect();
+    if names.iter().any(String::is_empty) || distinct.len() < names.len() {
+        return patterns.to_vec();
+    }
+    names
+}
+
+const SEPARATORS: [char; 5] = ['_', '-', '.', ' ', '#'];
+
+/// One pattern for all: what is common at the ends with `*` between.
+fn common_pattern(patterns: &[String]) -> String {
+    match patterns {
+        [] => String::new(),
+        [one] => one.clone(),
+        [first, ..] => {
+            let (start, end) = common_ends(patterns);
+            format!("{}*{}", &first[..start], &first[first.len() - end..])
+        }
+    }
+}
+
+/// Lengths of the common start and end of all `texts`, cut back to separators and not
+/// overlapping in any.
+fn common_ends(texts: &[String]) -> (usize, usize) {
+    let Some((first, others)) = texts.split_first() else {
+        return (0, 0);
+    };
+    let start_with = |other: &String| {
+        let same = first.chars().zip(other.chars()).take_while(|(a, b)| a == b);
+        same.map(|(a, _)| a.len_utf8()).sum::<usize>()
+    };
+    let start = others.iter().map(start_with).min().unwrap_or(first.len());
+    let start = first[..start].rfind(SEPARATORS).map_or(0, |i| i + 1);
+    let end_with = |other: &String| {
+        let tails = first[start..]
+            .chars()
+            .rev()
+            .zip(other[start..].chars().rev());
+        let same = tails.take_while(|(a, b)| a == b);
+        same.map(|(a, _)| a.len_utf8()).sum::<usize>()
+    };
+    let end = others.iter().map(end_with).min().unwrap_or(0);
+    let tail = &first[first.len() - end..];
+    let end = tail.find(SEPARATORS).map_or(0, |i| tail.len() - i);
+    (start, end)
+}
+
+#[cfg(test)]
+mod tests;

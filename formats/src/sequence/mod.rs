@@ -1,0 +1,361 @@
+//! Which files are which frame: directories, patterns, lists; several files a step, several steps
+//! a file.
+//!
+//! Grouping looks at names only ([`mod@group`] has the rules); contents are looked at where a format
+//! may hold several steps. What a file holds is checked when its frame is loaded, so one damaged
+//! file costs one frame and not the sequence.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::SystemTime;
+
+use glam::DVec3;
+
+use crate::open::FrameFile;
+use crate::{FrameError, ParseError, ParticleFrame, RawParticles};
+
+mod error;
+mod group;
+mod merge;
+mod name;
+mod pattern;
+mod scan;
+
+pub use error::{GroupSummary, SequenceError};
+pub use merge::{PART_ATTRIBUTE, merge};
+
+use group::Group;
+use name::Name;
+use pattern::Pattern;
+
+/// What a user names.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub enum SequenceInput {
+    /// All particle files of a directory.
+    Directory(PathBuf),
+    /// `dump.#.vtk`, `frame_####.bgeo`, `%04d`, `*`, `?` in the file name.
+    Pattern(PathBuf),
+    /// Files, each of which may be a pattern or a directory itself.
+    Files(Vec<PathBuf>),
+}
+
+impl SequenceInput {
+    /// Tells by what is on disk: a directory, one file, or else a pattern if it has wildcards.
+    pub fn from_path(path: impl Into<PathBuf>) -> Self {
+        let path = path.into();
+        if path.is_dir() {
+            Self::Directory(path)
+        } else if !path.exists() && pattern::has_wildcards(&path) {
+            Self::Pattern(path)
+        } else {
+            Self::Files(vec![path])
+        }
+    }
+
+    /// One argument is read as by [`Self::from_path`], several are files.
+    pub fn from_paths(mut paths: Vec<PathBuf>) -> Self {
+        match (paths.pop(), paths.is_empty()) {
+            (Some(only), true) => Self::from_path(only),
+            (Some(last), false) => {
+                paths.push(last);
+                Self::Files(paths)
+            }
+            (None, _) => Self::Files(paths),
+        }
+    }
+}
+
+/// One file of a frame.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct PartFile {
+    /// The file.
+    pub path: PathBuf,
+    /// Index into [`Sequence::part_names`].
+    pub part: u32,
+    /// Which step of the file; `None` for a file that is one step.
+    pub step: Option<usize>,
+}
+
+/// One time step: its number in the simulation and the files it is made of.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct SequenceFrame {
+    /// The number in the file names, or the step number inside the file.
+    pub number: i64,
+    /// At least one file, in the order of the parts.
+    pub parts: Vec<PartFile>,
+}
+
+/// The time steps of a simulation in numeric order. Shared between threads by reference.
+#[derive(Debug)]
+pub struct Sequence {
+    frames: Vec<SequenceFrame>,
+    parts: Vec<String>,
+    notes: Vec<String>,
+    cache: Mutex<Option<Cached>>,
+}
+
+/// The file with several steps that was used last, so that its steps do not read it again each.
+#[derive(Debug)]
+struct Cached {
+    file: Arc<FrameFile>,
+    stamp: Option<(u64, SystemTime)>,
+}
+
+impl Sequence {
+    /// Finds the frames of `input`.
+    ///
+    /// # Errors
+    /// [`SequenceError`] if there is nothing, or no way to tell which files belong together.
+    pub fn open(input: &SequenceInput) -> Result<Self, SequenceError> {
+        let mut notes = Vec::new();
+        let group = match input {
+            SequenceInput::Directory(path) => {
+                group::pick(path, scan::directory(path)?, &mut notes)?
+            }
+            SequenceInput::Pattern(path) => {
+                let pattern = Pattern::parse(path)?;
+                let names = scan::fitting(&pattern, path)?;
+                group::pick(&pattern.directory, names, &mut notes)?
+            }
+            SequenceInput::Files(paths) => group::listed(listed_names(paths)?, &mut notes)?,
+        };
+        Ok(Self::from_group(group, notes))
+    }
+
+    fn from_group(group: Group, mut notes: Vec<String>) -> Self {
+        let (numbered, last) = scan::number_steps(group.files, &mut notes);
+        let mut by_number = BTreeMap::<i64, Vec<PartFile>>::new();
+        for entry in numbered {
+            by_number.entry(entry.number).or_default().push(entry.file);
+        }
+        let frames: Vec<SequenceFrame> = by_number
+            .into_iter()
+            .map(|(number, parts)| SequenceFrame { number, parts })
+            .collect();
+        note_gaps(&frames, &mut notes);
+        note_missing_parts(&frames, &group.parts, &mut notes);
+        let cache = last.filter(|f| f.steps().len() > 1).map(|file| Cached {
+            stamp: stamp(file.path()),
+            file: Arc::new(file),
+        });
+        Self {
+            frames,
+            parts: group.parts,
+            notes,
+            cache: Mutex::new(cache),
+        }
+    }
+
+    /// The frames, by number.
+    pub fn frames(&self) -> &[SequenceFrame] {
+        &self.frames
+    }
+
+    /// Names of the parts of a step, by index; a single empty name if steps have one part.
+    pub fn part_names(&self) -> &[String] {
+        &self.parts
+    }
+
+    /// What a user should know: gaps, files left out, missing parts.
+    pub fn notes(&self) -> &[String] {
+        &self.notes
+    }
+
+    /// The files that frame `index` is read from.
+    pub fn inputs(&self, index: usize) -> Vec<&Path> {
+        let frame = self.frames.get(index);
+        let parts = frame.map_or(&[][..], |f| f.parts.as_slice());
+        parts.iter().map(|p| p.path.as_path()).collect()
+    }
+
+    /// Reads frame `index`: finite particles, relative to `origin`.
+    ///
+    /// # Errors
+    /// As [`Self::load_raw`].
+    ///
+    /// # Panics
+    /// If there is no frame `index`.
+    pub fn load(&self, index: usize, origin: DVec3) -> Result<ParticleFrame, FrameError> {
+        Ok(ParticleFrame::from_raw(self.load_raw(index)?, origin))
+    }
+
+    /// Reads frame `index` (not: frame number) as it is in the files, parts merged.
+    ///
+    /// # Errors
+    /// [`FrameError`] of the first file that cannot be read.
+    ///
+    /// # Panics
+    /// If there is no frame `index`.
+    pub fn load_raw(&self, index: usize) -> Result<RawParticles, FrameError> {
+        self.load_noted(index).map(|(particles, _)| particles)
+    }
+
+    /// Like [`Self::load_raw`], with what got lost in merging the parts.
+    ///
+    /// # Errors
+    /// As [`Self::load_raw`].
+    ///
+    /// # Panics
+    /// If there is no frame `index`.
+    pub fn load_noted(&self, index: usize) -> Result<(RawParticles, Vec<String>), FrameError> {
+        let frame = &self.frames[index];
+        let mut notes = Vec::new();
+        let mut parts = Vec::with_capacity(frame.parts.len());
+        for part in &frame.parts {
+            let (file, step) = self.file_of(part)?;
+            parts.push((part.part, file.read(step)?));
+            notes.extend_from_slice(file.notes());
+        }
+        if self.parts.len() < 2
+            && let Some((_, only)) = parts.pop()
+        {
+            return Ok((only, notes));
+        }
+        Ok((merge(parts, &mut notes), notes))
+    }
+
+    /// The opened file of `part` and the step in it.
+    fn file_of(&self, part: &PartFile) -> Result<(Arc<FrameFile>, usize), FrameError> {
+        let Some(step) = part.step else {
+            let file = FrameFile::open(&part.path)?;
+            return match file.steps() {
+                [_, second, ..] => {
+                    let what = format!(
+                        "{} time steps where one was expected; give such files one at a time",
+                        file.steps().len()
+                    );
+                    Err(ParseError::malformed(second.span.start, what).in_file(&part.path))
+                }
+                _ => Ok((Arc::new(file), 0)),
+            };
+        };
+        let stamp = stamp(&part.path);
+        let lock = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cached) = lock().as_ref()
+            && cached.file.path() == part.path
+            && cached.stamp == stamp
+        {
+            return Ok((Arc::clone(&cached.file), step));
+        }
+        // Let go of the old one first: two large files need not be in memory at once.
+        *lock() = None;
+        let file = Arc::new(FrameFile::open(&part.path)?);
+        *lock() = Some(Cached {
+            file: Arc::clone(&file),
+            stamp,
+        });
+        Ok((file, step))
+    }
+}
+
+/// Tells a rewritten file from the one that was read.
+fn stamp(path: &Path) -> Option<(u64, SystemTime)> {
+    let meta = fs::metadata(path).ok()?;
+    Some((meta.len(), meta.modified().ok()?))
+}
+
+/// The files of a list, its patterns and directories filled in; the same file twice is once.
+fn listed_names(paths: &[PathBuf]) -> Result<Vec<Name>, SequenceError> {
+    let mut names: Vec<Name> = Vec::new();
+    for path in paths {
+        let found = match SequenceInput::from_path(path) {
+            SequenceInput::Directory(path) => scan::directory(&path)?,
+            SequenceInput::Pattern(path) => scan::fitting(&Pattern::parse(&path)?, &path)?,
+            SequenceInput::Files(_) if path.exists() => vec![Name::parse(path, None)],
+            SequenceInput::Files(_) => {
+                return Err(SequenceError::Missing {
+                    path: path.clone(),
+                    hint: scan::hint_for(path),
+                });
+            }
+        };
+        for name in found {
+            if !names.iter().any(|n| n.path == name.path) {
+                names.push(name);
+            }
+        }
+    }
+    if names.is_empty() {
+        return Err(SequenceError::NoInput);
+    }
+    Ok(names)
+}
+
+/// Tells where the numbering jumps by more than it usually does.
+fn note_gaps(frames: &[SequenceFrame], notes: &mut Vec<String>) {
+    const SHOWN: usize = 5;
+    let pairs = || frames.windows(2).map(|w| (w[0].number, w[1].number));
+    let mut strides = BTreeMap::<i64, usize>::new();
+    for (a, b) in pairs() {
+        *strides.entry(b.saturating_sub(a)).or_default() += 1;
+    }
+    // The most frequent one, the smallest of equals.
+    let usual = strides
+        .iter()
+        .max_by_key(|(stride, count)| (**count, std::cmp::Reverse(**stride)));
+    let Some((usual, _)) = usual else { return };
+    let gaps: Vec<String> = pairs()
+        .filter(|(a, b)| b.saturating_sub(*a) > *usual)
+        .map(|(a, b)| format!("{a} to {b}"))
+        .collect();
+    if gaps.is_empty() {
+        return;
+    }
+    let more = match gaps.len().saturating_sub(SHOWN) {
+        0 => String::new(),
+        more => format!(" and {more} times more"),
+    };
+    let shown = gaps[..gaps.len().min(SHOWN)].join(", ");
+    notes.push(format!(
+        "frame numbers go up by {usual}, but jump from {shown}{more}"
+    ));
+}
+
+fn note_missing_parts(frames: &[SequenceFrame], parts: &[String], notes: &mut Vec<String>) {
+    for (index, name) in (0u32..).zip(parts).filter(|_| parts.len() > 1) {
+        let missing: Vec<i64> = frames
+            .iter()
+            .filter(|f| f.parts.iter().all(|p| p.part != index))
+            .map(|f| f.number)
+            .collect();
+        if !missing.is_empty() {
+            notes.push(format!(
+                "part `{name}` is missing in {} of {} frames: {}",
+                missing.len(),
+                frames.len(),
+                ranges(&missing)
+            ));
+        }
+    }
+}
+
+/// Sorted numbers as `1-4, 7`; long lists are cut.
+fn ranges(numbers: &[i64]) -> String {
+    const SHOWN: usize = 8;
+    let mut runs: Vec<(i64, i64)> = Vec::new();
+    for &number in numbers {
+        match runs.last_mut() {
+            Some((_, last)) if number == *last || Some(number) == last.checked_add(1) => {
+                *last = number;
+            }
+            _ => runs.push((number, number)),
+        }
+    }
+    let text = |(first, last): &(i64, i64)| {
+        if first == last {
+            first.to_string()
+        } else {
+            format!("{first}-{last}")
+        }
+    };
+    let mut texts: Vec<String> = runs.iter().take(SHOWN).map(text).collect();
+    if runs.len() > SHOWN {
+        texts.push("...".to_owned());
+    }
+    texts.join(", ")
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,190 @@
+//! File names taken apart: literal text, numbers, extension.
+
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use crate::detect::{is_digits, strip_gz};
+
+/// A file name, split so that names of one sequence differ in `numbers` only.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub(super) struct Name {
+    /// The file.
+    pub path: PathBuf,
+    /// Text around the numbers, one more than there are numbers; without the extension.
+    pub literals: Vec<String>,
+    /// The runs of digits, in order.
+    pub numbers: Vec<i64>,
+    /// The same as written.
+    digits: Vec<String>,
+    /// Which of `numbers` a pattern's `#` stands for.
+    pub frame_column: Option<usize>,
+    /// Lower case, without dot and `.gz`; empty if there is none.
+    pub extension: String,
+    /// As written, dot and `.gz` included.
+    suffix: String,
+}
+
+impl Name {
+    /// Splits the name of `path`; `frame` is the byte range that a pattern says is the number.
+    pub(super) fn parse(path: &Path, frame: Option<Range<usize>>) -> Self {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        let stem_len = stem_len(&name);
+        let (stem, suffix) = name.split_at(stem_len);
+        let extension = strip_gz(&suffix.to_ascii_lowercase())
+            .trim_start_matches('.')
+            .to_owned();
+        let mut parts = Splitter::default();
+        let mut frame_column = None;
+        match frame.filter(|range| range.end <= stem_len) {
+            Some(range) => {
+                parts.split(&stem[..range.start]);
+                frame_column = Some(parts.numbers.len());
+                // Too long for a number: then it is text, and no frame number.
+                if !parts.push_number(&stem[range.clone()]) {
+                    frame_column = None;
+                }
+                parts.split(&stem[range.end..]);
+            }
+            None => parts.split(stem),
+        }
+        parts.literals.push(parts.literal);
+        Self {
+            path: path.to_owned(),
+            literals: parts.literals,
+            numbers: parts.numbers,
+            digits: parts.digits,
+            frame_column,
+            extension,
+            suffix: suffix.to_owned(),
+        }
+    }
+
+    /// The number of a file that has no siblings: what follows the word `frame`, else the last.
+    pub(super) fn lone_column(&self) -> Option<usize> {
+        let after_frame = self.literals.iter().take(self.numbers.len()).position(|l| {
+            let literal = l.to_ascii_lowercase();
+            literal
+                .trim_end_matches(['_', '-', '.', ' '])
+                .ends_with("frame")
+        });
+        self.frame_column
+            .or(after_frame)
+            .or(self.numbers.len().checked_sub(1))
+    }
+
+    /// A pattern for names like this one: `#` for column `frame`, `*` for the columns in `free`,
+    /// the numbers of this name elsewhere.
+    pub(super) fn pattern(&self, frame: Option<usize>, free: &[usize]) -> String {
+        let mut text = String::new();
+        for (column, literal) in self.literals.iter().enumerate() {
+            text += literal;
+            match self.digits.get(column) {
+                Some(_) if Some(column) == frame => text.push('#'),
+                Some(_) if free.contains(&column) => text.push('*'),
+                Some(digits) => text += digits,
+                None => {}
+            }
+        }
+        text + &self.suffix
+    }
+}
+
+/// Length of a file name without its extension and `.gz`. Digits are no extension (`dump.250`).
+fn stem_len(name: &str) -> usize {
+    let lower = name.to_ascii_lowercase();
+    let plain = strip_gz(&lower);
+    match plain.rsplit_once('.') {
+        Some((stem, extension)) if !stem.is_empty() && !is_digits(extension) => stem.len(),
+        _ => plain.len(),
+    }
+}
+
+#[derive(Default)]
+struct Splitter {
+    literals: Vec<String>,
+    numbers: Vec<i64>,
+    digits: Vec<String>,
+    literal: String,
+}
+
+impl Splitter {
+    fn split(&mut self, mut text: &str) {
+        while !text.is_empty() {
+            let plain = text
+                .find(|c: char| c.is_ascii_digit())
+                .unwrap_or(text.len());
+            self.literal += &text[..plain];
+            text = &text[plain..];
+            let digits = text.bytes().take_while(u8::is_ascii_digit).count();
+            if digits > 0 {
+                self.push_number(&text[..digits]);
+            }
+            text = &text[digits..];
+        }
+    }
+
+    /// Digits beyond i64 (hashes, time stamps in nanoseconds) stay text: false.
+    fn push_number(&mut self, digits: &str) -> bool {
+        match digits.parse() {
+            Ok(number) => {
+                self.numbers.push(number);
+                self.digits.push(digits.to_owned());
+                self.literals.push(std::mem::take(&mut self.literal));
+                true
+            }
+            Err(_) => {
+                self.literal += digits;
+                false
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parse(name: &str) -> Name {
+        Name::parse(Path::new(name), None)
+    }
+
+    #[test]
+    fn names_are_split_at_numbers() {
+        let name = parse("x/dam_break_frame_23_24389_particles.bgeo");
+        assert_eq!(name.literals, ["dam_break_frame_", "_", "_particles"]);
+        assert_eq!(name.numbers, [23, 24389]);
+        assert_eq!(name.extension, "bgeo");
+        assert_eq!(name.lone_column(), Some(0));
+        assert_eq!(
+            name.pattern(Some(0), &[1]),
+            "dam_break_frame_#_*_particles.bgeo"
+        );
+    }
+
+    #[test]
+    fn double_extensions_and_none() {
+        let gz = parse("dump.drop.1200.lammps.gz");
+        assert_eq!(
+            (gz.numbers.as_slice(), gz.extension.as_str()),
+            (&[1200][..], "lammps")
+        );
+        assert_eq!(gz.pattern(Some(0), &[]), "dump.drop.#.lammps.gz");
+        let bare = parse("dump.250");
+        assert_eq!(
+            (bare.numbers.as_slice(), bare.extension.as_str()),
+            (&[250][..], "")
+        );
+        let long = parse("a99999999999999999999_7.vtk");
+        assert_eq!(
+            (long.literals.len(), long.numbers.as_slice()),
+            (2, &[7][..])
+        );
+    }
+
+    #[test]
+    fn a_pattern_may_cut_a_run_of_digits() {
+        let name = Name::parse(Path::new("x17.vtk"), Some(2..3));
+        assert_eq!(name.pattern(Some(1), &[]), "x1#.vtk");
+        assert_eq!((name.numbers, name.frame_column), (vec![1, 7], Some(1)));
+    }
+}

@@ -1,0 +1,176 @@
+//! Directories, patterns and lists on disk.
+
+use std::fs;
+
+use super::*;
+
+struct Dir(tempfile::TempDir);
+
+impl Dir {
+    /// A directory with empty files of these names.
+    fn with(names: &[String]) -> Self {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        for name in names {
+            fs::write(dir.path().join(name), b"").expect("writable");
+        }
+        Self(dir)
+    }
+
+    fn path(&self, name: &str) -> PathBuf {
+        self.0.path().join(name)
+    }
+
+    fn open(&self, name: &str) -> Result<Sequence, SequenceError> {
+        Sequence::open(&SequenceInput::from_path(self.path(name)))
+    }
+
+    #[track_caller]
+    fn numbers(&self, name: &str) -> Vec<i64> {
+        let sequence = self.open(name).expect("a sequence");
+        sequence.frames().iter().map(|f| f.number).collect()
+    }
+
+    #[track_caller]
+    fn error(&self, name: &str) -> String {
+        self.open(name).expect_err("no sequence").to_string()
+    }
+}
+
+fn owned(texts: &[&str]) -> Vec<String> {
+    texts.iter().map(|t| (*t).to_owned()).collect()
+}
+
+fn series(count: i64, name: impl Fn(i64) -> String) -> Vec<String> {
+    (1..=count).map(name).collect()
+}
+
+#[test]
+fn a_directory_of_frames() {
+    let mut names = series(17, |i| format!("ParticleData_Fluid_{i}.vtk"));
+    names.extend(owned(&[
+        "README.md",
+        "scene.json",
+        "frame_1.png",
+        "frame_1.exr",
+        "job.toml",
+        ".hidden_1.vtk",
+        "ParticleData_Fluid_18.vtk.part",
+    ]));
+    let dir = Dir::with(&names);
+    assert_eq!(dir.numbers(""), (1..=17).collect::<Vec<_>>());
+    let sequence = dir.open("").expect("a sequence");
+    assert!(sequence.notes().is_empty(), "{:?}", sequence.notes());
+    assert_eq!(sequence.inputs(1), [dir.path("ParticleData_Fluid_2.vtk")]);
+    let error = sequence.load_raw(0).expect_err("empty file").to_string();
+    assert!(
+        error.contains("ParticleData_Fluid_1.vtk: byte 0: the file is empty"),
+        "{error}"
+    );
+}
+
+#[test]
+fn patterns_choose() {
+    let mut names = series(3, |i| format!("x_{i}.vtk"));
+    names.extend(series(3, |i| format!("x_{i}.bgeo")));
+    let dir = Dir::with(&names);
+    assert!(dir.error("").contains("2 sequences are here"));
+    for pattern in [
+        "x_#.vtk",
+        "x_####.bgeo",
+        "x_%04d.vtk",
+        "x_*.vtk",
+        "x_?.bgeo",
+        "*.vtk",
+    ] {
+        assert_eq!(dir.numbers(pattern), [1, 2, 3], "{pattern}");
+    }
+}
+
+#[test]
+fn a_mixed_directory_by_pattern() {
+    let dir = Dir::with(&owned(&[
+        "double_dam_break_frame_01_4732_particles.vtk",
+        "double_dam_break_frame_26_4732_particles.vtk",
+        "dam_break_frame_9_6859_particles.bgeo",
+        "dam_break_frame_23_24389_particles.bgeo",
+        "cube_8_particles.vtk",
+        "LICENSE",
+    ]));
+    assert_eq!(dir.numbers("dam_break_frame_*.bgeo"), [9, 23]);
+    assert_eq!(dir.numbers("double_dam_break_frame_#_*.vtk"), [1, 26]);
+    assert_eq!(dir.numbers("cube_8_particles.vtk"), [8]);
+}
+
+#[test]
+fn lammps_names() {
+    let mut names: Vec<String> = (0..10)
+        .map(|i| format!("dump.drop.{}.lammps", i * 400))
+        .collect();
+    names[3] += ".gz";
+    let dir = Dir::with(&names);
+    let expected: Vec<i64> = (0..10).map(|i| i * 400).collect();
+    assert_eq!(dir.numbers(""), expected);
+    assert_eq!(dir.numbers("dump.drop.#.lammps*"), expected);
+    let bare = Dir::with(&owned(&["dump.0", "dump.250", "log.lammps.txt"]));
+    assert_eq!(bare.numbers(""), [0, 250]);
+}
+
+#[test]
+fn parts_and_gaps_are_told() {
+    let mut names = series(9, |i| format!("ParticleData_Fluid_{i}.vtk"));
+    names.extend((6..=8).map(|i| format!("ParticleData_Oil_{i}.vtk")));
+    names.retain(|n| n != "ParticleData_Fluid_4.vtk");
+    let sequence = Dir::with(&names).open("").expect("a sequence");
+    assert_eq!(sequence.part_names(), ["Fluid", "Oil"]);
+    assert_eq!(
+        sequence.notes(),
+        [
+            "frame numbers go up by 1, but jump from 3 to 5",
+            "part `Oil` is missing in 5 of 8 frames: 1-3, 5, 9",
+        ]
+    );
+}
+
+#[test]
+fn what_is_not_there_is_told_with_a_remedy() {
+    let dir = Dir::with(&owned(&["x_1.vtk", "y.png"]));
+    let text = dir.error("x_#.vtu");
+    assert!(
+        text.contains("closest of 2 files") && text.contains("x_1.vtk"),
+        "{text}"
+    );
+    let text = dir.error("x_2.vtk");
+    assert!(
+        text.contains("no such file") && text.contains("x_1.vtk"),
+        "{text}"
+    );
+    assert!(dir.error("none/x_#.vtk").contains("no such file"));
+    fs::remove_file(dir.path("x_1.vtk")).expect("removable");
+    assert!(dir.error("").contains("it has 1 .png"));
+    fs::remove_file(dir.path("y.png")).expect("removable");
+    assert!(dir.error("").contains("empty"));
+    fs::create_dir(dir.path("vtk")).expect("writable");
+    assert!(dir.error("").contains("`vtk`; give one of them"));
+    fs::write(dir.path("a.hdf5"), b"\x89HDF\r\n\x1a\n").expect("writable");
+    assert!(dir.error("").contains("pysph dump_vtk"));
+    let nothing = Sequence::open(&SequenceInput::Files(vec![]));
+    assert!(matches!(nothing, Err(SequenceError::NoInput)));
+}
+
+#[test]
+fn lists_may_have_patterns() {
+    let dir = Dir::with(&owned(&["a_1.vtk", "a_2.vtk", "b_7.vtk"]));
+    let paths = ["a_#.vtk", "b_7.vtk", "a_1.vtk"]
+        .map(|n| dir.path(n))
+        .to_vec();
+    let sequence = Sequence::open(&SequenceInput::from_paths(paths)).expect("a sequence");
+    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    assert_eq!(numbers, [1, 2, 7]);
+}
+
+#[test]
+fn ranges_are_short() {
+    assert_eq!(ranges(&[]), "");
+    assert_eq!(ranges(&[1, 2, 3, 7, 9, 10]), "1-3, 7, 9-10");
+    assert!(ranges(&(0..99).map(|i| i * 2).collect::<Vec<_>>()).ends_with(", ..."));
+}
