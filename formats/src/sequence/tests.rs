@@ -2,7 +2,10 @@
 
 use std::fs;
 
+use glam::Vec3;
+
 use super::*;
+use crate::{AttributeData, native};
 
 struct Dir(tempfile::TempDir);
 
@@ -173,4 +176,55 @@ fn ranges_are_short() {
     assert_eq!(ranges(&[]), "");
     assert_eq!(ranges(&[1, 2, 3, 7, 9, 10]), "1-3, 7, 9-10");
     assert!(ranges(&(0..99).map(|i| i * 2).collect::<Vec<_>>()).ends_with(", ..."));
+}
+
+fn write_frame(path: &Path, positions: Vec<Vec3>, step: i64) {
+    let raw = RawParticles {
+        positions: crate::Positions::F32(positions),
+        attributes: vec![],
+        time: None,
+        step: None,
+    };
+    let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);
+    native::write(path, &frame, Some(step)).expect("writable");
+}
+
+#[test]
+fn frames_are_loaded_and_parts_merged() {
+    let dir = Dir::with(&[]);
+    for i in [1u8, 2, 10] {
+        let at = Vec3::splat(f32::from(i));
+        write_frame(&dir.path(&format!("fluid_{i}.spf")), vec![at; 2], i.into());
+        if i != 2 {
+            write_frame(&dir.path(&format!("wall_{i}.spf")), vec![-at], i.into());
+        }
+    }
+    let sequence = dir.open("").expect("a sequence");
+    assert_eq!(sequence.part_names(), ["fluid", "wall"]);
+    let (last, notes) = sequence.load_noted(2).expect("readable");
+    assert!(notes.is_empty());
+    let expected = vec![Vec3::splat(10.0), Vec3::splat(10.0), Vec3::splat(-10.0)];
+    assert_eq!(last.positions, crate::Positions::F32(expected));
+    assert_eq!(last.attributes[0].data, AttributeData::U32(vec![0, 0, 1]));
+    let middle = sequence.load(1, DVec3::ONE).expect("readable");
+    assert_eq!(middle.positions, [Vec3::ONE; 2]);
+    // Every frame has the attribute, also where a part is missing.
+    assert!(middle.attribute(PART_ATTRIBUTE).is_some());
+    fs::write(dir.path("wall_1.spf"), b"SPHERULE").expect("writable");
+    let error = sequence
+        .load(0, DVec3::ZERO)
+        .expect_err("damaged")
+        .to_string();
+    assert!(error.contains("wall_1.spf: byte 8"), "{error}");
+    assert!(sequence.load(2, DVec3::ZERO).is_ok());
+}
+
+#[test]
+fn one_file_is_a_sequence_of_its_steps() {
+    let dir = Dir::with(&[]);
+    write_frame(&dir.path("alone.spf"), vec![Vec3::ONE], 3);
+    assert_eq!(dir.numbers("alone.spf"), [0]);
+    assert_eq!(dir.numbers(""), [0]);
+    let sequence = dir.open("alone.spf").expect("a sequence");
+    assert_eq!(sequence.load(0, DVec3::ZERO).expect("readable").len(), 1);
 }

@@ -1,1 +1,7 @@
-//! Writers of foreign formats.
+//! Writers of foreign formats, for particles to be compared in other programs. Files appear whole
+//! or not at all. Native frames are [`crate::native`]'s.
+
+pub(crate) mod atomic;
+
+pub mod npy;
+pub mod vtk;
