@@ -172,7 +172,7 @@ fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
     clippy::cast_possible_truncation,
     reason = "radii are f32 in the renderer"
 )]
-fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
+pub(crate) fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
     let named = |wanted: &str| {
         attributes.iter().find(|a| {
             a.components == 1
