@@ -2,7 +2,7 @@
 //!
 //! Extensions lie (`.vtk` is text or binary, `.xyz` is three unrelated things, partio gzips
 //! `.bgeo`), so magic bytes decide and the name only breaks ties. Files that are known but not
-//! read get an error that says what to do instead ([`mod@self::foreign`]). Gzip is taken off
+//! read get an error that says what to do instead (`foreign.rs`). Gzip is taken off
 //! before, by [`crate::open`]; the readers themselves live in [`crate::read`].
 
 use std::path::Path;

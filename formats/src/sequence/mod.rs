@@ -1,7 +1,7 @@
 //! Which files are which frame: directories, patterns, lists; several files a step, several steps
 //! a file.
 //!
-//! Grouping looks at names only ([`mod@group`] has the rules); contents are looked at where a format
+//! Grouping looks at names only (`group.rs` has the rules); contents are looked at where a format
 //! may hold several steps. What a file holds is checked when its frame is loaded, so one damaged
 //! file costs one frame and not the sequence.
 
