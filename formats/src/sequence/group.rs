@@ -69,8 +69,13 @@ impl Candidate {
 
     fn summary(&self) -> GroupSummary {
         let patterns: Vec<String> = self.runs.iter().map(Run::pattern).collect();
+        let pattern = match self.runs.as_slice() {
+            // A file by itself is named: which of its numbers counts frames is a guess.
+            [run] if run.names.len() == 1 => run.names[0].pattern(None, &[]),
+            _ => common_pattern(&patterns),
+        };
         GroupSummary {
-            pattern: common_pattern(&patterns),
+            pattern,
             frames: self.frames(),
             files: self.runs.iter().map(|r| r.names.len()).sum(),
         }
@@ -80,7 +85,7 @@ impl Candidate {
 /// The one sequence among the `names` of a directory, or of those that fit a pattern.
 ///
 /// A sequence with at least four times the frames of every other one is taken and the others
-/// are noted; so are single files without a number beside numbered ones. Anything closer is
+/// are noted; so are files without a number beside two numbered frames or more. Anything closer is
 /// [`SequenceError::Ambiguous`]: rendering the wrong half of a directory would be worse.
 pub(super) fn pick(
     directory: &std::path::Path,
@@ -102,7 +107,7 @@ pub(super) fn pick(
         return Err(SequenceError::NoInput);
     };
     let is_minor = |c: &Candidate| {
-        let unnumbered = c.numbers.is_empty() && !first.numbers.is_empty();
+        let unnumbered = c.numbers.is_empty() && first.numbers.len() > 1;
         unnumbered || c.frames() * CLEARLY_MORE <= first.frames()
     };
     if !others.iter().all(is_minor) {

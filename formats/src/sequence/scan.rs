@@ -256,7 +256,7 @@ struct Scan {
 impl Scan {
     fn is_suspect(&self, files: &[GroupFile], index: usize) -> bool {
         let len = fs::metadata(&files[index].path).map_or(0, |m| m.len());
-        index == 0 || index + 1 == files.len() || len / 3 * 2 > self.single
+        index == 0 || index + 1 == files.len() || len > self.single.saturating_add(self.single / 2)
     }
 
     /// The steps of a file; one that cannot be read counts as one, and fails when it is loaded.

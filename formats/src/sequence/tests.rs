@@ -228,3 +228,87 @@ fn one_file_is_a_sequence_of_its_steps() {
     let sequence = dir.open("alone.spf").expect("a sequence");
     assert_eq!(sequence.load(0, DVec3::ZERO).expect("readable").len(), 1);
 }
+
+/// An array of shape (steps, 1, 3); the particle is at the step's index plus `from`.
+fn write_steps(path: &Path, steps: u8, from: u8) {
+    let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({steps}, 1, 3), }}");
+    let mut bytes = b"\x93NUMPY\x01\x00\x76\x00".to_vec();
+    bytes.extend_from_slice(format!("{dict:117}\n").as_bytes());
+    for step in 0..steps {
+        for _ in 0..3 {
+            bytes.extend_from_slice(&f32::from(from + step).to_le_bytes());
+        }
+    }
+    fs::write(path, bytes).expect("writable");
+}
+
+#[track_caller]
+fn first_x(sequence: &Sequence, index: usize) -> f64 {
+    let frame = sequence.load_raw(index).expect("readable");
+    frame.positions.get(0).x
+}
+
+#[test]
+fn steps_of_one_file_are_frames() {
+    let dir = Dir::with(&[]);
+    let path = dir.path("all_7.npy");
+    write_steps(&path, 3, 10);
+    let sequence = dir.open("").expect("a sequence");
+    let steps: Vec<_> = sequence
+        .frames()
+        .iter()
+        .map(|f| (f.number, f.parts[0].step))
+        .collect();
+    assert_eq!(steps, [(0, Some(0)), (1, Some(1)), (2, Some(2))]);
+    // Backwards and from several threads, as a pipeline may.
+    std::thread::scope(|scope| {
+        for index in [2u8, 0, 1] {
+            let sequence = &sequence;
+            scope.spawn(move || {
+                assert_eq!(first_x(sequence, index.into()), f64::from(10 + index));
+            });
+        }
+    });
+    // A file that was written anew is read anew.
+    write_steps(&path, 4, 20);
+    assert_eq!(first_x(&sequence, 1), 21.0);
+    write_steps(&path, 1, 0);
+    let error = sequence.load_raw(2).expect_err("gone").to_string();
+    assert!(
+        error.contains("step 2 was asked for, the file holds 1"),
+        "{error}"
+    );
+}
+
+#[test]
+fn steps_of_several_files_are_counted_on() {
+    let dir = Dir::with(&[]);
+    for (name, steps, from) in [("a_1.npy", 1, 0), ("a_2.npy", 1, 1), ("a_10.npy", 1, 8)] {
+        write_steps(&dir.path(name), steps, from);
+    }
+    assert_eq!(dir.numbers(""), [1, 2, 10]);
+    // Neither first nor last, but its size gives it away.
+    write_steps(&dir.path("a_2.npy"), 7, 1);
+    let sequence = dir.open("").expect("a sequence");
+    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    assert_eq!(numbers, (0..9).collect::<Vec<_>>());
+    for (index, expected) in (0u8..9).enumerate() {
+        assert_eq!(first_x(&sequence, index), f64::from(expected));
+    }
+}
+
+#[test]
+fn a_file_that_gained_steps_is_told() {
+    let dir = Dir::with(&[]);
+    for i in 1..=3 {
+        write_steps(&dir.path(&format!("a_{i}.npy")), 1, i);
+    }
+    let sequence = dir.open("").expect("a sequence");
+    write_steps(&dir.path("a_2.npy"), 2, 0);
+    assert_eq!(first_x(&sequence, 0), 1.0);
+    let error = sequence.load_raw(1).expect_err("two steps").to_string();
+    assert!(
+        error.contains("2 time steps where one was expected"),
+        "{error}"
+    );
+}
