@@ -1,1 +1,97 @@
-//! Placeholder: room for `scene`.
+//! What there is to see besides the particles: camera, lights, material, background, ground. Plain
+//! values; how light travels between them is `render`'s business.
+//!
+//! Everything here is in scene units relative to [`Scene::origin`] (see DESIGN section 4), so that
+//! f32 is enough however far out the simulation's domain lies. Colours are linear RGB.
+
+use glam::{DVec3, Vec3};
+
+pub mod background;
+pub mod camera;
+pub mod colormap;
+pub mod ground;
+pub mod light;
+pub mod material;
+
+pub use background::Background;
+pub use camera::{Camera, CameraError, CameraView, Framing};
+pub use colormap::{ColorMap, UnknownColorMap};
+pub use ground::Ground;
+pub use light::{Falloff, Light, LightKind, default_lights};
+pub use material::{Material, MaterialError};
+
+/// An axis-aligned box in world units, spheres included.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Bounds {
+    /// Lowest corner.
+    pub min: DVec3,
+    /// Highest corner.
+    pub max: DVec3,
+}
+
+impl Bounds {
+    /// The middle.
+    pub fn center(&self) -> DVec3 {
+        0.5 * (self.min + self.max)
+    }
+
+    /// Length of the space diagonal.
+    pub fn diagonal(&self) -> f64 {
+        (self.max - self.min).length()
+    }
+
+    /// The eight corners.
+    pub fn corners(&self) -> [DVec3; 8] {
+        std::array::from_fn(|i| {
+            let pick = |bit: usize, low: f64, high: f64| if i & bit == 0 { low } else { high };
+            DVec3::new(
+                pick(1, self.min.x, self.max.x),
+                pick(2, self.min.y, self.max.y),
+                pick(4, self.min.z, self.max.z),
+            )
+        })
+    }
+}
+
+/// Colour and strength of the ambient light where nothing else is said: white, so that a
+/// material's `ambient` alone decides, as `Ka` does in the thesis.
+pub const DEFAULT_AMBIENT_LIGHT: Vec3 = Vec3::ONE;
+
+/// Everything but the particles.
+#[derive(Debug, Clone)]
+pub struct Scene {
+    /// World position of the zero of all coordinates here and of the particles.
+    pub origin: DVec3,
+    /// Where the picture is taken from.
+    pub camera: Camera,
+    /// Point and directional lights.
+    pub lights: Vec<Light>,
+    /// Light that comes from everywhere (`ambient` of eq. 4.1).
+    pub ambient_light: Vec3,
+    /// One material for all particles; their colours come with the particles.
+    pub material: Material,
+    /// What rays see that meet nothing.
+    pub background: Background,
+    /// A floor, if wanted.
+    pub ground: Option<Ground>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn corners_are_all_there() {
+        let bounds = Bounds {
+            min: DVec3::new(-1.0, 2.0, 3.0),
+            max: DVec3::new(4.0, 5.0, 6.0),
+        };
+        let corners = bounds.corners();
+        assert_eq!(corners[0], bounds.min);
+        assert_eq!(corners[7], bounds.max);
+        for (i, a) in corners.iter().enumerate() {
+            assert!(corners[i + 1..].iter().all(|b| a != b));
+        }
+        assert_eq!(bounds.center(), DVec3::new(1.5, 3.5, 4.5));
+    }
+}

@@ -1,0 +1,78 @@
+//! What a ray sees that meets nothing: one colour, or a vertical gradient.
+
+use std::f32::consts::FRAC_1_PI;
+
+use glam::Vec3;
+
+/// Bottom of the default gradient (linear RGB): a dim, slightly warm grey under the horizon.
+pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.115, 0.125, 0.145);
+
+/// Top of the default gradient (linear RGB): darker and cooler, so that lit particles stand out
+/// and the picture does not tip over.
+pub const DEFAULT_TOP: Vec3 = Vec3::new(0.020, 0.027, 0.043);
+
+/// Colour by direction, linear RGB.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Background {
+    /// The same in every direction.
+    Constant(Vec3),
+    /// From `bottom` straight down to `top` straight up, linear in the angle over the horizon.
+    Gradient {
+        /// Colour seen looking against `up`.
+        bottom: Vec3,
+        /// Colour seen looking along `up`.
+        top: Vec3,
+        /// Unit vector.
+        up: Vec3,
+    },
+}
+
+impl Background {
+    /// The calm gradient that a picture has unless told otherwise.
+    pub fn default_for(up: Vec3) -> Self {
+        Self::Gradient {
+            bottom: DEFAULT_BOTTOM,
+            top: DEFAULT_TOP,
+            up: up.normalize_or(Vec3::Z),
+        }
+    }
+
+    /// The colour in unit `direction`.
+    pub fn color(&self, direction: Vec3) -> Vec3 {
+        match *self {
+            Self::Constant(color) => color,
+            Self::Gradient { bottom, top, up } => {
+                let height = direction.dot(up).clamp(-1.0, 1.0).asin();
+                bottom.lerp(top, 0.5 + height * FRAC_1_PI)
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn gradient_is_linear_in_the_angle() {
+        let sky = Background::Gradient {
+            bottom: Vec3::ZERO,
+            top: Vec3::new(1.0, 2.0, 4.0),
+            up: Vec3::Z,
+        };
+        for (degrees, part) in [(-90.0_f32, 0.0), (-45.0, 0.25), (0.0, 0.5), (90.0, 1.0)] {
+            let angle = degrees.to_radians();
+            let color = sky.color(Vec3::new(angle.cos(), 0.0, angle.sin()));
+            let wanted = part * Vec3::new(1.0, 2.0, 4.0);
+            assert!((color - wanted).length() < 1e-3, "{degrees}: {color}");
+        }
+        // Rounding past one must not make NaN.
+        assert!(sky.color(Vec3::new(0.0, 0.0, 1.000_001)).is_finite());
+    }
+
+    #[test]
+    fn constant_is_constant() {
+        let color = Vec3::new(0.1, 0.2, 0.3);
+        assert_eq!(Background::Constant(color).color(Vec3::X), color);
+    }
+}

@@ -1,0 +1,132 @@
+//! An optional floor: an infinite, opaque, diffuse plane that receives shadows and fades into the
+//! background, so that the horizon is no hard line.
+//!
+//! It is seen and casts shadow from above only: a camera below it looks through.
+
+use glam::Vec3;
+
+use super::Bounds;
+use crate::ray::Ray;
+
+/// Colour of the default floor (linear RGB): a middle grey that shows shadows without glare.
+pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.30, 0.31, 0.33);
+
+/// Part of the ambient light that the floor takes: it lies under everything, so it gets more of the
+/// sky than a particle inside a cloud.
+pub const AMBIENT: f32 = 0.2;
+
+/// Part of the lights' radiance that the floor takes, as a default material's `diffuse`.
+pub const DIFFUSE: f32 = 0.7;
+
+/// The default floor begins to fade at this many bounds' diagonals from its middle.
+const FADE_START: f32 = 1.5;
+
+/// ... and is gone at this many.
+const FADE_END: f32 = 6.0;
+
+/// A plane `dot(up, x) = height`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Ground {
+    /// Unit normal.
+    pub up: Vec3,
+    /// Distance of the plane from the scene's origin along `up`.
+    pub height: f32,
+    /// Diffuse colour, linear RGB.
+    pub color: Vec3,
+    /// A point that the fading is measured from.
+    pub center: Vec3,
+    /// Distance from `center` up to which the floor is whole.
+    pub fade_start: f32,
+    /// Distance from which on there is only background.
+    pub fade_end: f32,
+}
+
+impl Ground {
+    /// A floor just under `bounds`, which must be relative to the sequence's origin in `origin`.
+    pub fn under(bounds: &Bounds, up: Vec3, origin: glam::DVec3) -> Self {
+        let up = up.normalize_or(Vec3::Z);
+        let relative = bounds.corners().map(|c| (c - origin).as_vec3());
+        let height = relative
+            .iter()
+            .map(|c| c.dot(up))
+            .fold(f32::INFINITY, f32::min);
+        let diagonal = (bounds.max - bounds.min).as_vec3().length();
+        let center = (bounds.center() - origin).as_vec3();
+        Self {
+            up,
+            height,
+            color: DEFAULT_COLOR,
+            center: center + (height - center.dot(up)) * up,
+            fade_start: FADE_START * diagonal,
+            fade_end: FADE_END * diagonal,
+        }
+    }
+
+    /// Distance at which `ray` comes down through the plane, if that lies in its range.
+    pub fn hit(&self, ray: &Ray) -> Option<f32> {
+        let slope = ray.direction.dot(self.up);
+        if slope >= 0.0 {
+            return None;
+        }
+        let t = (self.height - ray.origin.dot(self.up)) / slope;
+        (t >= ray.t_min && t < ray.t_max && t.is_finite()).then_some(t)
+    }
+
+    /// How much of the floor is left at `point`: 1 near, 0 far, smooth between.
+    pub fn presence(&self, point: Vec3) -> f32 {
+        let distance = point.distance(self.center);
+        let span = (self.fade_end - self.fade_start).max(f32::MIN_POSITIVE);
+        let x = ((self.fade_end - distance) / span).clamp(0.0, 1.0);
+        x * x * (3.0 - 2.0 * x)
+    }
+
+    /// Length to step off the plane at `point` so that the next ray does not meet it again: a few
+    /// ulps of the numbers that made the point.
+    pub fn offset(&self, point: Vec3, t: f32) -> f32 {
+        let scale = point.abs().max_element().max(t).max(self.height.abs());
+        (8.0 * f32::EPSILON * scale).max(f32::MIN_POSITIVE)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::DVec3;
+
+    use super::*;
+
+    fn floor() -> Ground {
+        let bounds = Bounds {
+            min: DVec3::new(9.0, 9.0, 5.0),
+            max: DVec3::new(11.0, 11.0, 6.0),
+        };
+        Ground::under(&bounds, Vec3::Z, DVec3::new(10.0, 10.0, 4.0))
+    }
+
+    #[test]
+    fn lies_under_the_box_relative_to_the_origin() {
+        let floor = floor();
+        assert!((floor.height - 1.0).abs() < 1e-6);
+        assert!((floor.center - Vec3::new(0.0, 0.0, 1.0)).length() < 1e-6);
+    }
+
+    #[test]
+    fn is_met_from_above_only_and_within_range() {
+        let floor = floor();
+        let down = Ray::new(Vec3::new(3.0, 4.0, 11.0), Vec3::NEG_Z);
+        assert_eq!(floor.hit(&down), Some(10.0));
+        assert_eq!(floor.hit(&Ray { t_max: 9.9, ..down }), None);
+        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
+        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::NEG_Z)), None);
+        assert_eq!(floor.hit(&Ray::new(Vec3::splat(5.0), Vec3::X)), None);
+    }
+
+    #[test]
+    fn fades_smoothly() {
+        let floor = floor();
+        assert_eq!(floor.presence(floor.center), 1.0);
+        let far = floor.center + Vec3::X * (floor.fade_end * 1.01);
+        assert_eq!(floor.presence(far), 0.0);
+        let middle = 0.5 * (floor.fade_start + floor.fade_end);
+        assert!((floor.presence(floor.center + Vec3::Y * middle) - 0.5).abs() < 1e-4);
+    }
+}

@@ -1,0 +1,218 @@
+//! Point and directional lights.
+
+use glam::{DVec3, Vec3};
+
+use super::{Bounds, CameraView};
+
+/// Colour of the default key light (linear RGB): daylight, slightly warm.
+pub const KEY_COLOR: Vec3 = Vec3::new(1.0, 0.965, 0.91);
+
+/// Strength of the default key light: with the default material a surface that faces it stays just
+/// under white.
+pub const KEY_INTENSITY: f32 = 1.0;
+
+/// Colour of the default fill light: cool against the warm key.
+pub const FILL_COLOR: Vec3 = Vec3::new(0.72, 0.84, 1.0);
+
+/// Strength of the default fill light: a sixth to a fifth of the key keeps shadows open, not flat.
+pub const FILL_INTENSITY: f32 = 0.18;
+
+/// How a point light's strength depends on distance.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Falloff {
+    /// Not at all, as in the thesis.
+    #[default]
+    None,
+    /// `intensity / distance²`.
+    InverseSquare,
+}
+
+/// Where light comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum LightKind {
+    /// From a place.
+    Point {
+        /// Relative to the sequence's origin.
+        position: Vec3,
+        /// Strength over distance.
+        falloff: Falloff,
+    },
+    /// From infinitely far.
+    Directional {
+        /// Unit vector from the scene to the light.
+        to_light: Vec3,
+    },
+}
+
+/// A light.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Light {
+    /// Where it shines from.
+    pub kind: LightKind,
+    /// Colour times intensity, linear RGB.
+    pub radiance: Vec3,
+    /// Whether things stand in its way; without, it costs no shadow ray.
+    pub casts_shadow: bool,
+}
+
+/// A light as one point of the scene sees it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Incident {
+    /// Unit vector to the light.
+    pub to_light: Vec3,
+    /// Distance to it; infinite for directional lights.
+    pub distance: f32,
+    /// Light arriving if nothing is in the way.
+    pub radiance: Vec3,
+}
+
+impl Light {
+    /// A point light without falloff at a world `position`.
+    pub fn point(position: DVec3, origin: DVec3, radiance: Vec3) -> Self {
+        Self {
+            kind: LightKind::Point {
+                position: (position - origin).as_vec3(),
+                falloff: Falloff::None,
+            },
+            radiance,
+            casts_shadow: true,
+        }
+    }
+
+    /// Light that travels along `direction` (any length); `None` if that has no length.
+    pub fn directional(direction: Vec3, radiance: Vec3) -> Option<Self> {
+        Some(Self {
+            kind: LightKind::Directional {
+                to_light: -direction.try_normalize()?,
+            },
+            radiance,
+            casts_shadow: true,
+        })
+    }
+
+    /// The light at `point`; `None` at the very place of a point light.
+    pub fn at(&self, point: Vec3) -> Option<Incident> {
+        match self.kind {
+            LightKind::Directional { to_light } => Some(Incident {
+                to_light,
+                distance: f32::INFINITY,
+                radiance: self.radiance,
+            }),
+            LightKind::Point { position, falloff } => {
+                let offset = position - point;
+                let distance = offset.length();
+                let to_light = offset.try_normalize()?;
+                let radiance = match falloff {
+                    Falloff::None => self.radiance,
+                    Falloff::InverseSquare => self.radiance / (distance * distance),
+                };
+                Some(Incident {
+                    to_light,
+                    distance,
+                    radiance,
+                })
+            }
+        }
+    }
+}
+
+/// A key light from above the camera's left shoulder with shadows, and a soft fill from the right
+/// without. Both are directional, so they suit a scene of any size; they stay where they are when
+/// a camera moves, so pass a sequence's first view.
+pub fn default_lights(bounds: &Bounds, up: DVec3, view: &CameraView) -> Vec<Light> {
+    let up = up.try_normalize().unwrap_or(DVec3::Z);
+    let to_eye = view.eye - bounds.center();
+    let level = to_eye - to_eye.dot(up) * up;
+    // Seen from straight above any side is as good as another.
+    let back = level
+        .try_normalize()
+        .unwrap_or_else(|| up.any_orthonormal_vector());
+    let right = up.cross(back);
+    let light = |right_part: f64, up_part: f64, back_part: f64, radiance| {
+        let to_light = (right_part * right + up_part * up + back_part * back).normalize();
+        LightKind::Directional {
+            to_light: to_light.as_vec3(),
+        }
+        .with(radiance)
+    };
+    let key = light(-0.65, 1.0, 0.55, KEY_INTENSITY * KEY_COLOR);
+    let fill = light(0.9, 0.25, 0.6, FILL_INTENSITY * FILL_COLOR);
+    vec![
+        key,
+        Light {
+            casts_shadow: false,
+            ..fill
+        },
+    ]
+}
+
+impl LightKind {
+    /// A shadow-casting light of this kind.
+    const fn with(self, radiance: Vec3) -> Light {
+        Light {
+            kind: self,
+            radiance,
+            casts_shadow: true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn point_light_keeps_or_loses_strength() {
+        let mut light = Light::point(
+            DVec3::new(101.0, 0.0, 4.0),
+            DVec3::new(100.0, 0.0, 0.0),
+            Vec3::splat(8.0),
+        );
+        let at = Vec3::new(1.0, 0.0, 0.0);
+        let seen = light.at(at).unwrap();
+        assert_eq!(
+            (seen.to_light, seen.distance, seen.radiance),
+            (Vec3::Z, 4.0, Vec3::splat(8.0))
+        );
+        light.kind = LightKind::Point {
+            position: Vec3::new(1.0, 0.0, 4.0),
+            falloff: Falloff::InverseSquare,
+        };
+        assert_eq!(light.at(at).unwrap().radiance, Vec3::splat(0.5));
+        assert_eq!(light.at(Vec3::new(1.0, 0.0, 4.0)), None);
+    }
+
+    #[test]
+    fn directional_light_travels_along_its_direction() {
+        let light = Light::directional(Vec3::new(0.0, 0.0, -3.0), Vec3::ONE).unwrap();
+        let seen = light.at(Vec3::splat(1e6)).unwrap();
+        assert_eq!((seen.to_light, seen.distance), (Vec3::Z, f32::INFINITY));
+        assert_eq!(Light::directional(Vec3::ZERO, Vec3::ONE), None);
+    }
+
+    #[test]
+    fn default_lights_come_from_above_and_from_the_viewer() {
+        let bounds = Bounds {
+            min: DVec3::ZERO,
+            max: DVec3::ONE,
+        };
+        for (up, eye) in [
+            (DVec3::Z, DVec3::new(0.5, -9.0, 3.0)),
+            (DVec3::Y, DVec3::new(0.5, 9.0, 0.5)),
+        ] {
+            let view = CameraView {
+                eye,
+                look_at: bounds.center(),
+                up,
+                fov: 30.0,
+            };
+            let lights = default_lights(&bounds, up, &view);
+            assert_eq!(lights.len(), 2);
+            for light in lights {
+                let to_light = light.at(Vec3::ZERO).unwrap().to_light;
+                assert!(to_light.dot(up.as_vec3()) > 0.1);
+                assert!(to_light.dot((eye - bounds.center()).as_vec3()) > 0.0);
+            }
+        }
+    }
+}

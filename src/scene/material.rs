@@ -1,0 +1,197 @@
+//! The constants of eq. 4.1 to 4.3, and the optics that need nothing else: Schlick's Fresnel term
+//! and Snell's refraction.
+//!
+//! Schlick, "An inexpensive BRDF model for physically-based rendering", 1994. As in eq. 4.3 the
+//! cosine is the viewer's, on whichever side of the surface the viewer is.
+
+use glam::Vec3;
+use thiserror::Error;
+
+/// Base colour of particles that bring none (linear RGB): a clear light blue, the colour that
+/// readers expect of a fluid, light enough to show shading.
+pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.28, 0.50, 0.80);
+
+/// One set of constants for all particles. The base colour multiplies ambient and diffuse light;
+/// highlights have the light's colour.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Material {
+    /// `Ka`.
+    pub ambient: f32,
+    /// `kd`, not negative.
+    pub diffuse: f32,
+    /// `ks`, not negative.
+    pub specular: f32,
+    /// Exponent of the highlight, not negative.
+    pub shininess: f32,
+    /// Index of refraction inside against outside, above 0.
+    pub ior: f32,
+    /// Weight of the mirrored ray, 0 to 1.
+    pub reflection: f32,
+    /// Weight of the refracted ray, 0 to 1; 0 is opaque.
+    pub transmission: f32,
+}
+
+impl Material {
+    /// What a picture has unless told otherwise: water's index of refraction, opaque, a soft
+    /// highlight. The sum of `ambient`, `diffuse` and `specular` is 1, so that the default key
+    /// light does not push a white particle past white.
+    pub const DEFAULT: Self = Self {
+        ambient: 0.1,
+        diffuse: 0.7,
+        specular: 0.2,
+        shininess: 32.0,
+        ior: 1.33,
+        reflection: 1.0,
+        transmission: 0.0,
+    };
+
+    /// Checks that the constants make sense; with reflection and transmission in 0 to 1 a ray's
+    /// children never weigh more than itself.
+    ///
+    /// # Errors
+    /// Names the first constant that is out of range.
+    pub fn validate(&self) -> Result<(), MaterialError> {
+        let weights = [
+            ("ambient", self.ambient, f32::MAX),
+            ("diffuse", self.diffuse, f32::MAX),
+            ("specular", self.specular, f32::MAX),
+            ("shininess", self.shininess, f32::MAX),
+            ("reflection", self.reflection, 1.0),
+            ("transmission", self.transmission, 1.0),
+        ];
+        for (name, value, max) in weights {
+            if !(0.0..=max).contains(&value) {
+                return Err(MaterialError { name, value });
+            }
+        }
+        if self.ior > 0.0 && self.ior.is_finite() {
+            Ok(())
+        } else {
+            Err(MaterialError {
+                name: "ior",
+                value: self.ior,
+            })
+        }
+    }
+
+    /// `R0` of eq. 4.3; the same from either side.
+    pub fn r0(&self) -> f32 {
+        let root = (1.0 - self.ior) / (1.0 + self.ior);
+        root * root
+    }
+}
+
+impl Default for Material {
+    fn default() -> Self {
+        Self::DEFAULT
+    }
+}
+
+/// A constant out of range.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[error("material {name} = {value} is out of range")]
+pub struct MaterialError {
+    /// The constant.
+    pub name: &'static str,
+    /// What it was.
+    pub value: f32,
+}
+
+/// Reflected part by Schlick (eq. 4.3) from `r0` and the absolute cosine between normal and ray.
+pub fn schlick(r0: f32, cosine: f32) -> f32 {
+    let x = (1.0 - cosine).clamp(0.0, 1.0);
+    let x2 = x * x;
+    r0 + (1.0 - r0) * (x2 * x2 * x)
+}
+
+/// Direction after passing a surface by Snell's law; `None` if all is reflected.
+///
+/// `normal` is the unit normal on the side that unit `direction` comes from, `ratio` the index of
+/// refraction on that side over the one beyond.
+pub fn refract(direction: Vec3, normal: Vec3, ratio: f32) -> Option<Vec3> {
+    let cos_in = -direction.dot(normal);
+    let sin2_out = ratio * ratio * (1.0 - cos_in * cos_in).max(0.0);
+    if sin2_out >= 1.0 {
+        return None;
+    }
+    let along_normal = ratio * cos_in - (1.0 - sin2_out).sqrt();
+    // Normalised again so that errors do not add up over a long path.
+    Some((ratio * direction + along_normal * normal).normalize())
+}
+
+/// Mirrors unit `direction` at a surface with unit `normal` (either side).
+pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
+    (direction - 2.0 * direction.dot(normal) * normal).normalize()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn with_ior(ior: f32) -> Material {
+        Material {
+            ior,
+            ..Material::DEFAULT
+        }
+    }
+
+    #[test]
+    fn schlick_at_known_angles() {
+        // By hand: R0 = (0.33/2.33)^2 = 0.0200593, (0.5/2.5)^2 = 0.04.
+        // (1-cos)^5: 45 deg 0.2928932^5 = 0.00215548, 60 deg 1/32, 80 deg 0.8263518^5 = 0.385316.
+        for (ior, degrees, wanted) in [
+            (1.33, 0.0_f32, 0.020_059_3),
+            (1.33, 45.0, 0.022_171_5),
+            (1.33, 60.0, 0.050_682_4),
+            (1.33, 80.0, 0.397_653),
+            (1.5, 0.0, 0.04),
+            (1.5, 45.0, 0.042_069_3),
+            (1.5, 60.0, 0.07),
+            (1.5, 80.0, 0.409_910),
+        ] {
+            let r = schlick(with_ior(ior).r0(), degrees.to_radians().cos());
+            assert!((r - wanted).abs() < 2e-6, "{ior} {degrees}: {r} {wanted}");
+        }
+        assert!((schlick(0.04, 0.0) - 1.0).abs() < 1e-6);
+        assert_eq!(schlick(0.04, 1.000_001), 0.04);
+    }
+
+    #[test]
+    fn snell_and_total_reflection() {
+        let down = |degrees: f32| {
+            let a = degrees.to_radians();
+            Vec3::new(a.sin(), 0.0, -a.cos())
+        };
+        // sin 30 / 1.5 = 1/3.
+        let t = refract(down(30.0), Vec3::Z, 1.0 / 1.5).unwrap();
+        assert!((t.x - 1.0 / 3.0).abs() < 1e-6 && t.z < 0.0);
+        // And the way back.
+        let back = refract(-t, Vec3::NEG_Z, 1.5).unwrap();
+        assert!((back + down(30.0)).length() < 1e-6);
+        // Critical angle of 1.5 is 41.81 degrees.
+        assert!(refract(down(41.7), Vec3::Z, 1.5).is_some());
+        assert_eq!(refract(down(41.9), Vec3::Z, 1.5), None);
+        let mirrored = reflect(down(41.9), Vec3::Z);
+        assert!((mirrored.z - 41.9_f32.to_radians().cos()).abs() < 1e-6);
+    }
+
+    #[test]
+    fn bad_constants_are_named() {
+        assert_eq!(Material::DEFAULT.validate(), Ok(()));
+        let shiny = Material {
+            reflection: 1.5,
+            ..Material::DEFAULT
+        };
+        assert_eq!(
+            shiny.validate().unwrap_err().to_string(),
+            "material reflection = 1.5 is out of range"
+        );
+        assert_eq!(with_ior(0.0).validate().unwrap_err().name, "ior");
+        assert_eq!(with_ior(f32::NAN).validate().unwrap_err().name, "ior");
+        let dark = Material {
+            diffuse: -0.1,
+            ..Material::DEFAULT
+        };
+        assert_eq!(dark.validate().unwrap_err().name, "diffuse");
+    }
+}
