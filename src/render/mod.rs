@@ -1,1 +1,199 @@
-//! Placeholder: room for `render`.
+//! Rays in, planes out: samples every pixel of a [`Scene`] over a [`Surface`] and fills a [`Film`].
+//! No I/O; encoding is `output`'s business.
+//!
+//! The image is cut into tiles of 16x16 pixels that rayon hands out. Every tile is computed from
+//! its pixels' coordinates alone and sums its samples in a fixed order, so the film is the same to
+//! the bit whatever the number of threads.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use rayon::prelude::*;
+use thiserror::Error;
+
+use crate::{
+    scene::{MaterialError, Scene},
+    surface::Surface,
+};
+
+mod aov;
+#[cfg(test)]
+pub(crate) mod brute;
+mod film;
+mod sampler;
+mod source;
+mod tile;
+mod whitted;
+
+#[cfg(test)]
+mod image_tests;
+#[cfg(test)]
+mod whitted_tests;
+
+pub use aov::{DataSample, NO_ID};
+pub use film::{Channels, Film, UnknownChannel};
+pub use sampler::PixelSampler;
+pub use source::{Colors, ParticleShading, ShadeSource};
+
+use tile::Tile;
+use whitted::Tracer;
+
+/// Most samples per pixel: more than any picture needs, and few enough to count in f32.
+pub const MAX_SAMPLES: u32 = 4096;
+
+/// Deepest recursion: transparent surfaces double the rays at every level, and a level takes some
+/// stack.
+pub const MAX_DEPTH: u32 = 64;
+
+/// Longest side of an image in pixels.
+pub const MAX_SIDE: u32 = 65_536;
+
+/// How to render.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RenderSettings {
+    /// Pixels across.
+    pub width: u32,
+    /// Pixels down.
+    pub height: u32,
+    /// Samples per pixel; 1 looks through the pixel's centre exactly.
+    pub samples: u32,
+    /// 1 shades what the camera sees with direct light only; each level more follows reflections
+    /// and refractions once more. Where it ends, a ray sees the background.
+    pub max_depth: u32,
+    /// Rays that weigh less than this in their sample are not traced and see the background; 0
+    /// traces them all.
+    pub min_weight: f32,
+    /// Leaves the background out of the colour of pixels and fades the ground out in `A`; by
+    /// default the background is in `RGB` where `A` is 0.
+    pub transparent_background: bool,
+    /// Planes to fill.
+    pub channels: Channels,
+}
+
+impl RenderSettings {
+    /// Depth 3 as in the thesis, one sample per pixel, colour only.
+    pub const fn new(width: u32, height: u32) -> Self {
+        Self {
+            width,
+            height,
+            samples: 1,
+            max_depth: 3,
+            min_weight: 0.0,
+            transparent_background: false,
+            channels: Channels::COLOR,
+        }
+    }
+
+    fn validate(&self) -> Result<(), RenderError> {
+        for (name, value, max) in [
+            ("width", self.width, MAX_SIDE),
+            ("height", self.height, MAX_SIDE),
+            ("samples", self.samples, MAX_SAMPLES),
+            ("max_depth", self.max_depth, MAX_DEPTH),
+        ] {
+            if !(1..=max).contains(&value) {
+                return Err(RenderError::OutOfRange { name, value, max });
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Rays traced, by what they were for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct RayCounts {
+    /// From the camera.
+    pub primary: u64,
+    /// To a light.
+    pub shadow: u64,
+    /// Mirrored.
+    pub reflection: u64,
+    /// Into or out of a transmissive body.
+    pub refraction: u64,
+}
+
+impl RayCounts {
+    /// All together.
+    pub const fn total(&self) -> u64 {
+        self.primary + self.shadow + self.reflection + self.refraction
+    }
+}
+
+impl std::ops::Add for RayCounts {
+    type Output = Self;
+
+    fn add(self, other: Self) -> Self {
+        Self {
+            primary: self.primary + other.primary,
+            shadow: self.shadow + other.shadow,
+            reflection: self.reflection + other.reflection,
+            refraction: self.refraction + other.refraction,
+        }
+    }
+}
+
+/// Why there is no image.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+pub enum RenderError {
+    /// The caller's flag was raised.
+    #[error("rendering was interrupted")]
+    Interrupted,
+    /// A setting makes no image.
+    #[error("{name} = {value} is out of range, it must lie in 1 to {max}")]
+    OutOfRange {
+        /// The setting.
+        name: &'static str,
+        /// What it was.
+        value: u32,
+        /// The largest that works.
+        max: u32,
+    },
+    /// A constant of the material is out of range.
+    #[error(transparent)]
+    Material(#[from] MaterialError),
+}
+
+/// Renders one image on the current rayon pool.
+///
+/// The camera should have been made for `settings.width / settings.height`. No light is made: with
+/// `reflection` and `transmission` at most 1, which is checked, what a ray gathers from the
+/// background never exceeds the background's brightest colour.
+///
+/// # Errors
+/// If `interrupt` is raised (looked at before each tile), or a setting is out of range.
+pub fn render<S: Surface, C: ShadeSource>(
+    surface: &S,
+    scene: &Scene,
+    source: &C,
+    settings: &RenderSettings,
+    interrupt: &AtomicBool,
+) -> Result<(Film, RayCounts), RenderError> {
+    settings.validate()?;
+    scene.material.validate()?;
+    let tracer = Tracer::new(surface, scene, source, settings);
+    let mut film = Film::new(settings.width, settings.height, settings.channels);
+    // A band of tiles owns its rows of every plane. Bands run at once and their tiles do too, so
+    // that a slow corner of the image keeps all threads busy; finished tiles wait for their band.
+    let counts = film
+        .bands_mut(tile::SIDE)
+        .into_par_iter()
+        .map(|mut band| {
+            let rendered = (0..settings.width.div_ceil(tile::SIDE))
+                .into_par_iter()
+                .map(|column| {
+                    if interrupt.load(Ordering::Relaxed) {
+                        return Err(RenderError::Interrupted);
+                    }
+                    let tile = Tile::in_band(&band, column, settings);
+                    Ok(tile.render(&tracer, settings))
+                })
+                .collect::<Result<Vec<_>, _>>()?;
+            let mut counts = RayCounts::default();
+            for tile in rendered {
+                band.store(&tile);
+                counts = counts + tile.counts;
+            }
+            Ok::<_, RenderError>(counts)
+        })
+        .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
+    Ok((film, counts))
+}

@@ -1,0 +1,85 @@
+//! Test support: spheres met by trying every one in f64.
+
+use glam::{DVec3, Vec3};
+
+use crate::{
+    ray::Ray,
+    surface::{Crossing, Surface, SurfaceHit},
+};
+
+/// Centre and radius.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Ball {
+    pub(crate) center: Vec3,
+    pub(crate) radius: f32,
+}
+
+/// A [`Surface`] over a few spheres.
+pub(crate) struct Balls(pub(crate) Vec<Ball>);
+
+impl Balls {
+    pub(crate) fn one(center: Vec3, radius: f32) -> Self {
+        Self(vec![Ball { center, radius }])
+    }
+
+    /// Every meeting of `ray` with a ball in its range.
+    fn all<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = SurfaceHit> + 'a {
+        self.0.iter().zip(0_u32..).flat_map(move |(ball, index)| {
+            ball.roots(ray)
+                .into_iter()
+                .flatten()
+                .filter_map(move |t| ball.hit(ray, t, index))
+        })
+    }
+}
+
+impl Ball {
+    /// Distances of entry and exit.
+    fn roots(&self, ray: &Ray) -> Option<[f64; 2]> {
+        let center = self.center.as_dvec3() - ray.origin.as_dvec3();
+        let direction = ray.direction.as_dvec3();
+        let direction = direction / direction.length();
+        let middle = center.dot(direction);
+        let across = (center - middle * direction).length_squared();
+        let half2 = f64::from(self.radius).powi(2) - across;
+        (half2 > 0.0).then(|| [middle - half2.sqrt(), middle + half2.sqrt()])
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "surfaces answer in f32")]
+    fn hit(&self, ray: &Ray, t: f64, particle: u32) -> Option<SurfaceHit> {
+        let in_range = t >= f64::from(ray.t_min) && t < f64::from(ray.t_max);
+        in_range.then(|| {
+            let free: DVec3 = ray.origin.as_dvec3() + t * ray.direction.as_dvec3();
+            let normal = (free - self.center.as_dvec3()).normalize();
+            let point = self.center.as_dvec3() + f64::from(self.radius) * normal;
+            let scale = point.abs().max_element().max(t) as f32;
+            SurfaceHit {
+                t: t as f32,
+                point: point.as_vec3(),
+                normal: normal.as_vec3(),
+                particle,
+                offset: (1e-4 * self.radius).max(8.0 * f32::EPSILON * scale),
+            }
+        })
+    }
+}
+
+impl Surface for Balls {
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.all(ray)
+            .reduce(|best, hit| if hit.t < best.t { hit } else { best })
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.all(ray).next().is_some()
+    }
+
+    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
+        crossings.clear();
+        crossings.extend(self.all(ray).map(|hit| Crossing {
+            t: hit.t,
+            cosine: hit.normal.dot(ray.direction).abs(),
+        }));
+        crossings.sort_by(|a, b| a.t.total_cmp(&b.t));
+    }
+}

@@ -1,0 +1,192 @@
+//! Whole images: same bytes on any number of threads, data planes, edges, interruption.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::{DVec3, Vec3};
+
+use super::{
+    brute::{Ball, Balls},
+    *,
+};
+use crate::scene::{
+    Background, Bounds, Camera, CameraView, Framing, Ground, Material, default_lights,
+};
+
+/// A heap of balls, some overlapping, all different.
+fn heap(count: u32) -> Balls {
+    let unit = |seed: u32| {
+        let mixed = seed.wrapping_mul(0x9e37_79b9) ^ 0x5bd1_e995;
+        let mixed = (mixed ^ (mixed >> 15)).wrapping_mul(0x85eb_ca6b);
+        ((mixed ^ (mixed >> 13)) >> 8) as f32 / 16_777_216.0
+    };
+    let ball = |i: u32| Ball {
+        center: Vec3::new(unit(3 * i), unit(3 * i + 1), unit(3 * i + 2)) * 4.0,
+        radius: 0.1 + 0.3 * unit(i + 7_000_000),
+    };
+    Balls((0..count).map(ball).collect())
+}
+
+fn heap_scene(transmission: f32) -> Scene {
+    let bounds = Bounds {
+        min: DVec3::splat(-0.4),
+        max: DVec3::splat(4.4),
+    };
+    let framing = Framing::three_quarter(DVec3::Z, 1.5);
+    let view = Camera::framing(&bounds, &framing);
+    Scene {
+        origin: DVec3::ZERO,
+        camera: Camera::new(&view, 1.5, DVec3::ZERO).unwrap(),
+        lights: default_lights(&bounds, DVec3::Z, &view),
+        ambient_light: Vec3::ONE,
+        material: Material {
+            transmission,
+            ..Material::DEFAULT
+        },
+        background: Background::default_for(Vec3::Z),
+        ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+    }
+}
+
+fn settings() -> RenderSettings {
+    RenderSettings {
+        samples: 5,
+        channels: Channels::ALL,
+        // Not a multiple of the tile's side in either direction.
+        ..RenderSettings::new(75, 50)
+    }
+}
+
+#[test]
+fn the_same_film_on_any_number_of_threads() {
+    let heap = heap(60);
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    for transmission in [0.0, 0.8] {
+        let scene = heap_scene(transmission);
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let pool = pool.build().unwrap();
+            let never = AtomicBool::new(false);
+            pool.install(|| render(&heap, &scene, &source, &settings(), &never).unwrap())
+        };
+        let (film, counts) = on(1);
+        assert!(film.color.iter().flatten().all(|v| v.is_finite()));
+        assert_eq!(counts.primary, 75 * 50 * 5);
+        assert!(counts.shadow > 0 && counts.reflection > 0);
+        assert_eq!(counts.refraction > 0, transmission > 0.0);
+        assert_eq!((film.clone(), counts), on(2));
+        assert_eq!((film, counts), on(7));
+    }
+}
+
+#[test]
+fn data_planes_hold_the_nearest_sample() {
+    let view = CameraView {
+        eye: DVec3::new(100.0, 200.0, -5.0),
+        look_at: DVec3::new(100.0, 200.0, 0.0),
+        up: DVec3::Y,
+        fov: 40.0,
+    };
+    let origin = DVec3::new(100.0, 200.0, 0.0);
+    let mut scene = heap_scene(0.0);
+    scene.origin = origin;
+    scene.camera = Camera::new(&view, 1.0, origin).unwrap();
+    scene.ground = None;
+    let velocities = [Vec3::new(1.0, 2.0, 3.0)];
+    let source = ParticleShading {
+        ids: Some(&[77]),
+        velocities: Some(&velocities),
+        ..ParticleShading::constant(Vec3::new(0.1, 0.2, 0.3))
+    };
+    let settings = RenderSettings {
+        channels: Channels::ALL,
+        ..RenderSettings::new(33, 33)
+    };
+    let ball = Balls::one(Vec3::ZERO, 1.0);
+    let never = AtomicBool::new(false);
+    let (film, _) = render(&ball, &scene, &source, &settings, &never).unwrap();
+    let middle = 16 * 33 + 16;
+    assert!((film.depth.as_ref().unwrap()[middle] - 4.0).abs() < 1e-5);
+    assert!((film.normal.as_ref().unwrap()[middle] - Vec3::NEG_Z).length() < 1e-5);
+    let wanted = Vec3::new(100.0, 200.0, -1.0);
+    assert!((film.position.as_ref().unwrap()[middle] - wanted).length() < 1e-4);
+    assert_eq!(film.velocity.as_ref().unwrap()[middle], velocities[0]);
+    assert_eq!(film.albedo.as_ref().unwrap()[middle].z, 0.3);
+    assert_eq!(film.id.as_ref().unwrap()[middle], 77);
+    // A corner sees nothing.
+    assert_eq!(film.depth.unwrap()[0], f32::INFINITY);
+    assert_eq!(film.normal.unwrap()[0], Vec3::ZERO);
+    assert_eq!(film.id.unwrap()[0], NO_ID);
+    assert_eq!(film.color[0][3], 0.0);
+}
+
+#[test]
+fn row_zero_is_the_top() {
+    let mut scene = heap_scene(0.0);
+    scene.ground = None;
+    let view = CameraView {
+        eye: DVec3::new(0.0, -10.0, 0.0),
+        look_at: DVec3::ZERO,
+        up: DVec3::Z,
+        fov: 20.0,
+    };
+    scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
+    let source = ParticleShading::constant(Vec3::ONE);
+    let never = AtomicBool::new(false);
+    // Up and to the right of the middle.
+    let ball = Balls::one(Vec3::new(1.0, 0.0, 1.0), 0.3);
+    let (film, _) = render(&ball, &scene, &source, &RenderSettings::new(8, 8), &never).unwrap();
+    let covered = |x: usize, y: usize| film.color[y * 8 + x][3] == 1.0;
+    assert!(covered(6, 1) && !covered(6, 6) && !covered(1, 1));
+}
+
+#[test]
+fn transparent_background_is_left_out() {
+    let mut scene = heap_scene(0.0);
+    let source = ParticleShading::constant(Vec3::ONE);
+    let never = AtomicBool::new(false);
+    let settings = RenderSettings {
+        transparent_background: true,
+        ..settings()
+    };
+    let nothing = Balls(Vec::new());
+    scene.ground = None;
+    let (film, counts) = render(&nothing, &scene, &source, &settings, &never).unwrap();
+    assert!(film.color.iter().all(|c| *c == [0.0; 4]));
+    assert_eq!(counts.total(), counts.primary);
+    let opaque = RenderSettings {
+        transparent_background: false,
+        ..settings
+    };
+    let (film, _) = render(&nothing, &scene, &source, &opaque, &never).unwrap();
+    assert!(film.color.iter().all(|c| c[0] > 0.0 && c[3] == 0.0));
+}
+
+#[test]
+fn interruption_and_bad_settings_are_errors() {
+    let scene = heap_scene(0.0);
+    let source = ParticleShading::constant(Vec3::ONE);
+    let nothing = Balls(Vec::new());
+    let raised = AtomicBool::new(true);
+    let result = render(&nothing, &scene, &source, &settings(), &raised);
+    assert_eq!(result.unwrap_err(), RenderError::Interrupted);
+    let never = AtomicBool::new(false);
+    for bad in [
+        RenderSettings::new(0, 5),
+        RenderSettings::new(5, MAX_SIDE + 1),
+        RenderSettings {
+            samples: 0,
+            ..settings()
+        },
+        RenderSettings {
+            max_depth: MAX_DEPTH + 1,
+            ..settings()
+        },
+    ] {
+        let result = render(&nothing, &scene, &source, &bad, &never);
+        assert!(matches!(result, Err(RenderError::OutOfRange { .. })));
+    }
+    let mut wild = scene;
+    wild.material.transmission = 2.0;
+    let result = render(&nothing, &wild, &source, &settings(), &never);
+    assert!(matches!(result, Err(RenderError::Material(_))));
+}

@@ -1,0 +1,80 @@
+//! Where shading takes a particle's colour, id and velocity from.
+
+use glam::Vec3;
+
+use super::NO_ID;
+use crate::scene::ColorMap;
+
+/// Looks up what belongs to particle `index` of the frame, as [`crate::surface::SurfaceHit`] counts
+/// them.
+pub trait ShadeSource: Sync {
+    /// Base colour, linear RGB.
+    fn color(&self, index: u32) -> Vec3;
+
+    /// The number in the `id` channel.
+    fn id(&self, index: u32) -> u32;
+
+    /// Velocity in world units per time, zero if not known.
+    fn velocity(&self, index: u32) -> Vec3;
+}
+
+/// Base colours of a frame.
+#[derive(Debug, Clone, Copy)]
+pub enum Colors<'a> {
+    /// All alike.
+    Constant(Vec3),
+    /// One linear RGB each.
+    PerParticle(&'a [Vec3]),
+    /// A number each through a colour map.
+    Mapped {
+        /// The numbers.
+        values: &'a [f32],
+        /// The map with its range.
+        map: &'a ColorMap,
+    },
+}
+
+/// A [`ShadeSource`] over slices in the particles' order.
+#[derive(Debug, Clone, Copy)]
+pub struct ParticleShading<'a> {
+    /// Base colours.
+    pub colors: Colors<'a>,
+    /// Ids; without them a particle's id is its index.
+    pub ids: Option<&'a [u32]>,
+    /// Velocities; without them zero.
+    pub velocities: Option<&'a [Vec3]>,
+}
+
+impl ParticleShading<'_> {
+    /// One colour for all, indices for ids.
+    pub const fn constant(color: Vec3) -> Self {
+        Self {
+            colors: Colors::Constant(color),
+            ids: None,
+            velocities: None,
+        }
+    }
+}
+
+impl ShadeSource for ParticleShading<'_> {
+    fn color(&self, index: u32) -> Vec3 {
+        let i = index as usize;
+        // Slices that are too short give black, not a panic in the middle of a job.
+        match self.colors {
+            Colors::Constant(color) => color,
+            Colors::PerParticle(colors) => colors.get(i).copied().unwrap_or_default(),
+            Colors::Mapped { values, map } => map.color(values.get(i).copied().unwrap_or(f32::NAN)),
+        }
+    }
+
+    fn id(&self, index: u32) -> u32 {
+        self.ids.map_or(index, |ids| {
+            ids.get(index as usize).copied().unwrap_or(NO_ID)
+        })
+    }
+
+    fn velocity(&self, index: u32) -> Vec3 {
+        let velocities = self.velocities.unwrap_or_default();
+        velocities.get(index as usize).copied().unwrap_or_default()
+    }
+}
