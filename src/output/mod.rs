@@ -1,1 +1,9 @@
-//! Placeholder: room for `output`.
+//! Films to bytes: OpenEXR for work, PNG to look at. Encodes into memory; putting a file in place
+//! whole is the caller's.
+
+mod exr;
+mod preview;
+pub mod view;
+
+pub use exr::{Compression, CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr};
+pub use preview::{PreviewOptions, encode_preview};

@@ -1,0 +1,227 @@
+use ::exr::prelude::{ReadChannels, ReadLayers, read};
+
+use super::*;
+use crate::render::Channels;
+
+/// A film whose every value tells where it belongs.
+fn film(width: u32, height: u32, channels: Channels) -> Film {
+    let mut film = Film::new(width, height, channels);
+    let value = |i: usize| i as f32 * 0.25;
+    for (i, color) in film.color.iter_mut().enumerate() {
+        *color = [value(i), value(i) + 0.5, 1.0, 0.125];
+    }
+    let vectors = [
+        &mut film.normal,
+        &mut film.position,
+        &mut film.velocity,
+        &mut film.albedo,
+    ];
+    for (plane, add) in vectors.into_iter().zip([0.1, 0.2, 0.3, 0.4]) {
+        for (i, v) in plane.iter_mut().flatten().enumerate() {
+            *v = Vec3::new(value(i), value(i) * 3.0, -1.0) + add;
+        }
+    }
+    for (i, z) in film.depth.iter_mut().flatten().enumerate() {
+        if i % 3 != 0 {
+            *z = value(i) + 1e-3;
+        }
+    }
+    for (i, id) in (0_u32..).zip(film.id.iter_mut().flatten()) {
+        if i % 2 == 0 {
+            *id = 4_000_000_000 + i;
+        }
+    }
+    film
+}
+
+fn options() -> ExrOptions {
+    ExrOptions {
+        frames_per_second: Some((24_000, 1001)),
+        world_to_camera: Some(std::array::from_fn(|i| i as f32)),
+        comments: Some("frame 7".to_owned()),
+        custom: Some(CustomAttribute {
+            name: "spherule".to_owned(),
+            json: "{\"frame\":7}".to_owned(),
+        }),
+        ..ExrOptions::default()
+    }
+}
+
+/// Channels as written, in file order, and the layer's attributes.
+fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encoding) {
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .unwrap();
+    let layer = image.layer_data;
+    let list = layer.channel_data.list.into_iter();
+    let channels = list.map(|c| (c.name.to_string(), c.sample_data)).collect();
+    (channels, layer.attributes, layer.encoding)
+}
+
+#[test]
+fn reads_back_with_types_and_values() {
+    let film = film(37, 21, Channels::ALL);
+    for compression in [
+        Compression::None,
+        Compression::Rle,
+        Compression::Zip,
+        Compression::Zips,
+        Compression::Piz,
+    ] {
+        let options = ExrOptions {
+            compression,
+            ..options()
+        };
+        let encoded = encode_exr(&film, &options).unwrap();
+        assert_eq!(encoded.clamped, 0);
+        let (channels, attributes, encoding) = decode(&encoded.bytes);
+        let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
+        let wanted = [
+            "A", "B", "G", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "R", "V.X", "V.Y", "V.Z", "Z",
+            "albedo.B", "albedo.G", "albedo.R", "id.I",
+        ];
+        assert_eq!(names, wanted);
+        for (name, samples) in &channels {
+            check_channel(&film, name, samples);
+        }
+        assert_eq!(encoding.compression, compression.codec());
+        assert_eq!(encoding.blocks, Blocks::ScanLines);
+        assert_eq!(encoding.line_order, LineOrder::Increasing);
+        check_attributes(&attributes);
+    }
+}
+
+#[track_caller]
+fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
+    let color = |c: usize| film.color.iter().map(|v| f16::from_f32(v[c])).collect();
+    let axis = |plane: &Option<Vec<Vec3>>, a: usize| {
+        let plane = plane.as_ref().unwrap();
+        FlatSamples::F32(plane.iter().map(|v| v[a]).collect())
+    };
+    let wanted = match name {
+        "R" => FlatSamples::F16(color(0)),
+        "G" => FlatSamples::F16(color(1)),
+        "B" => FlatSamples::F16(color(2)),
+        "A" => FlatSamples::F16(color(3)),
+        "Z" => FlatSamples::F32(film.depth.clone().unwrap()),
+        "id.I" => FlatSamples::U32(film.id.clone().unwrap()),
+        "N.X" => axis(&film.normal, 0),
+        "N.Y" => axis(&film.normal, 1),
+        "N.Z" => axis(&film.normal, 2),
+        "P.X" => axis(&film.position, 0),
+        "P.Y" => axis(&film.position, 1),
+        "P.Z" => axis(&film.position, 2),
+        "V.X" => axis(&film.velocity, 0),
+        "V.Y" => axis(&film.velocity, 1),
+        "V.Z" => axis(&film.velocity, 2),
+        "albedo.R" => axis(&film.albedo, 0),
+        "albedo.G" => axis(&film.albedo, 1),
+        "albedo.B" => axis(&film.albedo, 2),
+        _ => panic!("unexpected channel {name}"),
+    };
+    assert_eq!(*samples, wanted, "{name}");
+}
+
+#[track_caller]
+fn check_attributes(attributes: &LayerAttributes) {
+    let software = attributes.software_name.as_ref().unwrap().to_string();
+    assert_eq!(software, concat!("spherule ", env!("CARGO_PKG_VERSION")));
+    assert_eq!(attributes.frames_per_second, Some((24_000, 1001)));
+    assert_eq!(attributes.world_to_camera.unwrap()[13], 13.0);
+    assert_eq!(attributes.comments.as_ref().unwrap().to_string(), "frame 7");
+    assert_eq!(attributes.capture_date, None);
+    assert_eq!(attributes.other.len(), 1);
+    let (name, value) = attributes.other.iter().next().unwrap();
+    assert_eq!(name.to_string(), "spherule");
+    assert_eq!(*value, AttributeValue::Text(Text::from("{\"frame\":7}")));
+}
+
+#[test]
+fn colour_alone_needs_no_options() {
+    let encoded = encode_exr(&film(3, 2, Channels::COLOR), &ExrOptions::default()).unwrap();
+    let (channels, attributes, _) = decode(&encoded.bytes);
+    assert_eq!(channels.len(), 4);
+    assert!(attributes.other.is_empty());
+}
+
+#[test]
+fn the_same_bytes_every_time_and_on_any_threads() {
+    let film = film(200, 300, Channels::ALL);
+    let first = encode_exr(&film, &options()).unwrap();
+    for single_thread in [false, true, false] {
+        let options = ExrOptions {
+            single_thread,
+            ..options()
+        };
+        assert!(encode_exr(&film, &options).unwrap() == first);
+    }
+}
+
+#[test]
+fn what_half_cannot_hold_is_clamped_and_counted() {
+    let mut film = film(2, 2, Channels::COLOR);
+    film.color[0] = [65_504.0, 65_505.0, f32::INFINITY, 1.0];
+    film.color[1] = [-1e9, f32::NAN, 0.0, 1.0];
+    let encoded = encode_exr(&film, &ExrOptions::default()).unwrap();
+    assert_eq!(encoded.clamped, 4);
+    let (channels, ..) = decode(&encoded.bytes);
+    let value = |name: &str, i: usize| {
+        let (_, samples) = channels.iter().find(|(n, _)| n == name).unwrap();
+        samples.value_by_flat_index(i).to_f32()
+    };
+    assert_eq!(value("R", 0), 65_504.0);
+    assert_eq!(value("G", 0), 65_504.0);
+    assert_eq!(value("B", 0), 65_504.0);
+    assert_eq!(value("R", 1), -65_504.0);
+    assert_eq!(value("G", 1), 0.0);
+}
+
+#[test]
+fn texts_may_be_empty_long_or_in_any_script() {
+    for json in [
+        String::new(),
+        "\u{6c34}\u{e9}".to_owned(),
+        "x".repeat(100_000),
+    ] {
+        let options = ExrOptions {
+            comments: Some(json.clone()),
+            custom: Some(CustomAttribute {
+                name: "n".repeat(255),
+                json: json.clone(),
+            }),
+            ..ExrOptions::default()
+        };
+        let encoded = encode_exr(&film(1, 1, Channels::COLOR), &options).unwrap();
+        let (_, attributes, _) = decode(&encoded.bytes);
+        let (_, value) = attributes.other.iter().next().unwrap();
+        let AttributeValue::Text(text) = value else {
+            panic!("{value:?} is no text");
+        };
+        assert_eq!(text.as_slice(), json.as_bytes());
+    }
+}
+
+#[test]
+fn attributes_that_do_not_fit_are_refused() {
+    let film = film(1, 1, Channels::COLOR);
+    let with = |name: &str, json: &str| ExrOptions {
+        custom: Some(CustomAttribute {
+            name: name.to_owned(),
+            json: json.to_owned(),
+        }),
+        ..ExrOptions::default()
+    };
+    for options in [
+        with("", "{}"),
+        with(&"x".repeat(256), "{}"),
+        with("\u{6c34}", "{}"),
+    ] {
+        let error = encode_exr(&film, &options).unwrap_err();
+        assert!(matches!(error, OutputError::Attribute { .. }), "{error}");
+    }
+}
