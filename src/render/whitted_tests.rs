@@ -189,6 +189,9 @@ fn total_internal_reflection_keeps_everything_inside() {
     let (value, counts) = middle(&Balls::one(Vec3::ZERO, 1.0), &scene, 4);
     assert_eq!((counts.refraction, counts.reflection), (0, 3));
     assert_near(value, 4.0 * 0.125 + 1.0);
+    // The deepest recursion that is allowed fits the stack.
+    let (deep, _) = middle(&Balls::one(Vec3::ZERO, 1.0), &scene, MAX_DEPTH);
+    assert_within(1e-3, deep, MAX_DEPTH as f32 * 0.125 + 1.0);
 }
 
 #[test]

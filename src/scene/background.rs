@@ -4,12 +4,13 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-/// Bottom of the default gradient (linear RGB): a dim, slightly warm grey under the horizon.
-pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.115, 0.125, 0.145);
+/// Bottom of the default gradient (linear RGB): a dim slate grey, dark enough for
+/// light particles and light enough for the dark ends of colour maps.
+pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.062, 0.070, 0.086);
 
 /// Top of the default gradient (linear RGB): darker and cooler, so that lit particles stand out
 /// and the picture does not tip over.
-pub const DEFAULT_TOP: Vec3 = Vec3::new(0.020, 0.027, 0.043);
+pub const DEFAULT_TOP: Vec3 = Vec3::new(0.010, 0.014, 0.024);
 
 /// Colour by direction, linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]

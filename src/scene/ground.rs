@@ -8,8 +8,9 @@ use glam::Vec3;
 use super::Bounds;
 use crate::ray::Ray;
 
-/// Colour of the default floor (linear RGB): a middle grey that shows shadows without glare.
-pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.30, 0.31, 0.33);
+/// Colour of the default floor (linear RGB): a dark grey that shows shadows and stays behind
+/// the particles.
+pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
 
 /// Part of the ambient light that the floor takes: it lies under everything, so it gets more of the
 /// sky than a particle inside a cloud.

@@ -7,15 +7,16 @@ use super::{Bounds, CameraView};
 /// Colour of the default key light (linear RGB): daylight, slightly warm.
 pub const KEY_COLOR: Vec3 = Vec3::new(1.0, 0.965, 0.91);
 
-/// Strength of the default key light: with the default material a surface that faces it stays just
-/// under white.
-pub const KEY_INTENSITY: f32 = 1.0;
+/// Strength of the default key light: with the default material a white surface that faces it comes out
+/// just under white, highlight apart, which the view transform rolls off.
+pub const KEY_INTENSITY: f32 = 1.25;
 
 /// Colour of the default fill light: cool against the warm key.
 pub const FILL_COLOR: Vec3 = Vec3::new(0.72, 0.84, 1.0);
 
-/// Strength of the default fill light: a sixth to a fifth of the key keeps shadows open, not flat.
-pub const FILL_INTENSITY: f32 = 0.18;
+/// Strength of the default fill light: an eighth of the key keeps shadows open without making
+/// them flat.
+pub const FILL_INTENSITY: f32 = 0.16;
 
 /// How a point light's strength depends on distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -135,7 +136,7 @@ pub fn default_lights(bounds: &Bounds, up: DVec3, view: &CameraView) -> Vec<Ligh
         }
         .with(radiance)
     };
-    let key = light(-0.65, 1.0, 0.55, KEY_INTENSITY * KEY_COLOR);
+    let key = light(-0.7, 1.0, 0.45, KEY_INTENSITY * KEY_COLOR);
     let fill = light(0.9, 0.25, 0.6, FILL_INTENSITY * FILL_COLOR);
     vec![
         key,

@@ -7,9 +7,9 @@
 use glam::Vec3;
 use thiserror::Error;
 
-/// Base colour of particles that bring none (linear RGB): a clear light blue, the colour that
-/// readers expect of a fluid, light enough to show shading.
-pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.28, 0.50, 0.80);
+/// Base colour of particles that bring none (linear RGB): a clear blue, the colour that
+/// readers expect of a fluid; highlights and rims take away saturation, so it has some to spare.
+pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.12, 0.38, 0.78);
 
 /// One set of constants for all particles. The base colour multiplies ambient and diffuse light;
 /// highlights have the light's colour.
@@ -33,8 +33,7 @@ pub struct Material {
 
 impl Material {
     /// What a picture has unless told otherwise: water's index of refraction, opaque, a soft
-    /// highlight. The sum of `ambient`, `diffuse` and `specular` is 1, so that the default key
-    /// light does not push a white particle past white.
+    /// highlight. Under the default lights a white particle comes out just under white.
     pub const DEFAULT: Self = Self {
         ambient: 0.1,
         diffuse: 0.7,
