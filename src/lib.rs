@@ -13,6 +13,7 @@ pub mod pipeline;
 pub mod ray;
 pub mod render;
 pub mod report;
+pub mod resolve;
 pub mod scene;
 pub mod surface;
 pub mod survey;

@@ -1,3 +1,7 @@
-//! The `spherule` command.
+//! The `spherule` command: a thin shell around the library.
 
-fn main() {}
+use std::process::ExitCode;
+
+fn main() -> ExitCode {
+    spherule::cli::main()
+}

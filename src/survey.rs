@@ -1,1 +1,299 @@
-//! Placeholder: room for `survey`.
+//! What "auto" means for a sequence, settled once from a look at its frames: the origin, the box
+//! that the camera frames, the particle radius, the range of the colour map.
+//!
+//! Percentiles rather than extremes, so that one escaped particle neither shrinks the picture nor
+//! washes out the colours. The answer is kept with the job, so that all frames, runs and machines
+//! agree.
+
+use std::collections::BTreeSet;
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
+use spherule_formats::sequence::Sequence;
+use spherule_formats::{
+    Attribute, FrameError, ParticleFrame, Positions, Radius, RawParticles, choose_origin,
+};
+
+use crate::scene::Bounds;
+
+/// Frames looked at; evenly spread, first and last among them. All of a shorter sequence.
+const FRAMES: usize = 24;
+/// Particles of a frame that percentiles are taken from.
+const SAMPLE: usize = 20_000;
+/// Distances to the nearest neighbour that the radius is estimated from.
+const NEIGHBOUR_QUERIES: usize = 512;
+/// Distance computations that the estimate may cost: half a second for a frame of 1e7.
+const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
+/// Names under which simulations write velocities.
+const VELOCITY_NAMES: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];
+
+/// What was found.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Survey {
+    /// World position that all coordinates are relative to.
+    pub origin: DVec3,
+    /// Box of the bulk of the particles over the sequence, world units.
+    pub min: DVec3,
+    /// Its upper corner.
+    pub max: DVec3,
+    /// Radius for frames that do not bring their own: half the usual distance of neighbours.
+    pub radius: Option<f32>,
+    /// Whether the frames bring radii of their own.
+    pub has_radii: bool,
+    /// The attribute that colours were asked for by, if any, with its range.
+    pub color: Option<ColorRange>,
+    /// Which way is up for users of this format, unit vector.
+    pub up: DVec3,
+    /// Names of all attributes seen.
+    pub attributes: Vec<String>,
+    /// Particles of the fullest frame looked at.
+    pub most_particles: usize,
+    /// Frames looked at.
+    pub frames: usize,
+}
+
+/// An attribute and the range its colours span.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct ColorRange {
+    /// Name of the attribute.
+    pub attribute: String,
+    /// Value at the map's start.
+    pub low: f64,
+    /// Value at the map's end.
+    pub high: f64,
+}
+
+/// What is asked about colours.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum ColorQuestion<'a> {
+    /// No attribute is needed.
+    None,
+    /// The velocity, if there is one.
+    Speed,
+    /// This attribute.
+    Attribute(&'a str),
+}
+
+/// Running totals over the frames.
+struct Totals {
+    bounds: Option<(DVec3, DVec3)>,
+    radius: Option<(usize, f32)>,
+    has_radii: bool,
+    range: Option<(f64, f64)>,
+    color: Option<String>,
+    velocity: Option<String>,
+    attributes: BTreeSet<String>,
+    most_particles: usize,
+    frames: usize,
+}
+
+impl Survey {
+    /// Looks at `sequence`. Frames that cannot be read are passed over here; they are reported when
+    /// their turn comes.
+    ///
+    /// # Errors
+    /// If none of the frames can be read, why the first one cannot.
+    pub fn of(sequence: &Sequence, color: ColorQuestion) -> Result<Self, FrameError> {
+        let mut totals = Totals {
+            bounds: None,
+            radius: None,
+            has_radii: false,
+            range: None,
+            color: None,
+            velocity: None,
+            attributes: BTreeSet::new(),
+            most_particles: 0,
+            frames: 0,
+        };
+        let mut failure = None;
+        for index in spread(sequence.frames().len()) {
+            match sequence.load_raw(index) {
+                Ok(raw) => totals.take_in(raw, color),
+                Err(error) => {
+                    failure.get_or_insert(error);
+                }
+            }
+        }
+        match failure {
+            Some(error) if totals.frames == 0 => Err(error),
+            _ => Ok(totals.finish(if sequence.is_y_up() {
+                DVec3::Y
+            } else {
+                DVec3::Z
+            })),
+        }
+    }
+
+    /// The box as the scene takes it.
+    pub fn bounds(&self) -> Bounds {
+        Bounds {
+            min: self.min,
+            max: self.max,
+        }
+    }
+}
+
+/// The attribute of `frame` that holds velocities, if any does.
+pub fn velocity_of(attributes: &[Attribute]) -> Option<&Attribute> {
+    VELOCITY_NAMES.iter().find_map(|name| {
+        attributes
+            .iter()
+            .find(|a| a.components == 3 && a.name.eq_ignore_ascii_case(name))
+    })
+}
+
+/// Up to [`FRAMES`] indices below `count`, evenly spread.
+fn spread(count: usize) -> Vec<usize> {
+    if count <= FRAMES {
+        return (0..count).collect();
+    }
+    (0..FRAMES)
+        .map(|i| i * (count - 1) / (FRAMES - 1))
+        .collect()
+}
+
+impl Totals {
+    fn take_in(&mut self, raw: RawParticles, color: ColorQuestion) {
+        self.frames += 1;
+        self.most_particles = self.most_particles.max(raw.positions.len());
+        self.attributes
+            .extend(raw.attributes.iter().map(|a| a.name.clone()));
+        if let Some((min, max)) = robust_bounds(&raw.positions) {
+            self.bounds = Some(match self.bounds {
+                Some((low, high)) => (low.min(min), high.max(max)),
+                None => (min, max),
+            });
+        }
+        if self.velocity.is_none() {
+            self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
+        }
+        let wanted = match color {
+            ColorQuestion::None => None,
+            ColorQuestion::Speed => self.velocity.clone(),
+            ColorQuestion::Attribute(name) => Some(name.to_owned()),
+        };
+        let origin = self
+            .bounds
+            .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
+        let frame = ParticleFrame::from_raw(raw, origin);
+        if let Some(name) = wanted {
+            if let Some(attribute) = frame.attribute(&name)
+                && let Some((low, high)) = robust_range(attribute)
+            {
+                let (a, b) = self.range.unwrap_or((low, high));
+                self.range = Some((a.min(low), b.max(high)));
+            }
+            self.color = Some(name);
+        }
+        self.take_in_radius(&frame);
+    }
+
+    fn take_in_radius(&mut self, frame: &ParticleFrame) {
+        match &frame.radius {
+            Some(Radius::Common(_) | Radius::PerParticle(_)) => self.has_radii = true,
+            None => {
+                // The fullest frame knows the spacing best.
+                let fuller = self.radius.is_none_or(|(count, _)| frame.len() > count);
+                if fuller && let Some(radius) = estimate_radius(&frame.positions) {
+                    self.radius = Some((frame.len(), radius));
+                }
+            }
+        }
+    }
+
+    fn finish(self, up: DVec3) -> Survey {
+        let (min, max) = self
+            .bounds
+            .unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
+        let color = self.color.map(|attribute| {
+            let (low, high) = self.range.unwrap_or((0.0, 1.0));
+            ColorRange {
+                attribute,
+                low,
+                high,
+            }
+        });
+        Survey {
+            origin: choose_origin(min, max),
+            min,
+            max,
+            radius: self.radius.map(|(_, radius)| radius),
+            has_radii: self.has_radii,
+            color,
+            up,
+            attributes: self.attributes.into_iter().collect(),
+            most_particles: self.most_particles,
+            frames: self.frames,
+        }
+    }
+}
+
+/// The box of the particles, except that on each axis it reaches beyond the middle 98 % by at most
+/// half their extent. None without finite particles.
+fn robust_bounds(positions: &Positions) -> Option<(DVec3, DVec3)> {
+    let count = positions.len();
+    let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
+    let stride = count.div_ceil(SAMPLE).max(1);
+    let mut sample: Vec<DVec3> = (0..count).step_by(stride).filter_map(finite).collect();
+    let (min, max) = (0..count)
+        .into_par_iter()
+        .filter_map(finite)
+        .map(|p| (p, p))
+        .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
+    let (mut low, mut high) = (min, max);
+    for axis in 0..3 {
+        sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
+        let (Some(first), Some(last)) = (
+            sample.get(sample.len() / 100),
+            sample.get((sample.len() - sample.len() / 100).saturating_sub(1)),
+        ) else {
+            continue;
+        };
+        let margin = 0.5 * (last[axis] - first[axis]);
+        low[axis] = min[axis].max(first[axis] - margin);
+        high[axis] = max[axis].min(last[axis] + margin);
+    }
+    Some((low, high))
+}
+
+/// The middle 99 % of an attribute's values (vectors by magnitude, from zero up).
+fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
+    let count = attribute.count();
+    let stride = count.div_ceil(SAMPLE).max(1);
+    let mut values: Vec<f64> = (0..count)
+        .step_by(stride)
+        .map(|i| attribute.magnitude(i))
+        .filter(|v| v.is_finite())
+        .collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let low = *values.get(values.len() / 200)?;
+    let high = *values.get((values.len() - values.len() / 200).saturating_sub(1))?;
+    let is_vector = attribute.components > 1;
+    Some((if is_vector { 0.0 } else { low }, high))
+}
+
+/// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
+fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
+    let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
+    let stride = positions.len().div_ceil(queries).max(1);
+    let mut distances: Vec<f32> = positions
+        .iter()
+        .step_by(stride)
+        .filter_map(|from| {
+            let nearest = positions
+                .par_chunks(64 * 1024)
+                .map(|chunk| {
+                    chunk
+                        .iter()
+                        .map(|to| from.distance_squared(*to))
+                        .filter(|d| *d > 0.0)
+                        .fold(f32::INFINITY, f32::min)
+                })
+                .reduce(|| f32::INFINITY, f32::min);
+            nearest.is_finite().then(|| nearest.sqrt())
+        })
+        .collect();
+    distances.sort_unstable_by(f32::total_cmp);
+    distances.get(distances.len() / 2).map(|d| 0.5 * d)
+}

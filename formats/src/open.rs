@@ -114,22 +114,27 @@ impl FrameFile {
 /// # Errors
 /// As [`FrameFile::open`], as far as the first bytes tell.
 pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
+    let head = head(path)?;
+    Format::detect(&head, path).map_err(|e| e.in_file(path))
+}
+
+/// The first bytes of the file at `path`, gzip taken off.
+pub(crate) fn head(path: &Path) -> Result<Vec<u8>, FrameError> {
     let io = |e| FrameError::io(path, e);
     regular_len(path)?;
     let mut stored = Vec::new();
     File::open(path)
         .and_then(|f| f.take(4 * HEAD_LEN as u64).read_to_end(&mut stored))
         .map_err(io)?;
-    let mut head = Vec::new();
-    if is_gzip(&stored) {
-        // The end is cut off on purpose, so an early end is no fault here.
-        let _ = GzDecoder::new(stored.as_slice())
-            .take(HEAD_LEN as u64)
-            .read_to_end(&mut head);
-    } else {
-        head = stored;
+    if !is_gzip(&stored) {
+        return Ok(stored);
     }
-    Format::detect(&head, path).map_err(|e| e.in_file(path))
+    let mut head = Vec::new();
+    // The end is cut off on purpose, so an early end is no fault here.
+    let _ = GzDecoder::new(stored.as_slice())
+        .take(HEAD_LEN as u64)
+        .read_to_end(&mut head);
+    Ok(head)
 }
 
 /// The whole file, if it did not change size while it was read.

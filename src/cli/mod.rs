@@ -1,1 +1,84 @@
-//! Placeholder: room for `cli`.
+//! The command line: one thin file per command. Only this room prints and decides exit codes.
+//!
+//! Results go to standard output, everything else to standard error. Exit codes: 0 all done, 1 some
+//! frames or files failed, 2 could not start, 75 interrupted and to be resumed.
+#![expect(clippy::print_stderr, reason = "this is the edge that talks to people")]
+
+use std::process::ExitCode;
+
+use clap::{Parser, Subcommand};
+
+mod errors;
+mod generate;
+mod init;
+mod inspect;
+mod job;
+mod progress;
+mod render;
+mod signals;
+
+use errors::CliError;
+
+/// Renders particle-simulation time steps to OpenEXR image sequences by CPU ray tracing.
+#[derive(Debug, Parser)]
+#[command(name = "spherule", version, max_term_width = 100)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Render a directory, pattern or list of particle files, or a manifest, to images.
+    Render(Box<render::RenderArgs>),
+    /// Print a complete, commented manifest for an input.
+    Init(Box<init::InitArgs>),
+    /// Print counts, bounds and attributes of particle files.
+    Inspect(inspect::InspectArgs),
+    /// Make particles to measure with.
+    Generate(generate::GenerateArgs),
+}
+
+/// Parses the arguments of the process, runs the command, reports what went wrong.
+pub fn main() -> ExitCode {
+    let cli = Cli::parse();
+    let result = match cli.command {
+        Command::Render(args) => render::run(&args),
+        Command::Init(args) => init::run(&args),
+        Command::Inspect(args) => inspect::run(&args),
+        Command::Generate(args) => generate::run(&args),
+    };
+    match result {
+        Ok(outcome) => outcome.into(),
+        Err(error) => {
+            for line in error.to_string().lines() {
+                eprintln!("error: {line}");
+            }
+            ExitCode::from(2)
+        }
+    }
+}
+
+/// How a command ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Outcome {
+    /// Everything was done.
+    Done,
+    /// Some frames or files failed; they were named.
+    SomeFailed,
+    /// Stopped by a signal; the same command goes on.
+    Interrupted,
+}
+
+impl From<Outcome> for ExitCode {
+    fn from(outcome: Outcome) -> Self {
+        Self::from(match outcome {
+            Outcome::Done => 0,
+            Outcome::SomeFailed => 1,
+            Outcome::Interrupted => INTERRUPTED,
+        })
+    }
+}
+
+/// `EX_TEMPFAIL`: queueing systems take it as "try again".
+const INTERRUPTED: u8 = 75;

@@ -20,15 +20,17 @@ named! {
         /// Blue to yellow, the same to colour-blind eyes.
         Cividis = "cividis",
         /// Blue to red through white, for values around a middle.
-        Coolwarm = "coolwarm",
+        RedBlue = "red-blue",
         /// Black to white.
-        Gray = "gray",
+        Greys = "greys",
     }
 }
 
 /// Where a particle's colour comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColorSetting {
+    /// By speed where the particles have velocities, else one colour.
+    Auto,
     /// Linear RGB, the same for all.
     Rgb([f32; 3]),
     /// An attribute through a map; vectors by their length.
@@ -45,6 +47,8 @@ pub enum ColorSetting {
 /// What rays see that meet nothing. Linear RGB.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Background {
+    /// A calm gradient.
+    Auto,
     /// One colour.
     Plain([f32; 3]),
     /// From straight down to straight up.
@@ -69,11 +73,14 @@ fn as_rgb(field: &Field<'_>) -> Option<[f32; 3]> {
 
 impl ColorSetting {
     pub(super) fn read(field: &Field<'_>) -> Option<Self> {
+        if field.as_text() == Some("auto") {
+            return Some(Self::Auto);
+        }
         if !field.is_table() {
             let rgb = as_rgb(field).map(Self::Rgb);
             return field.or_wants(
                 rgb,
-                "three numbers from 0, as [0.6, 0.7, 0.9], or { attribute = \"velocity\", map = \"viridis\" }",
+                "three numbers from 0, as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\"",
             );
         }
         let mut section = field.section()?;
@@ -98,6 +105,7 @@ impl ColorSetting {
 impl Toml for ColorSetting {
     fn toml(&self) -> String {
         match self {
+            Self::Auto => "auto".toml(),
             Self::Rgb(rgb) => rgb.toml(),
             Self::Attribute {
                 attribute,
@@ -114,11 +122,14 @@ impl Toml for ColorSetting {
 
 impl Background {
     pub(super) fn read(field: &Field<'_>) -> Option<Self> {
+        if field.as_text() == Some("auto") {
+            return Some(Self::Auto);
+        }
         if !field.is_table() {
             let plain = as_rgb(field).map(Self::Plain);
             return field.or_wants(
                 plain,
-                "three numbers from 0, as [0.1, 0.1, 0.1], or { bottom = [...], top = [...] }",
+                "three numbers from 0, as [0.1, 0.1, 0.1], { bottom = [...], top = [...] }, or \"auto\"",
             );
         }
         let mut section: Section<'_> = field.section()?;
@@ -140,6 +151,7 @@ impl Background {
 impl Toml for Background {
     fn toml(&self) -> String {
         match self {
+            Self::Auto => "auto".toml(),
             Self::Plain(rgb) => rgb.toml(),
             Self::Gradient { bottom, top } => {
                 format!("{{ bottom = {}, top = {} }}", bottom.toml(), top.toml())

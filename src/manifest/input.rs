@@ -65,8 +65,9 @@ pub struct Input {
     pub parts: Option<Vec<String>>,
     /// How large particles are.
     pub radius: RadiusSetting,
-    /// Which axis points up.
-    pub up: UpAxis,
+    /// Which axis points up; None is what the format's users are used to: y for BGEO and
+    /// SPlisHSPlasH, else z.
+    pub up: Option<UpAxis>,
 }
 
 impl Input {
@@ -77,7 +78,7 @@ impl Input {
             frames: None,
             parts: None,
             radius: RadiusSetting::Auto,
-            up: UpAxis::Z,
+            up: None,
         }
     }
 
@@ -94,7 +95,7 @@ impl Input {
             frames: section.value("frames", None, read_frames),
             parts: section.optional("parts", |f| names(f, "a list of names, as [\"fluid\"]")),
             radius: section.value("radius", RadiusSetting::Auto, RadiusSetting::read),
-            up: section.value("up", UpAxis::Z, |f| f.choice(UpAxis::ALL)),
+            up: section.value("up", None, read_up),
         };
         section.finish();
         input
@@ -133,8 +134,16 @@ impl Input {
             &self.radius,
             "a length, auto, or { attribute = \"radius\", scale = 1.0 }",
         );
-        out.put("up", &self.up, "x | y | z | -x | -y | -z");
+        let up = self.up.map_or("auto", UpAxis::name);
+        out.put("up", up, "auto | x | y | z | -x | -y | -z");
     }
+}
+
+fn read_up(field: &Field<'_>) -> Option<Option<UpAxis>> {
+    if field.as_text() == Some("auto") {
+        return Some(None);
+    }
+    field.choice(UpAxis::ALL).map(Some)
 }
 
 /// TOML as it is.

@@ -6,7 +6,7 @@ use super::reader::{Field, Section};
 use super::write::{Entries, Toml};
 
 const MAX_SIDE: u32 = 65_536;
-const MAX_SAMPLES: u32 = 65_536;
+const MAX_SAMPLES: u32 = 4096;
 const MAX_DEPTH: u32 = 64;
 
 /// `[image]`.
@@ -101,7 +101,7 @@ impl Default for Render {
         Self {
             accelerator: Accelerator::Auto,
             max_depth: 3,
-            background: Background::Plain([0.05, 0.06, 0.08]),
+            background: Background::Auto,
             ground: false,
             ground_height: GroundHeight::Auto,
             ground_color: [0.25, 0.25, 0.25],
@@ -112,7 +112,7 @@ impl Default for Render {
 impl Default for Material {
     fn default() -> Self {
         Self {
-            color: ColorSetting::Rgb([0.6, 0.7, 0.9]),
+            color: ColorSetting::Auto,
             ambient: 0.1,
             diffuse: 0.7,
             specular: 0.2,
@@ -149,7 +149,7 @@ impl Render {
         let default = Self::default();
         let render = Self {
             accelerator: section.value("accelerator", default.accelerator, read_accelerator),
-            max_depth: section.value("max_depth", default.max_depth, |f| f.count(0, MAX_DEPTH)),
+            max_depth: section.value("max_depth", default.max_depth, |f| f.count(1, MAX_DEPTH)),
             background: section.value("background", default.background, Background::read),
             ground: section.value("ground", default.ground, Field::bool),
             ground_height: section.value("ground_height", default.ground_height, |f| {
@@ -176,12 +176,12 @@ impl Render {
         out.put(
             "max_depth",
             &self.max_depth,
-            "reflections and refractions in a row",
+            "1 is direct light only; each more follows reflections and refractions once",
         );
         out.put(
             "background",
             &self.background,
-            "linear RGB, or { bottom = [...], top = [...] }",
+            "auto, linear RGB, or { bottom = [...], top = [...] }",
         );
         out.put(
             "ground",
@@ -246,7 +246,7 @@ impl Material {
         out.put(
             "color",
             &self.color,
-            "linear RGB, or { attribute = \"velocity\", map = \"viridis\", range = [0.0, 4.0] }",
+            "auto (by speed), linear RGB, or { attribute = \"velocity\", map = \"viridis\", range = [0.0, 4.0] }",
         );
         out.put("ambient", &self.ambient, "light from everywhere");
         out.put("diffuse", &self.diffuse, "scattered light");

@@ -197,11 +197,6 @@ impl Manifest {
         Ok(())
     }
 
-    /// What is up in the picture, unless the camera says otherwise. Of any length but 0.
-    pub fn up(&self) -> [f64; 3] {
-        self.camera.up.unwrap_or(self.input.up.vector())
-    }
-
     /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
     /// order. Left out: frames, accelerator, and the directory of the images.
     ///

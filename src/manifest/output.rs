@@ -54,6 +54,8 @@ pub struct Output {
     pub preview: bool,
     /// Brightness of the PNG, stops.
     pub preview_exposure: f32,
+    /// Leaves the background out of the images, so that they lie over others; previews show it.
+    pub transparent: bool,
     /// Frames per second, noted in the images.
     pub fps: Option<f64>,
 }
@@ -66,6 +68,7 @@ impl Default for Output {
             compression: Compression::Zip,
             preview: true,
             preview_exposure: 0.0,
+            transparent: false,
             fps: None,
         }
     }
@@ -88,6 +91,7 @@ impl Output {
             preview_exposure: section.value("preview_exposure", default.preview_exposure, |f| {
                 f.number32("stops from -100 to 100", |v| v.abs() <= 100.0)
             }),
+            transparent: section.value("transparent", default.transparent, Field::bool),
             fps: section.optional("fps", |f| f.number("a number above 0", |v| v > 0.0)),
         };
         section.finish();
@@ -111,6 +115,11 @@ impl Output {
         );
         out.put("preview", &self.preview, "PNG beside each image");
         out.put("preview_exposure", &self.preview_exposure, "stops");
+        out.put(
+            "transparent",
+            &self.transparent,
+            "leaves the background out of the EXR, to lay it over something else",
+        );
         out.maybe(
             "fps",
             self.fps.as_ref(),

@@ -80,7 +80,7 @@ fn the_example_reads() {
     let manifest = parse(EXAMPLE);
     let mut wanted = Manifest::new("ParticleData_Fluid_#.vtk");
     wanted.input.frames = Some("1-17".parse().unwrap());
-    wanted.input.up = UpAxis::Y;
+    wanted.input.up = Some(UpAxis::Y);
     wanted.camera.mode = CameraMode::Fixed;
     wanted.camera.eye = Some([0.0; 3]);
     wanted.camera.look_at = Some([5.0, 5.0, 0.0]);
@@ -405,7 +405,7 @@ fn lists_of_everything_read_back() {
 input = { path = ["a", "b"], radius = { attribute = "d", scale = 0.5 }, up = "-y" }
 camera.key = [{ frame = 9, eye = [1,2,3], look_at = [0,0,0], fov = 30 }, { frame = -1, eye = [1,1,1], look_at = [0,0,0] }]
 render = { background = { bottom = [0,0,0], top = [1,1,1] }, ground = true, ground_height = -2 }
-material.color = { attribute = "velocity", map = "coolwarm", range = [-1, 1] }
+material.color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }
 light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", position = [1,1,1], falloff = "inverse-square" }]
 "#;
     let manifest = parse(text);

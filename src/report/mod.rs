@@ -1,1 +1,8 @@
-//! Placeholder: room for `report`.
+//! What a run says of itself: time and memory of every frame, for people and for scripts.
+
+pub mod frame;
+pub mod job;
+pub mod memory;
+
+pub use frame::FrameReport;
+pub use memory::MemoryUse;

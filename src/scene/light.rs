@@ -70,10 +70,15 @@ pub struct Incident {
 impl Light {
     /// A point light without falloff at a world `position`.
     pub fn point(position: DVec3, origin: DVec3, radiance: Vec3) -> Self {
+        Self::point_with(position, origin, radiance, Falloff::None)
+    }
+
+    /// A point light at a world `position`.
+    pub fn point_with(position: DVec3, origin: DVec3, radiance: Vec3, falloff: Falloff) -> Self {
         Self {
             kind: LightKind::Point {
                 position: (position - origin).as_vec3(),
-                falloff: Falloff::None,
+                falloff,
             },
             radiance,
             casts_shadow: true,

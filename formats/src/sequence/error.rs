@@ -65,6 +65,14 @@ pub enum SequenceError {
         /// The other.
         second: PathBuf,
     },
+    /// A part was asked for that the steps do not have.
+    #[error("no part is called `{name}`; the parts are {}", if known.len() > 1 { known.join(", ") } else { "not named: there is one file a step".to_owned() })]
+    NoSuchPart {
+        /// What was asked for.
+        name: String,
+        /// What there is.
+        known: Vec<String>,
+    },
     /// The operating system refused to list a directory.
     #[error("{}: {source}", path.display())]
     Io {

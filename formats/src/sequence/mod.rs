@@ -13,6 +13,7 @@ use std::time::SystemTime;
 
 use glam::DVec3;
 
+use crate::detect::Format;
 use crate::open::FrameFile;
 use crate::{FrameError, ParseError, ParticleFrame, RawParticles};
 
@@ -158,6 +159,37 @@ impl Sequence {
         &self.parts
     }
 
+    /// Whether users of this format are used to y pointing up: Houdini's BGEO, and VTK files that
+    /// SPlisHSPlasH signs in their title. Elsewhere z is. Looks into the first file.
+    pub fn is_y_up(&self) -> bool {
+        let first = self.frames.first().and_then(|f| f.parts.first());
+        first.is_some_and(|part| y_is_up(&part.path))
+    }
+
+    /// Keeps only the parts whose names are in `names`; frames without any of them are left out.
+    ///
+    /// # Errors
+    /// The first name that is not a part.
+    pub fn keep_parts(&mut self, names: &[String]) -> Result<(), SequenceError> {
+        if let Some(name) = names.iter().find(|n| !self.parts.contains(n)) {
+            return Err(SequenceError::NoSuchPart {
+                name: name.clone(),
+                known: self.parts.clone(),
+            });
+        }
+        let parts = &self.parts;
+        let kept = |part: &PartFile| {
+            parts
+                .get(part.part as usize)
+                .is_some_and(|p| names.contains(p))
+        };
+        for frame in &mut self.frames {
+            frame.parts.retain(kept);
+        }
+        self.frames.retain(|f| !f.parts.is_empty());
+        Ok(())
+    }
+
     /// What a user should know: gaps, files left out, missing parts.
     pub fn notes(&self) -> &[String] {
         &self.notes
@@ -247,6 +279,22 @@ impl Sequence {
             stamp,
         });
         Ok((file, step))
+    }
+}
+
+/// See [`Sequence::is_y_up`].
+fn y_is_up(path: &Path) -> bool {
+    let Ok(head) = crate::open::head(path) else {
+        return false;
+    };
+    match Format::detect(&head, path) {
+        Ok(Format::Bgeo) => true,
+        Ok(Format::VtkLegacy) => {
+            let mut lines = head.split(|b| *b == b'\n');
+            let title = lines.nth(1).unwrap_or_default();
+            title.starts_with(b"SPlisHSPlasH")
+        }
+        _ => false,
     }
 }
 

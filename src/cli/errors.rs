@@ -1,0 +1,38 @@
+//! Why a command could not start. Messages are those of the libraries; commands only add what they
+//! alone know.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use spherule_formats::FrameError;
+use spherule_formats::sequence::SequenceError;
+use spherule_jobs::JobError;
+
+use crate::manifest::ManifestError;
+
+#[derive(Debug, thiserror::Error)]
+pub(super) enum CliError {
+    #[error(transparent)]
+    Manifest(#[from] ManifestError),
+    #[error(transparent)]
+    Sequence(#[from] SequenceError),
+    #[error(transparent)]
+    Job(#[from] JobError),
+    #[error("no frame can be read: {0}")]
+    Frame(#[from] FrameError),
+    #[error("{}: {source}", path.display())]
+    Io { path: PathBuf, source: io::Error },
+    #[error("{0}")]
+    Other(String),
+}
+
+impl CliError {
+    pub(super) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+        let path = path.to_owned();
+        move |source| Self::Io { path, source }
+    }
+
+    pub(super) fn other(what: impl Into<String>) -> Self {
+        Self::Other(what.into())
+    }
+}

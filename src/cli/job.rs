@@ -1,0 +1,242 @@
+//! From arguments to a manifest and its sequence: what `render` and `init` share.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use spherule_formats::sequence::{Sequence, SequenceInput};
+
+use super::CliError;
+use crate::manifest::{Manifest, Override};
+
+/// What can be said on the command line about the pictures. Every key of the manifest has
+/// `--set`; the usual ones have a flag.
+#[derive(Debug, Args)]
+pub(super) struct ManifestArgs {
+    /// A directory, a pattern (dump.#.vtk, frame_%04d.bgeo, *), files, or a manifest (.toml).
+    #[arg(required = true)]
+    pub(super) input: Vec<PathBuf>,
+    /// Images to write: out/frame.####.exr.
+    #[arg(short, long, value_name = "PATTERN")]
+    pub(super) output: Option<String>,
+    /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8.
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+    pub(super) frames: Option<String>,
+    /// Any key of the manifest: --set render.max_depth=5. May be repeated.
+    #[arg(long, value_name = "KEY=VALUE")]
+    pub(super) set: Vec<String>,
+    /// Image width in pixels.
+    #[arg(long)]
+    pub(super) width: Option<i64>,
+    /// Image height in pixels.
+    #[arg(long)]
+    pub(super) height: Option<i64>,
+    /// Samples per pixel.
+    #[arg(long)]
+    pub(super) samples: Option<i64>,
+    /// Particle radius: a length, or "auto".
+    #[arg(long)]
+    pub(super) radius: Option<String>,
+    /// Axis that points up: x, y, z, -x, -y, -z, or "auto".
+    #[arg(long, allow_hyphen_values = true)]
+    pub(super) up: Option<String>,
+    /// Attribute to colour by.
+    #[arg(long, value_name = "ATTRIBUTE")]
+    pub(super) color_by: Option<String>,
+    /// Colour map of the attribute: viridis, turbo...
+    #[arg(long, value_name = "NAME", requires = "color_by")]
+    pub(super) map: Option<String>,
+    /// Values at the ends of the colour map; default: what the sequence has.
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], requires = "color_by", allow_negative_numbers = true)]
+    pub(super) range: Option<Vec<f64>>,
+    /// Channels of the images: RGBA,Z,N,id,P,V,albedo.
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    pub(super) channels: Option<Vec<String>>,
+    /// Reflections and refractions followed; 1 is direct light only.
+    #[arg(long)]
+    pub(super) max_depth: Option<i64>,
+    /// A ground plane under the particles.
+    #[arg(long)]
+    pub(super) ground: bool,
+    /// Parts of a step to keep where it has several files: fluid,oil.
+    #[arg(long, value_delimiter = ',', value_name = "LIST")]
+    pub(super) parts: Option<Vec<String>>,
+    /// Acceleration structure.
+    #[arg(long, value_name = "NAME")]
+    pub(super) accelerator: Option<String>,
+}
+
+/// A manifest as asked for, and where its paths begin.
+pub(super) struct Asked {
+    /// With all options laid over it.
+    pub(super) manifest: Manifest,
+    /// The directory that its paths are relative to; empty for the current one.
+    pub(super) base: PathBuf,
+    /// The manifest's own file, if there is one.
+    pub(super) file: Option<PathBuf>,
+}
+
+impl ManifestArgs {
+    /// Reads the manifest, or makes one of the arguments.
+    pub(super) fn manifest(&self) -> Result<Asked, CliError> {
+        let mut overrides = Vec::new();
+        let file = self.manifest_file()?;
+        let (text, base) = match &file {
+            Some(path) => {
+                let text = fs::read_to_string(path).map_err(CliError::io(path))?;
+                (
+                    text,
+                    path.parent().map_or_else(PathBuf::new, Path::to_owned),
+                )
+            }
+            None => {
+                overrides.push(self.input_override()?);
+                (String::new(), PathBuf::new())
+            }
+        };
+        self.add_overrides(&mut overrides, file.is_some())?;
+        let shown = file
+            .clone()
+            .unwrap_or_else(|| PathBuf::from("command line"));
+        let manifest = Manifest::parse_with(&text, &shown, overrides)?;
+        Ok(Asked {
+            manifest,
+            base,
+            file,
+        })
+    }
+
+    fn manifest_file(&self) -> Result<Option<PathBuf>, CliError> {
+        let is_toml = |p: &&PathBuf| {
+            p.extension()
+                .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+        };
+        match self.input.iter().find(is_toml) {
+            None => Ok(None),
+            Some(path) if self.input.len() == 1 => Ok(Some(path.clone())),
+            Some(path) => Err(CliError::other(format!(
+                "{}: a manifest stands alone; its input.path names the particles",
+                path.display()
+            ))),
+        }
+    }
+
+    fn input_override(&self) -> Result<Override, CliError> {
+        let paths = self
+            .input
+            .iter()
+            .map(|p| text(p))
+            .collect::<Result<Vec<_>, _>>()?;
+        let value = match <[String; 1]>::try_from(paths) {
+            Ok([one]) => toml::Value::from(one),
+            Err(many) => toml::Value::from(many),
+        };
+        over("input.path", value, "INPUT")
+    }
+
+    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
+        if let Some(output) = &self.output {
+            // As typed it is relative to here; in a manifest it would be relative to that.
+            let path = if from_file {
+                text(&absolute(Path::new(output))?)?
+            } else {
+                output.clone()
+            };
+            list.push(over("output.path", path, "--output")?);
+        }
+        if let Some(frames) = &self.frames {
+            list.push(over("input.frames", frames.clone(), "--frames")?);
+        }
+        for (key, value, shown) in [
+            ("image.width", self.width, "--width"),
+            ("image.height", self.height, "--height"),
+            ("image.samples", self.samples, "--samples"),
+            ("render.max_depth", self.max_depth, "--max-depth"),
+        ] {
+            if let Some(value) = value {
+                list.push(over(key, value, shown)?);
+            }
+        }
+        for (key, value, shown) in [
+            ("input.up", &self.up, "--up"),
+            ("render.accelerator", &self.accelerator, "--accelerator"),
+        ] {
+            if let Some(value) = value {
+                list.push(over(key, value.clone(), shown)?);
+            }
+        }
+        if let Some(radius) = &self.radius {
+            let value = radius.parse().map_or_else(
+                |_| toml::Value::from(radius.clone()),
+                |number: f64| toml::Value::from(number),
+            );
+            list.push(over("input.radius", value, "--radius")?);
+        }
+        if let Some(value) = self.color() {
+            list.push(over("material.color", value, "--color-by")?);
+        }
+        for (key, value, shown) in [
+            ("output.channels", &self.channels, "--channels"),
+            ("input.parts", &self.parts, "--parts"),
+        ] {
+            if let Some(value) = value {
+                list.push(over(key, value.clone(), shown)?);
+            }
+        }
+        if self.ground {
+            list.push(over("render.ground", true, "--ground")?);
+        }
+        for assignment in &self.set {
+            list.push(Override::parse(assignment).map_err(CliError::Other)?);
+        }
+        Ok(())
+    }
+
+    fn color(&self) -> Option<toml::Value> {
+        let mut table = toml::Table::new();
+        table.insert("attribute".to_owned(), self.color_by.clone()?.into());
+        if let Some(map) = &self.map {
+            table.insert("map".to_owned(), map.clone().into());
+        }
+        if let Some(range) = &self.range {
+            table.insert("range".to_owned(), range.clone().into());
+        }
+        Some(table.into())
+    }
+}
+
+impl Asked {
+    /// Finds the frames.
+    pub(super) fn sequence(&self) -> Result<Sequence, CliError> {
+        let input = &self.manifest.input;
+        let paths = input.path.iter().map(|p| self.base.join(p)).collect();
+        let mut sequence = Sequence::open(&SequenceInput::from_paths(paths))?;
+        if let Some(parts) = &input.parts {
+            sequence.keep_parts(parts)?;
+        }
+        Ok(sequence)
+    }
+
+    /// The directory that paths begin at, absolute.
+    pub(super) fn absolute_base(&self) -> Result<PathBuf, CliError> {
+        absolute(&self.base)
+    }
+}
+
+fn over(key: &str, value: impl Into<toml::Value>, shown: &str) -> Result<Override, CliError> {
+    Override::new(key, value, shown).map_err(CliError::Other)
+}
+
+/// `path` from the root, without looking at what is there.
+pub(super) fn absolute(path: &Path) -> Result<PathBuf, CliError> {
+    if path.as_os_str().is_empty() {
+        return env::current_dir().map_err(CliError::io(Path::new(".")));
+    }
+    std::path::absolute(path).map_err(CliError::io(path))
+}
+
+fn text(path: &Path) -> Result<String, CliError> {
+    let text = path.to_str().map(str::to_owned);
+    text.ok_or_else(|| CliError::other(format!("{}: the path is not UTF-8", path.display())))
+}

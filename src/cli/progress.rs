@@ -1,0 +1,181 @@
+//! What a running job shows: bars on a terminal, one plain line a frame elsewhere, or lines for
+//! programs.
+
+use std::io::{IsTerminal, stderr};
+use std::sync::Mutex;
+use std::time::Instant;
+
+use clap::ValueEnum;
+use indicatif::{ProgressBar, ProgressStyle};
+use serde_json::json;
+
+use crate::pipeline::{Event, Stage};
+use crate::report::FrameReport;
+
+/// How progress is shown.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+pub(super) enum ProgressMode {
+    /// Bars on a terminal, plain lines elsewhere.
+    Auto,
+    /// One line a frame.
+    Plain,
+    /// One JSON object a frame.
+    Json,
+    /// The lines that Open Job Description engines read.
+    Openjd,
+    /// Nothing but warnings and errors.
+    None,
+}
+
+/// Shows the frames of one run.
+pub(super) struct Progress {
+    show: Show,
+    total: usize,
+    start: Instant,
+    finished: Mutex<usize>,
+}
+
+enum Show {
+    Bar(ProgressBar),
+    Plain,
+    Json,
+    Openjd,
+    Nothing,
+}
+
+impl Progress {
+    /// For a run of `total` frames.
+    pub(super) fn new(mode: ProgressMode, total: usize) -> Self {
+        let show = match mode {
+            ProgressMode::Auto if stderr().is_terminal() => Show::Bar(bar(total)),
+            ProgressMode::Auto | ProgressMode::Plain => Show::Plain,
+            ProgressMode::Json => Show::Json,
+            ProgressMode::Openjd => Show::Openjd,
+            ProgressMode::None => Show::Nothing,
+        };
+        Self {
+            show,
+            total,
+            start: Instant::now(),
+            finished: Mutex::new(0),
+        }
+    }
+
+    /// Shows `event`. Called from all stages.
+    pub(super) fn show(&self, event: &Event) {
+        match event {
+            Event::Entered(frame, stage) => self.entered(*frame, *stage),
+            Event::Done(task, report) => {
+                let done = self.count();
+                let image = task.image.display().to_string();
+                self.line(
+                    done,
+                    &format!("frame {}: {image} ({})", task.frame, told(report)),
+                    &json!({"frame": task.frame, "status": "done", "image": image,
+                        "done": done, "total": self.total, "seconds": report.seconds}),
+                );
+            }
+            Event::Failed(frame, reason) => {
+                let done = self.count();
+                self.warn(&format!("error: frame {frame}: {reason}"));
+                self.line(
+                    done,
+                    "",
+                    &json!({"frame": frame, "status": "failed", "reason": reason,
+                        "done": done, "total": self.total}),
+                );
+            }
+            Event::Note(note) => self.warn(&format!("note: {note}")),
+        }
+    }
+
+    /// Takes the bar away.
+    pub(super) fn finish(&self) {
+        if let Show::Bar(bar) = &self.show {
+            bar.finish_and_clear();
+        }
+    }
+
+    fn count(&self) -> usize {
+        let mut finished = self.finished.lock().unwrap_or_else(|e| e.into_inner());
+        *finished += 1;
+        *finished
+    }
+
+    fn entered(&self, frame: i64, stage: Stage) {
+        if let Show::Bar(bar) = &self.show {
+            let what = match stage {
+                Stage::Read => "reading",
+                Stage::Trace => "tracing",
+                Stage::Write => "writing",
+            };
+            bar.set_message(format!("{what} frame {frame}"));
+        }
+    }
+
+    /// One frame has ended, well or badly.
+    fn line(&self, done: usize, plain: &str, json: &serde_json::Value) {
+        match &self.show {
+            Show::Bar(bar) => bar.set_position(done as u64),
+            Show::Plain if plain.is_empty() => {}
+            Show::Plain => eprintln!("[{done}/{}] {plain}, {}", self.total, self.remaining(done)),
+            Show::Json => eprintln!("{json}"),
+            Show::Openjd => openjd(done, self.total, plain),
+            Show::Nothing => {}
+        }
+    }
+
+    fn warn(&self, text: &str) {
+        match &self.show {
+            Show::Bar(bar) => bar.suspend(|| eprintln!("{text}")),
+            _ => eprintln!("{text}"),
+        }
+    }
+
+    fn remaining(&self, done: usize) -> String {
+        let each = self.start.elapsed().as_secs_f64() / done.max(1) as f64;
+        let left = each * (self.total - done.min(self.total)) as f64;
+        format!("{} left", duration(left))
+    }
+}
+
+/// Engines read these on standard output.
+#[expect(clippy::print_stdout, reason = "the protocol of Open Job Description")]
+fn openjd(done: usize, total: usize, plain: &str) {
+    println!(
+        "openjd_progress: {:.1}",
+        100.0 * done as f64 / total.max(1) as f64
+    );
+    if !plain.is_empty() {
+        println!("openjd_status: {plain}");
+    }
+}
+
+fn bar(total: usize) -> ProgressBar {
+    let template = "{bar:30} {pos}/{len} frames  {msg}  {elapsed} gone, {eta} left";
+    let style = ProgressStyle::with_template(template)
+        .expect("the template is well formed")
+        .progress_chars("━╸─");
+    let bar = ProgressBar::new(total as u64).with_style(style);
+    bar.enable_steady_tick(std::time::Duration::from_millis(200));
+    bar
+}
+
+fn told(report: &FrameReport) -> String {
+    let s = &report.seconds;
+    format!(
+        "{} particles, build {:.3} s, trace {:.2} s",
+        report.particles, s.build, s.trace
+    )
+}
+
+/// Seconds as a person says them.
+pub(super) fn duration(seconds: f64) -> String {
+    #[expect(clippy::cast_possible_truncation, reason = "saturates")]
+    let whole = seconds.round().max(0.0) as u64;
+    match whole {
+        0..60 => format!("{whole} s"),
+        60..3600 => format!("{}:{:02} min", whole / 60, whole % 60),
+        _ => format!("{}:{:02} h", whole / 3600, whole % 3600 / 60),
+    }
+}

@@ -1,0 +1,302 @@
+//! `spherule render`: a sequence, or the job of a manifest, to images.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+use spherule_formats::Sequence;
+use spherule_jobs::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode, publish};
+
+use super::job::{Asked, ManifestArgs, absolute};
+use super::progress::{Progress, ProgressMode, duration};
+use super::{CliError, Outcome, signals};
+use crate::manifest::Manifest;
+use crate::pipeline::{self, ImageTask, Setup};
+use crate::report;
+use crate::resolve::{self, color_question};
+use crate::survey::Survey;
+
+/// The manifest that is written beside the images.
+const JOB_FILE: &str = "job.toml";
+
+#[derive(Debug, Args)]
+pub(super) struct RenderArgs {
+    #[command(flatten)]
+    manifest: ManifestArgs,
+    /// Start over, whatever was rendered here before.
+    #[arg(long)]
+    force: bool,
+    /// Keep finished images although settings or inputs have changed.
+    #[arg(long, conflicts_with = "force")]
+    keep_done: bool,
+    /// Threads to use; default: all.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+    /// How progress is shown.
+    #[arg(long, value_enum, default_value = "auto")]
+    progress: ProgressMode,
+}
+
+pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
+    if let Some(threads) = args.threads {
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global()
+            .map_err(|e| CliError::other(format!("--threads {threads}: {e}")))?;
+    }
+    let asked = args.manifest.manifest()?;
+    let sequence = asked.sequence()?;
+    for note in sequence.notes() {
+        eprintln!("note: {note}");
+    }
+    let plan = Plan::new(asked, &sequence)?;
+    plan.guard_manifest(args.force)?;
+    let mut job = plan.open(&sequence, args)?;
+    let (survey, setup) = plan.settle(&job)?;
+    plan.write_manifest()?;
+    tell(&sequence, &survey, &setup);
+    let tasks = plan.tasks(&sequence, &job.pending());
+    let kept = job.selected().len() - tasks.len();
+    if kept > 0 {
+        eprintln!("{kept} of {} frames are done already", job.selected().len());
+    }
+    let interrupt = signals::listen()?;
+    let progress = Progress::new(args.progress, tasks.len());
+    let start = std::time::Instant::now();
+    let ended = pipeline::run(&setup, &sequence, &tasks, &mut job, &interrupt, &|event| {
+        progress.show(&event);
+    });
+    progress.finish();
+    report::job::write(&plan.dir, job.state(), &plan.manifest)
+        .map_err(CliError::io(&plan.dir.join(report::job::FILE)))?;
+    let summary = job.summary();
+    eprintln!(
+        "{} of {} frames done in {}: {}",
+        summary.done,
+        summary.total,
+        duration(start.elapsed().as_secs_f64()),
+        plan.shown_output.display()
+    );
+    if !summary.failed.is_empty() {
+        eprintln!("failed: {}", list(&summary.failed));
+    }
+    match ended {
+        Err(error) => {
+            eprintln!("error: {error}");
+            Ok(Outcome::SomeFailed)
+        }
+        Ok(()) if interrupt.is_raised() && summary.pending > 0 => Ok(Outcome::Interrupted),
+        Ok(()) if summary.done < summary.total => Ok(Outcome::SomeFailed),
+        Ok(()) => Ok(Outcome::Done),
+    }
+}
+
+/// Frame numbers as a range.
+fn list(frames: &[i64]) -> String {
+    spherule_jobs::FrameRange::from_frames(frames.iter().copied())
+        .map_or_else(String::new, |r| r.to_string())
+}
+
+/// A job before anything is written.
+struct Plan {
+    /// Where the images go: everything of the job lies there. Absolute.
+    dir: PathBuf,
+    /// With paths relative to `dir`.
+    manifest: Manifest,
+    /// The manifest's own file, absolute.
+    file: Option<PathBuf>,
+    /// The images as the user named them.
+    shown_output: PathBuf,
+}
+
+impl Plan {
+    fn new(asked: Asked, sequence: &Sequence) -> Result<Self, CliError> {
+        let base = asked.absolute_base()?;
+        let mut manifest = asked.manifest;
+        let chosen = match &manifest.input.frames {
+            None => sequence.frames().len(),
+            Some(range) => {
+                let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+                let chosen = range.select(&numbers).len();
+                if chosen == 0 {
+                    return Err(CliError::other(format!(
+                        "input.frames: {range} has none of the frames that there are: {}",
+                        list(&numbers)
+                    )));
+                }
+                chosen
+            }
+        };
+        manifest.check_frame_count(chosen)?;
+        let shown_output = PathBuf::from(manifest.output.path.as_str());
+        let dir = plain(&base.join(manifest.output.path.dir()));
+        manifest.rebase(&base, &dir).map_err(CliError::Other)?;
+        let file = asked
+            .file
+            .as_deref()
+            .map(absolute)
+            .transpose()?
+            .map(|f| plain(&f));
+        Ok(Self {
+            dir,
+            manifest,
+            file,
+            shown_output,
+        })
+    }
+
+    fn job_file(&self) -> PathBuf {
+        self.dir.join(JOB_FILE)
+    }
+
+    /// Whether the manifest that was given is the one that would be written.
+    fn is_own_manifest(&self) -> bool {
+        self.file.as_deref() == Some(&self.job_file())
+    }
+
+    /// Refuses to overwrite a `job.toml` that belongs to no job of ours.
+    fn guard_manifest(&self, force: bool) -> Result<(), CliError> {
+        let path = self.job_file();
+        if force || self.is_own_manifest() || !path.exists() || Job::peek(&self.dir)?.is_some() {
+            return Ok(());
+        }
+        Err(CliError::other(format!(
+            "{}: is in the way of this job's own manifest; render that file, choose another \
+             output directory, or overwrite it with --force",
+            path.display()
+        )))
+    }
+
+    fn image(&self, frame: i64) -> PathBuf {
+        self.dir.join(self.manifest.output.path.path_for(frame))
+    }
+
+    fn preview(&self, frame: i64) -> Option<PathBuf> {
+        let path = || {
+            self.dir
+                .join(self.manifest.output.path.preview_path_for(frame))
+        };
+        self.manifest.output.preview.then(path)
+    }
+
+    fn open(&self, sequence: &Sequence, args: &RenderArgs) -> Result<Job, CliError> {
+        let frames = sequence
+            .frames()
+            .iter()
+            .enumerate()
+            .map(|(index, frame)| FrameRequest {
+                number: frame.number,
+                inputs: sequence
+                    .inputs(index)
+                    .into_iter()
+                    .map(Path::to_owned)
+                    .collect(),
+                outputs: std::iter::once(self.image(frame.number))
+                    .chain(self.preview(frame.number))
+                    .collect(),
+            })
+            .collect();
+        let request = JobRequest {
+            worker: DEFAULT_WORKER.to_owned(),
+            settings: self.manifest.settings(),
+            frames,
+            selection: self.manifest.input.frames.clone(),
+            mode: match (args.force, args.keep_done) {
+                (true, _) => Mode::Force,
+                (_, true) => Mode::KeepDone,
+                _ => Mode::Resume,
+            },
+        };
+        let survey = |_: Option<&Value>| -> Result<Value, CliError> {
+            eprintln!("looking at the sequence");
+            let survey = Survey::of(sequence, color_question(&self.manifest))?;
+            resolve::setup(&self.manifest, &survey).map_err(|e| CliError::Other(e.to_string()))?;
+            serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
+        };
+        Ok(Job::open(&self.dir, request, survey)?)
+    }
+
+    /// The pictures, by what was found when the job began.
+    fn settle(&self, job: &Job) -> Result<(Survey, Setup), CliError> {
+        let survey: Survey = serde_json::from_value(job.resolved().clone()).map_err(|e| {
+            CliError::other(format!(
+                "{}: its resolved values cannot be read ({e}); start over with --force",
+                self.dir.join(spherule_jobs::PLAN_FILE).display()
+            ))
+        })?;
+        let setup =
+            resolve::setup(&self.manifest, &survey).map_err(|e| CliError::Other(e.to_string()))?;
+        Ok((survey, setup))
+    }
+
+    /// Writes the manifest beside the images, unless it is what was given or stands there already.
+    fn write_manifest(&self) -> Result<(), CliError> {
+        let path = self.job_file();
+        let text = self.manifest.to_commented_toml();
+        if self.is_own_manifest() || fs::read_to_string(&path).is_ok_and(|old| old == text) {
+            return Ok(());
+        }
+        publish(&path, text.as_bytes()).map_err(CliError::io(&path))
+    }
+
+    fn tasks(&self, sequence: &Sequence, pending: &[i64]) -> Vec<ImageTask> {
+        let frames = sequence.frames();
+        let task = |number: &i64| {
+            let index = frames.binary_search_by_key(number, |f| f.number).ok()?;
+            Some(ImageTask {
+                frame: *number,
+                index,
+                image: self.image(*number),
+                preview: self.preview(*number),
+            })
+        };
+        pending.iter().filter_map(task).collect()
+    }
+}
+
+/// `path` without `.` and `..`, by its words alone.
+fn plain(path: &Path) -> PathBuf {
+    let mut out = PathBuf::new();
+    for component in path.components() {
+        match component {
+            std::path::Component::CurDir => {}
+            std::path::Component::ParentDir => {
+                out.pop();
+            }
+            other => out.push(other),
+        }
+    }
+    out
+}
+
+/// What was decided for the user, so that nothing is a surprise.
+fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+    let count = sequence.frames().len();
+    eprintln!(
+        "{count} frame{}, up to {} particles",
+        if count == 1 { "" } else { "s" },
+        survey.most_particles
+    );
+    match &setup.radius {
+        pipeline::RadiusRule::Common(radius) => eprintln!("radius {radius}"),
+        pipeline::RadiusRule::FileOr(_) if survey.has_radii => eprintln!("radius from the files"),
+        pipeline::RadiusRule::FileOr(radius) => {
+            eprintln!("radius {radius}, half the usual distance of neighbours (--radius sets it)");
+        }
+        pipeline::RadiusRule::Attribute { name, scale } => {
+            eprintln!("radius {scale} x attribute `{name}`");
+        }
+    }
+    if let pipeline::ColorRule::Attribute { name, .. } = &setup.color
+        && let Some(color) = &survey.color
+    {
+        eprintln!(
+            "colour by `{name}`, seen from {} to {}",
+            color.low, color.high
+        );
+    }
+    if survey.origin != glam::DVec3::ZERO {
+        eprintln!("origin {}: the particles are far from zero", survey.origin);
+    }
+}

@@ -1,0 +1,58 @@
+//! Everything about a job's pictures that is the same for every frame.
+
+use glam::{DVec3, Vec3};
+
+use crate::output::{ExrOptions, PreviewOptions};
+use crate::render::RenderSettings;
+use crate::scene::{ColorMap, Scene};
+
+/// Where radii come from.
+#[derive(Debug, Clone, PartialEq)]
+pub enum RadiusRule {
+    /// What the frame brings, or this where it brings none.
+    FileOr(f32),
+    /// One for all.
+    Common(f32),
+    /// A scalar attribute times a factor.
+    Attribute {
+        /// Its name.
+        name: String,
+        /// The factor.
+        scale: f32,
+    },
+}
+
+/// Where base colours come from.
+#[derive(Debug, Clone)]
+pub enum ColorRule {
+    /// One for all, linear RGB.
+    Constant(Vec3),
+    /// An attribute through a map; vectors by magnitude.
+    Attribute {
+        /// Its name.
+        name: String,
+        /// The map with the range of the whole sequence.
+        map: ColorMap,
+    },
+}
+
+/// The pictures of a job.
+#[derive(Debug, Clone)]
+pub struct Setup {
+    /// World position that all coordinates are relative to.
+    pub origin: DVec3,
+    /// Radii under this cannot be told from nothing and are raised to it.
+    pub least_radius: f32,
+    /// Where radii come from.
+    pub radius: RadiusRule,
+    /// Where colours come from.
+    pub color: ColorRule,
+    /// Camera, lights, material, background, ground.
+    pub scene: Scene,
+    /// Image size, samples, depth, channels.
+    pub render: RenderSettings,
+    /// How the EXR is written.
+    pub exr: ExrOptions,
+    /// How the PNG is made.
+    pub preview: PreviewOptions,
+}

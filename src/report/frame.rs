@@ -1,0 +1,137 @@
+//! The report of one frame, as it stands in the ledger and in `report.json`.
+
+use std::time::Duration;
+
+use serde::{Deserialize, Serialize};
+
+use crate::accel::BuildReport;
+use crate::render::RayCounts;
+
+/// What one image took. Times are wall-clock seconds, sizes bytes.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrameReport {
+    /// Particles drawn.
+    pub particles: u64,
+    /// Particles left out because a coordinate was NaN or infinite.
+    pub dropped: u64,
+    /// Particles whose radius was raised to the least that can be drawn.
+    pub clamped_radii: u64,
+    /// Pixels whose colour was too bright for half floats.
+    pub clamped_pixels: u64,
+    /// Time by stage.
+    pub seconds: StageSeconds,
+    /// The acceleration structure.
+    pub build: BuildSummary,
+    /// Memory by purpose.
+    pub bytes: FrameBytes,
+    /// Rays by purpose.
+    pub rays: RaySummary,
+    /// Memory of the process when the frame was done.
+    pub rss: RssSummary,
+}
+
+/// Wall-clock seconds of the stages; neighbouring frames overlap.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(missing_docs, reason = "the names say all")]
+pub struct StageSeconds {
+    pub read: f64,
+    pub build: f64,
+    pub trace: f64,
+    pub encode: f64,
+}
+
+/// What [`BuildReport`] says, in the form of the files.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(missing_docs, reason = "see `BuildReport`")]
+pub struct BuildSummary {
+    pub structure: String,
+    pub order: String,
+    pub simd: String,
+    pub nodes: u64,
+    pub leaves: u64,
+    pub depth: u32,
+    pub sah_cost: f64,
+    /// Seconds by phase, in order.
+    pub phases: Vec<(String, f64)>,
+}
+
+/// Bytes by purpose.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct FrameBytes {
+    /// Positions and radii in tree order.
+    pub positions: u64,
+    /// Nodes and the way back to the file's order.
+    pub structure: u64,
+    /// Most held while building, the frame as read not counted.
+    pub build_peak: u64,
+}
+
+/// Rays by purpose.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(missing_docs, reason = "the names say all")]
+pub struct RaySummary {
+    pub primary: u64,
+    pub shadow: u64,
+    pub reflection: u64,
+    pub refraction: u64,
+}
+
+/// Resident memory of the process, the largest seen so far.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct RssSummary {
+    /// Heap and stacks.
+    pub anonymous_peak: u64,
+    /// Mapped files.
+    pub file_peak: u64,
+    /// Everything, as the kernel's `VmHWM` has it.
+    pub total_peak: u64,
+}
+
+impl From<RayCounts> for RaySummary {
+    fn from(rays: RayCounts) -> Self {
+        Self {
+            primary: rays.primary,
+            shadow: rays.shadow,
+            reflection: rays.reflection,
+            refraction: rays.refraction,
+        }
+    }
+}
+
+impl FrameReport {
+    /// Takes over what the builder says.
+    pub fn set_build(&mut self, report: &BuildReport) {
+        self.seconds.build = report.total.as_secs_f64();
+        self.build = BuildSummary {
+            structure: report.structure.to_owned(),
+            order: report.order.to_owned(),
+            simd: report.simd.to_owned(),
+            nodes: report.nodes,
+            leaves: report.leaves,
+            depth: report.depth,
+            sah_cost: report.sah_cost,
+            phases: report
+                .phases
+                .iter()
+                .map(|p| (p.name.to_owned(), p.time.as_secs_f64()))
+                .collect(),
+        };
+        self.bytes = FrameBytes {
+            positions: report.position_bytes,
+            structure: report.structure_bytes,
+            build_peak: report.peak_bytes,
+        };
+    }
+
+    /// Sum of the stages.
+    pub fn total(&self) -> Duration {
+        let s = &self.seconds;
+        Duration::from_secs_f64(s.read + s.build + s.trace + s.encode)
+    }
+}

@@ -1,0 +1,112 @@
+//! `report.json`: the job so far, from its ledger.
+
+use std::io;
+use std::path::Path;
+
+use serde_json::{Value, json};
+use spherule_jobs::{JobState, Status, publish};
+
+use super::frame::FrameReport;
+use crate::accel::simd::SimdLevel;
+use crate::manifest::Manifest;
+
+/// Name of the report beside the images.
+pub const FILE: &str = "report.json";
+
+/// Writes the report of the job in `dir`.
+///
+/// # Errors
+/// It cannot be written.
+pub fn write(dir: &Path, state: &JobState, manifest: &Manifest) -> io::Result<()> {
+    let text = format!("{:#}\n", of(state, manifest));
+    publish(&dir.join(FILE), text.as_bytes())
+}
+
+/// The report as JSON.
+pub fn of(state: &JobState, manifest: &Manifest) -> Value {
+    let frames: Vec<Value> = state
+        .plan()
+        .frames()
+        .iter()
+        .map(|planned| {
+            let mut frame = json!({
+                "frame": planned.number,
+                "image": planned.outputs.first(),
+                "status": "pending",
+            });
+            if let (Some(entry), Some(into)) =
+                (state.ledger().entry(planned.number), frame.as_object_mut())
+            {
+                let done = entry.status == Status::Done;
+                into.insert("status".into(), json!(if done { "done" } else { "failed" }));
+                if let Some(reason) = &entry.reason {
+                    into.insert("reason".into(), json!(reason));
+                }
+                if let Value::Object(details) = &entry.details {
+                    into.extend(details.clone());
+                }
+            }
+            frame
+        })
+        .collect();
+    let settings: serde_json::Map<String, Value> = manifest
+        .settings()
+        .into_iter()
+        .map(|(k, v)| (k, json!(v)))
+        .collect();
+    json!({
+        "frames": frames,
+        "totals": totals(state),
+        "settings": settings,
+        "machine": {
+            "threads": rayon::current_num_threads(),
+            "simd": SimdLevel::best().name(),
+            "os": std::env::consts::OS,
+            "arch": std::env::consts::ARCH,
+            "spherule": env!("CARGO_PKG_VERSION"),
+        },
+    })
+}
+
+/// Sums over the frames that are done.
+fn totals(state: &JobState) -> Value {
+    let summary = state.summary();
+    let mut sums = FrameReport::default();
+    for entry in state
+        .ledger()
+        .entries()
+        .filter(|e| e.status == Status::Done)
+    {
+        let Ok(frame) = serde_json::from_value::<FrameReport>(entry.details.clone()) else {
+            continue;
+        };
+        sums.particles += frame.particles;
+        sums.dropped += frame.dropped;
+        sums.clamped_radii += frame.clamped_radii;
+        sums.clamped_pixels += frame.clamped_pixels;
+        sums.seconds.read += frame.seconds.read;
+        sums.seconds.build += frame.seconds.build;
+        sums.seconds.trace += frame.seconds.trace;
+        sums.seconds.encode += frame.seconds.encode;
+        sums.rays.primary += frame.rays.primary;
+        sums.rays.shadow += frame.rays.shadow;
+        sums.rays.reflection += frame.rays.reflection;
+        sums.rays.refraction += frame.rays.refraction;
+        sums.rss.anonymous_peak = sums.rss.anonymous_peak.max(frame.rss.anonymous_peak);
+        sums.rss.file_peak = sums.rss.file_peak.max(frame.rss.file_peak);
+        sums.rss.total_peak = sums.rss.total_peak.max(frame.rss.total_peak);
+    }
+    json!({
+        "frames": summary.total,
+        "done": summary.done,
+        "failed": summary.failed,
+        "pending": summary.pending,
+        "particles": sums.particles,
+        "dropped": sums.dropped,
+        "clamped_radii": sums.clamped_radii,
+        "clamped_pixels": sums.clamped_pixels,
+        "seconds": sums.seconds,
+        "rays": sums.rays,
+        "rss": sums.rss,
+    })
+}

@@ -1,0 +1,343 @@
+//! From what was asked ([`Manifest`]) and what was found ([`Survey`]) to pictures ([`Setup`]).
+
+use glam::{DVec3, Vec3};
+
+use crate::manifest::{
+    Background as BackgroundSetting, CameraMode, ColorSetting, Falloff as FalloffSetting,
+    GroundHeight, LightKind, Manifest, RadiusSetting,
+};
+use crate::output::{Compression, ExrOptions, PreviewOptions};
+use crate::pipeline::{ColorRule, RadiusRule, Setup, attribute_list};
+use crate::render::{Channels, RenderSettings};
+use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
+use crate::scene::{
+    Background, Bounds, Camera, CameraError, CameraView, ColorMap, Falloff, Framing, Ground, Light,
+    Material, Scene, default_lights, material,
+};
+use crate::survey::{ColorQuestion, Survey};
+
+/// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
+const LEAST_RADIUS: f64 = 1e-6;
+
+/// Why there can be no pictures.
+#[derive(Debug, thiserror::Error)]
+pub enum ResolveError {
+    /// A value is understood but not drawn by this version.
+    #[error("{key}: {what}")]
+    Unsupported {
+        /// The manifest's key.
+        key: &'static str,
+        /// What is wrong and what to do.
+        what: String,
+    },
+    /// The attribute that is asked for is nowhere in the sequence.
+    #[error("{key}: no attribute `{name}` in any frame looked at; there are {has}")]
+    MissingAttribute {
+        /// The manifest's key.
+        key: &'static str,
+        /// The attribute.
+        name: String,
+        /// What there is.
+        has: String,
+    },
+    /// Neither the frames nor their spacing tell a radius.
+    #[error("input.radius: the frames bring none and are too sparse to estimate it; give a length")]
+    NoRadius,
+    /// The camera sees nothing.
+    #[error("camera: {0}")]
+    Camera(#[from] CameraError),
+}
+
+/// What the survey has to find out about colours.
+pub fn color_question(manifest: &Manifest) -> ColorQuestion<'_> {
+    match &manifest.material.color {
+        ColorSetting::Auto => ColorQuestion::Speed,
+        ColorSetting::Rgb(_) => ColorQuestion::None,
+        ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
+    }
+}
+
+/// Settles everything about the pictures of a job.
+///
+/// # Errors
+/// See [`ResolveError`]; the messages name the manifest's keys.
+pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError> {
+    let radius = radius_rule(manifest, survey)?;
+    let color = color_rule(manifest, survey)?;
+    let up = up(manifest, survey);
+    // Spheres reach beyond their centres.
+    let reach = DVec3::splat(f64::from(typical_radius(&radius)));
+    let bounds = Bounds {
+        min: survey.min - reach,
+        max: survey.max + reach,
+    };
+    let image = &manifest.image;
+    let aspect = f64::from(image.width) / f64::from(image.height);
+    let view = view(manifest, &bounds, up, aspect)?;
+    let camera = Camera::new(&view, aspect, survey.origin)?;
+    let lights = if manifest.lights.is_empty() {
+        default_lights(&bounds, up, &view)
+    } else {
+        lights(manifest, survey.origin)
+    };
+    let scene = Scene {
+        origin: survey.origin,
+        camera,
+        lights,
+        ambient_light: crate::scene::DEFAULT_AMBIENT_LIGHT,
+        material: surface_material(manifest),
+        background: background(manifest, up.as_vec3()),
+        ground: ground(manifest, &bounds, up, survey.origin),
+    };
+    let output = &manifest.output;
+    let channels = Channels::from_names(output.channels.iter().map(|c| c.name())).map_err(|e| {
+        ResolveError::Unsupported {
+            key: "output.channels",
+            what: e.to_string(),
+        }
+    })?;
+    let mut render = RenderSettings::new(image.width, image.height);
+    render.samples = image.samples;
+    render.max_depth = manifest.render.max_depth;
+    render.channels = channels;
+    render.transparent_background = output.transparent;
+    let backdrop = output
+        .transparent
+        .then(|| scene.background.color(scene.camera.forward()));
+    Ok(Setup {
+        origin: survey.origin,
+        least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
+        radius,
+        color,
+        exr: ExrOptions {
+            compression: compression(manifest),
+            frames_per_second: output.fps.map(fps),
+            world_to_camera: Some(scene.camera.world_to_camera()),
+            comments: Some(COMMENTS.to_owned()),
+            custom: None,
+            single_thread: rayon::current_num_threads() == 1,
+        },
+        preview: PreviewOptions {
+            exposure: output.preview_exposure,
+            backdrop,
+        },
+        scene,
+        render,
+    })
+}
+
+/// For whoever opens an image years later.
+const COMMENTS: &str = "linear RGB premultiplied by A; A is coverage by particles and ground; \
+Z is the distance along the view axis (infinite where nothing is hit); N is the world-space \
+normal; id.I is the particle's id, 4294967295 where there is none; Z, N and id come from the \
+nearest of a pixel's samples";
+
+#[expect(clippy::cast_possible_truncation, reason = "the renderer works in f32")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+fn up(manifest: &Manifest, survey: &Survey) -> DVec3 {
+    let axis = manifest.input.up.map(|up| DVec3::from_array(up.vector()));
+    axis.unwrap_or(survey.up)
+}
+
+fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, ResolveError> {
+    Ok(match &manifest.input.radius {
+        RadiusSetting::Length(radius) => RadiusRule::Common(narrow(*radius)),
+        RadiusSetting::Attribute { attribute, scale } => {
+            require_attribute(survey, "input.radius", attribute)?;
+            RadiusRule::Attribute {
+                name: attribute.clone(),
+                scale: narrow(*scale),
+            }
+        }
+        RadiusSetting::Auto => match survey.radius {
+            Some(radius) => RadiusRule::FileOr(radius),
+            // Every frame brings its own, or there are no particles to need one.
+            None if survey.has_radii || survey.most_particles == 0 => RadiusRule::FileOr(0.0),
+            None => return Err(ResolveError::NoRadius),
+        },
+    })
+}
+
+fn typical_radius(rule: &RadiusRule) -> f32 {
+    match rule {
+        RadiusRule::Common(radius) | RadiusRule::FileOr(radius) => *radius,
+        RadiusRule::Attribute { .. } => 0.0,
+    }
+}
+
+fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(), ResolveError> {
+    let known = |a: &String| a.eq_ignore_ascii_case(name);
+    if survey.most_particles == 0 || survey.attributes.iter().any(known) {
+        return Ok(());
+    }
+    Err(ResolveError::MissingAttribute {
+        key,
+        name: name.to_owned(),
+        has: attribute_list(survey.attributes.iter().map(String::as_str)),
+    })
+}
+
+fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
+    let mapped = |name: &str, map: &str, range: Option<[f64; 2]>| {
+        let found = survey
+            .color
+            .as_ref()
+            .map_or([0.0, 1.0], |c| [c.low, c.high]);
+        let [low, high] = range.unwrap_or(found);
+        let map = ColorMap::new(map, narrow(low), narrow(high)).map_err(|e| {
+            ResolveError::Unsupported {
+                key: "material.color.map",
+                what: e.to_string(),
+            }
+        })?;
+        Ok(ColorRule::Attribute {
+            name: name.to_owned(),
+            map,
+        })
+    };
+    match &manifest.material.color {
+        ColorSetting::Rgb(rgb) => Ok(ColorRule::Constant(Vec3::from_array(*rgb))),
+        ColorSetting::Auto => match &survey.color {
+            Some(color) => mapped(&color.attribute, "viridis", None),
+            None => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
+        },
+        ColorSetting::Attribute {
+            attribute,
+            map,
+            range,
+        } => {
+            require_attribute(survey, "material.color.attribute", attribute)?;
+            mapped(attribute, map.name(), *range)
+        }
+    }
+}
+
+fn view(
+    manifest: &Manifest,
+    bounds: &Bounds,
+    up: DVec3,
+    aspect: f64,
+) -> Result<CameraView, ResolveError> {
+    let camera = &manifest.camera;
+    let up = camera.up.map_or(up, DVec3::from_array);
+    match camera.mode {
+        CameraMode::Auto => Ok(Camera::framing(
+            bounds,
+            &Framing {
+                up,
+                azimuth: camera.azimuth.unwrap_or(DEFAULT_AZIMUTH),
+                elevation: camera.elevation.unwrap_or(DEFAULT_ELEVATION),
+                fov: camera.fov,
+                aspect,
+            },
+        )),
+        CameraMode::Fixed => {
+            let point = |p: Option<[f64; 3]>| DVec3::from_array(p.unwrap_or_default());
+            Ok(CameraView {
+                eye: point(camera.eye),
+                look_at: point(camera.look_at),
+                up,
+                fov: camera.fov,
+            })
+        }
+        CameraMode::Turntable | CameraMode::Keys => Err(ResolveError::Unsupported {
+            key: "camera.mode",
+            what: format!(
+                "{} is not in this version; auto and fixed are",
+                camera.mode.name()
+            ),
+        }),
+    }
+}
+
+fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
+    manifest
+        .lights
+        .iter()
+        .filter_map(|light| {
+            let radiance = Vec3::from_array(light.color) * light.intensity;
+            match &light.kind {
+                LightKind::Point { position, falloff } => Some(Light::point_with(
+                    DVec3::from_array(*position),
+                    origin,
+                    radiance,
+                    match falloff {
+                        FalloffSetting::None => Falloff::None,
+                        FalloffSetting::InverseSquare => Falloff::InverseSquare,
+                    },
+                )),
+                LightKind::Directional { direction } => {
+                    Light::directional(DVec3::from_array(*direction).as_vec3(), radiance)
+                }
+            }
+        })
+        .collect()
+}
+
+fn surface_material(manifest: &Manifest) -> Material {
+    let m = &manifest.material;
+    Material {
+        ambient: m.ambient,
+        diffuse: m.diffuse,
+        specular: m.specular,
+        shininess: m.shininess,
+        ior: m.ior,
+        reflection: m.reflection,
+        transmission: m.transmission,
+    }
+}
+
+fn background(manifest: &Manifest, up: Vec3) -> Background {
+    match &manifest.render.background {
+        BackgroundSetting::Auto => Background::default_for(up),
+        BackgroundSetting::Plain(rgb) => Background::Constant(Vec3::from_array(*rgb)),
+        BackgroundSetting::Gradient { bottom, top } => Background::Gradient {
+            bottom: Vec3::from_array(*bottom),
+            top: Vec3::from_array(*top),
+            up,
+        },
+    }
+}
+
+fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Option<Ground> {
+    let render = &manifest.render;
+    if !render.ground {
+        return None;
+    }
+    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
+    if let GroundHeight::At(height) = render.ground_height {
+        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
+        ground.center += (relative - ground.height) * ground.up;
+        ground.height = relative;
+    }
+    ground.color = Vec3::from_array(render.ground_color);
+    Some(ground)
+}
+
+fn compression(manifest: &Manifest) -> Compression {
+    use crate::manifest::Compression as Setting;
+    match manifest.output.compression {
+        Setting::None => Compression::None,
+        Setting::Rle => Compression::Rle,
+        Setting::Zip => Compression::Zip,
+        Setting::Zips => Compression::Zips,
+        Setting::Piz => Compression::Piz,
+    }
+}
+
+/// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "clamped to what the attribute holds"
+)]
+fn fps(rate: f64) -> (i32, u32) {
+    let whole = rate.round();
+    if (rate - whole).abs() < 1e-9 {
+        ((whole.min(1e9)) as i32, 1)
+    } else {
+        (((rate * 1000.0).round().min(2e9)) as i32, 1000)
+    }
+}
