@@ -1,0 +1,10 @@
+//! The program from outside, and the library across its rooms: one binary, a module a subject.
+
+mod harness;
+
+mod bad_input;
+mod damaged;
+mod golden;
+mod resume;
+mod samples;
+mod thesis;
