@@ -4,13 +4,12 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-/// Bottom of the default gradient (linear RGB): a dim slate grey, dark enough for
-/// light particles and light enough for the dark ends of colour maps.
-pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.062, 0.070, 0.086);
+/// Bottom of the default gradient (linear RGB): a light grey as in a studio. The dark ends of
+/// colour maps stand out against it, it prints, and mirrored in particles it rounds them.
+pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.45, 0.47, 0.50);
 
-/// Top of the default gradient (linear RGB): darker and cooler, so that lit particles stand out
-/// and the picture does not tip over.
-pub const DEFAULT_TOP: Vec3 = Vec3::new(0.010, 0.014, 0.024);
+/// Top of the default gradient (linear RGB): a lighter, cooler grey, as skies are.
+pub const DEFAULT_TOP: Vec3 = Vec3::new(0.75, 0.79, 0.85);
 
 /// Colour by direction, linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
