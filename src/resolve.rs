@@ -14,7 +14,7 @@ use crate::scene::{
     Background, Bounds, Camera, CameraError, CameraView, ColorMap, Falloff, Framing, Ground, Light,
     Material, Scene, default_lights, material,
 };
-use crate::survey::{ColorQuestion, Survey};
+use crate::survey::{ColorQuestion, Question, Survey};
 
 /// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -48,12 +48,15 @@ pub enum ResolveError {
     Camera(#[from] CameraError),
 }
 
-/// What the survey has to find out about colours.
-pub fn color_question(manifest: &Manifest) -> ColorQuestion<'_> {
-    match &manifest.material.color {
-        ColorSetting::Auto => ColorQuestion::Speed,
-        ColorSetting::Rgb(_) => ColorQuestion::None,
-        ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
+/// What the survey has to find out.
+pub fn question(manifest: &Manifest) -> Question<'_> {
+    Question {
+        color: match &manifest.material.color {
+            ColorSetting::Auto => ColorQuestion::Speed,
+            ColorSetting::Rgb(_) => ColorQuestion::None,
+            ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
+        },
+        radius: manifest.input.radius == RadiusSetting::Auto,
     }
 }
 

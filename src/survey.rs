@@ -64,6 +64,15 @@ pub struct ColorRange {
     pub high: f64,
 }
 
+/// What a job needs to know.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Question<'a> {
+    /// About colours.
+    pub color: ColorQuestion<'a>,
+    /// Whether a radius has to be estimated where the frames bring none.
+    pub radius: bool,
+}
+
 /// What is asked about colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColorQuestion<'a> {
@@ -94,7 +103,7 @@ impl Survey {
     ///
     /// # Errors
     /// If none of the frames can be read, why the first one cannot.
-    pub fn of(sequence: &Sequence, color: ColorQuestion) -> Result<Self, FrameError> {
+    pub fn of(sequence: &Sequence, question: Question) -> Result<Self, FrameError> {
         let mut totals = Totals {
             bounds: None,
             radius: None,
@@ -109,7 +118,7 @@ impl Survey {
         let mut failure = None;
         for index in spread(sequence.frames().len()) {
             match sequence.load_raw(index) {
-                Ok(raw) => totals.take_in(raw, color),
+                Ok(raw) => totals.take_in(raw, question),
                 Err(error) => {
                     failure.get_or_insert(error);
                 }
@@ -154,7 +163,7 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
-    fn take_in(&mut self, raw: RawParticles, color: ColorQuestion) {
+    fn take_in(&mut self, raw: RawParticles, question: Question) {
         self.frames += 1;
         self.most_particles = self.most_particles.max(raw.positions.len());
         self.attributes
@@ -168,7 +177,7 @@ impl Totals {
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
         }
-        let wanted = match color {
+        let wanted = match question.color {
             ColorQuestion::None => None,
             ColorQuestion::Speed => self.velocity.clone(),
             ColorQuestion::Attribute(name) => Some(name.to_owned()),
@@ -186,7 +195,9 @@ impl Totals {
             }
             self.color = Some(name);
         }
-        self.take_in_radius(&frame);
+        if question.radius {
+            self.take_in_radius(&frame);
+        }
     }
 
     fn take_in_radius(&mut self, frame: &ParticleFrame) {

@@ -11,10 +11,10 @@ use spherule_jobs::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode, publish
 use super::job::{Asked, ManifestArgs, absolute};
 use super::progress::{Progress, ProgressMode, duration};
 use super::{CliError, Outcome, signals};
-use crate::manifest::Manifest;
+use crate::manifest::{Manifest, without_dots};
 use crate::pipeline::{self, ImageTask, Setup};
 use crate::report;
-use crate::resolve::{self, color_question};
+use crate::resolve::{self, question};
 use crate::survey::Survey;
 
 /// The manifest that is written beside the images.
@@ -130,14 +130,14 @@ impl Plan {
         };
         manifest.check_frame_count(chosen)?;
         let shown_output = PathBuf::from(manifest.output.path.as_str());
-        let dir = plain(&base.join(manifest.output.path.dir()));
+        let dir = without_dots(&base.join(manifest.output.path.dir()));
         manifest.rebase(&base, &dir).map_err(CliError::Other)?;
         let file = asked
             .file
             .as_deref()
             .map(absolute)
             .transpose()?
-            .map(|f| plain(&f));
+            .map(|f| without_dots(&f));
         Ok(Self {
             dir,
             manifest,
@@ -210,7 +210,7 @@ impl Plan {
         };
         let survey = |_: Option<&Value>| -> Result<Value, CliError> {
             eprintln!("looking at the sequence");
-            let survey = Survey::of(sequence, color_question(&self.manifest))?;
+            let survey = Survey::of(sequence, question(&self.manifest))?;
             resolve::setup(&self.manifest, &survey).map_err(|e| CliError::Other(e.to_string()))?;
             serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
         };
@@ -253,21 +253,6 @@ impl Plan {
         };
         pending.iter().filter_map(task).collect()
     }
-}
-
-/// `path` without `.` and `..`, by its words alone.
-fn plain(path: &Path) -> PathBuf {
-    let mut out = PathBuf::new();
-    for component in path.components() {
-        match component {
-            std::path::Component::CurDir => {}
-            std::path::Component::ParentDir => {
-                out.pop();
-            }
-            other => out.push(other),
-        }
-    }
-    out
 }
 
 /// What was decided for the user, so that nothing is a surprise.

@@ -32,8 +32,8 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
     if Path::new(path).is_absolute() {
         return Ok(path.to_owned());
     }
-    let target = plain(&from.join(path));
-    let base = plain(to);
+    let target = without_dots(&from.join(path));
+    let base = without_dots(to);
     let shared = target
         .components()
         .zip(base.components())
@@ -54,7 +54,7 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
 }
 
 /// Without `.` and, where possible, `..`.
-fn plain(path: &Path) -> PathBuf {
+pub fn without_dots(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
         match component {
