@@ -4,10 +4,8 @@ use super::color::{Background, ColorSetting, rgb};
 use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml};
-
-const MAX_SIDE: u32 = 65_536;
-const MAX_SAMPLES: u32 = 4096;
-const MAX_DEPTH: u32 = 64;
+use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
+use crate::scene::{self, ground};
 
 /// `[image]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -104,22 +102,31 @@ impl Default for Render {
             background: Background::Auto,
             ground: false,
             ground_height: GroundHeight::Auto,
-            ground_color: [0.25, 0.25, 0.25],
+            ground_color: ground::DEFAULT_COLOR.to_array(),
         }
     }
 }
 
 impl Default for Material {
     fn default() -> Self {
+        let scene::Material {
+            ambient,
+            diffuse,
+            specular,
+            shininess,
+            ior,
+            reflection,
+            transmission,
+        } = scene::Material::DEFAULT;
         Self {
             color: ColorSetting::Auto,
-            ambient: 0.1,
-            diffuse: 0.7,
-            specular: 0.2,
-            shininess: 32.0,
-            ior: 1.33,
-            reflection: 1.0,
-            transmission: 0.0,
+            ambient,
+            diffuse,
+            specular,
+            shininess,
+            ior,
+            reflection,
+            transmission,
         }
     }
 }

@@ -36,6 +36,8 @@ pub enum LoadError {
 pub struct LoadedFrame {
     /// The image that it is for.
     pub task: ImageTask,
+    /// What the user should know of it.
+    pub notes: Vec<String>,
     /// Centres relative to the origin.
     pub centers: Vec<Vec3>,
     /// Radii.
@@ -66,7 +68,8 @@ pub fn load_frame(
     task: &ImageTask,
 ) -> Result<LoadedFrame, LoadError> {
     let start = Instant::now();
-    let frame = sequence.load(task.index, setup.origin)?;
+    let (raw, mut notes) = sequence.load_noted(task.index)?;
+    let frame = ParticleFrame::from_raw(raw, setup.origin);
     let file = || {
         let inputs = sequence.inputs(task.index);
         inputs
@@ -74,6 +77,20 @@ pub fn load_frame(
             .map_or_else(String::new, |p| p.display().to_string())
     };
     let (radius, clamped_radii) = radii(setup, &frame, &file)?;
+    for (count, what) in [
+        (
+            frame.dropped,
+            "particles left out: a coordinate is not finite",
+        ),
+        (
+            clamped_radii,
+            "radii raised: too small to be seen, or no number",
+        ),
+    ] {
+        if count > 0 {
+            notes.push(format!("frame {}: {count} {what}", task.frame));
+        }
+    }
     let values = match &setup.color {
         ColorRule::Constant(_) => Vec::new(),
         ColorRule::Attribute { name, .. } => match attribute(&frame, name, "colour", &file)? {
@@ -90,6 +107,7 @@ pub fn load_frame(
     };
     Ok(LoadedFrame {
         task: task.clone(),
+        notes,
         radius,
         values,
         ids,

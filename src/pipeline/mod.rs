@@ -5,6 +5,7 @@
 //! long the sequence. The last stage records every frame in the job's ledger, image first. What
 //! the picture looks like is settled before, in [`Setup`].
 
+use std::collections::HashSet;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -112,13 +113,23 @@ fn read_stage(
     next: &SyncSender<Passed<LoadedFrame>>,
     watch: Watch,
 ) {
+    let mut told = HashSet::new();
     for task in tasks {
         if interrupt.is_raised() {
             return;
         }
         watch(Event::Entered(task.frame, Stage::Read));
         let passed = match load_frame(setup, sequence, task) {
-            Ok(frame) => Passed::Frame(frame),
+            Ok(mut frame) => {
+                // What is so in every frame is said once.
+                for note in std::mem::take(&mut frame.notes) {
+                    if !told.contains(&note) {
+                        watch(Event::Note(&note));
+                        told.insert(note);
+                    }
+                }
+                Passed::Frame(frame)
+            }
             Err(error) => Passed::Failed(task.clone(), error.to_string()),
         };
         // An error means that the next stage has ended: so do we.

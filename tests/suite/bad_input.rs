@@ -21,6 +21,9 @@ fn one_frame_makes_one_image() {
     let size = ["--width", "32", "--height", "18", "--samples", "1"];
     let arguments = [&["render", input, "-o", "still.exr"][..], &size].concat();
     let mut command = workshop.command(&arguments);
-    assert_eq!(command.status().expect("the program starts").code(), Some(0));
+    assert_eq!(
+        command.status().expect("the program starts").code(),
+        Some(0)
+    );
     assert!(workshop.path().join("still.exr").exists());
 }
