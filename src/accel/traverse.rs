@@ -3,7 +3,7 @@
 
 use super::block::BLOCK_SIZE;
 use super::node::WIDTH;
-use super::simd::{self, Kernel};
+use super::simd::{Kernel, KernelTask};
 use super::wide::{MAX_LEVELS, WideTree};
 use crate::ray::Ray;
 
@@ -29,19 +29,23 @@ impl WideTree {
     /// The nearest crossing of a sphere's surface (entering, or leaving when the ray starts inside)
     /// with `t` in `ray.t_min..ray.t_max`. Equal distances go to the lower particle index.
     pub fn nearest(&self, ray: &Ray) -> Option<TreeHit> {
-        simd::nearest(self, ray)
+        self.simd.run(Nearest { tree: self, ray })
     }
 
     /// Whether any sphere's surface crosses the ray within `ray.t_min..ray.t_max`.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        simd::any_hit(self, ray)
+        self.simd.run(AnyHit { tree: self, ray })
     }
 
     /// Replaces `crossings` by every crossing within `ray.t_min..ray.t_max`, by distance; equal
     /// distances by particle index.
     pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
         crossings.clear();
-        simd::crossings(self, ray, crossings);
+        self.simd.run(Crossings {
+            tree: self,
+            ray,
+            crossings,
+        });
         crossings.sort_unstable_by(|a, b| {
             a.t.total_cmp(&b.t)
                 .then_with(|| self.tie_order(a.slot, b.slot))
@@ -173,34 +177,44 @@ fn sort_descending(keys: &mut [u32]) {
     }
 }
 
-#[inline(always)]
-pub(super) fn nearest<K: Kernel>(kernel: K, tree: &WideTree, ray: &Ray) -> Option<TreeHit> {
-    let prepared = kernel.prepare(ray, tree.radius);
-    let mut best: Option<TreeHit> = None;
-    // The end is exclusive for the ray and inclusive for ties.
-    walk(
-        kernel,
-        tree,
-        &prepared,
-        ray.t_max.next_down(),
-        |block, limit| {
-            let Some((t, lanes)) = kernel.nearest_in_block(
-                &prepared,
-                &tree.blocks[block],
-                tree.radii.get(block),
-                limit,
-            ) else {
-                return limit;
-            };
-            let slot = first_of_tied(tree, block, lanes);
-            match &best {
-                Some(held) if held.t == t && tree.tie_order(held.slot, slot).is_le() => {}
-                _ => best = Some(TreeHit { t, slot }),
-            }
-            t
-        },
-    );
-    best
+struct Nearest<'a> {
+    tree: &'a WideTree,
+    ray: &'a Ray,
+}
+
+impl KernelTask for Nearest<'_> {
+    type Output = Option<TreeHit>;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> Option<TreeHit> {
+        let Self { tree, ray } = self;
+        let prepared = kernel.prepare(ray, tree.radius);
+        let mut best: Option<TreeHit> = None;
+        // The end is exclusive for the ray and inclusive for ties.
+        walk(
+            kernel,
+            tree,
+            &prepared,
+            ray.t_max.next_down(),
+            |block, limit| {
+                let Some((t, lanes)) = kernel.nearest_in_block(
+                    &prepared,
+                    &tree.blocks[block],
+                    tree.radii.get(block),
+                    limit,
+                ) else {
+                    return limit;
+                };
+                let slot = first_of_tied(tree, block, lanes);
+                match &best {
+                    Some(held) if held.t == t && tree.tie_order(held.slot, slot).is_le() => {}
+                    _ => best = Some(TreeHit { t, slot }),
+                }
+                t
+            },
+        );
+        best
+    }
 }
 
 /// The slot among the `lanes` of `block` that wins at equal distance.
@@ -223,69 +237,84 @@ fn first_of_tied(tree: &WideTree, block: usize, lanes: u32) -> u32 {
     slot
 }
 
-#[inline(always)]
-pub(super) fn any_hit<K: Kernel>(kernel: K, tree: &WideTree, ray: &Ray) -> bool {
-    let prepared = kernel.prepare(ray, tree.radius);
-    let mut found = false;
-    walk(
-        kernel,
-        tree,
-        &prepared,
-        ray.t_max.next_down(),
-        |block, limit| {
-            found =
-                kernel.any_in_block(&prepared, &tree.blocks[block], tree.radii.get(block), limit);
-            if found { -1.0 } else { limit }
-        },
-    );
-    found
+struct AnyHit<'a> {
+    tree: &'a WideTree,
+    ray: &'a Ray,
 }
 
-#[inline(always)]
-pub(super) fn crossings<K: Kernel>(
-    kernel: K,
-    tree: &WideTree,
-    ray: &Ray,
-    crossings: &mut Vec<TreeCrossing>,
-) {
-    let prepared = kernel.prepare(ray, tree.radius);
-    walk(
-        kernel,
-        tree,
-        &prepared,
-        ray.t_max.next_down(),
-        |block, limit| {
-            let found = kernel.all_in_block(&prepared, &tree.blocks[block], tree.radii.get(block));
-            let mut lanes = found.lanes;
-            while lanes != 0 {
-                let lane = lanes.trailing_zeros() as usize;
-                lanes &= lanes - 1;
-                let slot = block * BLOCK_SIZE + lane;
-                if slot >= tree.count {
-                    break;
-                }
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    reason = "slots are counted in 32 bits"
-                )]
-                let slot = slot as u32;
-                for t in [found.near[lane], found.far[lane]] {
-                    if t >= ray.t_min && t < ray.t_max {
-                        crossings.push(TreeCrossing { t, slot });
+impl KernelTask for AnyHit<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) -> bool {
+        let Self { tree, ray } = self;
+        let prepared = kernel.prepare(ray, tree.radius);
+        let mut found = false;
+        walk(
+            kernel,
+            tree,
+            &prepared,
+            ray.t_max.next_down(),
+            |block, limit| {
+                found = kernel.any_in_block(
+                    &prepared,
+                    &tree.blocks[block],
+                    tree.radii.get(block),
+                    limit,
+                );
+                if found { -1.0 } else { limit }
+            },
+        );
+        found
+    }
+}
+
+struct Crossings<'a> {
+    tree: &'a WideTree,
+    ray: &'a Ray,
+    crossings: &'a mut Vec<TreeCrossing>,
+}
+
+impl KernelTask for Crossings<'_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<K: Kernel>(self, kernel: K) {
+        let Self {
+            tree,
+            ray,
+            crossings,
+        } = self;
+        let prepared = kernel.prepare(ray, tree.radius);
+        walk(
+            kernel,
+            tree,
+            &prepared,
+            ray.t_max.next_down(),
+            |block, limit| {
+                let found =
+                    kernel.all_in_block(&prepared, &tree.blocks[block], tree.radii.get(block));
+                let mut lanes = found.lanes;
+                while lanes != 0 {
+                    let lane = lanes.trailing_zeros() as usize;
+                    lanes &= lanes - 1;
+                    let slot = block * BLOCK_SIZE + lane;
+                    if slot >= tree.count {
+                        break;
+                    }
+                    #[expect(
+                        clippy::cast_possible_truncation,
+                        reason = "slots are counted in 32 bits"
+                    )]
+                    let slot = slot as u32;
+                    for t in [found.near[lane], found.far[lane]] {
+                        if t >= ray.t_min && t < ray.t_max {
+                            crossings.push(TreeCrossing { t, slot });
+                        }
                     }
                 }
-            }
-            limit
-        },
-    );
-}
-
-/// Both crossings of each sphere of a block with the line of a ray.
-pub(super) struct BlockCrossings {
-    /// Lanes whose sphere the line meets.
-    pub(super) lanes: u32,
-    /// Distance of the first crossing.
-    pub(super) near: [f32; BLOCK_SIZE],
-    /// Distance of the second.
-    pub(super) far: [f32; BLOCK_SIZE],
+                limit
+            },
+        );
+    }
 }

@@ -4,10 +4,8 @@
 //! levels with fused multiply-add give the same results to the bit; the portable one may differ in
 //! the last.
 
-use super::block::{Block, BlockRadii};
+use super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::node::{Node, WIDTH};
-use super::traverse::{self, BlockCrossings, TreeCrossing, TreeHit};
-use super::wide::WideTree;
 use crate::ray::Ray;
 
 mod portable;
@@ -130,32 +128,45 @@ pub(super) trait Kernel: Copy {
     fn prefetch_block(self, block: &Block);
 }
 
-pub(super) fn nearest(tree: &WideTree, ray: &Ray) -> Option<TreeHit> {
-    #[cfg(target_arch = "x86_64")]
-    match tree.simd {
-        SimdLevel::Avx512 => return x86::nearest_avx512(tree, ray),
-        SimdLevel::Avx2 => return x86::nearest_avx2(tree, ray),
-        SimdLevel::Portable => {}
-    }
-    traverse::nearest(portable::Portable, tree, ray)
+/// Both crossings of each sphere of a block with the line of a ray.
+pub(super) struct BlockCrossings {
+    /// Lanes whose sphere the line meets.
+    pub(super) lanes: u32,
+    /// Distance of the first crossing.
+    pub(super) near: [f32; BLOCK_SIZE],
+    /// Distance of the second.
+    pub(super) far: [f32; BLOCK_SIZE],
 }
 
-pub(super) fn any_hit(tree: &WideTree, ray: &Ray) -> bool {
-    #[cfg(target_arch = "x86_64")]
-    match tree.simd {
-        SimdLevel::Avx512 => return x86::any_hit_avx512(tree, ray),
-        SimdLevel::Avx2 => return x86::any_hit_avx2(tree, ray),
-        SimdLevel::Portable => {}
-    }
-    traverse::any_hit(portable::Portable, tree, ray)
+impl BlockCrossings {
+    /// No lane is met.
+    const NONE: Self = Self {
+        lanes: 0,
+        near: [0.0; BLOCK_SIZE],
+        far: [0.0; BLOCK_SIZE],
+    };
 }
 
-pub(super) fn crossings(tree: &WideTree, ray: &Ray, found: &mut Vec<TreeCrossing>) {
-    #[cfg(target_arch = "x86_64")]
-    match tree.simd {
-        SimdLevel::Avx512 => return x86::crossings_avx512(tree, ray, found),
-        SimdLevel::Avx2 => return x86::crossings_avx2(tree, ray, found),
-        SimdLevel::Portable => {}
+/// Something to be done with a kernel, compiled for each level. `run` should be `inline(always)`, so
+/// that all of it gets the level's instructions.
+pub(super) trait KernelTask {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn run<K: Kernel>(self, kernel: K) -> Self::Output;
+}
+
+impl SimdLevel {
+    /// Does `task` with the kernel of this level, which must have come out of [`Self::or_best`].
+    #[inline]
+    pub(super) fn run<T: KernelTask>(self, task: T) -> T::Output {
+        match self {
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx512 => x86::run_avx512(task),
+            #[cfg(target_arch = "x86_64")]
+            Self::Avx2 => x86::run_avx2(task),
+            _ => task.run(portable::Portable),
+        }
     }
-    traverse::crossings(portable::Portable, tree, ray, found);
 }

@@ -5,8 +5,7 @@ use glam::Vec3;
 
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
-use super::super::traverse::BlockCrossings;
-use super::{Kernel, MIN_DIRECTION, SLAB_SLACK};
+use super::{BlockCrossings, Kernel, MIN_DIRECTION, SLAB_SLACK};
 use crate::ray::Ray;
 
 /// See the module.
@@ -149,11 +148,7 @@ impl Kernel for Portable {
         radii: Option<&BlockRadii>,
     ) -> BlockCrossings {
         let chords = ray.chords(block, radii);
-        let mut found = BlockCrossings {
-            lanes: 0,
-            near: [0.0; BLOCK_SIZE],
-            far: [0.0; BLOCK_SIZE],
-        };
+        let mut found = BlockCrossings::NONE;
         for (lane, (middle, half)) in chords.into_iter().enumerate() {
             if half >= 0.0 {
                 found.lanes |= 1 << lane;

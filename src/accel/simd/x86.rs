@@ -1,4 +1,4 @@
-//! Hand-written AVX2 and AVX-512 tests, and the traversals compiled with them.
+//! Hand-written AVX2 and AVX-512 tests, and the doors to code compiled with them.
 //!
 //! The traits' methods are inlined into the functions at the end, which carry the target features;
 //! those are only called after the machine was asked.
@@ -8,10 +8,8 @@ use std::arch::x86_64::*;
 
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
-use super::super::traverse::{self, BlockCrossings, TreeCrossing, TreeHit};
-use super::super::wide::WideTree;
 use super::portable::finite_inverse;
-use super::{Kernel, SLAB_SLACK, SimdLevel};
+use super::{BlockCrossings, Kernel, KernelTask, SLAB_SLACK};
 use crate::ray::Ray;
 
 pub(super) fn has_avx2() -> bool {
@@ -285,11 +283,7 @@ impl Kernel for Avx2 {
         block: &Block,
         radii: Option<&BlockRadii>,
     ) -> BlockCrossings {
-        let mut found = BlockCrossings {
-            lanes: 0,
-            near: [0.0; BLOCK_SIZE],
-            far: [0.0; BLOCK_SIZE],
-        };
+        let mut found = BlockCrossings::NONE;
         for half in 0..2 {
             // SAFETY: this kernel is only used inside functions with AVX2 and FMA; stores go to
             // lanes 0..8 or 8..16 of 16.
@@ -542,11 +536,7 @@ impl Kernel for Avx512 {
         block: &Block,
         radii: Option<&BlockRadii>,
     ) -> BlockCrossings {
-        let mut found = BlockCrossings {
-            lanes: 0,
-            near: [0.0; BLOCK_SIZE],
-            far: [0.0; BLOCK_SIZE],
-        };
+        let mut found = BlockCrossings::NONE;
         // SAFETY: this kernel is only used inside functions with AVX-512; stores fill arrays of 16.
         unsafe {
             let (middle, discriminant) = ray.chords(block, radii);
@@ -571,46 +561,26 @@ impl Kernel for Avx512 {
     }
 }
 
-/// A traversal compiled for a level, behind a safe function that trusts the tree's level.
+/// A task compiled with a kernel's instructions.
 macro_rules! compiled {
-    ($safe:ident, $inner:ident, $kernel:expr, $level:expr, $features:literal,
-     $run:path, ($($arg:ident: $ty:ty),*), $out:ty) => {
-        pub(super) fn $safe(tree: &WideTree, $($arg: $ty),*) -> $out {
+    ($run:ident, $kernel:expr, $is_there:path, $features:literal) => {
+        pub(super) fn $run<T: KernelTask>(task: T) -> T::Output {
             #[target_feature(enable = $features)]
-            fn $inner(tree: &WideTree, $($arg: $ty),*) -> $out {
-                $run($kernel, tree, $($arg),*)
+            fn with_features<T: KernelTask>(task: T) -> T::Output {
+                task.run($kernel)
             }
-            debug_assert_eq!(tree.simd, $level);
-            // SAFETY: a tree only gets a level that the machine was asked for (`or_best`).
-            unsafe { $inner(tree, $($arg),*) }
+            debug_assert!($is_there());
+            // SAFETY: a tree only gets a level that the machine was asked for (`or_best`), so the
+            // features are there.
+            unsafe { with_features(task) }
         }
     };
 }
 
-macro_rules! compiled_traversals {
-    ($kernel:expr, $level:expr, $features:literal, $nearest:ident, $any:ident, $all:ident) => {
-        compiled!($nearest, inner, $kernel, $level, $features,
-            traverse::nearest, (ray: &Ray), Option<TreeHit>);
-        compiled!($any, inner, $kernel, $level, $features,
-            traverse::any_hit, (ray: &Ray), bool);
-        compiled!($all, inner, $kernel, $level, $features,
-            traverse::crossings, (ray: &Ray, found: &mut Vec<TreeCrossing>), ());
-    };
-}
-
-compiled_traversals!(
-    Avx2,
-    SimdLevel::Avx2,
-    "avx2,fma",
-    nearest_avx2,
-    any_hit_avx2,
-    crossings_avx2
-);
-compiled_traversals!(
+compiled!(run_avx2, Avx2, has_avx2, "avx2,fma");
+compiled!(
+    run_avx512,
     Avx512,
-    SimdLevel::Avx512,
-    "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl",
-    nearest_avx512,
-    any_hit_avx512,
-    crossings_avx512
+    has_avx512,
+    "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl"
 );
