@@ -1,0 +1,157 @@
+//! The three ways to spend rays on a scene, the same for every program.
+//!
+//! A program traces rays one by one; everything about images, tiles and threads is here, so that a
+//! rate says something about the structure alone.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use spherule::accel::wide::WideTree;
+use spherule::ray::Ray;
+
+use super::scene::{Scene, TILE_SIDE};
+
+/// Secondary rays start this part of a radius above the surface.
+const LIFT: f32 = 1e-3;
+/// The point light, above the box.
+const LIGHT: Vec3 = Vec3::new(0.0, 0.0, 10.0);
+/// Pixels or points that a thread takes at a time.
+const CHUNK: usize = TILE_SIDE * TILE_SIDE;
+
+/// A program that can be asked for rays.
+pub(crate) trait Tracer: Sync {
+    /// The nearest sphere that the ray meets: distance and the tracer's own number for it.
+    fn nearest(&self, ray: &Ray) -> Option<(f32, u32)>;
+    /// Whether any sphere lies within the ray's ends.
+    fn any_hit(&self, ray: &Ray) -> bool;
+    /// Centre of the sphere with that number.
+    fn center(&self, sphere: u32) -> Vec3;
+}
+
+impl Tracer for WideTree {
+    fn nearest(&self, ray: &Ray) -> Option<(f32, u32)> {
+        WideTree::nearest(self, ray).map(|hit| (hit.t, hit.slot))
+    }
+
+    fn any_hit(&self, ray: &Ray) -> bool {
+        WideTree::any_hit(self, ray)
+    }
+
+    fn center(&self, sphere: u32) -> Vec3 {
+        self.sphere(sphere).0
+    }
+}
+
+/// What a primary ray leaves behind: distance, infinite for a miss, and the sphere.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct HitRecord {
+    t: f32,
+    sphere: u32,
+}
+
+impl HitRecord {
+    const MISS: Self = Self {
+        t: f32::INFINITY,
+        sphere: u32::MAX,
+    };
+
+    /// Along the primary ray; infinite for a miss.
+    pub(crate) fn distance(&self) -> f32 {
+        self.t
+    }
+}
+
+/// A point that a primary ray found.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SurfacePoint {
+    /// Lifted off the surface.
+    position: Vec3,
+    normal: Vec3,
+    /// Direction of the ray that came here.
+    incoming: Vec3,
+}
+
+/// One ray through every pixel, the hits recorded in `records`. Returns how many hit.
+pub(crate) fn trace_primary<T: Tracer>(
+    tracer: &T,
+    scene: &Scene,
+    records: &mut Vec<HitRecord>,
+) -> usize {
+    records.resize(scene.pixels.len(), HitRecord::MISS);
+    scene
+        .pixels
+        .par_chunks(CHUNK)
+        .zip(records.par_chunks_mut(CHUNK))
+        .map(|(pixels, records)| {
+            let mut hits = 0;
+            for (pixel, record) in pixels.iter().zip(records) {
+                *record = match tracer.nearest(&scene.camera.ray(*pixel)) {
+                    Some((t, sphere)) => {
+                        hits += 1;
+                        HitRecord { t, sphere }
+                    }
+                    None => HitRecord::MISS,
+                };
+            }
+            hits
+        })
+        .sum()
+}
+
+/// The points that the primary rays found, in tile order.
+pub(crate) fn surface_points<T: Tracer>(
+    tracer: &T,
+    scene: &Scene,
+    records: &[HitRecord],
+) -> Vec<SurfacePoint> {
+    let pairs = scene.pixels.par_iter().zip(records);
+    pairs
+        .filter(|(_, record)| record.t < f32::INFINITY)
+        .map(|(pixel, record)| {
+            let ray = scene.camera.ray(*pixel);
+            let center = tracer.center(record.sphere);
+            let normal = (ray.at(record.t) - center).normalize();
+            SurfacePoint {
+                position: center + normal * (scene.radius * (1.0 + LIFT)),
+                normal,
+                incoming: ray.direction,
+            }
+        })
+        .collect()
+}
+
+/// A shadow ray from every point that faces the light. Returns how many points are lit.
+pub(crate) fn trace_shadow<T: Tracer>(tracer: &T, points: &[SurfacePoint]) -> usize {
+    let is_lit = |point: &&SurfacePoint| {
+        let to_light = LIGHT - point.position;
+        if point.normal.dot(to_light) <= 0.0 {
+            return false;
+        }
+        let distance = to_light.length();
+        !tracer.any_hit(&Ray {
+            t_max: distance,
+            ..Ray::new(point.position, to_light / distance)
+        })
+    };
+    count_in_chunks(points, is_lit)
+}
+
+/// A ray mirrored at every point. Returns how many hit.
+pub(crate) fn trace_reflection<T: Tracer>(tracer: &T, points: &[SurfacePoint]) -> usize {
+    let hits = |point: &&SurfacePoint| {
+        let mirrored = point.incoming.reflect(point.normal).normalize();
+        tracer
+            .nearest(&Ray::new(point.position, mirrored))
+            .is_some()
+    };
+    count_in_chunks(points, hits)
+}
+
+fn count_in_chunks(
+    points: &[SurfacePoint],
+    counts: impl Fn(&&SurfacePoint) -> bool + Sync,
+) -> usize {
+    points
+        .par_chunks(CHUNK)
+        .map(|chunk| chunk.iter().filter(&counts).count())
+        .sum()
+}

@@ -1,0 +1,108 @@
+//! Build and trace rates on the thesis's scene, ours and obvhs, as criterion groups.
+//!
+//! Rates of the two programs are measured minutes apart here; for their ratio on a machine that
+//! does other things too see the bench `ratio`.
+
+use std::hint::black_box;
+use std::time::Duration;
+
+use criterion::measurement::WallTime;
+use criterion::{BenchmarkGroup, BenchmarkId, Criterion, SamplingMode, Throughput};
+use spherule::accel::lbvh::Lbvh;
+
+mod support;
+
+use support::obvhs::ObvhsBuilder;
+use support::rays::{trace_primary, trace_reflection, trace_shadow};
+use support::{Case, build_lbvh, is_quick_run, particle_counts};
+
+fn main() {
+    let mut criterion = Criterion::default().configure_from_args();
+    let cases: Vec<Case> = particle_counts(is_quick_run())
+        .into_iter()
+        .map(Case::new)
+        .collect();
+    build(&mut criterion, &cases);
+    primary(&mut criterion, &cases);
+    shadow(&mut criterion, &cases);
+    reflection(&mut criterion, &cases);
+    criterion.final_summary();
+}
+
+/// One iteration is a frame, so few are enough and none may be dropped.
+fn group<'a>(criterion: &'a mut Criterion, name: &str) -> BenchmarkGroup<'a, WallTime> {
+    let mut group = criterion.benchmark_group(name);
+    group
+        .sample_size(10)
+        .sampling_mode(SamplingMode::Flat)
+        .warm_up_time(Duration::from_millis(300))
+        .measurement_time(Duration::from_secs(2));
+    group
+}
+
+/// Trees in the memory of the tree before, as in a sequence of frames.
+fn build(criterion: &mut Criterion, cases: &[Case]) {
+    let mut group = group(criterion, "build");
+    for case in cases {
+        let particles = case.scene.centers.len();
+        group.throughput(Throughput::Elements(particles as u64));
+        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
+            let mut builder = Lbvh::new();
+            bencher.iter(|| black_box(build_lbvh(&mut builder, &case.scene).nodes));
+        });
+        group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
+            let mut builder = ObvhsBuilder::new();
+            bencher.iter(|| black_box(builder.build(&case.spheres)));
+        });
+    }
+    group.finish();
+}
+
+fn primary(criterion: &mut Criterion, cases: &[Case]) {
+    let mut group = group(criterion, "primary");
+    for case in cases {
+        let particles = case.scene.centers.len();
+        let scene = &case.scene;
+        let mut records = Vec::new();
+        group.throughput(Throughput::Elements(scene.pixels.len() as u64));
+        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
+            bencher.iter(|| trace_primary(case.lbvh.tree(), scene, &mut records));
+        });
+        group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
+            bencher.iter(|| trace_primary(&case.obvhs, scene, &mut records));
+        });
+    }
+    group.finish();
+}
+
+fn shadow(criterion: &mut Criterion, cases: &[Case]) {
+    let mut group = group(criterion, "shadow");
+    for case in cases {
+        let particles = case.scene.centers.len();
+        let points = &case.points;
+        group.throughput(Throughput::Elements(points.len() as u64));
+        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
+            bencher.iter(|| trace_shadow(case.lbvh.tree(), points));
+        });
+        group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
+            bencher.iter(|| trace_shadow(&case.obvhs, points));
+        });
+    }
+    group.finish();
+}
+
+fn reflection(criterion: &mut Criterion, cases: &[Case]) {
+    let mut group = group(criterion, "reflection");
+    for case in cases {
+        let particles = case.scene.centers.len();
+        let points = &case.points;
+        group.throughput(Throughput::Elements(points.len() as u64));
+        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
+            bencher.iter(|| trace_reflection(case.lbvh.tree(), points));
+        });
+        group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
+            bencher.iter(|| trace_reflection(&case.obvhs, points));
+        });
+    }
+    group.finish();
+}
