@@ -16,13 +16,18 @@ pub(super) struct Node {
     pub(super) origin: [f32; 3],
     /// Biased power of two of the quantisation step, per axis.
     pub(super) exponent: [u8; 3],
-    /// Children in use; they are the first ones.
-    pub(super) child_count: u8,
+    /// A bit for each child in use; they are the first ones.
+    pub(super) child_mask: u8,
     /// Per axis: the eight lower planes, then the eight upper ones.
     pub(super) planes: [[[u8; WIDTH]; 2]; 3],
 }
 
 impl Node {
+    /// Children in use.
+    pub(super) fn child_count(&self) -> usize {
+        self.child_mask.count_ones() as usize
+    }
+
     /// Encloses up to eight `children`; every quantised box holds its child.
     pub(super) fn enclosing(children: &[Aabb]) -> Self {
         debug_assert!(!children.is_empty() && children.len() <= WIDTH);
@@ -31,7 +36,7 @@ impl Node {
         node.origin = own.min.to_array();
         #[expect(clippy::cast_possible_truncation, reason = "at most eight children")]
         {
-            node.child_count = children.len() as u8;
+            node.child_mask = ((1_u32 << children.len()) - 1) as u8;
         }
         for axis in 0..3 {
             let exponent = step_exponent(own.min[axis], own.max[axis]);

@@ -72,13 +72,23 @@ const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
 /// Bits of a stack code below the level.
 const INDEX_BITS: u32 = 28;
 
-/// A node or block still to visit.
+/// A node or block still to visit, as one word so that it is stored and loaded whole: the bits of
+/// the distance at which the ray enters its box (rounded down) above, and below them its code: the
+/// level in the upper bits, the number in the level under it.
 #[derive(Clone, Copy, Default)]
-struct Pending {
-    /// Distance at which the ray enters its box, rounded down.
-    t: f32,
-    /// Level in the upper bits, number in the level below.
-    code: u32,
+struct Pending(u64);
+
+impl Pending {
+    #[inline(always)]
+    fn new(key: u32, code: u32) -> Self {
+        Self((u64::from(key & !7) << 32) | u64::from(code))
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
+    fn split(self) -> (f32, u32) {
+        (f32::from_bits((self.0 >> 32) as u32), self.0 as u32)
+    }
 }
 
 /// Visits the blocks whose boxes the ray enters before `limit`, nearest boxes first. `visit` gets
@@ -98,10 +108,10 @@ fn walk<K: Kernel>(
     }
     let mut stack = [Pending::default(); STACK_SIZE];
     let mut depth = 0;
-    let mut current = Pending::default();
+    let mut code = 0_u32;
     loop {
-        let level = current.code >> INDEX_BITS;
-        let index = (current.code & ((1 << INDEX_BITS) - 1)) as usize;
+        let level = code >> INDEX_BITS;
+        let index = (code & ((1 << INDEX_BITS) - 1)) as usize;
         if level == levels {
             limit = visit(index, limit);
             if limit < 0.0 {
@@ -109,23 +119,37 @@ fn walk<K: Kernel>(
             }
         } else {
             let node = &tree.nodes[tree.level_starts[level as usize] as usize + index];
-            let mut keys = [0; WIDTH];
-            let mut found = kernel.test_node(ray, node, limit, &mut keys);
-            if found > 0 {
-                let first = index * WIDTH;
-                #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^28 blocks")]
-                let child = |key: u32| Pending {
-                    t: f32::from_bits(key),
-                    code: ((level + 1) << INDEX_BITS) | (first as u32 + (key & 7)),
-                };
-                prefetch(kernel, tree, level + 1, levels, first, &keys[..found]);
-                sort_descending(&mut keys[..found]);
-                found -= 1;
+            let (found, keys) = kernel.test_node(ray, node, limit);
+            let below = Below {
+                tree,
+                level: level + 1,
+                is_blocks: level + 1 == levels,
+                first: index * WIDTH,
+            };
+            if found == 1 {
+                code = below.code(kernel.first_two(keys)[0]);
+                continue;
+            }
+            if found == 2 {
+                let [a, b] = kernel.first_two(keys);
+                let (near, far) = (a.min(b), a.max(b));
+                below.prefetch(kernel, far);
+                stack[depth] = Pending::new(far, below.code(far));
+                depth += 1;
+                code = below.code(near);
+                continue;
+            }
+            if found > 2 {
+                let mut keys = kernel.all_keys(keys);
                 for key in &keys[..found] {
-                    stack[depth] = child(*key);
+                    below.prefetch(kernel, *key);
+                }
+                sort_descending(&mut keys[..found]);
+                for key in &keys[..found - 1] {
+                    stack[depth] = Pending::new(*key, below.code(*key));
                     depth += 1;
                 }
-                current = child(keys[found]);
+                code = below.code(keys[found - 1]);
                 continue;
             }
         }
@@ -134,30 +158,41 @@ fn walk<K: Kernel>(
                 return;
             }
             depth -= 1;
-            if stack[depth].t <= limit {
-                current = stack[depth];
+            let (t, pending) = stack[depth].split();
+            if t <= limit {
+                code = pending;
                 break;
             }
         }
     }
 }
 
-/// Asks for the memory of the children that will be visited, well before they are.
-#[inline(always)]
-fn prefetch<K: Kernel>(
-    kernel: K,
-    tree: &WideTree,
+/// The level below a node, seen from it.
+struct Below<'a> {
+    tree: &'a WideTree,
     level: u32,
-    levels: u32,
+    is_blocks: bool,
+    /// Number of the node's first child.
     first: usize,
-    keys: &[u32],
-) {
-    for key in keys {
-        let child = first + (key & 7) as usize;
-        if level == levels {
-            kernel.prefetch_block(&tree.blocks[child]);
+}
+
+impl Below<'_> {
+    /// Code of the child that a key is for.
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^28 blocks")]
+    fn code(&self, key: u32) -> u32 {
+        (self.level << INDEX_BITS) | (self.first as u32 + (key & 7))
+    }
+
+    /// Asks for the memory of a child that will be visited, well before it is.
+    #[inline(always)]
+    fn prefetch<K: Kernel>(&self, kernel: K, key: u32) {
+        let child = self.first + (key & 7) as usize;
+        if self.is_blocks {
+            kernel.prefetch_block(&self.tree.blocks[child]);
         } else {
-            kernel.prefetch_node(&tree.nodes[tree.level_starts[level as usize] as usize + child]);
+            let start = self.tree.level_starts[self.level as usize] as usize;
+            kernel.prefetch_node(&self.tree.nodes[start + child]);
         }
     }
 }

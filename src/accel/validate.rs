@@ -47,7 +47,7 @@ impl WideTree {
         let mut reached = 0;
         for (index, node) in self.nodes[start..end].iter().enumerate() {
             let mut bounds = Aabb::EMPTY;
-            for slot in 0..usize::from(node.child_count) {
+            for slot in 0..node.child_count() {
                 let Some(child) = below.get(index * WIDTH + slot) else {
                     return Err(format!("level {level} node {index}: no child {slot}"));
                 };

@@ -85,14 +85,22 @@ const MIN_DIRECTION: f32 = 1e-7;
 pub(super) trait Kernel: Copy {
     /// A ray with what all tests need of it.
     type Ray;
+    /// Keys of the children that a ray enters, packed: a key is the bits of the distance of entry,
+    /// the low three replaced by the child's slot.
+    type Keys: Copy;
 
     /// Prepares `ray` for spheres of a common `radius` (0 where boxes hold the spheres).
     fn prepare(self, ray: &Ray, radius: f32) -> Self::Ray;
 
-    /// Tests the children of `node` up to distance `limit`. Puts a key for each child that the ray
-    /// enters into `keys`, in slot order, and returns their number. A key is the bits of the
-    /// distance of entry, the low three replaced by the child's slot.
-    fn test_node(self, ray: &Self::Ray, node: &Node, limit: f32, keys: &mut [u32; WIDTH]) -> usize;
+    /// Tests the children of `node` up to distance `limit`. Returns how many the ray enters, and
+    /// their keys in slot order.
+    fn test_node(self, ray: &Self::Ray, node: &Node, limit: f32) -> (usize, Self::Keys);
+
+    /// The first two keys, without a way through memory: most nodes have no more.
+    fn first_two(self, keys: Self::Keys) -> [u32; 2];
+
+    /// All keys.
+    fn all_keys(self, keys: Self::Keys) -> [u32; WIDTH];
 
     /// The smallest distance in `t_min..=limit` at which the ray crosses a sphere of `block`, and the
     /// lanes that have it. `radii` where they differ.

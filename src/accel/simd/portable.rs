@@ -67,6 +67,7 @@ impl PreparedRay {
 
 impl Kernel for Portable {
     type Ray = PreparedRay;
+    type Keys = [u32; WIDTH];
 
     fn prepare(self, ray: &Ray, radius: f32) -> PreparedRay {
         PreparedRay {
@@ -76,13 +77,8 @@ impl Kernel for Portable {
         }
     }
 
-    fn test_node(
-        self,
-        ray: &PreparedRay,
-        node: &Node,
-        limit: f32,
-        keys: &mut [u32; WIDTH],
-    ) -> usize {
+    fn test_node(self, ray: &PreparedRay, node: &Node, limit: f32) -> (usize, [u32; WIDTH]) {
+        let mut keys = [0; WIDTH];
         let mut near = [ray.ray.t_min.max(0.0); WIDTH];
         let mut far = [limit; WIDTH];
         for axis in 0..3 {
@@ -99,7 +95,7 @@ impl Kernel for Portable {
             }
         }
         let mut found = 0;
-        for slot in 0..usize::from(node.child_count).min(WIDTH) {
+        for slot in 0..node.child_count() {
             if near[slot] <= far[slot] {
                 #[expect(clippy::cast_possible_truncation, reason = "slots are under eight")]
                 {
@@ -108,7 +104,15 @@ impl Kernel for Portable {
                 found += 1;
             }
         }
-        found
+        (found, keys)
+    }
+
+    fn first_two(self, keys: [u32; WIDTH]) -> [u32; 2] {
+        [keys[0], keys[1]]
+    }
+
+    fn all_keys(self, keys: [u32; WIDTH]) -> [u32; WIDTH] {
+        keys
     }
 
     fn nearest_in_block(

@@ -13,7 +13,10 @@ use super::{BlockCrossings, Kernel, KernelTask, SLAB_SLACK};
 use crate::ray::Ray;
 
 pub(super) fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2") && is_x86_feature_detected!("fma")
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("popcnt")
+        && is_x86_feature_detected!("bmi1")
 }
 
 pub(super) fn has_avx512() -> bool {
@@ -60,16 +63,20 @@ impl SlabRay {
     #[inline(always)]
     fn enter(&self, node: &Node) -> SlabNode {
         // SAFETY: SSE4.1 and FMA are there, or no kernel here would run. The 16 bytes read from the
-        // node's start are its origin, exponents and count: within its 64 bytes.
+        // node's start are its origin, exponents and mask: within its 64 bytes.
         unsafe {
             let head = _mm_load_si128(std::ptr::from_ref(node).cast());
-            let origin = _mm_castsi128_ps(head);
-            let exponents = _mm_cvtepu8_epi32(_mm_srli_si128::<12>(head));
+            // The fourth lane is kept at zero throughout: what else it would hold gives denormal
+            // products, each of which costs an Intel processor over a hundred cycles.
+            let origin = _mm_blend_ps::<0b1000>(_mm_castsi128_ps(head), self.origin);
+            let three = _mm_setr_epi32(0, 0, 0, 0x00ff_ffff);
+            let exponents = _mm_cvtepu8_epi32(_mm_srli_si128::<12>(_mm_and_si128(head, three)));
             let scale = _mm_castsi128_ps(_mm_slli_epi32::<23>(exponents));
             let step = _mm_mul_ps(scale, self.inverse);
             let base = _mm_mul_ps(_mm_sub_ps(origin, self.origin), self.inverse);
-            let magnitude = _mm_fmadd_ps(absolute(step), _mm_set1_ps(255.0), absolute(base));
-            let slack = _mm_fmadd_ps(magnitude, _mm_set1_ps(SLAB_SLACK), self.reach);
+            // The part that does not wait for the origin comes first.
+            let fixed = _mm_fmadd_ps(absolute(step), _mm_set1_ps(255.0 * SLAB_SLACK), self.reach);
+            let slack = _mm_fmadd_ps(absolute(base), _mm_set1_ps(SLAB_SLACK), fixed);
             SlabNode { step, base, slack }
         }
     }
@@ -172,6 +179,7 @@ impl Avx2Ray {
 
 impl Kernel for Avx2 {
     type Ray = Avx2Ray;
+    type Keys = __m256i;
 
     #[inline(always)]
     fn prepare(self, ray: &Ray, radius: f32) -> Avx2Ray {
@@ -187,7 +195,7 @@ impl Kernel for Avx2 {
     }
 
     #[inline(always)]
-    fn test_node(self, ray: &Avx2Ray, node: &Node, limit: f32, keys: &mut [u32; WIDTH]) -> usize {
+    fn test_node(self, ray: &Avx2Ray, node: &Node, limit: f32) -> (usize, __m256i) {
         // SAFETY: this kernel is only used inside functions with AVX2 and FMA. Plane loads are of
         // eight bytes out of arrays of eight.
         unsafe {
@@ -213,19 +221,22 @@ impl Kernel for Avx2 {
             axis!(1, 0x55);
             axis!(2, 0xaa);
             let entered = _mm256_cmp_ps::<_CMP_LE_OQ>(near, far);
-            let used = (1_u32 << node.child_count) - 1;
-            let mut mask = _mm256_movemask_ps(entered).cast_unsigned() & used;
-            let mut distances = [0.0_f32; WIDTH];
-            _mm256_storeu_ps(distances.as_mut_ptr(), near);
-            let mut found = 0;
-            while mask != 0 {
-                let slot = mask.trailing_zeros();
-                mask &= mask - 1;
-                keys[found & 7] = (distances[slot as usize & 7].to_bits() & !7) | slot;
-                found += 1;
-            }
-            found
+            let mask = _mm256_movemask_ps(entered).cast_unsigned() & u32::from(node.child_mask);
+            let order = COMPRESSED[mask as usize & 255].as_ptr();
+            let order = _mm256_cvtepu8_epi32(_mm_loadl_epi64(order.cast()));
+            let packed = _mm256_permutevar8x32_epi32(keys_of(near), order);
+            (mask.count_ones() as usize, packed)
         }
+    }
+
+    #[inline(always)]
+    fn first_two(self, keys: __m256i) -> [u32; 2] {
+        first_two(keys)
+    }
+
+    #[inline(always)]
+    fn all_keys(self, keys: __m256i) -> [u32; WIDTH] {
+        keys_to_array(keys)
     }
 
     #[inline(always)]
@@ -312,6 +323,56 @@ impl Kernel for Avx2 {
         (0..3).for_each(|line| prefetch_line(block, line));
     }
 }
+
+/// Keys of eight distances: see [`Kernel::Keys`].
+///
+/// # Safety
+/// The caller's machine has AVX2.
+#[inline(always)]
+unsafe fn keys_of(distances: __m256) -> __m256i {
+    // SAFETY: AVX2 by contract.
+    unsafe {
+        let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
+        let bits = _mm256_and_si256(_mm256_castps_si256(distances), _mm256_set1_epi32(!7));
+        _mm256_or_si256(bits, slots)
+    }
+}
+
+/// All lanes.
+#[inline(always)]
+fn keys_to_array(keys: __m256i) -> [u32; WIDTH] {
+    let mut array = [0; WIDTH];
+    // SAFETY: AVX is there, or no kernel here would run; the store fills the array.
+    unsafe { _mm256_storeu_si256(array.as_mut_ptr().cast(), keys) };
+    array
+}
+
+/// The first two lanes, by register.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "the two halves")]
+fn first_two(keys: __m256i) -> [u32; 2] {
+    // SAFETY: SSE2 is part of x86-64.
+    let pair = unsafe { _mm_cvtsi128_si64(_mm256_castsi256_si128(keys)) }.cast_unsigned();
+    [pair as u32, (pair >> 32) as u32]
+}
+
+/// For each mask of eight lanes, the lanes that are set, in order: AVX2 has no compress.
+const COMPRESSED: [[u8; WIDTH]; 256] = {
+    let mut table = [[0; WIDTH]; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let (mut lane, mut found) = (0, 0);
+        while lane < 8 {
+            if mask & (1 << lane) != 0 {
+                table[mask][found] = lane;
+                found += 1;
+            }
+            lane += 1;
+        }
+        mask += 1;
+    }
+    table
+};
 
 /// Eight planes as floats.
 ///
@@ -429,6 +490,7 @@ impl Avx512Ray {
 
 impl Kernel for Avx512 {
     type Ray = Avx512Ray;
+    type Keys = __m256i;
 
     #[inline(always)]
     fn prepare(self, ray: &Ray, radius: f32) -> Avx512Ray {
@@ -453,7 +515,7 @@ impl Kernel for Avx512 {
     /// Both sides of an axis in one register: the planes entered in the lower half, those left
     /// negated in the upper, so that one maximum serves both.
     #[inline(always)]
-    fn test_node(self, ray: &Avx512Ray, node: &Node, limit: f32, keys: &mut [u32; WIDTH]) -> usize {
+    fn test_node(self, ray: &Avx512Ray, node: &Node, limit: f32) -> (usize, __m256i) {
         // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL. Plane
         // loads are of sixteen bytes out of two arrays of eight in a row; the store fills `keys`.
         unsafe {
@@ -463,9 +525,9 @@ impl Kernel for Avx512 {
                 _mm256_set1_epi32(i32::MIN),
             ));
             let start = _mm512_castps256_ps512(_mm256_set1_ps(ray.slab.t_min));
-            let mut bound = _mm512_insertf32x8::<1>(start, _mm256_set1_ps(-limit));
+            let limits = _mm512_insertf32x8::<1>(start, _mm256_set1_ps(-limit));
             macro_rules! axis {
-                ($axis:literal) => {
+                ($axis:literal) => {{
                     let lane = _mm512_set1_epi32($axis);
                     let pick = |v: __m128| _mm512_permutexvar_ps(lane, _mm512_castps128_ps512(v));
                     let step = _mm512_xor_ps(pick(slab.step), upper);
@@ -474,27 +536,29 @@ impl Kernel for Avx512 {
                     let bytes = _mm_loadu_si128(node.planes[$axis].as_ptr().cast());
                     let bytes = _mm_shuffle_epi8(bytes, ray.order[$axis]);
                     let plane = _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes));
-                    // A NaN (planes beyond the range of f32) yields the second operand: no bound.
-                    bound = _mm512_max_ps(_mm512_fmadd_ps(plane, step, base), bound);
-                };
+                    _mm512_fmadd_ps(plane, step, base)
+                }};
             }
-            axis!(0);
-            axis!(1);
-            axis!(2);
+            // A NaN (planes beyond the range of f32) yields the second operand: no bound.
+            let z = _mm512_max_ps(axis!(2), limits);
+            let y = _mm512_max_ps(axis!(1), limits);
+            let bound = _mm512_max_ps(axis!(0), _mm512_max_ps(y, z));
             let near = _mm512_castps512_ps256(bound);
             let far = _mm256_xor_ps(_mm512_extractf32x8_ps::<1>(bound), _mm256_set1_ps(-0.0));
-            #[expect(
-                clippy::cast_possible_truncation,
-                reason = "eight children, eight bits"
-            )]
-            let used = ((1_u32 << node.child_count) - 1) as u8;
-            let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(used, near, far);
-            let slots = _mm256_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7);
-            let bits = _mm256_and_si256(_mm256_castps_si256(near), _mm256_set1_epi32(!7));
-            let packed = _mm256_maskz_compress_epi32(mask, _mm256_or_si256(bits, slots));
-            _mm256_storeu_si256(keys.as_mut_ptr().cast(), packed);
-            mask.count_ones() as usize
+            let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(node.child_mask, near, far);
+            let packed = _mm256_maskz_compress_epi32(mask, keys_of(near));
+            (mask.count_ones() as usize, packed)
         }
+    }
+
+    #[inline(always)]
+    fn first_two(self, keys: __m256i) -> [u32; 2] {
+        first_two(keys)
+    }
+
+    #[inline(always)]
+    fn all_keys(self, keys: __m256i) -> [u32; WIDTH] {
+        keys_to_array(keys)
     }
 
     #[inline(always)]
@@ -577,10 +641,10 @@ macro_rules! compiled {
     };
 }
 
-compiled!(run_avx2, Avx2, has_avx2, "avx2,fma");
+compiled!(run_avx2, Avx2, has_avx2, "avx2,fma,popcnt,bmi1");
 compiled!(
     run_avx512,
     Avx512,
     has_avx512,
-    "avx2,fma,avx512f,avx512bw,avx512dq,avx512vl"
+    "avx2,fma,popcnt,bmi1,avx512f,avx512bw,avx512dq,avx512vl"
 );
