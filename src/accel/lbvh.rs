@@ -89,9 +89,12 @@ impl Lbvh {
         }
         clock.lap("nodes");
 
-        let report = self
-            .tree
-            .report("lbvh", "hilbert", sah_cost, clock.finish());
+        let report = self.tree.report(
+            "lbvh",
+            "hilbert, k-d above 1024 particles",
+            sah_cost,
+            clock.finish(),
+        );
         #[cfg(debug_assertions)]
         if let Err(fault) = self.tree.validate(spheres) {
             panic!("lbvh built a broken tree: {fault}");

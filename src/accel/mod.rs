@@ -16,6 +16,7 @@ mod node;
 mod partition;
 pub mod simd;
 pub mod traverse;
+mod upper;
 mod validate;
 pub mod wide;
 

@@ -124,7 +124,7 @@ fn walk<K: Kernel>(
                 tree,
                 level: level + 1,
                 is_blocks: level + 1 == levels,
-                first: index * WIDTH,
+                first: tree.first_child(level, index),
             };
             if found == 1 {
                 code = below.code(kernel.first_two(keys)[0]);

@@ -2,7 +2,6 @@
 //! exactly once. Debug builds run it after each build.
 
 use super::block::BLOCK_SIZE;
-use super::node::WIDTH;
 use super::wide::WideTree;
 use super::{Aabb, SphereRadius, Spheres};
 
@@ -44,28 +43,31 @@ impl WideTree {
             .get(level + 1)
             .map_or(self.nodes.len(), |s| *s as usize);
         let mut own = Vec::with_capacity(end - start);
-        let mut reached = 0;
+        let mut reached = vec![false; below.len()];
+        let number = super::partition::index_u32(level);
         for (index, node) in self.nodes[start..end].iter().enumerate() {
             let mut bounds = Aabb::EMPTY;
             for slot in 0..node.child_count() {
-                let Some(child) = below.get(index * WIDTH + slot) else {
+                let place = self.first_child(number, index) + slot;
+                let Some(child) = below.get(place) else {
                     return Err(format!("level {level} node {index}: no child {slot}"));
                 };
+                if std::mem::replace(&mut reached[place], true) {
+                    return Err(format!(
+                        "level {level} node {index}: child {slot} has two parents"
+                    ));
+                }
                 if !node.child_holds(slot, child) {
                     return Err(format!(
                         "level {level} node {index}: child {slot} sticks out"
                     ));
                 }
                 bounds = bounds.union(*child);
-                reached += 1;
             }
             own.push(bounds);
         }
-        if reached != below.len() {
-            return Err(format!(
-                "level {level}: {reached} of {} children reached",
-                below.len()
-            ));
+        if let Some(lost) = reached.iter().position(|r| !r) {
+            return Err(format!("level {level}: nobody has child {lost}"));
         }
         Ok(own)
     }

@@ -1,7 +1,8 @@
 //! The tree that every builder ends with: implicit levels of 8-wide nodes over blocks.
 //!
 //! Child `c` of node `i` on one level is node `8 i + c` on the next, and the children of the last
-//! level are the blocks themselves: no pointers. With one radius for all, boxes bound the centres
+//! level are the blocks themselves: no pointers. One level may be in another order than the one
+//! below it (see [`super::upper`]): there a table says where the children of node `i` begin. With one radius for all, boxes bound the centres
 //! and the radius is added per ray; with radii of their own, boxes hold the spheres.
 
 use glam::Vec3;
@@ -21,6 +22,10 @@ pub struct WideTree {
     pub(super) nodes: Vec<Node>,
     /// Number of the first node of each level in `nodes`, root level first.
     pub(super) level_starts: Vec<u32>,
+    /// The level whose nodes are in another order than their children; none if beyond all levels.
+    pub(super) mapped_level: u32,
+    /// For each node of that level, the node whose place its children have.
+    pub(super) mapped: Vec<u32>,
     pub(super) blocks: Vec<Block>,
     /// Empty when the radius is common.
     pub(super) radii: Vec<BlockRadii>,
@@ -63,6 +68,16 @@ impl WideTree {
     /// Traces with `level` from now on, or with the best the machine has if it lacks that.
     pub fn set_simd(&mut self, level: SimdLevel) {
         self.simd = level.or_best();
+    }
+
+    /// Number of the first child of node `index` on `level`, among the nodes (or blocks) below.
+    #[inline(always)]
+    pub(super) fn first_child(&self, level: u32, index: usize) -> usize {
+        if level == self.mapped_level {
+            self.mapped[index] as usize * WIDTH
+        } else {
+            index * WIDTH
+        }
     }
 
     /// Index in the frame of the particle in `slot` (tree order), or the slot itself when the way
@@ -131,6 +146,9 @@ impl WideTree {
             total += count;
         }
         self.nodes.resize(total, bytemuck::Zeroable::zeroed());
+        let mapped_level = mapped_level(counts.len());
+        self.mapped_level = mapped_level.map_or(u32::MAX, super::partition::index_u32);
+        self.mapped.clear();
         let (mut boxes, mut areas) = (Vec::new(), 0.0);
         let mut rest = &mut self.nodes[..];
         for (depth, count) in counts.iter().enumerate().rev() {
@@ -145,6 +163,10 @@ impl WideTree {
             let (level_boxes, child_areas) = build_level(level, &children, self.radius);
             boxes = level_boxes;
             areas += child_areas;
+            if Some(depth) == mapped_level {
+                self.mapped = super::upper::kd_order(&boxes);
+                bring_into_order(level, &mut boxes, &self.mapped);
+            }
         }
         self.bounds = match boxes.first() {
             Some(root) => root.padded(self.radius),
@@ -168,8 +190,9 @@ impl WideTree {
     ) -> BuildReport {
         let position_bytes =
             size_of_val(&self.blocks[..]) as u64 + size_of_val(&self.radii[..]) as u64;
-        let structure_bytes =
-            size_of_val(&self.nodes[..]) as u64 + size_of_val(&self.indices[..]) as u64;
+        let structure_bytes = size_of_val(&self.nodes[..]) as u64
+            + size_of_val(&self.mapped[..]) as u64
+            + size_of_val(&self.indices[..]) as u64;
         // Sorting happens in the memory of the result; beside it there are boxes of the lowest
         // level and what one cell per thread needs.
         let boxes = self.blocks.len().div_ceil(WIDTH) as u64 * size_of::<Aabb>() as u64;
@@ -189,6 +212,23 @@ impl WideTree {
             simd: self.simd.name(),
         }
     }
+}
+
+/// Levels of nodes that stay in the order of the particles: subtrees of 8 * 8 blocks.
+const LOWER_LEVELS: usize = 2;
+
+/// The level of the roots of those subtrees, if there are levels above it to gain by another order.
+fn mapped_level(levels: usize) -> Option<usize> {
+    levels.checked_sub(LOWER_LEVELS).filter(|level| *level > 0)
+}
+
+/// Puts the nodes of a level and their boxes into `order`.
+fn bring_into_order(level: &mut [Node], boxes: &mut Vec<Aabb>, order: &[u32]) {
+    let old = level.to_vec();
+    for (node, place) in level.iter_mut().zip(order) {
+        *node = old[*place as usize];
+    }
+    *boxes = order.iter().map(|place| boxes[*place as usize]).collect();
 }
 
 /// What the nodes of a level enclose.

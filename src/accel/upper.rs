@@ -1,0 +1,128 @@
+//! The order of the upper levels: subtrees of about a thousand particles, brought from the order of
+//! the curve into that of a k-d tree.
+//!
+//! A long run along a curve is no compact region, so the upper nodes of a curve-ordered implicit tree
+//! overlap. Splitting the few thousand subtrees at medians of the widest axis (Bentley 1975) costs a
+//! millisecond at 1e7 particles, and primary rays then take a third less time there. The subtrees
+//! stay where they are: only a table of their places is made.
+
+use rayon::prelude::*;
+
+use super::Aabb;
+use super::node::WIDTH;
+
+/// Below this a task of its own costs more than it saves.
+const PARALLEL_LEN: usize = 4096;
+
+/// Places of `boxes` in an order such that each aligned run of 8, 64, 512... is a cell of a k-d tree.
+pub(super) fn kd_order(boxes: &[Aabb]) -> Vec<u32> {
+    let mut items: Vec<Item> = boxes
+        .par_iter()
+        .enumerate()
+        .map(|(place, bounds)| Item {
+            // Twice the centre, which orders as well.
+            center: (bounds.min + bounds.max).to_array(),
+            place: super::partition::index_u32(place),
+        })
+        .collect();
+    split(&mut items);
+    items.into_iter().map(|item| item.place).collect()
+}
+
+#[derive(Clone, Copy)]
+struct Item {
+    center: [f32; 3],
+    place: u32,
+}
+
+fn split(items: &mut [Item]) {
+    let middle = aligned_middle(items.len());
+    if middle == 0 {
+        return;
+    }
+    let axis = widest_axis(items);
+    items.select_nth_unstable_by(middle, |a, b| {
+        let order = a.center[axis].total_cmp(&b.center[axis]);
+        order.then(a.place.cmp(&b.place))
+    });
+    let (lower, upper) = items.split_at_mut(middle);
+    if lower.len() > PARALLEL_LEN {
+        rayon::join(|| split(lower), || split(upper));
+    } else {
+        split(lower);
+        split(upper);
+    }
+}
+
+/// Where to cut `len` subtrees in two so that both sides are whole nodes: a multiple of the largest
+/// power of 8 below `len`. 0 when there is nothing to cut.
+fn aligned_middle(len: usize) -> usize {
+    let mut unit = 1;
+    while unit * WIDTH < len {
+        unit *= WIDTH;
+    }
+    let children = len.div_ceil(unit);
+    (children / 2) * unit
+}
+
+fn widest_axis(items: &[Item]) -> usize {
+    let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
+    for item in items {
+        for axis in 0..3 {
+            min[axis] = min[axis].min(item.center[axis]);
+            max[axis] = max[axis].max(item.center[axis]);
+        }
+    }
+    let extent = |axis: usize| max[axis] - min[axis];
+    (1..3).fold(0, |best, axis| {
+        if extent(axis) > extent(best) {
+            axis
+        } else {
+            best
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+
+    use super::*;
+
+    #[test]
+    fn cuts_keep_nodes_whole() {
+        assert_eq!(aligned_middle(0), 0);
+        assert_eq!(aligned_middle(1), 0);
+        assert_eq!(aligned_middle(2), 1);
+        assert_eq!(aligned_middle(8), 4);
+        assert_eq!(aligned_middle(9), 8);
+        assert_eq!(aligned_middle(64), 32);
+        assert_eq!(aligned_middle(65), 64);
+        assert_eq!(aligned_middle(9766), 2 * 4096 / 2);
+    }
+
+    #[test]
+    fn every_place_once_and_runs_compact() {
+        // A line of boxes in a shuffled order.
+        let boxes: Vec<Aabb> = (0..512)
+            .map(|i| {
+                let at = Vec3::X * ((i * 205) % 512) as f32;
+                Aabb { min: at, max: at }
+            })
+            .collect();
+        let order = kd_order(&boxes);
+        let mut seen = order.clone();
+        seen.sort_unstable();
+        assert!(
+            seen.iter()
+                .enumerate()
+                .all(|(i, place)| i == *place as usize)
+        );
+        for run in order.chunks(8) {
+            let x = |place: &u32| boxes[*place as usize].min.x;
+            let low = run.iter().map(x).fold(f32::INFINITY, f32::min);
+            let high = run.iter().map(x).fold(0.0, f32::max);
+            assert_eq!(high - low, 7.0, "a run of eight neighbours");
+        }
+    }
+}
