@@ -40,7 +40,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
     let writer = writer(output)?;
     let centers = fill_box(&BoxSettings::thesis(*particles, *seed));
     writer(output, centers).map_err(|e| CliError::Other(e.to_string()))?;
-    eprintln!("{}: {particles} particles, seed {seed}", output.display());
+    say!("{}: {particles} particles, seed {seed}", output.display());
     Ok(Outcome::Done)
 }
 

@@ -18,7 +18,7 @@ pub(super) fn run(args: &InitArgs) -> Result<Outcome, CliError> {
     let asked = args.manifest.manifest()?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
-        eprintln!("note: {note}");
+        say!("note: {note}");
     }
     let text = asked.manifest.to_commented_toml();
     match io::stdout().write_all(text.as_bytes()) {

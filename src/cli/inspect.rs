@@ -46,7 +46,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
                         json!({"file": shown, "error": error.to_string()})
                     )
                 } else {
-                    eprintln!("error: {error}");
+                    say!("error: {error}");
                     Ok(())
                 }
             }

@@ -2,11 +2,18 @@
 //!
 //! Results go to standard output, everything else to standard error. Exit codes: 0 all done, 1 some
 //! frames or files failed, 2 could not start, 75 interrupted and to be resumed.
-#![expect(clippy::print_stderr, reason = "this is the edge that talks to people")]
-
+use std::io::Write;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+
+/// A line on standard error. A reader that has gone away, or a log on a full disk, is no reason to
+/// stop work.
+macro_rules! say {
+    ($($text:tt)*) => {
+        $crate::cli::put(&mut std::io::stderr(), &format!($($text)*))
+    };
+}
 
 mod errors;
 mod generate;
@@ -39,6 +46,11 @@ enum Command {
     Generate(generate::GenerateArgs),
 }
 
+/// Writes a line, as one piece so that lines of several threads or processes do not mix.
+fn put(to: &mut impl Write, text: &str) {
+    let _ = to.write_all(format!("{text}\n").as_bytes());
+}
+
 /// Parses the arguments of the process, runs the command, reports what went wrong.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -52,7 +64,7 @@ pub fn main() -> ExitCode {
         Ok(outcome) => outcome.into(),
         Err(error) => {
             for line in error.to_string().lines() {
-                eprintln!("error: {line}");
+                say!("error: {line}");
             }
             ExitCode::from(2)
         }

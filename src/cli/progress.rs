@@ -1,7 +1,7 @@
 //! What a running job shows: bars on a terminal, one plain line a frame elsewhere, or lines for
 //! programs.
 
-use std::io::{IsTerminal, stderr};
+use std::io::{IsTerminal, stderr, stdout};
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -9,6 +9,7 @@ use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::json;
 
+use super::put;
 use crate::pipeline::{Event, Stage};
 use crate::report::FrameReport;
 
@@ -118,8 +119,8 @@ impl Progress {
         match &self.show {
             Show::Bar(bar) => bar.set_position(done as u64),
             Show::Plain if plain.is_empty() => {}
-            Show::Plain => eprintln!("[{done}/{}] {plain}, {}", self.total, self.remaining(done)),
-            Show::Json => eprintln!("{json}"),
+            Show::Plain => say!("[{done}/{}] {plain}, {}", self.total, self.remaining(done)),
+            Show::Json => say!("{json}"),
             Show::Openjd => openjd(done, self.total, plain),
             Show::Nothing => {}
         }
@@ -127,8 +128,8 @@ impl Progress {
 
     fn warn(&self, text: &str) {
         match &self.show {
-            Show::Bar(bar) => bar.suspend(|| eprintln!("{text}")),
-            _ => eprintln!("{text}"),
+            Show::Bar(bar) => bar.suspend(|| say!("{text}")),
+            _ => say!("{text}"),
         }
     }
 
@@ -140,14 +141,11 @@ impl Progress {
 }
 
 /// Engines read these on standard output.
-#[expect(clippy::print_stdout, reason = "the protocol of Open Job Description")]
 fn openjd(done: usize, total: usize, plain: &str) {
-    println!(
-        "openjd_progress: {:.1}",
-        100.0 * done as f64 / total.max(1) as f64
-    );
+    let percent = 100.0 * done as f64 / total.max(1) as f64;
+    put(&mut stdout(), &format!("openjd_progress: {percent:.1}"));
     if !plain.is_empty() {
-        println!("openjd_status: {plain}");
+        put(&mut stdout(), &format!("openjd_status: {plain}"));
     }
 }
 

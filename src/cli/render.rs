@@ -48,7 +48,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let asked = args.manifest.manifest()?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
-        eprintln!("note: {note}");
+        say!("note: {note}");
     }
     let plan = Plan::new(asked, &sequence)?;
     plan.guard_manifest(args.force)?;
@@ -59,7 +59,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let tasks = plan.tasks(&sequence, &job.pending());
     let kept = job.selected().len() - tasks.len();
     if kept > 0 {
-        eprintln!("{kept} of {} frames are done already", job.selected().len());
+        say!("{kept} of {} frames are done already", job.selected().len());
     }
     let interrupt = signals::listen()?;
     let progress = Progress::new(args.progress, tasks.len());
@@ -71,7 +71,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     report::job::write(&plan.dir, job.state(), &plan.manifest)
         .map_err(CliError::io(&plan.dir.join(report::job::FILE)))?;
     let summary = job.summary();
-    eprintln!(
+    say!(
         "{} of {} frames done in {}: {}",
         summary.done,
         summary.total,
@@ -79,11 +79,11 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         plan.shown_output.display()
     );
     if !summary.failed.is_empty() {
-        eprintln!("failed: {}", list(&summary.failed));
+        say!("failed: {}", list(&summary.failed));
     }
     match ended {
         Err(error) => {
-            eprintln!("error: {error}");
+            say!("error: {error}");
             Ok(Outcome::SomeFailed)
         }
         Ok(()) if interrupt.is_raised() && summary.pending > 0 => Ok(Outcome::Interrupted),
@@ -209,7 +209,7 @@ impl Plan {
             },
         };
         let survey = |_: Option<&Value>| -> Result<Value, CliError> {
-            eprintln!("looking at the sequence");
+            say!("looking at the sequence");
             let survey = Survey::of(sequence, question(&self.manifest))?;
             resolve::setup(&self.manifest, &survey).map_err(|e| CliError::Other(e.to_string()))?;
             serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
@@ -258,30 +258,31 @@ impl Plan {
 /// What was decided for the user, so that nothing is a surprise.
 fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
     let count = sequence.frames().len();
-    eprintln!(
+    say!(
         "{count} frame{}, up to {} particles",
         if count == 1 { "" } else { "s" },
         survey.most_particles
     );
     match &setup.radius {
-        pipeline::RadiusRule::Common(radius) => eprintln!("radius {radius}"),
-        pipeline::RadiusRule::FileOr(_) if survey.has_radii => eprintln!("radius from the files"),
+        pipeline::RadiusRule::Common(radius) => say!("radius {radius}"),
+        pipeline::RadiusRule::FileOr(_) if survey.has_radii => say!("radius from the files"),
         pipeline::RadiusRule::FileOr(radius) => {
-            eprintln!("radius {radius}, half the usual distance of neighbours (--radius sets it)");
+            say!("radius {radius}, half the usual distance of neighbours (--radius sets it)");
         }
         pipeline::RadiusRule::Attribute { name, scale } => {
-            eprintln!("radius {scale} x attribute `{name}`");
+            say!("radius {scale} x attribute `{name}`");
         }
     }
     if let pipeline::ColorRule::Attribute { name, .. } = &setup.color
         && let Some(color) = &survey.color
     {
-        eprintln!(
+        say!(
             "colour by `{name}`, seen from {} to {}",
-            color.low, color.high
+            color.low,
+            color.high
         );
     }
     if survey.origin != glam::DVec3::ZERO {
-        eprintln!("origin {}: the particles are far from zero", survey.origin);
+        say!("origin {}: the particles are far from zero", survey.origin);
     }
 }

@@ -22,7 +22,7 @@ pub(super) fn listen() -> Result<Interrupt, CliError> {
                 std::process::exit(i32::from(INTERRUPTED));
             }
             flag.raise();
-            eprintln!("stopping after the frame in hand; once more stops at once");
+            say!("stopping after the frame in hand; once more stops at once");
         }
     });
     Ok(interrupt)
