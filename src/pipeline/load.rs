@@ -165,6 +165,9 @@ fn radii(
             }
         }
     };
+    if frame.is_empty() {
+        return Ok((radius, 0));
+    }
     let least = setup.least_radius;
     let mut clamped = 0;
     let mut raise = |radius: &mut f32| {
