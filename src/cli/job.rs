@@ -27,16 +27,16 @@ pub(super) struct ManifestArgs {
     #[arg(long, value_name = "KEY=VALUE")]
     pub(super) set: Vec<String>,
     /// Image width in pixels.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub(super) width: Option<i64>,
     /// Image height in pixels.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub(super) height: Option<i64>,
     /// Samples per pixel.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub(super) samples: Option<i64>,
     /// Particle radius: a length, or "auto".
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub(super) radius: Option<String>,
     /// Axis that points up: x, y, z, -x, -y, -z, or "auto".
     #[arg(long, allow_hyphen_values = true)]
@@ -54,7 +54,7 @@ pub(super) struct ManifestArgs {
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub(super) channels: Option<Vec<String>>,
     /// Reflections and refractions followed; 1 is direct light only.
-    #[arg(long)]
+    #[arg(long, allow_negative_numbers = true)]
     pub(super) max_depth: Option<i64>,
     /// A ground plane under the particles.
     #[arg(long)]

@@ -68,16 +68,16 @@ impl Framing {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum CameraError {
     /// A coordinate is NaN or infinite.
-    #[error("a camera coordinate is not a finite number")]
+    #[error("a coordinate is not a finite number")]
     NotFinite,
     /// There is no direction to look in.
-    #[error("camera eye and look_at are the same point, move one of them")]
+    #[error("eye and look_at are the same point; move one of them")]
     NoDirection,
     /// `up` is zero or along the view.
-    #[error("camera up is zero or points along the view, choose another up")]
+    #[error("up is zero or points along the view; choose another camera.up")]
     NoUp,
     /// Field of view outside 0 to 180 degrees.
-    #[error("camera fov must lie above 0 and below 180 degrees")]
+    #[error("fov must lie above 0 and below 180 degrees")]
     FieldOfView,
     /// Width over height is zero, negative or not finite.
     #[error("image width over height must be above 0")]
