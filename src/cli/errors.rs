@@ -20,10 +20,20 @@ pub(super) enum CliError {
     Job(#[from] JobError),
     #[error("no frame can be read: {0}")]
     Frame(#[from] FrameError),
-    #[error("{}: {source}", path.display())]
+    #[error("{}: {}", path.display(), reason(source))]
     Io { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Other(String),
+}
+
+/// The system's words, with the remedy where there is one.
+fn reason(error: &io::Error) -> String {
+    match error.kind() {
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
+            "no space left; free some and give the same command again".to_owned()
+        }
+        _ => error.to_string(),
+    }
 }
 
 impl CliError {

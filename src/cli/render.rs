@@ -68,8 +68,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         progress.show(&event);
     });
     progress.finish();
-    report::job::write(&plan.dir, job.state(), &plan.manifest)
-        .map_err(CliError::io(&plan.dir.join(report::job::FILE)))?;
+    let reported = report::job::write(&plan.dir, job.state(), &plan.manifest)
+        .map_err(CliError::io(&plan.dir.join(report::job::FILE)));
+    // What ended the run explains why there is no report either.
+    let ended = ended.map_err(CliError::from).and(reported);
     let summary = job.summary();
     say!(
         "{} of {} frames done in {}: {}",

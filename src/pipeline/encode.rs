@@ -1,7 +1,7 @@
 //! Third stage: images are encoded, published under their final names, and recorded.
 
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::mpsc::Receiver;
 use std::time::Instant;
 
@@ -24,10 +24,10 @@ pub(super) enum WriteError {
     #[error(transparent)]
     Encode(#[from] OutputError),
     /// It cannot be written.
-    #[error("{path}: {source}")]
+    #[error("{}: {source}", path.display())]
     Io {
         /// The image.
-        path: String,
+        path: PathBuf,
         /// The operating system's reason.
         source: io::Error,
     },
@@ -62,19 +62,14 @@ pub(super) fn write_stage(
                         job.record_done(task.frame, &outputs, json!(report))?;
                         watch(Event::Done(&task, &report));
                     }
+                    // Not the frame's fault: it stays to be done.
+                    Err(WriteError::Io { path, source }) if is_disk_full(&source) => {
+                        return Err(JobError::DiskFull { path, source });
+                    }
                     Err(error) => {
                         let reason = error.to_string();
                         watch(Event::Failed(task.frame, &reason));
-                        let recorded = job.record_failed(task.frame, &reason, json!(null));
-                        recorded?;
-                        if let WriteError::Io { source, .. } = error
-                            && is_disk_full(&source)
-                        {
-                            return Err(JobError::DiskFull {
-                                path: task.image,
-                                source,
-                            });
-                        }
+                        job.record_failed(task.frame, &reason, json!(null))?;
                     }
                 }
             }
@@ -99,7 +94,7 @@ fn write_frame(
     let exr = encode_frame(setup, &frame)?;
     report.clamped_pixels = exr.clamped;
     let at = |path: &Path| {
-        let path = path.display().to_string();
+        let path = path.to_owned();
         move |source| WriteError::Io { path, source }
     };
     // The preview first: a ledger line vouches for both, and the EXR is what people wait for.

@@ -1,5 +1,6 @@
 //! `report.json`: the job so far, from its ledger.
 
+use std::fs;
 use std::io;
 use std::path::Path;
 
@@ -13,13 +14,17 @@ use crate::manifest::Manifest;
 /// Name of the report beside the images.
 pub const FILE: &str = "report.json";
 
-/// Writes the report of the job in `dir`.
+/// Writes the report of the job in `dir`, unless it stands there already.
 ///
 /// # Errors
 /// It cannot be written.
 pub fn write(dir: &Path, state: &JobState, manifest: &Manifest) -> io::Result<()> {
+    let path = dir.join(FILE);
     let text = format!("{:#}\n", of(state, manifest));
-    publish(&dir.join(FILE), text.as_bytes())
+    if fs::read_to_string(&path).is_ok_and(|old| old == text) {
+        return Ok(());
+    }
+    publish(&path, text.as_bytes())
 }
 
 /// The report as JSON.
