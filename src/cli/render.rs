@@ -39,6 +39,7 @@ pub(super) struct RenderArgs {
 }
 
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
+    let signals = signals::listen()?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))
@@ -61,10 +62,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     if kept > 0 {
         say!("{kept} of {} frames are done already", job.selected().len());
     }
-    let interrupt = signals::listen()?;
     let progress = Progress::new(args.progress, tasks.len());
     let start = std::time::Instant::now();
-    let ended = pipeline::run(&setup, &sequence, &tasks, &mut job, &interrupt, &|event| {
+    let interrupt = signals.at_work();
+    let ended = pipeline::run(&setup, &sequence, &tasks, &mut job, interrupt, &|event| {
         progress.show(&event);
     });
     progress.finish();

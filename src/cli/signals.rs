@@ -1,5 +1,8 @@
 //! TERM and Ctrl-C: the first asks the job to finish the frame in hand, the second stops at once.
+//! Before there is a frame in hand, so does the first.
 
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread;
 
 use signal_hook::consts::{SIGINT, SIGTERM};
@@ -8,22 +11,42 @@ use spherule_jobs::Interrupt;
 
 use super::{CliError, INTERRUPTED};
 
-/// Raises the returned flag on the first signal and ends the process on the second.
-pub(super) fn listen() -> Result<Interrupt, CliError> {
+/// Whoever listens for signals.
+pub(super) struct Listener {
+    /// Raised by the first signal once there are frames in hand.
+    interrupt: Interrupt,
+    at_work: Arc<AtomicBool>,
+}
+
+impl Listener {
+    /// From now on there are frames in hand.
+    pub(super) fn at_work(&self) -> &Interrupt {
+        self.at_work.store(true, Ordering::Release);
+        &self.interrupt
+    }
+}
+
+/// Listens until the process ends.
+pub(super) fn listen() -> Result<Listener, CliError> {
     let interrupt = Interrupt::new();
+    let at_work = Arc::new(AtomicBool::new(false));
     let mut signals = Signals::new([SIGINT, SIGTERM])
         .map_err(|e| CliError::other(format!("cannot listen for signals: {e}")))?;
-    let flag = interrupt.clone();
+    let listener = Listener {
+        interrupt: interrupt.clone(),
+        at_work: Arc::clone(&at_work),
+    };
     thread::spawn(move || {
         for _ in signals.forever() {
-            if flag.is_raised() {
+            if interrupt.is_raised() || !at_work.load(Ordering::Acquire) {
                 // Nothing is lost: images appear whole or not at all, and what was being written
                 // is cleared away by the next run.
+                say!("stopped; the same command goes on from here");
                 std::process::exit(i32::from(INTERRUPTED));
             }
-            flag.raise();
+            interrupt.raise();
             say!("stopping after the frame in hand; once more stops at once");
         }
     });
-    Ok(interrupt)
+    Ok(listener)
 }
