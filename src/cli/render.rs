@@ -52,6 +52,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         say!("note: {note}");
     }
     let plan = Plan::new(asked, &sequence)?;
+    plan.guard_directory()?;
     plan.guard_manifest(args.force)?;
     let mut job = plan.open(&sequence, args)?;
     let (survey, setup) = plan.settle(&job)?;
@@ -158,6 +159,17 @@ impl Plan {
         self.file.as_deref() == Some(&self.job_file())
     }
 
+    /// Refuses a directory that cannot be because a file is in its place.
+    fn guard_directory(&self) -> Result<(), CliError> {
+        match self.dir.ancestors().find(|p| p.exists()) {
+            Some(found) if !found.is_dir() => Err(CliError::other(format!(
+                "{}: is a file where a directory for the images should be; choose another output",
+                found.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
     /// Refuses to overwrite a `job.toml` that belongs to no job of ours.
     fn guard_manifest(&self, force: bool) -> Result<(), CliError> {
         let path = self.job_file();
@@ -211,13 +223,22 @@ impl Plan {
                 _ => Mode::Resume,
             },
         };
-        let survey = |_: Option<&Value>| -> Result<Value, CliError> {
-            say!("looking at the sequence");
-            let survey = Survey::of(sequence, question(&self.manifest))?;
-            resolve::setup(&self.manifest, &survey).map_err(|e| CliError::Other(e.to_string()))?;
-            serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
+        // A new job is begun, and an old one forgotten, only for pictures that can be.
+        let surveyed = if args.force || Job::peek(&self.dir)?.is_none() {
+            Some(self.survey(sequence)?)
+        } else {
+            None
         };
-        Ok(Job::open(&self.dir, request, survey)?)
+        Ok(Job::open(&self.dir, request, |_| {
+            surveyed.map_or_else(|| self.survey(sequence), Ok)
+        })?)
+    }
+
+    fn survey(&self, sequence: &Sequence) -> Result<Value, CliError> {
+        say!("looking at the sequence");
+        let survey = Survey::of(sequence, question(&self.manifest))?;
+        resolve::setup(&self.manifest, &survey).map_err(|e| CliError::Other(e.to_string()))?;
+        serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
     }
 
     /// The pictures, by what was found when the job began.
@@ -260,12 +281,14 @@ impl Plan {
 
 /// What was decided for the user, so that nothing is a surprise.
 fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
-    let count = sequence.frames().len();
     say!(
-        "{count} frame{}, up to {} particles",
-        if count == 1 { "" } else { "s" },
-        survey.most_particles
+        "{}, up to {}",
+        counted(sequence.frames().len(), "frame"),
+        counted(survey.most_particles, "particle")
     );
+    if survey.most_particles == 0 {
+        return;
+    }
     match &setup.radius {
         pipeline::RadiusRule::Common(radius) => say!("radius {radius}"),
         pipeline::RadiusRule::FileOr(_) if survey.has_radii => say!("radius from the files"),
@@ -288,4 +311,9 @@ fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
     if survey.origin != glam::DVec3::ZERO {
         say!("origin {}: the particles are far from zero", survey.origin);
     }
+}
+
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
 }
