@@ -165,7 +165,6 @@ fn spread(count: usize) -> Vec<usize> {
 impl Totals {
     fn take_in(&mut self, raw: RawParticles, question: Question) {
         self.frames += 1;
-        self.most_particles = self.most_particles.max(raw.positions.len());
         self.attributes
             .extend(raw.attributes.iter().map(|a| a.name.clone()));
         if let Some((min, max)) = robust_bounds(&raw.positions) {
@@ -186,6 +185,7 @@ impl Totals {
             .bounds
             .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
         let frame = ParticleFrame::from_raw(raw, origin);
+        self.most_particles = self.most_particles.max(frame.len());
         if let Some(name) = wanted {
             if let Some(attribute) = frame.attribute(&name)
                 && let Some((low, high)) = robust_range(attribute)
