@@ -77,6 +77,15 @@ impl Job {
         Plan::load(named(dir))
     }
 
+    /// Whether a job has begun in `dir`, damaged or not: there is a plan, or a ledger with lines.
+    ///
+    /// # Errors
+    /// Trouble reading the directory.
+    pub fn has_begun(dir: &Path) -> Result<bool, JobError> {
+        let dir = named(dir);
+        Ok(Plan::path_in(dir).exists() || ledger_files(dir)?.iter().any(|(_, len)| *len > 0))
+    }
+
     /// How the job in `dir` stands, or None if none has begun there. Touches nothing, and may be
     /// asked while another process works.
     ///

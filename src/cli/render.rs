@@ -173,7 +173,7 @@ impl Plan {
     /// Refuses to overwrite a `job.toml` that belongs to no job of ours.
     fn guard_manifest(&self, force: bool) -> Result<(), CliError> {
         let path = self.job_file();
-        if force || self.is_own_manifest() || !path.exists() || Job::peek(&self.dir)?.is_some() {
+        if force || self.is_own_manifest() || !path.exists() || Job::has_begun(&self.dir)? {
             return Ok(());
         }
         Err(CliError::other(format!(
