@@ -1,29 +1,44 @@
-//! What people type wrong: one clear message, the right exit code, nothing half-written.
+//! What people type wrong and what machines lack: one clear message, the right exit code, nothing
+//! half written.
 
-use crate::harness::{Workshop, sample};
+use std::collections::HashSet;
 
-#[test]
-fn a_missing_directory_is_named() {
-    let workshop = Workshop::new();
-    let ran = workshop
-        .run(&["render", "no-such-place", "-o", "out/frame.####.exr"])
-        .expect(2);
-    assert!(ran.errors().contains("no-such-place"), "{}", ran.errors());
-    assert!(ran.text().is_empty());
-    assert!(!workshop.join("out").exists());
+use crate::harness::{Ran, Workshop};
+
+mod arguments;
+mod disk;
+mod frames;
+mod inputs;
+mod manifest;
+mod output;
+mod pipes;
+
+/// Runs what cannot start; the messages must have these texts.
+#[track_caller]
+fn refused(workshop: &Workshop, arguments: &[&str], wanted: &[&str]) -> Ran {
+    let ran = workshop.run(arguments).expect(2);
+    let errors = ran.errors();
+    for text in wanted {
+        assert!(errors.contains(text), "nothing of `{text}` in:\n{errors}");
+    }
+    assert!(ran.text().is_empty(), "{}", ran.text());
+    assert!(!errors.contains("panicked"), "{errors}");
+    let mut told = HashSet::new();
+    for line in errors.lines().filter(|l| l.starts_with("error: ")) {
+        assert!(told.insert(line), "told twice:\n{errors}");
+        assert!(!line.ends_with('.'), "{line}");
+    }
+    assert!(!told.is_empty(), "{errors}");
+    ran
 }
 
-#[test]
-fn one_frame_makes_one_image() {
-    let workshop = Workshop::new();
-    let input = sample("single_frames/raw.xyz");
-    let input = input.to_str().expect("UTF-8");
-    let size = ["--width", "32", "--height", "18", "--samples", "1"];
-    let arguments = [&["render", input, "-o", "still.exr"][..], &size].concat();
-    let mut command = workshop.command(&arguments);
-    assert_eq!(
-        command.status().expect("the program starts").code(),
-        Some(0)
+/// The same for `render in` with these options; nothing may be left behind.
+#[track_caller]
+fn not_rendered(workshop: &Workshop, options: &[&str], wanted: &[&str]) {
+    let render = ["render", "in", "-o", "out/f.####.exr"];
+    refused(workshop, &[&render, options].concat(), wanted);
+    assert!(
+        !workshop.join("out").exists(),
+        "a refused job leaves nothing"
     );
-    assert!(workshop.path().join("still.exr").exists());
 }

@@ -5,6 +5,17 @@ use std::process::{Command, Output};
 
 use tempfile::TempDir;
 
+mod frames;
+mod outputs;
+mod running;
+
+pub(crate) use frames::{dam_break, npy};
+pub(crate) use outputs::{files, images, ledger, no_leftovers, stamps};
+pub(crate) use running::Running;
+
+/// Images that take a few milliseconds.
+pub(crate) const SMALL: [&str; 6] = ["--width", "64", "--height", "36", "--samples", "1"];
+
 /// A directory for one test, and the program to run in it.
 pub(crate) struct Workshop {
     dir: TempDir,
@@ -42,6 +53,23 @@ impl Workshop {
             .output()
             .expect("the program starts"))
     }
+
+    /// Renders `in` to small images in `out`, with these options.
+    pub(crate) fn render(&self, options: &[&str]) -> Ran {
+        self.render_to("out", options)
+    }
+
+    /// Renders `in` to small images in another directory.
+    pub(crate) fn render_to(&self, out: &str, options: &[&str]) -> Ran {
+        let pattern = format!("{out}/f.####.exr");
+        let arguments = [&["render", "in", "-o", &pattern][..], &SMALL, options].concat();
+        self.run(&arguments)
+    }
+
+    /// Starts the program and leaves it running.
+    pub(crate) fn start(&self, arguments: &[&str]) -> Running {
+        Running::new(self.command(arguments))
+    }
 }
 
 /// What a run left.
@@ -61,6 +89,30 @@ impl Ran {
     /// Standard output as text.
     pub(crate) fn text(&self) -> String {
         String::from_utf8_lossy(&self.0.stdout).into_owned()
+    }
+
+    /// Fails the test unless standard error has `text`.
+    #[track_caller]
+    pub(crate) fn tells(self, text: &str) -> Self {
+        assert!(
+            self.errors().contains(text),
+            "nothing of `{text}` in:\n{}",
+            self.errors()
+        );
+        self
+    }
+
+    /// The frames that this run made, by its lines on standard error.
+    pub(crate) fn rendered(&self) -> Vec<i64> {
+        let frame = |line: &str| {
+            line.split_once("] frame ")?
+                .1
+                .split_once(':')?
+                .0
+                .parse()
+                .ok()
+        };
+        self.errors().lines().filter_map(frame).collect()
     }
 
     /// Fails the test with what was printed unless the exit code is `code`.

@@ -1,0 +1,146 @@
+//! A disk that is full, played by a small file system in a namespace of its own.
+#![cfg(target_os = "linux")]
+
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+
+const FRAMES: usize = 5;
+
+/// Renders into a file system of `$2`, keeps what it left as `after`, makes room, renders again.
+const SCRIPT: &str = r#"
+program=$1; size=$2; shift 2
+mkdir -p full
+mount -t tmpfs -o size=$size none full || exit 99
+"$program" "$@" 2> errors; echo $? > code
+cp -a full after
+mount -o remount,size=64m full || exit 99
+"$program" "$@" 2> errors-again; echo $? > code-again
+cp -a full again
+"#;
+
+/// How this user may mount, if at all.
+fn namespace() -> Option<&'static [&'static str]> {
+    let ways: [&[&str]; 2] = [&["-r", "-m"], &["-m"]];
+    ways.into_iter().find(|options| {
+        Command::new("unshare")
+            .args(*options)
+            .args(["mount", "-t", "tmpfs", "none", "/mnt"])
+            .stderr(Stdio::null())
+            .status()
+            .is_ok_and(|status| status.success())
+    })
+}
+
+#[test]
+#[expect(clippy::print_stderr, reason = "a test that is left out says so")]
+fn a_full_disk_is_told_and_nothing_is_half_written() {
+    let Some(namespace) = namespace() else {
+        eprintln!("left out: no file system may be mounted here");
+        return;
+    };
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=FRAMES);
+    workshop.render_to("whole", &[]).expect(0);
+    let whole = images(&workshop.join("whole"));
+    // Room for the plan only; for some of the first image; for some images.
+    for (size, code) in [
+        ("8k", 2),
+        ("16k", 1),
+        ("20k", 1),
+        ("24k", 1),
+        ("40k", 1),
+        ("60k", 1),
+    ] {
+        let place = Workshop::new();
+        dam_break(&place.join("in"), 1..=FRAMES);
+        let status = Command::new("unshare")
+            .args(namespace)
+            .args([
+                "sh",
+                "-c",
+                SCRIPT,
+                "sh",
+                env!("CARGO_BIN_EXE_spherule"),
+                size,
+            ])
+            .args(["render", "in", "-o", "full/f.####.exr"])
+            .args(SMALL)
+            .current_dir(place.path())
+            .status();
+        assert!(status.expect("unshare starts").success());
+        let text = |name: &str| std::fs::read_to_string(place.join(name)).expect(name);
+
+        let errors = text("errors");
+        assert_eq!(text("code").trim(), code.to_string(), "{size}: {errors}");
+        let told: Vec<&str> = errors
+            .lines()
+            .filter(|l| l.starts_with("error: "))
+            .collect();
+        assert_eq!(told.len(), 1, "{size}: {errors}");
+        assert!(told[0].contains("/full/") && told[0].contains(": no space left; free some"));
+        whatever_is_there_is_whole(&place.join("after"), &whole);
+
+        assert_eq!(
+            text("code-again").trim(),
+            "0",
+            "{size}: {}",
+            text("errors-again")
+        );
+        no_leftovers(&place.join("again"));
+        assert!(images(&place.join("again")) == whole, "{size}");
+    }
+}
+
+#[track_caller]
+fn whatever_is_there_is_whole(dir: &Path, whole: &std::collections::BTreeMap<String, Vec<u8>>) {
+    no_leftovers(dir);
+    let made = images(dir);
+    for (name, bytes) in &made {
+        assert!(whole.get(name) == Some(bytes), "{name} is not whole");
+    }
+    for (name, length) in ledger(dir).done() {
+        assert_eq!(
+            made.get(&name).map(|b| b.len() as u64),
+            Some(length),
+            "{name}"
+        );
+    }
+}
+
+/// Files may not grow beyond some limit: the frame fails, the others do not.
+#[test]
+fn an_image_that_cannot_be_written_costs_one_frame() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=9);
+    workshop.render_to("whole", &[]).expect(0);
+    let whole = images(&workshop.join("whole"));
+    let largest = whole.values().map(Vec::len).max().expect("images");
+    // In blocks of 512 bytes; the signal that tells of it is let pass.
+    let script = format!(
+        "trap '' XFSZ; ulimit -f {}; exec \"$@\"",
+        (largest - 1) / 512
+    );
+    let output = Command::new("sh")
+        .args(["-c", &script, "sh", env!("CARGO_BIN_EXE_spherule")])
+        .args(["render", "in", "-o", "out/f.####.exr"])
+        .args(SMALL)
+        .current_dir(workshop.path())
+        .output()
+        .expect("sh starts");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(
+        errors.contains("error: frame 9: ") && errors.contains("/out/f.0009.exr: "),
+        "{errors}"
+    );
+    assert!(
+        errors.contains("8 of 9 frames done") && errors.contains("failed: 9"),
+        "{errors}"
+    );
+    whatever_is_there_is_whole(&workshop.join("out"), &whole);
+    let ran = workshop.render(&[]).expect(0);
+    assert_eq!(ran.rendered(), [9]);
+    assert!(images(&workshop.join("out")) == whole);
+}

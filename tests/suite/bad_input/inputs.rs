@@ -1,0 +1,142 @@
+//! Inputs that are no sequence of particles.
+
+use std::fs;
+
+use glam::Vec3;
+
+use super::refused;
+use crate::harness::{SMALL, Workshop, dam_break, npy};
+
+#[track_caller]
+fn no_sequence(workshop: &Workshop, input: &str, wanted: &[&str]) {
+    refused(workshop, &["render", input, "-o", "out/f.####.exr"], wanted);
+    assert!(!workshop.join("out").exists());
+    refused(workshop, &["init", input], &wanted[..1]);
+}
+
+#[test]
+fn what_is_not_there_is_named() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=3);
+    no_sequence(
+        &workshop,
+        "no-such-place",
+        &["error: no-such-place: no such file or directory"],
+    );
+    no_sequence(
+        &workshop,
+        "in/f_7.bgeo",
+        &["in/f_7.bgeo: no such file", "f_1.bgeo"],
+    );
+    no_sequence(
+        &workshop,
+        "in/nothing_#.bgeo",
+        &[
+            "in/nothing_#.bgeo: no file name fits this pattern",
+            "f_1.bgeo",
+        ],
+    );
+    no_sequence(&workshop, "nowhere/f_#.bgeo", &["nowhere"]);
+    refused(&workshop, &["render", "in/job.toml"], &["in/job.toml: "]);
+}
+
+#[test]
+fn directories_without_particles_say_what_they_have() {
+    let workshop = Workshop::new();
+    fs::create_dir(workshop.join("empty")).expect("a directory");
+    no_sequence(
+        &workshop,
+        "empty",
+        &["empty: no particle files here; the directory is empty"],
+    );
+    fs::create_dir(workshop.join("papers")).expect("a directory");
+    for name in ["a.txt", "b.txt", "c.json"] {
+        fs::write(workshop.join("papers").join(name), "words").expect("a file");
+    }
+    no_sequence(
+        &workshop,
+        "papers",
+        &[
+            "papers: no particle files here; it has ",
+            "2 .txt",
+            "1 .json",
+        ],
+    );
+}
+
+#[test]
+fn unknown_formats_are_told_by_their_beginning() {
+    let workshop = Workshop::new();
+    let render = |file: &str, wanted: &[&str]| {
+        refused(&workshop, &["render", file, "-o", "out/f.exr"], wanted);
+        assert!(!workshop.join("out").exists());
+        let error = workshop.run(&["inspect", file]).expect(1).errors();
+        assert!(
+            wanted[1..].iter().all(|text| error.contains(text)),
+            "{error}"
+        );
+    };
+    fs::write(workshop.join("words.dat"), "garbage here").expect("a file");
+    render(
+        "words.dat",
+        &[
+            "error: no frame can be read: ",
+            "words.dat: byte 0: no particle format begins with `garbage `",
+            "vtk",
+        ],
+    );
+    fs::write(workshop.join("wrong.bgeo"), [0x91, 3, 7, 200, 11, 90, 1, 2]).expect("a file");
+    render(
+        "wrong.bgeo",
+        &[
+            "error: no frame can be read: ",
+            "wrong.bgeo: byte 0: named like a bgeo file, but does not begin like one",
+        ],
+    );
+    fs::write(workshop.join("none.vtk"), "").expect("a file");
+    render("none.vtk", &["error: no frame can be read: ", "none.vtk: "]);
+}
+
+#[test]
+fn two_sequences_in_a_directory_have_to_be_told_apart() {
+    let workshop = Workshop::new();
+    for (name, frames) in [("fluid", 1..4), ("snow", 50..55)] {
+        for frame in frames {
+            npy(
+                &workshop.join(format!("in/{name}_{frame}.npy")),
+                50,
+                1,
+                Vec3::ZERO,
+            );
+        }
+    }
+    no_sequence(
+        &workshop,
+        "in",
+        &[
+            "in: 2 sequences are here; give the pattern of one: ",
+            "snow_",
+            "fluid_",
+            "(5 frames)",
+            "(3 frames)",
+        ],
+    );
+    let arguments = [
+        &["render", "in/fluid_#.npy", "-o", "out/f.####.exr"][..],
+        &SMALL,
+    ]
+    .concat();
+    assert_eq!(workshop.run(&arguments).expect(0).rendered(), [1, 2, 3]);
+}
+
+#[test]
+fn a_manifest_stands_alone() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), [1]);
+    fs::write(workshop.join("job.toml"), "[input]\npath = \"in\"\n").expect("a file");
+    refused(
+        &workshop,
+        &["render", "job.toml", "in"],
+        &["job.toml: a manifest stands alone; its input.path names the particles"],
+    );
+}

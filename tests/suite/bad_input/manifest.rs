@@ -1,0 +1,113 @@
+//! Manifests with something wrong in them: file, line, column, key, remedy.
+
+use std::fs;
+
+use super::refused;
+use crate::harness::{Workshop, dam_break};
+
+#[track_caller]
+fn wrong(text: &str, wanted: &[&str]) {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), [1]);
+    fs::write(workshop.join("my.toml"), text).expect("a file");
+    refused(&workshop, &["render", "my.toml"], wanted);
+    let left = fs::read_dir(workshop.path())
+        .expect("the directory")
+        .count();
+    assert_eq!(left, 2, "a refused job leaves nothing");
+}
+
+#[test]
+fn unknown_keys_get_the_nearest_known_one() {
+    wrong(
+        "[input]\npath = \"in\"\n[render]\nmax_dept = 3\n",
+        &[
+            "error: my.toml: line 4, column 1: render.max_dept: unknown key; did you mean `render.max_depth`?",
+        ],
+    );
+    wrong(
+        "[input]\npath = \"in\"\n[rendr]\nmax_depth = 3\n",
+        &["my.toml: line 3, column 2: rendr: unknown key; did you mean `render`?"],
+    );
+    wrong(
+        "[input]\npath = \"in\"\n[render]\nsamples = 3\n",
+        &[
+            "my.toml: line 4, column 1: render.samples: unknown key here; did you mean `image.samples`?",
+        ],
+    );
+}
+
+#[test]
+fn wrong_types_have_line_and_column() {
+    wrong(
+        "[input]\npath = \"in\"\n[image]\nwidth = \"wide\"\nheight = 1.5\n",
+        &[
+            "error: my.toml: line 4, column 9: image.width: wants a whole number from 1 to 65536, not the text \"wide\"",
+            "error: my.toml: line 5, column 10: image.height: wants a whole number",
+        ],
+    );
+    wrong(
+        "[input]\npath = \"in\"\n[camera]\neye = 3\nlook_at = [0, 0, 0]\n",
+        &["my.toml: line 4, column 7: camera.eye: wants three numbers"],
+    );
+    wrong(
+        "[input]\npath = 7\n",
+        &["my.toml: line 2, column 8: input.path: wants a name in quotes, not 7"],
+    );
+    wrong(
+        "image = 3\n[input]\npath = \"in\"\n",
+        &["line 1, column 9: image: wants a table"],
+    );
+}
+
+#[test]
+fn what_is_missing_is_named() {
+    wrong(
+        "",
+        &[
+            "my.toml: ",
+            "input.path: is missing; a directory, a pattern",
+        ],
+    );
+    wrong("[input]\nup = \"y\"\n", &["input.path: is missing"]);
+    wrong(
+        "[input]\npath = \"in\"\n[camera]\nmode = \"fixed\"\n",
+        &["camera.eye: is missing", "camera.look_at: is missing"],
+    );
+    wrong(
+        "[input]\npath = \"elsewhere\"\n",
+        &["elsewhere: no such file or directory"],
+    );
+}
+
+#[test]
+fn what_is_no_toml_has_a_place() {
+    wrong("[input]\npath = [\n", &["my.toml: line 2, column "]);
+    wrong(
+        "[input]\npath = \"a\"\npath = \"b\"\n",
+        &["my.toml: line 3, column 1: duplicate key"],
+    );
+    wrong("\u{1}\u{2}", &["my.toml: line 1, column "]);
+}
+
+#[test]
+fn what_is_not_built_is_said() {
+    wrong(
+        "[input]\npath = \"in\"\n[camera]\nmode = \"turntable\"\n",
+        &["camera.mode: turntable is not in this version"],
+    );
+}
+
+#[test]
+fn a_manifest_that_is_no_text_or_no_file() {
+    let workshop = Workshop::new();
+    fs::write(workshop.join("bytes.toml"), [0xff, 0xfe, 0, 9]).expect("a file");
+    refused(
+        &workshop,
+        &["render", "bytes.toml"],
+        &["error: bytes.toml: "],
+    );
+    fs::create_dir(workshop.join("dir.toml")).expect("a directory");
+    refused(&workshop, &["render", "dir.toml"], &["error: dir.toml: "]);
+    refused(&workshop, &["render", "none.toml"], &["error: none.toml: "]);
+}

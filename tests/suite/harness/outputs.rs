@@ -1,0 +1,81 @@
+//! What a job's directory holds.
+
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+use std::time::SystemTime;
+
+use serde_json::Value;
+
+/// All files in `dir` with their bytes, by name.
+pub(crate) fn files(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let read = |entry: fs::DirEntry| Some((name(&entry), fs::read(entry.path()).ok()?));
+    entries(dir).into_iter().filter_map(read).collect()
+}
+
+/// The images and previews in `dir`, by name.
+pub(crate) fn images(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = files(dir);
+    all.retain(|name, _| {
+        let extension = Path::new(name).extension().and_then(|e| e.to_str());
+        !name.starts_with('.') && matches!(extension, Some("exr" | "png"))
+    });
+    all
+}
+
+/// When each file in `dir` was written.
+pub(crate) fn stamps(dir: &Path) -> BTreeMap<String, SystemTime> {
+    let stamp = |entry: fs::DirEntry| Some((name(&entry), entry.metadata().ok()?.modified().ok()?));
+    entries(dir).into_iter().filter_map(stamp).collect()
+}
+
+/// Fails the test if `dir` has temporary files.
+#[track_caller]
+pub(crate) fn no_leftovers(dir: &Path) {
+    let is_left = |name: &String| name.starts_with('.') || name.ends_with(".part");
+    let left: Vec<String> = entries(dir).iter().map(name).filter(is_left).collect();
+    assert!(left.is_empty(), "{left:?}");
+}
+
+/// The ledger of a job as scripts see it.
+pub(crate) struct Ledger {
+    /// The whole lines.
+    pub(crate) lines: Vec<Value>,
+    /// Whether an unfinished line follows.
+    pub(crate) torn: bool,
+}
+
+impl Ledger {
+    /// Names and lengths of the files that lines say are done.
+    pub(crate) fn done(&self) -> Vec<(String, u64)> {
+        let outputs = |line: &Value| line["outputs"].as_array().cloned().unwrap_or_default();
+        self.lines
+            .iter()
+            .filter(|line| line["status"] == "done")
+            .flat_map(outputs)
+            .map(|o| {
+                let path = o["path"].as_str().expect("a path").to_owned();
+                (path, o["len"].as_u64().expect("a length"))
+            })
+            .collect()
+    }
+}
+
+/// The ledger in `dir`; empty if there is none.
+pub(crate) fn ledger(dir: &Path) -> Ledger {
+    let text = fs::read_to_string(dir.join("job.ledger.main.jsonl")).unwrap_or_default();
+    let whole = text.rfind('\n').map_or(0, |at| at + 1);
+    let parse = |line: &str| serde_json::from_str(line).expect("a whole line is JSON");
+    Ledger {
+        lines: text[..whole].lines().map(parse).collect(),
+        torn: whole < text.len(),
+    }
+}
+
+fn entries(dir: &Path) -> Vec<fs::DirEntry> {
+    fs::read_dir(dir).map_or_else(|_| Vec::new(), |list| list.filter_map(Result::ok).collect())
+}
+
+fn name(entry: &fs::DirEntry) -> String {
+    entry.file_name().to_string_lossy().into_owned()
+}

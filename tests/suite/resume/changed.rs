@@ -1,0 +1,170 @@
+//! The same command does nothing; another setting or input is refused by name.
+
+use std::fs;
+
+use crate::harness::{Ran, Workshop, dam_break, images, ledger, stamps};
+
+fn five_frames() -> Workshop {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=5);
+    workshop
+}
+
+#[test]
+fn the_same_command_again_does_nothing() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0).tells("5 of 5 frames done");
+    let out = workshop.join("out");
+    let before = stamps(&out);
+    assert_eq!(before.len(), 2 * 5 + 4);
+    let nothing = |ran: Ran| {
+        let ran = ran.expect(0).tells("5 of 5 frames are done already");
+        assert!(ran.rendered().is_empty());
+    };
+    nothing(workshop.render(&[]));
+    assert_eq!(stamps(&out), before);
+
+    // The same job in other words.
+    nothing(workshop.render(&["--threads", "1", "--progress", "json"]));
+    nothing(workshop.render(&["--accelerator", "lbvh"]));
+    nothing(workshop.run(&["render", "out/job.toml"]));
+    nothing(workshop.run(&["render", "./out/../out/job.toml"]));
+    let after = stamps(&out);
+    for (name, stamp) in &before {
+        // The others tell of the last run: accelerator, threads, paths as they were given.
+        if name.starts_with("f.") || name.ends_with(".jsonl") {
+            assert_eq!(after.get(name), Some(stamp), "{name} was touched");
+        }
+    }
+}
+
+#[test]
+fn the_directory_may_be_moved() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0);
+    fs::rename(workshop.join("out"), workshop.join("moved")).expect("a rename");
+    workshop
+        .run(&["render", "moved/job.toml"])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+    workshop
+        .render_to("moved", &[])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+    assert!(!workshop.join("out").exists());
+}
+
+#[test]
+fn changed_settings_are_refused_with_old_and_new_value() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0);
+    let before = stamps(&workshop.join("out"));
+    let refused = workshop
+        .render(&["--max-depth", "2", "--set", "material.ior=1.5"])
+        .expect(2)
+        .tells("out: settings have changed since this job began: render.max_depth: 3 -> 2; material.ior: 1.33 -> 1.5;")
+        .tells("--force starts over, --keep-done keeps what is there");
+    assert_eq!(refused.errors().matches("error:").count(), 1);
+    assert_eq!(stamps(&workshop.join("out")), before);
+
+    let file = workshop.join("out/job.toml");
+    let text = fs::read_to_string(&file).expect("the manifest");
+    fs::write(&file, text.replace("max_depth = 3", "max_depth = 4")).expect("a file");
+    workshop
+        .run(&["render", "out/job.toml"])
+        .expect(2)
+        .tells("render.max_depth: 3 -> 4");
+}
+
+#[test]
+fn force_starts_over() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0);
+    workshop.render_to("fresh", &["--max-depth", "1"]).expect(0);
+    let old = images(&workshop.join("out"));
+    let ran = workshop.render(&["--max-depth", "1", "--force"]).expect(0);
+    assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
+    let new = images(&workshop.join("out"));
+    assert!(new != old && new == images(&workshop.join("fresh")));
+    assert_eq!(ledger(&workshop.join("out")).lines.len(), 5);
+    workshop
+        .render(&[])
+        .expect(2)
+        .tells("render.max_depth: 1 -> 3");
+    workshop
+        .render(&["--max-depth", "1"])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+}
+
+#[test]
+fn force_does_not_forget_a_job_for_one_that_cannot_be() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0);
+    let before = stamps(&workshop.join("out"));
+    workshop
+        .render(&["--force", "--color-by", "nosuch"])
+        .expect(2)
+        .tells("nosuch");
+    assert_eq!(stamps(&workshop.join("out")), before);
+    workshop
+        .render(&[])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+}
+
+#[test]
+fn keep_done_keeps_what_is_there_and_does_the_rest_anew() {
+    let workshop = five_frames();
+    workshop.render(&["--frames", "1-3"]).expect(0);
+    let old = images(&workshop.join("out"));
+    workshop.render_to("fresh", &["--max-depth", "1"]).expect(0);
+    let fresh = images(&workshop.join("fresh"));
+    let ran = workshop
+        .render(&["--max-depth", "1", "--keep-done"])
+        .expect(0);
+    assert_eq!(ran.rendered(), [4, 5]);
+    let mixed = images(&workshop.join("out"));
+    assert_eq!(mixed.len(), 10);
+    for (name, bytes) in &mixed {
+        let wanted = old.get(name).or_else(|| fresh.get(name));
+        assert!(wanted == Some(bytes), "{name}");
+    }
+    // From now on the new setting is the job's.
+    workshop
+        .render(&["--max-depth", "1"])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+    workshop
+        .render(&[])
+        .expect(2)
+        .tells("render.max_depth: 1 -> 3");
+}
+
+#[test]
+fn force_and_keep_done_exclude_each_other() {
+    let workshop = five_frames();
+    workshop
+        .render(&["--force", "--keep-done"])
+        .expect(2)
+        .tells("cannot be used with");
+    assert!(!workshop.join("out").exists());
+}
+
+#[test]
+fn a_rewritten_input_is_refused_by_name() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0);
+    fs::copy(workshop.join("in/f_5.bgeo"), workshop.join("in/f_2.bgeo")).expect("a copy");
+    workshop
+        .render(&[])
+        .expect(2)
+        .tells("inputs of finished frames have changed: frame 2: in/f_2.bgeo: ");
+    // Other frames are not concerned.
+    workshop
+        .render(&["--frames", "3-5"])
+        .expect(0)
+        .tells("3 of 3 frames are done already");
+    let ran = workshop.render(&["--keep-done"]).expect(0);
+    assert!(ran.rendered().is_empty());
+}

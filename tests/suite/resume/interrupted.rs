@@ -1,0 +1,107 @@
+//! TERM and Ctrl-C: exit code 75, and the same command goes on.
+
+use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+
+const FRAMES: usize = 30;
+/// A signal may come after the last frame on a busy machine; then it is tried again.
+const TRIES: usize = 5;
+
+/// Interrupts a job after its first frame; false if it was done before.
+fn interrupt(workshop: &Workshop, out: &str, signal: &str) -> bool {
+    let pattern = format!("{out}/f.####.exr");
+    let arguments = [&["render", "in", "-o", &pattern][..], &SMALL].concat();
+    let mut running = workshop.start(&arguments);
+    assert!(running.wait_for_line("] frame 1:"));
+    running.signal(signal);
+    let (told, status) = running.end();
+    if status.code() == Some(0) {
+        return false;
+    }
+    assert_eq!(status.code(), Some(75), "{told}");
+    assert!(told.contains("stopping after the frame in hand"), "{told}");
+    // The frame in hand was finished, and what is told is what is there.
+    let done = ledger(&workshop.join(out)).lines.len();
+    assert!((1..FRAMES).contains(&done), "{told}");
+    assert!(
+        told.contains(&format!("{done} of {FRAMES} frames done")),
+        "{told}"
+    );
+    assert!(
+        !told.contains("error:") && !told.contains("failed:"),
+        "{told}"
+    );
+    assert_eq!(images(&workshop.join(out)).len(), 2 * done);
+    no_leftovers(&workshop.join(out));
+    true
+}
+
+#[test]
+fn term_and_interrupt_end_with_75_and_the_job_goes_on() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=FRAMES);
+    workshop.render_to("whole", &[]).expect(0);
+    let whole = images(&workshop.join("whole"));
+    for signal in ["TERM", "INT"] {
+        let tried = |n: &usize| interrupt(&workshop, &format!("{signal}{n}"), signal);
+        let out = (0..TRIES).find(tried).map(|n| format!("{signal}{n}"));
+        let out = out.expect("a signal comes in time");
+        let done = ledger(&workshop.join(&out)).lines.len();
+        // By the same command after one signal, by the job's own manifest after the other.
+        let ran = if signal == "TERM" {
+            workshop.render_to(&out, &[])
+        } else {
+            workshop.run(&["render", &format!("{out}/job.toml")])
+        }
+        .expect(0)
+        .tells(&format!("{done} of {FRAMES} frames are done already"));
+        assert_eq!(ran.rendered().len(), FRAMES - done);
+        assert!(images(&workshop.join(&out)) == whole, "{signal}");
+    }
+}
+
+/// Frames that take minutes: the program ends early or the test does not.
+const LONG: [&str; 6] = ["--width", "1280", "--height", "720", "--samples", "256"];
+
+#[test]
+fn a_second_term_stops_at_once() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &LONG].concat();
+    let in_hand = (0..TRIES).any(|_| {
+        let mut running = workshop.start(&arguments);
+        // Told last before the first frame is begun.
+        assert!(running.wait_for_line("colour by"));
+        running.signal("TERM");
+        let asked = running.wait_for_line("stopping after the frame in hand");
+        running.signal("TERM");
+        let (told, status) = running.end();
+        assert_eq!(status.code(), Some(75), "{told}");
+        // Without a frame in hand, the first one has sufficed.
+        asked && told.contains("stopped; the same command goes on from here")
+    });
+    assert!(in_hand, "there never was a frame in hand");
+    assert!(images(&workshop.join("out")).is_empty());
+    assert!(ledger(&workshop.join("out")).lines.is_empty());
+}
+
+#[test]
+fn a_second_process_is_told_that_one_is_at_work() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &LONG].concat();
+    let mut running = workshop.start(&arguments);
+    assert!(running.wait_for_line("colour by"));
+    workshop
+        .run(&arguments)
+        .expect(2)
+        .tells("job.ledger.main.jsonl: another process is at work here");
+    // Nor may it be started over under the first one's hands.
+    let force = [&arguments[..], &["--force"]].concat();
+    workshop
+        .run(&force)
+        .expect(2)
+        .tells("another process is at work here");
+    running.kill();
+    assert_eq!(running.end().1.code(), None);
+    assert!(workshop.join("out/job.plan.json").exists());
+}

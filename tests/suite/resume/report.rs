@@ -1,0 +1,126 @@
+//! `report.json` has what scripts rely on (DESIGN 3.2).
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::harness::{Workshop, dam_break};
+
+fn report(workshop: &Workshop) -> Value {
+    let bytes = fs::read(workshop.join("out/report.json")).expect("a report");
+    serde_json::from_slice(&bytes).expect("JSON")
+}
+
+fn keys(value: &Value) -> Vec<&str> {
+    let object = value.as_object().expect("an object");
+    object.keys().map(String::as_str).collect()
+}
+
+#[track_caller]
+fn has(value: &Value, wanted: &[&str]) {
+    let keys = keys(value);
+    for key in wanted {
+        assert!(keys.contains(key), "no `{key}` among {keys:?}");
+    }
+}
+
+#[test]
+fn frames_totals_settings_and_machine() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=4);
+    let file = workshop.join("in/f_2.bgeo");
+    let good = fs::read(&file).expect("a frame");
+    fs::write(&file, &good[..100]).expect("a file");
+    workshop
+        .render(&["--frames", "1-3", "--threads", "2"])
+        .expect(1);
+    let first = report(&workshop);
+    has(&first, &["frames", "totals", "settings", "machine"]);
+    let frames = first["frames"].as_array().expect("frames");
+    let status: Vec<&str> = frames.iter().filter_map(|f| f["status"].as_str()).collect();
+    assert_eq!(status, ["done", "failed", "done", "pending"]);
+    let numbers: Vec<i64> = frames.iter().filter_map(|f| f["frame"].as_i64()).collect();
+    assert_eq!(numbers, [1, 2, 3, 4]);
+    let failed = frames[1]["reason"].as_str().expect("a reason");
+    assert!(failed.contains("f_2.bgeo"), "{failed}");
+    for (frame, image) in frames.iter().zip(1..) {
+        assert_eq!(frame["image"], format!("f.{image:04}.exr"));
+    }
+    done_frame(&frames[0]);
+    done_frame(&frames[2]);
+
+    let totals = &first["totals"];
+    assert_eq!((&totals["frames"], &totals["done"]), (&4.into(), &2.into()));
+    assert_eq!(totals["failed"], serde_json::json!([2]));
+    assert_eq!(totals["pending"], 1);
+    for key in ["primary", "shadow", "reflection", "refraction"] {
+        let sum: u64 = frames.iter().filter_map(|f| f["rays"][key].as_u64()).sum();
+        assert_eq!(totals["rays"][key], sum, "{key}");
+    }
+    assert_eq!(first["settings"]["render.max_depth"], "3");
+    assert_eq!(first["settings"]["image.width"], "64");
+    assert_eq!(first["machine"]["threads"], 2);
+
+    // It tells of the whole job, not of the last run.
+    fs::write(&file, good).expect("a file");
+    workshop.render(&["--threads", "2"]).expect(0);
+    let second = report(&workshop);
+    let frames = second["frames"].as_array().expect("frames");
+    assert!(frames.iter().all(|f| f["status"] == "done"));
+    assert_eq!(frames[0], first["frames"][0]);
+    assert_eq!(second["totals"]["done"], 4);
+}
+
+#[track_caller]
+fn done_frame(frame: &Value) {
+    assert_eq!(frame["particles"], 10422);
+    has(&frame["seconds"], &["read", "build", "trace", "encode"]);
+    has(&frame["build"], &["order", "nodes"]);
+    has(&frame["bytes"], &["positions", "structure", "build_peak"]);
+    has(
+        &frame["rays"],
+        &["primary", "shadow", "reflection", "refraction"],
+    );
+    has(&frame["rss"], &["anonymous_peak", "file_peak"]);
+    assert_eq!(frame["rays"]["primary"], 64 * 36);
+    assert!(frame["bytes"]["positions"].as_u64() >= Some(10422 * 12));
+    assert!(frame["build"]["nodes"].as_u64() > Some(0));
+    for stage in ["read", "build", "trace", "encode"] {
+        assert!(frame["seconds"][stage].as_f64() > Some(0.0), "{stage}");
+    }
+}
+
+#[test]
+fn progress_for_programs_tells_each_frame() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=3);
+    let file = workshop.join("in/f_2.bgeo");
+    fs::write(&file, &fs::read(&file).expect("a frame")[..100]).expect("a file");
+    let ran = workshop.render(&["--progress", "json"]).expect(1);
+    let lines: Vec<Value> = ran
+        .errors()
+        .lines()
+        .filter(|line| line.starts_with('{'))
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    let told: Vec<(i64, &str)> = lines
+        .iter()
+        .filter_map(|l| Some((l["frame"].as_i64()?, l["status"].as_str()?)))
+        .collect();
+    assert_eq!(told, [(1, "done"), (2, "failed"), (3, "done")]);
+
+    let ran = workshop
+        .render(&["--progress", "openjd", "--force"])
+        .expect(1);
+    let progress: Vec<String> = ran.text().lines().map(str::to_owned).collect();
+    assert!(
+        progress.contains(&"openjd_progress: 100.0".to_owned()),
+        "{progress:?}"
+    );
+
+    let ran = workshop
+        .render(&["--progress", "none", "--force"])
+        .expect(1);
+    assert!(ran.rendered().is_empty());
+    assert!(ran.errors().contains("error: frame 2: in/f_2.bgeo"));
+}
