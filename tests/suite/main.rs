@@ -1,6 +1,7 @@
 //! The program from outside, and the library across its rooms: one binary, a module a subject.
 
 mod harness;
+mod picture;
 
 mod bad_input;
 mod damaged;
