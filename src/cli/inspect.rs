@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
+use spherule_formats::sequence::lone_frame_number;
 use spherule_formats::stats::{AttributeStats, FrameStats, Number};
 use spherule_formats::{FrameError, FrameFile, Positions, RawParticles, Sequence, SequenceInput};
 
@@ -67,7 +68,7 @@ fn expand(arguments: &[PathBuf]) -> Result<Vec<(PathBuf, Option<i64>)>, CliError
         match SequenceInput::from_path(argument) {
             SequenceInput::Files(listed) => {
                 files.extend(listed.into_iter().map(|f| {
-                    let number = number_in(&f);
+                    let number = lone_frame_number(&f);
                     (f, number)
                 }));
             }
@@ -84,15 +85,6 @@ fn expand(arguments: &[PathBuf]) -> Result<Vec<(PathBuf, Option<i64>)>, CliError
         }
     }
     Ok(files)
-}
-
-/// The last number in a single file's name.
-fn number_in(path: &Path) -> Option<i64> {
-    let stem = path.file_stem()?.to_str()?;
-    let digits = stem
-        .rsplit(|c: char| !c.is_ascii_digit())
-        .find(|run| !run.is_empty())?;
-    digits.parse().ok()
 }
 
 /// Reads one file; the outer error is the file's, the inner one the output's.

@@ -298,6 +298,13 @@ fn y_is_up(path: &Path) -> bool {
     }
 }
 
+/// The frame number that the name of a file tells when there are no others to compare with: what
+/// follows the word `frame`, else the last number.
+pub fn lone_frame_number(path: &Path) -> Option<i64> {
+    let name = Name::parse(path, None);
+    name.numbers.get(name.lone_column()?).copied()
+}
+
 /// Tells a rewritten file from the one that was read.
 fn stamp(path: &Path) -> Option<(u64, SystemTime)> {
     let meta = fs::metadata(path).ok()?;
