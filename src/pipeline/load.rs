@@ -204,14 +204,20 @@ fn vectors(attribute: &Attribute) -> Vec<Vec3> {
         .collect()
 }
 
-/// The attribute `id`, or the place in the file of particles that others were dropped between.
+/// Names under which simulations write ids, the usual one first: also numpy's plural and
+/// DualSPHysics'.
+const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
+
+/// The particles' ids, or the place in the file of particles that others were dropped between.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "the channel has 32 bits; larger ids keep their low ones"
 )]
 fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
-    let named = frame.attribute("id").filter(|a| a.components == 1);
+    let named = ID_NAMES
+        .iter()
+        .find_map(|name| frame.attribute(name).filter(|a| a.components == 1));
     Some(match named.map(|a| &a.data) {
         Some(AttributeData::U32(v)) => v.clone(),
         Some(AttributeData::I32(v)) => v.iter().map(|id| id.cast_unsigned()).collect(),
