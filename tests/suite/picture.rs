@@ -49,7 +49,7 @@ impl Picture {
             let AttributeValue::Text(text) = value else {
                 return None;
             };
-            let is_ours = name.to_string() == "spherule";
+            let is_ours = *name == *"spherule";
             is_ours.then(|| serde_json::from_str(&text.to_string()).expect("JSON"))
         });
         let planes = layer.channel_data.list.into_iter().map(|channel| {

@@ -1,0 +1,195 @@
+//! `inspect --json` on every sample: the object that scripts rely on.
+
+use serde_json::Value;
+
+use super::data_files;
+use crate::harness::{Workshop, sample};
+
+const KEYS: [&str; 13] = [
+    "attributes",
+    "bounds",
+    "bytes_per_particle",
+    "count",
+    "dropped",
+    "encoding",
+    "error_bound",
+    "file",
+    "format",
+    "frame",
+    "mean",
+    "radius",
+    "time",
+];
+const ATTRIBUTE_KEYS: [&str; 7] = ["components", "max", "mean", "min", "name", "sum", "type"];
+
+/// Runs `inspect --json` on `files` and parses each line.
+#[track_caller]
+fn inspect(files: &[String], code: i32) -> Vec<Value> {
+    let arguments: Vec<&str> = ["inspect", "--json"]
+        .into_iter()
+        .chain(files.iter().map(String::as_str))
+        .collect();
+    let ran = Workshop::new().run(&arguments).expect(code);
+    let lines = ran.text();
+    let parsed = lines.lines().map(|l| serde_json::from_str(l).expect(l));
+    parsed.collect()
+}
+
+fn paths(directory: &str) -> Vec<String> {
+    let full = |name| sample(&format!("{directory}/{name}")).display().to_string();
+    data_files(directory).into_iter().map(full).collect()
+}
+
+fn keys(object: &Value) -> Vec<&str> {
+    let map = object.as_object().expect("an object");
+    let mut keys: Vec<&str> = map.keys().map(String::as_str).collect();
+    keys.sort_unstable();
+    keys
+}
+
+/// The shape that every object has, whatever is in it.
+#[track_caller]
+fn check_shape(object: &Value) {
+    assert_eq!(keys(object), KEYS, "{object}");
+    for key in ["count", "dropped"] {
+        assert!(object[key].is_u64(), "{object}");
+    }
+    let empty = object["count"] == 0;
+    for key in ["bounds", "mean"] {
+        assert_eq!(object[key].is_null(), empty, "{object}");
+    }
+    for attribute in object["attributes"].as_array().expect("a list") {
+        assert_eq!(keys(attribute), ATTRIBUTE_KEYS, "{attribute}");
+        let components = attribute["components"].as_u64().expect("a number");
+        let is_float = attribute["type"].as_str().expect("a name").starts_with('f');
+        for key in ["min", "max", "mean", "sum"] {
+            let values = attribute[key].as_array().expect("a list");
+            assert_eq!(values.len() as u64, components, "{attribute}");
+            for value in values.iter().filter(|_| !empty) {
+                assert!(value.is_number(), "{attribute}");
+                let is_whole = key != "mean" && !is_float;
+                assert_eq!(value.is_i64() || value.is_u64(), is_whole, "{attribute}");
+            }
+        }
+    }
+}
+
+#[test]
+fn one_frame_in_every_format() {
+    let objects = inspect(&paths("single_frames"), 0);
+    assert_eq!(objects.len(), data_files("single_frames").len());
+    for object in objects {
+        check_shape(&object);
+        assert_eq!(object["count"], 1200, "{object}");
+        assert_eq!(object["dropped"], 0, "{object}");
+        assert_eq!(object["error_bound"], 0.0, "{object}");
+        let mean = [0.222_775, 0.508_420, 0.041_543_5];
+        for (found, expected) in object["mean"].as_array().expect("a list").iter().zip(mean) {
+            let found = found.as_f64().expect("a number");
+            assert!((found - expected).abs() < 1e-6, "{object}");
+        }
+        // The ids are 15..10421 with gaps; their sum is exact. LAMMPS counts from 1.
+        let expected = if object["format"] == "lammps" {
+            10_022_102
+        } else {
+            10_020_902
+        };
+        let attributes = object["attributes"].as_array().expect("a list");
+        let ids = attributes.iter().find(|a| {
+            let name = a["name"].as_str().expect("a name");
+            ["id", "ids", "Idp"].contains(&name)
+        });
+        if let Some(ids) = ids {
+            assert_eq!(ids["sum"], serde_json::json!([expected]), "{object}");
+        }
+    }
+}
+
+#[test]
+fn files_that_cannot_be_read_are_objects_too() {
+    for (directory, refused) in [
+        ("public_partio", vec!["test.geo", "test.pdb"]),
+        ("public_splashsurf", vec!["cube_normals.ply"]),
+        ("pysph", vec!["dam_break_3d_00300.npz"]),
+    ] {
+        let files = paths(directory);
+        let objects = inspect(&files, 1);
+        assert_eq!(objects.len(), files.len());
+        for (file, object) in files.iter().zip(&objects) {
+            assert_eq!(object["file"], file.as_str());
+            if refused.iter().any(|name| file.ends_with(name)) {
+                assert_eq!(keys(object), ["error", "file"]);
+            } else {
+                check_shape(object);
+            }
+        }
+    }
+}
+
+/// A file by itself has the number that `render` would give its image.
+#[test]
+fn frame_numbers_are_those_of_the_images() {
+    for (file, frame) in [
+        ("emitter_sph/ParticleData_Fluid_10.bgeo", 10),
+        ("lammps_drop/dump.drop.1200.lammps.gz", 1200),
+        ("pysph/dam_break_3d_fluid_00100.vtu", 100),
+        ("public_splashsurf/dam_break_frame_9_6859_particles.bgeo", 9),
+        (
+            "public_splashsurf/double_dam_break_frame_26_4732_particles.vtk",
+            26,
+        ),
+    ] {
+        let objects = inspect(&[sample(file).display().to_string()], 0);
+        assert_eq!(objects.len(), 1);
+        assert_eq!(objects[0]["frame"], frame, "{file}");
+    }
+    let workshop = Workshop::new();
+    std::fs::copy(
+        sample("lammps_drop/steps/dump.drop.400.lammps"),
+        workshop.join("dump.400"),
+    )
+    .expect("a copy");
+    let ran = workshop.run(&["inspect", "--json", "dump.400"]).expect(0);
+    let object: Value = serde_json::from_str(&ran.text()).expect("one object");
+    assert_eq!(object["frame"], 400);
+}
+
+#[test]
+fn a_file_of_several_steps_gives_an_object_each() {
+    let file = sample("lammps_drop/drop_4frames.lammpstrj")
+        .display()
+        .to_string();
+    let objects = inspect(&[file], 0);
+    let frames: Vec<i64> = objects.iter().filter_map(|o| o["frame"].as_i64()).collect();
+    assert_eq!(frames, [0, 400, 800, 1200]);
+    for object in &objects {
+        check_shape(object);
+        assert_eq!(object["count"], 200);
+        assert_eq!(object["attributes"][0]["sum"][0], 200 * 201 / 2);
+    }
+}
+
+#[test]
+fn a_pattern_gives_its_sequence_with_frames_without_particles() {
+    let pattern = sample("emitter_sph").join("ParticleData_Fluid_#.bgeo");
+    let objects = inspect(&[pattern.display().to_string()], 0);
+    let told: Vec<(i64, u64)> = objects
+        .iter()
+        .map(|o| {
+            (
+                o["frame"].as_i64().expect("a frame"),
+                o["count"].as_u64().expect("a count"),
+            )
+        })
+        .collect();
+    assert_eq!(
+        told,
+        [(1, 0), (2, 0), (3, 90), (4, 300), (5, 480), (10, 1410)]
+    );
+    for object in &objects {
+        check_shape(object);
+        let count = object["count"].as_i64().expect("a count");
+        // An emitter numbers what it makes: 0, 1, 2...
+        assert_eq!(object["attributes"][0]["sum"][0], count * (count - 1) / 2);
+    }
+}
