@@ -143,6 +143,12 @@ pub(super) fn zip_error(error: &ZipError, what: &str) -> ParseError {
         | ZipError::InvalidPassword => ParseError::unsupported(format!(
             "{what}: {error}; save with numpy.savez or numpy.savez_compressed"
         )),
+        ZipError::InvalidArchive(_) => ParseError::malformed(
+            0,
+            format!(
+                "{what}: {error}: the file is damaged or cut short, perhaps still being written"
+            ),
+        ),
         _ => ParseError::malformed(0, format!("{what}: {error}")),
     }
 }
