@@ -1,0 +1,297 @@
+//! Broken files: each gives its named error, or the particles that are left, and none costs memory
+//! or a panic.
+//!
+//! `tests/damaged` holds the files and `table.tsv`, a line for each: the name, then text that
+//! the error must have, or `reads K kept D dropped`. `SPHERULE_BLESS=1` writes the files anew
+//! from `make.rs`; the table is written by hand.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use proptest::prelude::*;
+use proptest::sample::Index;
+use serde_json::Value;
+use spherule_formats::stats::FrameStats;
+use spherule_formats::{FrameError, FrameFile};
+
+use crate::harness::{Workshop, sample};
+
+mod make;
+
+fn directory() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/damaged")
+}
+
+/// Names and what they must give.
+fn table() -> Vec<(String, String)> {
+    let text = fs::read_to_string(directory().join("table.tsv")).expect("the table");
+    let lines = text.lines().filter(|l| !l.is_empty());
+    lines
+        .map(|line| {
+            let (name, expected) = line.split_once('\t').expect("a name, a tab and a message");
+            (name.to_owned(), expected.to_owned())
+        })
+        .collect()
+}
+
+/// Whether `found` is what the table has: counts exactly, and an error by the text it must have.
+fn agrees(found: &str, expected: &str) -> bool {
+    let counts = expected.starts_with("reads ");
+    found == expected || !counts && found.contains(expected)
+}
+
+/// All steps of the file at `path`, as the table has it.
+fn outcome(path: &Path) -> String {
+    match read_all(path, FrameFile::open(path)) {
+        Ok((kept, dropped)) => format!("reads {kept} kept {dropped} dropped"),
+        Err(error) => {
+            let message = error.to_string();
+            let prefix = format!("{}: ", path.display());
+            let what = message.strip_prefix(&prefix);
+            what.expect("an error begins with the path").to_owned()
+        }
+    }
+}
+
+/// Particles kept and dropped over all steps.
+fn read_all(path: &Path, file: Result<FrameFile, FrameError>) -> Result<(u64, u64), FrameError> {
+    let file = file?;
+    assert_eq!(file.path(), path);
+    let mut sum = (0, 0);
+    for index in 0..file.steps().len() {
+        let stats = FrameStats::of(&file.read(index)?);
+        sum = (sum.0 + stats.count, sum.1 + stats.dropped);
+    }
+    Ok(sum)
+}
+
+#[test]
+fn every_file_gives_its_named_error() {
+    let made = make::files();
+    if std::env::var_os("SPHERULE_BLESS").is_some() {
+        for (name, bytes) in &made {
+            fs::write(directory().join(name), bytes).expect("a file");
+        }
+    }
+    let table = table();
+    let mut wrong = Vec::new();
+    for (name, expected) in &table {
+        let found = outcome(&directory().join(name));
+        if !agrees(&found, expected) {
+            wrong.push(format!("{name}\t{found}"));
+        }
+    }
+    assert!(
+        wrong.is_empty(),
+        "these differ from the table:\n{}",
+        wrong.join("\n")
+    );
+
+    let sorted = |names: Vec<String>| {
+        let mut names = names;
+        names.sort();
+        names
+    };
+    let listed = sorted(table.into_iter().map(|(name, _)| name).collect());
+    let makeable = sorted(made.into_iter().map(|(name, _)| name).collect());
+    assert_eq!(listed, makeable, "the table and the files that are made");
+    let entries = fs::read_dir(directory()).expect("the directory");
+    let there = entries.map(|e| {
+        e.expect("an entry")
+            .file_name()
+            .to_string_lossy()
+            .into_owned()
+    });
+    let there: Vec<String> = there.filter(|name| name != "table.tsv").collect();
+    assert_eq!(sorted(there), listed, "the directory and the table");
+}
+
+/// A count in a file must not become an allocation: the program has far less memory than the
+/// counts ask for.
+#[test]
+#[cfg(target_os = "linux")]
+fn the_program_tells_every_error_within_little_memory() {
+    let table = table();
+    let workshop = Workshop::new();
+    let program = workshop.command(&[]);
+    // In KiB; the counts ask for 20 GB and more.
+    let script = "ulimit -v 1500000 && exec \"$@\"";
+    let mut command = Command::new("sh");
+    command
+        .args(["-c", script, "sh"])
+        .arg(program.get_program());
+    command
+        .env("RAYON_NUM_THREADS", "2")
+        .current_dir(directory());
+    command
+        .args(["inspect", "--json"])
+        .args(table.iter().map(|(name, _)| name));
+    let output = command.output().expect("a shell");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(1), "{errors}");
+    assert!(errors.is_empty(), "{errors}");
+    let text = String::from_utf8(output.stdout).expect("UTF-8");
+    let objects: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).expect(line))
+        .collect();
+    assert_eq!(objects.len(), table.len());
+    for ((name, expected), object) in table.iter().zip(&objects) {
+        assert_eq!(object["file"], name.as_str());
+        if let Some(counts) = expected.strip_prefix("reads ") {
+            let told = format!("{} kept {} dropped", object["count"], object["dropped"]);
+            assert_eq!(told, counts, "{name}");
+        } else {
+            let told = object["error"].as_str().expect("a message");
+            assert!(told.starts_with(&format!("{name}: ")), "{told}");
+            assert!(told.contains(expected), "{told}");
+            assert_eq!(
+                object.as_object().map(serde_json::Map::len),
+                Some(2),
+                "{name}"
+            );
+        }
+    }
+}
+
+/// For people the same goes to standard error, and nothing to standard output.
+#[test]
+fn the_program_tells_people_too() {
+    let (name, expected) = table()
+        .into_iter()
+        .find(|(_, e)| !e.starts_with("reads"))
+        .expect("one");
+    let mut command = Workshop::new().command(&["inspect", &name]);
+    let output = command
+        .current_dir(directory())
+        .output()
+        .expect("the program starts");
+    assert_eq!(output.status.code(), Some(1));
+    let told = String::from_utf8_lossy(&output.stderr);
+    assert!(told.starts_with(&format!("error: {name}: ")), "{told}");
+    assert!(told.contains(&expected), "{told}");
+    assert_eq!(told.lines().count(), 1, "{told}");
+    assert!(output.stdout.is_empty());
+}
+
+/// What happens to a file on the way.
+#[derive(Debug, Clone)]
+enum Harm {
+    /// A byte becomes another.
+    Byte(Index, u8),
+    /// Bytes are lost.
+    Lose(Index, u8),
+    /// A piece comes twice.
+    Repeat(Index, u8),
+    /// The rest is missing.
+    Cut(Index),
+}
+
+fn harm() -> impl Strategy<Value = Harm> {
+    let place = || any::<Index>();
+    // Digits and separators are what text formats stumble over.
+    let byte = prop_oneof![
+        any::<u8>(),
+        prop::sample::select(&b"0123456789-+.eE \n,<>\"'"[..])
+    ];
+    prop_oneof![
+        8 => (place(), byte).prop_map(|(at, byte)| Harm::Byte(at, byte)),
+        1 => (place(), any::<u8>()).prop_map(|(at, length)| Harm::Lose(at, length)),
+        1 => (place(), any::<u8>()).prop_map(|(at, length)| Harm::Repeat(at, length)),
+        1 => place().prop_map(Harm::Cut),
+    ]
+}
+
+fn harmed(bytes: &[u8], harms: &[Harm], in_head: bool) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    for harm in harms {
+        if bytes.is_empty() {
+            break;
+        }
+        // Most of a file is numbers; what is believed stands at its start.
+        let reach = if in_head {
+            bytes.len().min(400)
+        } else {
+            bytes.len()
+        };
+        let end = |at: usize, length: u8| (at + usize::from(length)).min(bytes.len());
+        match harm {
+            Harm::Byte(at, byte) => bytes[at.index(reach)] = *byte,
+            Harm::Lose(at, length) => {
+                let at = at.index(reach);
+                let end = end(at, *length);
+                bytes.drain(at..end);
+            }
+            Harm::Repeat(at, length) => {
+                let at = at.index(reach);
+                let piece = bytes[at..end(at, *length)].to_vec();
+                bytes.splice(at..at, piece);
+            }
+            Harm::Cut(at) => bytes.truncate(at.index(reach)),
+        }
+    }
+    bytes
+}
+
+/// Every sample, and the damaged ones on top.
+fn samples() -> Vec<(PathBuf, Vec<u8>)> {
+    let mut all = Vec::new();
+    for folder in [
+        "emitter_sph",
+        "lammps_drop/steps",
+        "public_partio",
+        "public_splashsurf",
+        "pysph",
+        "single_frames",
+    ] {
+        let entries = fs::read_dir(sample(folder)).expect("a directory of samples");
+        all.extend(
+            entries
+                .map(|e| e.expect("an entry").path())
+                .filter(|p| p.is_file()),
+        );
+    }
+    all.extend(
+        make::files()
+            .into_iter()
+            .map(|(name, _)| directory().join(name)),
+    );
+    all.sort();
+    let mut samples = Vec::new();
+    for path in all {
+        let bytes = fs::read(&path).expect("a sample");
+        // Harm to a gzip stream seldom gets past its checksum.
+        if let Ok(file) = FrameFile::open(&path)
+            && file.bytes() != bytes
+        {
+            samples.push((path.clone(), file.bytes().to_vec()));
+        }
+        samples.push((path, bytes));
+    }
+    samples
+}
+
+/// Harmed copies of each sample.
+const CASES: u32 = 48;
+
+#[test]
+fn harmed_samples_do_not_panic() {
+    let config = ProptestConfig {
+        cases: CASES,
+        failure_persistence: None,
+        rng_seed: proptest::test_runner::RngSeed::Fixed(7),
+        ..ProptestConfig::default()
+    };
+    for (path, bytes) in samples() {
+        let mut runner = proptest::test_runner::TestRunner::new(config.clone());
+        let harms = (prop::collection::vec(harm(), 1..6), any::<bool>());
+        let result = runner.run(&harms, |(harms, in_head)| {
+            let bytes = harmed(&bytes, &harms, in_head);
+            // Either is fine, as long as it comes back.
+            let _ = read_all(&path, FrameFile::from_bytes(&path, bytes));
+            Ok(())
+        });
+        result.unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    }
+}
