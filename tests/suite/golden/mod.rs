@@ -1,0 +1,162 @@
+//! One small image for every feature, compared with the one in `tests/golden` by two limits: how
+//! far a value may be off, and how many pixels may be off further.
+//!
+//! A failure writes what was expected, what came out and the difference to `golden-failures` in
+//! the target directory. `SPHERULE_BLESS=1` makes the images of this machine the golden ones: look
+//! at them before they are committed.
+
+use std::env;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
+
+use spherule::accel::lbvh::Lbvh;
+use spherule::accel::simd::SimdLevel;
+use spherule::accel::{BuildSettings, SphereRadius, Spheres};
+use spherule::output::{ExrOptions, encode_exr};
+use spherule::render::{Film, ParticleShading, render};
+use spherule::surface::spheres::SphereSurface;
+
+use crate::picture::{Picture, Plane};
+
+mod compare;
+mod scenes;
+
+use compare::{LIMITS, differences};
+use scenes::Shot;
+
+const BLESS: &str = "SPHERULE_BLESS";
+
+/// Traces a shot with one instruction set.
+fn trace(shot: &Shot, simd: SimdLevel) -> Film {
+    let mut builder = Lbvh::new();
+    let radius = match shot.radii.as_slice() {
+        [one] => SphereRadius::Common(*one),
+        each => SphereRadius::Each(each),
+    };
+    let spheres = Spheres {
+        centers: &shot.centers,
+        radius,
+    };
+    builder.build(&spheres, &BuildSettings::default());
+    builder.tree_mut().set_simd(simd);
+    let source = ParticleShading {
+        colors: shot.colors.as_colors(),
+        ids: shot.ids.as_deref(),
+        velocities: shot.velocities.as_deref(),
+    };
+    let surface = SphereSurface::new(builder.tree());
+    let never = AtomicBool::new(false);
+    let (film, _) = render(&surface, &shot.scene, &source, &shot.settings, &never).expect("a film");
+    film
+}
+
+/// As it stands in a file, so that both sides were rounded to half alike.
+fn encode(film: &Film) -> Vec<u8> {
+    encode_exr(film, &ExrOptions::default())
+        .expect("an image")
+        .bytes
+}
+
+fn golden(name: &str) -> PathBuf {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
+    root.join("tests/golden").join(format!("{name}.exr"))
+}
+
+/// Compares the shot `name`, traced with every instruction set of this machine.
+#[track_caller]
+fn check(name: &str, shot: &Shot) {
+    let path = golden(name);
+    if env::var_os(BLESS).is_some() {
+        let best = encode(&trace(shot, SimdLevel::best()));
+        fs::write(&path, best).expect("a golden image");
+    }
+    let expected = Picture::open(&path);
+    for simd in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+        let actual = Picture::decode(&encode(&trace(shot, simd)));
+        let differing = differences(&expected, &actual, &LIMITS);
+        if !differing.is_empty() {
+            let told: Vec<String> = differing.iter().map(ToString::to_string).collect();
+            let folder = compare::write_failure(name, &expected, &actual, &differing);
+            panic!(
+                "{name} ({}) is not the golden image:\n{}\nsee {}; {BLESS}=1 takes the new one",
+                simd.name(),
+                told.join("\n"),
+                folder.display()
+            );
+        }
+    }
+}
+
+macro_rules! shots {
+    ($($name:ident),* $(,)?) => {
+        $(
+            #[test]
+            fn $name() {
+                check(stringify!($name), &scenes::$name());
+            }
+        )*
+
+        #[test]
+        fn no_golden_image_is_left_over() {
+            let folder = golden("x");
+            let entries = fs::read_dir(folder.parent().expect("a folder")).expect("golden images");
+            for entry in entries {
+                let path = entry.expect("an entry").path();
+                let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
+                assert!([$(stringify!($name)),*].contains(&stem.as_str()), "{}", path.display());
+            }
+        }
+    };
+}
+
+shots! {
+    shadow,
+    reflection,
+    refraction,
+    total_reflection,
+    shadow_through_glass,
+    viridis,
+    turbo,
+    radius_per_particle,
+    ground,
+    gradient_background,
+    inverse_square_light,
+    directional_lights,
+    data_channels,
+    transparent_background,
+}
+
+/// The limits must let nothing through that can be seen, and say where it is.
+#[test]
+fn a_changed_image_is_noticed() {
+    let good = Picture::decode(&encode(&trace(&scenes::data_channels(), SimdLevel::best())));
+    assert!(differences(&good, &good, &LIMITS).is_empty());
+    let with = |channel: &str, pixels: usize, change: fn(f32) -> f32| {
+        let mut other = good.clone();
+        let Some(Plane::Float(values)) = other.planes.get_mut(channel) else {
+            panic!("{channel} holds numbers");
+        };
+        let hit = values.iter_mut().filter(|v| v.is_finite() && **v != 0.0);
+        hit.take(pixels).for_each(|v| *v = change(*v));
+        differences(&good, &other, &LIMITS)
+    };
+    let few = LIMITS.pixels;
+    assert!(with("G", usize::MAX, |v| v + 0.001).is_empty());
+    assert!(with("G", few, |v| v + 1.0).is_empty());
+    assert_eq!(with("G", few + 1, |v| v + 0.01).len(), 1);
+    assert_eq!(with("Z", few + 1, |v| v * 1.001).len(), 1);
+    assert_eq!(with("Z", few + 1, |_| f32::INFINITY).len(), 1);
+    assert_eq!(with("N.X", few + 1, |_| f32::NAN).len(), 1);
+
+    let mut other = good.clone();
+    let Some(Plane::Uint(ids)) = other.planes.get_mut("id.I") else {
+        panic!("ids are integers");
+    };
+    ids.iter_mut().take(few + 1).for_each(|id| *id ^= 1);
+    assert_eq!(differences(&good, &other, &LIMITS).len(), 1);
+
+    let mut other = good.clone();
+    other.planes.remove("Z");
+    assert_eq!(differences(&good, &other, &LIMITS).len(), 1);
+}
