@@ -184,7 +184,7 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
 }
 
 fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
-    let mapped = |name: &str, map: &str, range: Option<[f64; 2]>| {
+    let mapped = |name: &str, map: &str, range: Option<[f64; 2]>, required: bool| {
         let found = survey
             .color
             .as_ref()
@@ -199,12 +199,13 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
         Ok(ColorRule::Attribute {
             name: name.to_owned(),
             map,
+            required,
         })
     };
     match &manifest.material.color {
         ColorSetting::Rgb(rgb) => Ok(ColorRule::Constant(Vec3::from_array(*rgb))),
         ColorSetting::Auto => match &survey.color {
-            Some(color) => mapped(&color.attribute, "viridis", None),
+            Some(color) => mapped(&color.attribute, "viridis", None, false),
             None => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
         },
         ColorSetting::Attribute {
@@ -213,7 +214,7 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
             range,
         } => {
             require_attribute(survey, "material.color.attribute", attribute)?;
-            mapped(attribute, map.name(), *range)
+            mapped(attribute, map.name(), *range, true)
         }
     }
 }

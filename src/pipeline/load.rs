@@ -42,7 +42,8 @@ pub struct LoadedFrame {
     pub centers: Vec<Vec3>,
     /// Radii.
     pub radius: Radius,
-    /// Numbers for the colour map, one a particle; empty with a constant colour.
+    /// Numbers for the colour map, one a particle; empty with a constant colour, and in a frame
+    /// that lacks an attribute which nobody asked for.
     pub values: Vec<f32>,
     /// Numbers for the `id` channel; None if the particle's index serves.
     pub ids: Option<Vec<u32>>,
@@ -93,10 +94,14 @@ pub fn load_frame(
     }
     let values = match &setup.color {
         ColorRule::Constant(_) => Vec::new(),
-        ColorRule::Attribute { name, .. } => match attribute(&frame, name, "colour", &file)? {
-            Some(attribute) => magnitudes(attribute, 1.0),
-            None => Vec::new(),
-        },
+        ColorRule::Attribute { name, required, .. } => {
+            let found = if *required {
+                attribute(&frame, name, "colour", &file)?
+            } else {
+                frame.attribute(name)
+            };
+            found.map_or_else(Vec::new, |attribute| magnitudes(attribute, 1.0))
+        }
     };
     let channels = setup.render.channels;
     let ids = if channels.id { ids(&frame) } else { None };

@@ -13,6 +13,7 @@ use crate::accel::{BuildSettings, SphereRadius, Spheres};
 use crate::render::{Colors, Film, ParticleShading, RenderError, render};
 use crate::report::FrameReport;
 use crate::scene::ColorMap;
+use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::spheres::SphereSurface;
 
 /// An image in memory.
@@ -87,6 +88,7 @@ impl FrameTracer {
         drop((centers, radius));
         let colors = match &setup.color {
             ColorRule::Constant(color) => Colors::Constant(*color),
+            ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
             ColorRule::Attribute { map, .. } => mapped(&values, map),
         };
         let source = ParticleShading {

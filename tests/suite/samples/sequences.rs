@@ -1,7 +1,10 @@
 //! Sample sequences: found, ordered, gaps told, every frame read, and rendered.
 
+use glam::Vec3;
 use spherule_formats::sequence::{PART_ATTRIBUTE, SequenceError};
-use spherule_formats::{FrameFile, Positions, Sequence, SequenceInput};
+use spherule_formats::{
+    Attribute, AttributeData, FrameFile, Positions, Sequence, SequenceInput, write,
+};
 
 use crate::harness::{Workshop, sample};
 use crate::picture::Picture;
@@ -181,4 +184,39 @@ fn ids_are_found_under_the_names_of_their_tools() {
         // The digits of the text may move an edge.
         assert!(same.count() + 2 >= expected.len(), "{file}");
     }
+}
+
+/// Colour by speed is only what `auto` chooses: a frame without velocities is drawn all the same,
+/// unless they were asked for.
+#[test]
+fn a_frame_may_lack_what_nobody_asked_for() {
+    let workshop = Workshop::new();
+    let positions: Vec<Vec3> = (0..20_u8).map(|i| Vec3::X * f32::from(i)).collect();
+    let velocity = Attribute {
+        name: "velocity".to_owned(),
+        components: 3,
+        data: AttributeData::F32(vec![1.0; 60]),
+    };
+    let write = |name, attributes: &[Attribute]| {
+        write::vtk::write(&workshop.join(name), &positions, attributes).expect("a file");
+    };
+    write("f_1.vtk", &[velocity]);
+    write("f_2.vtk", &[]);
+    let render = |output: &str, more: &[&str]| {
+        let size = ["--width", "48", "--height", "27", "--samples", "1"];
+        let arguments = [&["render", "f_#.vtk", "-o", output][..], &size, more].concat();
+        workshop.run(&arguments)
+    };
+    render("auto/f.#.exr", &[]).expect(0);
+    let picture = Picture::open(&workshop.join("auto/f.2.exr"));
+    assert!(picture.floats("A").iter().any(|a| *a > 0.0));
+
+    let ran = render("named/f.#.exr", &["--color-by", "velocity"]).expect(1);
+    assert!(
+        ran.errors().contains("no attribute `velocity` for colour"),
+        "{}",
+        ran.errors()
+    );
+    assert!(workshop.join("named/f.1.exr").exists());
+    assert!(!workshop.join("named/f.2.exr").exists());
 }
