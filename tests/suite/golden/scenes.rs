@@ -21,11 +21,16 @@ const SUNSET: Background = Background::Gradient {
     up: Vec3::Z,
 };
 
-/// Light on surfaces only: nothing mirrored, nothing let through.
+/// Light on surfaces only: nothing mirrored, nothing let through. Spelled out, so that new
+/// defaults of the program do not change these pictures.
 const MATT: Material = Material {
+    ambient: 0.1,
+    diffuse: 0.7,
     specular: 0.0,
+    shininess: 32.0,
+    ior: 1.33,
     reflection: 0.0,
-    ..Material::DEFAULT
+    transmission: 0.0,
 };
 
 /// Owned colours.
@@ -141,10 +146,11 @@ pub(super) fn reflection() -> Shot {
     let mut shot = Shot::new(centers, 1.0, DVec3::new(0.0, -8.0, 0.8), DVec3::ZERO);
     shot.scene.material = Material {
         diffuse: 0.35,
+        specular: 0.2,
         // A head-on reflection of 0.6.
         ior: 8.0,
         reflection: 1.0,
-        ..Material::DEFAULT
+        ..MATT
     };
     shot.scene.background = SUNSET;
     shot.settings.max_depth = 4;
@@ -272,7 +278,10 @@ pub(super) fn ground() -> Shot {
         min: DVec3::new(-2.8, -1.4, 0.0),
         max: DVec3::new(2.8, 1.3, 2.0),
     };
-    shot.scene.ground = Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO));
+    shot.scene.ground = Some(Ground {
+        color: Vec3::new(0.135, 0.140, 0.150),
+        ..Ground::under(&bounds, Vec3::Z, DVec3::ZERO)
+    });
     shot.scene.lights = vec![sun(Vec3::new(1.0, 0.4, -1.2), 1.2)];
     shot.painted(&[RED, GREEN, BLUE])
 }
