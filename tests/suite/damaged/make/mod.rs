@@ -9,6 +9,12 @@ use glam::{DVec3, Vec3};
 use spherule_formats::{ParticleFrame, native};
 use zip::write::{SimpleFileOptions, ZipWriter};
 
+mod base;
+mod text;
+
+use base::{Base, find, replace};
+use text::{csv, lammps, vtk_ascii, xyz};
+
 /// Name and content.
 pub(super) type Made = (String, Vec<u8>);
 
@@ -28,69 +34,6 @@ pub(super) fn files() -> Vec<Made> {
     all
 }
 
-/// A file to be broken.
-struct Base {
-    name: &'static str,
-    extension: &'static str,
-    bytes: Vec<u8>,
-    made: Vec<Made>,
-}
-
-impl Base {
-    fn new(name: &'static str, extension: &'static str, bytes: Vec<u8>) -> Self {
-        let made = Vec::new();
-        Self {
-            name,
-            extension,
-            bytes,
-            made,
-        }
-    }
-
-    /// A file `<name>-<what>` with this content.
-    fn file(mut self, what: &str, bytes: Vec<u8>) -> Self {
-        let name = format!("{}-{what}.{}", self.name, self.extension);
-        self.made.push((name, bytes));
-        self
-    }
-
-    /// Ends `more` bytes after the first `marker`.
-    fn cut(self, what: &str, marker: &str, more: usize) -> Self {
-        let end = find(&self.bytes, marker.as_bytes()) + marker.len() + more;
-        let bytes = self.bytes[..end].to_vec();
-        self.file(what, bytes)
-    }
-
-    /// Ends after `length` bytes.
-    fn cut_at(self, what: &str, length: usize) -> Self {
-        let bytes = self.bytes[..length].to_vec();
-        self.file(what, bytes)
-    }
-
-    /// The first `old` is `new`.
-    fn replace(self, what: &str, old: impl AsRef<[u8]>, new: impl AsRef<[u8]>) -> Self {
-        let bytes = replace(&self.bytes, old.as_ref(), new.as_ref());
-        self.file(what, bytes)
-    }
-
-    /// Other bytes from `at` on.
-    fn patch(self, what: &str, at: usize, new: &[u8]) -> Self {
-        let mut bytes = self.bytes.clone();
-        bytes[at..at + new.len()].copy_from_slice(new);
-        self.file(what, bytes)
-    }
-}
-
-fn find(bytes: &[u8], marker: &[u8]) -> usize {
-    let found = bytes.windows(marker.len()).position(|w| w == marker);
-    found.expect("the marker is in the file")
-}
-
-fn replace(bytes: &[u8], old: &[u8], new: &[u8]) -> Vec<u8> {
-    let at = find(bytes, old);
-    [&bytes[..at], new, &bytes[at + old.len()..]].concat()
-}
-
 fn big(points: &[[f32; 3]]) -> Vec<u8> {
     let all = points.iter().flatten();
     all.flat_map(|v| v.to_be_bytes()).collect()
@@ -99,11 +42,6 @@ fn big(points: &[[f32; 3]]) -> Vec<u8> {
 fn little(points: &[[f32; 3]]) -> Vec<u8> {
     let all = points.iter().flatten();
     all.flat_map(|v| v.to_le_bytes()).collect()
-}
-
-fn text(points: &[[f32; 3]]) -> String {
-    let line = |p: &[f32; 3]| format!("{} {} {}\n", p[0], p[1], p[2]);
-    points.iter().map(line).collect()
 }
 
 /// Legacy, binary, with cells and two attributes.
@@ -150,17 +88,6 @@ fn vtk() -> Vec<Made> {
         .replace("other-count", "POINT_DATA 3", "POINT_DATA 4")
         .file("nan", vtk_bytes(&NAN))
         .file("zero", vtk_bytes(&[]))
-        .made
-}
-
-fn vtk_ascii() -> Vec<Made> {
-    let head = "# vtk DataFile Version 3.0\ntitle\nASCII\nDATASET POLYDATA\nPOINTS 3 float\n";
-    let with = |points: &[[f32; 3]]| format!("{head}{}", text(points)).into_bytes();
-    Base::new("legacy-ascii", "vtk", with(&WHOLE))
-        .cut("cut", "1 0.5", 0)
-        .replace("word", "0.25", "zero")
-        .replace("absurd", "POINTS 3", "POINTS 2000000000")
-        .file("nan", with(&NAN))
         .made
 }
 
@@ -325,54 +252,6 @@ fn ply() -> Vec<Made> {
         .made
 }
 
-fn xyz() -> Vec<Made> {
-    let molecular = |points: &[[f32; 3]]| {
-        let lines: String = points
-            .iter()
-            .map(|p| format!("W {}", text(&[*p])))
-            .collect();
-        format!("{}\ncomment\n{lines}", points.len()).into_bytes()
-    };
-    let mut made = Base::new("molecular", "xyz", molecular(&WHOLE))
-        .cut("cut", "W 1 0.5", 0)
-        .replace("absurd", "3\n", "2000000000\n")
-        .replace("word", "0.25", "half")
-        .file("nan", molecular(&NAN))
-        .file("zero", molecular(&[]))
-        .made;
-    let raw = Base::new("raw", "xyz", little(&WHOLE))
-        .cut_at("cut", 29)
-        .file("nan", little(&NAN))
-        .file("zero", Vec::new());
-    made.extend(raw.made);
-    made
-}
-
-fn lammps() -> Vec<Made> {
-    let dump = |points: &[[f32; 3]]| {
-        let head = "ITEM: BOX BOUNDS ff ff ff\n0 9\n0 9\n0 9\nITEM: ATOMS id type x y z\n";
-        let lines = points
-            .iter()
-            .zip(7..)
-            .map(|(p, id)| format!("{id} 1 {}", text(&[*p])));
-        let lines: String = lines.collect();
-        let n = points.len();
-        format!("ITEM: TIMESTEP\n100\nITEM: NUMBER OF ATOMS\n{n}\n{head}{lines}").into_bytes()
-    };
-    Base::new("dump", "lammpstrj", dump(&WHOLE))
-        .replace("magic", "ITEM: TIMESTEP", "ATOM: TIMESTEP")
-        .cut("cut-in-head", "NUMBER OF ATOMS\n", 0)
-        .cut("cut-in-bounds", "0 9\n0", 0)
-        .cut("cut-in-atoms", "8 1 1 0.5", 0)
-        .replace("absurd-atoms", "ATOMS\n3\n", "ATOMS\n2000000000\n")
-        .replace("negative-atoms", "ATOMS\n3\n", "ATOMS\n-3\n")
-        .replace("no-positions", "x y z", "a b c")
-        .replace("word", "0.25", "half")
-        .file("nan", dump(&NAN))
-        .file("zero", dump(&[]))
-        .made
-}
-
 /// An array of shape (N, 3) whose header says `count`.
 fn npy_bytes(points: &[[f32; 3]], count: &str) -> Vec<u8> {
     let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 3), }}");
@@ -423,24 +302,6 @@ fn npz() -> Vec<Made> {
         .file("not-numpy", archive(b"no array at all"))
         .file("nan", archive(&npy_bytes(&NAN, "3")))
         .file("zero", archive(&npy_bytes(&[], "0")))
-        .made
-}
-
-fn csv() -> Vec<Made> {
-    let table =
-        |points: &[[f32; 3]]| format!("x,y,z\n{}", text(points).replace(' ', ",")).into_bytes();
-    Base::new("table", "csv", table(&WHOLE))
-        .replace("flat", "x,y,z", "x,y,w")
-        .replace("no-positions", "x,y,z", "a,b,c")
-        .replace("word", "0.25", "half")
-        .cut("cut", "1,0.5", 0)
-        .replace("long-row", "0.25", "0.25,7,8,9")
-        .file(
-            "prose",
-            b"these are no particles\nbut two lines of words\n".to_vec(),
-        )
-        .file("nan", table(&NAN))
-        .file("zero", table(&[]))
         .made
 }
 
