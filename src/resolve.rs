@@ -8,13 +8,14 @@ use crate::manifest::{
 };
 use crate::output::{Compression, ExrOptions, PreviewOptions};
 use crate::pipeline::{ColorRule, RadiusRule, Setup, attribute_list};
-use crate::render::{Channels, RenderSettings};
+use crate::render::{Channels, Film, RenderSettings};
+use crate::report::memory::available;
 use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
 use crate::scene::{
     Background, Bounds, Camera, CameraError, CameraView, ColorMap, Falloff, Framing, Ground, Light,
     Material, Scene, default_lights, material,
 };
-use crate::survey::{ColorQuestion, Question, Survey};
+use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 /// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -43,6 +44,21 @@ pub enum ResolveError {
     /// Neither the frames nor their spacing tell a radius.
     #[error("input.radius: the frames bring none and are too sparse to estimate it; give a length")]
     NoRadius,
+    /// The image would not fit into memory.
+    #[error(
+        "image.width, image.height: an image of {width}x{height} needs about {need} MiB, \
+         {available} MiB of memory are free; make it smaller or ask for fewer channels"
+    )]
+    ImageTooLarge {
+        /// Pixels across.
+        width: u32,
+        /// Pixels down.
+        height: u32,
+        /// What its planes and encoding need, in two stages at once.
+        need: u64,
+        /// What there is.
+        available: u64,
+    },
     /// The camera sees nothing.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
@@ -56,7 +72,13 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
             ColorSetting::Rgb(_) => ColorQuestion::None,
             ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
         },
-        radius: manifest.input.radius == RadiusSetting::Auto,
+        radius: match &manifest.input.radius {
+            RadiusSetting::Auto => RadiusQuestion::Auto,
+            RadiusSetting::Length(_) => RadiusQuestion::None,
+            RadiusSetting::Attribute { attribute, scale } => {
+                RadiusQuestion::Attribute(attribute, *scale)
+            }
+        },
     }
 }
 
@@ -69,7 +91,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     let color = color_rule(manifest, survey)?;
     let up = up(manifest, survey);
     // Spheres reach beyond their centres.
-    let reach = DVec3::splat(f64::from(typical_radius(&radius)));
+    let reach = DVec3::splat(f64::from(reach(&radius, survey)));
     let bounds = Bounds {
         min: survey.min - reach,
         max: survey.max + reach,
@@ -104,6 +126,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     render.max_depth = manifest.render.max_depth;
     render.channels = channels;
     render.transparent_background = output.transparent;
+    check_image_size(&render)?;
     let backdrop = output
         .transparent
         .then(|| scene.background.color(scene.camera.forward()));
@@ -118,7 +141,9 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             world_to_camera: Some(scene.camera.world_to_camera()),
             comments: Some(COMMENTS.to_owned()),
             custom: None,
-            single_thread: rayon::current_num_threads() == 1,
+            // The encoder's own threads are as many as the machine has; a run that was given fewer
+            // must not take them.
+            single_thread: rayon::current_num_threads() < machine_threads(),
         },
         preview: PreviewOptions {
             exposure: output.preview_exposure,
@@ -127,6 +152,24 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         scene,
         render,
     })
+}
+
+fn machine_threads() -> usize {
+    std::thread::available_parallelism().map_or(1, usize::from)
+}
+
+/// Refuses an image that cannot fit: one is traced while another is encoded.
+fn check_image_size(render: &RenderSettings) -> Result<(), ResolveError> {
+    let need = 2 * Film::bytes_for(render.width, render.height, render.channels);
+    match available() {
+        Some(available) if need > available => Err(ResolveError::ImageTooLarge {
+            width: render.width,
+            height: render.height,
+            need: need >> 20,
+            available: available >> 20,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// For whoever opens an image years later.
@@ -164,10 +207,12 @@ fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, Resol
     })
 }
 
-fn typical_radius(rule: &RadiusRule) -> f32 {
+/// How far the spheres reach beyond their centres.
+fn reach(rule: &RadiusRule, survey: &Survey) -> f32 {
     match rule {
-        RadiusRule::Common(radius) | RadiusRule::FileOr(radius) => *radius,
-        RadiusRule::Attribute { .. } => 0.0,
+        RadiusRule::Common(radius) => *radius,
+        RadiusRule::FileOr(radius) => radius.max(survey.reach),
+        RadiusRule::Attribute { .. } => survey.reach,
     }
 }
 

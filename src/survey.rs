@@ -41,6 +41,9 @@ pub struct Survey {
     pub radius: Option<f32>,
     /// Whether the frames bring radii of their own.
     pub has_radii: bool,
+    /// How far the spheres reach beyond their centres, as far as the frames tell: the 99th
+    /// percentile of the radii of the frame with the largest; 0 where they bring none.
+    pub reach: f32,
     /// The attribute that colours were asked for by, if any, with its range.
     pub color: Option<ColorRange>,
     /// Which way is up for users of this format, unit vector.
@@ -65,12 +68,23 @@ pub struct ColorRange {
 }
 
 /// What a job needs to know.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Question<'a> {
     /// About colours.
     pub color: ColorQuestion<'a>,
-    /// Whether a radius has to be estimated where the frames bring none.
-    pub radius: bool,
+    /// About radii.
+    pub radius: RadiusQuestion<'a>,
+}
+
+/// What is asked about radii.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RadiusQuestion<'a> {
+    /// Nothing: it is given.
+    None,
+    /// What the frames bring, or an estimate where they bring none.
+    Auto,
+    /// The largest values of an attribute times a factor.
+    Attribute(&'a str, f64),
 }
 
 /// What is asked about colours.
@@ -89,6 +103,7 @@ struct Totals {
     bounds: Option<(DVec3, DVec3)>,
     radius: Option<(usize, f32)>,
     has_radii: bool,
+    reach: f32,
     range: Option<(f64, f64)>,
     color: Option<String>,
     velocity: Option<String>,
@@ -108,6 +123,7 @@ impl Survey {
             bounds: None,
             radius: None,
             has_radii: false,
+            reach: 0.0,
             range: None,
             color: None,
             velocity: None,
@@ -195,14 +211,28 @@ impl Totals {
             }
             self.color = Some(name);
         }
-        if question.radius {
-            self.take_in_radius(&frame);
+        match question.radius {
+            RadiusQuestion::None => {}
+            RadiusQuestion::Auto => self.take_in_radius(&frame),
+            RadiusQuestion::Attribute(name, scale) => {
+                if let Some(attribute) = frame.attribute(name) {
+                    let radius = |i| narrow(attribute.magnitude(i) * scale);
+                    self.reach = self.reach.max(robust_largest(attribute.count(), radius));
+                }
+            }
         }
     }
 
     fn take_in_radius(&mut self, frame: &ParticleFrame) {
         match &frame.radius {
-            Some(Radius::Common(_) | Radius::PerParticle(_)) => self.has_radii = true,
+            Some(Radius::Common(radius)) => {
+                self.has_radii = true;
+                self.reach = self.reach.max(*radius);
+            }
+            Some(Radius::PerParticle(radii)) => {
+                self.has_radii = true;
+                self.reach = self.reach.max(robust_largest(radii.len(), |i| radii[i]));
+            }
             None => {
                 // The fullest frame knows the spacing best.
                 let fuller = self.radius.is_none_or(|(count, _)| frame.len() > count);
@@ -231,6 +261,7 @@ impl Totals {
             max,
             radius: self.radius.map(|(_, radius)| radius),
             has_radii: self.has_radii,
+            reach: self.reach,
             color,
             up,
             attributes: self.attributes.into_iter().collect(),
@@ -266,6 +297,24 @@ fn robust_bounds(positions: &Positions) -> Option<(DVec3, DVec3)> {
         high[axis] = max[axis].min(last[axis] + margin);
     }
     Some((low, high))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+/// The 99th percentile of `count` radii; 0 without finite ones.
+fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32 {
+    let stride = count.div_ceil(SAMPLE).max(1);
+    let mut radii: Vec<f32> = (0..count)
+        .step_by(stride)
+        .map(radius)
+        .filter(|r| r.is_finite() && *r > 0.0)
+        .collect();
+    radii.sort_unstable_by(f32::total_cmp);
+    let place = (radii.len() - radii.len() / 100).saturating_sub(1);
+    radii.get(place).copied().unwrap_or(0.0)
 }
 
 /// The middle 99 % of an attribute's values (vectors by magnitude, from zero up).

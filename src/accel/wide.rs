@@ -10,7 +10,7 @@ use rayon::prelude::*;
 
 use super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::node::{Node, WIDTH};
-use super::simd::SimdLevel;
+use super::simd::{SimdLevel, Supported};
 use super::{Aabb, BuildReport, Phase};
 
 /// Node levels at most: 8^10 blocks of 16 are more particles than 32 bits count.
@@ -35,7 +35,7 @@ pub struct WideTree {
     pub(super) indices: Vec<u32>,
     pub(super) count: usize,
     pub(super) bounds: Aabb,
-    pub(super) simd: SimdLevel,
+    pub(super) simd: Supported,
 }
 
 impl Default for Aabb {
@@ -62,12 +62,12 @@ impl WideTree {
 
     /// The instruction set that rays are traced with.
     pub fn simd(&self) -> SimdLevel {
-        self.simd
+        self.simd.level()
     }
 
     /// Traces with `level` from now on, or with the best the machine has if it lacks that.
     pub fn set_simd(&mut self, level: SimdLevel) {
-        self.simd = level.or_best();
+        self.simd = Supported::or_best(level);
     }
 
     /// Number of the first child of node `index` on `level`, among the nodes (or blocks) below.
@@ -105,7 +105,6 @@ impl WideTree {
         }
         let lanes = if indexed { blocks * BLOCK_SIZE } else { 0 };
         self.indices.resize(lanes, 0);
-        self.simd = self.simd.or_best();
     }
 
     /// The memory of the blocks as plain points, and the indices: what builders sort in.
@@ -209,7 +208,7 @@ impl WideTree {
             position_bytes,
             structure_bytes,
             peak_bytes: position_bytes + structure_bytes + boxes,
-            simd: self.simd.name(),
+            simd: self.simd().name(),
         }
     }
 }

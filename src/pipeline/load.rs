@@ -1,5 +1,6 @@
 //! First stage: a frame's files become positions, radii and the few numbers that shading needs.
 
+use std::fs;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
@@ -9,6 +10,7 @@ use spherule_formats::{Attribute, AttributeData, FrameError, ParticleFrame, Radi
 
 use super::ImageTask;
 use super::setup::{ColorRule, RadiusRule, Setup};
+use crate::report::memory::available;
 use crate::survey::velocity_of;
 
 /// Why a frame cannot be drawn.
@@ -16,7 +18,20 @@ use crate::survey::velocity_of;
 pub enum LoadError {
     /// Its files cannot be read.
     #[error(transparent)]
-    Frame(#[from] FrameError),
+    Frame(FrameError),
+    /// The same for the last frame of the sequence, which a simulation may be at.
+    #[error("{0}; it is the newest frame, perhaps still being written: render again later")]
+    Newest(FrameError),
+    /// It would not fit.
+    #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]
+    TooLarge {
+        /// The frame's first file.
+        file: String,
+        /// What reading and building need, estimated.
+        need: u64,
+        /// What there is.
+        available: u64,
+    },
     /// It lacks an attribute that the job needs.
     #[error("{file}: no attribute `{name}` for {purpose}; it has {has}")]
     MissingAttribute {
@@ -69,7 +84,16 @@ pub fn load_frame(
     task: &ImageTask,
 ) -> Result<LoadedFrame, LoadError> {
     let start = Instant::now();
-    let (raw, mut notes) = sequence.load_noted(task.index)?;
+    check_memory(sequence, task)?;
+    let is_newest = task.index + 1 == sequence.frames().len();
+    let (raw, mut notes) = sequence.load_noted(task.index).map_err(|error| {
+        let is_damage = matches!(error, FrameError::Malformed { .. });
+        if is_newest && is_damage && !error.to_string().contains("being written") {
+            LoadError::Newest(error)
+        } else {
+            LoadError::Frame(error)
+        }
+    })?;
     let frame = ParticleFrame::from_raw(raw, setup.origin);
     let file = || {
         let inputs = sequence.inputs(task.index);
@@ -123,6 +147,27 @@ pub fn load_frame(
         centers: frame.positions,
         read_time: start.elapsed(),
     })
+}
+
+/// Copies of a frame's bytes that are held at once: the file, the numbers read from it, the tree. A
+/// rough figure, meant to refuse what cannot work and nothing else.
+const COPIES: u64 = 2;
+
+/// Refuses a frame that cannot fit, before the system ends the whole job for it.
+fn check_memory(sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
+    let inputs = sequence.inputs(task.index);
+    let sizes = inputs.iter().filter_map(|p| fs::metadata(p).ok());
+    let need = COPIES.saturating_mul(sizes.map(|m| m.len()).sum());
+    match available() {
+        Some(available) if need > available => Err(LoadError::TooLarge {
+            file: inputs
+                .first()
+                .map_or_else(String::new, |p| p.display().to_string()),
+            need: need >> 20,
+            available: available >> 20,
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// The attribute `name`; None in a frame without particles, which need not declare any.

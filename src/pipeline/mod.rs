@@ -6,6 +6,7 @@
 //! the picture looks like is settled before, in [`Setup`].
 
 use std::collections::HashSet;
+use std::panic::{self, AssertUnwindSafe};
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -101,7 +102,7 @@ pub fn run(
         trace_stage(setup, loaded, to_write, &stop, interrupt, watch);
         writer
             .join()
-            .unwrap_or_else(|panic| std::panic::resume_unwind(panic))
+            .unwrap_or_else(|fault| panic::resume_unwind(fault))
     })
 }
 
@@ -119,7 +120,8 @@ fn read_stage(
             return;
         }
         watch(Event::Entered(task.frame, Stage::Read));
-        let passed = match load_frame(setup, sequence, task) {
+        let loaded = guarded(|| load_frame(setup, sequence, task).map_err(|e| e.to_string()));
+        let passed = match loaded {
             Ok(mut frame) => {
                 // What is so in every frame is said once.
                 for note in std::mem::take(&mut frame.notes) {
@@ -130,7 +132,7 @@ fn read_stage(
                 }
                 Passed::Frame(frame)
             }
-            Err(error) => Passed::Failed(task.clone(), error.to_string()),
+            Err(reason) => Passed::Failed(task.clone(), reason),
         };
         // An error means that the next stage has ended: so do we.
         if next.send(passed).is_err() {
@@ -157,10 +159,16 @@ fn trace_stage(
             Passed::Frame(frame) => {
                 let task = frame.task.clone();
                 watch(Event::Entered(task.frame, Stage::Trace));
-                match tracer.trace(setup, frame, stop) {
+                let traced =
+                    guarded(|| tracer.trace(setup, frame, stop).map_err(|e| e.to_string()));
+                match traced {
                     Ok(traced) => Passed::Frame(traced),
                     Err(_) if stop.load(Ordering::Relaxed) => return,
-                    Err(error) => Passed::Failed(task, error.to_string()),
+                    Err(reason) => {
+                        // Whatever happened may have left the buffers half filled.
+                        tracer = FrameTracer::new();
+                        Passed::Failed(task, reason)
+                    }
                 }
             }
             Passed::Failed(task, reason) => Passed::Failed(task, reason),
@@ -169,4 +177,18 @@ fn trace_stage(
             return;
         }
     }
+}
+
+/// Runs the work of one frame; a panic in it is a fault of ours that costs this frame and no other.
+fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| {
+        let text = fault
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| fault.downcast_ref::<&str>().copied())
+            .unwrap_or("no reason given");
+        Err(format!(
+            "a fault in spherule itself, please report it: {text}"
+        ))
+    })
 }

@@ -124,13 +124,18 @@ impl Film {
         }
     }
 
-    /// Bytes of all planes.
-    pub fn bytes(&self) -> u64 {
-        let scalars = [self.depth.is_some(), self.id.is_some()];
-        let vectors = [&self.normal, &self.position, &self.velocity, &self.albedo];
-        let scalar_count = scalars.iter().filter(|s| **s).count();
-        let vector_count = vectors.iter().filter(|v| v.is_some()).count();
-        self.color.len() as u64 * (16 + 4 * scalar_count as u64 + 12 * vector_count as u64)
+    /// Bytes of all planes of an image.
+    pub fn bytes_for(width: u32, height: u32, channels: Channels) -> u64 {
+        let scalars = [channels.depth, channels.id];
+        let vectors = [
+            channels.normal,
+            channels.position,
+            channels.velocity,
+            channels.albedo,
+        ];
+        let count = |wanted: &[bool]| wanted.iter().filter(|w| **w).count() as u64;
+        let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors);
+        u64::from(width) * u64::from(height) * pixel
     }
 
     /// Cuts all planes into bands of `rows` rows (the last may have fewer), from the top.
@@ -234,7 +239,7 @@ mod tests {
         assert_eq!(film.depth.as_ref().unwrap().len(), 6);
         assert_eq!(film.id.as_ref().unwrap()[5], NO_ID);
         assert!(film.normal.is_none());
-        assert_eq!(film.bytes(), 6 * 24);
+        assert_eq!(Film::bytes_for(3, 2, channels), 6 * 24);
         let error = Channels::from_names(["depth"]).unwrap_err();
         assert!(error.to_string().contains("\"depth\""));
     }

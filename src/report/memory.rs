@@ -17,6 +17,20 @@ pub struct MemoryUse {
     pub file: u64,
 }
 
+/// Bytes that can still be had without swapping (`MemAvailable`); None where the system does not
+/// tell.
+pub fn available() -> Option<u64> {
+    value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable")
+}
+
+/// The bytes that a line `key: n kB` tells.
+fn value_of(table: &str, key: &str) -> Option<u64> {
+    let mut lines = table.lines();
+    let rest = lines.find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))?;
+    let kib = rest.trim().strip_suffix("kB")?.trim();
+    Some(kib.parse::<u64>().ok()? * 1024)
+}
+
 impl MemoryUse {
     /// Asks the system.
     pub fn now() -> Self {
@@ -25,13 +39,7 @@ impl MemoryUse {
     }
 
     fn parse(status: &str) -> Self {
-        let bytes = |key: &str| {
-            status
-                .lines()
-                .find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))
-                .and_then(|rest| rest.trim().strip_suffix("kB")?.trim().parse::<u64>().ok())
-                .map_or(0, |kib| kib * 1024)
-        };
+        let bytes = |key: &str| value_of(status, key).unwrap_or(0);
         Self {
             peak: bytes("VmHWM"),
             anonymous: bytes("RssAnon"),

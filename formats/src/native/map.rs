@@ -118,8 +118,8 @@ impl Bytes {
 fn map(file: &File) -> std::io::Result<Mmap> {
     // SAFETY: `Mmap::map` needs the file neither changed nor cut while mapped. Native frames are
     // published by rename and never written in place, so only somebody outside can do that.
-    // `NativeFile::frame` compares the length before every use; what remains is a user who
-    // rewrites the file in place while rendering, which `Access::Read` is there for. Contents are
+    // `NativeFile::frame` compares the length whenever a view is taken; what remains is a user who
+    // rewrites the file in place while a view is held, which `Access::Read` is there for. Contents are
     // plain numbers, of which any bit pattern is valid, and are never used as indices unchecked.
     unsafe { Mmap::map(file) }
 }

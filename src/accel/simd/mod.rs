@@ -165,15 +165,29 @@ pub(super) trait KernelTask {
     fn run<K: Kernel>(self, kernel: K) -> Self::Output;
 }
 
-impl SimdLevel {
-    /// Does `task` with the kernel of this level, which must have come out of [`Self::or_best`].
+/// A level that this machine was asked for and has: proof that its kernel may run.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Supported(SimdLevel);
+
+impl Supported {
+    /// `level` where supported, else the best one.
+    pub(super) fn or_best(level: SimdLevel) -> Self {
+        Self(level.or_best())
+    }
+
+    /// The level.
+    pub(super) fn level(self) -> SimdLevel {
+        self.0
+    }
+
+    /// Does `task` with the kernel of this level.
     #[inline]
     pub(super) fn run<T: KernelTask>(self, task: T) -> T::Output {
-        match self {
+        match self.0 {
             #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => x86::run_avx512(task),
+            SimdLevel::Avx512 => x86::run_avx512(self, task),
             #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => x86::run_avx2(task),
+            SimdLevel::Avx2 => x86::run_avx2(self, task),
             _ => task.run(portable::Portable),
         }
     }

@@ -9,7 +9,7 @@ use std::arch::x86_64::*;
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
 use super::portable::finite_inverse;
-use super::{BlockCrossings, Kernel, KernelTask, SLAB_SLACK};
+use super::{BlockCrossings, Kernel, KernelTask, SLAB_SLACK, SimdLevel, Supported};
 use crate::ray::Ray;
 
 pub(super) fn has_avx2() -> bool {
@@ -627,24 +627,26 @@ impl Kernel for Avx512 {
 
 /// A task compiled with a kernel's instructions.
 macro_rules! compiled {
-    ($run:ident, $kernel:expr, $is_there:path, $features:literal) => {
-        pub(super) fn $run<T: KernelTask>(task: T) -> T::Output {
+    ($run:ident, $kernel:expr, $level:path, $features:literal) => {
+        /// # Panics
+        /// If `proof` is of another level.
+        pub(super) fn $run<T: KernelTask>(proof: Supported, task: T) -> T::Output {
             #[target_feature(enable = $features)]
             fn with_features<T: KernelTask>(task: T) -> T::Output {
                 task.run($kernel)
             }
-            debug_assert!($is_there());
-            // SAFETY: a tree only gets a level that the machine was asked for (`or_best`), so the
-            // features are there.
+            assert_eq!(proof.level(), $level);
+            // SAFETY: a `Supported` is only made for a level whose features the machine was found
+            // to have, and this one is for the level of these features.
             unsafe { with_features(task) }
         }
     };
 }
 
-compiled!(run_avx2, Avx2, has_avx2, "avx2,fma,popcnt,bmi1");
+compiled!(run_avx2, Avx2, SimdLevel::Avx2, "avx2,fma,popcnt,bmi1");
 compiled!(
     run_avx512,
     Avx512,
-    has_avx512,
+    SimdLevel::Avx512,
     "avx2,fma,popcnt,bmi1,avx512f,avx512bw,avx512dq,avx512vl"
 );
