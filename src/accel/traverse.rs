@@ -3,7 +3,7 @@
 
 use super::block::BLOCK_SIZE;
 use super::node::WIDTH;
-use super::simd::{Kernel, KernelTask};
+use super::simd::{Kernel, KernelTask, SLAB_SLACK, finite_inverse};
 use super::wide::{MAX_LEVELS, WideTree};
 use crate::ray::Ray;
 
@@ -29,7 +29,23 @@ impl WideTree {
     /// The nearest crossing of a sphere's surface (entering, or leaving when the ray starts inside)
     /// with `t` in `ray.t_min..ray.t_max`. Equal distances go to the lower particle index.
     pub fn nearest(&self, ray: &Ray) -> Option<TreeHit> {
+        // Most rays of a picture miss everything: that is cheap to see before anything is prepared.
+        if !self.may_be_met_by(ray) {
+            return None;
+        }
         self.simd.run(Nearest { tree: self, ray })
+    }
+
+    /// Whether the ray comes near the box of all spheres; a superset of the rays that meet any.
+    fn may_be_met_by(&self, ray: &Ray) -> bool {
+        let inverse = finite_inverse(ray.direction);
+        let a = (self.bounds.min - ray.origin) * inverse;
+        let b = (self.bounds.max - ray.origin) * inverse;
+        let slack = a.abs().max(b.abs()) * SLAB_SLACK;
+        let near = (a.min(b) - slack).max_element();
+        let far = (a.max(b) + slack).min_element();
+        // Said so that NaN (bounds beyond the range of f32) counts as met.
+        !(near > far.min(ray.t_max) || far < ray.t_min)
     }
 
     /// Whether any sphere's surface crosses the ray within `ray.t_min..ray.t_max`.

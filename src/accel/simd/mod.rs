@@ -4,6 +4,8 @@
 //! levels with fused multiply-add give the same results to the bit; the portable one may differ in
 //! the last.
 
+use glam::Vec3;
+
 use super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::node::{Node, WIDTH};
 use crate::ray::Ray;
@@ -77,9 +79,22 @@ impl SimdLevel {
 
 /// Slack of the slab test, as a fraction of the larger terms: covers the rounding of planes,
 /// inverses and products (about five roundings of 2^-24), so that no sphere is lost at a box's edge.
-const SLAB_SLACK: f32 = 1e-6;
+pub(super) const SLAB_SLACK: f32 = 1e-6;
 /// Directions are kept this far from zero in the slab test, so that their inverses are finite.
 const MIN_DIRECTION: f32 = 1e-7;
+
+/// Inverse direction with every component finite.
+pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
+    direction
+        .map(|d| {
+            if d.abs() < MIN_DIRECTION {
+                MIN_DIRECTION.copysign(d)
+            } else {
+                d
+            }
+        })
+        .recip()
+}
 
 /// What a traversal needs of the machine.
 pub(super) trait Kernel: Copy {

@@ -5,7 +5,7 @@ use glam::Vec3;
 
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
-use super::{BlockCrossings, Kernel, MIN_DIRECTION, SLAB_SLACK};
+use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
 
 /// See the module.
@@ -17,19 +17,6 @@ pub(super) struct PreparedRay {
     ray: Ray,
     inverse: Vec3,
     radius: f32,
-}
-
-/// Inverse direction with every component finite.
-pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
-    direction
-        .map(|d| {
-            if d.abs() < MIN_DIRECTION {
-                MIN_DIRECTION.copysign(d)
-            } else {
-                d
-            }
-        })
-        .recip()
 }
 
 impl PreparedRay {

@@ -8,8 +8,7 @@ use std::arch::x86_64::*;
 
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
-use super::portable::finite_inverse;
-use super::{BlockCrossings, Kernel, KernelTask, SLAB_SLACK, SimdLevel, Supported};
+use super::{BlockCrossings, Kernel, KernelTask, SLAB_SLACK, SimdLevel, Supported, finite_inverse};
 use crate::ray::Ray;
 
 pub(super) fn has_avx2() -> bool {
@@ -34,6 +33,8 @@ struct SlabRay {
     inverse: __m128,
     /// Distance that the common radius adds on either side, per axis.
     reach: __m128,
+    /// Which side's planes come first, per axis: 1 where the direction is negative.
+    near_side: [usize; 3],
     t_min: f32,
 }
 
@@ -55,6 +56,9 @@ impl SlabRay {
                 origin: _mm_setr_ps(ray.origin.x, ray.origin.y, ray.origin.z, 0.0),
                 inverse: _mm_setr_ps(inverse.x, inverse.y, inverse.z, 1.0),
                 reach: _mm_setr_ps(reach.x, reach.y, reach.z, 0.0),
+                near_side: inverse
+                    .to_array()
+                    .map(|d| usize::from(d.is_sign_negative())),
                 t_min: ray.t_min.max(0.0),
             }
         }
@@ -80,6 +84,39 @@ impl SlabRay {
             SlabNode { step, base, slack }
         }
     }
+
+    /// Where the ray enters and leaves each child of `node`, within its own start and `limit`.
+    ///
+    /// # Safety
+    /// The caller's machine has AVX2 and FMA.
+    #[inline(always)]
+    unsafe fn test(&self, node: &Node, limit: f32) -> (__m256, __m256) {
+        // SAFETY: AVX2 and FMA by contract. Plane loads are of eight bytes out of arrays of eight.
+        unsafe {
+            let slab = self.enter(node);
+            let low = _mm_sub_ps(slab.base, slab.slack);
+            let high = _mm_add_ps(slab.base, slab.slack);
+            let mut near = _mm256_set1_ps(self.t_min);
+            let mut far = _mm256_set1_ps(limit);
+            macro_rules! axis {
+                ($axis:literal, $lanes:literal) => {
+                    let side = self.near_side[$axis];
+                    let step = spread::<$lanes>(slab.step);
+                    let enter = planes(&node.planes[$axis][side]);
+                    let leave = planes(&node.planes[$axis][1 - side]);
+                    let enter = _mm256_fmadd_ps(enter, step, spread::<$lanes>(low));
+                    let leave = _mm256_fmadd_ps(leave, step, spread::<$lanes>(high));
+                    // A NaN (planes beyond the range of f32) yields the second operand: no bound.
+                    near = _mm256_max_ps(enter, near);
+                    far = _mm256_min_ps(leave, far);
+                };
+            }
+            axis!(0, 0x00);
+            axis!(1, 0x55);
+            axis!(2, 0xaa);
+            (near, far)
+        }
+    }
 }
 
 /// # Safety
@@ -97,8 +134,6 @@ struct Avx2;
 struct Avx2Ray {
     ray: Ray,
     slab: SlabRay,
-    /// Which side's planes come first, per axis: 1 where the direction is negative.
-    near_side: [usize; 3],
     radius_squared: f32,
 }
 
@@ -186,40 +221,15 @@ impl Kernel for Avx2 {
         Avx2Ray {
             ray: *ray,
             slab: SlabRay::new(ray, radius),
-            near_side: ray
-                .direction
-                .to_array()
-                .map(|d| usize::from(d.is_sign_negative())),
             radius_squared: radius * radius,
         }
     }
 
     #[inline(always)]
     fn test_node(self, ray: &Avx2Ray, node: &Node, limit: f32) -> (usize, __m256i) {
-        // SAFETY: this kernel is only used inside functions with AVX2 and FMA. Plane loads are of
-        // eight bytes out of arrays of eight.
+        // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
         unsafe {
-            let slab = ray.slab.enter(node);
-            let low = _mm_sub_ps(slab.base, slab.slack);
-            let high = _mm_add_ps(slab.base, slab.slack);
-            let mut near = _mm256_set1_ps(ray.slab.t_min);
-            let mut far = _mm256_set1_ps(limit);
-            macro_rules! axis {
-                ($axis:literal, $lanes:literal) => {
-                    let side = ray.near_side[$axis];
-                    let step = spread::<$lanes>(slab.step);
-                    let enter = planes(&node.planes[$axis][side]);
-                    let leave = planes(&node.planes[$axis][1 - side]);
-                    let enter = _mm256_fmadd_ps(enter, step, spread::<$lanes>(low));
-                    let leave = _mm256_fmadd_ps(leave, step, spread::<$lanes>(high));
-                    // A NaN (planes beyond the range of f32) yields the second operand: no bound.
-                    near = _mm256_max_ps(enter, near);
-                    far = _mm256_min_ps(leave, far);
-                };
-            }
-            axis!(0, 0x00);
-            axis!(1, 0x55);
-            axis!(2, 0xaa);
+            let (near, far) = ray.slab.test(node, limit);
             let entered = _mm256_cmp_ps::<_CMP_LE_OQ>(near, far);
             let mask = _mm256_movemask_ps(entered).cast_unsigned() & u32::from(node.child_mask);
             let order = COMPRESSED[mask as usize & 255].as_ptr();
@@ -416,8 +426,6 @@ struct Avx512;
 struct Avx512Ray {
     ray: Ray,
     slab: SlabRay,
-    /// Byte orders that bring the planes entered first into the lower half, per axis.
-    order: [__m128i; 3],
     radius_squared: f32,
 }
 
@@ -494,57 +502,20 @@ impl Kernel for Avx512 {
 
     #[inline(always)]
     fn prepare(self, ray: &Ray, radius: f32) -> Avx512Ray {
-        let order = ray.direction.to_array().map(|d| {
-            // SAFETY: SSE2 is part of x86-64.
-            unsafe {
-                if d.is_sign_negative() {
-                    _mm_setr_epi8(8, 9, 10, 11, 12, 13, 14, 15, 0, 1, 2, 3, 4, 5, 6, 7)
-                } else {
-                    _mm_setr_epi8(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
-                }
-            }
-        });
         Avx512Ray {
             ray: *ray,
             slab: SlabRay::new(ray, radius),
-            order,
             radius_squared: radius * radius,
         }
     }
 
-    /// Both sides of an axis in one register: the planes entered in the lower half, those left
-    /// negated in the upper, so that one maximum serves both.
+    /// In 256 bits as for AVX2: a node has eight children, and the 512-bit form (both sides of an axis
+    /// in one register) has the longer chain from load to branch.
     #[inline(always)]
     fn test_node(self, ray: &Avx512Ray, node: &Node, limit: f32) -> (usize, __m256i) {
-        // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL. Plane
-        // loads are of sixteen bytes out of two arrays of eight in a row; the store fills `keys`.
+        // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL.
         unsafe {
-            let slab = ray.slab.enter(node);
-            let upper = _mm512_castsi512_ps(_mm512_inserti64x4::<1>(
-                _mm512_setzero_si512(),
-                _mm256_set1_epi32(i32::MIN),
-            ));
-            let start = _mm512_castps256_ps512(_mm256_set1_ps(ray.slab.t_min));
-            let limits = _mm512_insertf32x8::<1>(start, _mm256_set1_ps(-limit));
-            macro_rules! axis {
-                ($axis:literal) => {{
-                    let lane = _mm512_set1_epi32($axis);
-                    let pick = |v: __m128| _mm512_permutexvar_ps(lane, _mm512_castps128_ps512(v));
-                    let step = _mm512_xor_ps(pick(slab.step), upper);
-                    let base = _mm512_xor_ps(pick(slab.base), upper);
-                    let base = _mm512_sub_ps(base, pick(slab.slack));
-                    let bytes = _mm_loadu_si128(node.planes[$axis].as_ptr().cast());
-                    let bytes = _mm_shuffle_epi8(bytes, ray.order[$axis]);
-                    let plane = _mm512_cvtepi32_ps(_mm512_cvtepu8_epi32(bytes));
-                    _mm512_fmadd_ps(plane, step, base)
-                }};
-            }
-            // A NaN (planes beyond the range of f32) yields the second operand: no bound.
-            let z = _mm512_max_ps(axis!(2), limits);
-            let y = _mm512_max_ps(axis!(1), limits);
-            let bound = _mm512_max_ps(axis!(0), _mm512_max_ps(y, z));
-            let near = _mm512_castps512_ps256(bound);
-            let far = _mm256_xor_ps(_mm512_extractf32x8_ps::<1>(bound), _mm256_set1_ps(-0.0));
+            let (near, far) = ray.slab.test(node, limit);
             let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(node.child_mask, near, far);
             let packed = _mm256_maskz_compress_epi32(mask, keys_of(near));
             (mask.count_ones() as usize, packed)
