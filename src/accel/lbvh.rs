@@ -1,7 +1,7 @@
 //! `lbvh`: the linear bounding volume hierarchy (Lauterbach et al. 2009) with blocks as leaves and
 //! implicit 8-wide levels: Hilbert order, then nothing but arithmetic. The fastest build.
 //!
-//! Sort: one parallel scatter into the cells of the curve's top levels ([`super::partition`]), then
+//! Sort: one parallel scatter into the cells of the curve's top levels (`partition.rs`), then
 //! each cell on its own inside the cache. Everything happens in the memory that the finished tree
 //! keeps, so building needs almost nothing beside it.
 

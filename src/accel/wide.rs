@@ -2,8 +2,10 @@
 //!
 //! Child `c` of node `i` on one level is node `8 i + c` on the next, and the children of the last
 //! level are the blocks themselves: no pointers. One level may be in another order than the one
-//! below it (see [`super::upper`]): there a table says where the children of node `i` begin. With one radius for all, boxes bound the centres
-//! and the radius is added per ray; with radii of their own, boxes hold the spheres.
+//! below it (see `upper.rs`): there a table says where the children of node `i` begin.
+//!
+//! With one radius for all, boxes bound the centres and the radius is added per ray; with radii of
+//! their own, boxes hold the spheres.
 
 use glam::Vec3;
 use rayon::prelude::*;
