@@ -111,15 +111,18 @@ impl Bytes {
     }
 }
 
+/// Maps `file`, which nobody may change or cut while the map lives.
+///
+/// Native frames are published by rename and never written in place, so only somebody outside can do
+/// that. `NativeFile::frame` compares the length whenever a view is taken; what remains is a user who
+/// rewrites the file in place while a view is held, which `Access::Read` is there for. Contents are
+/// plain numbers, of which any bit pattern is valid, and are never used as indices unchecked.
 #[expect(
     unsafe_code,
     reason = "mapping has no safe form: other processes may change the file"
 )]
 fn map(file: &File) -> std::io::Result<Mmap> {
-    // SAFETY: `Mmap::map` needs the file neither changed nor cut while mapped. Native frames are
-    // published by rename and never written in place, so only somebody outside can do that.
-    // `NativeFile::frame` compares the length whenever a view is taken; what remains is a user who
-    // rewrites the file in place while a view is held, which `Access::Read` is there for. Contents are
-    // plain numbers, of which any bit pattern is valid, and are never used as indices unchecked.
+    // SAFETY: `Mmap::map` needs the file neither changed nor cut while mapped; what is done for
+    // that, and what is left to the user, stands above.
     unsafe { Mmap::map(file) }
 }
