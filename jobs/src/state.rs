@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use crate::{Entry, Ledger, OutputFile, Plan, Status};
+use crate::{Entry, Ledger, OutputFile, Plan, PlannedFrame, Status};
 
 /// How a frame stands.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -13,9 +13,10 @@ pub enum FrameState {
     Pending,
     /// Tried and failed; the reason is in its ledger entry.
     Failed,
-    /// Was done, but an output is missing or has another length now.
+    /// Was done, but an output that is wanted now is missing, has another length, or was not made
+    /// under that name.
     Lost,
-    /// Done, and its outputs are there.
+    /// Done, and all outputs wanted now are there.
     Done,
 }
 
@@ -48,7 +49,7 @@ impl JobState {
         let states = plan
             .frames()
             .iter()
-            .map(|f| (f.number, frame_state(dir, ledger.entry(f.number))))
+            .map(|f| (f.number, frame_state(dir, f, ledger.entry(f.number))))
             .collect();
         Self {
             dir: dir.to_owned(),
@@ -111,14 +112,25 @@ impl JobState {
     }
 }
 
-fn frame_state(dir: &Path, entry: Option<&Entry>) -> FrameState {
+/// What was made counts by what is wanted now: under other names the images are still to be made.
+fn frame_state(dir: &Path, planned: &PlannedFrame, entry: Option<&Entry>) -> FrameState {
     let in_place = |file: &OutputFile| {
         fs::metadata(dir.join(&file.path)).is_ok_and(|m| m.is_file() && m.len() == file.len)
     };
     match entry {
         None => FrameState::Pending,
         Some(entry) if entry.status == Status::Failed => FrameState::Failed,
-        Some(entry) if entry.outputs.iter().all(in_place) => FrameState::Done,
-        Some(_) => FrameState::Lost,
+        Some(entry) => {
+            let made = |path: &String| entry.outputs.iter().find(|o| o.path == *path);
+            if planned
+                .outputs
+                .iter()
+                .all(|p| made(p).is_some_and(in_place))
+            {
+                FrameState::Done
+            } else {
+                FrameState::Lost
+            }
+        }
     }
 }

@@ -239,6 +239,24 @@ fn keep_done_takes_the_new_settings_for_the_rest() {
 }
 
 #[test]
+fn done_under_another_name_is_not_done() {
+    let place = Place::new(0..2);
+    place.started(0..2, &[0, 1]);
+    let mut request = place.request(0..2);
+    request.mode = Mode::KeepDone;
+    request.frames[1].outputs = vec![place.dir().join("other.1.exr")];
+    let job = place.open(request).unwrap();
+    assert_eq!(job.pending(), [1]);
+    assert_eq!(job.state().frame_state(1), Some(FrameState::Lost));
+    drop(job);
+    // What was made beside the wanted image does no harm.
+    let mut request = place.request(0..2);
+    request.mode = Mode::KeepDone;
+    request.frames[0].outputs.clear();
+    assert!(place.open(request).unwrap().pending().is_empty());
+}
+
+#[test]
 fn force_starts_over_but_leaves_images() {
     let place = Place::new(0..2);
     place.started(0..2, &[0]);
