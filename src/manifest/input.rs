@@ -112,6 +112,8 @@ impl Input {
             &Raw(path),
             "a directory, a pattern (#, %04d, *), or a list of files",
         );
+        // The same files may be named in many ways; jobs know them by their fingerprints.
+        out.depends_on(None);
         let frames = self
             .frames
             .as_ref()

@@ -199,9 +199,8 @@ impl Manifest {
     }
 
     /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
-    /// order. Left out: frames, accelerator, and the directory of the images.
-    ///
-    /// `input.path` is among them: bring paths into one form by [`Manifest::rebase`] first.
+    /// order. Left out: `input.path` and frames, which are told by the files themselves, the
+    /// accelerator, and the directory of the images.
     pub fn settings(&self) -> Vec<(String, String)> {
         self.entries().settings()
     }

@@ -348,6 +348,7 @@ fn sets_that_will_not_do() {
 fn settings_are_what_images_depend_on() {
     let base = parse(EXAMPLE).settings();
     let same = [
+        "input.path=other",
         "input.frames=1-20",
         "render.accelerator=lbvh",
         "output.path=elsewhere/frame.####.exr",
@@ -361,7 +362,6 @@ fn settings_are_what_images_depend_on() {
     assert_eq!(changes[0].to_string(), "render.max_depth: 3 -> 5");
     for set in [
         "output.path=out/f.####.exr",
-        "input.path=other",
         "light.0.intensity=2",
         "output.fps=25",
     ] {

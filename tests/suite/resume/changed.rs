@@ -2,7 +2,16 @@
 
 use std::fs;
 
-use crate::harness::{Ran, Workshop, dam_break, images, ledger, stamps};
+use crate::harness::{Ran, SMALL, Workshop, dam_break, images, ledger, stamps};
+
+/// As a shell gives them for `in/*`.
+const FIVE: [&str; 5] = [
+    "in/f_1.bgeo",
+    "in/f_2.bgeo",
+    "in/f_3.bgeo",
+    "in/f_4.bgeo",
+    "in/f_5.bgeo",
+];
 
 fn five_frames() -> Workshop {
     let workshop = Workshop::new();
@@ -29,6 +38,11 @@ fn the_same_command_again_does_nothing() {
     nothing(workshop.render(&["--accelerator", "lbvh"]));
     nothing(workshop.run(&["render", "out/job.toml"]));
     nothing(workshop.run(&["render", "./out/../out/job.toml"]));
+    let absolute = workshop.join("in").display().to_string();
+    for input in [&[absolute.as_str()][..], &["in/f_#.bgeo"], &FIVE] {
+        let arguments = [&["render"], input, &["-o", "out/f.####.exr"], &SMALL].concat();
+        nothing(workshop.run(&arguments));
+    }
     let after = stamps(&out);
     for (name, stamp) in &before {
         // The others tell of the last run: accelerator, threads, paths as they were given.
