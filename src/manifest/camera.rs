@@ -3,6 +3,7 @@
 use super::named;
 use super::reader::{Field, Section};
 use super::write::Entries;
+use crate::scene::camera::DEFAULT_FOV;
 
 named! {
     /// How the camera is placed.
@@ -62,7 +63,7 @@ impl Default for Camera {
             eye: None,
             look_at: None,
             up: None,
-            fov: 45.0,
+            fov: DEFAULT_FOV,
             azimuth: None,
             elevation: None,
             degrees_per_frame: 1.0,

@@ -10,9 +10,9 @@ use thiserror::Error;
 use super::Bounds;
 use crate::ray::Ray;
 
-/// Vertical field of view where none is given, degrees: near a 50 mm lens on a film still's
-/// height, close enough for depth and far enough to keep spheres round at the rim.
-pub const DEFAULT_FOV: f64 = 35.0;
+/// Vertical field of view where none is given, degrees: about a 29 mm lens on a film still's
+/// height (24 mm), close enough for depth and far enough to keep spheres round at the rim.
+pub const DEFAULT_FOV: f64 = 45.0;
 
 /// Part of the image's half width and height left free around a framed box.
 pub const FRAMING_MARGIN: f64 = 0.08;
