@@ -5,7 +5,7 @@ use std::io;
 use std::path::Path;
 
 use serde_json::{Value, json};
-use spherule_jobs::{JobState, Status, publish};
+use spherule_jobs::{Entry, FrameState, JobState, publish};
 
 use super::frame::FrameReport;
 use crate::accel::simd::SimdLevel;
@@ -37,13 +37,11 @@ pub fn of(state: &JobState, manifest: &Manifest) -> Value {
             let mut frame = json!({
                 "frame": planned.number,
                 "image": planned.outputs.first(),
-                "status": "pending",
+                "status": status(state, planned.number),
             });
             if let (Some(entry), Some(into)) =
-                (state.ledger().entry(planned.number), frame.as_object_mut())
+                (word_on(state, planned.number), frame.as_object_mut())
             {
-                let done = entry.status == Status::Done;
-                into.insert("status".into(), json!(if done { "done" } else { "failed" }));
                 if let Some(reason) = &entry.reason {
                     into.insert("reason".into(), json!(reason));
                 }
@@ -73,15 +71,29 @@ pub fn of(state: &JobState, manifest: &Manifest) -> Value {
     })
 }
 
+/// A lost image is still to be made.
+fn status(state: &JobState, frame: i64) -> &'static str {
+    match state.frame_state(frame) {
+        Some(FrameState::Done) => "done",
+        Some(FrameState::Failed) => "failed",
+        Some(FrameState::Pending | FrameState::Lost) | None => "pending",
+    }
+}
+
+/// The ledger's word on a frame, if it still holds.
+fn word_on(state: &JobState, frame: i64) -> Option<&Entry> {
+    match state.frame_state(frame)? {
+        FrameState::Done | FrameState::Failed => state.ledger().entry(frame),
+        FrameState::Pending | FrameState::Lost => None,
+    }
+}
+
 /// Sums over the frames that are done.
 fn totals(state: &JobState) -> Value {
     let summary = state.summary();
     let mut sums = FrameReport::default();
-    for entry in state
-        .ledger()
-        .entries()
-        .filter(|e| e.status == Status::Done)
-    {
+    let done = |entry: &&Entry| state.frame_state(entry.frame) == Some(FrameState::Done);
+    for entry in state.ledger().entries().filter(done) {
         let Ok(frame) = serde_json::from_value::<FrameReport>(entry.details.clone()) else {
             continue;
         };

@@ -71,6 +71,21 @@ fn frames_totals_settings_and_machine() {
     assert_eq!(second["totals"]["done"], 4);
 }
 
+#[test]
+fn lost_images_are_not_called_done() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=3);
+    workshop.render(&[]).expect(0);
+    fs::remove_file(workshop.join("out/f.0002.exr")).expect("an image");
+    workshop.render(&["--frames", "1"]).expect(0);
+    let report = report(&workshop);
+    assert_eq!(report["frames"][0]["status"], "done");
+    assert_eq!(report["frames"][1]["status"], "pending");
+    assert_eq!(report["frames"][1]["particles"], Value::Null);
+    assert_eq!(report["totals"]["done"], 2);
+    assert_eq!(report["totals"]["particles"], 2 * 10422);
+}
+
 #[track_caller]
 fn done_frame(frame: &Value) {
     assert_eq!(frame["particles"], 10422);
