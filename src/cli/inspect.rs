@@ -1,5 +1,6 @@
 //! `spherule inspect`: what is in particle files, for people and (`--json`) for scripts.
 
+use std::collections::HashSet;
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
@@ -34,18 +35,20 @@ struct Inspected<'a> {
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     let mut out = io::BufWriter::new(io::stdout().lock());
     let mut outcome = Outcome::Done;
-    for (file, number) in expand(&args.files)? {
-        let written = match inspect(&file, number, args.json, &mut out) {
+    for meant in expand(&args.files) {
+        let inspected = match meant {
+            Meant::File(file, number) => {
+                inspect(&file, number, args.json, &mut out).map_err(|e| (file, e.to_string()))
+            }
+            Meant::Nothing(argument, why) => Err((argument, why)),
+        };
+        let written = match inspected {
             Ok(written) => written,
-            Err(error) => {
+            Err((file, error)) => {
                 outcome = Outcome::SomeFailed;
                 if args.json {
                     let shown = file.display().to_string();
-                    writeln!(
-                        out,
-                        "{}",
-                        json!({"file": shown, "error": error.to_string()})
-                    )
+                    writeln!(out, "{}", json!({"file": shown, "error": error}))
                 } else {
                     say!("error: {error}");
                     Ok(())
@@ -61,30 +64,43 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-/// The files meant, with the frame number that their names tell where they are a sequence.
-fn expand(arguments: &[PathBuf]) -> Result<Vec<(PathBuf, Option<i64>)>, CliError> {
-    let mut files = Vec::new();
+/// What an argument stands for.
+enum Meant {
+    /// A file, with the frame number that its name tells where it is one of a sequence.
+    File(PathBuf, Option<i64>),
+    /// No file, and why.
+    Nothing(PathBuf, String),
+}
+
+/// All that is meant; an argument that means nothing does not hinder the others.
+fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
+    let mut all = Vec::new();
+    let mut known = HashSet::new();
     for argument in arguments {
         match SequenceInput::from_path(argument) {
             SequenceInput::Files(listed) => {
-                files.extend(listed.into_iter().map(|f| {
-                    let number = lone_frame_number(&f);
-                    (f, number)
-                }));
+                for file in listed {
+                    let number = lone_frame_number(&file);
+                    known.insert(file.clone());
+                    all.push(Meant::File(file, number));
+                }
             }
-            input => {
-                let sequence = Sequence::open(&input)?;
-                for frame in sequence.frames() {
-                    for part in &frame.parts {
-                        if !files.iter().any(|(known, _)| known == &part.path) {
-                            files.push((part.path.clone(), Some(frame.number)));
+            input => match Sequence::open(&input) {
+                Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
+                Ok(sequence) => {
+                    for frame in sequence.frames() {
+                        // A file with many steps is in many frames.
+                        for part in &frame.parts {
+                            if known.insert(part.path.clone()) {
+                                all.push(Meant::File(part.path.clone(), Some(frame.number)));
+                            }
                         }
                     }
                 }
-            }
+            },
         }
     }
-    Ok(files)
+    all
 }
 
 /// Reads one file; the outer error is the file's, the inner one the output's.

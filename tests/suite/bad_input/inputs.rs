@@ -3,6 +3,7 @@
 use std::fs;
 
 use glam::Vec3;
+use serde_json::Value;
 
 use super::refused;
 use crate::harness::{SMALL, Workshop, dam_break, npy};
@@ -38,6 +39,37 @@ fn what_is_not_there_is_named() {
     );
     no_sequence(&workshop, "nowhere/f_#.bgeo", &["nowhere"]);
     refused(&workshop, &["render", "in/job.toml"], &["in/job.toml: "]);
+}
+
+#[test]
+fn inspect_goes_on_after_what_is_not_there() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), [1, 2]);
+    let arguments = ["nowhere/f_#.bgeo", "in/f_7.bgeo", "in/f_#.bgeo"];
+    let ran = workshop
+        .run(&[&["inspect", "--json"], &arguments[..]].concat())
+        .expect(1);
+    let lines: Vec<Value> = ran
+        .text()
+        .lines()
+        .map(|line| serde_json::from_str(line).expect("JSON"))
+        .collect();
+    assert_eq!(lines.len(), 4);
+    for (line, argument) in lines.iter().zip(&arguments[..2]) {
+        assert_eq!(line["file"], *argument);
+        assert!(line["error"].is_string(), "{line}");
+    }
+    assert_eq!(
+        (&lines[2]["frame"], &lines[3]["frame"]),
+        (&1.into(), &2.into())
+    );
+
+    let ran = workshop
+        .run(&[&["inspect"], &arguments[..]].concat())
+        .expect(1)
+        .tells("error: nowhere")
+        .tells("error: in/f_7.bgeo: ");
+    assert_eq!(ran.text().matches("10422 particles").count(), 2);
 }
 
 #[test]
