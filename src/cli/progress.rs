@@ -33,7 +33,16 @@ pub(super) struct Progress {
     show: Show,
     total: usize,
     start: Instant,
-    finished: Mutex<usize>,
+    ended: Mutex<Ended>,
+}
+
+/// How the frames of this run ended.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Ended {
+    /// How many, well or badly.
+    pub(super) count: usize,
+    /// Those that failed.
+    pub(super) failed: Vec<i64>,
 }
 
 enum Show {
@@ -58,7 +67,7 @@ impl Progress {
             show,
             total,
             start: Instant::now(),
-            finished: Mutex::new(0),
+            ended: Mutex::default(),
         }
     }
 
@@ -67,7 +76,7 @@ impl Progress {
         match event {
             Event::Entered(frame, stage) => self.entered(*frame, *stage),
             Event::Done(task, report) => {
-                let done = self.count();
+                let done = self.count(None);
                 let image = task.image.display().to_string();
                 self.line(
                     done,
@@ -77,7 +86,7 @@ impl Progress {
                 );
             }
             Event::Failed(frame, reason) => {
-                let done = self.count();
+                let done = self.count(Some(*frame));
                 self.warn(&format!("error: frame {frame}: {reason}"));
                 self.line(
                     done,
@@ -91,16 +100,19 @@ impl Progress {
     }
 
     /// Takes the bar away.
-    pub(super) fn finish(&self) {
+    pub(super) fn finish(self) -> Ended {
         if let Show::Bar(bar) = &self.show {
             bar.finish_and_clear();
         }
+        self.ended.into_inner().unwrap_or_else(|e| e.into_inner())
     }
 
-    fn count(&self) -> usize {
-        let mut finished = self.finished.lock().unwrap_or_else(|e| e.into_inner());
-        *finished += 1;
-        *finished
+    /// Another frame has ended.
+    fn count(&self, failed: Option<i64>) -> usize {
+        let mut ended = self.ended.lock().unwrap_or_else(|e| e.into_inner());
+        ended.count += 1;
+        ended.failed.extend(failed);
+        ended.count
     }
 
     fn entered(&self, frame: i64, stage: Stage) {

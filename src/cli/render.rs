@@ -66,14 +66,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let progress = Progress::new(args.progress, tasks.len());
     let start = std::time::Instant::now();
     let interrupt = signals.at_work();
-    let ended = pipeline::run(&setup, &sequence, &tasks, &mut job, interrupt, &|event| {
+    let result = pipeline::run(&setup, &sequence, &tasks, &mut job, interrupt, &|event| {
         progress.show(&event);
     });
-    progress.finish();
+    let ended = progress.finish();
     let reported = report::job::write(&plan.dir, job.state(), &plan.manifest)
         .map_err(CliError::io(&plan.dir.join(report::job::FILE)));
     // What ended the run explains why there is no report either.
-    let ended = ended.map_err(CliError::from).and(reported);
+    let result = result.map_err(CliError::from).and(reported);
     let summary = job.summary();
     say!(
         "{} of {} frames done in {}: {}",
@@ -82,15 +82,16 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         duration(start.elapsed().as_secs_f64()),
         plan.shown_output.display()
     );
-    if !summary.failed.is_empty() {
-        say!("failed: {}", list(&summary.failed));
+    // Frames that failed earlier and were not tried again are still to be done.
+    if !ended.failed.is_empty() {
+        say!("failed: {}", list(&ended.failed));
     }
-    match ended {
+    match result {
         Err(error) => {
             say!("error: {error}");
             Ok(Outcome::SomeFailed)
         }
-        Ok(()) if interrupt.is_raised() && summary.pending > 0 => Ok(Outcome::Interrupted),
+        Ok(()) if interrupt.is_raised() && ended.count < tasks.len() => Ok(Outcome::Interrupted),
         Ok(()) if summary.done < summary.total => Ok(Outcome::SomeFailed),
         Ok(()) => Ok(Outcome::Done),
     }

@@ -1,5 +1,7 @@
 //! TERM and Ctrl-C: exit code 75, and the same command goes on.
 
+use std::fs;
+
 use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
 
 const FRAMES: usize = 30;
@@ -57,6 +59,39 @@ fn term_and_interrupt_end_with_75_and_the_job_goes_on() {
         assert_eq!(ran.rendered().len(), FRAMES - done);
         assert!(images(&workshop.join(&out)) == whole, "{signal}");
     }
+}
+
+#[test]
+fn an_interrupted_second_try_is_no_failure() {
+    let workshop = Workshop::new();
+    let input = workshop.join("in");
+    let tried = |n: &usize| {
+        let out = format!("out{n}");
+        dam_break(&input, 1..=FRAMES);
+        for frame in 2..=FRAMES {
+            let file = input.join(format!("f_{frame}.bgeo"));
+            let good = fs::read(&file).expect("a frame");
+            fs::write(&file, &good[..good.len() / 2]).expect("a file");
+        }
+        workshop
+            .render_to(&out, &[])
+            .expect(1)
+            .tells(&format!("failed: 2-{FRAMES}"));
+        dam_break(&input, 2..=FRAMES);
+        let pattern = format!("{out}/f.####.exr");
+        let arguments = [&["render", "in", "-o", &pattern][..], &SMALL].concat();
+        let mut running = workshop.start(&arguments);
+        assert!(running.wait_for_line("] frame 2:"));
+        running.signal("TERM");
+        let (told, status) = running.end();
+        if status.code() == Some(0) {
+            return false;
+        }
+        assert_eq!(status.code(), Some(75), "{told}");
+        assert!(!told.contains("failed:"), "{told}");
+        true
+    };
+    assert!((0..TRIES).any(|n| tried(&n)), "no signal came in time");
 }
 
 /// Frames that take minutes: the program ends early or the test does not.
