@@ -11,7 +11,7 @@ use spherule_jobs::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode, publish
 use super::job::{Asked, ManifestArgs, absolute};
 use super::progress::{Progress, ProgressMode, duration};
 use super::{CliError, Outcome, signals};
-use crate::manifest::{Manifest, without_dots};
+use crate::manifest::{Manifest, named_place, real_dir};
 use crate::pipeline::{self, ImageTask, Setup};
 use crate::report;
 use crate::resolve::{self, question};
@@ -135,14 +135,14 @@ impl Plan {
         };
         manifest.check_frame_count(chosen)?;
         let shown_output = PathBuf::from(manifest.output.path.as_str());
-        let dir = without_dots(&base.join(manifest.output.path.dir()));
+        let dir = real_dir(&base.join(manifest.output.path.dir()));
         manifest.rebase(&base, &dir).map_err(CliError::Other)?;
         let file = asked
             .file
             .as_deref()
             .map(absolute)
             .transpose()?
-            .map(|f| without_dots(&f));
+            .map(|f| named_place(&f));
         Ok(Self {
             dir,
             manifest,

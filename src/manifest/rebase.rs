@@ -6,7 +6,7 @@ use super::{Manifest, OutputPattern};
 
 impl Manifest {
     /// Rewrites the relative paths, now relative to `from`, to be relative to `to`; both must be
-    /// absolute. Nothing is looked up on the disk. Absolute paths stay.
+    /// absolute. Absolute paths stay. The disk is asked where links lead.
     ///
     /// # Errors
     /// A directory that would have to be named is not UTF-8, or `from` or `to` is not absolute.
@@ -32,8 +32,18 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
     if Path::new(path).is_absolute() {
         return Ok(path.to_owned());
     }
-    let target = without_dots(&from.join(path));
-    let base = without_dots(to);
+    let target = from.join(path);
+    let short = relative(&without_dots(&target), &without_dots(to))?;
+    // What links there are may stay in the path if `..` does not have to go past one.
+    let place = named_place(&target);
+    if named_place(&real_dir(to).join(&short)) == place {
+        return Ok(short);
+    }
+    relative(&place, &real_dir(to))
+}
+
+/// `target` as seen from `base`, both absolute and without `..`.
+fn relative(target: &Path, base: &Path) -> Result<String, String> {
     let shared = target
         .components()
         .zip(base.components())
@@ -41,7 +51,7 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
         .count();
     // Nothing shared, not even a root: another drive.
     let relative: PathBuf = if shared == 0 {
-        target
+        target.to_owned()
     } else {
         let ups = base.components().skip(shared).map(|_| Component::ParentDir);
         ups.chain(target.components().skip(shared)).collect()
@@ -53,8 +63,30 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
     }
 }
 
-/// Without `.` and, where possible, `..`.
-pub fn without_dots(path: &Path) -> PathBuf {
+/// A directory without links, `.` and `..`, as far as it exists; what is to be created below is
+/// taken by its name alone. `path` must be absolute.
+pub fn real_dir(path: &Path) -> PathBuf {
+    // `x/..` is where the system says, not `x` taken away: `x` may be a link.
+    for existing in path.ancestors() {
+        let Ok(real) = existing.canonicalize() else {
+            continue;
+        };
+        let rest = path.strip_prefix(existing).unwrap_or(Path::new(""));
+        return without_dots(&real.join(rest));
+    }
+    without_dots(path)
+}
+
+/// The same for a file or pattern, whose own name stays even if it is a link: names have meaning.
+pub fn named_place(path: &Path) -> PathBuf {
+    match (path.parent(), path.file_name()) {
+        (Some(dir), Some(name)) => real_dir(dir).join(name),
+        _ => real_dir(path),
+    }
+}
+
+/// Without `.` and, where possible, `..`, by the text alone.
+fn without_dots(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
         match component {
@@ -92,5 +124,27 @@ mod tests {
         let mut all = Manifest::new("out");
         all.rebase(here, there).unwrap();
         assert_eq!(all.input.path, ["."]);
+    }
+
+    #[test]
+    fn links_are_followed_before_dots() {
+        let root = tempfile::tempdir().unwrap();
+        let at = |name: &str| root.path().join(name);
+        for dir in ["work/in", "disk/deep/out", "disk/data"] {
+            std::fs::create_dir_all(at(dir)).unwrap();
+        }
+        std::os::unix::fs::symlink(at("disk/deep/out"), at("work/out")).unwrap();
+        std::os::unix::fs::symlink(at("disk/data"), at("work/data")).unwrap();
+        let seen = |path: &str, to: &str| rebased(path, &at("work"), &at(to)).unwrap();
+        assert_eq!(seen("in/f_#.vtk", "work/out"), "../../../work/in/f_#.vtk");
+        assert_eq!(seen("out/../f_#.vtk", "work/in"), "../../disk/deep/f_#.vtk");
+        assert_eq!(seen("data/f_#.vtk", "work/in"), "../data/f_#.vtk");
+        assert_eq!(seen("in/f_#.vtk", "work/new/out"), "../../in/f_#.vtk");
+        let real = root.path().canonicalize().unwrap();
+        assert_eq!(
+            real_dir(&at("work/out/../new/../a")),
+            real.join("disk/deep/a")
+        );
+        assert_eq!(named_place(&at("work/data")), real.join("work/data"));
     }
 }

@@ -68,6 +68,23 @@ fn the_directory_may_be_moved() {
     assert!(!workshop.join("out").exists());
 }
 
+#[cfg(unix)]
+#[test]
+fn images_may_go_through_a_link() {
+    let workshop = five_frames();
+    fs::create_dir_all(workshop.join("disk/deep")).expect("a directory");
+    std::os::unix::fs::symlink("disk/deep", workshop.join("out")).expect("a link");
+    workshop.render(&[]).expect(0);
+    workshop
+        .run(&["render", "out/job.toml"])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+    workshop
+        .render_to("out/../beside", &["--frames", "1"])
+        .expect(0);
+    assert!(workshop.join("disk/beside/f.0001.exr").exists());
+}
+
 #[test]
 fn changed_settings_are_refused_with_old_and_new_value() {
     let workshop = five_frames();
