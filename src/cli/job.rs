@@ -75,6 +75,8 @@ pub(super) struct Asked {
     pub(super) base: PathBuf,
     /// The manifest's own file, if there is one.
     pub(super) file: Option<PathBuf>,
+    /// What that file says without the options, if it can stand alone.
+    pub(super) unchanged: Option<Manifest>,
 }
 
 impl ManifestArgs {
@@ -100,10 +102,14 @@ impl ManifestArgs {
             .clone()
             .unwrap_or_else(|| PathBuf::from("command line"));
         let manifest = Manifest::parse_with(&text, &shown, overrides)?;
+        let unchanged = file
+            .as_ref()
+            .and_then(|path| Manifest::parse(&text, path).ok());
         Ok(Asked {
             manifest,
             base,
             file,
+            unchanged,
         })
     }
 

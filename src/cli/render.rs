@@ -11,7 +11,7 @@ use spherule_jobs::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode, publish
 use super::job::{Asked, ManifestArgs, absolute};
 use super::progress::{Progress, ProgressMode, duration};
 use super::{CliError, Outcome, signals};
-use crate::manifest::{Manifest, named_place, real_dir};
+use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
 use crate::pipeline::{self, ImageTask, Setup};
 use crate::report;
 use crate::resolve::{self, question};
@@ -56,7 +56,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     plan.guard_manifest(args.force)?;
     let mut job = plan.open(&sequence, args)?;
     let (survey, setup) = plan.settle(&job)?;
-    plan.write_manifest()?;
+    plan.write_manifest(args.force || args.keep_done)?;
     tell(&sequence, &survey, &setup);
     let tasks = plan.tasks(&sequence, &job.pending());
     let kept = job.selected().len() - tasks.len();
@@ -111,6 +111,8 @@ struct Plan {
     manifest: Manifest,
     /// The manifest's own file, absolute.
     file: Option<PathBuf>,
+    /// What that file says, seen from `dir` too; None if it cannot stand alone.
+    unchanged: Option<Manifest>,
     /// The images as the user named them.
     shown_output: PathBuf,
 }
@@ -136,7 +138,11 @@ impl Plan {
         manifest.check_frame_count(chosen)?;
         let shown_output = PathBuf::from(manifest.output.path.as_str());
         let dir = real_dir(&base.join(manifest.output.path.dir()));
-        manifest.rebase(&base, &dir).map_err(CliError::Other)?;
+        move_into(&mut manifest, &base, &dir)?;
+        let mut unchanged = asked.unchanged;
+        if let Some(manifest) = &mut unchanged {
+            move_into(manifest, &base, &dir)?;
+        }
         let file = asked
             .file
             .as_deref()
@@ -147,6 +153,7 @@ impl Plan {
             dir,
             manifest,
             file,
+            unchanged,
             shown_output,
         })
     }
@@ -256,10 +263,19 @@ impl Plan {
     }
 
     /// Writes the manifest beside the images, unless it is what was given or stands there already.
-    fn write_manifest(&self) -> Result<(), CliError> {
+    /// If it is what was given, options become part of it where the job was `settled_anew` by them.
+    fn write_manifest(&self, settled_anew: bool) -> Result<(), CliError> {
         let path = self.job_file();
-        let text = self.manifest.to_commented_toml();
-        if self.is_own_manifest() || fs::read_to_string(&path).is_ok_and(|old| old == text) {
+        let mut manifest = self.manifest.clone();
+        if self.is_own_manifest() {
+            // Which frames to do now is no property of the job.
+            manifest.input.frames = self.unchanged.as_ref().and_then(|m| m.input.frames.clone());
+            if !settled_anew || self.unchanged.as_ref() == Some(&manifest) {
+                return Ok(());
+            }
+        }
+        let text = manifest.to_commented_toml();
+        if fs::read_to_string(&path).is_ok_and(|old| old == text) {
             return Ok(());
         }
         publish(&path, text.as_bytes()).map_err(CliError::io(&path))
@@ -278,6 +294,17 @@ impl Plan {
         };
         pending.iter().filter_map(task).collect()
     }
+}
+
+/// Makes paths relative to `dir`, where the images of `manifest` are to be.
+fn move_into(manifest: &mut Manifest, base: &Path, dir: &Path) -> Result<(), CliError> {
+    manifest.rebase(base, dir).map_err(CliError::Other)?;
+    // However the directory was named: it may be moved with its manifest.
+    if real_dir(&dir.join(manifest.output.path.dir())) == dir {
+        manifest.output.path =
+            OutputPattern::parse(manifest.output.path.file_name()).map_err(CliError::Other)?;
+    }
+    Ok(())
 }
 
 /// What was decided for the user, so that nothing is a surprise.

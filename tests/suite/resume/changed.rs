@@ -173,6 +173,33 @@ fn keep_done_keeps_what_is_there_and_does_the_rest_anew() {
 }
 
 #[test]
+fn options_on_the_job_s_own_manifest_become_part_of_it() {
+    let workshop = five_frames();
+    workshop.render(&[]).expect(0);
+    let own = |options: &[&str]| workshop.run(&[&["render", "out/job.toml"], options].concat());
+    let manifest = || fs::read_to_string(workshop.join("out/job.toml")).expect("the manifest");
+    let first = manifest();
+
+    let ran = own(&["--width", "80", "--frames", "2", "--force"]).expect(0);
+    assert_eq!(ran.rendered(), [2]);
+    assert_eq!(manifest(), first.replace("width = 64", "width = 80"));
+    let ran = own(&[]).expect(0);
+    assert_eq!(ran.rendered(), [1, 3, 4, 5]);
+
+    let output = workshop.join("out/g.####.exr").display().to_string();
+    let ran = own(&["--keep-done", "-o", &output]).expect(0);
+    assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
+    assert!(manifest().contains("path = \"g.####.exr\""));
+    own(&[]).expect(0).tells("5 of 5 frames are done already");
+    // Without either, and without a change, the file is as the user wrote it.
+    let mine = format!("# mine\n{}", manifest());
+    fs::write(workshop.join("out/job.toml"), &mine).expect("a file");
+    own(&["--frames", "1", "--keep-done"]).expect(0);
+    own(&["--width", "90"]).expect(2);
+    assert_eq!(manifest(), mine);
+}
+
+#[test]
 fn force_and_keep_done_exclude_each_other() {
     let workshop = five_frames();
     workshop
