@@ -321,6 +321,7 @@ fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
         pipeline::RadiusRule::Common(radius) => say!("radius {radius}"),
         pipeline::RadiusRule::FileOr(_) if survey.has_radii => say!("radius from the files"),
         pipeline::RadiusRule::FileOr(radius) => {
+            let radius = short(f64::from(*radius));
             say!("radius {radius}, half the usual distance of neighbours (--radius sets it)");
         }
         pipeline::RadiusRule::Attribute { name, scale } => {
@@ -332,13 +333,18 @@ fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
     {
         say!(
             "colour by `{name}`, seen from {} to {}",
-            color.low,
-            color.high
+            short(color.low),
+            short(color.high)
         );
     }
     if survey.origin != glam::DVec3::ZERO {
         say!("origin {}: the particles are far from zero", survey.origin);
     }
+}
+
+/// Four digits, as a person reads a number.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }
 
 fn counted(count: usize, what: &str) -> String {
