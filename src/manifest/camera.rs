@@ -113,6 +113,16 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        if self.mode == CameraMode::Auto {
+            for key in ["eye", "look_at"] {
+                if !section.lacks(key) {
+                    section.wrong(
+                        key,
+                        "is given, but the automatic camera finds its own; say mode = \"fixed\"",
+                    );
+                }
+            }
+        }
         if self.mode == CameraMode::Fixed {
             for key in ["eye", "look_at"] {
                 if section.lacks(key) {

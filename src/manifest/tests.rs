@@ -393,7 +393,11 @@ fn commented_file_reads_back_and_shows_every_key() {
         })
         .map(|l| format!("{l}\n"))
         .collect();
-    let all = parse(&uncommented);
+    let error = Manifest::parse(&uncommented, path())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("camera.eye: is given"), "{error}");
+    let all = parse(&uncommented.replace("mode = \"auto\"", "mode = \"fixed\""));
     assert_eq!(all.lights.len(), 1);
     assert_eq!(all.output.fps, Some(24.0));
     assert_eq!(parse(&all.to_commented_toml()), all);
@@ -424,8 +428,11 @@ proptest! {
     ) {
         let narrow = narrow.abs().min(f32::MAX);
         let mut manifest = Manifest::new(path);
-        manifest.camera.mode = CameraMode::Auto;
-        manifest.camera.eye = Some(wide);
+        manifest.lights = vec![Light {
+            kind: LightKind::Point { position: wide, falloff: Falloff::None },
+            color: [narrow; 3],
+            intensity: narrow,
+        }];
         manifest.material.color = ColorSetting::Rgb([narrow; 3]);
         prop_assert_eq!(&parse(&manifest.to_commented_toml()), &manifest);
     }
