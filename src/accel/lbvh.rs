@@ -76,6 +76,7 @@ impl Lbvh {
         let cells = scatter(centers, &top, points, indices);
         clock.lap("scatter");
 
+        let scratch_bytes = sort_scratch_bytes(&cells, indexed);
         sort_cells(&grid, top.levels(), &cells, points, indices);
         clock.lap("sort");
 
@@ -93,6 +94,7 @@ impl Lbvh {
             "lbvh",
             "hilbert, k-d above 1024 particles",
             sah_cost,
+            scratch_bytes,
             clock.finish(),
         );
         #[cfg(debug_assertions)]
@@ -185,6 +187,15 @@ fn sort_cells(
                 scratch.sort(grid, top_levels, points, indices);
             }
         });
+}
+
+/// Most bytes that sorting holds beside the particles: crowded cells are copied with their keys, the
+/// others fit the caches.
+fn sort_scratch_bytes(cells: &Cells, indexed: bool) -> u64 {
+    let each = size_of::<(u64, u32)>() + size_of::<Vec3>() + if indexed { 4 } else { 0 };
+    let lens = cells.starts.windows(2).map(|pair| pair[1] - pair[0]);
+    let crowded: usize = lens.filter(|len| *len > LARGE_CELL).sum();
+    (crowded * each) as u64
 }
 
 /// Memory of one thread for sorting cells; a cell fits the cache.

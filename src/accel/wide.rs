@@ -187,6 +187,7 @@ impl WideTree {
         structure: &'static str,
         order: &'static str,
         sah_cost: f64,
+        sort_bytes: u64,
         phases: Vec<Phase>,
     ) -> BuildReport {
         let position_bytes =
@@ -194,8 +195,8 @@ impl WideTree {
         let structure_bytes = size_of_val(&self.nodes[..]) as u64
             + size_of_val(&self.mapped[..]) as u64
             + size_of_val(&self.indices[..]) as u64;
-        // Sorting happens in the memory of the result; beside it there are boxes of the lowest
-        // level and what one cell per thread needs.
+        // Sorting happens in the memory of the result and what the builder says; later there are
+        // the boxes of the lowest level.
         let boxes = self.blocks.len().div_ceil(WIDTH) as u64 * size_of::<Aabb>() as u64;
         BuildReport {
             structure,
@@ -209,7 +210,7 @@ impl WideTree {
             sah_cost,
             position_bytes,
             structure_bytes,
-            peak_bytes: position_bytes + structure_bytes + boxes,
+            peak_bytes: position_bytes + structure_bytes + boxes.max(sort_bytes),
             simd: self.simd().name(),
         }
     }
