@@ -21,6 +21,8 @@ use crate::scene::Bounds;
 const FRAMES: usize = 24;
 /// Particles of a frame that percentiles are taken from.
 const SAMPLE: usize = 20_000;
+/// Fewest particles of which one alone may count as escaped: of a handful each matters.
+const ESCAPE_MIN: usize = 16;
 /// Distances to the nearest neighbour that the radius is estimated from.
 const NEIGHBOUR_QUERIES: usize = 512;
 /// Distance computations that the estimate may cost: half a second for a frame of 1e7.
@@ -273,6 +275,10 @@ impl Totals {
 
 /// The box of the particles, except that on each axis it reaches beyond the middle 98 % by at most
 /// half their extent. None without finite particles.
+///
+/// Below 100 particles, where that would leave none out, the outermost on each side of an axis is
+/// not of the middle, and the box may reach beyond by the longest side of the middle: one of a few
+/// particles that lies off the others' plane belongs to the picture.
 fn robust_bounds(positions: &Positions) -> Option<(DVec3, DVec3)> {
     let count = positions.len();
     let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
@@ -283,20 +289,26 @@ fn robust_bounds(positions: &Positions) -> Option<(DVec3, DVec3)> {
         .filter_map(finite)
         .map(|p| (p, p))
         .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
-    let (mut low, mut high) = (min, max);
+    let few = sample.len() < 100;
+    let outside = match sample.len() / 100 {
+        0 => usize::from(sample.len() >= ESCAPE_MIN),
+        percent => percent,
+    };
+    let (mut first, mut last) = (min, max);
     for axis in 0..3 {
         sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
-        let (Some(first), Some(last)) = (
-            sample.get(sample.len() / 100),
-            sample.get((sample.len() - sample.len() / 100).saturating_sub(1)),
-        ) else {
-            continue;
-        };
-        let margin = 0.5 * (last[axis] - first[axis]);
-        low[axis] = min[axis].max(first[axis] - margin);
-        high[axis] = max[axis].min(last[axis] + margin);
+        let above = (sample.len() - outside).saturating_sub(1);
+        if let (Some(low), Some(high)) = (sample.get(outside), sample.get(above)) {
+            (first[axis], last[axis]) = (low[axis], high[axis]);
+        }
     }
-    Some((low, high))
+    let extent = last - first;
+    let margin = if few {
+        DVec3::splat(extent.max_element())
+    } else {
+        0.5 * extent
+    };
+    Some((min.max(first - margin), max.min(last + margin)))
 }
 
 #[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
@@ -356,4 +368,38 @@ fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
         .collect();
     distances.sort_unstable_by(f32::total_cmp);
     distances.get(distances.len() / 2).map(|d| 0.5 * d)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `side` by `side` particles in the unit square of a plane, and one more.
+    fn plane_and(side: u8, other: DVec3) -> (DVec3, DVec3) {
+        let step = |i: u8| f64::from(i) / f64::from(side - 1);
+        let mut all: Vec<DVec3> = (0..side)
+            .flat_map(|i| (0..side).map(move |j| DVec3::new(step(i), step(j), 0.0)))
+            .collect();
+        all.push(other);
+        robust_bounds(&Positions::F64(all)).unwrap()
+    }
+
+    #[test]
+    fn one_escaped_particle_is_left_out_of_many_and_of_few() {
+        for side in [5, 20] {
+            for escaped in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+                let (min, max) = plane_and(side, 1e4 * escaped);
+                assert!(min.min_element() >= -1.0, "{side} {escaped}: {min}");
+                assert!(max.max_element() <= 2.0, "{side} {escaped}: {max}");
+                assert!(min.x <= 0.0 && min.y <= 0.0 && max.x >= 1.0 && max.y >= 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn one_of_few_that_lies_near_is_kept() {
+        assert_eq!(plane_and(5, DVec3::new(0.5, 0.5, 0.9)).1.z, 0.9);
+        // Of less than sixteen none is left out.
+        assert_eq!(plane_and(3, DVec3::new(0.5, 0.5, 1e4)).1.z, 1e4);
+    }
 }
