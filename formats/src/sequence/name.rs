@@ -1,4 +1,7 @@
 //! File names taken apart: literal text, numbers, extension.
+//!
+//! `-` is a sign where a separator or nothing comes before it (`frame_-5`, `smoke.-0012`), else a
+//! separator (`frame-5`).
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,7 +15,7 @@ pub(super) struct Name {
     pub path: PathBuf,
     /// Text around the numbers, one more than there are numbers; without the extension.
     pub literals: Vec<String>,
-    /// The runs of digits, in order.
+    /// The runs of digits with their signs, in order.
     pub numbers: Vec<i64>,
     /// The same as written.
     digits: Vec<String>,
@@ -99,6 +102,11 @@ fn stem_len(name: &str) -> usize {
     }
 }
 
+/// Whether a `-` after `text` is a sign, if digits come next.
+pub(super) fn sign_may_follow(text: &str) -> bool {
+    text.is_empty() || text.ends_with(['_', '.', ' '])
+}
+
 #[derive(Default)]
 struct Splitter {
     literals: Vec<String>,
@@ -116,11 +124,19 @@ impl Splitter {
             self.literal += &text[..plain];
             text = &text[plain..];
             let digits = text.bytes().take_while(u8::is_ascii_digit).count();
-            if digits > 0 {
+            if digits > 0 && self.ends_in_sign() {
+                self.literal.pop();
+                self.push_number(&format!("-{}", &text[..digits]));
+            } else if digits > 0 {
                 self.push_number(&text[..digits]);
             }
             text = &text[digits..];
         }
+    }
+
+    fn ends_in_sign(&self) -> bool {
+        let before = self.literal.strip_suffix('-');
+        before.is_some_and(|b| sign_may_follow(b) && (self.numbers.is_empty() || !b.is_empty()))
     }
 
     /// Digits beyond i64 (hashes, time stamps in nanoseconds) stay text: false.
@@ -179,6 +195,22 @@ mod tests {
             (long.literals.len(), long.numbers.as_slice()),
             (2, &[7][..])
         );
+    }
+
+    #[test]
+    fn a_minus_is_a_sign_only_after_a_separator() {
+        for (text, numbers, pattern) in [
+            ("s_-5.vtk", [-5].as_slice(), "s_#.vtk"),
+            ("s.-0012.vtk", &[-12], "s.#.vtk"),
+            ("-7.vtk", &[-7], "#.vtk"),
+            ("s-5.vtk", &[5], "s-#.vtk"),
+            ("2024-11-05.vtk", &[2024, 11, 5], "#-11-05.vtk"),
+            ("s_--5.vtk", &[5], "s_--#.vtk"),
+        ] {
+            let name = parse(text);
+            assert_eq!(name.numbers, numbers, "{text}");
+            assert_eq!(name.pattern(Some(0), &[]), pattern, "{text}");
+        }
     }
 
     #[test]

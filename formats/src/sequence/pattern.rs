@@ -8,6 +8,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::SequenceError;
+use super::name::sign_may_follow;
 
 /// A parsed pattern.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -125,11 +126,16 @@ fn fits(tokens: &[Token], name: &str, at: usize, fit: &mut Fit) -> bool {
             .chain([rest.len()])
             .any(|skipped| fits(tokens, name, at + skipped, fit)),
         Token::Number => {
-            let digits = rest.bytes().take_while(u8::is_ascii_digit).count();
-            if digits == 0 || !fits(tokens, name, at + digits, fit) {
+            let unsigned = match rest.strip_prefix('-') {
+                Some(unsigned) if sign_may_follow(&name[..at]) => unsigned,
+                _ => rest,
+            };
+            let digits = unsigned.bytes().take_while(u8::is_ascii_digit).count();
+            let end = at + rest.len() - unsigned.len() + digits;
+            if digits == 0 || !fits(tokens, name, end, fit) {
                 return false;
             }
-            fit.number = Some(at..at + digits);
+            fit.number = Some(at..end);
             true
         }
     }
@@ -159,6 +165,15 @@ mod tests {
             assert_eq!(number(pattern, "d_.vtk"), None);
             assert_eq!(number(pattern, "d_7.vtk.gz"), None);
         }
+    }
+
+    #[test]
+    fn a_number_may_have_a_sign_after_a_separator() {
+        assert_eq!(number("d_#.vtk", "d_-07.vtk"), Some(Some("-07".into())));
+        assert_eq!(number("*#.vtk", "d_-7.vtk"), Some(Some("-7".into())));
+        assert_eq!(number("d_-#.vtk", "d_-7.vtk"), Some(Some("7".into())));
+        assert_eq!(number("d#.vtk", "d-7.vtk"), None);
+        assert_eq!(number("d_#.vtk", "d_-.vtk"), None);
     }
 
     #[test]
