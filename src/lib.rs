@@ -3,6 +3,23 @@
 //!
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. This crate joins them. Arrows never point the other way.
+//!
+//! A tree and a ray:
+//!
+//! ```
+//! use glam::Vec3;
+//! use spherule::accel::{BuildSettings, SphereRadius, Spheres, lbvh::Lbvh};
+//! use spherule::ray::Ray;
+//!
+//! let centers = [Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)];
+//! let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.5) };
+//! let mut builder = Lbvh::new();
+//! builder.build(&spheres, &BuildSettings::default());
+//! let tree = builder.tree();
+//! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("straight at it");
+//! assert_eq!(hit.t, 1.5);
+//! assert_eq!(tree.particle(hit.slot), 0);
+//! ```
 #![deny(unsafe_code)]
 
 pub mod accel;

@@ -33,6 +33,15 @@ impl BoxSettings {
 
 /// The particles of `settings`: x, y and z of each are three successive numbers of splitmix64,
 /// `min + ((next >> 40) * 2^-24) * (max - min)` in f32.
+///
+/// ```
+/// use spherule_formats::generate::{BoxSettings, fill_box};
+///
+/// let settings = BoxSettings::thesis(1000, 1);
+/// let centers = fill_box(&settings);
+/// assert_eq!(centers.len(), 1000);
+/// assert!(centers.iter().all(|c| c.cmpge(settings.min).all() && c.cmple(settings.max).all()));
+/// ```
 pub fn fill_box(settings: &BoxSettings) -> Vec<Vec3> {
     let BoxSettings {
         count,

@@ -11,6 +11,15 @@ use std::str::FromStr;
 use serde::{Deserialize, Serialize};
 
 /// One or more frames, in the order in which they were asked for; never empty.
+///
+/// ```
+/// use spherule_jobs::FrameRange;
+///
+/// let frames: FrameRange = "1-10x3,20".parse()?;
+/// assert_eq!(frames.iter().collect::<Vec<_>>(), [1, 4, 7, 10, 20]);
+/// assert!(frames.contains(7) && !frames.contains(8));
+/// # Ok::<(), spherule_jobs::RangeError>(())
+/// ```
 #[derive(Debug, Clone, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(try_from = "String", into = "String")]
 pub struct FrameRange {
