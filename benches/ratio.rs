@@ -10,7 +10,7 @@ use std::hint::black_box;
 use std::process::Command;
 use std::time::Instant;
 
-use spherule::accel::lbvh::Lbvh;
+use spherule::accel::TreeBuilder;
 
 mod support;
 
@@ -93,12 +93,12 @@ fn print_builds(case: &Case, rounds: usize) {
     let scene = &case.scene;
     let turns = Turns::take(
         rounds,
-        || build_lbvh(&mut Lbvh::new(), scene).nodes,
+        || build_lbvh(&mut TreeBuilder::new(), scene).nodes,
         || ObvhsBuilder::new().build(&case.spheres),
     );
     print_row(case, "build, new memory, s", Unit::Seconds, &turns);
 
-    let (mut ours, mut theirs) = (Lbvh::new(), ObvhsBuilder::new());
+    let (mut ours, mut theirs) = (TreeBuilder::new(), ObvhsBuilder::new());
     let report = build_lbvh(&mut ours, scene);
     let node_bytes = theirs.build(&case.spheres);
     let turns = Turns::take(

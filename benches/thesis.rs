@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, SamplingMode, Throughput};
-use spherule::accel::lbvh::Lbvh;
+use spherule::accel::TreeBuilder;
 
 mod support;
 
@@ -47,7 +47,7 @@ fn build(criterion: &mut Criterion, cases: &[Case]) {
         let particles = case.scene.centers.len();
         group.throughput(Throughput::Elements(particles as u64));
         group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
-            let mut builder = Lbvh::new();
+            let mut builder = TreeBuilder::new();
             bencher.iter(|| black_box(build_lbvh(&mut builder, &case.scene).nodes));
         });
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {

@@ -8,12 +8,12 @@
 //!
 //! ```
 //! use glam::Vec3;
-//! use spherule::accel::{BuildSettings, SphereRadius, Spheres, lbvh::Lbvh};
+//! use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 //! use spherule::ray::Ray;
 //!
 //! let centers = [Vec3::ZERO, Vec3::new(3.0, 0.0, 0.0)];
 //! let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.5) };
-//! let mut builder = Lbvh::new();
+//! let mut builder = TreeBuilder::new();
 //! builder.build(&spheres, &BuildSettings::default());
 //! let tree = builder.tree();
 //! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("straight at it");

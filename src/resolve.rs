@@ -135,6 +135,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
         color,
+        accelerator: manifest.render.accelerator.structure(),
         exr: ExrOptions {
             compression: compression(manifest),
             frames_per_second: output.fps.map(fps),

@@ -2,7 +2,7 @@
 
 use std::env;
 
-use spherule::accel::lbvh::Lbvh;
+use spherule::accel::TreeBuilder;
 use spherule::accel::{BuildReport, BuildSettings, SphereRadius, Spheres};
 
 pub(crate) mod obvhs;
@@ -33,7 +33,7 @@ pub(crate) struct Case {
     /// The particles as obvhs takes them.
     pub(crate) spheres: Vec<obvhs::Sphere>,
     /// Ours, built.
-    pub(crate) lbvh: Lbvh,
+    pub(crate) lbvh: TreeBuilder,
     /// Theirs, built.
     pub(crate) obvhs: Obvhs,
     /// Where secondary rays start.
@@ -48,7 +48,7 @@ impl Case {
     pub(crate) fn new(particles: usize) -> Self {
         let scene = Scene::thesis(particles);
         let spheres = obvhs::spheres(&scene);
-        let mut lbvh = Lbvh::new();
+        let mut lbvh = TreeBuilder::new();
         build_lbvh(&mut lbvh, &scene);
         let mut builder = ObvhsBuilder::new();
         builder.build(&spheres);
@@ -87,7 +87,7 @@ impl Case {
 }
 
 /// Builds our tree in the memory of `builder`; indices are not kept, as nothing here needs them.
-pub(crate) fn build_lbvh(builder: &mut Lbvh, scene: &Scene) -> BuildReport {
+pub(crate) fn build_lbvh(builder: &mut TreeBuilder, scene: &Scene) -> BuildReport {
     let spheres = Spheres {
         centers: &scene.centers,
         radius: SphereRadius::Common(scene.radius),
@@ -96,6 +96,7 @@ pub(crate) fn build_lbvh(builder: &mut Lbvh, scene: &Scene) -> BuildReport {
         &spheres,
         &BuildSettings {
             keep_indices: false,
+            ..BuildSettings::default()
         },
     )
 }

@@ -5,16 +5,15 @@
 //! each cell on its own inside the cache. Everything happens in the memory that the finished tree
 //! keeps, so building needs almost nothing beside it.
 
-use std::time::Instant;
-
 use glam::Vec3;
 use rayon::prelude::*;
 
 use super::block::{BLOCK_SIZE, BlockRadii};
 use super::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
 use super::partition::{Cells, scatter};
+use super::report::PhaseClock;
 use super::wide::WideTree;
-use super::{Aabb, BuildReport, BuildSettings, Phase, SphereRadius, Spheres};
+use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
 
 /// Curve levels that the sort inside a cell looks at; finer differences keep the input's order.
 const CELL_LEVELS: u32 = 12;
@@ -25,112 +24,53 @@ const LARGE_CELL: usize = 1 << 18;
 /// Positions looked at to place the grid.
 const SAMPLE: usize = 4096;
 
-/// Builds [`WideTree`]s in curve order, in the same memory frame after frame.
-#[derive(Debug, Default)]
-pub struct Lbvh {
-    tree: WideTree,
-}
+/// Builds over `spheres` in the memory of `tree`.
+pub(super) fn build(
+    tree: &mut WideTree,
+    spheres: &Spheres,
+    settings: &BuildSettings,
+) -> BuildReport {
+    let mut clock = PhaseClock::new();
+    let centers = spheres.centers;
+    let common = match spheres.radius {
+        SphereRadius::Common(radius) => Some(radius),
+        SphereRadius::Each(_) => None,
+    };
+    // Radii of their own follow by index, so then the indices are needed while building.
+    let indexed = settings.keep_indices || common.is_none();
+    tree.reset(centers.len(), common, indexed);
 
-impl Lbvh {
-    /// A builder without memory yet.
-    pub fn new() -> Self {
-        Self::default()
+    let bounds = bounds_of(centers);
+    let (min, size) = grid_placement(centers, bounds);
+    let grid = Grid::new(min, size);
+    clock.lap("bounds");
+
+    let (points, indices) = tree.points_mut();
+    let top = TopCells::new(grid, Cells::levels_for(centers.len()));
+    let cells = scatter(centers, &top, points, indices);
+    clock.lap("scatter");
+
+    let scratch_bytes = sort_scratch_bytes(&cells, indexed);
+    sort_cells(&grid, top.levels(), &cells, points, indices);
+    clock.lap("sort");
+
+    pad_last_block(points, indices, centers.len());
+    if let SphereRadius::Each(radii) = spheres.radius {
+        tree.gather_radii(radii);
     }
-
-    /// The tree of the last build.
-    pub fn tree(&self) -> &WideTree {
-        &self.tree
+    let sah_cost = tree.finish(bounds);
+    if !settings.keep_indices {
+        tree.drop_indices();
     }
+    clock.lap("nodes");
 
-    /// The tree, to change how it is traced.
-    pub fn tree_mut(&mut self) -> &mut WideTree {
-        &mut self.tree
-    }
-
-    /// Builds over `spheres`, replacing the last tree.
-    ///
-    /// # Panics
-    /// If there are 2^32 or more spheres, or fewer radii than centres.
-    pub fn build(&mut self, spheres: &Spheres, settings: &BuildSettings) -> BuildReport {
-        let mut clock = PhaseClock::new();
-        let centers = spheres.centers;
-        assert!(
-            u32::try_from(centers.len()).is_ok(),
-            "a tree holds fewer than 2^32 particles"
-        );
-        let common = match spheres.radius {
-            SphereRadius::Common(radius) => Some(radius),
-            SphereRadius::Each(_) => None,
-        };
-        // Radii of their own follow by index, so then the indices are needed while building.
-        let indexed = settings.keep_indices || common.is_none();
-        self.tree.reset(centers.len(), common, indexed);
-
-        let bounds = bounds_of(centers);
-        let (min, size) = grid_placement(centers, bounds);
-        let grid = Grid::new(min, size);
-        clock.lap("bounds");
-
-        let (points, indices) = self.tree.points_mut();
-        let top = TopCells::new(grid, Cells::levels_for(centers.len()));
-        let cells = scatter(centers, &top, points, indices);
-        clock.lap("scatter");
-
-        let scratch_bytes = sort_scratch_bytes(&cells, indexed);
-        sort_cells(&grid, top.levels(), &cells, points, indices);
-        clock.lap("sort");
-
-        pad_last_block(points, indices, centers.len());
-        if let SphereRadius::Each(radii) = spheres.radius {
-            self.tree.gather_radii(radii);
-        }
-        let sah_cost = self.tree.finish(bounds);
-        if !settings.keep_indices {
-            self.tree.drop_indices();
-        }
-        clock.lap("nodes");
-
-        let report = self.tree.report(
-            "lbvh",
-            "hilbert, k-d above 1024 particles",
-            sah_cost,
-            scratch_bytes,
-            clock.finish(),
-        );
-        #[cfg(debug_assertions)]
-        if let Err(fault) = self.tree.validate(spheres) {
-            panic!("lbvh built a broken tree: {fault}");
-        }
-        report
-    }
-}
-
-/// Wall-clock laps.
-struct PhaseClock {
-    last: Instant,
-    phases: Vec<Phase>,
-}
-
-impl PhaseClock {
-    fn new() -> Self {
-        Self {
-            last: Instant::now(),
-            phases: Vec::new(),
-        }
-    }
-
-    fn lap(&mut self, name: &'static str) {
-        let now = Instant::now();
-        self.phases.push(Phase {
-            name,
-            time: now - self.last,
-        });
-        self.last = now;
-    }
-
-    fn finish(self) -> Vec<Phase> {
-        self.phases
-    }
+    tree.report(
+        Structure::Lbvh,
+        "hilbert, k-d above 1024 particles",
+        sah_cost,
+        scratch_bytes,
+        clock.finish(),
+    )
 }
 
 fn bounds_of(centers: &[Vec3]) -> Aabb {

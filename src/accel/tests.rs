@@ -4,9 +4,8 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
-use super::lbvh::Lbvh;
 use super::simd::SimdLevel;
-use super::{BuildSettings, SphereRadius, Spheres};
+use super::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use crate::ray::Ray;
 
 /// A scene that owns its numbers.
@@ -159,20 +158,28 @@ fn exact(ray: &Ray, center: Vec3, radius: f32) -> (Vec<f64>, f64) {
     (vec![middle - half, middle + half], graze)
 }
 
+/// Every structure in every way that it can be built.
+fn all_settings() -> Vec<BuildSettings> {
+    Structure::ALL.map(BuildSettings::new).to_vec()
+}
+
 /// Returns how many rays were judged: too near to call are left out.
 #[track_caller]
-fn check(scene: &Scene, ray_count: usize) -> usize {
+fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
     let mut judged = 0;
     for keep_indices in [true, false] {
-        let mut lbvh = Lbvh::new();
-        let settings = BuildSettings { keep_indices };
-        let report = lbvh.build(&scene.spheres(), &settings);
+        let mut builder = TreeBuilder::new();
+        let settings = BuildSettings {
+            keep_indices,
+            ..*settings
+        };
+        let report = builder.build(&scene.spheres(), &settings);
         assert_eq!(report.particles, scene.centers.len() as u64);
-        lbvh.tree().validate(&scene.spheres()).expect(scene.name);
+        builder.tree().validate(&scene.spheres()).expect(scene.name);
         for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
-            lbvh.tree_mut().set_simd(level);
+            builder.tree_mut().set_simd(level);
             for ray in rays(scene, ray_count, 11) {
-                let certain = check_ray(scene, &lbvh, &ray, keep_indices, level);
+                let certain = check_ray(scene, &builder, &ray, keep_indices, level);
                 judged += usize::from(certain && level == SimdLevel::best() && keep_indices);
             }
         }
@@ -182,8 +189,14 @@ fn check(scene: &Scene, ray_count: usize) -> usize {
 
 /// The distances where f32 and f64 may differ: rounding of coordinates of this size, which a grazing
 /// ray turns into the root of it.
-fn check_ray(scene: &Scene, lbvh: &Lbvh, ray: &Ray, indexed: bool, level: SimdLevel) -> bool {
-    let tree = lbvh.tree();
+fn check_ray(
+    scene: &Scene,
+    builder: &TreeBuilder,
+    ray: &Ray,
+    indexed: bool,
+    level: SimdLevel,
+) -> bool {
+    let tree = builder.tree();
     let mut nearest: Option<(f64, usize)> = None;
     let mut doubtful = false;
     let mut certain_crossings = 0;
@@ -254,13 +267,15 @@ fn check_ray(scene: &Scene, lbvh: &Lbvh, ray: &Ray, indexed: bool, level: SimdLe
 
 #[test]
 fn awkward_scenes_match_brute_force() {
-    for scene in awkward_scenes() {
-        let judged = check(&scene, 300);
-        assert!(
-            judged >= 120,
-            "{}: only {judged} of 300 rays judged",
-            scene.name
-        );
+    for settings in all_settings() {
+        for scene in awkward_scenes() {
+            let judged = check(&scene, &settings, 300);
+            assert!(
+                judged >= 120,
+                "{} {settings:?}: only {judged} of 300 rays judged",
+                scene.name
+            );
+        }
     }
 }
 
@@ -270,15 +285,17 @@ fn levels_with_fused_multiply_add_agree_to_the_bit() {
     if !fused.iter().all(|level| level.is_supported()) {
         return;
     }
-    for scene in awkward_scenes() {
-        let mut lbvh = Lbvh::new();
-        lbvh.build(&scene.spheres(), &BuildSettings::default());
-        for ray in rays(&scene, 2000, 5) {
-            let [a, b] = fused.map(|level| {
-                lbvh.tree_mut().set_simd(level);
-                lbvh.tree().nearest(&ray)
-            });
-            assert_eq!(a, b, "{} {ray:?}", scene.name);
+    for settings in all_settings() {
+        for scene in awkward_scenes() {
+            let mut builder = TreeBuilder::new();
+            builder.build(&scene.spheres(), &settings);
+            for ray in rays(&scene, 2000, 5) {
+                let [a, b] = fused.map(|level| {
+                    builder.tree_mut().set_simd(level);
+                    builder.tree().nearest(&ray)
+                });
+                assert_eq!(a, b, "{} {settings:?} {ray:?}", scene.name);
+            }
         }
     }
 }
@@ -286,39 +303,44 @@ fn levels_with_fused_multiply_add_agree_to_the_bit() {
 #[test]
 fn trees_do_not_depend_on_threads() {
     let scene = Scene::common("cloud", random_points(100_000, 2), 0.01);
-    let build = |threads: usize| {
-        let pool = rayon::ThreadPoolBuilder::new()
-            .num_threads(threads)
-            .build()
-            .expect("threads");
-        pool.install(|| {
-            let mut lbvh = Lbvh::new();
-            let report = lbvh.build(&scene.spheres(), &BuildSettings::default());
-            (
-                lbvh.tree().nodes.clone(),
-                lbvh.tree().indices.clone(),
-                report.sah_cost.to_bits(),
-            )
-        })
-    };
-    let one = build(1);
-    for threads in [2, 3, 8] {
-        assert!(one == build(threads), "{threads} threads");
+    for settings in all_settings() {
+        let build = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads)
+                .build()
+                .expect("threads");
+            pool.install(|| {
+                let mut builder = TreeBuilder::new();
+                let report = builder.build(&scene.spheres(), &settings);
+                (
+                    builder.tree().nodes.clone(),
+                    builder.tree().indices.clone(),
+                    report.sah_cost.to_bits(),
+                )
+            })
+        };
+        let one = build(1);
+        for threads in [2, 3, 8] {
+            assert!(one == build(threads), "{settings:?} {threads} threads");
+        }
     }
 }
 
+/// Also when the last frame was built by another structure.
 #[test]
 fn a_builder_forgets_the_last_frame() {
-    let mut lbvh = Lbvh::new();
+    let mut builder = TreeBuilder::new();
     for scene in awkward_scenes() {
-        lbvh.build(&scene.spheres(), &BuildSettings::default());
-        lbvh.tree().validate(&scene.spheres()).expect(scene.name);
-        let fresh = {
-            let mut fresh = Lbvh::new();
-            fresh.build(&scene.spheres(), &BuildSettings::default());
-            fresh.tree().nodes.clone()
-        };
-        assert!(lbvh.tree().nodes == fresh, "{}", scene.name);
+        for settings in all_settings() {
+            builder.build(&scene.spheres(), &settings);
+            builder.tree().validate(&scene.spheres()).expect(scene.name);
+            let fresh = {
+                let mut fresh = TreeBuilder::new();
+                fresh.build(&scene.spheres(), &settings);
+                fresh.tree().nodes.clone()
+            };
+            assert!(builder.tree().nodes == fresh, "{} {settings:?}", scene.name);
+        }
     }
 }
 
@@ -327,9 +349,9 @@ fn a_crowded_cell_is_sorted_by_all_threads() {
     let mut centers = random_points(300_000, 8);
     centers.iter_mut().skip(10).for_each(|p| *p *= 1e-3);
     let scene = Scene::common("crowded", centers, 1e-5);
-    let mut lbvh = Lbvh::new();
-    lbvh.build(&scene.spheres(), &BuildSettings::default());
-    lbvh.tree().validate(&scene.spheres()).expect("sound");
+    let mut builder = TreeBuilder::new();
+    builder.build(&scene.spheres(), &BuildSettings::default());
+    builder.tree().validate(&scene.spheres()).expect("sound");
 }
 
 proptest! {
@@ -349,6 +371,9 @@ proptest! {
         } else {
             vec![radius * scale]
         };
-        check(&Scene { name: "random", centers, radii }, 20);
+        let scene = Scene { name: "random", centers, radii };
+        for settings in all_settings() {
+            check(&scene, &settings, 20);
+        }
     }
 }

@@ -4,6 +4,7 @@
 use super::block::BLOCK_SIZE;
 use super::node::WIDTH;
 use super::simd::{Kernel, KernelTask, SLAB_SLACK, finite_inverse};
+use super::topology::{Implicit, Linked, Place, Topology};
 use super::wide::{MAX_LEVELS, WideTree};
 use crate::ray::Ray;
 
@@ -33,7 +34,11 @@ impl WideTree {
         if !self.may_be_met_by(ray) {
             return None;
         }
-        self.simd.run(Nearest { tree: self, ray })
+        if self.links.is_empty() {
+            self.nearest_in(Implicit::of(self), ray)
+        } else {
+            self.nearest_in(Linked::of(self), ray)
+        }
     }
 
     /// Whether the ray comes near the box of all spheres; a superset of the rays that meet any.
@@ -50,21 +55,77 @@ impl WideTree {
 
     /// Whether any sphere's surface crosses the ray within `ray.t_min..ray.t_max`.
     pub fn any_hit(&self, ray: &Ray) -> bool {
-        self.simd.run(AnyHit { tree: self, ray })
+        if self.links.is_empty() {
+            self.any_hit_in(Implicit::of(self), ray)
+        } else {
+            self.any_hit_in(Linked::of(self), ray)
+        }
     }
 
     /// Replaces `crossings` by every crossing within `ray.t_min..ray.t_max`, by distance; equal
     /// distances by particle index.
     pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
         crossings.clear();
-        self.simd.run(Crossings {
-            tree: self,
-            ray,
-            crossings,
-        });
+        if self.links.is_empty() {
+            self.crossings_in(Implicit::of(self), ray, crossings);
+        } else {
+            self.crossings_in(Linked::of(self), ray, crossings);
+        }
         crossings.sort_unstable_by(|a, b| {
             a.t.total_cmp(&b.t)
                 .then_with(|| self.tie_order(a.slot, b.slot))
+                .then(a.slot.cmp(&b.slot))
+        });
+        if self.has_copies {
+            self.keep_first_copies(crossings);
+        }
+    }
+
+    #[inline]
+    fn nearest_in<T: Topology>(&self, topology: T, ray: &Ray) -> Option<TreeHit> {
+        let tree = self;
+        self.simd.run(Nearest {
+            tree,
+            topology,
+            ray,
+        })
+    }
+
+    #[inline]
+    fn any_hit_in<T: Topology>(&self, topology: T, ray: &Ray) -> bool {
+        let tree = self;
+        self.simd.run(AnyHit {
+            tree,
+            topology,
+            ray,
+        })
+    }
+
+    fn crossings_in<T: Topology>(&self, topology: T, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
+        self.simd.run(Crossings {
+            tree: self,
+            topology,
+            ray,
+            crossings,
+        });
+    }
+
+    /// Leaves one of several copies of a particle: all of them have the same crossings, next to each
+    /// other in `crossings`. A ray that touches a sphere crosses it twice at one distance, so it is
+    /// the slot that tells copies from crossings.
+    fn keep_first_copies(&self, crossings: &mut Vec<TreeCrossing>) {
+        let mut first: Option<TreeCrossing> = None;
+        crossings.retain(|crossing| match first {
+            Some(held)
+                if held.t == crossing.t
+                    && self.particle(held.slot) == self.particle(crossing.slot) =>
+            {
+                held.slot == crossing.slot
+            }
+            _ => {
+                first = Some(*crossing);
+                true
+            }
         });
     }
 
@@ -85,12 +146,9 @@ impl WideTree {
 
 /// Every level can leave all children but one on the stack.
 const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
-/// Bits of a stack code below the level.
-const INDEX_BITS: u32 = 28;
 
 /// A node or block still to visit, as one word so that it is stored and loaded whole: the bits of
-/// the distance at which the ray enters its box (rounded down) above, and below them its code: the
-/// level in the upper bits, the number in the level under it.
+/// the distance at which the ray enters its box (rounded down) above, and below them its code.
 #[derive(Clone, Copy, Default)]
 struct Pending(u64);
 
@@ -110,63 +168,62 @@ impl Pending {
 /// Visits the blocks whose boxes the ray enters before `limit`, nearest boxes first. `visit` gets
 /// each block's number and the limit, and returns the new limit; negative ends the walk.
 #[inline(always)]
-fn walk<K: Kernel>(
+fn walk<K: Kernel, T: Topology>(
     kernel: K,
     tree: &WideTree,
+    topology: T,
     ray: &K::Ray,
     mut limit: f32,
     mut visit: impl FnMut(usize, f32) -> f32,
 ) {
-    #[expect(clippy::cast_possible_truncation, reason = "ten levels at most")]
-    let levels = tree.level_starts.len() as u32;
-    if levels == 0 {
+    if tree.nodes.is_empty() {
         return;
     }
     let mut stack = [Pending::default(); STACK_SIZE];
     let mut depth = 0;
-    let mut code = 0_u32;
+    let mut code = T::ROOT;
     loop {
-        let level = code >> INDEX_BITS;
-        let index = (code & ((1 << INDEX_BITS) - 1)) as usize;
-        if level == levels {
-            limit = visit(index, limit);
-            if limit < 0.0 {
-                return;
-            }
-        } else {
-            let node = &tree.nodes[tree.level_starts[level as usize] as usize + index];
-            let (found, keys) = kernel.test_node(ray, node, limit);
-            let below = Below {
-                tree,
-                level: level + 1,
-                is_blocks: level + 1 == levels,
-                first: tree.first_child(level, index),
-            };
-            if found == 1 {
-                code = below.code(kernel.first_two(keys)[0]);
-                continue;
-            }
-            if found == 2 {
-                let [a, b] = kernel.first_two(keys);
-                let (near, far) = (a.min(b), a.max(b));
-                below.prefetch(kernel, far);
-                stack[depth] = Pending::new(far, below.code(far));
-                depth += 1;
-                code = below.code(near);
-                continue;
-            }
-            if found > 2 {
-                let mut keys = kernel.all_keys(keys);
-                for key in &keys[..found] {
-                    below.prefetch(kernel, *key);
+        match topology.place(code) {
+            Place::Block(block) => {
+                limit = visit(block, limit);
+                if limit < 0.0 {
+                    return;
                 }
-                sort_descending(&mut keys[..found]);
-                for key in &keys[..found - 1] {
-                    stack[depth] = Pending::new(*key, below.code(*key));
+            }
+            Place::Node(index) => {
+                let (found, keys) = kernel.test_node(ray, &tree.nodes[index], limit);
+                let below = Below {
+                    tree,
+                    topology,
+                    children: topology.children(code),
+                };
+                if found == 1 {
+                    code = below.code(kernel.first_two(keys)[0]);
+                    continue;
+                }
+                if found == 2 {
+                    let [a, b] = kernel.first_two(keys);
+                    let (near, far) = (a.min(b), a.max(b));
+                    let far_code = below.code(far);
+                    below.prefetch(kernel, far_code);
+                    stack[depth] = Pending::new(far, far_code);
                     depth += 1;
+                    code = below.code(near);
+                    continue;
                 }
-                code = below.code(keys[found - 1]);
-                continue;
+                if found > 2 {
+                    let mut keys = kernel.all_keys(keys);
+                    for key in &keys[..found] {
+                        below.prefetch(kernel, below.code(*key));
+                    }
+                    sort_descending(&mut keys[..found]);
+                    for key in &keys[..found - 1] {
+                        stack[depth] = Pending::new(*key, below.code(*key));
+                        depth += 1;
+                    }
+                    code = below.code(keys[found - 1]);
+                    continue;
+                }
             }
         }
         loop {
@@ -183,32 +240,26 @@ fn walk<K: Kernel>(
     }
 }
 
-/// The level below a node, seen from it.
-struct Below<'a> {
+/// What is below a node, seen from it.
+struct Below<'a, T: Topology> {
     tree: &'a WideTree,
-    level: u32,
-    is_blocks: bool,
-    /// Number of the node's first child.
-    first: usize,
+    topology: T,
+    children: T::Children,
 }
 
-impl Below<'_> {
+impl<T: Topology> Below<'_, T> {
     /// Code of the child that a key is for.
     #[inline(always)]
-    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^28 blocks")]
     fn code(&self, key: u32) -> u32 {
-        (self.level << INDEX_BITS) | (self.first as u32 + (key & 7))
+        self.topology.child(self.children, key & 7)
     }
 
     /// Asks for the memory of a child that will be visited, well before it is.
     #[inline(always)]
-    fn prefetch<K: Kernel>(&self, kernel: K, key: u32) {
-        let child = self.first + (key & 7) as usize;
-        if self.is_blocks {
-            kernel.prefetch_block(&self.tree.blocks[child]);
-        } else {
-            let start = self.tree.level_starts[self.level as usize] as usize;
-            kernel.prefetch_node(&self.tree.nodes[start + child]);
+    fn prefetch<K: Kernel>(&self, kernel: K, code: u32) {
+        match self.topology.place(code) {
+            Place::Block(block) => kernel.prefetch_block(&self.tree.blocks[block]),
+            Place::Node(node) => kernel.prefetch_node(&self.tree.nodes[node]),
         }
     }
 }
@@ -228,23 +279,29 @@ fn sort_descending(keys: &mut [u32]) {
     }
 }
 
-struct Nearest<'a> {
+struct Nearest<'a, T> {
     tree: &'a WideTree,
+    topology: T,
     ray: &'a Ray,
 }
 
-impl KernelTask for Nearest<'_> {
+impl<T: Topology> KernelTask for Nearest<'_, T> {
     type Output = Option<TreeHit>;
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> Option<TreeHit> {
-        let Self { tree, ray } = self;
-        let prepared = kernel.prepare(ray, tree.radius);
+        let Self {
+            tree,
+            topology,
+            ray,
+        } = self;
+        let prepared = kernel.prepare(ray, tree.radius, tree.padding);
         let mut best: Option<TreeHit> = None;
         // The end is exclusive for the ray and inclusive for ties.
         walk(
             kernel,
             tree,
+            topology,
             &prepared,
             ray.t_max.next_down(),
             |block, limit| {
@@ -288,22 +345,28 @@ fn first_of_tied(tree: &WideTree, block: usize, lanes: u32) -> u32 {
     slot
 }
 
-struct AnyHit<'a> {
+struct AnyHit<'a, T> {
     tree: &'a WideTree,
+    topology: T,
     ray: &'a Ray,
 }
 
-impl KernelTask for AnyHit<'_> {
+impl<T: Topology> KernelTask for AnyHit<'_, T> {
     type Output = bool;
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) -> bool {
-        let Self { tree, ray } = self;
-        let prepared = kernel.prepare(ray, tree.radius);
+        let Self {
+            tree,
+            topology,
+            ray,
+        } = self;
+        let prepared = kernel.prepare(ray, tree.radius, tree.padding);
         let mut found = false;
         walk(
             kernel,
             tree,
+            topology,
             &prepared,
             ray.t_max.next_down(),
             |block, limit| {
@@ -320,26 +383,30 @@ impl KernelTask for AnyHit<'_> {
     }
 }
 
-struct Crossings<'a> {
+struct Crossings<'a, T> {
     tree: &'a WideTree,
+    topology: T,
     ray: &'a Ray,
     crossings: &'a mut Vec<TreeCrossing>,
 }
 
-impl KernelTask for Crossings<'_> {
+impl<T: Topology> KernelTask for Crossings<'_, T> {
     type Output = ();
 
     #[inline(always)]
     fn run<K: Kernel>(self, kernel: K) {
         let Self {
             tree,
+            topology,
             ray,
             crossings,
         } = self;
-        let prepared = kernel.prepare(ray, tree.radius);
+        let prepared = kernel.prepare(ray, tree.radius, tree.padding);
+        let slots = tree.slot_count();
         walk(
             kernel,
             tree,
+            topology,
             &prepared,
             ray.t_max.next_down(),
             |block, limit| {
@@ -350,7 +417,7 @@ impl KernelTask for Crossings<'_> {
                     let lane = lanes.trailing_zeros() as usize;
                     lanes &= lanes - 1;
                     let slot = block * BLOCK_SIZE + lane;
-                    if slot >= tree.count {
+                    if slot >= slots {
                         break;
                     }
                     #[expect(

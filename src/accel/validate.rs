@@ -2,7 +2,8 @@
 //! exactly once. Debug builds run it after each build.
 
 use super::block::BLOCK_SIZE;
-use super::wide::WideTree;
+use super::topology::{Linked, Place, Topology};
+use super::wide::{MAX_LEVELS, WideTree};
 use super::{Aabb, SphereRadius, Spheres};
 
 impl WideTree {
@@ -19,12 +20,26 @@ impl WideTree {
             ));
         }
         self.validate_particles(spheres)?;
+        if self.links.is_empty() {
+            self.validate_levels()
+        } else {
+            self.validate_links()
+        }
+    }
+
+    /// The box that a block's own parent must hold.
+    fn block_bounds(&self, block: usize) -> Aabb {
+        match self.radii.get(block) {
+            Some(radii) => self.blocks[block].sphere_bounds(radii),
+            None => self.blocks[block].bounds(),
+        }
+    }
+
+    /// Checks whole levels from the blocks up.
+    fn validate_levels(&self) -> Result<(), String> {
         let levels = self.level_starts.len();
         let mut below: Vec<Aabb> = (0..self.blocks.len())
-            .map(|b| match self.radii.get(b) {
-                Some(radii) => self.blocks[b].sphere_bounds(radii),
-                None => self.blocks[b].bounds(),
-            })
+            .map(|b| self.block_bounds(b))
             .collect();
         for level in (0..levels).rev() {
             below = self.validate_level(level, &below)?;
@@ -72,16 +87,77 @@ impl WideTree {
         Ok(own)
     }
 
-    /// Every particle once, with its own centre and radius.
+    /// Checks a tree of links from the root down.
+    fn validate_links(&self) -> Result<(), String> {
+        if self.links.len() != self.nodes.len() {
+            return Err(format!(
+                "{} links for {} nodes",
+                self.links.len(),
+                self.nodes.len()
+            ));
+        }
+        let mut reached = Reached {
+            nodes: vec![false; self.nodes.len()],
+            blocks: vec![false; self.blocks.len()],
+        };
+        if self.nodes.is_empty() {
+            return reached.all();
+        }
+        reached.nodes[0] = true;
+        self.validate_below(Linked::ROOT, MAX_LEVELS, &mut reached)?;
+        reached.all()
+    }
+
+    /// Checks the subtree of the node with `code`, which has `levels` left to grow, and returns the
+    /// box of what is in it.
+    fn validate_below(
+        &self,
+        code: u32,
+        levels: usize,
+        reached: &mut Reached,
+    ) -> Result<Aabb, String> {
+        let topology = Linked::of(self);
+        let Place::Node(index) = topology.place(code) else {
+            return Err(format!("code {code} is no node"));
+        };
+        if levels == 0 {
+            return Err(format!("node {index}: deeper than {MAX_LEVELS} levels"));
+        }
+        let node = &self.nodes[index];
+        let mut own = Aabb::EMPTY;
+        for slot in 0..super::partition::index_u32(node.child_count()) {
+            let child = topology.child(topology.children(code), slot);
+            let place = topology.place(child);
+            reached
+                .mark(place)
+                .map_err(|fault| format!("node {index}, child {slot}: {fault}"))?;
+            let bounds = match place {
+                Place::Block(block) => self.block_bounds(block),
+                Place::Node(_) => self.validate_below(child, levels - 1, reached)?,
+            };
+            if !node.child_holds(slot as usize, &bounds) {
+                return Err(format!("node {index}: child {slot} sticks out"));
+            }
+            own = own.union(bounds);
+        }
+        Ok(own)
+    }
+
+    /// Every particle once, or several times where there may be copies, with its own centre and
+    /// radius.
     fn validate_particles(&self, spheres: &Spheres) -> Result<(), String> {
         if self.indices.is_empty() {
-            return Ok(());
+            return if self.has_copies {
+                Err("copies that cannot be told apart".to_owned())
+            } else {
+                Ok(())
+            };
         }
         let mut seen = vec![false; self.count];
-        for slot in 0..self.count {
+        for slot in 0..self.slot_count() {
             let index = self.indices[slot] as usize;
             match seen.get_mut(index) {
-                Some(seen) if !*seen => *seen = true,
+                Some(seen) if self.has_copies || !*seen => *seen = true,
                 Some(_) => return Err(format!("particle {index} twice")),
                 None => return Err(format!("slot {slot}: particle {index} does not exist")),
             }
@@ -95,6 +171,41 @@ impl WideTree {
                 return Err(format!("slot {slot}: not the radius of particle {index}"));
             }
         }
+        if let Some(lost) = seen.iter().position(|seen| !seen) {
+            return Err(format!("particle {lost} is nowhere"));
+        }
         Ok(())
+    }
+}
+
+/// What a walk has come to.
+struct Reached {
+    nodes: Vec<bool>,
+    blocks: Vec<bool>,
+}
+
+impl Reached {
+    fn mark(&mut self, place: Place) -> Result<(), String> {
+        let mark = match place {
+            Place::Node(node) => self.nodes.get_mut(node),
+            Place::Block(block) => self.blocks.get_mut(block),
+        };
+        match mark {
+            None => Err(format!("{place:?} does not exist")),
+            Some(true) => Err(format!("{place:?} has two parents")),
+            Some(mark) => {
+                *mark = true;
+                Ok(())
+            }
+        }
+    }
+
+    fn all(&self) -> Result<(), String> {
+        let lost = |marks: &[bool]| marks.iter().position(|mark| !mark);
+        match (lost(&self.nodes), lost(&self.blocks)) {
+            (None, None) => Ok(()),
+            (Some(node), _) => Err(format!("nobody has node {node}")),
+            (_, Some(block)) => Err(format!("nobody has block {block}")),
+        }
     }
 }

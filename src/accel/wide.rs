@@ -1,8 +1,9 @@
-//! The tree that every builder ends with: implicit levels of 8-wide nodes over blocks.
+//! The tree that every builder ends with: 8-wide nodes over blocks.
 //!
-//! Child `c` of node `i` on one level is node `8 i + c` on the next, and the children of the last
-//! level are the blocks themselves: no pointers. One level may be in another order than the one
-//! below it (see `upper.rs`): there a table says where the children of node `i` begin.
+//! In whole levels, child `c` of node `i` on one level is node `8 i + c` on the next, and the
+//! children of the last level are the blocks themselves: no pointers. One level may be in another
+//! order than the one below it (see `upper.rs`): there a table says where the children of node `i`
+//! begin. Trees of any other shape have a link for each node (see `topology.rs`).
 //!
 //! With one radius for all, boxes bound the centres and the radius is added per ray; with radii of
 //! their own, boxes hold the spheres.
@@ -13,10 +14,12 @@ use rayon::prelude::*;
 use super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::node::{Node, WIDTH};
 use super::simd::{SimdLevel, Supported};
-use super::{Aabb, BuildReport, Phase};
+use super::topology::Link;
+use super::{Aabb, BuildReport, Phase, Structure};
 
-/// Node levels at most: 8^10 blocks of 16 are more particles than 32 bits count.
-pub(super) const MAX_LEVELS: usize = 10;
+/// Node levels at most. Whole levels need ten: 8^10 blocks of 16 are more particles than 32 bits
+/// count. Builders of other shapes keep to it by balancing what would grow deeper.
+pub(super) const MAX_LEVELS: usize = 12;
 
 /// A tree over spheres. See [`WideTree::nearest`] and its neighbours.
 #[derive(Debug, Default)]
@@ -28,11 +31,19 @@ pub struct WideTree {
     pub(super) mapped_level: u32,
     /// For each node of that level, the node whose place its children have.
     pub(super) mapped: Vec<u32>,
+    /// Where the children of each node are; empty if levels are whole.
+    pub(super) links: Vec<Link>,
     pub(super) blocks: Vec<Block>,
     /// Empty when the radius is common.
     pub(super) radii: Vec<BlockRadii>,
     /// The common radius, or 0.
     pub(super) radius: f32,
+    /// Distance that rays pass outside the boxes of nodes and still meet spheres: the radius where
+    /// boxes bound centres, 0 where they bound spheres.
+    pub(super) padding: f32,
+    /// Whether a particle may lie in several slots (a sphere in several leaves, or the last one of
+    /// a block repeated to fill it). Only with indices.
+    pub(super) has_copies: bool,
     /// Index in the frame of the particle in each lane; empty when not kept.
     pub(super) indices: Vec<u32>,
     pub(super) count: usize,
@@ -82,6 +93,15 @@ impl WideTree {
         }
     }
 
+    /// Slots that hold particles to be told apart: all, or those before the last block's padding.
+    pub(super) fn slot_count(&self) -> usize {
+        if self.has_copies {
+            self.blocks.len() * BLOCK_SIZE
+        } else {
+            self.count
+        }
+    }
+
     /// Index in the frame of the particle in `slot` (tree order), or the slot itself when the way
     /// back was not kept.
     pub fn particle(&self, slot: u32) -> u32 {
@@ -100,6 +120,9 @@ impl WideTree {
         let blocks = count.div_ceil(BLOCK_SIZE);
         self.count = count;
         self.radius = radius.unwrap_or(0.0);
+        self.padding = self.radius;
+        self.has_copies = false;
+        self.links.clear();
         self.blocks.resize(blocks, bytemuck::Zeroable::zeroed());
         self.radii.clear();
         if radius.is_none() {
@@ -161,7 +184,7 @@ impl WideTree {
             } else {
                 Children::Nodes(&below)
             };
-            let (level_boxes, child_areas) = build_level(level, &children, self.radius);
+            let (level_boxes, child_areas) = build_level(level, &children, self.padding);
             boxes = level_boxes;
             areas += child_areas;
             if Some(depth) == mapped_level {
@@ -170,7 +193,7 @@ impl WideTree {
             }
         }
         self.bounds = match boxes.first() {
-            Some(root) => root.padded(self.radius),
+            Some(root) => root.padded(self.padding),
             None => center_bounds,
         };
         let root_area = self.bounds.area();
@@ -184,7 +207,7 @@ impl WideTree {
     /// The report of the build that just ended.
     pub(super) fn report(
         &self,
-        structure: &'static str,
+        structure: Structure,
         order: &'static str,
         sah_cost: f64,
         sort_bytes: u64,
@@ -194,6 +217,7 @@ impl WideTree {
             size_of_val(&self.blocks[..]) as u64 + size_of_val(&self.radii[..]) as u64;
         let structure_bytes = size_of_val(&self.nodes[..]) as u64
             + size_of_val(&self.mapped[..]) as u64
+            + size_of_val(&self.links[..]) as u64
             + size_of_val(&self.indices[..]) as u64;
         // Sorting happens in the memory of the result and what the builder says; later there are
         // the boxes of the lowest level.

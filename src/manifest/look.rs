@@ -4,6 +4,7 @@ use super::color::{Background, ColorSetting, rgb};
 use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml};
+use crate::accel::Structure;
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::scene::{self, ground};
 
@@ -34,8 +35,15 @@ named! {
     }
 }
 
-/// Those that are built so far.
-const ACCELERATORS: &[Accelerator] = &[Accelerator::Auto, Accelerator::Lbvh];
+impl Accelerator {
+    /// The structure that was asked for; None leaves it to the renderer.
+    pub fn structure(self) -> Option<Structure> {
+        match self {
+            Self::Auto => None,
+            named => named.name().parse().ok(),
+        }
+    }
+}
 
 /// Where the ground is.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -206,11 +214,11 @@ impl Render {
 
 fn read_accelerator(field: &Field<'_>) -> Option<Accelerator> {
     let accelerator = field.choice(Accelerator::ALL)?;
-    if !ACCELERATORS.contains(&accelerator) {
-        let built: Vec<&str> = ACCELERATORS.iter().map(|a| a.name()).collect();
+    if accelerator != Accelerator::Auto && accelerator.structure().is_none() {
+        let built = Structure::ALL.map(Structure::name);
         let name = accelerator.name();
         field.fail(&format!(
-            "{name} is not in this version; {} are",
+            "{name} is not in this version; auto and {} are",
             built.join(" and ")
         ));
         return None;

@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::accel::Structure;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
 use crate::scene::{ColorMap, Scene};
@@ -54,6 +55,8 @@ pub struct Setup {
     pub scene: Scene,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
+    /// Who builds the tree; None chooses by the frame.
+    pub accelerator: Option<Structure>,
     /// How the EXR is written.
     pub exr: ExrOptions,
     /// How the PNG is made.

@@ -8,7 +8,7 @@ use spherule_formats::Radius;
 use super::ImageTask;
 use super::load::LoadedFrame;
 use super::setup::{ColorRule, Setup};
-use crate::accel::lbvh::Lbvh;
+use crate::accel::TreeBuilder;
 use crate::accel::{BuildSettings, SphereRadius, Spheres};
 use crate::render::{Colors, Film, ParticleShading, RenderError, render};
 use crate::report::FrameReport;
@@ -32,7 +32,7 @@ pub struct TracedFrame {
 /// Traces frame after frame in the same buffers.
 #[derive(Debug, Default)]
 pub struct FrameTracer {
-    builder: Lbvh,
+    builder: TreeBuilder,
 }
 
 impl FrameTracer {
@@ -66,6 +66,7 @@ impl FrameTracer {
         let channels = setup.render.channels;
         let settings = BuildSettings {
             keep_indices: channels.id || channels.velocity || !frame.values.is_empty(),
+            ..BuildSettings::new(setup.accelerator.unwrap_or_default())
         };
         let spheres = Spheres {
             centers: &frame.centers,

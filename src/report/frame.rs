@@ -109,7 +109,7 @@ impl FrameReport {
     pub fn set_build(&mut self, report: &BuildReport) {
         self.seconds.build = report.total.as_secs_f64();
         self.build = BuildSummary {
-            structure: report.structure.to_owned(),
+            structure: report.structure.name().to_owned(),
             order: report.order.to_owned(),
             simd: report.simd.to_owned(),
             nodes: report.nodes,

@@ -104,8 +104,9 @@ pub(super) trait Kernel: Copy {
     /// the low three replaced by the child's slot.
     type Keys: Copy;
 
-    /// Prepares `ray` for spheres of a common `radius` (0 where boxes hold the spheres).
-    fn prepare(self, ray: &Ray, radius: f32) -> Self::Ray;
+    /// Prepares `ray` for spheres of a common `radius` (0 where each has its own) in boxes that lack
+    /// `padding` on every side.
+    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Self::Ray;
 
     /// Tests the children of `node` up to distance `limit`. Returns how many the ray enters, and
     /// their keys in slot order.

@@ -17,6 +17,7 @@ pub(super) struct PreparedRay {
     ray: Ray,
     inverse: Vec3,
     radius: f32,
+    padding: f32,
 }
 
 impl PreparedRay {
@@ -56,11 +57,12 @@ impl Kernel for Portable {
     type Ray = PreparedRay;
     type Keys = [u32; WIDTH];
 
-    fn prepare(self, ray: &Ray, radius: f32) -> PreparedRay {
+    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> PreparedRay {
         PreparedRay {
             ray: *ray,
             inverse: finite_inverse(ray.direction),
             radius,
+            padding,
         }
     }
 
@@ -72,7 +74,8 @@ impl Kernel for Portable {
             let inverse = ray.inverse[axis];
             let step = f32::from_bits(u32::from(node.exponent[axis]) << 23) * inverse;
             let base = (node.origin[axis] - ray.ray.origin[axis]) * inverse;
-            let slack = (base.abs() + 255.0 * step.abs()) * SLAB_SLACK + ray.radius * inverse.abs();
+            let slack =
+                (base.abs() + 255.0 * step.abs()) * SLAB_SLACK + ray.padding * inverse.abs();
             let side = usize::from(inverse < 0.0);
             for slot in 0..WIDTH {
                 let enter = f32::from(node.planes[axis][side][slot]) * step + (base - slack);

@@ -31,7 +31,7 @@ pub(super) fn has_avx512() -> bool {
 struct SlabRay {
     origin: __m128,
     inverse: __m128,
-    /// Distance that the common radius adds on either side, per axis.
+    /// Distance that the padding of boxes adds on either side, per axis.
     reach: __m128,
     /// Which side's planes come first, per axis: 1 where the direction is negative.
     near_side: [usize; 3],
@@ -47,9 +47,9 @@ struct SlabNode {
 
 impl SlabRay {
     #[inline(always)]
-    fn new(ray: &Ray, radius: f32) -> Self {
+    fn new(ray: &Ray, padding: f32) -> Self {
         let inverse = finite_inverse(ray.direction);
-        let reach = inverse.abs() * radius;
+        let reach = inverse.abs() * padding;
         // SAFETY: SSE2 is part of x86-64.
         unsafe {
             Self {
@@ -217,10 +217,10 @@ impl Kernel for Avx2 {
     type Keys = __m256i;
 
     #[inline(always)]
-    fn prepare(self, ray: &Ray, radius: f32) -> Avx2Ray {
+    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Avx2Ray {
         Avx2Ray {
             ray: *ray,
-            slab: SlabRay::new(ray, radius),
+            slab: SlabRay::new(ray, padding),
             radius_squared: radius * radius,
         }
     }
@@ -501,10 +501,10 @@ impl Kernel for Avx512 {
     type Keys = __m256i;
 
     #[inline(always)]
-    fn prepare(self, ray: &Ray, radius: f32) -> Avx512Ray {
+    fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Avx512Ray {
         Avx512Ray {
             ray: *ray,
-            slab: SlabRay::new(ray, radius),
+            slab: SlabRay::new(ray, padding),
             radius_squared: radius * radius,
         }
     }

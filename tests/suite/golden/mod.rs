@@ -10,7 +10,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use spherule::accel::lbvh::Lbvh;
+use spherule::accel::TreeBuilder;
 use spherule::accel::simd::SimdLevel;
 use spherule::accel::{BuildSettings, SphereRadius, Spheres};
 use spherule::output::{ExrOptions, encode_exr};
@@ -29,7 +29,7 @@ const BLESS: &str = "SPHERULE_BLESS";
 
 /// Traces a shot with one instruction set.
 fn trace(shot: &Shot, simd: SimdLevel) -> Film {
-    let mut builder = Lbvh::new();
+    let mut builder = TreeBuilder::new();
     let radius = match shot.radii.as_slice() {
         [one] => SphereRadius::Common(*one),
         each => SphereRadius::Each(each),

@@ -1,0 +1,113 @@
+//! The builders behind one door: which one, told what, in memory that lives on from frame to frame.
+
+use std::fmt;
+use std::str::FromStr;
+
+use super::wide::WideTree;
+use super::{BuildReport, Spheres, lbvh};
+
+/// How particles are ordered and grouped. The picture is the same with each.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Structure {
+    /// Along a space-filling curve (`lbvh.rs`): the fastest build.
+    #[default]
+    Lbvh,
+}
+
+impl Structure {
+    /// All there are.
+    pub const ALL: [Self; 1] = [Self::Lbvh];
+
+    /// Its name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Lbvh => "lbvh",
+        }
+    }
+}
+
+impl fmt::Display for Structure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Structure {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|s| s.name() == name);
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name);
+            format!("no structure {name:?}; there are {}", names.join(", "))
+        })
+    }
+}
+
+/// What the builders may be told.
+#[derive(Debug, Clone, Copy)]
+pub struct BuildSettings {
+    /// Who builds.
+    pub structure: Structure,
+    /// Keep the way back to the particle's index in the frame (4 bytes a particle): needed for
+    /// attributes and ids.
+    pub keep_indices: bool,
+}
+
+impl BuildSettings {
+    /// `structure` with everything else as usual.
+    pub fn new(structure: Structure) -> Self {
+        Self {
+            structure,
+            keep_indices: true,
+        }
+    }
+}
+
+impl Default for BuildSettings {
+    fn default() -> Self {
+        Self::new(Structure::default())
+    }
+}
+
+/// Builds one [`WideTree`] after another in the same memory.
+#[derive(Debug, Default)]
+pub struct TreeBuilder {
+    tree: WideTree,
+}
+
+impl TreeBuilder {
+    /// A builder without memory yet.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The tree of the last build.
+    pub fn tree(&self) -> &WideTree {
+        &self.tree
+    }
+
+    /// The tree, to change how it is traced.
+    pub fn tree_mut(&mut self) -> &mut WideTree {
+        &mut self.tree
+    }
+
+    /// Builds over `spheres`, replacing the last tree.
+    ///
+    /// # Panics
+    /// If there are 2^32 or more spheres, or fewer radii than centres.
+    pub fn build(&mut self, spheres: &Spheres, settings: &BuildSettings) -> BuildReport {
+        assert!(
+            u32::try_from(spheres.centers.len()).is_ok(),
+            "a tree holds fewer than 2^32 particles"
+        );
+        let report = match settings.structure {
+            Structure::Lbvh => lbvh::build(&mut self.tree, spheres, settings),
+        };
+        #[cfg(debug_assertions)]
+        if let Err(fault) = self.tree.validate(spheres) {
+            panic!("{} built a broken tree: {fault}", settings.structure);
+        }
+        report
+    }
+}

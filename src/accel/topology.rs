@@ -1,0 +1,187 @@
+//! Where the children of a node are: by arithmetic in trees of whole levels, by links in trees of
+//! any shape.
+//!
+//! A walk holds places as 32-bit codes that only the topology understands, so that the traversal
+//! is one whatever the tree.
+
+use bytemuck::{Pod, Zeroable};
+
+use super::node::WIDTH;
+use super::wide::WideTree;
+
+/// What a code stands for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Place {
+    /// A node, by its place in `WideTree::nodes`.
+    Node(usize),
+    /// A block, by its place in `WideTree::blocks`.
+    Block(usize),
+}
+
+/// The shape of a tree.
+pub(super) trait Topology: Copy {
+    /// What is known of a node's children before one is chosen.
+    type Children: Copy;
+
+    /// Code of the root.
+    const ROOT: u32 = 0;
+
+    /// What `code` stands for.
+    fn place(self, code: u32) -> Place;
+
+    /// The children of the node with `code`.
+    fn children(self, code: u32) -> Self::Children;
+
+    /// Code of the child in `slot`, under eight.
+    fn child(self, children: Self::Children, slot: u32) -> u32;
+}
+
+/// Bits of an implicit code below the level, and of a node's number in a link.
+const INDEX_BITS: u32 = 28;
+const INDEX_MASK: u32 = (1 << INDEX_BITS) - 1;
+/// Most nodes or blocks that a code can tell apart.
+pub(super) const MAX_INDEX: usize = 1 << INDEX_BITS;
+
+/// Whole levels: child `c` of node `i` is node `8 i + c` one level down, but on the one level that is
+/// mapped. A code is the level in the upper bits, the number in the level under it.
+#[derive(Clone, Copy)]
+pub(super) struct Implicit<'a> {
+    tree: &'a WideTree,
+    levels: u32,
+}
+
+impl<'a> Implicit<'a> {
+    pub(super) fn of(tree: &'a WideTree) -> Self {
+        #[expect(clippy::cast_possible_truncation, reason = "ten levels at most")]
+        let levels = tree.level_starts.len() as u32;
+        Self { tree, levels }
+    }
+}
+
+impl Topology for Implicit<'_> {
+    /// Code of the first child.
+    type Children = u32;
+
+    #[inline(always)]
+    fn place(self, code: u32) -> Place {
+        let (level, index) = (code >> INDEX_BITS, (code & INDEX_MASK) as usize);
+        if level == self.levels {
+            Place::Block(index)
+        } else {
+            Place::Node(self.tree.level_starts[level as usize] as usize + index)
+        }
+    }
+
+    #[inline(always)]
+    #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^28 blocks")]
+    fn children(self, code: u32) -> u32 {
+        let (level, index) = (code >> INDEX_BITS, (code & INDEX_MASK) as usize);
+        let first = self.tree.first_child(level, index) as u32;
+        ((level + 1) << INDEX_BITS) | first
+    }
+
+    #[inline(always)]
+    fn child(self, first: u32, slot: u32) -> u32 {
+        first + slot
+    }
+}
+
+/// Where the children of one node are. They lie together, nodes first and then blocks, in slot
+/// order.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub(super) struct Link {
+    /// Children that are nodes in the upper four bits, place of the first of them below.
+    nodes: u32,
+    /// Place of the first child that is a block.
+    first_block: u32,
+}
+
+#[cfg_attr(not(test), expect(dead_code, reason = "builders of linked trees"))]
+impl Link {
+    /// The first `node_count` slots are nodes from `first_node` on, the others blocks from
+    /// `first_block` on.
+    ///
+    /// # Panics
+    /// If there are more nodes or blocks than can be numbered.
+    #[expect(clippy::cast_possible_truncation, reason = "checked just above")]
+    pub(super) fn new(first_node: usize, node_count: usize, first_block: usize) -> Self {
+        assert!(
+            first_node < MAX_INDEX && first_block < MAX_INDEX && node_count <= WIDTH,
+            "a tree with links holds fewer than 2^28 nodes and blocks"
+        );
+        Self {
+            nodes: ((node_count as u32) << INDEX_BITS) | first_node as u32,
+            first_block: first_block as u32,
+        }
+    }
+}
+
+/// The bit that tells the code of a block from that of a node.
+const BLOCK: u32 = 1 << 31;
+
+/// Any shape: a link for each node. A code is the number of a node, or of a block with the top bit
+/// set.
+#[derive(Clone, Copy)]
+pub(super) struct Linked<'a> {
+    tree: &'a WideTree,
+}
+
+impl<'a> Linked<'a> {
+    pub(super) fn of(tree: &'a WideTree) -> Self {
+        Self { tree }
+    }
+}
+
+impl Topology for Linked<'_> {
+    type Children = Link;
+
+    #[inline(always)]
+    fn place(self, code: u32) -> Place {
+        if code & BLOCK != 0 {
+            Place::Block((code & !BLOCK) as usize)
+        } else {
+            Place::Node(code as usize)
+        }
+    }
+
+    #[inline(always)]
+    fn children(self, code: u32) -> Link {
+        self.tree.links[code as usize]
+    }
+
+    #[inline(always)]
+    fn child(self, link: Link, slot: u32) -> u32 {
+        let nodes = link.nodes >> INDEX_BITS;
+        if slot < nodes {
+            (link.nodes & INDEX_MASK) + slot
+        } else {
+            BLOCK | (link.first_block + (slot - nodes))
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn links_number_nodes_before_blocks() {
+        let tree = WideTree {
+            links: vec![Link::new(MAX_INDEX - 1, 1, 7), Link::new(0, 0, 3)],
+            ..WideTree::default()
+        };
+        let linked = Linked::of(&tree);
+        let places = |code: u32| {
+            [0, 1, 2].map(|slot| linked.place(linked.child(linked.children(code), slot)))
+        };
+        assert_eq!(
+            places(0),
+            [Place::Node(MAX_INDEX - 1), Place::Block(7), Place::Block(8)]
+        );
+        assert_eq!(
+            places(1),
+            [Place::Block(3), Place::Block(4), Place::Block(5)]
+        );
+    }
+}
