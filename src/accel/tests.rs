@@ -300,6 +300,34 @@ fn levels_with_fused_multiply_add_agree_to_the_bit() {
     }
 }
 
+/// On every machine: what the kernels with fused multiply-add find, as one number.
+#[test]
+fn fused_kernels_of_all_processors_agree_to_the_bit() {
+    const EXPECTED: u64 = 0x2bde_12a7_9f9a_49b3;
+    let scene = Scene::common("cloud", random_points(5000, 21), 0.05);
+    let mut builder = TreeBuilder::new();
+    builder.build(&scene.spheres(), &BuildSettings::default());
+    let fused = [SimdLevel::Neon, SimdLevel::Avx2, SimdLevel::Avx512];
+    for level in fused.into_iter().filter(|level| level.is_supported()) {
+        builder.tree_mut().set_simd(level);
+        let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+        let mut crossings = Vec::new();
+        for ray in rays(&scene, 2000, 22) {
+            builder.tree().crossings(&ray, &mut crossings);
+            let nearest = builder
+                .tree()
+                .nearest(&ray)
+                .map_or(0, |hit| hit.t.to_bits());
+            let all = crossings.iter().map(|c| c.t.to_bits());
+            for bits in all.chain([nearest]) {
+                // FNV-1a by words.
+                hash = (hash ^ u64::from(bits)).wrapping_mul(0x0100_0000_01b3);
+            }
+        }
+        assert_eq!(hash, EXPECTED, "{level:?}: {hash:#x}");
+    }
+}
+
 #[test]
 fn trees_do_not_depend_on_threads() {
     let scene = Scene::common("cloud", random_points(100_000, 2), 0.01);

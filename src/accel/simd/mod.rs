@@ -10,6 +10,8 @@ use super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::node::{Node, WIDTH};
 use crate::ray::Ray;
 
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
@@ -19,6 +21,8 @@ mod x86;
 pub enum SimdLevel {
     /// Whatever the compiler makes of plain loops.
     Portable,
+    /// 128-bit NEON, which every 64-bit Arm processor has.
+    Neon,
     /// 256-bit AVX2 with fused multiply-add.
     Avx2,
     /// 512-bit AVX-512 F, BW, DQ, VL.
@@ -33,7 +37,7 @@ impl Default for SimdLevel {
 
 impl SimdLevel {
     /// All levels, slowest first.
-    pub const ALL: [Self; 3] = [Self::Portable, Self::Avx2, Self::Avx512];
+    pub const ALL: [Self; 4] = [Self::Portable, Self::Neon, Self::Avx2, Self::Avx512];
 
     /// The best level of this machine.
     pub fn best() -> Self {
@@ -48,6 +52,7 @@ impl SimdLevel {
     pub fn is_supported(self) -> bool {
         match self {
             Self::Portable => true,
+            Self::Neon => cfg!(target_arch = "aarch64"),
             #[cfg(target_arch = "x86_64")]
             Self::Avx2 => x86::has_avx2(),
             #[cfg(target_arch = "x86_64")]
@@ -71,6 +76,7 @@ impl SimdLevel {
     pub const fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
+            Self::Neon => "neon",
             Self::Avx2 => "avx2",
             Self::Avx512 => "avx512",
         }
@@ -200,6 +206,8 @@ impl Supported {
     #[inline]
     pub(super) fn run<T: KernelTask>(self, task: T) -> T::Output {
         match self.0 {
+            #[cfg(target_arch = "aarch64")]
+            SimdLevel::Neon => task.run(neon::Neon),
             #[cfg(target_arch = "x86_64")]
             SimdLevel::Avx512 => x86::run_avx512(self, task),
             #[cfg(target_arch = "x86_64")]
