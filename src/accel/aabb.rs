@@ -41,6 +41,15 @@ impl Aabb {
         }
     }
 
+    /// What both have in common; empty if nothing.
+    #[must_use]
+    pub fn intersection(self, other: Self) -> Self {
+        Self {
+            min: self.min.max(other.min),
+            max: self.max.min(other.max),
+        }
+    }
+
     /// This box grown by `length` on every side.
     #[must_use]
     pub fn padded(self, length: f32) -> Self {

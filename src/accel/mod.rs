@@ -7,19 +7,24 @@
 use glam::Vec3;
 
 mod aabb;
+mod binary;
 pub mod block;
 mod builder;
+mod collapse;
 pub mod curve;
 mod lbvh;
+mod linked;
 mod node;
 mod partition;
 mod report;
 pub mod simd;
 mod topology;
 pub mod traverse;
+mod trim;
 mod upper;
 mod validate;
 pub mod wide;
+mod widen;
 
 pub use aabb::Aabb;
 pub use builder::{BuildSettings, Structure, TreeBuilder};
@@ -47,5 +52,7 @@ pub struct Spheres<'a> {
     pub radius: SphereRadius<'a>,
 }
 
+#[cfg(test)]
+mod collapse_tests;
 #[cfg(test)]
 mod tests;

@@ -97,7 +97,6 @@ pub(super) struct Link {
     first_block: u32,
 }
 
-#[cfg_attr(not(test), expect(dead_code, reason = "builders of linked trees"))]
 impl Link {
     /// The first `node_count` slots are nodes from `first_node` on, the others blocks from
     /// `first_block` on.
@@ -114,6 +113,21 @@ impl Link {
             nodes: ((node_count as u32) << INDEX_BITS) | first_node as u32,
             first_block: first_block as u32,
         }
+    }
+
+    /// Children that are nodes.
+    pub(super) fn node_count(self) -> usize {
+        (self.nodes >> INDEX_BITS) as usize
+    }
+
+    /// Place of the first of them.
+    pub(super) fn first_node(self) -> usize {
+        (self.nodes & INDEX_MASK) as usize
+    }
+
+    /// Place of the first child that is a block.
+    pub(super) fn first_block(self) -> usize {
+        self.first_block as usize
     }
 }
 

@@ -132,6 +132,16 @@ impl WideTree {
         self.indices.resize(lanes, 0);
     }
 
+    /// Makes room for `blocks` that may hold particles several times.
+    pub(super) fn make_room_for_copies(&mut self, blocks: usize) {
+        self.has_copies = blocks > 0;
+        self.blocks.resize(blocks, bytemuck::Zeroable::zeroed());
+        if !self.radii.is_empty() {
+            self.radii.resize(blocks, bytemuck::Zeroable::zeroed());
+        }
+        self.indices.resize(blocks * BLOCK_SIZE, 0);
+    }
+
     /// The memory of the blocks as plain points, and the indices: what builders sort in.
     pub(super) fn points_mut(&mut self) -> (&mut [Vec3], &mut [u32]) {
         (
@@ -196,12 +206,7 @@ impl WideTree {
             Some(root) => root.padded(self.padding),
             None => center_bounds,
         };
-        let root_area = self.bounds.area();
-        if root_area > 0.0 {
-            1.0 + areas / root_area
-        } else {
-            1.0
-        }
+        sah_cost(areas, self.bounds)
     }
 
     /// The report of the build that just ended.
@@ -237,6 +242,16 @@ impl WideTree {
             peak_bytes: position_bytes + structure_bytes + boxes.max(sort_bytes),
             simd: self.simd().name(),
         }
+    }
+}
+
+/// Expected tests of a ray that meets the `root` box, over children whose areas are summed up.
+pub(super) fn sah_cost(child_areas: f64, root: Aabb) -> f64 {
+    let root_area = root.area();
+    if root_area > 0.0 {
+        1.0 + child_areas / root_area
+    } else {
+        1.0
     }
 }
 

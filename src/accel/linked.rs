@@ -1,0 +1,182 @@
+//! Writes a tree with links: blocks and nodes to their places, boxes made anew from the blocks up.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::block::{BLOCK_SIZE, Block, BlockRadii};
+use super::node::{Node, WIDTH};
+use super::topology::Link;
+use super::trim::TrimmedTree;
+use super::wide::WideTree;
+use super::widen::Layout;
+use super::{Aabb, SphereRadius, Spheres};
+
+/// Brings the blocks of `tree` into the order of `layout`.
+pub(super) fn permute_blocks(tree: &mut WideTree, trimmed: &TrimmedTree, layout: &Layout) {
+    let order = |place: usize| trimmed.members(layout.blocks[place])[0] as usize;
+    permute(&mut tree.blocks, 1, order);
+    permute(&mut tree.radii, 1, order);
+    permute(&mut tree.indices, BLOCK_SIZE, order);
+}
+
+/// Brings runs of `run` values into the order in which `from` names them; does nothing to none.
+fn permute<T: Copy + Send + Sync + bytemuck::Zeroable>(
+    values: &mut Vec<T>,
+    run: usize,
+    from: impl Fn(usize) -> usize + Sync,
+) {
+    let mut ordered = vec![T::zeroed(); values.len()];
+    ordered
+        .par_chunks_mut(run)
+        .with_min_len(1024)
+        .enumerate()
+        .for_each(|(place, to)| to.copy_from_slice(&values[from(place) * run..][..run]));
+    *values = ordered;
+}
+
+/// Fills the blocks of `tree`, which has room, with the particles that the trimmed tree names.
+/// Lanes that are left over repeat the last particle.
+pub(super) fn gather_blocks(
+    tree: &mut WideTree,
+    spheres: &Spheres,
+    trimmed: &TrimmedTree,
+    layout: &Layout,
+) {
+    let members = |place: usize| trimmed.members(layout.blocks[place]);
+    let lanes = |place: usize| {
+        let members = members(place);
+        std::array::from_fn::<u32, BLOCK_SIZE, _>(|lane| members[lane.min(members.len() - 1)])
+    };
+    tree.blocks
+        .par_iter_mut()
+        .zip(tree.indices.par_chunks_mut(BLOCK_SIZE))
+        .with_min_len(256)
+        .enumerate()
+        .for_each(|(place, (block, indices))| {
+            for (lane, particle) in lanes(place).into_iter().enumerate() {
+                block.set_center(lane, spheres.centers[particle as usize]);
+                indices[lane] = particle;
+            }
+        });
+    if let SphereRadius::Each(radii) = spheres.radius {
+        tree.gather_radii(radii);
+    }
+}
+
+/// Box of each block in the space of the tree's boxes; where there are given ones, what they have
+/// in common with the spheres' own.
+pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> Vec<Aabb> {
+    let own = |place: usize| match tree.radii.get(place) {
+        Some(radii) => tree.blocks[place].sphere_bounds(radii),
+        None => tree.blocks[place]
+            .bounds()
+            .padded(tree.radius - tree.padding),
+    };
+    (0..tree.blocks.len())
+        .into_par_iter()
+        .with_min_len(1024)
+        .map(|place| {
+            let own = own(place);
+            match given.get(layout.blocks[place] as usize) {
+                None => own,
+                Some(given) => {
+                    let common = given.intersection(own);
+                    if common.is_empty() { *given } else { common }
+                }
+            }
+        })
+        .collect()
+}
+
+/// Makes the nodes of `tree` over its blocks, whose boxes are given. Returns the SAH cost.
+pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aabb]) -> f64 {
+    let Layout {
+        links,
+        child_counts,
+        level_starts,
+        ..
+    } = layout;
+    let mut nodes = std::mem::take(&mut tree.nodes);
+    nodes.clear();
+    nodes.resize(links.len(), bytemuck::Zeroable::zeroed());
+    let mut boxes = vec![Aabb::EMPTY; links.len()];
+    let mut areas = 0.0;
+    let mut end = links.len();
+    for start in level_starts.iter().rev().map(|start| *start as usize) {
+        let (own, below) = boxes[start..].split_at_mut(end - start);
+        let level = Level {
+            links: &links[start..end],
+            child_counts: &child_counts[start..end],
+            below,
+            first_below: end,
+            block_boxes,
+            padding: tree.padding,
+        };
+        areas += level.fill(&mut nodes[start..end], own);
+        end = start;
+    }
+    tree.nodes = nodes;
+    tree.links = links;
+    tree.level_starts = level_starts;
+    tree.mapped.clear();
+    tree.mapped_level = u32::MAX;
+    tree.bounds = boxes
+        .first()
+        .map_or(Aabb::EMPTY, |root| root.padded(tree.padding));
+    super::wide::sah_cost(areas, tree.bounds)
+}
+
+/// What the nodes of one level are made from.
+struct Level<'a> {
+    links: &'a [Link],
+    child_counts: &'a [u8],
+    /// Boxes of all nodes from `first_below` on.
+    below: &'a [Aabb],
+    first_below: usize,
+    block_boxes: &'a [Aabb],
+    padding: f32,
+}
+
+impl Level<'_> {
+    /// Fills `nodes` and their `boxes`; returns the summed area of the children.
+    fn fill(&self, nodes: &mut [Node], boxes: &mut [Aabb]) -> f64 {
+        // Areas are summed by runs of a fixed length, so that the sum does not depend on the threads.
+        const RUN: usize = 1024;
+        let areas: Vec<f64> = nodes
+            .par_chunks_mut(RUN)
+            .zip(boxes.par_chunks_mut(RUN))
+            .enumerate()
+            .map(|(run, (nodes, boxes))| {
+                let mut area = 0.0;
+                for (offset, (node, own)) in nodes.iter_mut().zip(boxes).enumerate() {
+                    let (children, count) = self.child_boxes(run * RUN + offset);
+                    for child in &children[..count] {
+                        area += child.padded(self.padding).area();
+                        *own = own.union(*child);
+                    }
+                    *node = Node::enclosing(&children[..count]);
+                }
+                area
+            })
+            .collect();
+        areas.iter().sum()
+    }
+
+    fn child_boxes(&self, index: usize) -> ([Aabb; WIDTH], usize) {
+        let (link, count) = (self.links[index], usize::from(self.child_counts[index]));
+        let mut boxes = [Aabb::EMPTY; WIDTH];
+        let (nodes, blocks) = boxes[..count].split_at_mut(link.node_count());
+        let first_node = link.first_node() - self.first_below;
+        nodes.copy_from_slice(&self.below[first_node..][..nodes.len()]);
+        blocks.copy_from_slice(&self.block_boxes[link.first_block()..][..blocks.len()]);
+        (boxes, count)
+    }
+}
+
+impl Block {
+    fn set_center(&mut self, lane: usize, center: Vec3) {
+        self.x[lane] = center.x;
+        self.y[lane] = center.y;
+        self.z[lane] = center.z;
+    }
+}
