@@ -9,6 +9,7 @@ use super::binary::BinaryTree;
 use super::block::BLOCK_SIZE;
 use super::linked::{block_boxes, build_nodes, gather_blocks, permute_blocks};
 use super::partition::index_u32;
+use super::report::PhaseClock;
 use super::trim::{Trim, TrimmedTree};
 use super::wide::WideTree;
 use super::widen::widen;
@@ -37,8 +38,14 @@ pub(super) struct Collapsed {
 }
 
 /// Makes `tree` of `binary`. With [`Content::Blocks`] its blocks must be there and only change
-/// places; otherwise all of it is replaced, and the indices stay (`has_copies`).
-pub(super) fn collapse(tree: &mut WideTree, binary: BinaryTree, content: &Content) -> Collapsed {
+/// places; otherwise all of it is replaced, and the indices stay (`has_copies`). Laps the phases
+/// `collapse` and `nodes`.
+pub(super) fn collapse(
+    tree: &mut WideTree,
+    binary: BinaryTree,
+    content: &Content,
+    clock: &mut PhaseClock,
+) -> Collapsed {
     if let Content::Particles(spheres) | Content::Clipped(spheres) = content {
         let common = match spheres.radius {
             SphereRadius::Common(radius) => Some(radius),
@@ -81,10 +88,12 @@ pub(super) fn collapse(tree: &mut WideTree, binary: BinaryTree, content: &Conten
             gather_blocks(tree, spheres, &trimmed, &layout);
         }
     }
+    clock.lap("collapse");
     let boxes = block_boxes(tree, &trimmed.boxes, &layout);
     scratch_bytes = scratch_bytes.max(trimmed.bytes() + size_of_val(&boxes[..]) as u64);
     drop(trimmed);
     let sah_cost = build_nodes(tree, layout, &boxes);
+    clock.lap("nodes");
     Collapsed {
         sah_cost,
         scratch_bytes,
