@@ -69,14 +69,11 @@ pub(super) fn collapse(
     );
     let mut scratch_bytes = binary_bytes(&binary) + trimmed.bytes();
     drop(binary);
-    // Slots are counted through to the end of the particles: only there may a block not be full.
-    let last_block = match content {
-        Content::Blocks if !tree.count.is_multiple_of(BLOCK_SIZE) => {
-            tree.blocks.len().checked_sub(1)
-        }
+    let unfilled = match content {
+        Content::Blocks => unfilled_block(tree, &trimmed),
         _ => None,
     };
-    let layout = widen(&trimmed, last_block.map(index_u32));
+    let layout = widen(&trimmed, unfilled);
     match content {
         Content::Blocks => {
             scratch_bytes =
@@ -98,6 +95,18 @@ pub(super) fn collapse(
         sah_cost,
         scratch_bytes,
     }
+}
+
+/// Which block of the trimmed tree is the one that is not full. Slots are counted through to the
+/// number of particles, so that one must come last.
+fn unfilled_block(tree: &WideTree, trimmed: &TrimmedTree) -> Option<u32> {
+    if tree.count.is_multiple_of(BLOCK_SIZE) {
+        return None;
+    }
+    let last = index_u32(tree.blocks.len() - 1);
+    // Here blocks have one member each.
+    let place = trimmed.members.iter().position(|block| *block == last);
+    place.map(index_u32)
 }
 
 fn binary_bytes(binary: &BinaryTree) -> u64 {

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::block::{BLOCK_SIZE, Block, BlockRadii};
+use super::block::{BLOCK_SIZE, Block};
 use super::node::{Node, WIDTH};
 use super::topology::Link;
 use super::trim::TrimmedTree;
