@@ -2,6 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
+use crate::accel::BvhSettings;
 use crate::manifest::{
     Background as BackgroundSetting, CameraMode, ColorSetting, Falloff as FalloffSetting,
     GroundHeight, LightKind, Manifest, RadiusSetting,
@@ -136,6 +137,10 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         radius,
         color,
         accelerator: manifest.render.accelerator.structure(),
+        bvh: BvhSettings {
+            preset: manifest.render.bvh_preset,
+            leaves: manifest.render.bvh_leaves,
+        },
         exr: ExrOptions {
             compression: compression(manifest),
             frames_per_second: output.fps.map(fps),

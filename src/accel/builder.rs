@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::wide::WideTree;
-use super::{BuildReport, Spheres, lbvh};
+use super::{BuildReport, BvhSettings, Spheres, bvh, lbvh};
 
 /// How particles are ordered and grouped. The picture is the same with each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -12,16 +12,19 @@ pub enum Structure {
     /// Along a space-filling curve (`lbvh.rs`): the fastest build.
     #[default]
     Lbvh,
+    /// By clustering from the leaves up (`bvh.rs`).
+    Bvh,
 }
 
 impl Structure {
     /// All there are.
-    pub const ALL: [Self; 1] = [Self::Lbvh];
+    pub const ALL: [Self; 2] = [Self::Lbvh, Self::Bvh];
 
     /// Its name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Lbvh => "lbvh",
+            Self::Bvh => "bvh",
         }
     }
 }
@@ -52,6 +55,8 @@ pub struct BuildSettings {
     /// Keep the way back to the particle's index in the frame (4 bytes a particle): needed for
     /// attributes and ids.
     pub keep_indices: bool,
+    /// What [`Structure::Bvh`] is told.
+    pub bvh: BvhSettings,
 }
 
 impl BuildSettings {
@@ -60,6 +65,7 @@ impl BuildSettings {
         Self {
             structure,
             keep_indices: true,
+            bvh: BvhSettings::default(),
         }
     }
 }
@@ -103,6 +109,7 @@ impl TreeBuilder {
         );
         let report = match settings.structure {
             Structure::Lbvh => lbvh::build(&mut self.tree, spheres, settings),
+            Structure::Bvh => bvh::build(&mut self.tree, spheres, settings),
         };
         #[cfg(debug_assertions)]
         if let Err(fault) = self.tree.validate(spheres) {

@@ -31,13 +31,45 @@ pub(super) fn build(
     settings: &BuildSettings,
 ) -> BuildReport {
     let mut clock = PhaseClock::new();
+    let sorted = sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
+    let sah_cost = tree.finish(sorted.bounds);
+    if !settings.keep_indices {
+        tree.drop_indices();
+    }
+    clock.lap("nodes");
+    tree.report(
+        Structure::Lbvh,
+        "hilbert, k-d above 1024 particles",
+        sah_cost,
+        sorted.scratch_bytes,
+        clock.finish(),
+    )
+}
+
+/// What the sort found and needed.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Sorted {
+    /// Box of the centres.
+    pub(super) bounds: Aabb,
+    /// Most bytes held beside the tree.
+    pub(super) scratch_bytes: u64,
+}
+
+/// Brings the particles along the curve into the blocks of `tree`, as points yet. Indices are there
+/// afterwards if they are to be kept or radii follow by them. Laps `bounds`, `scatter` and `sort`.
+pub(super) fn sort_into_blocks(
+    tree: &mut WideTree,
+    spheres: &Spheres,
+    keep_indices: bool,
+    clock: &mut PhaseClock,
+) -> Sorted {
     let centers = spheres.centers;
     let common = match spheres.radius {
         SphereRadius::Common(radius) => Some(radius),
         SphereRadius::Each(_) => None,
     };
     // Radii of their own follow by index, so then the indices are needed while building.
-    let indexed = settings.keep_indices || common.is_none();
+    let indexed = keep_indices || common.is_none();
     tree.reset(centers.len(), common, indexed);
 
     let bounds = bounds_of(centers);
@@ -52,25 +84,15 @@ pub(super) fn build(
 
     let scratch_bytes = sort_scratch_bytes(&cells, indexed);
     sort_cells(&grid, top.levels(), &cells, points, indices);
-    clock.lap("sort");
-
     pad_last_block(points, indices, centers.len());
     if let SphereRadius::Each(radii) = spheres.radius {
         tree.gather_radii(radii);
     }
-    let sah_cost = tree.finish(bounds);
-    if !settings.keep_indices {
-        tree.drop_indices();
-    }
-    clock.lap("nodes");
-
-    tree.report(
-        Structure::Lbvh,
-        "hilbert, k-d above 1024 particles",
-        sah_cost,
+    clock.lap("sort");
+    Sorted {
+        bounds,
         scratch_bytes,
-        clock.finish(),
-    )
+    }
 }
 
 fn bounds_of(centers: &[Vec3]) -> Aabb {

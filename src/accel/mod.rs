@@ -10,12 +10,14 @@ mod aabb;
 mod binary;
 pub mod block;
 mod builder;
+mod bvh;
 mod collapse;
 pub mod curve;
 mod lbvh;
 mod linked;
 mod node;
 mod partition;
+mod ploc;
 mod report;
 pub mod simd;
 mod topology;
@@ -28,6 +30,7 @@ mod widen;
 
 pub use aabb::Aabb;
 pub use builder::{BuildSettings, Structure, TreeBuilder};
+pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
 pub use report::{BuildReport, Phase};
 
 /// Index of a particle in the frame that was built over.

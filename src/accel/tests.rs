@@ -5,7 +5,9 @@ use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
 use super::simd::SimdLevel;
-use super::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
+use super::{
+    BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SphereRadius, Spheres, Structure, TreeBuilder,
+};
 use crate::ray::Ray;
 
 /// A scene that owns its numbers.
@@ -158,9 +160,23 @@ fn exact(ray: &Ray, center: Vec3, radius: f32) -> (Vec<f64>, f64) {
     (vec![middle - half, middle + half], graze)
 }
 
+fn every_bvh() -> impl Iterator<Item = BvhSettings> {
+    BvhLeaves::ALL
+        .into_iter()
+        .flat_map(|leaves| BvhPreset::ALL.map(|preset| BvhSettings { preset, leaves }))
+}
+
 /// Every structure in every way that it can be built.
 fn all_settings() -> Vec<BuildSettings> {
-    Structure::ALL.map(BuildSettings::new).to_vec()
+    let mut all = Vec::new();
+    for structure in Structure::ALL {
+        let plain = BuildSettings::new(structure);
+        match structure {
+            Structure::Bvh => all.extend(every_bvh().map(|bvh| BuildSettings { bvh, ..plain })),
+            _ => all.push(plain),
+        }
+    }
+    all
 }
 
 /// Returns how many rays were judged: too near to call are left out.

@@ -4,7 +4,7 @@ use super::color::{Background, ColorSetting, rgb};
 use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml};
-use crate::accel::Structure;
+use crate::accel::{BvhLeaves, BvhPreset, Structure};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::scene::{self, ground};
 
@@ -59,6 +59,10 @@ pub enum GroundHeight {
 pub struct Render {
     /// How particles are ordered for tracing.
     pub accelerator: Accelerator,
+    /// How much `bvh` spends on its tree.
+    pub bvh_preset: BvhPreset,
+    /// What `bvh` builds its tree over.
+    pub bvh_leaves: BvhLeaves,
     /// Reflections and refractions in a row.
     pub max_depth: u32,
     /// What rays see that meet nothing.
@@ -106,6 +110,8 @@ impl Default for Render {
     fn default() -> Self {
         Self {
             accelerator: Accelerator::Auto,
+            bvh_preset: BvhPreset::default(),
+            bvh_leaves: BvhLeaves::default(),
             max_depth: 3,
             background: Background::Auto,
             ground: false,
@@ -164,6 +170,12 @@ impl Render {
         let default = Self::default();
         let render = Self {
             accelerator: section.value("accelerator", default.accelerator, read_accelerator),
+            bvh_preset: section.value("bvh_preset", default.bvh_preset, |f| {
+                f.choice(&BvhPreset::ALL.map(|preset| (preset, preset.name())))
+            }),
+            bvh_leaves: section.value("bvh_leaves", default.bvh_leaves, |f| {
+                f.choice(&BvhLeaves::ALL.map(|leaves| (leaves, leaves.name())))
+            }),
             max_depth: section.value("max_depth", default.max_depth, |f| f.count(1, MAX_DEPTH)),
             background: section.value("background", default.background, Background::read),
             ground: section.value("ground", default.ground, Field::bool),
@@ -185,7 +197,19 @@ impl Render {
         out.put(
             "accelerator",
             &self.accelerator,
-            "auto | lbvh; the picture is the same",
+            "auto | lbvh | bvh; the picture is the same",
+        );
+        out.depends_on(None);
+        out.put(
+            "bvh_preset",
+            &self.bvh_preset,
+            "how much bvh spends on its tree: fast | medium | high",
+        );
+        out.depends_on(None);
+        out.put(
+            "bvh_leaves",
+            &self.bvh_leaves,
+            "what bvh builds over: blocks, or particles (200 bytes each while building)",
         );
         out.depends_on(None);
         out.put(
@@ -218,12 +242,24 @@ fn read_accelerator(field: &Field<'_>) -> Option<Accelerator> {
         let built = Structure::ALL.map(Structure::name);
         let name = accelerator.name();
         field.fail(&format!(
-            "{name} is not in this version; auto and {} are",
-            built.join(" and ")
+            "{name} is not in this version; auto, {} are",
+            built.join(", ")
         ));
         return None;
     }
     Some(accelerator)
+}
+
+impl Toml for BvhPreset {
+    fn toml(&self) -> String {
+        self.name().toml()
+    }
+}
+
+impl Toml for BvhLeaves {
+    fn toml(&self) -> String {
+        self.name().toml()
+    }
 }
 
 impl Toml for GroundHeight {

@@ -165,9 +165,17 @@ fn wrong_types_say_what_is_wanted() {
     );
     refused(
         "[render]\naccelerator = \"kdtree\"",
-        &["kdtree is not in this version; auto and lbvh are"],
+        &["kdtree is not in this version; auto, lbvh, bvh are"],
     );
     refused("[render]\naccelerator = \"lbhv\"", &["did you mean lbvh?"]);
+    refused(
+        "[render]\nbvh_preset = \"meduim\"",
+        &["render.bvh_preset", "did you mean medium?"],
+    );
+    refused(
+        "[render]\nbvh_leaves = 16",
+        &["render.bvh_leaves: wants one of blocks, particles"],
+    );
     refused(
         "[render]\nground_height = inf",
         &["render.ground_height", "height or"],
@@ -351,6 +359,8 @@ fn settings_are_what_images_depend_on() {
         "input.path=other",
         "input.frames=1-20",
         "render.accelerator=lbvh",
+        "render.bvh_preset=high",
+        "render.bvh_leaves=particles",
         "output.path=elsewhere/frame.####.exr",
     ];
     for set in same {

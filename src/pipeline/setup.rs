@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::accel::Structure;
+use crate::accel::{BvhSettings, Structure};
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
 use crate::scene::{ColorMap, Scene};
@@ -57,6 +57,8 @@ pub struct Setup {
     pub render: RenderSettings,
     /// Who builds the tree; None chooses by the frame.
     pub accelerator: Option<Structure>,
+    /// What `bvh` is told.
+    pub bvh: BvhSettings,
     /// How the EXR is written.
     pub exr: ExrOptions,
     /// How the PNG is made.

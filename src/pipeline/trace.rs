@@ -66,6 +66,7 @@ impl FrameTracer {
         let channels = setup.render.channels;
         let settings = BuildSettings {
             keep_indices: channels.id || channels.velocity || !frame.values.is_empty(),
+            bvh: setup.bvh,
             ..BuildSettings::new(setup.accelerator.unwrap_or_default())
         };
         let spheres = Spheres {

@@ -1,0 +1,189 @@
+//! `bvh`: a bounding volume hierarchy from the leaves up, by clustering and reinsertion (`ploc.rs`),
+//! collapsed into 8-wide nodes (`collapse.rs`).
+//!
+//! By default the leaves are the blocks that lbvh's sort makes: a sixteenth of the particles' number,
+//! and clustering costs that much less. Over the particles themselves blocks follow from the tree.
+
+use rayon::prelude::*;
+
+use super::block::Block;
+use super::collapse::{Collapsed, Content, collapse};
+use super::ploc::{Clustered, Effort, cluster};
+use super::report::PhaseClock;
+use super::wide::WideTree;
+use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure, lbvh};
+use obvhs::ploc::SortPrecision;
+
+/// How much is spent on the tree. Each stands for parameters of `obvhs`, whose presets of about the
+/// same names they follow.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum BvhPreset {
+    /// As `fast_build`: 6 neighbours to either side are looked at from the third pass on; 2 % of
+    /// the nodes are reinserted at a time.
+    #[default]
+    Fast,
+    /// As `medium_build`: 14 neighbours from the fourth pass on; 5 %.
+    Medium,
+    /// As `slow_build`: 24 neighbours from the third pass on, codes of 128 bits; 20 %.
+    High,
+}
+
+/// What the tree is built over.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum BvhLeaves {
+    /// Blocks of 16 particles along a space-filling curve.
+    #[default]
+    Blocks,
+    /// Single particles: some 200 bytes each while building, and blocks that are not full.
+    Particles,
+}
+
+/// What [`Structure::Bvh`] may be told.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub struct BvhSettings {
+    /// How much is spent.
+    pub preset: BvhPreset,
+    /// What the tree is built over.
+    pub leaves: BvhLeaves,
+}
+
+impl BvhPreset {
+    /// All there are.
+    pub const ALL: [Self; 3] = [Self::Fast, Self::Medium, Self::High];
+
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Fast => "fast",
+            Self::Medium => "medium",
+            Self::High => "high",
+        }
+    }
+
+    pub(super) const fn effort(self) -> Effort {
+        match self {
+            Self::Fast => Effort {
+                near_passes: 2,
+                reinsertion: 0.02,
+                precision: SortPrecision::U64,
+            },
+            Self::Medium => Effort {
+                near_passes: 3,
+                reinsertion: 0.05,
+                precision: SortPrecision::U64,
+            },
+            Self::High => Effort {
+                near_passes: 2,
+                reinsertion: 0.2,
+                precision: SortPrecision::U128,
+            },
+        }
+    }
+}
+
+impl BvhLeaves {
+    /// All there are.
+    pub const ALL: [Self; 2] = [Self::Blocks, Self::Particles];
+
+    /// Its name in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Blocks => "blocks",
+            Self::Particles => "particles",
+        }
+    }
+}
+
+/// Builds over `spheres` in the memory of `tree`.
+pub(super) fn build(
+    tree: &mut WideTree,
+    spheres: &Spheres,
+    settings: &BuildSettings,
+) -> BuildReport {
+    match settings.bvh.leaves {
+        BvhLeaves::Blocks => build_over_blocks(tree, spheres, settings),
+        BvhLeaves::Particles => build_over_particles(tree, spheres, settings),
+    }
+}
+
+fn build_over_blocks(
+    tree: &mut WideTree,
+    spheres: &Spheres,
+    settings: &BuildSettings,
+) -> BuildReport {
+    let mut clock = PhaseClock::new();
+    let sorted = lbvh::sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
+    tree.blocks
+        .par_iter_mut()
+        .with_min_len(256)
+        .for_each(Block::transpose_points);
+
+    let padding = tree.padding;
+    let bounds_of = |block: usize| match tree.radii.get(block) {
+        Some(radii) => tree.blocks[block].sphere_bounds(radii),
+        None => tree.blocks[block].bounds().padded(padding),
+    };
+    let clustered = cluster(
+        tree.blocks.len(),
+        bounds_of,
+        padding,
+        settings.bvh.preset,
+        &mut clock,
+    );
+    let held = clustered.peak_bytes.max(sorted.scratch_bytes);
+    let Collapsed {
+        sah_cost,
+        scratch_bytes,
+    } = collapse(tree, clustered.tree, &Content::Blocks, &mut clock);
+    if !settings.keep_indices {
+        tree.drop_indices();
+    }
+    tree.report(
+        Structure::Bvh,
+        "clustered blocks along a hilbert curve",
+        sah_cost,
+        held.max(scratch_bytes),
+        clock.finish(),
+    )
+}
+
+fn build_over_particles(
+    tree: &mut WideTree,
+    spheres: &Spheres,
+    settings: &BuildSettings,
+) -> BuildReport {
+    let mut clock = PhaseClock::new();
+    let (common, each): (f32, &[f32]) = match spheres.radius {
+        SphereRadius::Common(radius) => (radius, &[]),
+        SphereRadius::Each(radii) => (0.0, radii),
+    };
+    let bounds_of = |particle: usize| {
+        let radius = each.get(particle).copied().unwrap_or(common);
+        let center = spheres.centers[particle];
+        Aabb {
+            min: center - radius,
+            max: center + radius,
+        }
+    };
+    let Clustered {
+        tree: binary,
+        peak_bytes,
+    } = cluster(
+        spheres.centers.len(),
+        bounds_of,
+        common,
+        settings.bvh.preset,
+        &mut clock,
+    );
+    let collapsed = collapse(tree, binary, &Content::Particles(*spheres), &mut clock);
+    let mut report = tree.report(
+        Structure::Bvh,
+        "clustered particles",
+        collapsed.sah_cost,
+        collapsed.scratch_bytes,
+        clock.finish(),
+    );
+    // Nothing of the tree is there yet while particles are clustered.
+    report.peak_bytes = report.peak_bytes.max(peak_bytes);
+    report
+}

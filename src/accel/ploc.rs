@@ -1,0 +1,268 @@
+//! Binary trees by `obvhs`: locally ordered clustering (PLOC, Meister & Bittner 2018) and its
+//! optimiser, which takes subtrees out and puts them where they cost less (parallel reinsertion,
+//! Meister & Bittner 2018).
+//!
+//! Here is what it needs to be told, so that any scene comes back as one tree, the same whatever the
+//! number of threads:
+//! - Clustering merges neighbours that are each other's nearest. Where all are equally near
+//!   (coincident or equally spaced particles) that is one pair a pass, so boxes are shifted by a
+//!   small pseudo-random distance each.
+//! - It knows no infinite areas: coordinates are scaled by a power of two into -2..2.
+//! - Its own choice of what to reinsert depends on threads where areas are equal; ours does not.
+//! - Its stack has a fixed size, which we set by the depth that the tree has.
+
+use glam::{Vec3, Vec3A};
+use obvhs::bvh2::Bvh2;
+use obvhs::bvh2::node::Bvh2Node;
+use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
+use obvhs::ploc::{PlocBuilder, SortPrecision};
+use rayon::prelude::*;
+
+use super::Aabb;
+use super::binary::{BinaryNode, BinaryTree};
+use super::bvh::BvhPreset;
+use super::partition::index_u32;
+use super::report::PhaseClock;
+
+/// Shift of a box, as a part of its longest edge: far below what matters to the cost, far above
+/// where areas are rounded.
+const SHIFT: f32 = 1.0 / 512.0;
+/// The least shift, as a part of the coordinates: what f32 still tells apart.
+const LEAST_SHIFT: f32 = 1.0 / (1 << 21) as f32;
+/// The least shift of all, in scaled coordinates.
+const SMALLEST_SHIFT: f32 = 1e-12;
+/// Passes of reinsertion: over the whole batch first, then over 1/3, 1/5... of it, as obvhs does.
+const PASSES: usize = 16;
+
+/// A tree and what it took.
+#[derive(Debug)]
+pub(super) struct Clustered {
+    /// Each leaf has one reference, the box's number.
+    pub(super) tree: BinaryTree,
+    /// Most bytes held at any time, the boxes not counted where they are computed.
+    pub(super) peak_bytes: u64,
+}
+
+/// What a preset asks of obvhs.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Effort {
+    /// Passes in which only direct neighbours are looked at.
+    pub(super) near_passes: usize,
+    /// Part of the nodes that each round of reinsertion tries to place better.
+    pub(super) reinsertion: f32,
+    /// Bits of the Morton codes.
+    pub(super) precision: SortPrecision,
+}
+
+/// Clusters `count` boxes of spheres, each of which `bounds_of` tells; `padding` is what boxes of
+/// the result are smaller by on every side. Laps the phases `ploc` and `reinsert`.
+pub(super) fn cluster(
+    count: usize,
+    bounds_of: impl Fn(usize) -> Aabb + Sync,
+    padding: f32,
+    preset: BvhPreset,
+    clock: &mut PhaseClock,
+) -> Clustered {
+    let scale = Scale::of((0..count).into_par_iter().map(&bounds_of));
+    let effort = preset.effort();
+    let mut bvh = Bvh2::default();
+    let mut ploc = PlocBuilder::new();
+    (0..count)
+        .into_par_iter()
+        .with_min_len(1024)
+        .map(|place| leaf(scale.shifted(bounds_of(place), place), place))
+        .collect_into_vec(&mut ploc.current_nodes);
+    merge(&mut ploc, &mut bvh, preset);
+    let ploc_bytes = bytes(&ploc.current_nodes)
+        + bytes(&ploc.next_nodes)
+        + bytes(&ploc.mortons)
+        + bytes(&bvh.nodes);
+    drop(ploc);
+    clock.lap("ploc");
+    let reinsert_bytes = bytes(&bvh.nodes) + reinsert(&mut bvh, effort.reinsertion);
+    clock.lap("reinsert");
+    bvh.parents = Vec::new();
+    let tree = scale.binary(&bvh.nodes, padding);
+    let convert_bytes = bytes(&bvh.nodes) + bytes(&tree.nodes) + bytes(&tree.references);
+    Clustered {
+        tree,
+        peak_bytes: ploc_bytes.max(reinsert_bytes).max(convert_bytes),
+    }
+}
+
+fn bytes<T>(values: &Vec<T>) -> u64 {
+    (values.capacity() * size_of::<T>()) as u64
+}
+
+fn leaf(bounds: Aabb, place: usize) -> Bvh2Node {
+    let bounds = obvhs::aabb::Aabb::new(Vec3A::from(bounds.min), Vec3A::from(bounds.max));
+    Bvh2Node::new(bounds, 1, index_u32(place))
+}
+
+/// Merges the builder's nodes into one tree.
+fn merge(ploc: &mut PlocBuilder, bvh: &mut Bvh2, preset: BvhPreset) {
+    bvh.reset_for_reuse(ploc.current_nodes.len(), Some(Vec::new()));
+    let leaves = ploc.current_nodes.par_iter().map(|node| *node.aabb());
+    let total = leaves.reduce(obvhs::aabb::Aabb::empty, |a, b| a.union(&b));
+    let Effort {
+        near_passes,
+        precision,
+        ..
+    } = preset.effort();
+    // How far clustering looks is a constant of the code it is compiled to.
+    match preset {
+        BvhPreset::Fast => {
+            ploc.build_ploc_from_leaves::<6, false>(bvh, total, precision, near_passes);
+        }
+        BvhPreset::Medium => {
+            ploc.build_ploc_from_leaves::<14, false>(bvh, total, precision, near_passes);
+        }
+        BvhPreset::High => {
+            ploc.build_ploc_from_leaves::<24, false>(bvh, total, precision, near_passes);
+        }
+    }
+}
+
+/// Places `share` of the nodes better, again and again. Returns the bytes that took.
+fn reinsert(bvh: &mut Bvh2, share: f32) -> u64 {
+    if bvh.nodes.len() < 3 {
+        return 0;
+    }
+    let mut optimizer = ReinsertionOptimizer::default();
+    let mut most_candidates = 0;
+    for pass in 0..PASSES {
+        let part = share / (2 * pass + 1) as f32;
+        let candidates = largest_nodes(&bvh.nodes, part);
+        most_candidates = most_candidates.max(candidates.len());
+        bvh.max_depth = depth(&bvh.nodes) + 1;
+        optimizer.run_with_candidates(bvh, &candidates, 1);
+    }
+    // For each node its parent and a mark, for each candidate itself, a cost and what became of it.
+    let per_candidate = 4 + 8 + size_of::<obvhs::bvh2::reinsertion::Reinsertion>();
+    bytes(&bvh.parents) + (bvh.nodes.len() + per_candidate * most_candidates) as u64
+}
+
+/// The nodes of largest area among twice as many that lie first, where the upper ones are; as obvhs
+/// chooses, but nodes of equal area by number.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a part of what there is"
+)]
+fn largest_nodes(nodes: &[Bvh2Node], part: f32) -> Vec<u32> {
+    let count = ((nodes.len() as f32 * part) as usize).clamp(1, nodes.len() - 1);
+    let looked_at = nodes.len().min(2 * (count + 1));
+    let mut found: Vec<(f32, u32)> = (1..looked_at)
+        .map(|index| (nodes[index].aabb().half_area(), index_u32(index)))
+        .collect();
+    found.par_sort_unstable_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+    found.truncate(count);
+    found.into_iter().map(|(_, index)| index).collect()
+}
+
+/// Levels below the root.
+fn depth(nodes: &[Bvh2Node]) -> usize {
+    let mut deepest = 0;
+    let mut pending = vec![(0_u32, 0_usize)];
+    while let Some((index, level)) = pending.pop() {
+        deepest = deepest.max(level);
+        let node = &nodes[index as usize];
+        if !node.is_leaf() {
+            pending.extend([0, 1].map(|side| (node.first_index + side, level + 1)));
+        }
+    }
+    deepest
+}
+
+/// The way into the coordinates that obvhs sees and back.
+#[derive(Debug, Clone, Copy)]
+struct Scale {
+    factor: f32,
+    inverse: f32,
+}
+
+impl Scale {
+    /// Brings all boxes into -2..2 by a power of two, which loses nothing.
+    fn of(bounds: impl ParallelIterator<Item = Aabb>) -> Self {
+        let largest = bounds
+            .map(|b| b.min.abs().max(b.max.abs()).max_element())
+            .reduce(|| 0.0, f32::max);
+        #[expect(clippy::cast_possible_wrap, reason = "nine bits")]
+        let exponent = ((largest.to_bits() >> 23) as i32 - 126).clamp(-126, 127);
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "a power of two in the range of f32"
+        )]
+        let power = |exponent| 2.0_f64.powi(exponent) as f32;
+        Self {
+            factor: power(-exponent),
+            inverse: power(exponent),
+        }
+    }
+
+    /// `bounds` in the coordinates of obvhs, shifted so that no two distances are equal.
+    fn shifted(self, bounds: Aabb, place: usize) -> Aabb {
+        let scaled =
+            |corner: Vec3| (corner * self.factor).clamp(Vec3::splat(-2.0), Vec3::splat(2.0));
+        let (min, max) = (scaled(bounds.min), scaled(bounds.max));
+        let far = min.abs().max(max.abs()).max_element();
+        let edge = (max - min).max_element();
+        let shift = (SHIFT * edge).max(LEAST_SHIFT * far).max(SMALLEST_SHIFT) * unit_vector(place);
+        Aabb {
+            min: min + shift,
+            max: max + shift,
+        }
+    }
+
+    /// The tree of obvhs in our order and coordinates, boxes smaller by `padding`.
+    fn binary(self, nodes: &[Bvh2Node], padding: f32) -> BinaryTree {
+        let mut tree = BinaryTree::default();
+        let Some(root) = nodes.first() else {
+            return tree;
+        };
+        tree.nodes.reserve_exact(nodes.len());
+        tree.references.reserve_exact(nodes.len().div_ceil(2));
+        tree.nodes.push(self.node(root, padding));
+        let mut pending = vec![(0_usize, 0_usize)];
+        while let Some((from, to)) = pending.pop() {
+            let node = &nodes[from];
+            if node.is_leaf() {
+                tree.nodes[to].first = index_u32(tree.references.len());
+                tree.nodes[to].count = 1;
+                tree.references.push(node.first_index);
+            } else {
+                let (left, place) = (node.first_index as usize, tree.nodes.len());
+                tree.nodes[to].first = index_u32(place);
+                for side in [0, 1] {
+                    tree.nodes.push(self.node(&nodes[left + side], padding));
+                }
+                pending.extend([(left + 1, place + 1), (left, place)]);
+            }
+        }
+        tree
+    }
+
+    fn node(self, node: &Bvh2Node, padding: f32) -> BinaryNode {
+        let corner = |corner: Vec3A| Vec3::from(corner) * self.inverse;
+        let bounds = Aabb {
+            min: corner(node.aabb().min),
+            max: corner(node.aabb().max),
+        };
+        BinaryNode {
+            bounds: bounds.padded(-padding),
+            first: 0,
+            count: 0,
+        }
+    }
+}
+
+/// A vector with edges from 0 to 1 that looks random and depends on `place` alone (the finaliser of
+/// splitmix64, Steele, Lea & Flood 2014).
+fn unit_vector(place: usize) -> Vec3 {
+    let mut bits = (place as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+    bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    bits = (bits ^ (bits >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    bits ^= bits >> 31;
+    let part = |shift: u32| ((bits >> shift) & 0x1f_ffff) as f32 / (1 << 21) as f32;
+    Vec3::new(part(0), part(21), part(42))
+}
