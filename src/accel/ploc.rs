@@ -266,3 +266,88 @@ fn unit_vector(place: usize) -> Vec3 {
     let part = |shift: u32| ((bits >> shift) & 0x1f_ffff) as f32 / (1 << 21) as f32;
     Vec3::new(part(0), part(21), part(42))
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const COUNT: usize = 3000;
+
+    /// Clusters spheres of radius 1 about `centers`.
+    fn clustered(centers: &[Vec3], preset: BvhPreset) -> Clustered {
+        let bounds_of = |place: usize| Aabb {
+            min: centers[place] - 1.0,
+            max: centers[place] + 1.0,
+        };
+        cluster(
+            centers.len(),
+            bounds_of,
+            1.0,
+            preset,
+            &mut PhaseClock::new(),
+        )
+    }
+
+    fn levels(tree: &BinaryTree) -> usize {
+        let mut levels = vec![0; tree.nodes.len()];
+        for (index, node) in tree.nodes.iter().enumerate() {
+            if !node.is_leaf() {
+                let below = levels[index] + 1;
+                levels[node.first as usize..][..2].fill(below);
+            }
+        }
+        levels.into_iter().max().unwrap_or(0)
+    }
+
+    /// Else merging is one pair a pass, and time grows with the square of the particles.
+    #[test]
+    fn equal_distances_do_not_make_chains() {
+        let line = (0..COUNT).map(|i| Vec3::X * i as f32).collect();
+        let coincident = vec![Vec3::ONE; COUNT];
+        let origin = vec![Vec3::ZERO; COUNT];
+        for centers in [line, coincident, origin] {
+            for preset in BvhPreset::ALL {
+                let tree = clustered(&centers, preset).tree;
+                let levels = levels(&tree);
+                assert!(levels < 60, "{preset:?}: {levels} levels");
+                let mut found = tree.references;
+                found.sort_unstable();
+                assert!((0..COUNT).eq(found.into_iter().map(|r| r as usize)));
+            }
+        }
+    }
+
+    #[test]
+    fn boxes_come_back_in_their_own_coordinates() {
+        let line: Vec<Vec3> = (0..COUNT).map(|i| Vec3::X * (100 * i) as f32).collect();
+        let tree = clustered(&line, BvhPreset::Fast).tree;
+        let root = tree.nodes[0].bounds;
+        let near = |a: Vec3, b: Vec3| (a - b).abs().max_element() < 1.0;
+        assert!(near(root.min, Vec3::ZERO), "{root:?}");
+        assert!(near(root.max, line[COUNT - 1]), "{root:?}");
+        for node in tree.nodes.iter().filter(|node| node.is_leaf()) {
+            let center = line[tree.references[node.first as usize] as usize];
+            assert!(near(node.bounds.min, center), "{node:?} {center}");
+        }
+    }
+
+    #[test]
+    fn no_coordinate_is_too_large_or_too_small() {
+        for size in [0.0, 1e-38, 1e-20, 1e20, 3e38] {
+            let scale = Scale::of([0, 1].into_par_iter().map(|side| Aabb {
+                min: Vec3::splat(-size),
+                max: Vec3::splat(size * side as f32),
+            }));
+            assert!(scale.factor * scale.inverse == 1.0, "{size}: {scale:?}");
+            let shifted = scale.shifted(
+                Aabb {
+                    min: Vec3::splat(-size),
+                    max: Vec3::splat(size),
+                },
+                7,
+            );
+            assert!(shifted.min.abs().max(shifted.max.abs()).max_element() < 2.1);
+            assert!(shifted.min.is_finite(), "{shifted:?}");
+        }
+    }
+}

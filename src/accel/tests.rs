@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
+use super::node::Node;
 use super::simd::SimdLevel;
 use super::{
     BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SphereRadius, Spheres, Structure, TreeBuilder,
@@ -346,28 +347,44 @@ fn fused_kernels_of_all_processors_agree_to_the_bit() {
 
 #[test]
 fn trees_do_not_depend_on_threads() {
-    let scene = Scene::common("cloud", random_points(100_000, 2), 0.01);
-    for settings in all_settings() {
-        let build = |threads: usize| {
-            let pool = rayon::ThreadPoolBuilder::new()
-                .num_threads(threads)
-                .build()
-                .expect("threads");
-            pool.install(|| {
-                let mut builder = TreeBuilder::new();
-                let report = builder.build(&scene.spheres(), &settings);
-                (
-                    builder.tree().nodes.clone(),
-                    builder.tree().indices.clone(),
-                    report.sah_cost.to_bits(),
-                )
-            })
-        };
-        let one = build(1);
-        for threads in [2, 3, 8] {
-            assert!(one == build(threads), "{settings:?} {threads} threads");
+    let lattice = (0..40_000)
+        .map(|i| Vec3::new((i % 40) as f32, (i / 40 % 40) as f32, (i / 1600) as f32))
+        .collect();
+    for scene in [
+        Scene::common("cloud", random_points(100_000, 2), 0.01),
+        // Many equal distances and areas.
+        Scene::common("lattice", lattice, 0.5),
+    ] {
+        for settings in all_settings() {
+            let one = tree_by_threads(&scene, &settings, 1);
+            for threads in [2, 3, 8] {
+                let other = tree_by_threads(&scene, &settings, threads);
+                assert!(one == other, "{} {settings:?} {threads}", scene.name);
+            }
         }
     }
+}
+
+/// Nodes, indices and SAH cost.
+fn tree_by_threads(
+    scene: &Scene,
+    settings: &BuildSettings,
+    threads: usize,
+) -> (Vec<Node>, Vec<u32>, u64) {
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .expect("threads");
+    pool.install(|| {
+        let mut builder = TreeBuilder::new();
+        let report = builder.build(&scene.spheres(), settings);
+        let tree = builder.tree();
+        (
+            tree.nodes.clone(),
+            tree.indices.clone(),
+            report.sah_cost.to_bits(),
+        )
+    })
 }
 
 /// Also when the last frame was built by another structure.

@@ -118,15 +118,12 @@ impl Children {
     /// The children of the node that `part` becomes, each of which can do with `levels` more.
     fn of(tree: &TrimmedTree, part: Part, levels: usize) -> Self {
         let most = (WIDTH as u64).saturating_pow(index_u32(levels));
-        match part.openable(tree) {
-            Some((left, _)) => {
-                let opened = Self::opened(tree, left);
-                let fits = |part: &Part| u64::from(part.count(tree)) <= most;
-                if opened.all().iter().all(fits) {
-                    return opened;
-                }
+        if let Some((left, _)) = part.openable(tree) {
+            let opened = Self::opened(tree, left);
+            let fits = |part: &Part| u64::from(part.count(tree)) <= most;
+            if opened.all().iter().all(fits) {
+                return opened;
             }
-            None => {}
         }
         Self::dealt(part.first(tree), part.count(tree))
     }
@@ -159,6 +156,10 @@ impl Children {
     }
 
     /// Deals `count` blocks out evenly, in their order.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "eight parts at most, and no more blocks than count"
+    )]
     fn dealt(first: u32, count: u32) -> Self {
         let parts = count.min(WIDTH as u32);
         let bound = |part: u32| {
