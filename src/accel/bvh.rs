@@ -3,7 +3,22 @@
 //!
 //! By default the leaves are the blocks that lbvh's sort makes: a sixteenth of the particles' number,
 //! and clustering costs that much less. Over the particles themselves blocks follow from the tree.
+//!
+//! What it buys on equal spheres: the thesis's box with 1e6 particles, against lbvh in turns, 2 threads
+//! of an AMD Zen 5 with AVX-512. Times of the last row are those of a busy machine, its ratios of
+//! turns side by side.
+//!
+//! | leaves, preset | build | primary | shadow | reflection | bytes a particle, peak |
+//! |---|---|---|---|---|---|
+//! | lbvh | 0.033 s | 1 | 1 | 1 | 12.6, 14.9 |
+//! | blocks, fast | 0.060 s | 1.04 | 1.09 | 1.09 | 13.6, 27 |
+//! | blocks, medium | 0.060 s | 1.06 | 1.09 | 1.09 | 13.7, 27 |
+//! | blocks, high | 0.080 s | 1.05 | 1.10 | 1.08 | 13.5, 27 |
+//! | particles, medium | 15 to 32 x lbvh | 1.07 to 1.12 | 1.1 to 1.2 | 1.1 to 1.2 | 25.8, 208 |
+//!
+//! So presets make no difference there; nor does more than the first one pay for itself.
 
+use obvhs::ploc::SortPrecision;
 use rayon::prelude::*;
 
 use super::block::Block;
@@ -12,7 +27,6 @@ use super::ploc::{Clustered, Effort, cluster};
 use super::report::PhaseClock;
 use super::wide::WideTree;
 use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure, lbvh};
-use obvhs::ploc::SortPrecision;
 
 /// How much is spent on the tree. Each stands for parameters of `obvhs`, whose presets of about the
 /// same names they follow.

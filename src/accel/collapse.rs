@@ -80,8 +80,8 @@ pub(super) fn collapse(
     let layout = widen(&trimmed, unfilled);
     match content {
         Content::Blocks => {
-            scratch_bytes =
-                scratch_bytes.max(trimmed.bytes() + size_of_val(&tree.blocks[..]) as u64);
+            let copy = size_of_val(&tree.blocks[..]) as u64;
+            scratch_bytes = scratch_bytes.max(trimmed.bytes() + layout.bytes() + copy);
             permute_blocks(tree, &trimmed, &layout);
         }
         Content::Particles(spheres) | Content::Clipped(spheres) => {
@@ -91,7 +91,8 @@ pub(super) fn collapse(
     }
     clock.lap("collapse");
     let boxes = block_boxes(tree, &trimmed.boxes, &layout);
-    scratch_bytes = scratch_bytes.max(trimmed.bytes() + size_of_val(&boxes[..]) as u64);
+    scratch_bytes =
+        scratch_bytes.max(trimmed.bytes() + layout.bytes() + size_of_val(&boxes[..]) as u64);
     drop(trimmed);
     let sah_cost = build_nodes(tree, layout, &boxes);
     clock.lap("nodes");

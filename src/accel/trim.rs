@@ -71,6 +71,9 @@ impl TrimmedTree {
         let costs = costs(binary, trim);
         let areas = Areas::of(binary, trim.padding);
         trimmed.members.reserve_exact(binary.references.len());
+        // Each at most; a growing vector would hold up to three times what it needs.
+        trimmed.nodes.reserve_exact(binary.nodes.len());
+        trimmed.starts.reserve_exact(binary.references.len() + 1);
         trimmed.nodes.push(trimmed.leaf());
         let mut pending = vec![(0_u32, 0_u32)];
         while let Some((index, place)) = pending.pop() {
@@ -91,6 +94,8 @@ impl TrimmedTree {
         }
         trimmed.starts.push(index_u32(trimmed.members.len()));
         trimmed.count_blocks();
+        trimmed.nodes.shrink_to_fit();
+        trimmed.starts.shrink_to_fit();
         trimmed
     }
 

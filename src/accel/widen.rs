@@ -25,6 +25,16 @@ pub(super) struct Layout {
     pub(super) blocks: Vec<u32>,
 }
 
+impl Layout {
+    /// Bytes held.
+    pub(super) fn bytes(&self) -> u64 {
+        (size_of_val(&self.links[..])
+            + size_of_val(&self.child_counts[..])
+            + size_of_val(&self.level_starts[..])
+            + size_of_val(&self.blocks[..])) as u64
+    }
+}
+
 /// What becomes one child of a wide node.
 #[derive(Debug, Clone, Copy)]
 enum Part {
