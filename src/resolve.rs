@@ -141,6 +141,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             preset: manifest.render.bvh_preset,
             leaves: manifest.render.bvh_leaves,
         },
+        sbvh: manifest.render.sbvh,
         exr: ExrOptions {
             compression: compression(manifest),
             frames_per_second: output.fps.map(fps),

@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::wide::WideTree;
-use super::{BuildReport, BvhSettings, Spheres, bvh, lbvh};
+use super::{BuildReport, BvhSettings, SbvhSettings, Spheres, bvh, lbvh, sbvh};
 
 /// How particles are ordered and grouped. The picture is the same with each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -14,17 +14,20 @@ pub enum Structure {
     Lbvh,
     /// By clustering from the leaves up (`bvh.rs`).
     Bvh,
+    /// By the surface area heuristic with spatial splits (`sbvh/`): the slowest build.
+    Sbvh,
 }
 
 impl Structure {
     /// All there are.
-    pub const ALL: [Self; 2] = [Self::Lbvh, Self::Bvh];
+    pub const ALL: [Self; 3] = [Self::Lbvh, Self::Bvh, Self::Sbvh];
 
     /// Its name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Lbvh => "lbvh",
             Self::Bvh => "bvh",
+            Self::Sbvh => "sbvh",
         }
     }
 }
@@ -53,10 +56,12 @@ pub struct BuildSettings {
     /// Who builds.
     pub structure: Structure,
     /// Keep the way back to the particle's index in the frame (4 bytes a particle): needed for
-    /// attributes and ids.
+    /// attributes and ids. Structures that may have a particle twice keep it anyway.
     pub keep_indices: bool,
     /// What [`Structure::Bvh`] is told.
     pub bvh: BvhSettings,
+    /// What [`Structure::Sbvh`] is told.
+    pub sbvh: SbvhSettings,
 }
 
 impl BuildSettings {
@@ -66,6 +71,7 @@ impl BuildSettings {
             structure,
             keep_indices: true,
             bvh: BvhSettings::default(),
+            sbvh: SbvhSettings::DEFAULT,
         }
     }
 }
@@ -110,6 +116,7 @@ impl TreeBuilder {
         let report = match settings.structure {
             Structure::Lbvh => lbvh::build(&mut self.tree, spheres, settings),
             Structure::Bvh => bvh::build(&mut self.tree, spheres, settings),
+            Structure::Sbvh => sbvh::build(&mut self.tree, spheres, settings),
         };
         #[cfg(debug_assertions)]
         if let Err(fault) = self.tree.validate(spheres) {

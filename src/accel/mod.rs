@@ -12,6 +12,7 @@ pub mod block;
 mod builder;
 mod bvh;
 mod collapse;
+mod coverage;
 pub mod curve;
 mod lbvh;
 mod linked;
@@ -19,6 +20,7 @@ mod node;
 mod partition;
 mod ploc;
 mod report;
+mod sbvh;
 pub mod simd;
 mod topology;
 pub mod traverse;
@@ -32,6 +34,7 @@ pub use aabb::Aabb;
 pub use builder::{BuildSettings, Structure, TreeBuilder};
 pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
 pub use report::{BuildReport, Phase};
+pub use sbvh::SbvhSettings;
 
 /// Index of a particle in the frame that was built over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

@@ -53,7 +53,7 @@ impl Node {
     }
 
     /// Lower and upper plane of child `slot` on `axis`, exact.
-    fn interval(&self, slot: usize, axis: usize) -> [f64; 2] {
+    pub(super) fn interval(&self, slot: usize, axis: usize) -> [f64; 2] {
         let step = decode_step(self.exponent[axis]);
         [0, 1].map(|side| plane_at(self.origin[axis], step, self.planes[axis][side][slot]))
     }

@@ -26,6 +26,8 @@ pub struct BuildReport {
     pub phases: Vec<Phase>,
     /// Particles.
     pub particles: u64,
+    /// Places of particles in leaves: one for each, and more where spatial splits have cut some.
+    pub references: u64,
     /// 8-wide nodes.
     pub nodes: u64,
     /// Leaves (blocks).

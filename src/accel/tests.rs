@@ -7,7 +7,8 @@ use proptest::prelude::*;
 use super::node::Node;
 use super::simd::SimdLevel;
 use super::{
-    BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SphereRadius, Spheres, Structure, TreeBuilder,
+    BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SbvhSettings, SphereRadius, Spheres,
+    Structure, TreeBuilder,
 };
 use crate::ray::Ray;
 
@@ -167,6 +168,15 @@ fn every_bvh() -> impl Iterator<Item = BvhSettings> {
         .flat_map(|leaves| BvhPreset::ALL.map(|preset| BvhSettings { preset, leaves }))
 }
 
+/// As usual, with spatial splits wherever they pay at all, and without any.
+fn every_sbvh() -> [SbvhSettings; 3] {
+    let none = SbvhSettings {
+        budget: 0.0,
+        ..SbvhSettings::DEFAULT
+    };
+    [SbvhSettings::DEFAULT, EAGER, none]
+}
+
 /// Every structure in every way that it can be built.
 fn all_settings() -> Vec<BuildSettings> {
     let mut all = Vec::new();
@@ -174,11 +184,18 @@ fn all_settings() -> Vec<BuildSettings> {
         let plain = BuildSettings::new(structure);
         match structure {
             Structure::Bvh => all.extend(every_bvh().map(|bvh| BuildSettings { bvh, ..plain })),
-            _ => all.push(plain),
+            Structure::Sbvh => all.extend(every_sbvh().map(|sbvh| BuildSettings { sbvh, ..plain })),
+            Structure::Lbvh => all.push(plain),
         }
     }
     all
 }
+
+/// Spatial splits wherever they pay at all.
+const EAGER: SbvhSettings = SbvhSettings {
+    alpha: 0.0,
+    budget: 2.0,
+};
 
 /// Returns how many rays were judged: too near to call are left out.
 #[track_caller]
@@ -365,6 +382,23 @@ fn trees_do_not_depend_on_threads() {
     }
 }
 
+/// Spheres are cut by all threads together.
+#[test]
+fn cuts_do_not_depend_on_threads() {
+    let scene = large_among_small(70_000);
+    let settings = BuildSettings {
+        sbvh: EAGER,
+        ..BuildSettings::new(Structure::Sbvh)
+    };
+    let one = tree_by_threads(&scene, &settings, 1);
+    for threads in [2, 8] {
+        assert!(
+            one == tree_by_threads(&scene, &settings, threads),
+            "{threads}"
+        );
+    }
+}
+
 /// Nodes, indices and SAH cost.
 fn tree_by_threads(
     scene: &Scene,
@@ -403,6 +437,43 @@ fn a_builder_forgets_the_last_frame() {
             assert!(builder.tree().nodes == fresh, "{} {settings:?}", scene.name);
         }
     }
+}
+
+/// Large spheres among small ones: what spatial splits are for.
+fn large_among_small(count: usize) -> Scene {
+    let radii = (0..count).map(|i| if i % 7 == 0 { 0.2 } else { 1e-3 });
+    Scene {
+        name: "large among small",
+        centers: random_points(count, 13),
+        radii: radii.collect(),
+    }
+}
+
+#[test]
+fn cut_spheres_are_found_once() {
+    let scene = large_among_small(3000);
+    let settings = every_sbvh().map(|sbvh| BuildSettings {
+        sbvh,
+        ..BuildSettings::new(Structure::Sbvh)
+    });
+    let [usual, eager, none] = settings.map(|settings| {
+        let judged = check(&scene, &settings, 300);
+        assert!(
+            judged >= 120,
+            "{settings:?}: only {judged} of 300 rays judged"
+        );
+        let report = TreeBuilder::new().build(&scene.spheres(), &settings);
+        report.references
+    });
+    assert_eq!(none, 3000, "nothing may be cut without a budget");
+    assert!(
+        usual > 4000 && usual <= 6000,
+        "{usual} with the usual budget"
+    );
+    assert!(
+        eager > usual && eager <= 9000,
+        "{eager} with twice the budget"
+    );
 }
 
 #[test]

@@ -1,5 +1,5 @@
 //! Proof that a tree is sound: every child inside its own parent, every particle in the tree
-//! exactly once. Debug builds run it after each build.
+//! exactly once, or its parts covering it (`coverage.rs`). Debug builds run it after each build.
 
 use super::block::BLOCK_SIZE;
 use super::topology::{Linked, Place, Topology};
@@ -23,7 +23,11 @@ impl WideTree {
         if self.links.is_empty() {
             self.validate_levels()
         } else {
-            self.validate_links()
+            self.validate_links()?;
+            if self.is_clipped {
+                self.validate_coverage(spheres)?;
+            }
+            Ok(())
         }
     }
 
@@ -135,7 +139,8 @@ impl WideTree {
                 Place::Block(block) => self.block_bounds(block),
                 Place::Node(_) => self.validate_below(child, levels - 1, reached)?,
             };
-            if !node.child_holds(slot as usize, &bounds) {
+            // Of clipped spheres, whether parts cover them is seen from above (`coverage.rs`).
+            if !self.is_clipped && !node.child_holds(slot as usize, &bounds) {
                 return Err(format!("node {index}: child {slot} sticks out"));
             }
             own = own.union(bounds);

@@ -44,6 +44,8 @@ pub struct WideTree {
     /// Whether a particle may lie in several slots (a sphere in several leaves, or the last one of
     /// a block repeated to fill it). Only with indices.
     pub(super) has_copies: bool,
+    /// Whether boxes bound parts of spheres, which only together cover them.
+    pub(super) is_clipped: bool,
     /// Index in the frame of the particle in each lane; empty when not kept.
     pub(super) indices: Vec<u32>,
     pub(super) count: usize,
@@ -102,6 +104,21 @@ impl WideTree {
         }
     }
 
+    /// Lanes in use. Where there may be copies, those that fill a block up repeat its last particle,
+    /// and before them no particle is in a block twice.
+    fn reference_count(&self) -> u64 {
+        if !self.has_copies {
+            return self.count as u64;
+        }
+        let used = |block: &[u32]| {
+            let last = block[BLOCK_SIZE - 1];
+            let repeated = block.iter().rev().take_while(|index| **index == last);
+            BLOCK_SIZE + 1 - repeated.count()
+        };
+        let blocks = self.indices.par_chunks_exact(BLOCK_SIZE);
+        blocks.map(|block| used(block) as u64).sum()
+    }
+
     /// Index in the frame of the particle in `slot` (tree order), or the slot itself when the way
     /// back was not kept.
     pub fn particle(&self, slot: u32) -> u32 {
@@ -122,6 +139,7 @@ impl WideTree {
         self.radius = radius.unwrap_or(0.0);
         self.padding = self.radius;
         self.has_copies = false;
+        self.is_clipped = false;
         self.links.clear();
         self.blocks.resize(blocks, bytemuck::Zeroable::zeroed());
         self.radii.clear();
@@ -233,6 +251,7 @@ impl WideTree {
             total: phases.iter().map(|p| p.time).sum(),
             phases,
             particles: self.count as u64,
+            references: self.reference_count(),
             nodes: self.nodes.len() as u64,
             leaves: self.blocks.len() as u64,
             depth: super::partition::index_u32(self.level_starts.len()),

@@ -4,7 +4,7 @@ use super::color::{Background, ColorSetting, rgb};
 use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml};
-use crate::accel::{BvhLeaves, BvhPreset, Structure};
+use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::scene::{self, ground};
 
@@ -63,6 +63,8 @@ pub struct Render {
     pub bvh_preset: BvhPreset,
     /// What `bvh` builds its tree over.
     pub bvh_leaves: BvhLeaves,
+    /// What `sbvh` is told.
+    pub sbvh: SbvhSettings,
     /// Reflections and refractions in a row.
     pub max_depth: u32,
     /// What rays see that meet nothing.
@@ -112,6 +114,7 @@ impl Default for Render {
             accelerator: Accelerator::Auto,
             bvh_preset: BvhPreset::default(),
             bvh_leaves: BvhLeaves::default(),
+            sbvh: SbvhSettings::DEFAULT,
             max_depth: 3,
             background: Background::Auto,
             ground: false,
@@ -176,6 +179,18 @@ impl Render {
             bvh_leaves: section.value("bvh_leaves", default.bvh_leaves, |f| {
                 f.choice(&BvhLeaves::ALL.map(|leaves| (leaves, leaves.name())))
             }),
+            sbvh: SbvhSettings {
+                alpha: section.value("sbvh_alpha", default.sbvh.alpha, |f| {
+                    f.number32("a number from 0 to 1", |v| {
+                        SbvhSettings::ALPHAS.contains(&v)
+                    })
+                }),
+                budget: section.value("sbvh_budget", default.sbvh.budget, |f| {
+                    f.number32("a number from 0 (no spatial splits) to 8", |v| {
+                        SbvhSettings::BUDGETS.contains(&v)
+                    })
+                }),
+            },
             max_depth: section.value("max_depth", default.max_depth, |f| f.count(1, MAX_DEPTH)),
             background: section.value("background", default.background, Background::read),
             ground: section.value("ground", default.ground, Field::bool),
@@ -197,7 +212,7 @@ impl Render {
         out.put(
             "accelerator",
             &self.accelerator,
-            "auto | lbvh | bvh; the picture is the same",
+            "auto | lbvh | bvh | sbvh; the picture is the same",
         );
         out.depends_on(None);
         out.put(
@@ -210,6 +225,18 @@ impl Render {
             "bvh_leaves",
             &self.bvh_leaves,
             "what bvh builds over: blocks, or particles (200 bytes each while building)",
+        );
+        out.depends_on(None);
+        out.put(
+            "sbvh_alpha",
+            &self.sbvh.alpha,
+            "sbvh tries to cut spheres where boxes overlap by more than this part of the scene's area",
+        );
+        out.depends_on(None);
+        out.put(
+            "sbvh_budget",
+            &self.sbvh.budget,
+            "parts of cut spheres that sbvh may add, per particle; 0 cuts none",
         );
         out.depends_on(None);
         out.put(

@@ -165,7 +165,7 @@ fn wrong_types_say_what_is_wanted() {
     );
     refused(
         "[render]\naccelerator = \"kdtree\"",
-        &["kdtree is not in this version; auto, lbvh, bvh are"],
+        &["kdtree is not in this version; auto, lbvh, bvh, sbvh are"],
     );
     refused("[render]\naccelerator = \"lbhv\"", &["did you mean lbvh?"]);
     refused(
@@ -176,6 +176,23 @@ fn wrong_types_say_what_is_wanted() {
         "[render]\nbvh_leaves = 16",
         &["render.bvh_leaves: wants one of blocks, particles"],
     );
+    for wrong in ["-0.5", "nan", "8.01", "1e39", "inf", "\"much\"", "[1]"] {
+        refused(
+            &format!("[render]\nsbvh_budget = {wrong}"),
+            &["render.sbvh_budget: wants a number from 0 (no spatial splits) to 8, not"],
+        );
+    }
+    for wrong in ["-1e-5", "1.5", "nan"] {
+        refused(
+            &format!("[render]\nsbvh_alpha = {wrong}"),
+            &["render.sbvh_alpha: wants a number from 0 to 1, not"],
+        );
+    }
+    for right in ["0", "0.5", "8"] {
+        let set = format!("render.sbvh_budget={right}");
+        let budget = with_sets(&[&set]).unwrap().render.sbvh.budget;
+        assert_eq!(budget, right.parse::<f32>().unwrap());
+    }
     refused(
         "[render]\nground_height = inf",
         &["render.ground_height", "height or"],
@@ -361,6 +378,9 @@ fn settings_are_what_images_depend_on() {
         "render.accelerator=lbvh",
         "render.bvh_preset=high",
         "render.bvh_leaves=particles",
+        "render.accelerator=sbvh",
+        "render.sbvh_alpha=0.001",
+        "render.sbvh_budget=0",
         "output.path=elsewhere/frame.####.exr",
     ];
     for set in same {

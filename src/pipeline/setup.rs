@@ -2,7 +2,7 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::accel::{BvhSettings, Structure};
+use crate::accel::{BvhSettings, SbvhSettings, Structure};
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
 use crate::scene::{ColorMap, Scene};
@@ -59,6 +59,8 @@ pub struct Setup {
     pub accelerator: Option<Structure>,
     /// What `bvh` is told.
     pub bvh: BvhSettings,
+    /// What `sbvh` is told.
+    pub sbvh: SbvhSettings,
     /// How the EXR is written.
     pub exr: ExrOptions,
     /// How the PNG is made.

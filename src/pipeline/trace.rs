@@ -67,6 +67,7 @@ impl FrameTracer {
         let settings = BuildSettings {
             keep_indices: channels.id || channels.velocity || !frame.values.is_empty(),
             bvh: setup.bvh,
+            sbvh: setup.sbvh,
             ..BuildSettings::new(setup.accelerator.unwrap_or_default())
         };
         let spheres = Spheres {
