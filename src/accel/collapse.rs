@@ -22,10 +22,6 @@ pub(super) enum Content<'a> {
     Particles(Spheres<'a>),
     /// Particles of the frame, each perhaps in several leaves: the leaves' boxes, which bound
     /// spheres, tell which part of them counts.
-    #[cfg_attr(
-        not(test),
-        expect(dead_code, reason = "for builders with spatial splits")
-    )]
     Clipped(Spheres<'a>),
     /// Blocks that are in the wide tree already, as arrays, all but the last of them full. Boxes
     /// are made anew from them.

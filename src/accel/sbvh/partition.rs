@@ -113,7 +113,7 @@ mod tests {
             // Whole runs on the wrong side, and mixed ones.
             let is_first = |r: &Reference| {
                 let i = r.particle as usize;
-                i % modulus == 0 || i > 4 * CHUNK
+                i.is_multiple_of(modulus) || i > 4 * CHUNK
             };
             let wanted = references.iter().filter(|r| is_first(r)).count();
             assert_eq!(partition(&mut references, is_first), wanted);

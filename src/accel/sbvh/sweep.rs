@@ -60,9 +60,9 @@ fn sweep(references: &[Reference], axis: usize, best: &mut Option<Split>) {
         above[at] = upper;
     }
     let mut below = Bounds::EMPTY;
-    for at in 1..count {
+    for (at, upper) in above.iter().enumerate().take(count).skip(1) {
         below = below.union(bounds(at - 1));
-        let (boxes, counts) = ([below, above[at]], [at, count - at]);
+        let (boxes, counts) = ([below, *upper], [at, count - at]);
         let cost = cost::of_pair(boxes, counts);
         if best.is_none_or(|best| cost < best.cost) {
             *best = Some(Split {
