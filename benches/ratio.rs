@@ -1,4 +1,4 @@
-//! Ours against obvhs on the thesis's scene: one table.
+//! Each of our structures against obvhs on the thesis's scene: one table.
 //!
 //! The two take turns, so that whatever else the machine does hits both; a ratio of the same turn
 //! is worth more than either rate. Ratios say how many times better ours is, in every row.
@@ -10,13 +10,13 @@ use std::hint::black_box;
 use std::process::Command;
 use std::time::Instant;
 
-use spherule::accel::TreeBuilder;
+use spherule::accel::{Structure, TreeBuilder};
 
 mod support;
 
 use support::obvhs::ObvhsBuilder;
 use support::rays::{trace_primary, trace_reflection, trace_shadow};
-use support::{Case, build_lbvh, is_quick_run, particle_counts};
+use support::{Case, build_ours, is_quick_run, particle_counts, structures};
 
 /// Turns per row; an odd number has a median.
 const ROUNDS: usize = 5;
@@ -29,12 +29,18 @@ fn main() {
     }
     let quick = is_quick_run();
     let rounds = if quick { 1 } else { ROUNDS };
-    for (place, particles) in particle_counts(quick).into_iter().enumerate() {
+    print_machine(rounds);
+    for particles in particle_counts(quick) {
         let case = Case::new(particles);
-        if place == 0 {
-            print_machine(&case, rounds);
+        for structure in structures() {
+            let table = Table {
+                case: &case,
+                structure,
+                rounds,
+            };
+            table.print_builds();
+            table.print_rays();
         }
-        print_rows(&case, rounds);
     }
 }
 
@@ -48,19 +54,19 @@ fn is_asked_for() -> bool {
     !listing && (names.peek().is_none() || names.any(|name| NAME.contains(&name)))
 }
 
-fn print_machine(case: &Case, rounds: usize) {
+fn print_machine(rounds: usize) {
     println!("thesis's box, 1920x1080, one ray a pixel; turns of each: {rounds}; best (median)");
     println!(
         "{}, {} threads, {}, {}",
         cpu_name(),
         rayon::current_num_threads(),
-        case.lbvh.tree().simd().name(),
+        TreeBuilder::new().tree().simd().name(),
         compiler_version(),
     );
-    println!("ratio: obvhs / lbvh in time or bytes, of the best (median of the turns' ratios)");
+    println!("ratio: obvhs / ours in time or bytes, of the best (median of the turns' ratios)");
     println!(
-        "{:>9}  {:<21} {:>15} {:>15} {:>14}",
-        "particles", "", "lbvh", "obvhs", "ratio"
+        "{:>9}  {:<7} {:<21} {:>15} {:>15} {:>14}",
+        "particles", "", "", "ours", "obvhs", "ratio"
     );
 }
 
@@ -84,76 +90,84 @@ fn compiler_version() -> String {
         .map_or_else(|| "unknown rustc".to_owned(), |text| text.trim().to_owned())
 }
 
-fn print_rows(case: &Case, rounds: usize) {
-    print_builds(case, rounds);
-    print_rays(case, rounds);
+/// The rows of one structure.
+struct Table<'a> {
+    case: &'a Case,
+    structure: Structure,
+    rounds: usize,
 }
 
-fn print_builds(case: &Case, rounds: usize) {
-    let scene = &case.scene;
-    let turns = Turns::take(
-        rounds,
-        || build_lbvh(&mut TreeBuilder::new(), scene).nodes,
-        || ObvhsBuilder::new().build(&case.spheres),
-    );
-    print_row(case, "build, new memory, s", Unit::Seconds, &turns);
+impl Table<'_> {
+    fn print_builds(&self) {
+        let (scene, spheres) = (&self.case.scene, &self.case.spheres);
+        let build = |builder: &mut TreeBuilder| build_ours(self.structure, builder, scene);
+        let turns = Turns::take(
+            self.rounds,
+            || build(&mut TreeBuilder::new()).nodes,
+            || ObvhsBuilder::new().build(spheres),
+        );
+        self.print_row("build, new memory, s", &turns.text(Unit::Seconds));
 
-    let (mut ours, mut theirs) = (TreeBuilder::new(), ObvhsBuilder::new());
-    let report = build_lbvh(&mut ours, scene);
-    let node_bytes = theirs.build(&case.spheres);
-    let turns = Turns::take(
-        rounds,
-        || build_lbvh(&mut ours, scene).nodes,
-        || theirs.build(&case.spheres),
-    );
-    print_row(case, "build, kept memory, s", Unit::Seconds, &turns);
+        let (mut ours, mut theirs) = (TreeBuilder::new(), ObvhsBuilder::new());
+        let report = build(&mut ours);
+        let node_bytes = theirs.build(spheres);
+        let turns = Turns::take(
+            self.rounds,
+            || build(&mut ours).nodes,
+            || theirs.build(spheres),
+        );
+        self.print_row("build, kept memory, s", &turns.text(Unit::Seconds));
 
-    // Positions and structure; neither keeps the way back to the particles' order.
-    let our_bytes = report.position_bytes + report.structure_bytes;
-    let their_bytes = size_of_val(&scene.centers[..]) + node_bytes;
-    print_bytes(scene.centers.len(), our_bytes, their_bytes as u64);
-}
+        // Positions and structure; neither keeps the way back to the particles' order.
+        let our_bytes = report.position_bytes + report.structure_bytes;
+        let their_bytes = (size_of_val(&scene.centers[..]) + node_bytes) as u64;
+        self.print_bytes("bytes a particle", our_bytes, Some(their_bytes));
+        self.print_bytes("  while building", report.peak_bytes, None);
+    }
 
-fn print_rays(case: &Case, rounds: usize) {
-    let (tree, obvhs) = (case.lbvh.tree(), &case.obvhs);
-    let (scene, points) = (&case.scene, &case.points);
-    let (mut records, mut others) = (Vec::new(), Vec::new());
-    let turns = Turns::take(
-        rounds,
-        || trace_primary(tree, scene, &mut records),
-        || trace_primary(obvhs, scene, &mut others),
-    );
-    let unit = Unit::MillionsOf(scene.pixels.len());
-    print_row(case, "primary, Mrays/s", unit, &turns);
+    fn print_rays(&self) {
+        let case = self.case;
+        let builder = case.tree(self.structure);
+        let (tree, obvhs) = (builder.tree(), &case.obvhs);
+        let (scene, points) = (&case.scene, &case.points);
+        let (mut records, mut others) = (Vec::new(), Vec::new());
+        let turns = Turns::take(
+            self.rounds,
+            || trace_primary(tree, scene, &mut records),
+            || trace_primary(obvhs, scene, &mut others),
+        );
+        let unit = Unit::MillionsOf(scene.pixels.len());
+        self.print_row("primary, Mrays/s", &turns.text(unit));
 
-    let unit = Unit::MillionsOf(points.len());
-    let turns = Turns::take(
-        rounds,
-        || trace_shadow(tree, points),
-        || trace_shadow(obvhs, points),
-    );
-    print_row(case, "shadow, Mrays/s", unit, &turns);
-    let turns = Turns::take(
-        rounds,
-        || trace_reflection(tree, points),
-        || trace_reflection(obvhs, points),
-    );
-    print_row(case, "reflection, Mrays/s", unit, &turns);
-}
+        let unit = Unit::MillionsOf(points.len());
+        let turns = Turns::take(
+            self.rounds,
+            || trace_shadow(tree, points),
+            || trace_shadow(obvhs, points),
+        );
+        self.print_row("shadow, Mrays/s", &turns.text(unit));
+        let turns = Turns::take(
+            self.rounds,
+            || trace_reflection(tree, points),
+            || trace_reflection(obvhs, points),
+        );
+        self.print_row("reflection, Mrays/s", &turns.text(unit));
+    }
 
-fn print_row(case: &Case, what: &str, unit: Unit, turns: &Turns) {
-    let particles = case.scene.centers.len();
-    println!("{particles:>9}  {what:<21} {}", turns.text(unit));
-}
+    fn print_row(&self, what: &str, figures: &str) {
+        let (particles, name) = (self.case.scene.centers.len(), self.structure.name());
+        println!("{particles:>9}  {name:<7} {what:<21} {figures}");
+    }
 
-fn print_bytes(particles: usize, ours: u64, theirs: u64) {
-    #[expect(clippy::cast_precision_loss, reason = "a figure for people")]
-    let [ours, theirs] = [ours, theirs].map(|bytes| bytes as f64 / particles as f64);
-    println!(
-        "{particles:>9}  {:<21} {ours:>15.2} {theirs:>15.2} {:>7.2}",
-        "bytes a particle",
-        theirs / ours
-    );
+    fn print_bytes(&self, what: &str, ours: u64, theirs: Option<u64>) {
+        #[expect(clippy::cast_precision_loss, reason = "a figure for people")]
+        let each = |bytes: u64| bytes as f64 / self.case.scene.centers.len() as f64;
+        let ours = each(ours);
+        let compared = theirs.map_or_else(String::new, |theirs| {
+            format!("{:>15.2} {:>7.2}", each(theirs), each(theirs) / ours)
+        });
+        self.print_row(what, format!("{ours:>15.2} {compared}").trim_end());
+    }
 }
 
 /// What a row's figures are.

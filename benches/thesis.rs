@@ -8,19 +8,30 @@ use std::time::Duration;
 
 use criterion::measurement::WallTime;
 use criterion::{BenchmarkGroup, BenchmarkId, Criterion, SamplingMode, Throughput};
-use spherule::accel::TreeBuilder;
+use spherule::accel::{Structure, TreeBuilder};
 
 mod support;
 
 use support::obvhs::ObvhsBuilder;
 use support::rays::{trace_primary, trace_reflection, trace_shadow};
-use support::{Case, build_lbvh, is_quick_run, particle_counts};
+use support::{Case, build_ours, is_quick_run, particle_counts, structures};
+
+/// A particle count with all trees, ready to trace.
+struct Built {
+    case: Case,
+    ours: Vec<(Structure, TreeBuilder)>,
+}
 
 fn main() {
     let mut criterion = Criterion::default().configure_from_args();
-    let cases: Vec<Case> = particle_counts(is_quick_run())
+    let cases: Vec<Built> = particle_counts(is_quick_run())
         .into_iter()
-        .map(Case::new)
+        .map(|particles| {
+            let case = Case::new(particles);
+            let build = |structure| (structure, case.tree(structure));
+            let ours = structures().into_iter().map(build).collect();
+            Built { case, ours }
+        })
         .collect();
     build(&mut criterion, &cases);
     primary(&mut criterion, &cases);
@@ -41,15 +52,17 @@ fn group<'a>(criterion: &'a mut Criterion, name: &str) -> BenchmarkGroup<'a, Wal
 }
 
 /// Trees in the memory of the tree before, as in a sequence of frames.
-fn build(criterion: &mut Criterion, cases: &[Case]) {
+fn build(criterion: &mut Criterion, cases: &[Built]) {
     let mut group = group(criterion, "build");
-    for case in cases {
+    for Built { case, ours } in cases {
         let particles = case.scene.centers.len();
         group.throughput(Throughput::Elements(particles as u64));
-        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
-            let mut builder = TreeBuilder::new();
-            bencher.iter(|| black_box(build_lbvh(&mut builder, &case.scene).nodes));
-        });
+        for (structure, _) in ours {
+            group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
+                let mut builder = TreeBuilder::new();
+                bencher.iter(|| black_box(build_ours(*structure, &mut builder, &case.scene).nodes));
+            });
+        }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
             let mut builder = ObvhsBuilder::new();
             bencher.iter(|| black_box(builder.build(&case.spheres)));
@@ -58,16 +71,18 @@ fn build(criterion: &mut Criterion, cases: &[Case]) {
     group.finish();
 }
 
-fn primary(criterion: &mut Criterion, cases: &[Case]) {
+fn primary(criterion: &mut Criterion, cases: &[Built]) {
     let mut group = group(criterion, "primary");
-    for case in cases {
+    for Built { case, ours } in cases {
         let particles = case.scene.centers.len();
         let scene = &case.scene;
         let mut records = Vec::new();
         group.throughput(Throughput::Elements(scene.pixels.len() as u64));
-        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
-            bencher.iter(|| trace_primary(case.lbvh.tree(), scene, &mut records));
-        });
+        for (structure, builder) in ours {
+            group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
+                bencher.iter(|| trace_primary(builder.tree(), scene, &mut records));
+            });
+        }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
             bencher.iter(|| trace_primary(&case.obvhs, scene, &mut records));
         });
@@ -75,15 +90,17 @@ fn primary(criterion: &mut Criterion, cases: &[Case]) {
     group.finish();
 }
 
-fn shadow(criterion: &mut Criterion, cases: &[Case]) {
+fn shadow(criterion: &mut Criterion, cases: &[Built]) {
     let mut group = group(criterion, "shadow");
-    for case in cases {
+    for Built { case, ours } in cases {
         let particles = case.scene.centers.len();
         let points = &case.points;
         group.throughput(Throughput::Elements(points.len() as u64));
-        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
-            bencher.iter(|| trace_shadow(case.lbvh.tree(), points));
-        });
+        for (structure, builder) in ours {
+            group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
+                bencher.iter(|| trace_shadow(builder.tree(), points));
+            });
+        }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
             bencher.iter(|| trace_shadow(&case.obvhs, points));
         });
@@ -91,15 +108,17 @@ fn shadow(criterion: &mut Criterion, cases: &[Case]) {
     group.finish();
 }
 
-fn reflection(criterion: &mut Criterion, cases: &[Case]) {
+fn reflection(criterion: &mut Criterion, cases: &[Built]) {
     let mut group = group(criterion, "reflection");
-    for case in cases {
+    for Built { case, ours } in cases {
         let particles = case.scene.centers.len();
         let points = &case.points;
         group.throughput(Throughput::Elements(points.len() as u64));
-        group.bench_function(BenchmarkId::new("lbvh", particles), |bencher| {
-            bencher.iter(|| trace_reflection(case.lbvh.tree(), points));
-        });
+        for (structure, builder) in ours {
+            group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
+                bencher.iter(|| trace_reflection(builder.tree(), points));
+            });
+        }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
             bencher.iter(|| trace_reflection(&case.obvhs, points));
         });

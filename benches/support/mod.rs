@@ -2,8 +2,7 @@
 
 use std::env;
 
-use spherule::accel::TreeBuilder;
-use spherule::accel::{BuildReport, BuildSettings, SphereRadius, Spheres};
+use spherule::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 
 pub(crate) mod obvhs;
 pub(crate) mod rays;
@@ -15,6 +14,8 @@ use scene::Scene;
 
 /// Particle counts: a comma-separated list such as `1e5,300000`.
 const PARTICLES_VARIABLE: &str = "SPHERULE_BENCH_PARTICLES";
+/// Structures: a comma-separated list such as `lbvh,kdtree`.
+const STRUCTURES_VARIABLE: &str = "SPHERULE_BENCH_STRUCTURES";
 /// The thesis's three, with the primary rays that hit for seed 1. Every exact method finds these.
 const KNOWN_HITS: [(usize, usize); 3] = [
     (100_000, 614_870),
@@ -26,68 +27,83 @@ const GRAZING: f64 = 2e-5;
 /// Part of a radius by which two distances may differ.
 const SAME_DISTANCE: f32 = 0.01;
 
-/// One particle count with both programs ready to trace.
+/// One particle count with what all structures are compared on.
 pub(crate) struct Case {
     /// Particles and primary rays.
     pub(crate) scene: Scene,
     /// The particles as obvhs takes them.
     pub(crate) spheres: Vec<obvhs::Sphere>,
-    /// Ours, built.
-    pub(crate) lbvh: TreeBuilder,
-    /// Theirs, built.
+    /// The other program's tree.
     pub(crate) obvhs: Obvhs,
     /// Where secondary rays start.
     pub(crate) points: Vec<SurfacePoint>,
+    /// What obvhs finds by primary rays, and how many shadow and reflection rays it counts.
+    records: Vec<HitRecord>,
+    secondary: [usize; 2],
 }
 
 impl Case {
-    /// Builds both trees.
+    /// Builds the tree to compare with.
     ///
     /// # Panics
-    /// If they do not find the same, or not what is known: rates would mean nothing.
+    /// If it does not find what is known: rates would mean nothing.
     pub(crate) fn new(particles: usize) -> Self {
         let scene = Scene::thesis(particles);
         let spheres = obvhs::spheres(&scene);
-        let mut lbvh = TreeBuilder::new();
-        build_lbvh(&mut lbvh, &scene);
         let mut builder = ObvhsBuilder::new();
         builder.build(&spheres);
         let obvhs = Obvhs::new(&scene, builder);
-
-        let (mut records, mut others) = (Vec::new(), Vec::new());
-        check_primary("lbvh", &scene, lbvh.tree(), &mut records);
-        check_primary("obvhs", &scene, &obvhs, &mut others);
-        let same = |(a, b): &(&HitRecord, &HitRecord)| {
-            a.distance() == b.distance()
-                || (a.distance() - b.distance()).abs() <= SAME_DISTANCE * scene.radius
-        };
-        let agreeing = records.iter().zip(&others).filter(same).count();
-        check_agreement("primary", [agreeing, records.len()], records.len());
-
-        let points = rays::surface_points(lbvh.tree(), &scene, &records);
-        let (tree, rays) = (lbvh.tree(), points.len());
-        let lit = [
-            rays::trace_shadow(tree, &points),
-            rays::trace_shadow(&obvhs, &points),
-        ];
-        check_agreement("shadow", lit, rays);
-        let hits = [
-            rays::trace_reflection(tree, &points),
-            rays::trace_reflection(&obvhs, &points),
-        ];
-        check_agreement("reflection", hits, rays);
+        let mut records = Vec::new();
+        check_primary("obvhs", &scene, &obvhs, &mut records);
+        let points = rays::surface_points(&obvhs, &scene, &records);
+        let secondary = count_secondary(&obvhs, &points);
         Self {
             scene,
             spheres,
-            lbvh,
             obvhs,
             points,
+            records,
+            secondary,
         }
+    }
+
+    /// Builds our tree by `structure`.
+    ///
+    /// # Panics
+    /// If it does not find what obvhs finds.
+    pub(crate) fn tree(&self, structure: Structure) -> TreeBuilder {
+        let mut builder = TreeBuilder::new();
+        build_ours(structure, &mut builder, &self.scene);
+        let tree = builder.tree();
+        let mut records = Vec::new();
+        check_primary(structure.name(), &self.scene, tree, &mut records);
+        let same = |(a, b): &(&HitRecord, &HitRecord)| {
+            a.distance() == b.distance()
+                || (a.distance() - b.distance()).abs() <= SAME_DISTANCE * self.scene.radius
+        };
+        let agreeing = records.iter().zip(&self.records).filter(same).count();
+        check_agreement("primary", [agreeing, records.len()], records.len());
+        let [lit, hits] = count_secondary(tree, &self.points);
+        check_agreement("shadow", [lit, self.secondary[0]], self.points.len());
+        check_agreement("reflection", [hits, self.secondary[1]], self.points.len());
+        builder
     }
 }
 
+/// Lit points and reflections that hit.
+fn count_secondary<T: Tracer>(tracer: &T, points: &[SurfacePoint]) -> [usize; 2] {
+    [
+        rays::trace_shadow(tracer, points),
+        rays::trace_reflection(tracer, points),
+    ]
+}
+
 /// Builds our tree in the memory of `builder`; indices are not kept, as nothing here needs them.
-pub(crate) fn build_lbvh(builder: &mut TreeBuilder, scene: &Scene) -> BuildReport {
+pub(crate) fn build_ours(
+    structure: Structure,
+    builder: &mut TreeBuilder,
+    scene: &Scene,
+) -> BuildReport {
     let spheres = Spheres {
         centers: &scene.centers,
         radius: SphereRadius::Common(scene.radius),
@@ -96,9 +112,21 @@ pub(crate) fn build_lbvh(builder: &mut TreeBuilder, scene: &Scene) -> BuildRepor
         &spheres,
         &BuildSettings {
             keep_indices: false,
-            ..BuildSettings::default()
+            ..BuildSettings::new(structure)
         },
     )
+}
+
+/// Structures to measure: from the environment, else all.
+pub(crate) fn structures() -> Vec<Structure> {
+    let Ok(list) = env::var(STRUCTURES_VARIABLE) else {
+        return Structure::ALL.to_vec();
+    };
+    let parse = |name: &str| match name.trim().parse() {
+        Ok(structure) => structure,
+        Err(fault) => panic!("{STRUCTURES_VARIABLE}: {fault}"),
+    };
+    list.split(',').map(parse).collect()
 }
 
 /// Particle counts to measure: from the environment, else one small or the thesis's three.

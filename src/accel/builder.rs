@@ -4,7 +4,7 @@ use std::fmt;
 use std::str::FromStr;
 
 use super::wide::WideTree;
-use super::{BuildReport, BvhSettings, SbvhSettings, Spheres, bvh, lbvh, sbvh};
+use super::{BuildReport, BvhSettings, SbvhSettings, Spheres, bvh, kdtree, lbvh, sbvh};
 
 /// How particles are ordered and grouped. The picture is the same with each.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
@@ -12,6 +12,8 @@ pub enum Structure {
     /// Along a space-filling curve (`lbvh.rs`): the fastest build.
     #[default]
     Lbvh,
+    /// By medians of the widest axis (`kdtree/`): the fastest to trace.
+    Kdtree,
     /// By clustering from the leaves up (`bvh.rs`).
     Bvh,
     /// By the surface area heuristic with spatial splits (`sbvh/`): the slowest build.
@@ -20,12 +22,13 @@ pub enum Structure {
 
 impl Structure {
     /// All there are.
-    pub const ALL: [Self; 3] = [Self::Lbvh, Self::Bvh, Self::Sbvh];
+    pub const ALL: [Self; 4] = [Self::Lbvh, Self::Kdtree, Self::Bvh, Self::Sbvh];
 
     /// Its name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Lbvh => "lbvh",
+            Self::Kdtree => "kdtree",
             Self::Bvh => "bvh",
             Self::Sbvh => "sbvh",
         }
@@ -115,6 +118,7 @@ impl TreeBuilder {
         );
         let report = match settings.structure {
             Structure::Lbvh => lbvh::build(&mut self.tree, spheres, settings),
+            Structure::Kdtree => kdtree::build(&mut self.tree, spheres, settings),
             Structure::Bvh => bvh::build(&mut self.tree, spheres, settings),
             Structure::Sbvh => sbvh::build(&mut self.tree, spheres, settings),
         };

@@ -126,7 +126,7 @@ fn build_over_blocks(
     settings: &BuildSettings,
 ) -> BuildReport {
     let mut clock = PhaseClock::new();
-    let sorted = lbvh::sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
+    let sort_bytes = lbvh::sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
     tree.blocks
         .par_iter_mut()
         .with_min_len(256)
@@ -144,7 +144,7 @@ fn build_over_blocks(
         settings.bvh.preset,
         &mut clock,
     );
-    let held = clustered.peak_bytes.max(sorted.scratch_bytes);
+    let held = clustered.peak_bytes.max(sort_bytes);
     let Collapsed {
         sah_cost,
         scratch_bytes,

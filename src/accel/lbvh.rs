@@ -8,11 +8,10 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::block::{BLOCK_SIZE, BlockRadii};
 use super::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
 use super::partition::{Cells, scatter};
 use super::report::PhaseClock;
-use super::wide::WideTree;
+use super::wide::{UpperLevels, WideTree};
 use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
 
 /// Curve levels that the sort inside a cell looks at; finer differences keep the input's order.
@@ -31,8 +30,8 @@ pub(super) fn build(
     settings: &BuildSettings,
 ) -> BuildReport {
     let mut clock = PhaseClock::new();
-    let sorted = sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
-    let sah_cost = tree.finish(sorted.bounds);
+    let scratch_bytes = sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
+    let sah_cost = tree.finish(UpperLevels::Mapped);
     if !settings.keep_indices {
         tree.drop_indices();
     }
@@ -41,28 +40,20 @@ pub(super) fn build(
         Structure::Lbvh,
         "hilbert, k-d above 1024 particles",
         sah_cost,
-        sorted.scratch_bytes,
+        scratch_bytes,
         clock.finish(),
     )
 }
 
-/// What the sort found and needed.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Sorted {
-    /// Box of the centres.
-    pub(super) bounds: Aabb,
-    /// Most bytes held beside the tree.
-    pub(super) scratch_bytes: u64,
-}
-
 /// Brings the particles along the curve into the blocks of `tree`, as points yet. Indices are there
-/// afterwards if they are to be kept or radii follow by them. Laps `bounds`, `scatter` and `sort`.
+/// afterwards if they are to be kept or radii follow by them. Returns the most bytes held beside the
+/// tree. Laps `bounds`, `scatter` and `sort`.
 pub(super) fn sort_into_blocks(
     tree: &mut WideTree,
     spheres: &Spheres,
     keep_indices: bool,
     clock: &mut PhaseClock,
-) -> Sorted {
+) -> u64 {
     let centers = spheres.centers;
     let common = match spheres.radius {
         SphereRadius::Common(radius) => Some(radius),
@@ -79,20 +70,18 @@ pub(super) fn sort_into_blocks(
 
     let (points, indices) = tree.points_mut();
     let top = TopCells::new(grid, Cells::levels_for(centers.len()));
-    let cells = scatter(centers, &top, points, indices);
+    let cell_of = |_, center| top.cell_of(center);
+    let cells = scatter(centers, top.len(), cell_of, points, indices);
     clock.lap("scatter");
 
     let scratch_bytes = sort_scratch_bytes(&cells, indexed);
     sort_cells(&grid, top.levels(), &cells, points, indices);
-    pad_last_block(points, indices, centers.len());
+    tree.pad_last_block();
     if let SphereRadius::Each(radii) = spheres.radius {
         tree.gather_radii(radii);
     }
     clock.lap("sort");
-    Sorted {
-        bounds,
-        scratch_bytes,
-    }
+    scratch_bytes
 }
 
 fn bounds_of(centers: &[Vec3]) -> Aabb {
@@ -130,17 +119,8 @@ fn sort_cells(
     points: &mut [Vec3],
     indices: &mut [u32],
 ) {
-    let mut tasks = Vec::with_capacity(cells.starts.len());
-    let (mut points, mut indices) = (points, indices);
-    for pair in cells.starts.windows(2) {
-        let len = pair[1] - pair[0];
-        let (cell_points, rest) = points.split_at_mut(len);
-        points = rest;
-        let (cell_indices, rest) = indices.split_at_mut(len.min(indices.len()));
-        indices = rest;
-        tasks.push((cell_points, cell_indices));
-    }
-    tasks
+    cells
+        .slices_of(points, indices)
         .into_par_iter()
         .for_each_init(CellScratch::default, |scratch, (points, indices)| {
             if points.len() > LARGE_CELL {
@@ -273,17 +253,4 @@ fn sort_large_cell(grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &
     }
 }
 
-/// Unused lanes repeat the last particle, so that they never add a hit.
-fn pad_last_block(points: &mut [Vec3], indices: &mut [u32], count: usize) {
-    if let Some(last) = count.checked_sub(1) {
-        let point = points[last];
-        points[count..].fill(point);
-        if !indices.is_empty() {
-            let index = indices[last];
-            indices[count..].fill(index);
-        }
-    }
-}
-
 const _: () = assert!(LARGE_CELL <= 1 << CELL_INDEX_BITS);
-const _: () = assert!(size_of::<BlockRadii>() == BLOCK_SIZE * 4);

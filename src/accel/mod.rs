@@ -14,6 +14,7 @@ mod bvh;
 mod collapse;
 mod coverage;
 pub mod curve;
+mod kdtree;
 mod lbvh;
 mod linked;
 mod node;

@@ -1,9 +1,8 @@
-//! First half of the curve sort: a parallel, stable scatter of the particles into the cells of the
-//! top levels of the curve (one pass of a most-significant-digit radix sort).
+//! First half of every sort: a parallel, stable scatter of the particles into cells (one pass of a
+//! most-significant-digit radix sort).
 //!
-//! The keys are the positions themselves: they are computed where they are needed and never stored,
-//! so the only large memory is the destination. Stable means that the result does not depend on
-//! how many threads took part.
+//! The only large memory is the destination. Stable means that the result does not depend on how
+//! many threads took part.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -29,24 +28,50 @@ impl Cells {
         }
         levels
     }
+
+    /// The memory of each cell: its points, and its indices unless there are none at all.
+    pub(super) fn slices_of<'a>(
+        &self,
+        mut points: &'a mut [Vec3],
+        mut indices: &'a mut [u32],
+    ) -> Vec<(&'a mut [Vec3], &'a mut [u32])> {
+        let mut slices = Vec::with_capacity(self.starts.len());
+        for pair in self.starts.windows(2) {
+            let len = pair[1] - pair[0];
+            let (cell_points, rest) = points.split_at_mut(len);
+            points = rest;
+            let (cell_indices, rest) = indices.split_at_mut(len.min(indices.len()));
+            indices = rest;
+            slices.push((cell_points, cell_indices));
+        }
+        slices
+    }
 }
 
 /// Scatters `centers` into `points`, and their indices into `indices` unless that is empty.
+/// `cell_of` tells the cell of the particle with an index and position, below `cell_count`.
 ///
 /// # Panics
 /// If `points` (or a non-empty `indices`) is shorter than `centers`.
 pub(super) fn scatter(
     centers: &[Vec3],
-    top: &TopCells,
+    cell_count: usize,
+    cell_of: impl Fn(usize, Vec3) -> usize + Sync,
     points: &mut [Vec3],
     indices: &mut [u32],
 ) -> Cells {
-    let cell_count = top.len();
     let threads = rayon::current_num_threads();
     let chunk_len = centers.len().div_ceil(4 * threads).max(16 * 1024);
     let counts: Vec<Vec<u32>> = centers
         .par_chunks(chunk_len)
-        .map(|chunk| count(chunk, top))
+        .enumerate()
+        .map(|(chunk_number, chunk)| {
+            let mut counts = vec![0; cell_count];
+            for (index, center) in (chunk_number * chunk_len..).zip(chunk) {
+                counts[cell_of(index, *center)] += 1;
+            }
+            counts
+        })
         .collect();
     let starts = cell_starts(&counts, cell_count);
     let point_parts = split_by_cell(&mut points[..centers.len()], &counts, cell_count);
@@ -63,13 +88,13 @@ pub(super) fn scatter(
         .for_each(|(chunk_number, ((chunk, mut points), mut indices))| {
             let first = chunk_number * chunk_len;
             let mut filled = vec![0_usize; cell_count];
-            for (offset, center) in chunk.iter().enumerate() {
-                let cell = top.cell_of(*center);
+            for (index, center) in (first..).zip(chunk) {
+                let cell = cell_of(index, *center);
                 let slot = filled[cell];
                 filled[cell] += 1;
                 points[cell][slot] = *center;
                 if let Some(part) = indices.get_mut(cell) {
-                    part[slot] = index_u32(first + offset);
+                    part[slot] = index_u32(index);
                 }
             }
         });
@@ -79,14 +104,6 @@ pub(super) fn scatter(
 /// A particle index as stored.
 pub(super) fn index_u32(index: usize) -> u32 {
     u32::try_from(index).expect("a frame holds fewer than 2^32 particles, checked by the builder")
-}
-
-fn count(chunk: &[Vec3], top: &TopCells) -> Vec<u32> {
-    let mut counts = vec![0; top.len()];
-    for center in chunk {
-        counts[top.cell_of(*center)] += 1;
-    }
-    counts
 }
 
 fn cell_starts(counts: &[Vec<u32>], cell_count: usize) -> Vec<usize> {

@@ -54,9 +54,9 @@ fn split(items: &mut [Item]) {
     }
 }
 
-/// Where to cut `len` subtrees in two so that both sides are whole nodes: a multiple of the largest
-/// power of 8 below `len`. 0 when there is nothing to cut.
-fn aligned_middle(len: usize) -> usize {
+/// Where to cut `len` subtrees (or blocks) in two so that both sides are whole nodes: a multiple of
+/// the largest power of 8 below `len`. 0 when there is nothing to cut.
+pub(super) fn aligned_middle(len: usize) -> usize {
     let mut unit = 1;
     while unit * WIDTH < len {
         unit *= WIDTH;

@@ -21,6 +21,15 @@ use super::{Aabb, BuildReport, Phase, Structure};
 /// count. Builders of other shapes keep to it by balancing what would grow deeper.
 pub(super) const MAX_LEVELS: usize = 12;
 
+/// The order of the levels above subtrees of about a thousand particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum UpperLevels {
+    /// That of the particles.
+    InOrder,
+    /// One of their own, where that of the particles makes no compact nodes (see `upper.rs`).
+    Mapped,
+}
+
 /// A tree over spheres. See [`WideTree::nearest`] and its neighbours.
 #[derive(Debug, Default)]
 pub struct WideTree {
@@ -184,8 +193,22 @@ impl WideTree {
         self.indices = Vec::new();
     }
 
+    /// Fills the unused lanes of the last block with its last particle, so that they never add a hit.
+    pub(super) fn pad_last_block(&mut self) {
+        let count = self.count;
+        let (points, indices) = self.points_mut();
+        if let Some(last) = count.checked_sub(1) {
+            let point = points[last];
+            points[count..].fill(point);
+            if !indices.is_empty() {
+                let index = indices[last];
+                indices[count..].fill(index);
+            }
+        }
+    }
+
     /// Turns sorted points into blocks and builds all levels over them. Returns the SAH cost.
-    pub(super) fn finish(&mut self, center_bounds: Aabb) -> f64 {
+    pub(super) fn finish(&mut self, upper: UpperLevels) -> f64 {
         self.blocks
             .par_iter_mut()
             .with_min_len(256)
@@ -198,7 +221,10 @@ impl WideTree {
             total += count;
         }
         self.nodes.resize(total, bytemuck::Zeroable::zeroed());
-        let mapped_level = mapped_level(counts.len());
+        let mapped_level = match upper {
+            UpperLevels::InOrder => None,
+            UpperLevels::Mapped => mapped_level(counts.len()),
+        };
         self.mapped_level = mapped_level.map_or(u32::MAX, super::partition::index_u32);
         self.mapped.clear();
         let (mut boxes, mut areas) = (Vec::new(), 0.0);
@@ -222,7 +248,7 @@ impl WideTree {
         }
         self.bounds = match boxes.first() {
             Some(root) => root.padded(self.padding),
-            None => center_bounds,
+            None => Aabb::EMPTY,
         };
         sah_cost(areas, self.bounds)
     }

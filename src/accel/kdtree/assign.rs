@@ -1,0 +1,254 @@
+//! The upper cuts made exact: one pass over all particles, then the few that it left undecided.
+
+use std::sync::atomic::{AtomicU16, Ordering};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::item::{Item, key};
+use super::plan::{Bracket, CutPlan, Way, descend};
+use crate::accel::partition::index_u32;
+
+/// Fewest particles that a task is made for.
+const TASK_LEN: usize = 16 * 1024;
+/// The same for particles that a cut has to decide.
+const UNDECIDED_TASK_LEN: usize = 2048;
+
+/// Which cell each particle is in.
+#[derive(Debug)]
+pub(super) struct Assigned {
+    /// By particle; empty when there is but one cell.
+    cells: Vec<AtomicU16>,
+    pub(super) cell_count: usize,
+    /// Most bytes held beside the particles, here and for the plan.
+    pub(super) bytes: u64,
+}
+
+impl Assigned {
+    /// The cell of the particle with that index.
+    #[inline(always)]
+    pub(super) fn cell(&self, index: usize) -> usize {
+        self.cells
+            .get(index)
+            .map_or(0, |cell| usize::from(cell.load(Ordering::Relaxed)))
+    }
+}
+
+/// Cuts all of `centers` as planned.
+pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> Assigned {
+    let cell_count = plan.brackets.len() + 1;
+    if cell_count == 1 {
+        return Assigned {
+            cells: Vec::new(),
+            cell_count,
+            bytes: 0,
+        };
+    }
+    let cells: Vec<AtomicU16> = centers.par_iter().map(|_| AtomicU16::new(0)).collect();
+    let undecided_bytes = loop {
+        match cut_all(centers, &plan, &cells) {
+            Ok(bytes) => break bytes,
+            Err(Outside { cut }) => plan.widen(cut),
+        }
+    };
+    let bytes = plan.bytes.max(size_of_val(&cells[..]) + undecided_bytes) as u64;
+    Assigned {
+        cells,
+        cell_count,
+        bytes,
+    }
+}
+
+/// The median of a cut is not in its bracket.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Outside {
+    cut: usize,
+}
+
+/// Writes the cell of every particle. Returns the bytes needed for the undecided ones.
+fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usize, Outside> {
+    let parts = 4 * rayon::current_num_threads();
+    let chunk_len = centers.len().div_ceil(parts).max(TASK_LEN);
+    let chunks: Vec<Passed> = centers
+        .par_chunks(chunk_len)
+        .zip(cells.par_chunks(chunk_len))
+        .enumerate()
+        .map(|(chunk, (centers, cells))| pass(chunk * chunk_len, centers, cells, plan))
+        .collect();
+    let mut counts = vec![0; plan.brackets.len() + 1];
+    for chunk in &chunks {
+        for (count, more) in counts.iter_mut().zip(&chunk.counts) {
+            *count += *more as usize;
+        }
+    }
+    let mut undecided: Vec<Vec<u32>> = (0..plan.brackets.len())
+        .into_par_iter()
+        .map(|cut| {
+            let lists: Vec<&[u32]> = chunks.iter().map(|c| &c.undecided[cut][..]).collect();
+            lists.concat()
+        })
+        .collect();
+    let capacity = |lists: &[Vec<u32>]| lists.iter().map(Vec::capacity).sum::<usize>();
+    let held: usize = chunks.iter().map(|c| capacity(&c.undecided)).sum();
+    let bytes = (held + capacity(&undecided)) * size_of::<u32>();
+    drop(chunks);
+    let whole = Subtree {
+        first_cut: 0,
+        brackets: &plan.brackets,
+        middles: &plan.middles,
+        undecided: &mut undecided,
+        first_cell: 0,
+        counts: &mut counts,
+    };
+    whole.decide(centers, cells)?;
+    Ok(bytes)
+}
+
+/// What a pass over some particles found.
+struct Passed {
+    /// Particles in each cell.
+    counts: Vec<u32>,
+    /// By cut, the particles that it has to decide.
+    undecided: Vec<Vec<u32>>,
+}
+
+fn pass(first: usize, centers: &[Vec3], cells: &[AtomicU16], plan: &CutPlan) -> Passed {
+    let brackets = &plan.brackets[..];
+    let mut passed = Passed {
+        counts: vec![0; brackets.len() + 1],
+        undecided: vec![Vec::new(); brackets.len()],
+    };
+    for (offset, (center, own)) in centers.iter().zip(cells).enumerate() {
+        let index = index_u32(first + offset);
+        match descend(brackets, keys_of(*center, index)) {
+            Way::Cell(cell) => {
+                own.store(cell_u16(cell), Ordering::Relaxed);
+                passed.counts[cell] += 1;
+            }
+            Way::Undecided(cut) => passed.undecided[cut].push(index),
+        }
+    }
+    passed
+}
+
+#[inline(always)]
+fn keys_of(center: Vec3, index: u32) -> [i64; 4] {
+    [
+        key(center.x, index),
+        key(center.y, index),
+        key(center.z, index),
+        0,
+    ]
+}
+
+#[inline(always)]
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "the plan has at most 2^15 cells"
+)]
+fn cell_u16(cell: usize) -> u16 {
+    cell as u16
+}
+
+/// A cut and all below it.
+struct Subtree<'a> {
+    /// Number of the cut in the plan.
+    first_cut: usize,
+    brackets: &'a [Bracket],
+    middles: &'a [usize],
+    /// By cut, the particles that it has to decide.
+    undecided: &'a mut [Vec<u32>],
+    /// Number of the lowest cell.
+    first_cell: usize,
+    /// Particles decided to be in each cell.
+    counts: &'a mut [usize],
+}
+
+impl<'a> Subtree<'a> {
+    /// Decides all particles that are left.
+    fn decide(self, centers: &[Vec3], cells: &[AtomicU16]) -> Result<(), Outside> {
+        let (Some(bracket), Some(middle)) = (self.brackets.first(), self.middles.first()) else {
+            return Ok(());
+        };
+        if !bracket.is_cut() {
+            // Then there is none below either.
+            return Ok(());
+        }
+        let cut = self.first_cut;
+        let axis = bracket.axis();
+        let own = std::mem::take(&mut self.undecided[0]);
+        let (mut low, mut high) = self.halves();
+        let Some(rank) = middle.checked_sub(low.len()).filter(|r| *r <= own.len()) else {
+            return Err(Outside { cut });
+        };
+        let mut items: Vec<Item> = own
+            .par_iter()
+            .with_min_len(UNDECIDED_TASK_LEN)
+            .map(|index| Item::new(centers[*index as usize], *index))
+            .collect();
+        drop(own);
+        if rank < items.len() {
+            items.select_nth_unstable_by_key(rank, |item| item.key(axis));
+        }
+        low.take(&items[..rank], cells);
+        high.take(&items[rank..], cells);
+        drop(items);
+        let (a, b) = rayon::join(
+            || low.decide(centers, cells),
+            || high.decide(centers, cells),
+        );
+        a.and(b)
+    }
+
+    /// What is below the cut and above it.
+    fn halves(self) -> (Self, Self) {
+        let half = self.brackets.len() / 2;
+        let (undecided_low, undecided_high) = self.undecided[1..].split_at_mut(half);
+        let (counts_low, counts_high) = self.counts.split_at_mut(half + 1);
+        let low = Subtree {
+            first_cut: self.first_cut + 1,
+            brackets: &self.brackets[1..=half],
+            middles: &self.middles[1..=half],
+            undecided: undecided_low,
+            first_cell: self.first_cell,
+            counts: counts_low,
+        };
+        let high = Subtree {
+            first_cut: self.first_cut + 1 + half,
+            brackets: &self.brackets[half + 1..],
+            middles: &self.middles[half + 1..],
+            undecided: undecided_high,
+            first_cell: self.first_cell + half + 1,
+            counts: counts_high,
+        };
+        (low, high)
+    }
+
+    /// Particles in it, decided or not.
+    fn len(&self) -> usize {
+        let undecided: usize = self.undecided.iter().map(Vec::len).sum();
+        self.counts.iter().sum::<usize>() + undecided
+    }
+
+    /// Takes in particles that the cut above has decided.
+    fn take(&mut self, items: &[Item], cells: &[AtomicU16]) {
+        let ways: Vec<Way> = items
+            .par_iter()
+            .with_min_len(UNDECIDED_TASK_LEN)
+            .map(|item| {
+                let way = descend(self.brackets, keys_of(item.center(), item.number()));
+                if let Way::Cell(cell) = way {
+                    let own = &cells[item.number() as usize];
+                    own.store(cell_u16(self.first_cell + cell), Ordering::Relaxed);
+                }
+                way
+            })
+            .collect();
+        for (item, way) in items.iter().zip(ways) {
+            match way {
+                Way::Cell(cell) => self.counts[cell] += 1,
+                Way::Undecided(cut) => self.undecided[cut].push(item.number()),
+            }
+        }
+    }
+}

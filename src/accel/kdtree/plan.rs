@@ -1,0 +1,266 @@
+//! The upper cuts as far as a sample knows them: which axis, and between which two particles the
+//! median must lie.
+//!
+//! The rank that a value has in a sample of m particles tells its rank among all within a few times
+//! sqrt(m)/2 (as in the selection of Floyd & Rivest 1975). Whatever lies outside of that bracket is
+//! decided by one comparison.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::item::{Item, widest};
+use super::middle_of;
+use crate::accel::partition::index_u32;
+
+/// Particles in a cell that is left to `cell.rs`: both of its buffers fit an L2 cache.
+const CELL_LEN: usize = 32 * 1024;
+/// Cuts above one another at most: their leaves are numbered in 16 bits.
+const MAX_DEPTH: u32 = 15;
+/// One of so many particles is in the sample.
+const STRIDE: usize = 12;
+/// Most particles of the sample that one median is looked for in.
+const SELECT_LEN: usize = 64 * 1024;
+/// Most particles of the sample that an axis is chosen by.
+const AXIS_LEN: usize = 512;
+/// Width of a bracket to either side, standard deviations of the rank. One in 100 000 cuts fails at
+/// 4.5 and costs another pass.
+const DEVIATIONS: f64 = 4.5;
+/// A task for less than this costs more than it saves.
+const PARALLEL_LEN: usize = 4096;
+
+/// Where a median may lie: particles with keys from `low` on, up to `width` above it, are undecided.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Bracket {
+    low: i64,
+    width: u64,
+    axis: u32,
+}
+
+/// On which side of a cut a particle is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Way {
+    /// In the cell with that number.
+    Cell(usize),
+    /// The cut with that number has to decide.
+    Undecided(usize),
+}
+
+impl Bracket {
+    /// No cut: everything is low.
+    const NONE: Self = Self {
+        low: i64::MAX,
+        width: 0,
+        axis: 0,
+    };
+
+    /// Nothing is known.
+    fn everything(axis: u32) -> Self {
+        Self::between(i64::MIN, i64::MAX, axis)
+    }
+
+    fn between(low: i64, high: i64, axis: u32) -> Self {
+        Self {
+            low,
+            width: high.wrapping_sub(low).cast_unsigned(),
+            axis,
+        }
+    }
+
+    /// Whether there is a cut.
+    pub(super) fn is_cut(&self) -> bool {
+        self.width > 0
+    }
+
+    pub(super) fn axis(&self) -> usize {
+        self.axis as usize
+    }
+}
+
+/// Follows the cuts in `brackets`, a whole binary tree in preorder, as far as they are sure. `keys`
+/// are the particle's along each axis.
+#[inline(always)]
+pub(super) fn descend(brackets: &[Bracket], keys: [i64; 4]) -> Way {
+    let (mut cut, mut cell) = (0, 0);
+    let mut half = brackets.len().div_ceil(2);
+    while half > 0 {
+        let bracket = &brackets[cut];
+        let key = keys[(bracket.axis & 3) as usize];
+        if key.wrapping_sub(bracket.low).cast_unsigned() < bracket.width {
+            return Way::Undecided(cut);
+        }
+        let is_high = key >= bracket.low;
+        cut += if is_high { half } else { 1 };
+        cell = 2 * cell + usize::from(is_high);
+        half >>= 1;
+    }
+    Way::Cell(cell)
+}
+
+/// The upper cuts: a whole binary tree in preorder, with cuts that are none where cells are small
+/// enough already.
+#[derive(Debug)]
+pub(super) struct CutPlan {
+    pub(super) brackets: Vec<Bracket>,
+    /// How many particles are below each cut.
+    pub(super) middles: Vec<usize>,
+    /// Bytes that were needed to find them.
+    pub(super) bytes: usize,
+}
+
+impl CutPlan {
+    pub(super) fn from_sample(centers: &[Vec3]) -> Self {
+        let mut cell_len = CELL_LEN;
+        while depth_of(centers.len(), cell_len) > MAX_DEPTH {
+            cell_len *= 2;
+        }
+        let cuts = (1 << depth_of(centers.len(), cell_len)) - 1;
+        let mut plan = Self {
+            brackets: vec![Bracket::NONE; cuts],
+            middles: vec![0; cuts],
+            bytes: 0,
+        };
+        if cuts > 0 {
+            let mut sample = sample_of(centers);
+            let mut spare = vec![Item::default(); sample.len()];
+            plan.bytes = 2 * size_of_val(&sample[..]);
+            let subtree = Subtree {
+                brackets: &mut plan.brackets,
+                middles: &mut plan.middles,
+                cell_len,
+            };
+            subtree.fill(centers.len(), &mut sample, &mut spare);
+        }
+        plan
+    }
+
+    /// Gives up the bracket of a cut whose median is not in it.
+    pub(super) fn widen(&mut self, cut: usize) {
+        let bracket = &mut self.brackets[cut];
+        *bracket = Bracket::everything(bracket.axis);
+    }
+}
+
+/// Cuts above one another until cells have `cell_len` particles at most.
+fn depth_of(len: usize, cell_len: usize) -> u32 {
+    if len <= cell_len {
+        return 0;
+    }
+    let middle = middle_of(len);
+    1 + depth_of(middle, cell_len).max(depth_of(len - middle, cell_len))
+}
+
+/// One particle of each run, at a place in the run that looks random: files are often ordered.
+fn sample_of(centers: &[Vec3]) -> Vec<Item> {
+    (0..centers.len() / STRIDE)
+        .into_par_iter()
+        .with_min_len(PARALLEL_LEN)
+        .map(|run| {
+            let hash = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
+            let index = run * STRIDE + hash as usize % STRIDE;
+            Item::new(centers[index], index_u32(index))
+        })
+        .collect()
+}
+
+/// A cut and all below it.
+struct Subtree<'a> {
+    brackets: &'a mut [Bracket],
+    middles: &'a mut [usize],
+    cell_len: usize,
+}
+
+impl Subtree<'_> {
+    /// Finds the brackets for `len` particles, of which `sample` are known.
+    fn fill(self, len: usize, sample: &mut [Item], spare: &mut [Item]) {
+        if len <= self.cell_len {
+            return;
+        }
+        let [bracket, brackets @ ..] = self.brackets else {
+            return;
+        };
+        let [own_middle, middles @ ..] = self.middles else {
+            return;
+        };
+        let middle = middle_of(len);
+        *own_middle = middle;
+        let axis = widest_axis(sample);
+        let guess;
+        (*bracket, guess) = bracket_for(sample, axis, middle as f64 / len as f64);
+        let low_count = part(sample, spare, axis, guess);
+
+        let (sample_low, sample_high) = sample.split_at_mut(low_count);
+        let (spare_low, spare_high) = spare.split_at_mut(low_count);
+        let half = brackets.len() / 2;
+        let (brackets_low, brackets_high) = brackets.split_at_mut(half);
+        let (middles_low, middles_high) = middles.split_at_mut(half);
+        let cell_len = self.cell_len;
+        let low = Subtree {
+            brackets: brackets_low,
+            middles: middles_low,
+            cell_len,
+        };
+        let high = Subtree {
+            brackets: brackets_high,
+            middles: middles_high,
+            cell_len,
+        };
+        rayon::join(
+            || low.fill(middle, spare_low, sample_low),
+            || high.fill(len - middle, spare_high, sample_high),
+        );
+    }
+}
+
+/// The axis along which the bulk of the particles extends farthest: a few that escaped shall not
+/// decide.
+fn widest_axis(sample: &[Item]) -> usize {
+    let stride = sample.len().div_ceil(AXIS_LEN).max(1);
+    let points: Vec<Vec3> = sample.iter().step_by(stride).map(Item::center).collect();
+    let Some(last) = points.len().checked_sub(1) else {
+        return 0;
+    };
+    let trimmed = points.len() / 64;
+    let extent = [0, 1, 2].map(|axis| {
+        let mut values: Vec<f32> = points.iter().map(|p| p[axis]).collect();
+        values.sort_unstable_by(f32::total_cmp);
+        values[last - trimmed] - values[trimmed]
+    });
+    widest(extent.into())
+}
+
+/// The bracket of the particle that has `fraction` of all below it, and the best guess at its key.
+fn bracket_for(sample: &[Item], axis: usize, fraction: f64) -> (Bracket, i64) {
+    let axis_number = index_u32(axis);
+    let stride = sample.len().div_ceil(SELECT_LEN).max(1);
+    let mut keys: Vec<i64> = sample.iter().step_by(stride).map(|i| i.key(axis)).collect();
+    let count = keys.len() as f64;
+    let rank = (count * fraction) as usize;
+    let spread = (DEVIATIONS * (count * fraction * (1.0 - fraction)).sqrt()) as usize + 1;
+    if rank >= keys.len() {
+        return (Bracket::everything(axis_number), i64::MAX);
+    }
+    let (below, guess, above) = keys.select_nth_unstable(rank);
+    let low = match rank.checked_sub(spread) {
+        Some(rank) => *below.select_nth_unstable(rank).1,
+        None => i64::MIN,
+    };
+    let high = if spread < above.len() {
+        *above.select_nth_unstable(spread).1
+    } else {
+        i64::MAX
+    };
+    (Bracket::between(low, high, axis_number), *guess)
+}
+
+/// Moves what is under `pivot` to the front of `to` and the others to its end; returns how many
+/// are in front.
+fn part(items: &[Item], to: &mut [Item], axis: usize, pivot: i64) -> usize {
+    let (mut low, mut high) = (0, items.len());
+    for item in items {
+        let is_low = item.key(axis) < pivot;
+        high -= usize::from(!is_low);
+        to[if is_low { low } else { high }] = *item;
+        low += usize::from(is_low);
+    }
+    low
+}
