@@ -11,6 +11,7 @@ mod binary;
 pub mod block;
 mod builder;
 mod bvh;
+mod choose;
 mod collapse;
 mod coverage;
 pub mod curve;
@@ -34,6 +35,7 @@ mod widen;
 pub use aabb::Aabb;
 pub use builder::{BuildSettings, Structure, TreeBuilder};
 pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
+pub use choose::choose;
 pub use report::{BuildReport, Phase};
 pub use sbvh::SbvhSettings;
 
@@ -61,5 +63,7 @@ pub struct Spheres<'a> {
 
 #[cfg(test)]
 mod collapse_tests;
+#[cfg(test)]
+mod oracle;
 #[cfg(test)]
 mod tests;

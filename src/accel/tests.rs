@@ -5,6 +5,7 @@ use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
 use super::node::Node;
+use super::oracle::ParticleTree;
 use super::simd::SimdLevel;
 use super::{
     BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SbvhSettings, SphereRadius, Spheres,
@@ -185,7 +186,7 @@ fn all_settings() -> Vec<BuildSettings> {
         match structure {
             Structure::Bvh => all.extend(every_bvh().map(|bvh| BuildSettings { bvh, ..plain })),
             Structure::Sbvh => all.extend(every_sbvh().map(|sbvh| BuildSettings { sbvh, ..plain })),
-            Structure::Lbvh => all.push(plain),
+            Structure::Lbvh | Structure::Kdtree => all.push(plain),
         }
     }
     all
@@ -481,9 +482,55 @@ fn a_crowded_cell_is_sorted_by_all_threads() {
     let mut centers = random_points(300_000, 8);
     centers.iter_mut().skip(10).for_each(|p| *p *= 1e-3);
     let scene = Scene::common("crowded", centers, 1e-5);
-    let mut builder = TreeBuilder::new();
-    builder.build(&scene.spheres(), &BuildSettings::default());
-    builder.tree().validate(&scene.spheres()).expect("sound");
+    for settings in all_settings() {
+        let mut builder = TreeBuilder::new();
+        builder.build(&scene.spheres(), &settings);
+        builder.tree().validate(&scene.spheres()).expect("sound");
+    }
+}
+
+/// Where brute force is too slow: uniform, crowded, and on few planes, so that most coordinates are
+/// equal to many others.
+#[test]
+fn large_scenes_match_a_particle_tree() {
+    let cloud = random_points(100_000, 21);
+    let crowded = cloud
+        .iter()
+        .enumerate()
+        .map(|(i, p)| if i % 3 == 0 { *p } else { *p * 1e-2 });
+    let planes = cloud
+        .iter()
+        .map(|p| (*p * 8.0).round() / 8.0 + p.with_x(0.0) * 1e-3);
+    let scenes = [
+        Scene::common("cloud", cloud.clone(), 5e-3),
+        Scene::common("crowded cloud", crowded.collect(), 1e-3),
+        Scene::common("planes", planes.collect(), 2e-3),
+        Scene::common("all coincident", vec![Vec3::splat(0.25); 100_000], 0.1),
+    ];
+    for scene in &scenes {
+        let oracle = ParticleTree::new(&scene.centers, scene.radii[0]);
+        let rays = rays(scene, 1000, 17);
+        let truth: Vec<_> = rays.iter().map(|ray| oracle.nearest(ray)).collect();
+        for settings in all_settings() {
+            let mut builder = TreeBuilder::new();
+            builder.build(&scene.spheres(), &settings);
+            let mut judged = 0;
+            for (ray, (nearest, closeness)) in rays.iter().zip(&truth) {
+                if *closeness < 1e-5 {
+                    continue;
+                }
+                judged += 1;
+                let what = format!("{} {settings:?} {ray:?}", scene.name);
+                let hit = builder.tree().nearest(ray);
+                assert_eq!(hit.is_some(), nearest.is_some(), "{what}");
+                assert_eq!(builder.tree().any_hit(ray), nearest.is_some(), "{what}");
+                if let (Some(hit), Some((t, _))) = (hit, nearest) {
+                    assert!((f64::from(hit.t) - t).abs() < 1e-4, "{what}: {} {t}", hit.t);
+                }
+            }
+            assert!(judged >= 300, "{}: {judged} rays judged", scene.name);
+        }
+    }
 }
 
 proptest! {

@@ -174,8 +174,8 @@ fn bar(total: usize) -> ProgressBar {
 fn told(report: &FrameReport) -> String {
     let s = &report.seconds;
     format!(
-        "{} particles, build {:.3} s, trace {:.2} s",
-        report.particles, s.build, s.trace
+        "{} particles, {} built in {:.3} s, trace {:.2} s",
+        report.particles, report.build.structure, s.build, s.trace
     )
 }
 

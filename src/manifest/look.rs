@@ -172,7 +172,9 @@ impl Render {
     pub(super) fn read(mut section: Section<'_>) -> Self {
         let default = Self::default();
         let render = Self {
-            accelerator: section.value("accelerator", default.accelerator, read_accelerator),
+            accelerator: section.value("accelerator", default.accelerator, |field| {
+                field.choice(Accelerator::ALL)
+            }),
             bvh_preset: section.value("bvh_preset", default.bvh_preset, |f| {
                 f.choice(&BvhPreset::ALL.map(|preset| (preset, preset.name())))
             }),
@@ -261,20 +263,6 @@ impl Render {
         );
         out.put("ground_color", &self.ground_color, "linear RGB");
     }
-}
-
-fn read_accelerator(field: &Field<'_>) -> Option<Accelerator> {
-    let accelerator = field.choice(Accelerator::ALL)?;
-    if accelerator != Accelerator::Auto && accelerator.structure().is_none() {
-        let built = Structure::ALL.map(Structure::name);
-        let name = accelerator.name();
-        field.fail(&format!(
-            "{name} is not in this version; auto, {} are",
-            built.join(", ")
-        ));
-        return None;
-    }
-    Some(accelerator)
 }
 
 impl Toml for BvhPreset {

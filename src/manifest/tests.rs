@@ -163,10 +163,6 @@ fn wrong_types_say_what_is_wanted() {
         "[render]\nbackground = { bottom = [0,0,0] }",
         &["render.background.top: is missing"],
     );
-    refused(
-        "[render]\naccelerator = \"kdtree\"",
-        &["kdtree is not in this version; auto, lbvh, bvh, sbvh are"],
-    );
     refused("[render]\naccelerator = \"lbhv\"", &["did you mean lbvh?"]);
     refused(
         "[render]\nbvh_preset = \"meduim\"",

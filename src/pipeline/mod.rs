@@ -17,6 +17,7 @@ use spherule_jobs::{Interrupt, Job, JobError};
 
 mod encode;
 mod load;
+mod rays;
 mod setup;
 mod trace;
 

@@ -7,9 +7,9 @@ use spherule_formats::Radius;
 
 use super::ImageTask;
 use super::load::LoadedFrame;
+use super::rays::expected_rays;
 use super::setup::{ColorRule, Setup};
-use crate::accel::TreeBuilder;
-use crate::accel::{BuildSettings, SphereRadius, Spheres};
+use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder, choose};
 use crate::render::{Colors, Film, ParticleShading, RenderError, render};
 use crate::report::FrameReport;
 use crate::scene::ColorMap;
@@ -63,12 +63,16 @@ impl FrameTracer {
             Radius::Common(radius) => SphereRadius::Common(*radius),
             Radius::PerParticle(radii) => SphereRadius::Each(radii),
         };
+        let structure = setup.accelerator.unwrap_or_else(|| {
+            let threads = rayon::current_num_threads();
+            choose(frame.centers.len(), expected_rays(setup), threads)
+        });
         let channels = setup.render.channels;
         let settings = BuildSettings {
             keep_indices: channels.id || channels.velocity || !frame.values.is_empty(),
             bvh: setup.bvh,
             sbvh: setup.sbvh,
-            ..BuildSettings::new(setup.accelerator.unwrap_or_default())
+            ..BuildSettings::new(structure)
         };
         let spheres = Spheres {
             centers: &frame.centers,

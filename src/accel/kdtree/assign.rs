@@ -48,7 +48,7 @@ pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> Assigned {
     let undecided_bytes = loop {
         match cut_all(centers, &plan, &cells) {
             Ok(bytes) => break bytes,
-            Err(Outside { cut }) => plan.widen(cut),
+            Err(Outside { cuts }) => plan.widen(&cuts),
         }
     };
     let bytes = plan.bytes.max(size_of_val(&cells[..]) + undecided_bytes) as u64;
@@ -59,10 +59,10 @@ pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> Assigned {
     }
 }
 
-/// The median of a cut is not in its bracket.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The medians of these cuts are not in their brackets.
+#[derive(Debug, Clone, PartialEq, Eq)]
 struct Outside {
-    cut: usize,
+    cuts: Vec<usize>,
 }
 
 /// Writes the cell of every particle. Returns the bytes needed for the undecided ones.
@@ -179,7 +179,7 @@ impl<'a> Subtree<'a> {
         let own = std::mem::take(&mut self.undecided[0]);
         let (mut low, mut high) = self.halves();
         let Some(rank) = middle.checked_sub(low.len()).filter(|r| *r <= own.len()) else {
-            return Err(Outside { cut });
+            return Err(Outside { cuts: vec![cut] });
         };
         let mut items: Vec<Item> = own
             .par_iter()
@@ -197,7 +197,13 @@ impl<'a> Subtree<'a> {
             || low.decide(centers, cells),
             || high.decide(centers, cells),
         );
-        a.and(b)
+        match (a, b) {
+            (Err(mut a), Err(b)) => {
+                a.cuts.extend(b.cuts);
+                Err(a)
+            }
+            (a, b) => a.and(b),
+        }
     }
 
     /// What is below the cut and above it.
@@ -250,5 +256,53 @@ impl<'a> Subtree<'a> {
                 Way::Undecided(cut) => self.undecided[cut].push(item.number()),
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn points() -> Vec<Vec3> {
+        let unit = |i: u32, k: u32| {
+            let hash = (i * 3 + k).wrapping_mul(0x9e37_79b9).rotate_left(13);
+            hash.wrapping_mul(0x85eb_ca6b) as f32 / u32::MAX as f32
+        };
+        (0..200_000)
+            .map(|i| Vec3::new(unit(i, 0), unit(i, 1), unit(i, 2)))
+            .collect()
+    }
+
+    fn cells(assigned: &Assigned) -> Vec<usize> {
+        (0..assigned.cells.len())
+            .map(|i| assigned.cell(i))
+            .collect()
+    }
+
+    #[test]
+    fn cuts_are_exact() {
+        let points = points();
+        let plan = CutPlan::from_sample(&points);
+        let (middle, axis) = (plan.middles[0], plan.brackets[0].axis());
+        let assigned = assign(&points, plan);
+        let half = assigned.cell_count / 2;
+        let key = |i: usize| key(points[i][axis], index_u32(i));
+        let (low, high): (Vec<usize>, Vec<usize>) =
+            (0..points.len()).partition(|i| assigned.cell(*i) < half);
+        assert_eq!(low.len(), middle);
+        assert!(low.into_iter().map(key).max() < high.into_iter().map(key).min());
+    }
+
+    #[test]
+    fn a_bracket_without_its_median_is_given_up() {
+        let points = points();
+        let expected = cells(&assign(&points, CutPlan::from_sample(&points)));
+        let mut plan = CutPlan::from_sample(&points);
+        let last = plan.brackets.iter().rposition(Bracket::is_cut);
+        for cut in [0, 1, last.expect("more than one cell")] {
+            let axis = index_u32(plan.brackets[cut].axis());
+            plan.brackets[cut] = Bracket::between(key(0.9, 0), key(0.9, 1), axis);
+        }
+        assert!(cells(&assign(&points, plan)) == expected);
     }
 }

@@ -111,7 +111,7 @@ mod tests {
         let mut to = vec![Item::default(); 64];
         part(&items, &mut to, &mut [0; 64], 0, 48);
         let numbers: Vec<u32> = to.iter().map(Item::number).collect();
-        let is_low = |i: &u32| i % 2 == 0 || *i < 32;
+        let is_low = |i: &u32| i.is_multiple_of(2) || *i < 32;
         let (low, high): (Vec<u32>, Vec<u32>) = (0..64).partition(is_low);
         assert_eq!(numbers, [low, high].concat());
     }
