@@ -3,6 +3,8 @@
 pub mod frame;
 pub mod job;
 pub mod memory;
+pub mod page;
+pub mod plots;
 
 pub use frame::FrameReport;
 pub use memory::MemoryUse;

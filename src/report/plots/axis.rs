@@ -1,0 +1,379 @@
+//! An axis: which values it spans and where its ticks stand.
+
+use std::ops::Range;
+
+use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
+
+/// How values become lengths.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Scale {
+    /// In proportion.
+    #[default]
+    Linear,
+    /// By their logarithm; values up to zero have no place.
+    Log,
+}
+
+/// What an axis is to look like; the range comes from the data.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Axis {
+    title: String,
+    scale: Scale,
+    from_zero: bool,
+    whole: bool,
+}
+
+impl Axis {
+    /// A linear axis. `title` names the quantity and its unit.
+    pub fn linear(title: impl Into<String>) -> Self {
+        Self {
+            title: title.into(),
+            scale: Scale::Linear,
+            from_zero: false,
+            whole: false,
+        }
+    }
+
+    /// A logarithmic axis.
+    pub fn log(title: impl Into<String>) -> Self {
+        Self {
+            scale: Scale::Log,
+            ..Self::linear(title)
+        }
+    }
+
+    /// Shows zero as well, so that heights can be compared; a logarithmic axis has none.
+    #[must_use]
+    pub const fn from_zero(mut self) -> Self {
+        self.from_zero = true;
+        self
+    }
+
+    /// Ticks at whole numbers alone, for counts and frame numbers.
+    #[must_use]
+    pub const fn whole(mut self) -> Self {
+        self.whole = true;
+        self
+    }
+
+    pub(super) fn title(&self) -> &str {
+        &self.title
+    }
+
+    pub(super) fn is_log(&self) -> bool {
+        self.scale == Scale::Log
+    }
+
+    /// Where `value` stands on the axis; NaN where it has no place. Values past 1e100 are as good
+    /// as infinite: sums and differences of what is left are finite.
+    pub(super) fn place(&self, value: f64) -> f64 {
+        match self.scale {
+            _ if value.abs() > 1e100 => f64::NAN,
+            Scale::Linear => value,
+            Scale::Log if value < 1e-100 => f64::NAN,
+            Scale::Log => value.log10(),
+        }
+    }
+
+    /// The axis over places from `low` to `high`, both finite, with about `wanted` ticks.
+    pub(super) fn span(&self, low: f64, high: f64, wanted: f64) -> Span {
+        match self.scale {
+            Scale::Linear => self.linear_span(low, high, wanted),
+            Scale::Log => log_span(low, high, wanted),
+        }
+    }
+
+    fn linear_span(&self, mut low: f64, mut high: f64, wanted: f64) -> Span {
+        if self.from_zero {
+            low = low.min(0.0);
+            high = high.max(0.0);
+        }
+        // All equal, or so nearly that ticks would fall together.
+        if high - low <= 1e-9 * high.abs().max(low.abs()) {
+            let half = if self.whole {
+                (1e-6 * high.abs()).max(1.0)
+            } else {
+                0.5 * high.abs()
+            };
+            let half = if half > 0.0 { half } else { 1.0 };
+            (low, high) = (low - half, high + half);
+        }
+        let mut step = nice_step((high - low) / wanted);
+        if self.whole {
+            step = step.max(1.0);
+        }
+        // Air for the markers at the edge.
+        if !self.whole {
+            let air = 0.05 * (high - low);
+            let keeps = |end: f64| self.from_zero && end == 0.0;
+            high += if keeps(high) { 0.0 } else { air };
+            low -= if keeps(low) { 0.0 } else { air };
+        }
+        // Slack, so that rounding does not cost the first or the last tick.
+        let first = (low / step - 1e-9).ceil();
+        let count = (high / step + 1e-9).floor() - first;
+        let largest = high.abs().max(low.abs());
+        let mut ticks = Vec::new();
+        let mut i = 0.0;
+        while i <= count {
+            let value = (first + i) * step;
+            ticks.push((value, label(value, step, largest)));
+            i += 1.0;
+        }
+        Span { low, high, ticks }
+    }
+}
+
+/// The range of an axis in places, and its ticks with their labels.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct Span {
+    pub(super) low: f64,
+    pub(super) high: f64,
+    pub(super) ticks: Vec<(f64, String)>,
+}
+
+impl Ranged for Span {
+    type FormatOption = NoDefaultFormatting;
+    type ValueType = f64;
+
+    fn map(&self, place: &f64, limit: (i32, i32)) -> i32 {
+        let (start, end) = (f64::from(limit.0), f64::from(limit.1));
+        let at = start + (place - self.low) / (self.high - self.low) * (end - start);
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "saturates, and the axis holds it"
+        )]
+        let at = at.round() as i32;
+        at
+    }
+
+    fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
+        // No finer lines between the ticks.
+        if hint.weight().allow_light_points() {
+            return Vec::new();
+        }
+        self.ticks.iter().map(|(at, _)| *at).collect()
+    }
+
+    fn range(&self) -> Range<f64> {
+        self.low..self.high
+    }
+}
+
+impl ValueFormatter<f64> for Span {
+    fn format_ext(&self, place: &f64) -> String {
+        let tick = self.ticks.iter().find(|(at, _)| at == place);
+        tick.map_or_else(String::new, |(_, label)| label.clone())
+    }
+}
+
+/// 1, 2 or 5 times a power of ten, not under `least`.
+fn nice_step(least: f64) -> f64 {
+    let power = 10f64.powf(least.log10().floor());
+    let factor = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|f| f * power >= least * (1.0 - 1e-9));
+    factor.unwrap_or(10.0) * power
+}
+
+/// `value` with the decimals that a step of `step` needs, on an axis up to `largest`.
+fn label(value: f64, step: f64, largest: f64) -> String {
+    // Rounding leaves a tiny or a negative zero.
+    let value = if value.abs() < 0.5 * step { 0.0 } else { value };
+    if largest >= 1e6 || step < 1e-4 {
+        return if value == 0.0 {
+            "0".to_owned()
+        } else {
+            scientific(value, step)
+        };
+    }
+    let decimals = (0..5).find(|d| {
+        let scaled = step * 10f64.powi(*d);
+        (scaled - scaled.round()).abs() < 1e-6
+    });
+    let text = format!(
+        "{value:.*}",
+        usize::try_from(decimals.unwrap_or(5)).unwrap_or(5)
+    );
+    minus(&text)
+}
+
+/// As `1.25e6`, with the digits that tell it from its neighbour.
+fn scientific(value: f64, step: f64) -> String {
+    let digits = (value.abs().log10().floor() - step.log10().floor()).clamp(0.0, 8.0);
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "0 to 8"
+    )]
+    let text = format!("{value:.*e}", digits as usize);
+    match text.split_once('e') {
+        Some((mantissa, power)) if mantissa.contains('.') => {
+            let mantissa = mantissa.trim_end_matches('0').trim_end_matches('.');
+            minus(&format!("{mantissa}e{power}"))
+        }
+        _ => minus(&text),
+    }
+}
+
+/// With a minus sign as wide as a digit.
+fn minus(text: &str) -> String {
+    text.replace('-', "\u{2212}")
+}
+
+/// Widened to the next 1, 2 or 5 times a power of ten; ticks at these, or at powers alone.
+fn log_span(low: f64, high: f64, wanted: f64) -> Span {
+    const SLACK: f64 = 1e-9;
+    // Steps of a third of a decade: 3k, 3k+1, 3k+2 are 1, 2 and 5 times 10^k.
+    let place = |step: f64| {
+        let decade = (step / 3.0).floor();
+        let factor = [1.0f64, 2.0, 5.0];
+        let third = step - 3.0 * decade;
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0, 1, 2"
+        )]
+        let factor = factor[third as usize];
+        (decade + factor.log10(), decade, factor)
+    };
+    let mut first = 3.0 * low.floor();
+    while place(first + 1.0).0 <= low + SLACK {
+        first += 1.0;
+    }
+    let mut last = first + 1.0;
+    while place(last).0 < high - SLACK {
+        last += 1.0;
+    }
+    // One value would sit on the edge.
+    if place(first).0 >= low - SLACK && high - low < SLACK {
+        first -= 1.0;
+    }
+    let decades = (last - first) / 3.0;
+    let every = (decades / wanted).ceil().max(1.0);
+    // 10000 beside 1e5 would be odd.
+    let is_plain = low >= -4.0 && high < 5.0;
+    let mut ticks = Vec::new();
+    let mut step = first;
+    while step <= last {
+        let (at, decade, factor) = place(step);
+        let shown = decades <= 2.0 || (factor == 1.0 && decade % every == 0.0);
+        if shown {
+            ticks.push((at, log_label(decade, factor, is_plain)));
+        }
+        step += 1.0;
+    }
+    Span {
+        low: place(first).0,
+        high: place(last).0,
+        ticks,
+    }
+}
+
+/// `factor` times ten to the `decade`; in full where that is short, or all over the axis.
+fn log_label(decade: f64, factor: f64, is_plain: bool) -> String {
+    if is_plain || (-3.0..=3.0).contains(&decade) {
+        #[expect(
+            clippy::cast_possible_truncation,
+            clippy::cast_sign_loss,
+            reason = "0 to 4"
+        )]
+        let decimals = (-decade).max(0.0) as usize;
+        let value = factor * 10f64.powf(decade);
+        return format!("{value:.decimals$}");
+    }
+    minus(&format!("{factor:.0}e{decade:.0}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn labels(axis: &Axis, low: f64, high: f64) -> Vec<String> {
+        let span = axis.span(axis.place(low), axis.place(high), 5.0);
+        for pair in span.ticks.windows(2) {
+            assert!(pair[0].0 < pair[1].0 && pair[0].1 != pair[1].1, "{span:?}");
+        }
+        for (at, _) in &span.ticks {
+            let slack = 1e-9 * (span.high - span.low);
+            assert!(
+                *at >= span.low - slack && *at <= span.high + slack,
+                "{span:?}"
+            );
+        }
+        assert!(span.low < span.high && !span.ticks.is_empty(), "{span:?}");
+        span.ticks.into_iter().map(|(_, label)| label).collect()
+    }
+
+    #[test]
+    fn ticks_are_round_numbers() {
+        let axis = Axis::linear("t, s");
+        assert_eq!(
+            labels(&axis, 0.0, 1.0),
+            ["0.0", "0.2", "0.4", "0.6", "0.8", "1.0"]
+        );
+        assert_eq!(labels(&axis, -3.0, 7.0), ["\u{2212}2", "0", "2", "4", "6"]);
+        assert_eq!(labels(&axis, 0.0, 4e6), ["0", "1e6", "2e6", "3e6", "4e6"]);
+        assert_eq!(
+            labels(&axis, 5e-6, 1e-5),
+            [
+                "5e\u{2212}6",
+                "6e\u{2212}6",
+                "7e\u{2212}6",
+                "8e\u{2212}6",
+                "9e\u{2212}6",
+                "1e\u{2212}5"
+            ]
+        );
+        assert_eq!(
+            labels(&axis.clone().from_zero(), 3.0, 4.0),
+            ["0", "1", "2", "3", "4"]
+        );
+        assert_eq!(labels(&axis.whole(), 1.0, 3.0), ["1", "2", "3"]);
+    }
+
+    #[test]
+    fn decades_or_their_parts() {
+        let axis = Axis::log("n");
+        assert_eq!(
+            labels(&axis, 1e5, 1e7),
+            ["1e5", "2e5", "5e5", "1e6", "2e6", "5e6", "1e7"]
+        );
+        assert_eq!(
+            labels(&axis, 0.01, 1000.0),
+            ["0.01", "0.1", "1", "10", "100", "1000"]
+        );
+        assert_eq!(labels(&axis, 3.0, 3.0), ["2", "5"]);
+        assert_eq!(labels(&axis, 10.0, 10.0), ["5", "10", "20"]);
+        assert!(labels(&axis, 1e-99, 1e99).len() < 12);
+    }
+
+    #[test]
+    fn awkward_ranges_still_make_an_axis() {
+        for axis in [
+            Axis::linear("v"),
+            Axis::linear("v").from_zero(),
+            Axis::linear("v").whole(),
+        ] {
+            for value in [0.0, 1.0, -1.0, 1e9, -1e-9, 1e99, 1e-99] {
+                labels(&axis, value, value);
+                labels(&axis, value, value * (1.0 + 1e-15));
+            }
+            labels(&axis, -1e99, 1e99);
+            labels(&axis, 1e9, 1e9 + 0.25);
+        }
+        for value in [1e-99, 1e-5, 0.3, 1.0, 7.0, 1e99] {
+            labels(&Axis::log("v"), value, value);
+        }
+    }
+
+    #[test]
+    fn what_has_no_place() {
+        let axis = Axis::log("n");
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(axis.place(value).is_nan(), "{value}");
+        }
+        assert!(Axis::linear("n").place(f64::INFINITY).is_nan());
+    }
+}

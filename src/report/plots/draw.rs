@@ -1,0 +1,205 @@
+//! Draws a plot with `plotters`.
+
+use std::cell::RefCell;
+
+use plotters::prelude::*;
+use plotters_backend::text_anchor::{HPos, Pos, VPos};
+
+use super::axis::Span;
+use super::svg::{FINE, GRID, INK, SERIES, SvgText};
+use super::{Line, Plot, Series, key};
+use crate::report::page::escaped;
+
+/// Size of a plot in units, of which a line of text is [`FONT`] high.
+const WIDTH: i32 = 440;
+const HEIGHT: i32 = 270;
+const FONT: i32 = 13;
+/// Digits are about this wide.
+const DIGIT: i32 = 8;
+/// Room above for the title of the vertical axis, and below for labels and the horizontal one's.
+const TOP: i32 = 28;
+const BOTTOM: i32 = 43;
+/// Room for half of the last label.
+const RIGHT: i32 = 22;
+
+/// More points than this are thinned, to one smallest and one largest in each of half as many
+/// stretches: about a point for each unit of width.
+const MOST_POINTS: usize = 800;
+/// Series with more points have markers at some only.
+const MOST_MARKERS: usize = 24;
+
+/// A series in places of its axes, cut at gaps.
+pub(super) struct Drawn<'a> {
+    pub(super) name: &'a str,
+    pub(super) hue: usize,
+    pub(super) line: Line,
+    pieces: Vec<Vec<(f64, f64)>>,
+}
+
+impl<'a> Drawn<'a> {
+    pub(super) fn new(plot: &Plot, series: &'a Series, hue: usize) -> Self {
+        let placed = series.points.iter();
+        let placed = placed.map(|(x, y)| (plot.x.place(*x), plot.y.place(*y)));
+        let placed = thinned(placed.collect());
+        let pieces = placed
+            .split(|point| !is_finite(*point))
+            .filter(|piece| !piece.is_empty())
+            .map(<[_]>::to_vec)
+            .collect();
+        Self {
+            name: &series.name,
+            hue,
+            line: series.line,
+            pieces,
+        }
+    }
+
+    pub(super) fn point_count(&self) -> usize {
+        self.pieces.iter().map(Vec::len).sum()
+    }
+
+    /// Where markers go: lone points always, of many joined ones some.
+    fn marked(&self) -> Vec<(f64, f64)> {
+        let joined = self.line != Line::None;
+        let every = if joined {
+            self.point_count().div_ceil(MOST_MARKERS).max(1)
+        } else {
+            1
+        };
+        let mut marked = Vec::new();
+        let mut place = 0;
+        for piece in &self.pieces {
+            for point in piece {
+                if place % every == 0 || piece.len() == 1 {
+                    marked.push(*point);
+                }
+                place += 1;
+            }
+        }
+        marked
+    }
+}
+
+fn is_finite((x, y): (f64, f64)) -> bool {
+    x.is_finite() && y.is_finite()
+}
+
+/// Long series as the smallest and the largest value of each stretch, in their order; a stretch
+/// without values stays a gap.
+fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
+    if points.len() <= MOST_POINTS {
+        return points;
+    }
+    let stretches = MOST_POINTS / 2;
+    let mut kept = Vec::with_capacity(MOST_POINTS);
+    for i in 0..stretches {
+        let range = i * points.len() / stretches..(i + 1) * points.len() / stretches;
+        let of = |index: &usize| points[*index].1;
+        let present = range.filter(|index| is_finite(points[*index]));
+        let least = present.clone().min_by(|a, b| of(a).total_cmp(&of(b)));
+        let most = present.max_by(|a, b| of(a).total_cmp(&of(b)));
+        match (least, most) {
+            (Some(a), Some(b)) if a == b => kept.push(points[a]),
+            (Some(a), Some(b)) => kept.extend([points[a.min(b)], points[a.max(b)]]),
+            _ => kept.push((f64::NAN, f64::NAN)),
+        }
+    }
+    kept
+}
+
+/// The plot of at least one point.
+pub(super) fn svg_of(plot: &Plot, series: &[Drawn]) -> String {
+    let text = RefCell::new(format!(
+        "<svg class=\"plot\" id=\"{id}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
+         aria-labelledby=\"{id}-title\" xmlns=\"http://www.w3.org/2000/svg\" \
+         font-family=\"system-ui,sans-serif\" font-size=\"{FONT}\" fill=\"#1b1b1b\">\n\
+         <title id=\"{id}-title\">{}: {} against {}</title>\n",
+        escaped(&plot.title),
+        escaped(plot.y.title()),
+        escaped(plot.x.title()),
+        id = escaped(&plot.id),
+    ));
+    let size = (
+        (WIDTH * FINE).cast_unsigned(),
+        (HEIGHT * FINE).cast_unsigned(),
+    );
+    let backend = SvgText { text: &text, size };
+    draw(plot, series, spans(plot, series), backend, &text)
+        .expect("our backend takes everything, and nobody else draws to it");
+    text.into_inner() + "</svg>\n"
+}
+
+/// The axes that hold all points.
+fn spans(plot: &Plot, series: &[Drawn]) -> (Span, Span) {
+    let points = || series.iter().flat_map(|s| s.pieces.iter().flatten());
+    let range = |of: fn(&(f64, f64)) -> f64| {
+        let low = points().map(of).fold(f64::INFINITY, f64::min);
+        let high = points().map(of).fold(f64::NEG_INFINITY, f64::max);
+        (low, high)
+    };
+    let (left, right) = range(|point| point.0);
+    let (bottom, top) = range(|point| point.1);
+    (plot.x.span(left, right, 6.0), plot.y.span(bottom, top, 5.0))
+}
+
+type DrawError = DrawingAreaErrorKind<std::convert::Infallible>;
+
+fn draw(
+    plot: &Plot,
+    series: &[Drawn],
+    (x, y): (Span, Span),
+    backend: SvgText,
+    text: &RefCell<String>,
+) -> Result<(), DrawError> {
+    let font = TextStyle::from(("sans-serif", FONT * FINE).into_font()).color(&INK);
+    let root = backend.into_drawing_area();
+    let longest = y.ticks.iter().map(|(_, label)| label.chars().count()).max();
+    let left = i32::try_from(longest.unwrap_or(0)).unwrap_or(0) * DIGIT + 14;
+    let mut chart = ChartBuilder::on(&root)
+        .margin_top(TOP * FINE)
+        .margin_right(RIGHT * FINE)
+        .x_label_area_size(BOTTOM * FINE)
+        .y_label_area_size(left * FINE)
+        .build_cartesian_2d(x, y)?;
+    chart
+        .configure_mesh()
+        .max_light_lines(0)
+        .bold_line_style(GRID)
+        .axis_style(GRID)
+        .label_style(font.clone())
+        .set_all_tick_mark_size(4 * FINE)
+        .draw()?;
+    root.draw_text(plot.y.title(), &font, (0, 0))?;
+    let bottom_right = Pos::new(HPos::Right, VPos::Bottom);
+    let corner = ((WIDTH - 2) * FINE, (HEIGHT - 4) * FINE);
+    root.draw_text(plot.x.title(), &font.pos(bottom_right), corner)?;
+
+    let put = |piece: &str| text.borrow_mut().push_str(piece);
+    for drawn in series {
+        put(&key::group(drawn.hue, "series"));
+        put(&format!("<title>{}</title>\n", escaped(drawn.name)));
+        let at = |point: &(f64, f64)| chart.backend_coord(point);
+        if drawn.line != Line::None {
+            put(key::part(drawn.line, false));
+            for piece in drawn.pieces.iter().filter(|piece| piece.len() > 1) {
+                root.draw(&PathElement::new(
+                    piece.iter().map(at).collect::<Vec<_>>(),
+                    SERIES,
+                ))?;
+            }
+            put("</g>\n");
+        }
+        put(key::part(drawn.line, true));
+        for (x, y) in drawn.marked().iter().map(at) {
+            match key::marker(drawn.hue) {
+                None => root.draw(&Circle::new((x, y), key::MARKER_RADIUS, SERIES.filled()))?,
+                Some(corners) => {
+                    let corners = corners.iter().map(|(dx, dy)| (x + dx, y + dy));
+                    root.draw(&Polygon::new(corners.collect::<Vec<_>>(), SERIES))?;
+                }
+            }
+        }
+        put("</g></g>\n");
+    }
+    root.present()
+}
