@@ -70,8 +70,10 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         progress.show(&event);
     });
     let ended = progress.finish();
-    let reported = report::job::write(&plan.dir, job.state(), &plan.manifest)
-        .map_err(CliError::io(&plan.dir.join(report::job::FILE)));
+    let report = report::job::JobReport::new(job.state(), &plan.manifest);
+    let reported = report.files().iter().try_for_each(|(name, text)| {
+        report::job::write(&plan.dir, name, text).map_err(CliError::io(&plan.dir.join(name)))
+    });
     // What ended the run explains why there is no report either.
     let result = result.map_err(CliError::from).and(reported);
     let summary = job.summary();

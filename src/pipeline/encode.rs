@@ -48,13 +48,16 @@ pub(super) fn write_stage(
     watch: Watch,
 ) -> Result<(), JobError> {
     let mut peak = MemoryUse::default();
+    let mut image_before = Instant::now();
     for passed in traced {
         match passed {
             Passed::Frame(frame) => {
                 watch(Event::Entered(frame.task.frame, Stage::Write));
                 let task = frame.task.clone();
                 match write_frame(setup, frame, &mut peak) {
-                    Ok(report) => {
+                    Ok(mut report) => {
+                        report.seconds.wall = image_before.elapsed().as_secs_f64();
+                        image_before = Instant::now();
                         let outputs: Vec<_> = std::iter::once(&task.image)
                             .chain(&task.preview)
                             .cloned()

@@ -40,6 +40,9 @@ pub struct StageSeconds {
     pub build: f64,
     pub trace: f64,
     pub encode: f64,
+    /// From the image before, or the beginning of the run, to this image: summed, the time that the
+    /// frames had anyone wait.
+    pub wall: f64,
 }
 
 /// What [`BuildReport`] says, in the form of the files.
@@ -104,6 +107,13 @@ impl From<RayCounts> for RaySummary {
     }
 }
 
+impl RaySummary {
+    /// Rays of all kinds.
+    pub const fn total(&self) -> u64 {
+        self.primary + self.shadow + self.reflection + self.refraction
+    }
+}
+
 impl FrameReport {
     /// Takes over what the builder says.
     pub fn set_build(&mut self, report: &BuildReport) {
@@ -134,4 +144,44 @@ impl FrameReport {
         let s = &self.seconds;
         Duration::from_secs_f64(s.read + s.build + s.trace + s.encode)
     }
+
+    /// Bytes of positions, radii and tree for a particle; None without particles.
+    pub fn bytes_per_particle(&self) -> Option<f64> {
+        let bytes = self.bytes.positions + self.bytes.structure;
+        ratio(bytes, float(self.particles))
+    }
+
+    /// Rays of all kinds in a second of tracing; None if there was none.
+    pub fn rays_per_second(&self) -> Option<f64> {
+        ratio(self.rays.total(), self.seconds.trace)
+    }
+
+    /// Adds what can be summed over frames; of memory the larger value stays.
+    pub(super) fn add(&mut self, frame: &Self) {
+        self.particles += frame.particles;
+        self.dropped += frame.dropped;
+        self.clamped_radii += frame.clamped_radii;
+        self.clamped_pixels += frame.clamped_pixels;
+        self.seconds.read += frame.seconds.read;
+        self.seconds.build += frame.seconds.build;
+        self.seconds.trace += frame.seconds.trace;
+        self.seconds.encode += frame.seconds.encode;
+        self.seconds.wall += frame.seconds.wall;
+        self.rays.primary += frame.rays.primary;
+        self.rays.shadow += frame.rays.shadow;
+        self.rays.reflection += frame.rays.reflection;
+        self.rays.refraction += frame.rays.refraction;
+        self.rss.anonymous_peak = self.rss.anonymous_peak.max(frame.rss.anonymous_peak);
+        self.rss.file_peak = self.rss.file_peak.max(frame.rss.file_peak);
+        self.rss.total_peak = self.rss.total_peak.max(frame.rss.total_peak);
+    }
+}
+
+fn ratio(of: u64, to: f64) -> Option<f64> {
+    (to > 0.0).then(|| float(of) / to)
+}
+
+#[expect(clippy::cast_precision_loss, reason = "for people and ratios")]
+const fn float(count: u64) -> f64 {
+    count as f64
 }

@@ -17,8 +17,8 @@ const FONT: i32 = 13;
 /// Digits are about this wide.
 const DIGIT: i32 = 8;
 /// Room above for the title of the vertical axis, and below for labels and the horizontal one's.
-const TOP: i32 = 28;
-const BOTTOM: i32 = 43;
+const TOP: i32 = 30;
+const BOTTOM: i32 = 46;
 /// Room for half of the last label.
 const RIGHT: i32 = 22;
 
@@ -167,9 +167,10 @@ fn draw(
         .bold_line_style(GRID)
         .axis_style(GRID)
         .label_style(font.clone())
-        .set_all_tick_mark_size(4 * FINE)
+        .set_tick_mark_size(LabelAreaPosition::Left, 4 * FINE)
+        .set_tick_mark_size(LabelAreaPosition::Bottom, 6 * FINE)
         .draw()?;
-    root.draw_text(plot.y.title(), &font, (0, 0))?;
+    root.draw_text(plot.y.title(), &font, (0, 4 * FINE))?;
     let bottom_right = Pos::new(HPos::Right, VPos::Bottom);
     let corner = ((WIDTH - 2) * FINE, (HEIGHT - 4) * FINE);
     root.draw_text(plot.x.title(), &font.pos(bottom_right), corner)?;

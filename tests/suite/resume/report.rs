@@ -1,4 +1,4 @@
-//! `report.json` has what scripts rely on (DESIGN 3.2).
+//! `report.json` has what scripts rely on (DESIGN 3.2), and `report.html` shows the same.
 
 use std::fs;
 
@@ -9,6 +9,10 @@ use crate::harness::{Workshop, dam_break};
 fn report(workshop: &Workshop) -> Value {
     let bytes = fs::read(workshop.join("out/report.json")).expect("a report");
     serde_json::from_slice(&bytes).expect("JSON")
+}
+
+fn page(workshop: &Workshop) -> String {
+    fs::read_to_string(workshop.join("out/report.html")).expect("a page")
 }
 
 fn keys(value: &Value) -> Vec<&str> {
@@ -35,7 +39,10 @@ fn frames_totals_settings_and_machine() {
         .render(&["--frames", "1-3", "--threads", "2"])
         .expect(1);
     let first = report(&workshop);
-    has(&first, &["frames", "totals", "settings", "machine"]);
+    has(
+        &first,
+        &["frames", "totals", "slowest", "settings", "machine"],
+    );
     let frames = first["frames"].as_array().expect("frames");
     let status: Vec<&str> = frames.iter().filter_map(|f| f["status"].as_str()).collect();
     assert_eq!(status, ["done", "failed", "done", "pending"]);
@@ -57,9 +64,18 @@ fn frames_totals_settings_and_machine() {
         let sum: u64 = frames.iter().filter_map(|f| f["rays"][key].as_u64()).sum();
         assert_eq!(totals["rays"][key], sum, "{key}");
     }
+    let wall: f64 = frames
+        .iter()
+        .filter_map(|f| f["seconds"]["wall"].as_f64())
+        .sum();
+    assert_eq!(totals["seconds"]["wall"], wall);
+    assert_eq!(first["slowest"].as_array().map(Vec::len), Some(2));
     assert_eq!(first["settings"]["render.max_depth"], "3");
     assert_eq!(first["settings"]["image.width"], "64");
     assert_eq!(first["machine"]["threads"], 2);
+    let shown = page(&workshop);
+    assert!(shown.contains("2 of 4 done") && shown.contains("1 frame failed"));
+    assert!(shown.contains("f_2.bgeo") && shown.contains("id=\"plot-stages\""));
 
     // It tells of the whole job, not of the last run.
     fs::write(&file, good).expect("a file");
@@ -69,6 +85,29 @@ fn frames_totals_settings_and_machine() {
     assert!(frames.iter().all(|f| f["status"] == "done"));
     assert_eq!(frames[0], first["frames"][0]);
     assert_eq!(second["totals"]["done"], 4);
+    let shown = page(&workshop);
+    assert!(shown.contains("4 of 4 done") && !shown.contains("f_2.bgeo"));
+}
+
+#[test]
+fn a_job_with_failures_only_has_a_page_that_names_them() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=1);
+    workshop.render(&[]).expect(0);
+    let old = page(&workshop);
+    let unchanged = fs::metadata(workshop.join("out/report.html")).and_then(|m| m.modified());
+    workshop.render(&[]).expect(0);
+    assert_eq!(page(&workshop), old);
+    let now = fs::metadata(workshop.join("out/report.html")).and_then(|m| m.modified());
+    assert_eq!(now.expect("a time"), unchanged.expect("a time"));
+
+    fs::remove_file(workshop.join("out/f.0001.exr")).expect("an image");
+    let file = workshop.join("in/f_1.bgeo");
+    fs::write(&file, &fs::read(&file).expect("a frame")[..100]).expect("a file");
+    workshop.render(&[]).expect(1);
+    let shown = page(&workshop);
+    assert!(shown.contains("0 of 1 done") && shown.contains("No frame is done yet"));
+    assert!(shown.contains("in/f_1.bgeo"), "{shown}");
 }
 
 #[test]
@@ -89,7 +128,10 @@ fn lost_images_are_not_called_done() {
 #[track_caller]
 fn done_frame(frame: &Value) {
     assert_eq!(frame["particles"], 10422);
-    has(&frame["seconds"], &["read", "build", "trace", "encode"]);
+    has(
+        &frame["seconds"],
+        &["read", "build", "trace", "encode", "wall"],
+    );
     has(&frame["build"], &["order", "nodes"]);
     has(&frame["bytes"], &["positions", "structure", "build_peak"]);
     has(
@@ -99,6 +141,15 @@ fn done_frame(frame: &Value) {
     has(&frame["rss"], &["anonymous_peak", "file_peak"]);
     assert_eq!(frame["rays"]["primary"], 64 * 36);
     assert!(frame["bytes"]["positions"].as_u64() >= Some(10422 * 12));
+    let bytes = frame["bytes"]["positions"]
+        .as_f64()
+        .zip(frame["bytes"]["structure"].as_f64());
+    let (positions, structure) = bytes.expect("numbers");
+    assert_eq!(
+        frame["bytes"]["per_particle"],
+        (positions + structure) / 10422.0
+    );
+    assert!(frame["rays_per_second"].as_f64() > Some(0.0));
     assert!(frame["build"]["nodes"].as_u64() > Some(0));
     for stage in ["read", "build", "trace", "encode"] {
         assert!(frame["seconds"][stage].as_f64() > Some(0.0), "{stage}");

@@ -1,0 +1,159 @@
+//! Tables of frames. A long sequence has all its frames in `report.json` and a choice here.
+
+use super::numbers::{count, float, mib, short, shortened};
+use super::{JobFrame, JobReport, Status};
+use crate::report::page::{Page, Table};
+
+/// Rows of the table of frames, and of that of failures.
+const MOST_FRAMES: usize = 300;
+const MOST_FAILURES: usize = 50;
+/// Characters of a message.
+const MOST_TEXT: usize = 500;
+
+const HEADS: [&str; 17] = [
+    "frame",
+    "status",
+    "particles",
+    "read\ns",
+    "build\ns",
+    "trace\ns",
+    "encode\ns",
+    "all stages\ns",
+    "rays\nmillions",
+    "rays\nM/s",
+    "anonymous\nMiB",
+    "file\nMiB",
+    "bytes a\nparticle",
+    "tree peak\nMiB",
+    "particles\ndropped",
+    "radii\nclamped",
+    "pixels\nclamped",
+];
+
+impl JobReport {
+    /// Failed frames with their reasons, if any.
+    pub(super) fn put_failures(&self, page: &mut Page) {
+        let failed = || self.frames.iter().filter(|f| f.status == Status::Failed);
+        let total = failed().count();
+        if total == 0 {
+            return;
+        }
+        page.section("failed", "Failed");
+        page.warning(&match total {
+            1 => "1 frame failed.".to_owned(),
+            total => format!("{total} frames failed."),
+        });
+        let mut table = Table::new("failed-frames", &["frame", "image", "reason"]);
+        for frame in failed().take(MOST_FAILURES) {
+            table.bad_row([
+                frame.number.to_string(),
+                frame.image.clone().unwrap_or_default(),
+                shortened(frame.reason.as_deref().unwrap_or("not told"), MOST_TEXT),
+            ]);
+        }
+        page.table(&table);
+        if total > MOST_FAILURES {
+            let note = format!("These are the first {MOST_FAILURES}; all are in");
+            page.link(&note, super::JSON_FILE);
+        }
+    }
+
+    /// The slowest frames, where there are so many that they are worth a table.
+    pub(super) fn put_slowest(&self, page: &mut Page) {
+        if self.done().count() < 2 {
+            return;
+        }
+        page.section("slowest", "Slowest frames");
+        let mut table = Table::new("slowest-frames", &HEADS);
+        for (frame, _) in self.slowest() {
+            table.row(cells(frame));
+        }
+        page.table(&table);
+    }
+
+    /// Frames that were tried.
+    pub(super) fn put_frames(&self, page: &mut Page) {
+        page.section("frames", "Frames");
+        let tried: Vec<&JobFrame> = self
+            .frames
+            .iter()
+            .filter(|frame| frame.status != Status::Pending)
+            .collect();
+        if tried.is_empty() {
+            page.text("No frame has been tried yet.");
+            return;
+        }
+        let mut table = Table::new("all-frames", &HEADS);
+        let chosen = evenly(tried.len(), MOST_FRAMES);
+        let all = chosen.len() == tried.len();
+        for index in chosen {
+            let frame = tried[index];
+            if frame.status == Status::Failed {
+                table.bad_row(cells(frame));
+            } else {
+                table.row(cells(frame));
+            }
+        }
+        page.text(
+            "Times are wall-clock; neighbouring frames overlap. Memory is that of the process, the \
+             largest seen from the beginning of its run to this frame.",
+        );
+        if !all {
+            let tried = count(tried.len() as u64);
+            let note = format!("{MOST_FRAMES} of {tried} frames, evenly chosen; all are in");
+            page.link(&note, super::JSON_FILE);
+        }
+        page.table(&table);
+    }
+}
+
+/// At most `most` of the indices up to `total`, evenly spread, the first and the last among them.
+fn evenly(total: usize, most: usize) -> Vec<usize> {
+    if total <= most {
+        return (0..total).collect();
+    }
+    (0..most).map(|i| i * (total - 1) / (most - 1)).collect()
+}
+
+/// The row of a frame under [`HEADS`]; empty cells for what is not known.
+fn cells(frame: &JobFrame) -> Vec<String> {
+    let mut cells = vec![frame.number.to_string(), frame.status.name().to_owned()];
+    let Some(report) = &frame.report else {
+        return cells;
+    };
+    let seconds = &report.seconds;
+    let rate = report.rays_per_second().map_or(f64::NAN, |rate| rate / 1e6);
+    cells.extend([
+        count(report.particles),
+        short(seconds.read),
+        short(seconds.build),
+        short(seconds.trace),
+        short(seconds.encode),
+        short(report.total().as_secs_f64()),
+        short(float(report.rays.total()) / 1e6),
+        short(rate),
+        mib(report.rss.anonymous_peak),
+        mib(report.rss.file_peak),
+        short(report.bytes_per_particle().unwrap_or(f64::NAN)),
+        mib(report.bytes.build_peak),
+        count(report.dropped),
+        count(report.clamped_radii),
+        count(report.clamped_pixels),
+    ]);
+    cells
+}
+
+#[cfg(test)]
+mod tests {
+    use super::evenly;
+
+    #[test]
+    fn a_choice_has_both_ends() {
+        assert_eq!(evenly(3, 5), [0, 1, 2]);
+        assert_eq!(evenly(9, 3), [0, 4, 8]);
+        assert_eq!(evenly(0, 3), [0usize; 0]);
+        let chosen = evenly(10_000, 300);
+        assert_eq!((chosen.len(), chosen[0], chosen[299]), (300, 0, 9999));
+        assert!(chosen.windows(2).all(|pair| pair[0] < pair[1]));
+    }
+}

@@ -1,0 +1,158 @@
+//! `report.html`: the same for people.
+
+use spherule_jobs::FrameRange;
+
+use super::numbers::{bytes, count, duration, short, shortened};
+use super::{JobReport, Status};
+use crate::report::FrameReport;
+use crate::report::page::{Page, Table};
+
+/// Characters of a list of frame numbers, or of a setting.
+const MOST_TEXT: usize = 300;
+
+impl JobReport {
+    /// The report as a page.
+    pub fn to_html(&self) -> String {
+        let mut page = Page::new(&self.title());
+        page.key_values(&self.progress());
+        self.put_failures(&mut page);
+        page.section("totals", "Totals");
+        page.key_values(&self.totals_list());
+        page.section("plots", "Over the sequence");
+        if self.done().next().is_some() {
+            page.plots(&self.plots());
+        } else {
+            page.text("No frame is done yet.");
+        }
+        self.put_slowest(&mut page);
+        self.put_tree(&mut page);
+        self.put_frames(&mut page);
+        self.put_settings(&mut page);
+        page.link("All numbers, for scripts:", super::JSON_FILE);
+        page.html()
+    }
+
+    /// The images' name is what the user knows the job by.
+    fn title(&self) -> String {
+        let path = self.settings.iter().find(|(key, _)| key == "output.path");
+        path.map_or_else(
+            || "Job report".to_owned(),
+            |(_, path)| format!("Job report: {}", path.trim_matches('"')),
+        )
+    }
+
+    fn progress(&self) -> Vec<(&'static str, String)> {
+        let done = self.with_status(Status::Done).len();
+        let mut list = vec![("Frames", format!("{done} of {} done", self.frames.len()))];
+        for (name, status) in [("Failed", Status::Failed), ("Still to do", Status::Pending)] {
+            let frames = self.with_status(status);
+            if !frames.is_empty() {
+                list.push((name, format!("{}: {}", frames.len(), list_of(&frames))));
+            }
+        }
+        list.push((
+            "Reported on",
+            format!(
+                "{} threads, {}, {} {}, spherule {}",
+                self.machine.threads,
+                self.machine.simd,
+                std::env::consts::OS,
+                std::env::consts::ARCH,
+                env!("CARGO_PKG_VERSION")
+            ),
+        ));
+        list
+    }
+
+    fn totals_list(&self) -> Vec<(&'static str, String)> {
+        let totals = &self.totals;
+        let seconds = &totals.seconds;
+        let rays = &totals.rays;
+        let mut list = vec![
+            ("Particles drawn", count(totals.particles)),
+            ("Wall-clock time of the frames done", duration(seconds.wall)),
+            ("Reading", duration(seconds.read)),
+            ("Building", duration(seconds.build)),
+            ("Tracing", duration(seconds.trace)),
+            ("Encoding and writing", duration(seconds.encode)),
+            ("Rays", count(rays.total())),
+            (
+                "of these primary, shadow, reflected, refracted",
+                [rays.primary, rays.shadow, rays.reflection, rays.refraction]
+                    .map(count)
+                    .join(", "),
+            ),
+        ];
+        if let Some(rate) = totals.rays_per_second() {
+            list.push((
+                "Rays a second while tracing",
+                format!("{} million", short(rate / 1e6)),
+            ));
+        }
+        list.extend([
+            ("Peak memory, anonymous", bytes(totals.rss.anonymous_peak)),
+            ("Peak memory, file-backed", bytes(totals.rss.file_peak)),
+            ("Peak of all resident memory", bytes(totals.rss.total_peak)),
+            ("Particles dropped (not finite)", count(totals.dropped)),
+            ("Radii clamped (too small)", count(totals.clamped_radii)),
+            ("Pixels clamped (too bright)", count(totals.clamped_pixels)),
+        ]);
+        list
+    }
+
+    /// The tree of the slowest frame, and where the time to build it went.
+    fn put_tree(&self, page: &mut Page) {
+        let slowest = self.slowest();
+        let Some((frame, report)) = slowest.first() else {
+            return;
+        };
+        let build = &report.build;
+        page.section(
+            "build",
+            &format!("Tree of the slowest frame, {}", frame.number),
+        );
+        page.key_values(&[
+            ("Structure", build.structure.clone()),
+            ("Order of the particles", build.order.clone()),
+            ("Instruction set of the rays", build.simd.clone()),
+            ("Nodes", count(build.nodes)),
+            ("Leaves", count(build.leaves)),
+            ("Depth", build.depth.to_string()),
+            ("SAH cost", short(build.sah_cost)),
+            ("Positions", bytes(report.bytes.positions)),
+            ("Nodes and indices", bytes(report.bytes.structure)),
+            ("Peak while building", bytes(report.bytes.build_peak)),
+        ]);
+        let table = phases(report);
+        if !table.is_empty() {
+            page.table(&table);
+        }
+    }
+
+    fn put_settings(&self, page: &mut Page) {
+        page.section("settings", "Settings");
+        page.fold(&format!("All {} settings", self.settings.len()));
+        let mut table = Table::new("all-settings", &["setting", "value"]);
+        for (key, value) in &self.settings {
+            table.row([key.clone(), shortened(value, MOST_TEXT)]);
+        }
+        page.table(&table);
+        page.end_fold();
+    }
+}
+
+/// Seconds by phase, and their part of the whole.
+fn phases(report: &FrameReport) -> Table {
+    let mut table = Table::new("build-phases", &["phase", "seconds", "part, %"]);
+    for (name, seconds) in &report.build.phases {
+        let part = 100.0 * seconds / report.seconds.build;
+        table.row([name.clone(), short(*seconds), short(part)]);
+    }
+    table
+}
+
+/// Frame numbers as a range.
+fn list_of(frames: &[i64]) -> String {
+    let range = FrameRange::from_frames(frames.iter().copied());
+    range.map_or_else(String::new, |r| shortened(&r.to_string(), MOST_TEXT))
+}
