@@ -240,13 +240,13 @@ h2{font-size:1.2rem;margin:2.2rem 0 .7rem;padding-top:.7rem;border-top:1px solid
 p{margin:.5rem 0;max-width:46rem;overflow-wrap:anywhere}
 a{color:var(--link)}
 .warning{color:var(--bad);font-weight:600}
-dl{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,15rem),1fr));gap:.5rem 1.5rem;margin:.5rem 0}
+dl{display:grid;grid-template-columns:repeat(auto-fill,minmax(min(100%,10rem),1fr));gap:.6rem 1.2rem;margin:.5rem 0}
 dl div{min-width:0}
 dt{color:var(--faint);font-size:.85rem}
 dd{margin:0;overflow-wrap:anywhere;unicode-bidi:isolate;font-variant-numeric:tabular-nums}
 .wide{overflow-x:auto;border:1px solid var(--grid);border-radius:6px;margin:.6rem 0}
 table{border-collapse:collapse;width:100%;font-size:.85rem;font-variant-numeric:tabular-nums}
-th,td{padding:.35rem .7rem;text-align:left;vertical-align:top;unicode-bidi:isolate}
+th,td{padding:.35rem .5rem;text-align:left;vertical-align:top;unicode-bidi:isolate}
 th{vertical-align:bottom;background:var(--band);font-weight:600;white-space:pre-line}
 td{border-top:1px solid var(--grid);overflow-wrap:break-word;max-width:40rem}
 .number{text-align:right;white-space:nowrap}

@@ -1,6 +1,6 @@
 //! Tables of frames. A long sequence has all its frames in `report.json` and a choice here.
 
-use super::numbers::{count, float, mib, short, shortened};
+use super::numbers::{count, float, mib, seconds, short, shortened};
 use super::{JobFrame, JobReport, Status};
 use crate::report::page::{Page, Table};
 
@@ -64,9 +64,10 @@ impl JobReport {
             return;
         }
         page.section("slowest", "Slowest frames");
-        let mut table = Table::new("slowest-frames", &HEADS);
+        // Up to the sum of the stages: the rest is further down.
+        let mut table = Table::new("slowest-frames", &HEADS[..8]);
         for (frame, _) in self.slowest() {
-            table.row(cells(frame));
+            table.row(cells(frame).into_iter().take(8));
         }
         page.table(&table);
     }
@@ -121,15 +122,15 @@ fn cells(frame: &JobFrame) -> Vec<String> {
     let Some(report) = &frame.report else {
         return cells;
     };
-    let seconds = &report.seconds;
+    let times = &report.seconds;
     let rate = report.rays_per_second().map_or(f64::NAN, |rate| rate / 1e6);
     cells.extend([
         count(report.particles),
-        short(seconds.read),
-        short(seconds.build),
-        short(seconds.trace),
-        short(seconds.encode),
-        short(report.total().as_secs_f64()),
+        seconds(times.read),
+        seconds(times.build),
+        seconds(times.trace),
+        seconds(times.encode),
+        seconds(report.total().as_secs_f64()),
         short(float(report.rays.total()) / 1e6),
         short(rate),
         mib(report.rss.anonymous_peak),

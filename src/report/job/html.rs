@@ -2,7 +2,7 @@
 
 use spherule_jobs::FrameRange;
 
-use super::numbers::{bytes, count, duration, short, shortened};
+use super::numbers::{bytes, count, duration, seconds as time, short, shortened};
 use super::{JobReport, Status};
 use crate::report::FrameReport;
 use crate::report::page::{Page, Table};
@@ -77,7 +77,7 @@ impl JobReport {
             ("Encoding and writing", duration(seconds.encode)),
             ("Rays", count(rays.total())),
             (
-                "of these primary, shadow, reflected, refracted",
+                "Primary, shadow, reflected, refracted",
                 [rays.primary, rays.shadow, rays.reflection, rays.refraction]
                     .map(count)
                     .join(", "),
@@ -146,7 +146,7 @@ fn phases(report: &FrameReport) -> Table {
     let mut table = Table::new("build-phases", &["phase", "seconds", "part, %"]);
     for (name, seconds) in &report.build.phases {
         let part = 100.0 * seconds / report.seconds.build;
-        table.row([name.clone(), short(*seconds), short(part)]);
+        table.row([name.clone(), time(*seconds), short(part)]);
     }
     table
 }

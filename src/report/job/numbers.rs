@@ -28,6 +28,15 @@ pub(super) fn short(value: f64) -> String {
     }
 }
 
+/// Seconds in a table, to a tenth of a millisecond where that counts.
+pub(super) fn seconds(value: f64) -> String {
+    if value < 0.9995 {
+        format!("{value:.4}")
+    } else {
+        short(value)
+    }
+}
+
 /// Seconds in the unit that suits them.
 pub(super) fn duration(seconds: f64) -> String {
     if seconds < 1.0 {
@@ -58,7 +67,9 @@ pub(super) fn mib(bytes: u64) -> String {
 /// Bytes with their unit.
 pub(super) fn bytes(bytes: u64) -> String {
     let mib = float(bytes) / MIB;
-    if mib < 1024.0 {
+    if mib < 0.9995 {
+        format!("{} KiB", short(mib * 1024.0))
+    } else if mib < 1024.0 {
         format!("{} MiB", short(mib))
     } else {
         format!("{} GiB", short(mib / 1024.0))
@@ -76,5 +87,36 @@ pub(super) fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}\u{2026}", &text[..end]),
         None => text.to_owned(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn as_people_write_them() {
+        assert_eq!(
+            [0, 999, 1000, 12_345_678].map(count),
+            ["0", "999", "1\u{202f}000", "12\u{202f}345\u{202f}678"]
+        );
+        let values = [0.0, 0.001_234, 0.0346, 1.0, 12.34, 99.96, 1234.6, f64::NAN];
+        assert_eq!(
+            values.map(short),
+            [
+                "0.000", "0.00123", "0.035", "1.00", "12.3", "100", "1235", ""
+            ]
+        );
+        assert_eq!([0.002_76, 1.5].map(seconds), ["0.0028", "1.50"]);
+        assert_eq!(
+            [0.002, 5.0, 125.0, 7260.0].map(duration),
+            ["2.00 ms", "5.00 s", "2 min 5 s", "2 h 1 min"]
+        );
+        assert_eq!(
+            [2048, 3 << 20, 5 << 30].map(bytes),
+            ["2.00 KiB", "3.00 MiB", "5.00 GiB"]
+        );
+        assert_eq!(shortened("a\u{e4}bc", 2), "a\u{e4}\u{2026}");
+        assert_eq!(shortened("ab", 2), "ab");
     }
 }

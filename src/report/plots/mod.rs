@@ -9,6 +9,8 @@
 //! What is in the data is left to the caller; [`super::page`] puts the figure onto a page.
 
 mod axis;
+#[cfg(test)]
+mod axis_tests;
 mod draw;
 mod key;
 mod svg;
