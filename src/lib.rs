@@ -31,6 +31,7 @@ pub mod ray;
 pub mod render;
 pub mod report;
 pub mod resolve;
+pub mod scale;
 pub mod scene;
 pub mod surface;
 pub mod survey;

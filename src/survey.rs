@@ -121,6 +121,18 @@ impl Survey {
     /// # Errors
     /// If none of the frames can be read, why the first one cannot.
     pub fn of(sequence: &Sequence, question: Question) -> Result<Self, FrameError> {
+        Self::of_frames(sequence, spread(sequence.frames().len()), question)
+    }
+
+    /// Looks at the frames of `sequence` with these indices.
+    ///
+    /// # Errors
+    /// As [`Self::of`].
+    pub fn of_frames(
+        sequence: &Sequence,
+        indices: impl IntoIterator<Item = usize>,
+        question: Question,
+    ) -> Result<Self, FrameError> {
         let mut totals = Totals {
             bounds: None,
             radius: None,
@@ -134,7 +146,7 @@ impl Survey {
             frames: 0,
         };
         let mut failure = None;
-        for index in spread(sequence.frames().len()) {
+        for index in indices {
             match sequence.load_raw(index) {
                 Ok(raw) => totals.take_in(raw, question),
                 Err(error) => {

@@ -53,14 +53,15 @@ pub fn fill_box(settings: &BoxSettings) -> Vec<Vec3> {
     // The state only counts up, so every particle can start at its own place.
     let particle = |index: usize| {
         let first = (index as u64).wrapping_mul(3);
-        let unit = Vec3::from_array([1, 2, 3].map(|k| unit(nth(seed, first.wrapping_add(k)))));
+        let unit =
+            Vec3::from_array([1, 2, 3].map(|k| unit(splitmix64(seed, first.wrapping_add(k)))));
         min + unit * size
     };
     (0..count).into_par_iter().map(particle).collect()
 }
 
 /// Number `n` (from 1) of splitmix64 started at `seed`.
-fn nth(seed: u64, n: u64) -> u64 {
+pub fn splitmix64(seed: u64, n: u64) -> u64 {
     const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
     let state = seed.wrapping_add(n.wrapping_mul(STEP));
     let z = (state ^ (state >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -90,7 +91,7 @@ mod tests {
             9_817_491_932_198_370_423,
             4_593_380_528_125_082_431,
         ];
-        assert_eq!([1, 2, 3, 4].map(|n| nth(1_234_567, n)), expected);
+        assert_eq!([1, 2, 3, 4].map(|n| splitmix64(1_234_567, n)), expected);
     }
 
     #[test]

@@ -74,7 +74,7 @@ fn write_native(path: &Path, centers: Vec<glam::Vec3>) -> Result<(), FrameError>
 }
 
 /// A whole number, also as 1e6 or 2_000_000.
-fn count(text: &str) -> Result<usize, String> {
+pub(super) fn count(text: &str) -> Result<usize, String> {
     let plain = text.replace('_', "");
     if let Ok(count) = plain.parse() {
         return Ok(count);

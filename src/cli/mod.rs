@@ -22,6 +22,7 @@ mod inspect;
 mod job;
 mod progress;
 mod render;
+mod scale;
 mod signals;
 
 use errors::CliError;
@@ -44,6 +45,11 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Make particles to measure with.
     Generate(generate::GenerateArgs),
+    /// Measure images per second, build time and memory over particle counts and structures.
+    Scale(Box<scale::ScaleArgs>),
+    /// Measure one cell for `scale`.
+    #[command(hide = true)]
+    ScaleCell,
 }
 
 /// Writes a line, as one piece so that lines of several threads or processes do not mix.
@@ -59,6 +65,8 @@ pub fn main() -> ExitCode {
         Command::Init(args) => init::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Scale(args) => scale::run(&args),
+        Command::ScaleCell => scale::measure::run(),
     };
     match result {
         Ok(outcome) => outcome.into(),

@@ -153,7 +153,7 @@ impl Progress {
 }
 
 /// Engines read these on standard output.
-fn openjd(done: usize, total: usize, plain: &str) {
+pub(super) fn openjd(done: usize, total: usize, plain: &str) {
     let percent = 100.0 * done as f64 / total.max(1) as f64;
     put(&mut stdout(), &format!("openjd_progress: {percent:.1}"));
     if !plain.is_empty() {

@@ -38,8 +38,13 @@ pub(super) struct RenderArgs {
     progress: ProgressMode,
 }
 
+const WORDS: signals::Words = signals::Words {
+    asked: "stopping after the frame in hand; once more stops at once",
+    at_once: "stopped; the same command goes on from here",
+};
+
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
-    let signals = signals::listen()?;
+    let signals = signals::listen(WORDS)?;
     if let Some(threads) = args.threads {
         rayon::ThreadPoolBuilder::new()
             .num_threads(usize::from(threads))

@@ -11,6 +11,15 @@ use spherule_jobs::Interrupt;
 
 use super::{CliError, INTERRUPTED};
 
+/// What is said to whoever sent a signal.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Words {
+    /// After the first, with work in hand.
+    pub(super) asked: &'static str,
+    /// After the one that ends the process.
+    pub(super) at_once: &'static str,
+}
+
 /// Whoever listens for signals.
 pub(super) struct Listener {
     /// Raised by the first signal once there are frames in hand.
@@ -27,7 +36,7 @@ impl Listener {
 }
 
 /// Listens until the process ends.
-pub(super) fn listen() -> Result<Listener, CliError> {
+pub(super) fn listen(words: Words) -> Result<Listener, CliError> {
     let interrupt = Interrupt::new();
     let at_work = Arc::new(AtomicBool::new(false));
     let mut signals = Signals::new([SIGINT, SIGTERM])
@@ -41,11 +50,11 @@ pub(super) fn listen() -> Result<Listener, CliError> {
             if interrupt.is_raised() || !at_work.load(Ordering::Acquire) {
                 // Nothing is lost: images appear whole or not at all, and what was being written
                 // is cleared away by the next run.
-                say!("stopped; the same command goes on from here");
+                say!("{}", words.at_once);
                 std::process::exit(i32::from(INTERRUPTED));
             }
             interrupt.raise();
-            say!("stopping after the frame in hand; once more stops at once");
+            say!("{}", words.asked);
         }
     });
     Ok(listener)

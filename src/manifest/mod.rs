@@ -32,6 +32,7 @@ pub use light::{Falloff, Light, LightKind};
 pub use look::{Accelerator, GroundHeight, Image, Material, Render};
 pub use output::{Channel, Compression, Output};
 pub use pattern::OutputPattern;
+pub(crate) use reader::nearest;
 pub use rebase::{named_place, real_dir};
 pub use tree::Override;
 

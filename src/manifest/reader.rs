@@ -322,7 +322,7 @@ pub(super) const fn narrow(value: f64) -> f32 {
 }
 
 /// The known word that was probably meant, if any is near enough.
-fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
+pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     let distance = |k: &str| strsim::damerau_levenshtein(&word.to_lowercase(), &k.to_lowercase());
     let best = known.iter().min_by_key(|k| distance(k))?;
     let is_part = word.len() >= 4 && best.contains(word) || best.len() >= 4 && word.contains(*best);

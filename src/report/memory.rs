@@ -23,6 +23,11 @@ pub fn available() -> Option<u64> {
     value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable")
 }
 
+/// Bytes of memory that the machine has (`MemTotal`); None where the system does not tell.
+pub fn installed() -> Option<u64> {
+    value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemTotal")
+}
+
 /// The bytes that a line `key: n kB` tells.
 fn value_of(table: &str, key: &str) -> Option<u64> {
     let mut lines = table.lines();

@@ -2,9 +2,11 @@
 
 pub mod frame;
 pub mod job;
+pub mod machine;
 pub mod memory;
 pub mod page;
 pub mod plots;
+pub mod scale;
 
 pub use frame::FrameReport;
 pub use memory::MemoryUse;

@@ -5,6 +5,7 @@
 //! image is its top. Lens blur and motion are left to later.
 
 use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
 use super::Bounds;
@@ -24,7 +25,7 @@ pub const DEFAULT_AZIMUTH: f64 = 30.0;
 pub const DEFAULT_ELEVATION: f64 = 20.0;
 
 /// Where a camera stands and looks, in world units, as a manifest has it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CameraView {
     /// Position of the pinhole.
     pub eye: DVec3,

@@ -5,6 +5,7 @@
 //! f32 is enough however far out the simulation's domain lies. Colours are linear RGB.
 
 use glam::{DVec3, Vec3};
+use serde::{Deserialize, Serialize};
 
 pub mod background;
 pub mod camera;
@@ -21,7 +22,7 @@ pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Material, MaterialError};
 
 /// An axis-aligned box in world units, spheres included.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Lowest corner.
     pub min: DVec3,

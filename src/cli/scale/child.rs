@@ -1,0 +1,175 @@
+//! One cell in a process of its own: this program again, under a hidden command.
+//!
+//! The request is one line on the child's standard input, which stays open: a child whose input
+//! ends has lost its parent and ends itself. The outcome is one line on its standard output. The
+//! child has its own process group, so that Ctrl-C reaches the parent alone.
+
+use std::io::{self, Read, Write};
+use std::path::PathBuf;
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::thread::{self, JoinHandle};
+use std::time::Duration;
+
+use spherule_jobs::Interrupt;
+
+use super::measure::COMMAND;
+use crate::report::scale::CellOutcome;
+use crate::scale::CellRequest;
+
+/// Between two looks at the child; short against any cell.
+const INTERVAL: Duration = Duration::from_millis(10);
+/// Characters of a reason; what a crash prints may be long.
+const REASON: usize = 400;
+
+/// How a child ended.
+pub(super) enum Ended {
+    /// With a result, or with a failure that is one.
+    Told(CellOutcome),
+    /// We have ended it because we were asked to.
+    Interrupted,
+}
+
+/// Runs the cell of `request`; whatever goes wrong in it is its outcome.
+pub(super) fn measure(request: &CellRequest, interrupt: &Interrupt) -> Ended {
+    if interrupt.is_raised() {
+        return Ended::Interrupted;
+    }
+    let failed = |reason: String| Ended::Told(CellOutcome::Failed { reason });
+    let mut child = match spawn() {
+        Ok(child) => child,
+        Err(e) => return failed(format!("cannot start a process: {e}")),
+    };
+    let output = reader(child.stdout.take());
+    let errors = reader(child.stderr.take());
+    let mut input = child.stdin.take();
+    if let (Some(input), Ok(line)) = (&mut input, serde_json::to_string(request)) {
+        // A child that is dead already tells by its status why.
+        let _ = writeln!(input, "{line}");
+    }
+    let status = loop {
+        match child.try_wait() {
+            Ok(Some(status)) => break status,
+            Ok(None) => {}
+            Err(e) => return failed(format!("lost its process: {e}")),
+        }
+        if interrupt.is_raised() {
+            let _ = child.kill();
+            let _ = child.wait();
+            return Ended::Interrupted;
+        }
+        thread::sleep(INTERVAL);
+    };
+    drop(input);
+    let text = |reader: JoinHandle<String>| reader.join().unwrap_or_default();
+    let (output, errors) = (text(output), text(errors));
+    match serde_json::from_str(&output) {
+        Ok(outcome) if status.success() => Ended::Told(outcome),
+        _ => failed(reason(status, &errors)),
+    }
+}
+
+fn spawn() -> io::Result<Child> {
+    let mut command = Command::new(own_program()?);
+    command
+        .arg(COMMAND)
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped());
+    #[cfg(unix)]
+    std::os::unix::process::CommandExt::process_group(&mut command, 0);
+    command.spawn()
+}
+
+/// The file that this process runs, even if another has taken its name since.
+fn own_program() -> io::Result<PathBuf> {
+    let link = PathBuf::from("/proc/self/exe");
+    if link.exists() {
+        Ok(link)
+    } else {
+        std::env::current_exe()
+    }
+}
+
+/// Reads to the end, so that the child never waits for us.
+fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
+    thread::spawn(move || {
+        let mut bytes = Vec::new();
+        if let Some(mut pipe) = pipe {
+            let _ = pipe.read_to_end(&mut bytes);
+        }
+        String::from_utf8_lossy(&bytes).into_owned()
+    })
+}
+
+/// Why a child ended without a result.
+fn reason(status: ExitStatus, errors: &str) -> String {
+    let told: Vec<&str> = errors
+        .lines()
+        .map(|line| line.strip_prefix("error: ").unwrap_or(line).trim())
+        .filter(|line| !line.is_empty() && !line.starts_with("note: "))
+        .collect();
+    let told: String = told.join("; ").chars().take(REASON).collect();
+    if told.contains("memory allocation of") {
+        return format!("out of memory: {told}");
+    }
+    let how = match signal(status) {
+        Some(9) => "killed by the system, most likely for want of memory".to_owned(),
+        Some(signal) => format!("ended by signal {signal}"),
+        None if told.contains("panicked at") => {
+            "a fault in spherule itself, please report it".to_owned()
+        }
+        None => status.to_string(),
+    };
+    if told.is_empty() {
+        how
+    } else {
+        format!("{how}: {told}")
+    }
+}
+
+#[cfg(unix)]
+fn signal(status: ExitStatus) -> Option<i32> {
+    std::os::unix::process::ExitStatusExt::signal(&status)
+}
+
+#[cfg(not(unix))]
+fn signal(_: ExitStatus) -> Option<i32> {
+    None
+}
+
+#[cfg(all(test, unix))]
+mod tests {
+    use super::*;
+    use std::os::unix::process::ExitStatusExt;
+
+    #[test]
+    fn reasons_are_readable() {
+        let by_signal = |n| ExitStatus::from_raw(n);
+        for (status, errors, wanted) in [
+            (
+                by_signal(6),
+                "memory allocation of 48000000000 bytes failed\n",
+                "out of memory: memory allocation of 48000000000 bytes failed",
+            ),
+            (
+                by_signal(9),
+                "",
+                "killed by the system, most likely for want of memory",
+            ),
+            (by_signal(15), "", "ended by signal 15"),
+            (
+                ExitStatus::from_raw(101 << 8),
+                "\nthread 'main' panicked at src/x.rs:1:2:\nno such thing\nnote: run with\n",
+                "a fault in spherule itself, please report it: thread 'main' panicked at \
+                 src/x.rs:1:2:; no such thing",
+            ),
+            (
+                ExitStatus::from_raw(2 << 8),
+                "error: standard input: no request\n",
+                "exit status: 2: standard input: no request",
+            ),
+        ] {
+            assert_eq!(reason(status, errors), wanted);
+        }
+    }
+}

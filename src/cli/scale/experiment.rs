@@ -1,0 +1,155 @@
+//! From arguments to the cells of the experiment.
+
+use std::collections::HashSet;
+use std::hash::Hash;
+use std::path::Path;
+
+use spherule_formats::sequence::{Sequence, SequenceInput};
+
+use super::ScaleArgs;
+use crate::accel::Structure;
+use crate::cli::CliError;
+use crate::cli::job::absolute;
+use crate::report::scale::{InputSummary, ScaleSettings};
+use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
+
+/// Seconds a cell where nothing else is said: the thesis's minute.
+const SECONDS: f64 = 60.0;
+
+/// Everything that is settled before the first cell runs.
+pub(super) struct Experiment {
+    /// As the report has it.
+    pub(super) settings: ScaleSettings,
+    structures: Vec<Structure>,
+    source: Source,
+    stage: Stage,
+}
+
+impl Experiment {
+    /// Looks at the input, if there is one.
+    pub(super) fn settle(args: &ScaleArgs) -> Result<Self, CliError> {
+        let structures = each_once(&args.structures, &Structure::ALL);
+        let mut settings = ScaleSettings {
+            input: None,
+            particles: each_once(&args.particles, &[]),
+            structures: structures.iter().map(|s| s.name().to_owned()).collect(),
+            motions: each_once(&args.motions, &Motion::ALL),
+            representations: each_once(&args.representations, &[Representation::F32]),
+            budget: match (args.seconds, args.images) {
+                (_, Some(images)) => Budget::Images(images),
+                (seconds, None) => Budget::Seconds(seconds.unwrap_or(SECONDS)),
+            },
+            width: args.width,
+            height: args.height,
+            samples: args.samples,
+            max_depth: args.max_depth,
+            seed: args.seed,
+            threads: args
+                .threads
+                .map_or_else(rayon::current_num_threads, usize::from),
+        };
+        let mut source = Source::Box;
+        let mut stage = Stage::THESIS;
+        if let Some(path) = &args.input {
+            let survey = look_at(path, args)?;
+            settings.input = Some(InputSummary {
+                path: path.display().to_string(),
+                frame: survey.source.frame,
+                particles: survey.particles,
+            });
+            settings.particles = at_most(survey.particles, &settings.particles);
+            source = Source::Frame(survey.source);
+            stage = survey.stage;
+        }
+        Ok(Self {
+            settings,
+            structures,
+            source,
+            stage,
+        })
+    }
+
+    /// In the order in which they run: what takes long comes last.
+    pub(super) fn cells(&self) -> Vec<CellRequest> {
+        let s = &self.settings;
+        let mut cells = Vec::new();
+        for &particles in &s.particles {
+            for &structure in &self.structures {
+                for &representation in &s.representations {
+                    for &motion in &s.motions {
+                        cells.push(CellRequest {
+                            source: self.source.clone(),
+                            particles,
+                            seed: s.seed,
+                            structure,
+                            motion,
+                            representation,
+                            stage: self.stage,
+                            budget: s.budget,
+                            width: s.width,
+                            height: s.height,
+                            samples: s.samples,
+                            max_depth: s.max_depth,
+                            threads: s.threads,
+                        });
+                    }
+                }
+            }
+        }
+        cells
+    }
+}
+
+/// What was asked for, once each; all there is if nothing was.
+fn each_once<T: Copy + Eq + Hash>(asked: &[T], all: &[T]) -> Vec<T> {
+    let mut seen = HashSet::new();
+    let wanted = if asked.is_empty() { all } else { asked };
+    wanted.iter().copied().filter(|t| seen.insert(*t)).collect()
+}
+
+fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
+    // Cells may be started from elsewhere.
+    let path = absolute(path)?;
+    let sequence = Sequence::open(&SequenceInput::from_path(&path))?;
+    for note in sequence.notes() {
+        say!("note: {note}");
+    }
+    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    let index = match args.frame {
+        None => 0,
+        Some(frame) => numbers.iter().position(|n| *n == frame).ok_or_else(|| {
+            CliError::other(format!(
+                "--frame {frame}: {} has no such frame; there are {}",
+                path.display(),
+                spherule_jobs::FrameRange::from_frames(numbers.iter().copied())
+                    .map_or_else(String::new, |r| r.to_string())
+            ))
+        })?,
+    };
+    if args.frame.is_none() && numbers.len() > 1 {
+        say!(
+            "note: {} has {} frames; frame {} is measured, --frame chooses another",
+            path.display(),
+            numbers.len(),
+            numbers[index]
+        );
+    }
+    let aspect = f64::from(args.width) / f64::from(args.height);
+    FrameSurvey::of(&sequence, &path, index, aspect).map_err(CliError::Other)
+}
+
+/// The `asked` counts that there are particles for; in place of those above, all `there` are, once.
+fn at_most(there: usize, asked: &[usize]) -> Vec<usize> {
+    let (mut fit, above): (Vec<_>, Vec<_>) = asked.iter().partition(|count| **count <= there);
+    if !above.is_empty() {
+        let above: Vec<String> = above.iter().map(usize::to_string).collect();
+        say!(
+            "note: the input has {there} particles; all of them are measured, once, instead of {}",
+            above.join(", ")
+        );
+        if !fit.contains(&there) {
+            fit.push(there);
+        }
+    }
+    fit
+}

@@ -1,0 +1,135 @@
+//! The paths that cameras take. The thesis names them (rotation, translation, both) and no more;
+//! these give its figures their shape: nearly even over a rotation, widely spread over a
+//! translation, because what is looked at grows from small to all of the view and then leaves it.
+
+use std::f64::consts::TAU;
+use std::fmt;
+
+use glam::{DQuat, DVec3};
+use serde::{Deserialize, Serialize};
+
+use crate::scene::CameraView;
+
+/// How the camera moves while images are made.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Motion {
+    /// Once around the middle of the particles, about the camera's up, from where it stands.
+    Rotation,
+    /// Straight along the view: from twice the distance to the point looked at, to it, and as far
+    /// again beyond it. A third of the way is before the still view, a third from there to the
+    /// point, a third behind it.
+    Translation,
+    /// Both at once: a spiral.
+    Both,
+}
+
+impl Motion {
+    /// All there are.
+    pub const ALL: [Self; 3] = [Self::Rotation, Self::Translation, Self::Both];
+
+    /// Its name on the command line and in files.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Rotation => "rotation",
+            Self::Translation => "translation",
+            Self::Both => "both",
+        }
+    }
+
+    /// The view at `t` in 0..1 of the way that goes with the still view `start` around `center`.
+    pub(super) fn view_at(self, t: f64, start: &CameraView, center: DVec3) -> CameraView {
+        match self {
+            Self::Rotation => orbited(start, center, t),
+            Self::Translation => shifted(start, t),
+            Self::Both => orbited(&shifted(start, t), center, t),
+        }
+    }
+}
+
+impl fmt::Display for Motion {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+fn orbited(view: &CameraView, center: DVec3, turns: f64) -> CameraView {
+    let turn = DQuat::from_axis_angle(view.up.normalize_or(DVec3::Z), turns * TAU);
+    let around = |point: DVec3| center + turn * (point - center);
+    CameraView {
+        eye: around(view.eye),
+        look_at: around(view.look_at),
+        ..*view
+    }
+}
+
+fn shifted(view: &CameraView, t: f64) -> CameraView {
+    let shift = (3.0 * t - 1.0) * (view.look_at - view.eye);
+    CameraView {
+        eye: view.eye + shift,
+        look_at: view.look_at + shift,
+        ..*view
+    }
+}
+
+/// Place on the path of image `index` of a run that ends when its time is up: the van der Corput
+/// sequence, so that however many images there are, they are spread evenly over the path, and a
+/// fast machine looks from the same places as a slow one.
+pub(super) fn spread_place(index: u32) -> f64 {
+    f64::from(index.reverse_bits()) / 2_f64.powi(32)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const START: CameraView = CameraView {
+        eye: DVec3::ZERO,
+        look_at: DVec3::new(5.0, 5.0, 0.0),
+        up: DVec3::Z,
+        fov: 45.0,
+    };
+    const CENTER: DVec3 = DVec3::new(5.0, 6.5, 0.0);
+
+    #[track_caller]
+    fn close(a: DVec3, b: DVec3) {
+        assert!(a.distance(b) < 1e-12, "{a} is not {b}");
+    }
+
+    #[test]
+    fn rotation_goes_around_once_and_keeps_its_distance() {
+        let at = |t| Motion::Rotation.view_at(t, &START, CENTER);
+        assert_eq!(at(0.0), START);
+        close(at(0.5).eye, DVec3::new(10.0, 13.0, 0.0));
+        close(at(0.25).eye, DVec3::new(11.5, 1.5, 0.0));
+        for t in [0.1, 0.6, 0.9] {
+            assert!((at(t).eye.distance(CENTER) - CENTER.length()).abs() < 1e-12);
+            assert_eq!(at(t).up, DVec3::Z);
+        }
+    }
+
+    #[test]
+    fn translation_passes_the_still_view_and_the_point() {
+        let at = |t| Motion::Translation.view_at(t, &START, CENTER);
+        close(at(0.0).eye, DVec3::new(-5.0, -5.0, 0.0));
+        close(at(1.0 / 3.0).eye, START.eye);
+        close(at(2.0 / 3.0).eye, START.look_at);
+        close(at(0.9).look_at - at(0.9).eye, START.look_at);
+    }
+
+    #[test]
+    fn both_is_the_one_after_the_other() {
+        let view = Motion::Both.view_at(0.5, &START, CENTER);
+        // The eye has gone half of (5, 5, 0), then half a turn about the middle.
+        close(view.eye, 2.0 * CENTER - DVec3::new(2.5, 2.5, 0.0));
+    }
+
+    #[test]
+    fn any_number_of_places_is_spread() {
+        let places: Vec<f64> = (0..4).map(spread_place).collect();
+        assert_eq!(places, [0.0, 0.5, 0.25, 0.75]);
+        let mut many: Vec<f64> = (0..48).map(spread_place).collect();
+        many.sort_unstable_by(f64::total_cmp);
+        assert!(many.windows(2).all(|w| w[1] - w[0] <= 1.0 / 32.0));
+    }
+}

@@ -1,0 +1,251 @@
+//! The particles of a cell: the box at any count, or a part of a user's frame.
+
+use glam::Vec3;
+use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
+use spherule_formats::sequence::{Sequence, SequenceInput};
+use spherule_formats::{ParticleFrame, Radius};
+
+use super::{CellRequest, FrameSource, Source, Stage};
+use crate::accel::{SphereRadius, Spheres};
+use crate::report::memory;
+use crate::scene::Bounds;
+use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+
+/// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
+const LEAST_RADIUS: f64 = 1e-6;
+/// Radius where nothing tells one (a single particle, or all in one place), as a part of the
+/// distance that the camera is framed from.
+const LONE_RADIUS: f64 = 0.1;
+/// Bytes a particle that are held at least while building: the positions as they came, and those
+/// in the tree.
+const LEAST_BYTES: u64 = 24;
+
+/// Spheres in memory.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Particles {
+    /// Centres relative to the stage's origin.
+    pub centers: Vec<Vec3>,
+    /// Radii.
+    pub radius: Radius,
+}
+
+impl Particles {
+    /// Makes or reads those of `request`.
+    ///
+    /// # Errors
+    /// They would not fit into memory, or the frame cannot be read.
+    pub fn of(request: &CellRequest) -> Result<Self, String> {
+        let need = LEAST_BYTES.saturating_mul(request.particles as u64);
+        if let Some(free) = memory::available()
+            && need > free
+        {
+            return Err(format!(
+                "out of memory: {} particles need at least {} MiB, {} MiB are free",
+                request.particles,
+                need >> 20,
+                free >> 20
+            ));
+        }
+        match &request.source {
+            Source::Box => Ok(Self::in_box(request.particles, request.seed)),
+            Source::Frame(source) => Self::in_frame(source, request.particles, request.seed),
+        }
+    }
+
+    /// The box always looks filled: the radius is half the mean spacing.
+    fn in_box(count: usize, seed: u64) -> Self {
+        let extent = Stage::THESIS.bounds.max - Stage::THESIS.bounds.min;
+        let spacing = (extent.element_product() / count.max(1) as f64).cbrt();
+        Self {
+            centers: fill_box(&BoxSettings::thesis(count, seed)),
+            radius: Radius::Common(narrow(0.5 * spacing)),
+        }
+    }
+
+    fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, String> {
+        let input = SequenceInput::from_path(&source.path);
+        let sequence = Sequence::open(&input).map_err(|e| e.to_string())?;
+        let index = sequence
+            .frames()
+            .iter()
+            .position(|f| f.number == source.frame)
+            .ok_or_else(|| format!("{}: no frame {}", source.path.display(), source.frame))?;
+        let frame = sequence
+            .load(index, source.origin)
+            .map_err(|e| e.to_string())?;
+        let ParticleFrame {
+            positions, radius, ..
+        } = frame;
+        let mut particles = Self {
+            radius: radius.unwrap_or(Radius::Common(source.radius)),
+            centers: positions,
+        };
+        particles.thin(count, seed);
+        particles.raise_radii(source.least_radius);
+        Ok(particles)
+    }
+
+    /// Keeps `count` particles, evenly chosen, in their order, and lets their radii grow so that
+    /// together they fill as much space as before: as in the box, pictures of all counts cover
+    /// about the same part of the image.
+    fn thin(&mut self, count: usize, seed: u64) {
+        let all = self.centers.len();
+        if count >= all {
+            return;
+        }
+        let growth = narrow((all as f64 / count.max(1) as f64).cbrt());
+        retain_chosen(&mut self.centers, count, seed);
+        match &mut self.radius {
+            Radius::Common(radius) => *radius *= growth,
+            Radius::PerParticle(radii) => {
+                retain_chosen(radii, count, seed);
+                radii.iter_mut().for_each(|r| *r *= growth);
+            }
+        }
+    }
+
+    fn raise_radii(&mut self, least: f32) {
+        // Also true for NaN.
+        let raise = |radius: &mut f32| {
+            if !(*radius >= least && radius.is_finite()) {
+                *radius = least;
+            }
+        };
+        match &mut self.radius {
+            Radius::Common(radius) => raise(radius),
+            Radius::PerParticle(radii) => radii.iter_mut().for_each(raise),
+        }
+    }
+
+    /// As builders take them.
+    pub fn spheres(&self) -> Spheres<'_> {
+        Spheres {
+            centers: &self.centers,
+            radius: match &self.radius {
+                Radius::Common(radius) => SphereRadius::Common(*radius),
+                Radius::PerParticle(radii) => SphereRadius::Each(radii),
+            },
+        }
+    }
+}
+
+/// Keeps `count` of `items` in their order, every choice being as likely (selection sampling,
+/// Knuth, The Art of Computer Programming 2, 3.4.2, algorithm S).
+fn retain_chosen<T>(items: &mut Vec<T>, count: usize, seed: u64) {
+    let mut left = items.len() as u64;
+    let mut wanted = count as u64;
+    let mut draw = 0_u64;
+    items.retain(|_| {
+        draw += 1;
+        let below = (u128::from(splitmix64(seed, draw)) * u128::from(left)) >> 64;
+        left -= 1;
+        let chosen = below < u128::from(wanted);
+        wanted -= u64::from(chosen);
+        chosen
+    });
+}
+
+/// What a look at a user's frame has settled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrameSurvey {
+    /// Its particles (finite ones).
+    pub particles: usize,
+    /// What cells read.
+    pub source: FrameSource,
+    /// What they look at.
+    pub stage: Stage,
+}
+
+impl FrameSurvey {
+    /// Looks at frame `index` of `sequence`, which was opened from `path`, for images of `aspect`
+    /// = width / height.
+    ///
+    /// # Errors
+    /// It cannot be read, or has no particles.
+    pub fn of(
+        sequence: &Sequence,
+        path: &std::path::Path,
+        index: usize,
+        aspect: f64,
+    ) -> Result<Self, String> {
+        let question = Question {
+            color: ColorQuestion::None,
+            radius: RadiusQuestion::Auto,
+        };
+        let survey = Survey::of_frames(sequence, [index], question).map_err(|e| e.to_string())?;
+        let frame = sequence.frames()[index].number;
+        if survey.most_particles == 0 {
+            return Err(format!(
+                "{}: frame {frame} has no particles, there is nothing to measure",
+                path.display()
+            ));
+        }
+        let reach = f64::from(survey.radius.unwrap_or(0.0).max(survey.reach));
+        let bounds = Bounds {
+            min: survey.min - reach,
+            max: survey.max + reach,
+        };
+        let stage = Stage::framing(bounds, survey.up, aspect, survey.origin);
+        let distance = stage.view.eye.distance(bounds.center());
+        Ok(Self {
+            particles: survey.most_particles,
+            source: FrameSource {
+                path: path.to_owned(),
+                frame,
+                origin: survey.origin,
+                radius: survey.radius.unwrap_or(narrow(LONE_RADIUS * distance)),
+                least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
+            },
+            stage,
+        })
+    }
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the renderer works in f32")]
+fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn exactly_as_many_are_kept_in_order() {
+        for (all, count) in [(0, 0), (1, 0), (1, 1), (10, 3), (1000, 999), (1000, 100)] {
+            let mut items: Vec<usize> = (0..all).collect();
+            retain_chosen(&mut items, count, 7);
+            assert_eq!(items.len(), count);
+            assert!(items.is_sorted());
+        }
+    }
+
+    #[test]
+    fn the_choice_is_even_and_seeded() {
+        let chosen = |seed| {
+            let mut items: Vec<u32> = (0..100_000).collect();
+            retain_chosen(&mut items, 10_000, seed);
+            items
+        };
+        assert_eq!(chosen(1), chosen(1));
+        assert_ne!(chosen(1), chosen(2));
+        // A tenth of the first half: 5000, standard deviation about 47.
+        let first_half = chosen(1).iter().filter(|i| **i < 50_000).count();
+        assert!((4700..5300).contains(&first_half), "{first_half}");
+    }
+
+    #[test]
+    fn what_is_left_fills_as_much_space() {
+        let mut particles = Particles {
+            centers: (0..800_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
+            radius: Radius::PerParticle((0..800_u16).map(f32::from).collect()),
+        };
+        particles.thin(100, 1);
+        let Radius::PerParticle(radii) = &particles.radius else {
+            panic!("radii stay one each")
+        };
+        for (center, radius) in particles.centers.iter().zip(radii) {
+            assert!((radius - 2.0 * center.x).abs() <= 1e-3, "{center} {radius}");
+        }
+    }
+}

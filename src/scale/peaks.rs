@@ -1,0 +1,86 @@
+//! The most memory that this process has had resident, by kind. The kernel keeps the peak of the
+//! whole alone, so that of the parts is what is seen by looking often while memory changes.
+
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::thread;
+use std::time::Duration;
+
+use crate::report::MemoryUse;
+use crate::report::frame::RssSummary;
+
+/// Between two looks; one takes some 30 microseconds.
+const INTERVAL: Duration = Duration::from_millis(4);
+
+/// Largest values seen so far.
+#[derive(Debug, Default)]
+pub(super) struct Peaks {
+    anonymous: AtomicU64,
+    file: AtomicU64,
+    done: AtomicBool,
+}
+
+impl Peaks {
+    /// Looks once.
+    pub(super) fn look(&self) {
+        let now = MemoryUse::now();
+        self.anonymous.fetch_max(now.anonymous, Ordering::Relaxed);
+        self.file.fetch_max(now.file, Ordering::Relaxed);
+    }
+
+    /// Does `work` and keeps looking meanwhile.
+    pub(super) fn during<T>(&self, work: impl FnOnce() -> T) -> T {
+        self.done.store(false, Ordering::Relaxed);
+        thread::scope(|scope| {
+            let watcher = scope.spawn(|| {
+                while !self.done.load(Ordering::Relaxed) {
+                    self.look();
+                    thread::park_timeout(INTERVAL);
+                }
+            });
+            let _ends = EndOnDrop(&self.done, watcher.thread());
+            work()
+        })
+    }
+
+    /// What was seen, and the kernel's own peak of the whole.
+    pub(super) fn summary(&self) -> RssSummary {
+        self.look();
+        RssSummary {
+            anonymous_peak: self.anonymous.load(Ordering::Relaxed),
+            file_peak: self.file.load(Ordering::Relaxed),
+            total_peak: MemoryUse::now().peak,
+        }
+    }
+}
+
+/// Ends the watcher even if the work panics, for which the scope would wait.
+struct EndOnDrop<'a>(&'a AtomicBool, &'a thread::Thread);
+
+impl Drop for EndOnDrop<'_> {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+        self.1.unpark();
+    }
+}
+
+#[cfg(all(test, target_os = "linux"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_peak_that_is_over_is_still_known() {
+        const SIZE: usize = 64 << 20;
+        let peaks = Peaks::default();
+        peaks.look();
+        let before = peaks.summary().anonymous_peak;
+        peaks.during(|| {
+            let block = std::hint::black_box(vec![1_u8; SIZE]);
+            peaks.look();
+            drop(block);
+        });
+        let after = peaks.summary();
+        // Other tests run in this process too: what they give back is less than this.
+        assert!(after.anonymous_peak >= before.max(SIZE as u64 / 2));
+        assert!(after.total_peak >= after.anonymous_peak / 2);
+    }
+}
