@@ -8,4 +8,5 @@ mod damaged;
 mod golden;
 mod resume;
 mod samples;
+mod scale;
 mod thesis;

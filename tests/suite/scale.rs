@@ -1,0 +1,323 @@
+//! `spherule scale` from outside: what it prints and leaves, and what it refuses.
+
+use std::fs;
+use std::path::Path;
+
+use glam::Vec3;
+use serde_json::Value;
+use spherule_formats::write;
+
+use crate::harness::{Ran, Workshop, dam_break, files, no_leftovers};
+
+/// Cells that take a few milliseconds, one a structure.
+const TINY: [&str; 9] = [
+    "scale",
+    "--images",
+    "2",
+    "--width",
+    "64",
+    "--height",
+    "36",
+    "--motions",
+    "both",
+];
+
+fn run(workshop: &Workshop, options: &[&str]) -> Ran {
+    workshop.run(&[&TINY, options].concat())
+}
+
+#[track_caller]
+fn report(workshop: &Workshop) -> Value {
+    let text = fs::read(workshop.join("scale/scale.json")).expect("a report");
+    serde_json::from_slice(&text).expect("JSON")
+}
+
+/// Starts nothing, says why, leaves nothing.
+#[track_caller]
+fn refused(workshop: &Workshop, options: &[&str], wanted: &str) {
+    let before = files(workshop.path());
+    let ran = run(workshop, options).expect(2).tells(wanted);
+    assert!(ran.text().is_empty(), "{}", ran.text());
+    assert!(!ran.errors().contains("panicked"), "{}", ran.errors());
+    assert!(!workshop.join("scale").exists());
+    assert_eq!(files(workshop.path()), before);
+}
+
+#[test]
+fn tables_and_files_of_a_tiny_run() {
+    let workshop = Workshop::new();
+    let arguments = [
+        "scale",
+        "--particles",
+        "0,1,1e3",
+        "--images",
+        "2",
+        "--width",
+        "64",
+        "--height",
+        "36",
+    ];
+    let ran = workshop.run(&arguments).expect(0);
+    let text = ran.text();
+    for heading in [
+        "Images per second, rotation: mean (standard deviation)",
+        "Images per second, translation",
+        "Images per second, both",
+        "Build time, s",
+        "Peak memory",
+    ] {
+        assert!(text.contains(heading), "{text}");
+    }
+    let report = report(&workshop);
+    let cells = report["cells"].as_array().expect("cells");
+    let structures = report["settings"]["structures"].as_array().expect("names");
+    assert_eq!(cells.len(), 3 * 3 * structures.len());
+    assert_eq!(report["planned"], cells.len());
+    for cell in cells {
+        assert_eq!(cell["status"], "done", "{cell}");
+        assert_eq!(cell["images"], 2);
+        assert_eq!(cell["rays"]["primary"], 2 * 64 * 36);
+        let positive = |value: &Value| value.as_f64().is_some_and(|v| v > 0.0);
+        let rate = &cell["images_per_second"];
+        assert!(positive(&rate["mean"]) && positive(&rate["min"]), "{cell}");
+        assert!(rate["sd"].is_f64());
+        assert!(positive(&cell["build_seconds"]["median"]));
+        assert!(positive(&cell["rays_per_second"]["primary"]));
+        if cfg!(target_os = "linux") {
+            assert!(positive(&cell["rss"]["anonymous_peak"]));
+            assert!(positive(&cell["rss"]["total_peak"]));
+        }
+        let none = cell["particles"] == 0;
+        assert_eq!(cell["bytes_per_particle"].is_null(), none, "{cell}");
+    }
+    let left = files(&workshop.join("scale"));
+    let names: Vec<&str> = left.keys().map(String::as_str).collect();
+    assert_eq!(names, ["scale.csv", "scale.html", "scale.json"]);
+    let rows = String::from_utf8_lossy(&left["scale.csv"]).lines().count();
+    assert_eq!(rows, 1 + cells.len());
+    let page = String::from_utf8_lossy(&left["scale.html"]);
+    assert!(page.contains("id=\"plot-memory\"") && page.ends_with("</html>\n"));
+    no_leftovers(&workshop.join("scale"));
+
+    // Our own results give way to new ones.
+    run(&workshop, &["--particles", "10", "--progress", "none"]).expect(0);
+    assert_eq!(self::report(&workshop)["settings"]["particles"][0], 10);
+}
+
+#[test]
+fn particles_of_one_s_own() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    let ran = run(
+        &workshop,
+        &[
+            "--input",
+            "in",
+            "--particles",
+            "1,500,1e6,1e7",
+            "--frame",
+            "2",
+        ],
+    );
+    ran.expect(0)
+        .tells("all of them are measured, once, instead of 1000000, 10000000");
+    let report = report(&workshop);
+    assert_eq!(report["settings"]["input"]["frame"], 2);
+    let all = &report["settings"]["input"]["particles"];
+    let counts = report["settings"]["particles"].as_array().expect("counts");
+    assert_eq!(counts[..], [1.into(), 500.into(), all.clone()]);
+    for cell in report["cells"].as_array().expect("cells") {
+        assert_eq!(cell["status"], "done", "{cell}");
+        assert!(
+            cell["rays"]["shadow"].as_u64() > Some(0),
+            "nothing is seen: {cell}"
+        );
+    }
+    run(&workshop, &["--input", "in", "--particles", "1"])
+        .expect(0)
+        .tells("has 2 frames; frame 1 is measured, --frame chooses another");
+}
+
+#[test]
+fn one_particle_and_all_in_one_place() {
+    for count in [1, 100] {
+        let workshop = Workshop::new();
+        npy(&workshop.join("one.npy"), &vec![[3.0, 4.0, 5.0]; count]);
+        run(&workshop, &["--input", "one.npy"]).expect(0);
+        let report = report(&workshop);
+        let cells = report["cells"].as_array().expect("cells");
+        assert!(!cells.is_empty());
+        for cell in cells {
+            assert_eq!(cell["particles"], count);
+            assert!(
+                cell["rays"]["shadow"].as_u64() > Some(0),
+                "nothing is seen: {cell}"
+            );
+        }
+    }
+}
+
+#[test]
+fn options_have_ranges() {
+    let workshop = Workshop::new();
+    for (option, value, wanted) in [
+        ("--particles", "-5", "`-5` is no number of particles"),
+        (
+            "--particles",
+            "1e3,many",
+            "`many` is no number of particles",
+        ),
+        ("--particles", "", "is no number of particles"),
+        (
+            "--particles",
+            "1e10",
+            "a tree holds fewer than 2^32 particles",
+        ),
+        ("--structures", "lbhv", "did you mean lbvh?"),
+        (
+            "--motions",
+            "rotate",
+            "wants one of rotation, translation, both",
+        ),
+        ("--representations", "f16", "did you mean f32?"),
+        ("--images", "0", "0 is not in 1.."),
+        ("--images", "-1", "-1 is not in 1.."),
+        ("--width", "0", "0 is not in 1..=65536"),
+        ("--height", "-1", "-1 is not in 1..=65536"),
+        ("--samples", "0", "0 is not in 1..=4096"),
+        ("--max-depth", "0", "0 is not in 1..=64"),
+        ("--depth", "65", "65 is not in 1..=64"),
+        ("--threads", "0", "--threads"),
+        ("--frame", "3", "--input"),
+    ] {
+        // Given twice, the fault in the second one would be that it is given twice.
+        let options: Vec<&str> = TINY[1..]
+            .chunks(2)
+            .filter(|pair| pair[0] != option)
+            .flatten()
+            .copied()
+            .chain([option, value])
+            .collect();
+        let ran = workshop.run(&[&["scale"], &options[..]].concat());
+        ran.expect(2).tells(wanted);
+    }
+    for seconds in ["0", "-1", "nan", "inf"] {
+        let ran = workshop.run(&["scale", "--seconds", seconds]).expect(2);
+        ran.tells("wants seconds above 0");
+    }
+    refused(&workshop, &["--seconds", "1"], "cannot be used with");
+    assert!(files(workshop.path()).is_empty());
+}
+
+#[test]
+fn inputs_that_have_nothing() {
+    let workshop = Workshop::new();
+    refused(&workshop, &["--input", "no.vtk"], "no.vtk");
+    fs::create_dir(workshop.join("empty")).expect("a directory");
+    refused(&workshop, &["--input", "empty"], "empty");
+    fs::write(workshop.join("empty.npy"), "").expect("a file");
+    refused(&workshop, &["--input", "empty.npy"], "empty.npy");
+    npy(&workshop.join("none.npy"), &[]);
+    refused(&workshop, &["--input", "none.npy"], "has no particles");
+    npy(&workshop.join("nan.npy"), &[[f32::NAN; 3]; 5]);
+    refused(&workshop, &["--input", "nan.npy"], "has no particles");
+    npy(&workshop.join("two.npy"), &[[0.0; 3], [1.0; 3]]);
+    refused(
+        &workshop,
+        &["--input", "two.npy", "--frame", "7"],
+        "--frame 7: ",
+    );
+}
+
+#[test]
+fn places_where_results_cannot_go() {
+    let workshop = Workshop::new();
+    fs::write(workshop.join("file"), "mine").expect("a file");
+    for place in ["file", "file/deeper"] {
+        let wanted = "file: is a file where a directory for the results should be";
+        refused(&workshop, &["-o", place], wanted);
+    }
+    if cfg!(target_os = "linux") {
+        refused(
+            &workshop,
+            &["-o", "/proc/nope"],
+            "/proc/nope: cannot be written",
+        );
+    }
+    fs::create_dir(workshop.join("theirs")).expect("a directory");
+    for name in ["scale.json", "scale.csv", "scale.html"] {
+        fs::write(workshop.join("theirs").join(name), "theirs").expect("a file");
+        refused(
+            &workshop,
+            &["-o", "theirs"],
+            &format!("{name}: is in the way"),
+        );
+        fs::remove_file(workshop.join("theirs").join(name)).expect("a file");
+    }
+}
+
+/// A cell that the system gives no memory costs that cell alone.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_cell_that_does_not_fit_is_shown_as_failed() {
+    let workshop = Workshop::new();
+    let program = env!("CARGO_BIN_EXE_spherule");
+    // 48 GB of positions in 8 GB of addresses.
+    let script = format!(
+        "ulimit -v 8000000 && exec {program} scale --particles 100,4e9 --structures lbvh \
+         --motions both --images 1 --width 16 --height 9 --threads 2"
+    );
+    let output = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(workshop.path())
+        .output()
+        .expect("a shell");
+    let ran = Ran(output)
+        .expect(1)
+        .tells("error: 4000000000 particles, lbvh f32, both: out of memory: ");
+    assert!(
+        ran.text().contains("failed: 4000000000 particles"),
+        "{}",
+        ran.text()
+    );
+    let report = report(&workshop);
+    assert_eq!(report["cells"][0]["status"], "done");
+    assert_eq!(report["cells"][1]["status"], "failed");
+    let reason = report["cells"][1]["reason"].as_str().expect("a reason");
+    assert!(reason.starts_with("out of memory: "), "{reason}");
+}
+
+#[cfg(unix)]
+#[test]
+fn interrupted_runs_keep_what_they_have() {
+    let workshop = Workshop::new();
+    let counts: Vec<String> = (10..40).map(|n| n.to_string()).collect();
+    let arguments = [
+        &TINY[..1],
+        &TINY[3..],
+        &["--structures", "lbvh", "--progress", "plain"],
+        &["--seconds", "0.5", "--particles", &counts.join(",")],
+    ];
+    let mut running = workshop.start(&arguments.concat());
+    assert!(running.wait_for_line("[1/30] 10 particles, lbvh f32, both: build "));
+    running.signal("TERM");
+    let (told, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{told}");
+    assert!(
+        told.contains("stopping; what is measured is kept"),
+        "{told}"
+    );
+    let report = report(&workshop);
+    assert_eq!(report["planned"], 30);
+    let cells = report["cells"].as_array().map_or(0, Vec::len);
+    assert!((1..30).contains(&cells), "{cells}");
+    let page = fs::read_to_string(workshop.join("scale/scale.html")).expect("a page");
+    assert!(page.contains(&format!("{} of 30 cells were not measured", 30 - cells)));
+    no_leftovers(&workshop.join("scale"));
+}
+
+/// Particles where a test wants them.
+fn npy(path: &Path, centers: &[[f32; 3]]) {
+    let centers: Vec<Vec3> = centers.iter().copied().map(Vec3::from_array).collect();
+    write::npy::write(path, &centers).expect("a file");
+}
