@@ -16,7 +16,9 @@ use crate::surface::spheres::SphereSurface;
 
 /// Most builds of a cell; an odd number has a median.
 const BUILDS: usize = 11;
-/// Seconds that builds may take where images are counted and not timed.
+/// Builds are repeated for up to this part of the time that images are given.
+const BUILD_PART: f64 = 0.25;
+/// The same where images are counted and not timed, seconds.
 const BUILD_SECONDS: f64 = 2.0;
 /// Fewest images where time decides: a quarter of the way apart, so that a slow cell too has seen
 /// all sides.
@@ -25,7 +27,7 @@ const LEAST_IMAGES: u32 = 4;
 /// Makes or reads the particles, builds, traces.
 ///
 /// The first build is in new memory, the others in that of the one before, as in a sequence. They
-/// are repeated [`BUILDS`] times or for as long as images may take.
+/// are repeated up to eleven in all, or until they have taken a quarter of the images' time.
 ///
 /// # Errors
 /// In words: what is asked makes no pictures, or would not fit into memory.
@@ -96,7 +98,7 @@ fn builds(
         ..BuildSettings::new(request.structure)
     };
     let allowed = match request.budget {
-        Budget::Seconds(seconds) => seconds,
+        Budget::Seconds(seconds) => BUILD_PART * seconds,
         Budget::Images(_) => BUILD_SECONDS,
     };
     let spheres = particles.spheres();

@@ -8,7 +8,7 @@ use std::time::Duration;
 use crate::report::MemoryUse;
 use crate::report::frame::RssSummary;
 
-/// Between two looks; one takes some 30 microseconds.
+/// Between two looks: often enough for what lasts as long as a phase of a build of 1e6.
 const INTERVAL: Duration = Duration::from_millis(4);
 
 /// Largest values seen so far.

@@ -179,7 +179,7 @@ fn options_have_ranges() {
             "rotate",
             "wants one of rotation, translation, both",
         ),
-        ("--representations", "f16", "did you mean f32?"),
+        ("--representations", "f16", "wants one of f32"),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
         ("--width", "0", "0 is not in 1..=65536"),

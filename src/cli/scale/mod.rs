@@ -6,6 +6,7 @@ use std::time::Instant;
 
 use clap::Args;
 use serde_json::json;
+use spherule_jobs::Interrupt;
 
 use super::progress::{ProgressMode, duration, openjd};
 use super::{CliError, Outcome, signals};
@@ -103,43 +104,60 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         cells: Vec::with_capacity(cells.len()),
     };
     say!("{}", table::subject(&report));
-    let progress = Progress {
-        mode: args.progress,
-        total: cells.len(),
-        budget: report.settings.budget,
-        start: Instant::now(),
-    };
-    let interrupt = signals.at_work();
-    let mut interrupted = false;
-    for request in &cells {
-        let Ended::Told(outcome) = child::measure(request, interrupt) else {
-            interrupted = true;
-            break;
-        };
-        report.cells.push(cell_report(request, outcome));
-        progress.show(&report);
-        // After every cell: a long run that is killed has not run for nothing.
-        files::write(&args.output, &report)
-            .map_err(|(path, source)| CliError::Io { path, source })?;
-    }
+    let ended = measure_all(&cells, &mut report, args, signals.at_work());
     if report.cells.is_empty() {
         return Ok(Outcome::Interrupted);
     }
     print(&table::text(&report))?;
-    say!(
-        "{}, {} and {} in {}",
-        files::JSON,
-        files::CSV,
-        files::HTML,
-        args.output.display()
-    );
-    Ok(if interrupted {
+    if let Some((path, source)) = ended.unwritten {
+        say!("error: {}", CliError::Io { path, source });
+        return Ok(Outcome::SomeFailed);
+    }
+    let [json, csv, html] = [files::JSON, files::CSV, files::HTML];
+    say!("{json}, {csv} and {html} are in {}", args.output.display());
+    Ok(if ended.interrupted {
         Outcome::Interrupted
     } else if report.failed().next().is_some() {
         Outcome::SomeFailed
     } else {
         Outcome::Done
     })
+}
+
+/// What came of the run as a whole.
+#[derive(Default)]
+struct EndOfRun {
+    interrupted: bool,
+    /// What the last try to write results met.
+    unwritten: Option<(PathBuf, io::Error)>,
+}
+
+/// Runs `cells` one after the other and puts what they tell into `report` and the files.
+fn measure_all(
+    cells: &[CellRequest],
+    report: &mut ScaleReport,
+    args: &ScaleArgs,
+    interrupt: &Interrupt,
+) -> EndOfRun {
+    let progress = Progress {
+        mode: args.progress,
+        total: cells.len(),
+        budget: report.settings.budget,
+        start: Instant::now(),
+    };
+    let mut ended = EndOfRun::default();
+    for request in cells {
+        let Ended::Told(outcome) = child::measure(request, interrupt) else {
+            ended.interrupted = true;
+            break;
+        };
+        report.cells.push(cell_report(request, outcome));
+        progress.show(report);
+        // After every cell: a long run that is killed has not run for nothing. One that finds the
+        // disk full goes on, in the hope of room and for its tables.
+        ended.unwritten = files::write(&args.output, report).err();
+    }
+    ended
 }
 
 fn cell_report(request: &CellRequest, outcome: CellOutcome) -> CellReport {
