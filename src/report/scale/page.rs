@@ -66,7 +66,7 @@ fn introduce(page: &mut Page, report: &ScaleReport) {
     page.key_values(&[
         ("measured", table::subject(report)),
         ("on", table::conditions(report)),
-        ("the thesis's machine", thesis::MACHINE.to_owned()),
+        ("the thesis measured on", thesis::MACHINE.to_owned()),
     ]);
     for (cell, reason) in report.failed() {
         page.warning(&format!("failed: {}: {reason}", table::cell_name(cell)));

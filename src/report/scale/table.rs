@@ -142,7 +142,9 @@ pub(super) fn summed(
     column: &Column,
     value: Option<String>,
 ) -> String {
-    let failed = report.cells_of(particles, column).next().is_some();
+    let mut cells = report.cells_of(particles, column).peekable();
+    // No particles have no bytes each: that is no failure.
+    let failed = cells.peek().is_some() && cells.all(|c| c.measured().is_none());
     value.unwrap_or_else(|| if failed { FAILED } else { MISSING }.to_owned())
 }
 

@@ -115,6 +115,28 @@ fn tables_are_laid_out_like_the_thesis_s() {
 }
 
 #[test]
+fn a_figure_that_there_cannot_be_is_no_failure() {
+    let mut report = report();
+    report.settings.particles = vec![0];
+    let CellOutcome::Done(measured) = &mut report.cells[0].outcome else {
+        panic!("the first cell was measured")
+    };
+    measured.bytes_per_particle = None;
+    report.cells.truncate(1);
+    report.cells[0].particles = 0;
+    let text = table::text(&report);
+    let (_, bytes) = text.split_once("Bytes a particle").unwrap();
+    assert!(!bytes.contains("failed"), "{text}");
+    // Nothing but failures is one.
+    report.cells[0].outcome = CellOutcome::Failed {
+        reason: "it was late".to_owned(),
+    };
+    let text = table::text(&report);
+    let (_, bytes) = text.split_once("Bytes a particle").unwrap();
+    assert!(bytes.contains("failed"), "{text}");
+}
+
+#[test]
 fn json_comes_back() {
     let report = report();
     let json = serde_json::json!(report);

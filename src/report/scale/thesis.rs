@@ -3,8 +3,8 @@
 
 use crate::scale::Motion;
 
-/// The thesis's machine.
-pub const MACHINE: &str = "GeForce GTX 1050 Ti 4 GB, OptiX (i7-7700HQ)";
+/// The thesis's machine and settings.
+pub const MACHINE: &str = "GeForce GTX 1050 Ti 4 GB, OptiX (i7-7700HQ); 1920x1080, depth 3, 60 s";
 
 /// Frames a second at 1e7 particles: mean and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
