@@ -1,5 +1,5 @@
 //! A job: plan and ledger together, opened for work ([`Job::open`]) or only looked at
-//! ([`Job::read`], [`Job::peek`]).
+//! ([`Job::read`], [`Job::peek`], [`Job::foresee`]).
 //!
 //! One process works in a directory at a time as yet; its ledger is locked. A second worker would
 //! come under a name of its own ([`JobRequest::worker`]) and claim frames.
@@ -60,6 +60,17 @@ pub struct FrameRequest {
     pub outputs: Vec<PathBuf>,
 }
 
+/// How a job would stand if it were opened.
+#[derive(Debug, Clone)]
+pub struct Foreseen {
+    /// Its plan and what is done of it.
+    pub state: JobState,
+    /// The frames of the run, done or not, in the order asked for.
+    pub selected: Vec<i64>,
+    /// What "auto" turned into when the job began; None if that would be settled anew.
+    pub resolved: Option<Value>,
+}
+
 /// A job opened for work.
 #[derive(Debug)]
 pub struct Job {
@@ -97,6 +108,46 @@ impl Job {
             Some(plan) => Ok(Some(JobState::new(dir, plan, Ledger::read(dir)?))),
             None => Ok(None),
         }
+    }
+
+    /// How the job in `dir` would stand after [`Job::open`]. Touches nothing, and may be asked while
+    /// another process works.
+    ///
+    /// # Errors
+    /// Those of [`Job::open`] that are known before anything is written.
+    pub fn foresee(dir: &Path, request: &JobRequest) -> Result<Foreseen, JobError> {
+        let dir = named(dir);
+        check_request(request)?;
+        let selected = select(request);
+        let forgotten = request.mode == Mode::Force || !dir.exists();
+        let (old, ledger) = if forgotten {
+            (None, Ledger::default())
+        } else {
+            (Plan::load(dir)?, Ledger::read(dir)?)
+        };
+        let (plan, ledger, settled_anew) = match old {
+            None => {
+                if !forgotten {
+                    refuse_ledgers(dir)?;
+                }
+                (new_plan(dir, request, Value::Null)?, ledger, true)
+            }
+            Some(old) => {
+                let state = JobState::new(dir, old, ledger);
+                let mut anew = false;
+                let plan = merged_plan(&state, request, &selected, |_| {
+                    anew = true;
+                    Ok::<_, JobError>(Value::Null)
+                })?;
+                (plan, state.ledger, anew)
+            }
+        };
+        let resolved = (!settled_anew).then(|| plan.resolved().clone());
+        Ok(Foreseen {
+            state: JobState::new(dir, plan, ledger),
+            selected,
+            resolved,
+        })
     }
 
     /// Begins the job in `dir` (created if need be), or goes on with it.
@@ -223,31 +274,67 @@ impl Job {
     }
 }
 
+impl Foreseen {
+    /// Frames of the run that are not done, in the order asked for.
+    pub fn pending(&self) -> Vec<i64> {
+        let open = |frame: &i64| !self.state.is_done(*frame);
+        self.selected.iter().copied().filter(open).collect()
+    }
+
+    /// How the frames of the run stand.
+    pub fn summary(&self) -> Summary {
+        self.state.summary_of(self.selected.iter().copied())
+    }
+}
+
 fn begin<E: Into<Box<dyn Error + Send + Sync>>>(
     dir: &Path,
     request: &JobRequest,
     ledger: Ledger,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<JobState, JobError> {
-    if let Some((ledger, _)) = ledger_files(dir)?.into_iter().find(|(_, len)| *len > 0) {
-        return Err(JobError::PlanMissing { ledger });
-    }
-    let mut frames = plan_frames(dir, request.frames.iter())?;
-    frames.sort_by_key(|f| f.number);
-    let resolved = resolve(None).map_err(|e| JobError::Resolve(e.into()))?;
-    let plan = Plan::new(request.settings.clone(), resolved, frames);
+    refuse_ledgers(dir)?;
+    let mut plan = new_plan(dir, request, Value::Null)?;
+    plan.resolve(resolve(None).map_err(|e| JobError::Resolve(e.into()))?);
     plan.store(dir)?;
     Ok(JobState::new(dir, plan, ledger))
 }
 
-/// Frames outside the selection that the plan knows are not looked at again, so that one of many
-/// runs over a long sequence reads only its own inputs.
+/// Refuses ledgers that no plan explains.
+fn refuse_ledgers(dir: &Path) -> Result<(), JobError> {
+    match ledger_files(dir)?.into_iter().find(|(_, len)| *len > 0) {
+        Some((ledger, _)) => Err(JobError::PlanMissing { ledger }),
+        None => Ok(()),
+    }
+}
+
+fn new_plan(dir: &Path, request: &JobRequest, resolved: Value) -> Result<Plan, JobError> {
+    let mut frames = plan_frames(dir, request.frames.iter())?;
+    frames.sort_by_key(|f| f.number);
+    Ok(Plan::new(request.settings.clone(), resolved, frames))
+}
+
 fn go_on<E: Into<Box<dyn Error + Send + Sync>>>(
     state: JobState,
     request: &JobRequest,
     selected: &[i64],
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<JobState, JobError> {
+    let plan = merged_plan(&state, request, selected, resolve)?;
+    if plan != state.plan {
+        plan.store(&state.dir)?;
+    }
+    Ok(JobState::new(&state.dir, plan, state.ledger))
+}
+
+/// Frames outside the selection that the plan knows are not looked at again, so that one of many
+/// runs over a long sequence reads only its own inputs.
+fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
+    state: &JobState,
+    request: &JobRequest,
+    selected: &[i64],
+    resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
+) -> Result<Plan, JobError> {
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
     if request.mode == Mode::Resume && !changes.is_empty() {
@@ -260,7 +347,7 @@ fn go_on<E: Into<Box<dyn Error + Send + Sync>>>(
         .filter(|f| selected.contains(&f.number) || state.plan.frame(f.number).is_none());
     let frames = plan_frames(&dir, to_plan)?;
     if request.mode == Mode::Resume {
-        let changes = changed_inputs(&state, &frames);
+        let changes = changed_inputs(state, &frames);
         if !changes.is_empty() {
             return Err(JobError::InputChanged { dir, changes });
         }
@@ -277,10 +364,7 @@ fn go_on<E: Into<Box<dyn Error + Send + Sync>>>(
     };
     let mut plan = Plan::new(settings, resolved, state.plan.frames().to_vec());
     plan.merge(frames);
-    if plan != state.plan {
-        plan.store(&dir)?;
-    }
-    Ok(JobState::new(&dir, plan, state.ledger))
+    Ok(plan)
 }
 
 /// Only finished frames can be stale; the others will be made from what is there now.

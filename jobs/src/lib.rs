@@ -25,7 +25,7 @@ mod state;
 pub use error::{InputChange, JobError, SettingChange};
 pub use fingerprint::{Fingerprint, compare_settings, settings_hash};
 pub use interrupt::{Interrupt, InterruptLevel};
-pub use job::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode};
+pub use job::{DEFAULT_WORKER, Foreseen, FrameRequest, Job, JobRequest, Mode};
 pub use ledger::{Entry, Ledger, OutputFile, Status};
 pub use plan::{PLAN_FILE, Plan, PlannedFrame, PlannedInput};
 pub use publish::{Publisher, publish, publish_with};

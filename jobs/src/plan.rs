@@ -73,6 +73,11 @@ impl Plan {
         compare_settings(&self.settings, settings)
     }
 
+    /// Settles what "auto" turned into.
+    pub(crate) fn resolve(&mut self, resolved: Value) {
+        self.resolved = resolved;
+    }
+
     /// What "auto" turned into.
     pub const fn resolved(&self) -> &Value {
         &self.resolved
