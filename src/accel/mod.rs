@@ -21,6 +21,7 @@ mod linked;
 mod node;
 mod partition;
 mod ploc;
+mod predict;
 mod report;
 mod sbvh;
 pub mod simd;
@@ -36,6 +37,7 @@ pub use aabb::Aabb;
 pub use builder::{BuildSettings, Structure, TreeBuilder};
 pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
 pub use choose::choose;
+pub use predict::{BuildBytes, BuildSize, predicted_bytes};
 pub use report::{BuildReport, Phase};
 pub use sbvh::SbvhSettings;
 

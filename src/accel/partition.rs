@@ -48,6 +48,22 @@ impl Cells {
     }
 }
 
+/// Particles that a task of the scatter takes.
+fn chunk_len(count: usize) -> usize {
+    count
+        .div_ceil(4 * rayon::current_num_threads())
+        .max(16 * 1024)
+}
+
+/// Bytes of the tables that scattering `count` particles makes: for each chunk and cell a count and
+/// two slices.
+pub(super) fn table_bytes(count: u64) -> u64 {
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
+    let cells = 1_u64 << (3 * Cells::levels_for(count));
+    let chunks = count.div_ceil(chunk_len(count)) as u64;
+    chunks * cells * (size_of::<u32>() + size_of::<usize>() + 2 * size_of::<&[u32]>()) as u64
+}
+
 /// Scatters `centers` into `points`, and their indices into `indices` unless that is empty.
 /// `cell_of` tells the cell of the particle with an index and position, below `cell_count`.
 ///
@@ -60,8 +76,7 @@ pub(super) fn scatter(
     points: &mut [Vec3],
     indices: &mut [u32],
 ) -> Cells {
-    let threads = rayon::current_num_threads();
-    let chunk_len = centers.len().div_ceil(4 * threads).max(16 * 1024);
+    let chunk_len = chunk_len(centers.len());
     let counts: Vec<Vec<u32>> = centers
         .par_chunks(chunk_len)
         .enumerate()
