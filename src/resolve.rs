@@ -8,8 +8,8 @@ use crate::manifest::{
     GroundHeight, LightKind, Manifest, RadiusSetting,
 };
 use crate::output::{Compression, ExrOptions, PreviewOptions};
-use crate::pipeline::{ColorRule, RadiusRule, Setup, attribute_list};
-use crate::render::{Channels, Film, RenderSettings};
+use crate::pipeline::{ColorRule, FrameSize, MemoryModel, RadiusRule, Setup, attribute_list};
+use crate::render::{Channels, RenderSettings};
 use crate::report::memory::available;
 use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
 use crate::scene::{
@@ -55,7 +55,7 @@ pub enum ResolveError {
         width: u32,
         /// Pixels down.
         height: u32,
-        /// What its planes and encoding need, in two stages at once.
+        /// What its planes and encoding need.
         need: u64,
         /// What there is.
         available: u64,
@@ -127,11 +127,10 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     render.max_depth = manifest.render.max_depth;
     render.channels = channels;
     render.transparent_background = output.transparent;
-    check_image_size(&render)?;
     let backdrop = output
         .transparent
         .then(|| scene.background.color(scene.camera.forward()));
-    Ok(Setup {
+    let setup = Setup {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
@@ -156,22 +155,26 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             exposure: output.preview_exposure,
             backdrop,
         },
+        weight: survey.weight,
+        view,
         scene,
         render,
-    })
+    };
+    check_image_size(&setup)?;
+    Ok(setup)
 }
 
 fn machine_threads() -> usize {
     std::thread::available_parallelism().map_or(1, usize::from)
 }
 
-/// Refuses an image that cannot fit: one is traced while another is encoded.
-fn check_image_size(render: &RenderSettings) -> Result<(), ResolveError> {
-    let need = 2 * Film::bytes_for(render.width, render.height, render.channels);
+/// Refuses images that cannot fit, whatever the particles.
+fn check_image_size(setup: &Setup) -> Result<(), ResolveError> {
+    let need = MemoryModel::new(setup).alone(&FrameSize::default()).total();
     match available() {
         Some(available) if need > available => Err(ResolveError::ImageTooLarge {
-            width: render.width,
-            height: render.height,
+            width: setup.render.width,
+            height: setup.render.height,
             need: need >> 20,
             available: available >> 20,
         }),

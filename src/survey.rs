@@ -10,10 +10,8 @@ use std::collections::BTreeSet;
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
-use spherule_formats::sequence::Sequence;
-use spherule_formats::{
-    Attribute, FrameError, ParticleFrame, Positions, Radius, RawParticles, choose_origin,
-};
+use spherule_formats::sequence::{Loaded, Sequence};
+use spherule_formats::{Attribute, FrameError, ParticleFrame, Positions, Radius, choose_origin};
 
 use crate::scene::Bounds;
 
@@ -56,6 +54,32 @@ pub struct Survey {
     pub most_particles: usize,
     /// Frames looked at.
     pub frames: usize,
+    /// What the heaviest frame looked at takes in memory. Jobs of the first versions lack it.
+    #[serde(default)]
+    pub weight: Option<FrameWeight>,
+}
+
+/// Bytes and counts of a frame as it was read: what the need of others is told by.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+pub struct FrameWeight {
+    /// Particles, those included that are not finite.
+    pub particles: u64,
+    /// Bytes of its files on disk.
+    pub stored: u64,
+    /// Bytes of the largest of its files, uncompressed.
+    pub content: u64,
+    /// Bytes of the numbers read from them.
+    pub raw: u64,
+    /// Bytes of the positions among them.
+    pub positions: u64,
+    /// Files.
+    pub files: u64,
+    /// Whether the file brings a radius for each particle.
+    pub own_radii: bool,
+    /// Whether it brings ids.
+    pub ids: bool,
+    /// Whether it brings velocities.
+    pub velocities: bool,
 }
 
 /// An attribute and the range its colours span.
@@ -112,6 +136,7 @@ struct Totals {
     attributes: BTreeSet<String>,
     most_particles: usize,
     frames: usize,
+    weight: Option<FrameWeight>,
 }
 
 impl Survey {
@@ -144,11 +169,15 @@ impl Survey {
             attributes: BTreeSet::new(),
             most_particles: 0,
             frames: 0,
+            weight: None,
         };
         let mut failure = None;
         for index in indices {
-            match sequence.load_raw(index) {
-                Ok(raw) => totals.take_in(raw, question),
+            match sequence.load_measured(index) {
+                Ok(loaded) => {
+                    let files = sequence.inputs(index).len() as u64;
+                    totals.take_in(loaded, files, question);
+                }
                 Err(error) => {
                     failure.get_or_insert(error);
                 }
@@ -182,6 +211,24 @@ pub fn velocity_of(attributes: &[Attribute]) -> Option<&Attribute> {
     })
 }
 
+/// Names under which simulations write ids, the usual one first: also numpy's plural and
+/// DualSPHysics'.
+const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
+
+/// The attribute that holds ids, if any does: exactly by name, or failing that without regard to
+/// case.
+pub fn id_of(attributes: &[Attribute]) -> Option<&Attribute> {
+    ID_NAMES.iter().find_map(|name| {
+        let exact = attributes.iter().find(|a| a.name == *name);
+        let alike = || {
+            attributes
+                .iter()
+                .find(|a| a.name.eq_ignore_ascii_case(name))
+        };
+        exact.or_else(alike).filter(|a| a.components == 1)
+    })
+}
+
 /// Up to [`FRAMES`] indices below `count`, evenly spread.
 fn spread(count: usize) -> Vec<usize> {
     if count <= FRAMES {
@@ -193,8 +240,10 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
-    fn take_in(&mut self, raw: RawParticles, question: Question) {
+    fn take_in(&mut self, loaded: Loaded, files: u64, question: Question) {
         self.frames += 1;
+        let mut weight = FrameWeight::of(&loaded, files);
+        let raw = loaded.particles;
         self.attributes
             .extend(raw.attributes.iter().map(|a| a.name.clone()));
         if let Some((min, max)) = robust_bounds(&raw.positions) {
@@ -216,6 +265,10 @@ impl Totals {
             .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
         let frame = ParticleFrame::from_raw(raw, origin);
         self.most_particles = self.most_particles.max(frame.len());
+        weight.own_radii = matches!(frame.radius, Some(Radius::PerParticle(_)));
+        if self.weight.is_none_or(|heaviest| weight.raw > heaviest.raw) {
+            self.weight = Some(weight);
+        }
         if let Some(name) = wanted {
             if let Some(attribute) = frame.attribute(&name)
                 && let Some((low, high)) = robust_range(attribute)
@@ -281,6 +334,25 @@ impl Totals {
             attributes: self.attributes.into_iter().collect(),
             most_particles: self.most_particles,
             frames: self.frames,
+            weight: self.weight,
+        }
+    }
+}
+
+impl FrameWeight {
+    /// All but the radii, which are looked for later.
+    fn of(loaded: &Loaded, files: u64) -> Self {
+        let raw = &loaded.particles;
+        Self {
+            particles: raw.positions.len() as u64,
+            stored: loaded.stored_bytes,
+            content: loaded.content_bytes,
+            raw: raw.byte_len(),
+            positions: raw.positions.byte_len(),
+            files,
+            own_radii: false,
+            ids: id_of(&raw.attributes).is_some(),
+            velocities: velocity_of(&raw.attributes).is_some(),
         }
     }
 }

@@ -60,6 +60,11 @@ impl AttributeData {
         self.len() == 0
     }
 
+    /// Bytes that they take in memory.
+    pub fn byte_len(&self) -> u64 {
+        self.len() as u64 * self.scalar_type().size() as u64
+    }
+
     /// The stored type.
     pub const fn scalar_type(&self) -> ScalarType {
         match self {

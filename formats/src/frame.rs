@@ -28,6 +28,14 @@ impl Positions {
         self.len() == 0
     }
 
+    /// Bytes that they take in memory.
+    pub fn byte_len(&self) -> u64 {
+        match self {
+            Self::F32(v) => size_of_val(&v[..]) as u64,
+            Self::F64(v) => size_of_val(&v[..]) as u64,
+        }
+    }
+
     /// Position `index` in f64.
     ///
     /// # Panics
@@ -52,6 +60,14 @@ pub struct RawParticles {
     pub time: Option<f64>,
     /// Step number written inside the file (LAMMPS `TIMESTEP`), if any.
     pub step: Option<i64>,
+}
+
+impl RawParticles {
+    /// Bytes that positions and attributes take in memory.
+    pub fn byte_len(&self) -> u64 {
+        let attributes = self.attributes.iter().map(|a| a.data.byte_len());
+        self.positions.byte_len() + attributes.sum::<u64>()
+    }
 }
 
 /// Sphere radii in scene units.

@@ -2,7 +2,9 @@
 
 use std::env;
 use std::fs;
+use std::panic;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use clap::Args;
 use spherule_formats::sequence::{Sequence, SequenceInput};
@@ -65,6 +67,9 @@ pub(super) struct ManifestArgs {
     /// Acceleration structure.
     #[arg(long, value_name = "NAME")]
     pub(super) accelerator: Option<String>,
+    /// Most memory to take: 4GiB, 512MiB. Frames that need more fail, the rest goes on.
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
+    pub(super) memory_limit: Option<String>,
 }
 
 /// A manifest as asked for, and where its paths begin.
@@ -172,6 +177,13 @@ impl ManifestArgs {
                 list.push(over(key, value.clone(), shown)?);
             }
         }
+        if let Some(limit) = &self.memory_limit {
+            list.push(over(
+                "render.memory_limit",
+                limit.clone(),
+                "--memory-limit",
+            )?);
+        }
         if let Some(radius) = &self.radius {
             let value = radius.parse().map_or_else(
                 |_| toml::Value::from(radius.clone()),
@@ -217,7 +229,7 @@ impl Asked {
     pub(super) fn sequence(&self) -> Result<Sequence, CliError> {
         let input = &self.manifest.input;
         let paths = input.path.iter().map(|p| self.base.join(p)).collect();
-        let mut sequence = Sequence::open(&SequenceInput::from_paths(paths))?;
+        let mut sequence = apart(|| Sequence::open(&SequenceInput::from_paths(paths)))?;
         if let Some(parts) = &input.parts {
             sequence.keep_parts(parts)?;
         }
@@ -228,6 +240,18 @@ impl Asked {
     pub(super) fn absolute_base(&self) -> Result<PathBuf, CliError> {
         absolute(&self.base)
     }
+}
+
+/// Does `work` in a thread of its own. Allocators keep what a thread has freed for the next thread
+/// that comes: that will be the one that reads frames, and needs as much. Freed by the main thread,
+/// it would lie there unused.
+pub(super) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    thread::scope(|scope| {
+        let worker = scope.spawn(work);
+        worker
+            .join()
+            .unwrap_or_else(|fault| panic::resume_unwind(fault))
+    })
 }
 
 fn over(key: &str, value: impl Into<toml::Value>, shown: &str) -> Result<Override, CliError> {

@@ -15,11 +15,14 @@ macro_rules! say {
     };
 }
 
+mod check;
+mod disk;
 mod errors;
 mod generate;
 mod init;
 mod inspect;
 mod job;
+mod plan;
 mod progress;
 mod render;
 mod scale;
@@ -39,6 +42,8 @@ struct Cli {
 enum Command {
     /// Render a directory, pattern or list of particle files, or a manifest, to images.
     Render(Box<render::RenderArgs>),
+    /// Tell what `render` would do, in what memory and time; touch nothing.
+    Check(Box<check::CheckArgs>),
     /// Print a complete, commented manifest for an input.
     Init(Box<init::InitArgs>),
     /// Print counts, bounds and attributes of particle files.
@@ -62,6 +67,7 @@ pub fn main() -> ExitCode {
     let cli = Cli::parse();
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
+        Command::Check(args) => check::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Generate(args) => generate::run(&args),
@@ -86,6 +92,8 @@ enum Outcome {
     Done,
     /// Some frames or files failed; they were named.
     SomeFailed,
+    /// Nothing could be started; it was said why.
+    Refused,
     /// Stopped by a signal; the same command goes on.
     Interrupted,
 }
@@ -95,6 +103,7 @@ impl From<Outcome> for ExitCode {
         Self::from(match outcome {
             Outcome::Done => 0,
             Outcome::SomeFailed => 1,
+            Outcome::Refused => 2,
             Outcome::Interrupted => INTERRUPTED,
         })
     }

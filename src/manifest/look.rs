@@ -6,6 +6,7 @@ use super::reader::{Field, Section};
 use super::write::{Entries, Toml};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
+use crate::report::Bytes;
 use crate::scene::{self, ground};
 
 /// `[image]`.
@@ -75,6 +76,8 @@ pub struct Render {
     pub ground_height: GroundHeight,
     /// Linear RGB.
     pub ground_color: [f32; 3],
+    /// Most memory to take; None is what is free.
+    pub memory_limit: Option<Bytes>,
 }
 
 /// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
@@ -120,6 +123,7 @@ impl Default for Render {
             ground: false,
             ground_height: GroundHeight::Auto,
             ground_color: ground::DEFAULT_COLOR.to_array(),
+            memory_limit: None,
         }
     }
 }
@@ -204,6 +208,7 @@ impl Render {
                     .map(GroundHeight::At)
             }),
             ground_color: section.value("ground_color", default.ground_color, rgb),
+            memory_limit: section.optional("memory_limit", read_size),
         };
         section.finish();
         render
@@ -262,6 +267,42 @@ impl Render {
             "auto, or a height along input.up",
         );
         out.put("ground_color", &self.ground_color, "linear RGB");
+        out.maybe(
+            "memory_limit",
+            self.memory_limit.as_ref(),
+            "\"4GiB\"",
+            "most memory to take; frames that need more fail; default: what is free",
+        );
+        out.depends_on(None);
+    }
+}
+
+/// A size as text or as a number of bytes, above 0.
+fn read_size(field: &Field<'_>) -> Option<Bytes> {
+    let size = match (field.as_text(), field.as_integer()) {
+        (Some(text), _) => text.parse().ok(),
+        (None, Some(bytes)) => u64::try_from(bytes).ok().map(Bytes),
+        (None, None) => None,
+    };
+    // TOML has no larger integers.
+    let size = size.filter(|size| (1..=i64::MAX as u64).contains(&size.0));
+    field.or_wants(
+        size,
+        "a size above 0, as \"4GiB\", \"512MiB\" or a number of bytes",
+    )
+}
+
+impl Toml for Bytes {
+    fn toml(&self) -> String {
+        // Exactly, in the largest unit that it is whole in.
+        let units = [("GiB", 30), ("MiB", 20), ("KiB", 10)];
+        let unit = units
+            .iter()
+            .find(|(_, shift)| self.0.trailing_zeros() >= *shift);
+        match unit {
+            Some((name, shift)) => format!("{}{name}", self.0 >> shift).toml(),
+            None => self.0.to_string(),
+        }
     }
 }
 

@@ -4,7 +4,7 @@
 //! at most one custom attribute (several would be written in random order) a film always gives the
 //! same bytes, however many threads compress. Nothing here looks at the clock.
 
-use std::io::Cursor;
+use std::io::{self, Cursor, Seek, Write};
 
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression as Codec, Encoding, FlatSamples,
@@ -95,11 +95,42 @@ pub enum OutputError {
     Png(#[source] image::ImageError),
 }
 
-/// Encodes `film` as an OpenEXR file.
+impl OutputError {
+    /// What the system said, if the file could not be written; else the error itself.
+    ///
+    /// # Errors
+    /// The encoder is to blame.
+    pub fn into_io(self) -> Result<io::Error, Self> {
+        match self {
+            Self::Exr(exr::error::Error::Io(error)) => Ok(error),
+            other => Err(other),
+        }
+    }
+}
+
+/// Encodes `film` as an OpenEXR file in memory.
 ///
 /// # Errors
 /// If an attribute cannot be stored or the encoder refuses the image.
 pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, OutputError> {
+    let mut file = Cursor::new(Vec::new());
+    let clamped = write_exr(film, options, &mut file)?;
+    Ok(EncodedExr {
+        bytes: file.into_inner(),
+        clamped,
+    })
+}
+
+/// Writes `film` as an OpenEXR file, block by block: the file is never in memory as a whole.
+/// Returns [`EncodedExr::clamped`].
+///
+/// # Errors
+/// If an attribute cannot be stored, the encoder refuses the image, or `file` does.
+pub fn write_exr(
+    film: &Film,
+    options: &ExrOptions,
+    file: &mut (impl Write + Seek),
+) -> Result<u64, OutputError> {
     let size = (film.width as usize, film.height as usize);
     let (channels, clamped) = channels(film);
     let encoding = Encoding {
@@ -111,18 +142,14 @@ pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, Outpu
     let window = IntegerBounds::from_dimensions(size);
     let image = Image::empty(ImageAttributes::new(window)).with_layer(layer);
 
-    let mut file = Cursor::new(Vec::new());
     let writer = image.write();
     let result = if options.single_thread {
-        writer.non_parallel().to_buffered(&mut file)
+        writer.non_parallel().to_buffered(file)
     } else {
-        writer.to_buffered(&mut file)
+        writer.to_buffered(file)
     };
     result.map_err(OutputError::Exr)?;
-    Ok(EncodedExr {
-        bytes: file.into_inner(),
-        clamped,
-    })
+    Ok(clamped)
 }
 
 impl Compression {

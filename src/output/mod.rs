@@ -5,5 +5,7 @@ mod exr;
 mod preview;
 pub mod view;
 
-pub use exr::{Compression, CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr};
+pub use exr::{
+    Compression, CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, write_exr,
+};
 pub use preview::{PreviewOptions, encode_preview};

@@ -2,20 +2,20 @@
 
 use std::io;
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::Receiver;
+use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
 
 use serde_json::json;
-use spherule_jobs::{Job, JobError, publish};
+use spherule_jobs::{Job, JobError, Publisher, publish};
 
 use super::setup::Setup;
 use super::trace::TracedFrame;
 use super::{Event, Passed, Stage, Watch};
 use crate::output::{
-    CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview,
+    CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
 use crate::report::frame::RssSummary;
-use crate::report::{FrameReport, MemoryUse};
+use crate::report::{FrameReport, MemoryPeaks, MemoryUse};
 
 /// Why an image is not there.
 #[derive(Debug, thiserror::Error)]
@@ -44,17 +44,18 @@ fn is_disk_full(error: &io::Error) -> bool {
 pub(super) fn write_stage(
     setup: &Setup,
     traced: Receiver<Passed<TracedFrame>>,
+    is_written: Option<SyncSender<()>>,
     job: &mut Job,
     watch: Watch,
 ) -> Result<(), JobError> {
-    let mut peak = MemoryUse::default();
+    let mut peaks = MemoryPeaks::default();
     let mut image_before = Instant::now();
     for passed in traced {
         match passed {
             Passed::Frame(frame) => {
                 watch(Event::Entered(frame.task.frame, Stage::Write));
                 let task = frame.task.clone();
-                match write_frame(setup, frame, &mut peak) {
+                match write_frame(setup, frame, &mut peaks) {
                     Ok(mut report) => {
                         report.seconds.wall = image_before.elapsed().as_secs_f64();
                         image_before = Instant::now();
@@ -81,6 +82,10 @@ pub(super) fn write_stage(
                 job.record_failed(task.frame, &reason, json!(null))?;
             }
         }
+        if let Some(is_written) = &is_written {
+            // Who reads may have ended by now.
+            let _ = is_written.send(());
+        }
     }
     Ok(())
 }
@@ -89,13 +94,11 @@ pub(super) fn write_stage(
 fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
-    peak: &mut MemoryUse,
+    peaks: &mut MemoryPeaks,
 ) -> Result<FrameReport, WriteError> {
     let start = Instant::now();
     let task = &frame.task;
     let mut report = frame.report.clone();
-    let exr = encode_frame(setup, &frame)?;
-    report.clamped_pixels = exr.clamped;
     let at = |path: &Path| {
         let path = path.to_owned();
         move |source| WriteError::Io { path, source }
@@ -105,36 +108,47 @@ fn write_frame(
         let png = encode_preview(&frame.film, &setup.preview)?;
         publish(path, &png).map_err(at(path))?;
     }
-    publish(&task.image, &exr.bytes).map_err(at(&task.image))?;
+    let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
+    let options = exr_options(setup, &frame);
+    report.clamped_pixels =
+        write_exr(&frame.film, &options, &mut file).map_err(|e| match e.into_io() {
+            Ok(source) => at(&task.image)(source),
+            Err(error) => error.into(),
+        })?;
+    file.commit().map_err(at(&task.image))?;
     report.seconds.encode = start.elapsed().as_secs_f64();
     let now = MemoryUse::now();
-    peak.anonymous = peak.anonymous.max(now.anonymous);
-    peak.file = peak.file.max(now.file);
+    peaks.take_in(now);
     report.rss = RssSummary {
-        anonymous_peak: peak.anonymous,
-        file_peak: peak.file,
-        total_peak: now.peak,
+        anonymous_peak: peaks.anonymous,
+        file_peak: peaks.file,
+        total_peak: peaks.total,
+        anonymous: now.anonymous,
     };
     Ok(report)
 }
 
-/// The EXR of `frame`, with what a compositor may ask about it in one attribute.
+/// The EXR of `frame` in memory.
 ///
 /// # Errors
 /// If the image cannot be encoded.
 pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, OutputError> {
+    encode_exr(&frame.film, &exr_options(setup, frame))
+}
+
+/// How the EXR of `frame` is written, with what a compositor may ask about it in one attribute.
+fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,
         "time": frame.time,
         "origin": setup.origin.to_array(),
         "particles": frame.report.particles,
     });
-    let options = ExrOptions {
+    ExrOptions {
         custom: Some(CustomAttribute {
             name: "spherule".to_owned(),
             json: facts.to_string(),
         }),
         ..setup.exr.clone()
-    };
-    encode_exr(&frame.film, &options)
+    }
 }

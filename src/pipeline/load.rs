@@ -1,6 +1,5 @@
 //! First stage: a frame's files become positions, radii and the few numbers that shading needs.
 
-use std::fs;
 use std::time::{Duration, Instant};
 
 use glam::Vec3;
@@ -9,9 +8,10 @@ use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, AttributeData, FrameError, ParticleFrame, Radius};
 
 use super::ImageTask;
+use super::predict::{FrameSize, MemoryModel};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::report::memory::available;
-use crate::survey::velocity_of;
+use crate::survey::{id_of, velocity_of};
 
 /// Why a frame cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -27,7 +27,7 @@ pub enum LoadError {
     TooLarge {
         /// The frame's first file.
         file: String,
-        /// What reading and building need, estimated.
+        /// What reading needs, estimated.
         need: u64,
         /// What there is.
         available: u64,
@@ -84,9 +84,9 @@ pub fn load_frame(
     task: &ImageTask,
 ) -> Result<LoadedFrame, LoadError> {
     let start = Instant::now();
-    check_memory(sequence, task)?;
+    check_memory(setup, sequence, task)?;
     let is_newest = task.index + 1 == sequence.frames().len();
-    let (raw, mut notes) = sequence.load_noted(task.index).map_err(|error| {
+    let loaded = sequence.load_measured(task.index).map_err(|error| {
         let is_damage = matches!(error, FrameError::Malformed { .. });
         if is_newest && is_damage && !error.to_string().contains("being written") {
             LoadError::Newest(error)
@@ -94,7 +94,8 @@ pub fn load_frame(
             LoadError::Frame(error)
         }
     })?;
-    let frame = ParticleFrame::from_raw(raw, setup.origin);
+    let mut notes = loaded.notes;
+    let frame = ParticleFrame::from_raw(loaded.particles, setup.origin);
     let file = || {
         let inputs = sequence.inputs(task.index);
         inputs
@@ -149,23 +150,21 @@ pub fn load_frame(
     })
 }
 
-/// Copies of a frame's bytes that are held at once: the file, the numbers read from it, the tree. A
-/// rough figure, meant to refuse what cannot work and nothing else.
-const COPIES: u64 = 2;
-
 /// Refuses a frame that cannot fit, before the system ends the whole job for it.
-fn check_memory(sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
-    let inputs = sequence.inputs(task.index);
-    let sizes = inputs.iter().filter_map(|p| fs::metadata(p).ok());
-    let need = COPIES.saturating_mul(sizes.map(|m| m.len()).sum());
+fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
+    let size = FrameSize::of(sequence, task.index, setup.weight.as_ref());
+    let need = MemoryModel::new(setup).reading(&size);
     match available() {
-        Some(available) if need > available => Err(LoadError::TooLarge {
-            file: inputs
-                .first()
-                .map_or_else(String::new, |p| p.display().to_string()),
-            need: need >> 20,
-            available: available >> 20,
-        }),
+        Some(available) if need > available => {
+            let inputs = sequence.inputs(task.index);
+            Err(LoadError::TooLarge {
+                file: inputs
+                    .first()
+                    .map_or_else(String::new, |p| p.display().to_string()),
+                need: need >> 20,
+                available: available >> 20,
+            })
+        }
         _ => Ok(()),
     }
 }
@@ -254,10 +253,6 @@ fn vectors(attribute: &Attribute) -> Vec<Vec3> {
         .collect()
 }
 
-/// Names under which simulations write ids, the usual one first: also numpy's plural and
-/// DualSPHysics'.
-const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
-
 /// The particles' ids, or the place in the file of particles that others were dropped between.
 #[expect(
     clippy::cast_possible_truncation,
@@ -265,10 +260,7 @@ const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
     reason = "the channel has 32 bits; larger ids keep their low ones"
 )]
 fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
-    let named = ID_NAMES
-        .iter()
-        .find_map(|name| frame.attribute(name).filter(|a| a.components == 1));
-    Some(match named.map(|a| &a.data) {
+    Some(match id_of(&frame.attributes).map(|a| &a.data) {
         Some(AttributeData::U32(v)) => v.clone(),
         Some(AttributeData::I32(v)) => v.iter().map(|id| id.cast_unsigned()).collect(),
         Some(AttributeData::U64(v)) => v.iter().map(|id| *id as u32).collect(),

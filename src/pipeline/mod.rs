@@ -2,7 +2,8 @@
 //! encoded and written.
 //!
 //! One frame is in flight in each stage, handed over without a queue, so memory is flat however
-//! long the sequence. The last stage records every frame in the job's ledger, image first. What
+//! long the sequence. Reading waits until the tree over the frame before is built: building is
+//! short, and only then are that frame's positions let go. The last stage records every frame in the job's ledger, image first. What
 //! the picture looks like is settled before, in [`Setup`].
 
 use std::collections::HashSet;
@@ -17,15 +18,21 @@ use spherule_jobs::{Interrupt, Job, JobError};
 
 mod encode;
 mod load;
+mod predict;
+mod probe;
 mod rays;
+mod schedule;
 mod setup;
 mod trace;
 
 pub use encode::encode_frame;
 pub(crate) use load::attribute_list;
 pub use load::{LoadError, LoadedFrame, load_frame};
+pub use predict::{FrameSize, MemoryModel, MemoryNeed};
+pub use probe::{Probe, probe};
+pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, RadiusRule, Setup};
-pub use trace::{FrameTracer, TracedFrame};
+pub use trace::{BuiltFrame, FrameTracer, TracedFrame};
 
 use crate::report::FrameReport;
 
@@ -40,6 +47,8 @@ pub struct ImageTask {
     pub image: PathBuf,
     /// The PNG beside it, if wanted.
     pub preview: Option<PathBuf>,
+    /// Why it cannot be made, if that is known before.
+    pub refused: Option<String>,
 }
 
 /// What a frame is going through.
@@ -76,7 +85,8 @@ enum Passed<T> {
 }
 
 /// Renders `tasks` in order and records each in `job`. Ends early, with the frame in hand finished,
-/// once `interrupt` is raised.
+/// once `interrupt` is raised. Without `overlap` a frame is read only when the one before is written
+/// and nothing of it is left.
 ///
 /// # Errors
 /// The ledger cannot be written, or the disk is full: nothing further could be recorded.
@@ -84,6 +94,7 @@ pub fn run(
     setup: &Setup,
     sequence: &Sequence,
     tasks: &[ImageTask],
+    overlap: Overlap,
     job: &mut Job,
     interrupt: &Interrupt,
     watch: Watch,
@@ -93,14 +104,33 @@ pub fn run(
         // Capacity 0: a stage holds its result until the next one is free to take it.
         let (to_trace, loaded) = sync_channel(0);
         let (to_write, traced) = sync_channel(0);
-        scope.spawn(move || read_stage(setup, sequence, tasks, interrupt, &to_trace, watch));
+        let (go_on, room) = sync_channel(1);
+        // Whoever frees the memory that the next frame needs.
+        let (is_built, is_written) = match overlap {
+            Overlap::Stages => (Some(go_on), None),
+            Overlap::None => (None, Some(go_on)),
+        };
+        let (begins, has_begun) = sync_channel(0);
+        scope.spawn(move || {
+            let _ = begins.send(());
+            let next = Next { to_trace, room };
+            read_stage(setup, sequence, tasks, interrupt, &next, watch);
+        });
+        // The first of the threads finds the memory that whoever looked at the frames has left.
+        let _ = has_begun.recv();
         let stop_all = &stop;
         let writer = scope.spawn(move || {
-            let ended = encode::write_stage(setup, traced, job, watch);
+            let ended = encode::write_stage(setup, traced, is_written, job, watch);
             stop_all.store(ended.is_err(), Ordering::Relaxed);
             ended
         });
-        trace_stage(setup, loaded, to_write, &stop, interrupt, watch);
+        let stage = TraceStage {
+            setup,
+            stop: &stop,
+            interrupt,
+            watch,
+        };
+        stage.run(loaded, is_built, to_write);
         writer
             .join()
             .unwrap_or_else(|fault| panic::resume_unwind(fault))
@@ -112,7 +142,7 @@ fn read_stage(
     sequence: &Sequence,
     tasks: &[ImageTask],
     interrupt: &Interrupt,
-    next: &SyncSender<Passed<LoadedFrame>>,
+    next: &Next,
     watch: Watch,
 ) {
     let mut told = HashSet::new();
@@ -121,7 +151,10 @@ fn read_stage(
             return;
         }
         watch(Event::Entered(task.frame, Stage::Read));
-        let loaded = guarded(|| load_frame(setup, sequence, task).map_err(|e| e.to_string()));
+        let loaded = match &task.refused {
+            Some(reason) => Err(reason.clone()),
+            None => guarded(|| load_frame(setup, sequence, task).map_err(|e| e.to_string())),
+        };
         let passed = match loaded {
             Ok(mut frame) => {
                 // What is so in every frame is said once.
@@ -135,47 +168,78 @@ fn read_stage(
             }
             Err(reason) => Passed::Failed(task.clone(), reason),
         };
-        // An error means that the next stage has ended: so do we.
-        if next.send(passed).is_err() {
+        if !next.pass_on(passed) {
             return;
         }
     }
 }
 
-fn trace_stage(
-    setup: &Setup,
-    loaded: Receiver<Passed<LoadedFrame>>,
-    next: SyncSender<Passed<TracedFrame>>,
-    stop: &AtomicBool,
-    interrupt: &Interrupt,
-    watch: Watch,
-) {
-    let mut tracer = FrameTracer::new();
-    for passed in loaded {
-        // A frame that was only read when the interrupt came is dropped, not begun.
-        if interrupt.is_raised() {
-            return;
-        }
-        let passed = match passed {
-            Passed::Frame(frame) => {
-                let task = frame.task.clone();
-                watch(Event::Entered(task.frame, Stage::Trace));
-                let traced =
-                    guarded(|| tracer.trace(setup, frame, stop).map_err(|e| e.to_string()));
-                match traced {
-                    Ok(traced) => Passed::Frame(traced),
-                    Err(_) if stop.load(Ordering::Relaxed) => return,
-                    Err(reason) => {
-                        // Whatever happened may have left the buffers half filled.
-                        tracer = FrameTracer::new();
-                        Passed::Failed(task, reason)
-                    }
-                }
+/// The way from reading to tracing.
+struct Next {
+    to_trace: SyncSender<Passed<LoadedFrame>>,
+    /// Tells when there is memory for another frame.
+    room: Receiver<()>,
+}
+
+impl Next {
+    /// Hands over and waits until there is room again; false once a later stage has ended.
+    fn pass_on(&self, passed: Passed<LoadedFrame>) -> bool {
+        self.to_trace.send(passed).is_ok() && self.room.recv().is_ok()
+    }
+}
+
+struct TraceStage<'a> {
+    setup: &'a Setup,
+    stop: &'a AtomicBool,
+    interrupt: &'a Interrupt,
+    watch: Watch<'a>,
+}
+
+impl TraceStage<'_> {
+    /// Its neighbours end when it does: it owns its ends of all channels.
+    fn run(
+        &self,
+        loaded: Receiver<Passed<LoadedFrame>>,
+        is_built: Option<SyncSender<()>>,
+        next: SyncSender<Passed<TracedFrame>>,
+    ) {
+        let mut tracer = FrameTracer::new();
+        for passed in loaded {
+            // A frame that was only read when the interrupt came is dropped, not begun.
+            if self.interrupt.is_raised() {
+                return;
             }
-            Passed::Failed(task, reason) => Passed::Failed(task, reason),
-        };
-        if next.send(passed).is_err() {
-            return;
+            let (task, built) = match passed {
+                Passed::Frame(frame) => {
+                    let task = frame.task.clone();
+                    (self.watch)(Event::Entered(task.frame, Stage::Trace));
+                    (task, guarded(|| Ok(tracer.build(self.setup, frame))))
+                }
+                Passed::Failed(task, reason) => (task, Err(reason)),
+            };
+            if let Some(is_built) = &is_built {
+                // Who reads may have ended by now.
+                let _ = is_built.send(());
+            }
+            let traced = built.and_then(|frame| {
+                let trace = || tracer.trace(self.setup, frame, self.stop);
+                guarded(|| trace().map_err(|e| e.to_string()))
+            });
+            let passed = match traced {
+                Ok(traced) => Passed::Frame(traced),
+                Err(_) if self.stop.load(Ordering::Relaxed) => return,
+                Err(reason) => {
+                    // Whatever happened may have left the buffers half filled.
+                    tracer = FrameTracer::new();
+                    Passed::Failed(task, reason)
+                }
+            };
+            if is_built.is_none() {
+                tracer = FrameTracer::new();
+            }
+            if next.send(passed).is_err() {
+                return;
+            }
         }
     }
 }

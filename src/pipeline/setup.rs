@@ -2,10 +2,12 @@
 
 use glam::{DVec3, Vec3};
 
-use crate::accel::{BvhSettings, SbvhSettings, Structure};
+use super::rays::expected_rays;
+use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
-use crate::scene::{ColorMap, Scene};
+use crate::scene::{CameraView, ColorMap, Scene};
+use crate::survey::FrameWeight;
 
 /// Where radii come from.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +53,8 @@ pub struct Setup {
     pub radius: RadiusRule,
     /// Where colours come from.
     pub color: ColorRule,
+    /// Where the scene's camera stands, world units.
+    pub view: CameraView,
     /// Camera, lights, material, background, ground.
     pub scene: Scene,
     /// Image size, samples, depth, channels.
@@ -65,4 +69,24 @@ pub struct Setup {
     pub exr: ExrOptions,
     /// How the PNG is made.
     pub preview: PreviewOptions,
+    /// What frames weigh, as far as is known.
+    pub weight: Option<FrameWeight>,
+}
+
+impl Setup {
+    /// How the tree over a frame of so many particles is built, with or without values to colour
+    /// them by.
+    pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {
+        let channels = self.render.channels;
+        let structure = self.accelerator.unwrap_or_else(|| {
+            let threads = rayon::current_num_threads();
+            choose(particles, expected_rays(self), threads)
+        });
+        BuildSettings {
+            keep_indices: channels.id || channels.velocity || has_values,
+            bvh: self.bvh,
+            sbvh: self.sbvh,
+            ..BuildSettings::new(structure)
+        }
+    }
 }

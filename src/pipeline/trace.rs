@@ -3,16 +3,15 @@
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
+use glam::Vec3;
 use spherule_formats::Radius;
 
 use super::ImageTask;
 use super::load::LoadedFrame;
-use super::rays::expected_rays;
 use super::setup::{ColorRule, Setup};
-use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder, choose};
-use crate::render::{Colors, Film, ParticleShading, RenderError, render};
+use crate::accel::{SphereRadius, Spheres, TreeBuilder};
+use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, render};
 use crate::report::FrameReport;
-use crate::scene::ColorMap;
 use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::spheres::SphereSurface;
 
@@ -29,6 +28,17 @@ pub struct TracedFrame {
     pub report: FrameReport,
 }
 
+/// A frame whose tree stands in the tracer; what shading needs beside it.
+#[derive(Debug)]
+pub struct BuiltFrame {
+    pub(super) task: ImageTask,
+    values: Vec<f32>,
+    ids: Option<Vec<u32>>,
+    velocities: Option<Vec<Vec3>>,
+    time: Option<f64>,
+    pub(super) report: FrameReport,
+}
+
 /// Traces frame after frame in the same buffers.
 #[derive(Debug, Default)]
 pub struct FrameTracer {
@@ -41,17 +51,8 @@ impl FrameTracer {
         Self::default()
     }
 
-    /// Builds the tree over `frame` and renders it.
-    ///
-    /// # Errors
-    /// [`RenderError::Interrupted`] once `stop` is set; the others are settings that were checked
-    /// before.
-    pub fn trace(
-        &mut self,
-        setup: &Setup,
-        frame: LoadedFrame,
-        stop: &AtomicBool,
-    ) -> Result<TracedFrame, RenderError> {
+    /// Builds the tree over `frame`, whose positions are let go: the tree has its own copy.
+    pub fn build(&mut self, setup: &Setup, frame: LoadedFrame) -> BuiltFrame {
         let mut report = FrameReport {
             particles: frame.centers.len() as u64,
             dropped: frame.dropped,
@@ -63,49 +64,42 @@ impl FrameTracer {
             Radius::Common(radius) => SphereRadius::Common(*radius),
             Radius::PerParticle(radii) => SphereRadius::Each(radii),
         };
-        let structure = setup.accelerator.unwrap_or_else(|| {
-            let threads = rayon::current_num_threads();
-            choose(frame.centers.len(), expected_rays(setup), threads)
-        });
-        let channels = setup.render.channels;
-        let settings = BuildSettings {
-            keep_indices: channels.id || channels.velocity || !frame.values.is_empty(),
-            bvh: setup.bvh,
-            sbvh: setup.sbvh,
-            ..BuildSettings::new(structure)
-        };
+        let settings = setup.build_settings(frame.centers.len(), !frame.values.is_empty());
         let spheres = Spheres {
             centers: &frame.centers,
             radius,
         };
         let build = self.builder.build(&spheres, &settings);
         report.set_build(&build);
+        BuiltFrame {
+            task: frame.task,
+            values: frame.values,
+            ids: frame.ids,
+            velocities: frame.velocities,
+            time: frame.time,
+            report,
+        }
+    }
 
-        let LoadedFrame {
+    /// Renders `frame`, the one that was built last.
+    ///
+    /// # Errors
+    /// [`RenderError::Interrupted`] once `stop` is set; the others are settings that were checked
+    /// before.
+    pub fn trace(
+        &self,
+        setup: &Setup,
+        frame: BuiltFrame,
+        stop: &AtomicBool,
+    ) -> Result<TracedFrame, RenderError> {
+        let start = Instant::now();
+        let (film, rays) = self.image(setup, &frame, stop)?;
+        let BuiltFrame {
             task,
-            centers,
-            radius,
-            values,
-            ids,
-            velocities,
             time,
+            mut report,
             ..
         } = frame;
-        // The tree has its own copy; while rays run, only that is needed.
-        drop((centers, radius));
-        let colors = match &setup.color {
-            ColorRule::Constant(color) => Colors::Constant(*color),
-            ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
-            ColorRule::Attribute { map, .. } => mapped(&values, map),
-        };
-        let source = ParticleShading {
-            colors,
-            ids: ids.as_deref(),
-            velocities: velocities.as_deref(),
-        };
-        let start = Instant::now();
-        let surface = SphereSurface::new(self.builder.tree());
-        let (film, rays) = render(&surface, &setup.scene, &source, &setup.render, stop)?;
         report.seconds.trace = seconds(start.elapsed());
         report.rays = rays.into();
         Ok(TracedFrame {
@@ -115,10 +109,31 @@ impl FrameTracer {
             report,
         })
     }
-}
 
-fn mapped<'a>(values: &'a [f32], map: &'a ColorMap) -> Colors<'a> {
-    Colors::Mapped { values, map }
+    /// Only the planes of `frame`, the one that was built last.
+    ///
+    /// # Errors
+    /// As [`Self::trace`].
+    pub fn image(
+        &self,
+        setup: &Setup,
+        frame: &BuiltFrame,
+        stop: &AtomicBool,
+    ) -> Result<(Film, RayCounts), RenderError> {
+        let values = &frame.values;
+        let colors = match &setup.color {
+            ColorRule::Constant(color) => Colors::Constant(*color),
+            ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
+            ColorRule::Attribute { map, .. } => Colors::Mapped { values, map },
+        };
+        let source = ParticleShading {
+            colors,
+            ids: frame.ids.as_deref(),
+            velocities: frame.velocities.as_deref(),
+        };
+        let surface = SphereSurface::new(self.builder.tree());
+        render(&surface, &setup.scene, &source, &setup.render, stop)
+    }
 }
 
 fn seconds(time: Duration) -> f64 {

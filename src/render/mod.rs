@@ -152,6 +152,12 @@ pub enum RenderError {
     Material(#[from] MaterialError),
 }
 
+/// Bytes that the finished tiles of a row of tiles take until the row is whole; each thread is at one.
+pub fn band_bytes(settings: &RenderSettings) -> u64 {
+    let pixels = u64::from(settings.width) * u64::from(tile::SIDE.min(settings.height));
+    pixels * size_of::<tile::Pixel>() as u64
+}
+
 /// Renders one image on the current rayon pool.
 ///
 /// The camera should have been made for `settings.width / settings.height`. No light is made: with

@@ -22,11 +22,14 @@ pub(super) struct Tile {
     height: u32,
 }
 
+/// A finished pixel.
+pub(super) type Pixel = ([f32; 4], DataSample);
+
 /// A tile's finished pixels, row by row.
 pub(super) struct RenderedTile {
     pub(super) left: u32,
     pub(super) width: u32,
-    pub(super) pixels: Vec<([f32; 4], DataSample)>,
+    pub(super) pixels: Vec<Pixel>,
     pub(super) counts: RayCounts,
 }
 

@@ -88,12 +88,14 @@ pub struct RaySummary {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RssSummary {
-    /// Heap and stacks.
+    /// Heap and stacks: [`crate::report::MemoryPeaks::anonymous`].
     pub anonymous_peak: u64,
     /// Mapped files.
     pub file_peak: u64,
     /// Everything, as the kernel's `VmHWM` has it.
     pub total_peak: u64,
+    /// Heap and stacks when this frame was done: what does not grow over a sequence.
+    pub anonymous: u64,
 }
 
 impl From<RayCounts> for RaySummary {

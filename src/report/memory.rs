@@ -1,8 +1,9 @@
 //! Memory of this process as Linux counts it.
 //!
-//! `VmHWM` is the peak of everything resident, mapped files included; the kernel splits only the
-//! present value into anonymous and file-backed pages, so the peaks of the parts are the largest
-//! values seen when asked.
+//! `VmHWM` is the exact peak of everything resident, mapped files included; the kernel splits only
+//! the present value into anonymous and file-backed pages. What is file-backed here is the program's
+//! own code, a few MiB that only grow, so [`MemoryPeaks`] takes the peak of anonymous memory as
+//! `VmHWM` less the largest `RssFile` seen: nothing between two looks is missed.
 
 use std::fs;
 
@@ -53,9 +54,50 @@ impl MemoryUse {
     }
 }
 
+/// The largest values so far, in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct MemoryPeaks {
+    /// Heap and stacks: the larger of `total` less `file` and any `RssAnon` seen. A file that was
+    /// mapped and let go between two looks would count here.
+    pub anonymous: u64,
+    /// Mapped files, when looked at (`RssFile`).
+    pub file: u64,
+    /// Everything, at any time (`VmHWM`).
+    pub total: u64,
+    /// Heap and stacks, when looked at.
+    seen: u64,
+}
+
+impl MemoryPeaks {
+    /// Takes in how things are `now`.
+    pub fn take_in(&mut self, now: MemoryUse) {
+        self.file = self.file.max(now.file);
+        self.total = self.total.max(now.peak);
+        self.seen = self.seen.max(now.anonymous);
+        self.anonymous = self.seen.max(self.total.saturating_sub(self.file));
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn the_peak_between_two_looks_counts() {
+        let mut peaks = MemoryPeaks::default();
+        let use_of = |peak, anonymous, file| MemoryUse {
+            peak,
+            anonymous,
+            file,
+        };
+        peaks.take_in(use_of(100, 30, 8));
+        assert_eq!((peaks.anonymous, peaks.file, peaks.total), (92, 8, 100));
+        peaks.take_in(use_of(100, 40, 10));
+        assert_eq!((peaks.anonymous, peaks.file, peaks.total), (90, 10, 100));
+        // Files let go by then: what was seen holds.
+        peaks.take_in(use_of(140, 95, 60));
+        assert_eq!((peaks.anonymous, peaks.file, peaks.total), (95, 60, 140));
+    }
 
     #[test]
     fn reads_the_kernels_table() {

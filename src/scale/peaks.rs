@@ -45,10 +45,12 @@ impl Peaks {
     /// What was seen, and the kernel's own peak of the whole.
     pub(super) fn summary(&self) -> RssSummary {
         self.look();
+        let now = MemoryUse::now();
         RssSummary {
+            anonymous: now.anonymous,
             anonymous_peak: self.anonymous.load(Ordering::Relaxed),
             file_peak: self.file.load(Ordering::Relaxed),
-            total_peak: MemoryUse::now().peak,
+            total_peak: now.peak,
         }
     }
 }

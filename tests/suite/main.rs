@@ -6,6 +6,7 @@ mod picture;
 mod bad_input;
 mod damaged;
 mod golden;
+mod memory;
 mod resume;
 mod samples;
 mod scale;

@@ -97,6 +97,19 @@ pub struct Sequence {
     cache: Mutex<Option<Cached>>,
 }
 
+/// A frame as it is in its files, and what was in memory for it.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The particles, parts merged.
+    pub particles: RawParticles,
+    /// Oddities of the files, and what got lost in merging.
+    pub notes: Vec<String>,
+    /// Bytes of all its files on disk.
+    pub stored_bytes: u64,
+    /// Bytes of the largest of its files, uncompressed: one is in memory at a time.
+    pub content_bytes: u64,
+}
+
 /// The file with several steps that was used last, so that its steps do not read it again each.
 #[derive(Debug)]
 struct Cached {
@@ -221,31 +234,40 @@ impl Sequence {
     /// # Panics
     /// If there is no frame `index`.
     pub fn load_raw(&self, index: usize) -> Result<RawParticles, FrameError> {
-        self.load_noted(index).map(|(particles, _)| particles)
+        self.load_measured(index).map(|loaded| loaded.particles)
     }
 
-    /// Like [`Self::load_raw`], with what got lost in merging the parts.
+    /// Like [`Self::load_raw`], with what got lost in merging the parts and what was read.
     ///
     /// # Errors
     /// As [`Self::load_raw`].
     ///
     /// # Panics
     /// If there is no frame `index`.
-    pub fn load_noted(&self, index: usize) -> Result<(RawParticles, Vec<String>), FrameError> {
+    pub fn load_measured(&self, index: usize) -> Result<Loaded, FrameError> {
         let frame = &self.frames[index];
         let mut notes = Vec::new();
+        let (mut stored_bytes, mut content_bytes) = (0, 0);
         let mut parts = Vec::with_capacity(frame.parts.len());
         for part in &frame.parts {
             let (file, step) = self.file_of(part)?;
             parts.push((part.part, file.read(step)?));
             notes.extend_from_slice(file.notes());
+            stored_bytes += file.stored_len();
+            content_bytes = content_bytes.max(file.bytes().len() as u64);
         }
-        if self.parts.len() < 2
-            && let Some((_, only)) = parts.pop()
-        {
-            return Ok((only, notes));
-        }
-        Ok((merge(parts, &mut notes), notes))
+        let only = if self.parts.len() < 2 {
+            parts.pop().map(|(_, only)| only)
+        } else {
+            None
+        };
+        let particles = only.unwrap_or_else(|| merge(parts, &mut notes));
+        Ok(Loaded {
+            particles,
+            notes,
+            stored_bytes,
+            content_bytes,
+        })
     }
 
     /// The opened file of `part` and the step in it.

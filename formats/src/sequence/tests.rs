@@ -201,8 +201,14 @@ fn frames_are_loaded_and_parts_merged() {
     }
     let sequence = dir.open("").expect("a sequence");
     assert_eq!(sequence.part_names(), ["fluid", "wall"]);
-    let (last, notes) = sequence.load_noted(2).expect("readable");
-    assert!(notes.is_empty());
+    let loaded = sequence.load_measured(2).expect("readable");
+    assert!(loaded.notes.is_empty());
+    let on_disk = |path: &std::path::Path| std::fs::metadata(path).expect("a file").len();
+    let sizes: Vec<u64> = sequence.inputs(2).into_iter().map(on_disk).collect();
+    assert_eq!(loaded.stored_bytes, sizes.iter().sum::<u64>());
+    assert_eq!(Some(&loaded.content_bytes), sizes.iter().max());
+    let last = loaded.particles;
+    assert_eq!(last.byte_len(), 3 * 12 + 3 * 4);
     let expected = vec![Vec3::splat(10.0), Vec3::splat(10.0), Vec3::splat(-10.0)];
     assert_eq!(last.positions, crate::Positions::F32(expected));
     assert_eq!(last.attributes[0].data, AttributeData::U32(vec![0, 0, 1]));

@@ -26,6 +26,8 @@ mod cell;
 mod item;
 mod plan;
 
+pub(in crate::accel) use plan::CELL_LEN;
+
 use cell::CellScratch;
 use plan::CutPlan;
 

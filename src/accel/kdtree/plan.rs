@@ -13,7 +13,7 @@ use super::middle_of;
 use crate::accel::partition::index_u32;
 
 /// Particles in a cell that is left to `cell.rs`: both of its buffers fit an L2 cache.
-const CELL_LEN: usize = 32 * 1024;
+pub(in crate::accel) const CELL_LEN: usize = 32 * 1024;
 /// Cuts above one another at most: their leaves are numbered in 16 bits.
 const MAX_DEPTH: u32 = 15;
 /// One of so many particles is in the sample.

@@ -1,0 +1,224 @@
+//! `spherule check`: what `render` would do with the same arguments. Writes nothing but its answer.
+
+use std::io::{self, Write};
+use std::path::Path;
+
+use clap::Args;
+use spherule_formats::Sequence;
+use spherule_jobs::{Foreseen, FrameState, Job};
+
+use super::plan::{Plan, RunArgs, one_fits};
+use super::{CliError, Outcome, disk};
+use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
+use crate::report::Bytes;
+use crate::report::memory::available;
+use crate::survey::Survey;
+
+mod show;
+
+#[derive(Debug, Args)]
+pub(super) struct CheckArgs {
+    #[command(flatten)]
+    run: RunArgs,
+    /// One JSON object on standard output.
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
+    args.run.use_threads()?;
+    let asked = args.run.manifest.manifest()?;
+    let sequence = asked.sequence()?;
+    for note in sequence.notes() {
+        say!("note: {note}");
+    }
+    let plan = Plan::new(asked, &sequence)?;
+    let mut check = Check::new(&plan, &sequence);
+    check.look(&args.run);
+    let text = if args.json {
+        format!("{:#}\n", check.to_json())
+    } else {
+        check.to_text()
+    };
+    match io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
+            return Err(CliError::io(Path::new("standard output"))(e));
+        }
+        _ => {}
+    }
+    for problem in &check.problems {
+        say!("error: {problem}");
+    }
+    Ok(if check.problems.is_empty() {
+        Outcome::Done
+    } else {
+        Outcome::Refused
+    })
+}
+
+/// What was found.
+struct Check<'a> {
+    plan: &'a Plan,
+    sequence: &'a Sequence,
+    /// What would make `render` refuse.
+    problems: Vec<String>,
+    foreseen: Option<Foreseen>,
+    pictures: Option<(Survey, Setup)>,
+    tasks: Vec<ImageTask>,
+    schedule: Option<Schedule>,
+    probe: Option<Probe>,
+    free_memory: Option<u64>,
+    free_disk: Option<u64>,
+}
+
+impl<'a> Check<'a> {
+    fn new(plan: &'a Plan, sequence: &'a Sequence) -> Self {
+        Self {
+            plan,
+            sequence,
+            problems: Vec::new(),
+            foreseen: None,
+            pictures: None,
+            tasks: Vec::new(),
+            schedule: None,
+            probe: None,
+            free_memory: available(),
+            free_disk: None,
+        }
+    }
+
+    /// Keeps what went well; what did not is a problem.
+    fn noted<T>(&mut self, result: Result<T, CliError>) -> Option<T> {
+        result
+            .map_err(|error| self.problems.push(error.to_string()))
+            .ok()
+    }
+
+    fn look(&mut self, args: &RunArgs) {
+        if self.look_at_place(args.force) {
+            let request = self.plan.request(self.sequence, args.mode());
+            let foreseen = Job::foresee(&self.plan.dir, &request).map_err(CliError::from);
+            self.foreseen = self.noted(foreseen);
+        }
+        let pictures = match self.foreseen.as_ref().and_then(|f| f.resolved.as_ref()) {
+            Some(resolved) => self.plan.settle(resolved),
+            None => self.plan.survey(self.sequence),
+        };
+        self.pictures = self.noted(pictures);
+        let frames = match &self.foreseen {
+            Some(foreseen) => foreseen.pending(),
+            None => self.plan.selected(self.sequence),
+        };
+        let mut tasks = self.plan.tasks(self.sequence, &frames);
+        if let Some((_, setup)) = &self.pictures {
+            let schedule = self.plan.fit(self.sequence, setup, &mut tasks);
+            let fits = one_fits(&tasks);
+            self.tasks = tasks;
+            self.look_at_room(&schedule);
+            self.schedule = Some(schedule);
+            if self.noted(fits).is_some() {
+                self.look_at_time();
+            }
+        }
+    }
+
+    /// Looks at where the images go; whether that is, or could be, a directory.
+    fn look_at_place(&mut self, force: bool) -> bool {
+        if self.noted(self.plan.guard_directory()).is_none() {
+            return false;
+        }
+        self.noted(self.plan.guard_manifest(force));
+        let there = disk::existing(&self.plan.dir);
+        self.free_disk = disk::free(&there);
+        if let Err(error) = disk::writable(&there) {
+            self.problems.push(format!(
+                "{}: cannot be written ({error}); check its permissions, or choose another directory",
+                there.display()
+            ));
+        }
+        true
+    }
+
+    fn look_at_room(&mut self, schedule: &Schedule) {
+        let need = schedule.need.total();
+        if let Some(free) = self.free_memory.filter(|free| need > *free) {
+            self.problems.push(format!(
+                "memory: {} are needed ({}), {} are free; make the image smaller, ask for fewer \
+                 channels, or use another machine",
+                Bytes(need),
+                schedule.need,
+                Bytes(free)
+            ));
+        }
+    }
+
+    /// Measures the heaviest frame that is to be done.
+    fn look_at_time(&mut self) {
+        let Some((_, setup)) = &self.pictures else {
+            return;
+        };
+        let fitting = self.tasks.iter().filter(|task| task.refused.is_none());
+        let Some(heaviest) = fitting.max_by_key(|task| self.size(setup, task).raw) else {
+            return;
+        };
+        match probe(setup, self.sequence, heaviest) {
+            Ok(probe) => self.probe = Some(probe),
+            // Costs that frame alone when its turn comes.
+            Err(reason) => say!("note: frame {}: {reason}", heaviest.frame),
+        }
+        let needed = self.disk_bytes().unwrap_or(0.0);
+        if let Some(free) = self.free_disk.filter(|free| needed > *free as f64) {
+            self.problems.push(format!(
+                "{}: the images need about {}, {} are free; choose another place",
+                self.plan.shown_output.display(),
+                Bytes(whole(needed)),
+                Bytes(free)
+            ));
+        }
+    }
+
+    fn size(&self, setup: &Setup, task: &ImageTask) -> FrameSize {
+        FrameSize::of(self.sequence, task.index, setup.weight.as_ref())
+    }
+
+    fn to_do(&self) -> impl Iterator<Item = &ImageTask> {
+        self.tasks.iter().filter(|task| task.refused.is_none())
+    }
+
+    fn disk_bytes(&self) -> Option<f64> {
+        Some(self.probe?.image_bytes * self.to_do().count() as f64)
+    }
+
+    fn seconds(&self) -> Option<f64> {
+        let probe = self.probe?;
+        let (_, setup) = self.pictures.as_ref()?;
+        let overlap = self.schedule.as_ref()?.overlap;
+        let sizes: Vec<FrameSize> = self.to_do().map(|task| self.size(setup, task)).collect();
+        let probed = self.to_do().find(|task| task.frame == probe.frame)?;
+        Some(probe.seconds_for(&sizes, &self.size(setup, probed), overlap))
+    }
+
+    /// Frames of the run that stand so.
+    fn standing(&self, state: FrameState) -> Vec<i64> {
+        let Some(foreseen) = &self.foreseen else {
+            return Vec::new();
+        };
+        let all = foreseen.selected.iter().copied();
+        all.filter(|frame| foreseen.state.frame_state(*frame) == Some(state))
+            .collect()
+    }
+
+    fn too_large(&self) -> Vec<i64> {
+        let refused = self.tasks.iter().filter(|task| task.refused.is_some());
+        refused.map(|task| task.frame).collect()
+    }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "an estimate of a size; saturates"
+)]
+const fn whole(bytes: f64) -> u64 {
+    bytes as u64
+}

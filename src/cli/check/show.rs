@@ -1,0 +1,195 @@
+//! What `check` has found, for people and for scripts.
+
+use serde_json::{Map, Value, json};
+use spherule_jobs::FrameState;
+
+use super::{Check, whole};
+use crate::accel::Structure;
+use crate::cli::plan::list;
+use crate::cli::progress::duration;
+use crate::cli::render::radius_text;
+use crate::pipeline::{ColorRule, Overlap, RadiusRule, Setup};
+use crate::report::Bytes;
+use crate::survey::Survey;
+
+impl Check<'_> {
+    pub(super) fn to_json(&self) -> Value {
+        let manifest = &self.plan.manifest;
+        let mut all = Map::new();
+        let mut put = |key: &str, value: Value| all.insert(key.to_owned(), value);
+        put("problems", json!(self.problems));
+        put(
+            "frames",
+            json!({
+                "all": self.plan.selected(self.sequence),
+                "done": self.standing(FrameState::Done),
+                "failed": self.standing(FrameState::Failed),
+                "to_do": self.tasks.iter().map(|t| t.frame).collect::<Vec<_>>(),
+                "too_large": self.too_large(),
+            }),
+        );
+        put(
+            "images",
+            self.tasks.iter().map(|t| json!(t.image)).collect(),
+        );
+        put("directory", json!(self.plan.dir));
+        put(
+            "image",
+            json!({
+                "width": manifest.image.width,
+                "height": manifest.image.height,
+                "samples": manifest.image.samples,
+                "channels": manifest.output.channels.iter().map(|c| c.name()).collect::<Vec<_>>(),
+                "preview": manifest.output.preview,
+            }),
+        );
+        if let Some((survey, setup)) = &self.pictures {
+            put("structure", json!(structure(survey, setup).name()));
+            put("most_particles", json!(survey.most_particles));
+            put("radius", radius_json(setup, survey));
+            put("camera", camera_json(setup));
+        }
+        if let Some(schedule) = &self.schedule {
+            let mut memory = json!(schedule.need);
+            if let Some(memory) = memory.as_object_mut() {
+                memory.insert("total".into(), json!(schedule.need.total()));
+                memory.insert("free".into(), json!(self.free_memory));
+                let limit = manifest.render.memory_limit.map(|l| l.0);
+                memory.insert("limit".into(), json!(limit));
+                let overlap = schedule.overlap == Overlap::Stages;
+                memory.insert("frames_overlap".into(), json!(overlap));
+            }
+            put("memory", memory);
+        }
+        put(
+            "disk",
+            json!({"estimate": self.disk_bytes().map(whole), "free": self.free_disk}),
+        );
+        put(
+            "time",
+            json!({"estimate": self.seconds(), "probe": self.probe}),
+        );
+        Value::Object(all)
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let mut lines = vec![self.frames_line()];
+        let manifest = &self.plan.manifest;
+        let names: Vec<&str> = manifest.output.channels.iter().map(|c| c.name()).collect();
+        lines.push(format!(
+            "images     {}: {}x{}, {} samples a pixel, {}{}",
+            self.plan.shown_output.display(),
+            manifest.image.width,
+            manifest.image.height,
+            manifest.image.samples,
+            names.join(" "),
+            if manifest.output.preview {
+                ", with previews"
+            } else {
+                ""
+            }
+        ));
+        if let Some((survey, setup)) = &self.pictures {
+            lines.push(format!(
+                "particles  {} at most in the frames looked at, {}",
+                survey.most_particles,
+                radius_text(setup, survey)
+            ));
+            let view = &setup.view;
+            lines.push(format!(
+                "camera     {} from {:.4} to {:.4}, up {:.4}, {} degrees",
+                manifest.camera.mode.name(),
+                view.eye,
+                view.look_at,
+                view.up,
+                view.fov
+            ));
+            lines.push(format!("structure  {}", structure(survey, setup)));
+        }
+        lines.extend(self.memory_line());
+        lines.extend(self.disk_line());
+        lines.extend(self.time_line());
+        lines.push(String::new());
+        lines.join("\n")
+    }
+
+    fn frames_line(&self) -> String {
+        let all = self.plan.selected(self.sequence);
+        let mut line = format!("frames     {} ({})", all.len(), list(&all));
+        let pending: Vec<i64> = self.tasks.iter().map(|t| t.frame).collect();
+        for (what, frames) in [
+            ("done", self.standing(FrameState::Done)),
+            ("failed before", self.standing(FrameState::Failed)),
+            ("too large", self.too_large()),
+            ("to do", pending),
+        ] {
+            if !frames.is_empty() {
+                line += &format!("; {what} {} ({})", frames.len(), list(&frames));
+            }
+        }
+        line
+    }
+
+    fn memory_line(&self) -> Option<String> {
+        let schedule = self.schedule.as_ref()?;
+        let mut line = format!("memory     about {}", Bytes(schedule.need.total()));
+        if let Some(limit) = self.plan.manifest.render.memory_limit {
+            line += &format!(", the limit is {limit}");
+        }
+        if let Some(free) = self.free_memory {
+            line += &format!(", {} are free", Bytes(free));
+        }
+        if schedule.overlap == Overlap::None {
+            line += "; one frame at a time";
+        }
+        Some(line + &format!("\n           {}", schedule.need))
+    }
+
+    fn disk_line(&self) -> Option<String> {
+        let needed = Bytes(whole(self.disk_bytes()?));
+        let free = self
+            .free_disk
+            .map_or_else(String::new, |free| format!(", {} are free", Bytes(free)));
+        Some(format!("disk       about {needed}{free}"))
+    }
+
+    fn time_line(&self) -> Option<String> {
+        let probe = self.probe?;
+        Some(format!(
+            "time       about {}, an estimate: frame {} read in {:.3} s and built in {:.3} s just \
+             now, {:.2} % of its rays traced",
+            duration(self.seconds()?),
+            probe.frame,
+            probe.read,
+            probe.build,
+            100.0 * probe.traced_part
+        ))
+    }
+}
+
+/// For the largest frame that was looked at; the others may have another.
+fn structure(survey: &Survey, setup: &Setup) -> Structure {
+    let has_values = matches!(setup.color, ColorRule::Attribute { .. });
+    setup
+        .build_settings(survey.most_particles, has_values)
+        .structure
+}
+
+fn radius_json(setup: &Setup, survey: &Survey) -> Value {
+    match &setup.radius {
+        RadiusRule::Common(radius) => json!(radius),
+        RadiusRule::FileOr(_) if survey.has_radii => json!("file"),
+        RadiusRule::FileOr(radius) => json!(radius),
+        RadiusRule::Attribute { name, scale } => json!({"attribute": name, "scale": scale}),
+    }
+}
+
+fn camera_json(setup: &Setup) -> Value {
+    let view = &setup.view;
+    json!({
+        "eye": view.eye.to_array(),
+        "look_at": view.look_at.to_array(),
+        "up": view.up.to_array(),
+        "fov": view.fov,
+    })
+}

@@ -1,0 +1,353 @@
+//! A job as it is asked for, before anything is written: what `render` and `check` share.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::Value;
+use spherule_formats::Sequence;
+use spherule_jobs::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode, publish};
+
+use super::CliError;
+use super::job::{Asked, ManifestArgs, absolute, apart};
+use crate::accel::Structure;
+use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
+use crate::report::Bytes;
+use crate::report::memory::available;
+use crate::resolve::{self, question};
+use crate::survey::Survey;
+
+/// The manifest that is written beside the images.
+const JOB_FILE: &str = "job.toml";
+
+/// What `render` and `check` are told alike.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    #[command(flatten)]
+    pub(super) manifest: ManifestArgs,
+    /// Start over, whatever was rendered here before.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Keep finished images although settings or inputs have changed.
+    #[arg(long, conflicts_with = "force")]
+    pub(super) keep_done: bool,
+    /// Threads to use; default: all.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl RunArgs {
+    /// What to do with what an earlier run left.
+    pub(super) const fn mode(&self) -> Mode {
+        match (self.force, self.keep_done) {
+            (true, _) => Mode::Force,
+            (_, true) => Mode::KeepDone,
+            _ => Mode::Resume,
+        }
+    }
+
+    /// Uses as many threads as asked for from now on.
+    pub(super) fn use_threads(&self) -> Result<(), CliError> {
+        let Some(threads) = self.threads else {
+            return Ok(());
+        };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global()
+            .map_err(|e| CliError::other(format!("--threads {threads}: {e}")))
+    }
+}
+
+/// A job before anything is written.
+pub(super) struct Plan {
+    /// Where the images go: everything of the job lies there. Absolute.
+    pub(super) dir: PathBuf,
+    /// With paths relative to `dir`.
+    pub(super) manifest: Manifest,
+    /// The manifest's own file, absolute.
+    file: Option<PathBuf>,
+    /// What that file says, seen from `dir` too; None if it cannot stand alone.
+    unchanged: Option<Manifest>,
+    /// The images as the user named them.
+    pub(super) shown_output: PathBuf,
+}
+
+impl Plan {
+    pub(super) fn new(asked: Asked, sequence: &Sequence) -> Result<Self, CliError> {
+        let base = asked.absolute_base()?;
+        let mut manifest = asked.manifest;
+        let chosen = match &manifest.input.frames {
+            None => sequence.frames().len(),
+            Some(range) => {
+                let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+                let chosen = range.select(&numbers).len();
+                if chosen == 0 {
+                    return Err(CliError::other(format!(
+                        "input.frames: {range} has none of the frames that there are: {}",
+                        list(&numbers)
+                    )));
+                }
+                chosen
+            }
+        };
+        manifest.check_frame_count(chosen)?;
+        let shown_output = PathBuf::from(manifest.output.path.as_str());
+        let dir = real_dir(&base.join(manifest.output.path.dir()));
+        move_into(&mut manifest, &base, &dir)?;
+        let mut unchanged = asked.unchanged;
+        if let Some(manifest) = &mut unchanged {
+            move_into(manifest, &base, &dir)?;
+        }
+        let file = asked
+            .file
+            .as_deref()
+            .map(absolute)
+            .transpose()?
+            .map(|f| named_place(&f));
+        Ok(Self {
+            dir,
+            manifest,
+            file,
+            unchanged,
+            shown_output,
+        })
+    }
+
+    fn job_file(&self) -> PathBuf {
+        self.dir.join(JOB_FILE)
+    }
+
+    /// Whether the manifest that was given is the one that would be written.
+    fn is_own_manifest(&self) -> bool {
+        self.file.as_deref() == Some(&self.job_file())
+    }
+
+    /// The frames asked for, done or not.
+    pub(super) fn selected(&self, sequence: &Sequence) -> Vec<i64> {
+        let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+        match &self.manifest.input.frames {
+            Some(range) => range.select(&numbers),
+            None => numbers,
+        }
+    }
+
+    /// Refuses a directory that cannot be because a file is in its place.
+    pub(super) fn guard_directory(&self) -> Result<(), CliError> {
+        match self.dir.ancestors().find(|p| p.exists()) {
+            Some(found) if !found.is_dir() => Err(CliError::other(format!(
+                "{}: is a file where a directory for the images should be; choose another output",
+                found.display()
+            ))),
+            _ => Ok(()),
+        }
+    }
+
+    /// Refuses to overwrite a `job.toml` that belongs to no job of ours.
+    pub(super) fn guard_manifest(&self, force: bool) -> Result<(), CliError> {
+        let path = self.job_file();
+        if force || self.is_own_manifest() || !path.exists() || Job::has_begun(&self.dir)? {
+            return Ok(());
+        }
+        Err(CliError::other(format!(
+            "{}: is in the way of this job's own manifest; render that file, choose another \
+             output directory, or overwrite it with --force",
+            path.display()
+        )))
+    }
+
+    fn image(&self, frame: i64) -> PathBuf {
+        self.dir.join(self.manifest.output.path.path_for(frame))
+    }
+
+    fn preview(&self, frame: i64) -> Option<PathBuf> {
+        let path = || {
+            self.dir
+                .join(self.manifest.output.path.preview_path_for(frame))
+        };
+        self.manifest.output.preview.then(path)
+    }
+
+    /// What is asked of the job.
+    pub(super) fn request(&self, sequence: &Sequence, mode: Mode) -> JobRequest {
+        let frames = sequence
+            .frames()
+            .iter()
+            .enumerate()
+            .map(|(index, frame)| FrameRequest {
+                number: frame.number,
+                inputs: sequence
+                    .inputs(index)
+                    .into_iter()
+                    .map(Path::to_owned)
+                    .collect(),
+                outputs: std::iter::once(self.image(frame.number))
+                    .chain(self.preview(frame.number))
+                    .collect(),
+            })
+            .collect();
+        JobRequest {
+            worker: DEFAULT_WORKER.to_owned(),
+            settings: self.manifest.settings(),
+            frames,
+            selection: self.manifest.input.frames.clone(),
+            mode,
+        }
+    }
+
+    pub(super) fn open(&self, sequence: &Sequence, mode: Mode) -> Result<Job, CliError> {
+        let request = self.request(sequence, mode);
+        // A new job is begun, and an old one forgotten, only for pictures that can be.
+        let surveyed = if mode == Mode::Force || Job::peek(&self.dir)?.is_none() {
+            Some(self.survey_to_begin(sequence)?)
+        } else {
+            None
+        };
+        Ok(Job::open(&self.dir, request, |_| {
+            surveyed.map_or_else(|| to_value(&self.survey(sequence)?.0), Ok)
+        })?)
+    }
+
+    fn survey_to_begin(&self, sequence: &Sequence) -> Result<Value, CliError> {
+        let (survey, setup) = self.survey(sequence)?;
+        let mut tasks = self.tasks(sequence, &self.selected(sequence));
+        self.fit(sequence, &setup, &mut tasks);
+        one_fits(&tasks)?;
+        to_value(&survey)
+    }
+
+    /// Looks at the sequence: what "auto" means, and the pictures that come of it.
+    pub(super) fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), CliError> {
+        say!("looking at the sequence");
+        let survey = apart(|| Survey::of(sequence, question(&self.manifest)))?;
+        let setup = self.setup(&survey)?;
+        Ok((survey, setup))
+    }
+
+    fn setup(&self, survey: &Survey) -> Result<Setup, CliError> {
+        resolve::setup(&self.manifest, survey).map_err(|e| CliError::Other(e.to_string()))
+    }
+
+    /// The pictures, by what was found when the job began.
+    pub(super) fn settle(&self, resolved: &Value) -> Result<(Survey, Setup), CliError> {
+        let survey: Survey = serde_json::from_value(resolved.clone()).map_err(|e| {
+            CliError::other(format!(
+                "{}: its resolved values cannot be read ({e}); start over with --force",
+                self.dir.join(spherule_jobs::PLAN_FILE).display()
+            ))
+        })?;
+        let setup = self.setup(&survey)?;
+        Ok((survey, setup))
+    }
+
+    /// How `tasks` go through memory. Those that do not fit into the limit are marked so.
+    pub(super) fn fit(
+        &self,
+        sequence: &Sequence,
+        setup: &Setup,
+        tasks: &mut [ImageTask],
+    ) -> Schedule {
+        let sizes: Vec<FrameSize> = tasks
+            .iter()
+            .map(|task| FrameSize::of(sequence, task.index, setup.weight.as_ref()))
+            .collect();
+        let limit = self.manifest.render.memory_limit;
+        let model = MemoryModel::new(setup);
+        let schedule = model.schedule(&sizes, limit.map(|l| l.0), available());
+        if let Some(limit) = limit {
+            for (place, need) in &schedule.too_large {
+                tasks[*place].refused = Some(format!(
+                    "it needs about {} ({need}), render.memory_limit is {limit}: {}",
+                    Bytes(need.total()),
+                    remedy(setup, &sizes[*place], limit)
+                ));
+            }
+        }
+        schedule
+    }
+
+    /// Writes the manifest beside the images, unless it is what was given or stands there already.
+    /// If it is what was given, options become part of it where the job was `settled_anew` by them.
+    pub(super) fn write_manifest(&self, settled_anew: bool) -> Result<(), CliError> {
+        let path = self.job_file();
+        let mut manifest = self.manifest.clone();
+        if self.is_own_manifest() {
+            // Which frames to do now is no property of the job.
+            manifest.input.frames = self.unchanged.as_ref().and_then(|m| m.input.frames.clone());
+            if !settled_anew || self.unchanged.as_ref() == Some(&manifest) {
+                return Ok(());
+            }
+        }
+        let text = manifest.to_commented_toml();
+        if fs::read_to_string(&path).is_ok_and(|old| old == text) {
+            return Ok(());
+        }
+        publish(&path, text.as_bytes()).map_err(CliError::io(&path))
+    }
+
+    pub(super) fn tasks(&self, sequence: &Sequence, pending: &[i64]) -> Vec<ImageTask> {
+        let frames = sequence.frames();
+        let task = |number: &i64| {
+            let index = frames.binary_search_by_key(number, |f| f.number).ok()?;
+            Some(ImageTask {
+                frame: *number,
+                index,
+                image: self.image(*number),
+                preview: self.preview(*number),
+                refused: None,
+            })
+        };
+        pending.iter().filter_map(task).collect()
+    }
+}
+
+fn to_value(survey: &Survey) -> Result<Value, CliError> {
+    serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
+}
+
+/// Refuses work of which nothing can be done.
+pub(super) fn one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
+    let refused = tasks.iter().map(|t| Some((t.frame, t.refused.as_ref()?)));
+    match refused.collect::<Option<Vec<_>>>().as_deref() {
+        Some([(frame, reason), ..]) => Err(CliError::other(format!(
+            "no frame fits into memory: frame {frame}: {reason}"
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// What to do about a frame that needs more than `limit`.
+fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
+    let mut ways = Vec::new();
+    let others = Structure::ALL.into_iter().filter(|structure| {
+        let setup = Setup {
+            accelerator: Some(*structure),
+            ..setup.clone()
+        };
+        MemoryModel::new(&setup).alone(frame).total() <= limit.0
+    });
+    ways.extend(others.map(|other| format!("choose --accelerator {other}")));
+    let images = MemoryModel::new(setup).alone(&FrameSize::default());
+    if 4 * images.total() > limit.0 {
+        ways.push("make the image smaller or ask for fewer channels".to_owned());
+    }
+    ways.push("raise the limit".to_owned());
+    ways.join(", or ")
+}
+
+/// Makes paths relative to `dir`, where the images of `manifest` are to be.
+fn move_into(manifest: &mut Manifest, base: &Path, dir: &Path) -> Result<(), CliError> {
+    manifest.rebase(base, dir).map_err(CliError::Other)?;
+    // However the directory was named: it may be moved with its manifest.
+    if real_dir(&dir.join(manifest.output.path.dir())) == dir {
+        manifest.output.path =
+            OutputPattern::parse(manifest.output.path.file_name()).map_err(CliError::Other)?;
+    }
+    Ok(())
+}
+
+/// Frame numbers as a range.
+pub(super) fn list(frames: &[i64]) -> String {
+    spherule_jobs::FrameRange::from_frames(frames.iter().copied())
+        .map_or_else(String::new, |r| r.to_string())
+}

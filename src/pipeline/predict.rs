@@ -1,0 +1,316 @@
+//! How much memory a job will take: the one model behind `--memory-limit`, `check` and the refusal
+//! of frames and images that cannot fit.
+//!
+//! It adds up what the stages hold at once (see the module above): while the tree over frame i is
+//! built, frame i-1 is encoded; while frame i is traced, frame i+1 is read and frame i-1 may still be
+//! encoded. What is counted is anonymous memory; files are read, not mapped. Particle counts of
+//! frames that nobody has looked at are estimated from the length of their files and the frame that
+//! the survey found heaviest.
+
+use std::fmt;
+use std::fs;
+
+use serde::Serialize;
+use spherule_formats::sequence::Sequence;
+
+use super::setup::{ColorRule, RadiusRule, Setup};
+use crate::accel::{BuildBytes, predicted_bytes};
+use crate::render::{Film, band_bytes};
+use crate::report::Bytes;
+use crate::survey::FrameWeight;
+
+/// What a frame is thought to weigh before it is read; all but the counts in bytes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct FrameSize {
+    /// Particles.
+    pub particles: u64,
+    /// The largest of its files, uncompressed.
+    pub content: u64,
+    /// The numbers read from them.
+    pub raw: u64,
+    /// The positions among those.
+    pub positions: u64,
+    /// Files.
+    pub files: u64,
+    /// Whether its file has other frames too and stays in memory for them.
+    pub is_shared: bool,
+}
+
+impl FrameSize {
+    /// Of frame `index` of `sequence`, by the length of its files and a known frame.
+    pub fn of(sequence: &Sequence, index: usize, known: Option<&FrameWeight>) -> Self {
+        let sizes = sequence.inputs(index).into_iter().map(fs::metadata);
+        let stored = sizes.filter_map(|m| Some(m.ok()?.len())).sum();
+        let parts = sequence.frames().get(index).map(|f| f.parts.as_slice());
+        let is_shared = parts.is_some_and(|parts| parts.iter().any(|p| p.step.is_some()));
+        Self::estimate(stored, is_shared, known)
+    }
+
+    /// Of a frame whose files have `stored` bytes on disk, in proportion to a known one. Nothing is
+    /// known in jobs of the first versions: then as for plain single-precision positions.
+    pub fn estimate(stored: u64, is_shared: bool, known: Option<&FrameWeight>) -> Self {
+        let Some(known) = known.filter(|k| k.stored > 0) else {
+            return Self {
+                particles: stored / 12,
+                content: stored,
+                raw: stored,
+                positions: stored,
+                files: 1,
+                is_shared,
+            };
+        };
+        let scaled = |value: u64| {
+            let product = u128::from(value) * u128::from(stored) / u128::from(known.stored);
+            u64::try_from(product).unwrap_or(u64::MAX)
+        };
+        Self {
+            particles: scaled(known.particles),
+            content: scaled(known.content),
+            raw: scaled(known.raw),
+            positions: scaled(known.positions),
+            files: known.files,
+            is_shared,
+        }
+    }
+}
+
+/// Bytes of anonymous memory by what they are for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
+pub struct MemoryNeed {
+    /// The program and its threads.
+    pub program: u64,
+    /// A frame being read: its file, the numbers in it, and what is kept of them.
+    pub reading: u64,
+    /// What is kept of the frame in hand beside its tree: colours, ids, velocities; while it is
+    /// built, positions too.
+    pub particles: u64,
+    /// The tree, and what building it takes.
+    pub tree: u64,
+    /// The planes of the images being traced and encoded.
+    pub images: u64,
+    /// What encoding takes beside the planes.
+    pub encoding: u64,
+}
+
+impl MemoryNeed {
+    /// All together.
+    pub const fn total(&self) -> u64 {
+        self.program + self.reading + self.particles + self.tree + self.images + self.encoding
+    }
+
+    /// The parts by name.
+    pub fn parts(&self) -> [(&'static str, u64); 6] {
+        [
+            ("images", self.images),
+            ("encoding", self.encoding),
+            ("tree", self.tree),
+            ("particles", self.particles),
+            ("reading the next frame", self.reading),
+            ("program", self.program),
+        ]
+    }
+
+    pub(super) fn larger(self, other: Self) -> Self {
+        if other.total() > self.total() {
+            other
+        } else {
+            self
+        }
+    }
+}
+
+impl fmt::Display for MemoryNeed {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let mut parts = self.parts();
+        parts.sort_by_key(|(_, bytes)| std::cmp::Reverse(*bytes));
+        for (index, (name, bytes)) in parts.iter().filter(|(_, b)| *b > 0).enumerate() {
+            let comma = if index > 0 { ", " } else { "" };
+            write!(f, "{comma}{name} {}", Bytes(*bytes))?;
+        }
+        Ok(())
+    }
+}
+
+/// The need of a job's frames.
+#[derive(Debug, Clone, Copy)]
+pub struct MemoryModel<'a> {
+    setup: &'a Setup,
+    own_radii: bool,
+    has_ids: bool,
+    has_velocities: bool,
+}
+
+/// Code and data of the program, its threads' stacks and small allocations, and what the allocator
+/// keeps.
+const PROGRAM: u64 = 7 << 20;
+/// The same for each thread.
+const THREAD: u64 = 256 << 10;
+
+/// Pieces from this size on go back to the system when they are freed: glibc's
+/// `DEFAULT_MMAP_THRESHOLD_MAX`. Other allocators keep less, as a rule.
+const RETURNED: u64 = 32 << 20;
+
+impl<'a> MemoryModel<'a> {
+    /// For the pictures of `setup`.
+    pub fn new(setup: &'a Setup) -> Self {
+        let known = setup.weight.unwrap_or_default();
+        Self {
+            setup,
+            own_radii: match setup.radius {
+                RadiusRule::Common(_) => false,
+                RadiusRule::FileOr(_) => known.own_radii,
+                RadiusRule::Attribute { .. } => true,
+            },
+            has_ids: known.ids,
+            has_velocities: known.velocities,
+        }
+    }
+
+    /// The most that is held at any time while these frames are rendered in turn.
+    pub fn peak(&self, frames: &[FrameSize]) -> MemoryNeed {
+        let mut need = MemoryNeed::default();
+        let mut tree = 0;
+        for (i, frame) in frames.iter().enumerate() {
+            // Its memory lives on from frame to frame.
+            tree = self.tree(frame).max(tree);
+            let before = i > 0;
+            need = need.larger(self.around(before, frame, frames.get(i + 1), tree));
+        }
+        need
+    }
+
+    /// What a frame needs that is rendered alone.
+    pub fn alone(&self, frame: &FrameSize) -> MemoryNeed {
+        self.peak(std::slice::from_ref(frame))
+    }
+
+    /// What reading a frame takes at its peak.
+    pub fn reading(&self, frame: &FrameSize) -> u64 {
+        let n = frame.particles;
+        // Several files are read in turn and then put together.
+        let files = if frame.files > 1 {
+            frame.content.max(frame.raw)
+        } else {
+            frame.content
+        };
+        let attributes = frame.raw.saturating_sub(frame.positions);
+        // Double precision is rounded into a copy, single is taken as it is.
+        let is_double = frame.positions >= 24 * n;
+        let rounding = if is_double { frame.raw + 12 * n } else { 0 };
+        let shared = if frame.is_shared { frame.content } else { 0 };
+        // One byte each tells which are finite.
+        let keeping = attributes + self.kept(frame) + n;
+        (files + frame.raw).max(shared + rounding.max(keeping))
+    }
+
+    /// What the allocator keeps of the memory that a frame was read in, after it is freed: all of it
+    /// if there are only small pieces.
+    fn retained(&self, frame: &FrameSize) -> u64 {
+        if frame.content.max(frame.positions) < RETURNED {
+            self.reading(frame)
+        } else {
+            0
+        }
+    }
+
+    /// What is kept of a frame that was read, until its tree is built.
+    fn kept(&self, frame: &FrameSize) -> u64 {
+        let radii = if self.own_radii { 4 } else { 0 };
+        frame.particles * (12 + radii) + self.shading(frame)
+    }
+
+    /// What is kept of it while it is traced.
+    fn shading(&self, frame: &FrameSize) -> u64 {
+        let channels = self.setup.render.channels;
+        let values = matches!(self.setup.color, ColorRule::Attribute { .. });
+        let each = [
+            (values, 4),
+            (channels.id && self.has_ids, 4),
+            (channels.velocity && self.has_velocities, 12),
+        ];
+        let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
+        frame.particles * each
+    }
+
+    fn build(&self, frame: &FrameSize) -> BuildBytes {
+        let values = matches!(self.setup.color, ColorRule::Attribute { .. });
+        let count = usize::try_from(frame.particles).unwrap_or(usize::MAX);
+        let settings = self.setup.build_settings(count, values);
+        predicted_bytes(&settings, frame.particles, self.own_radii)
+    }
+
+    fn tree(&self, frame: &FrameSize) -> u64 {
+        self.build(frame).tree
+    }
+
+    /// The peak of the time that `frame` is built and traced in memory for a tree of `tree` bytes:
+    /// the image of the frame `before` is encoded then, and the frame `after` is read.
+    fn around(
+        &self,
+        before: bool,
+        frame: &FrameSize,
+        after: Option<&FrameSize>,
+        tree: u64,
+    ) -> MemoryNeed {
+        let render = &self.setup.render;
+        let film = Film::bytes_for(render.width, render.height, render.channels);
+        let threads = rayon::current_num_threads() as u64;
+        let (film_before, encoding_before) = if before {
+            (film, self.encoding())
+        } else {
+            (0, 0)
+        };
+        let shared = if frame.is_shared { frame.content } else { 0 };
+        let idle = MemoryNeed {
+            program: PROGRAM + THREAD * threads,
+            reading: shared.max(self.retained(frame)),
+            ..MemoryNeed::default()
+        };
+        let kept = self.kept(frame);
+        let first_read = MemoryNeed {
+            reading: self.reading(frame),
+            ..idle
+        };
+        let building = MemoryNeed {
+            particles: kept,
+            // They lie in what the allocator keeps.
+            reading: shared.max(self.retained(frame).saturating_sub(kept)),
+            tree: tree + self.build(frame).scratch,
+            images: film_before,
+            encoding: encoding_before,
+            ..idle
+        };
+        let tracing = MemoryNeed {
+            reading: after.map_or(idle.reading, |after| self.reading(after).max(idle.reading)),
+            particles: self.shading(frame),
+            tree,
+            images: film + film_before + band_bytes(render) * threads,
+            encoding: encoding_before,
+            ..idle
+        };
+        let encoding = MemoryNeed {
+            images: film,
+            encoding: self.encoding(),
+            ..idle
+        };
+        first_read.larger(building).larger(tracing).larger(encoding)
+    }
+
+    /// What encoding an image takes beside its planes: a copy of them with the colours in half
+    /// precision, and the blocks that are compressed just then; or, before, the bytes of the preview
+    /// plain, filtered and compressed.
+    fn encoding(&self) -> u64 {
+        let render = &self.setup.render;
+        let pixels = u64::from(render.width) * u64::from(render.height);
+        let film = Film::bytes_for(render.width, render.height, render.channels);
+        let copy = film - 8 * pixels;
+        // Blocks have 16 rows at most; each is there plain and compressed.
+        let rows = 16 * copy / u64::from(render.height.max(16));
+        let in_hand = rayon::current_num_threads() as u64 + 2;
+        (copy + 2 * rows * in_hand).max(9 * pixels)
+    }
+}
+
+#[cfg(test)]
+#[path = "predict_tests.rs"]
+mod tests;

@@ -1,0 +1,88 @@
+//! The model against itself; `tests/suite/memory` compares it with what is measured.
+
+use super::*;
+use crate::pipeline::Overlap;
+
+/// A frame of plain single-precision positions.
+fn plain(particles: u64) -> FrameSize {
+    FrameSize {
+        particles,
+        content: 12 * particles,
+        raw: 12 * particles,
+        positions: 12 * particles,
+        files: 1,
+        is_shared: false,
+    }
+}
+
+fn setup() -> Setup {
+    let mut manifest = crate::manifest::Manifest::new("in");
+    manifest.input.radius = crate::manifest::RadiusSetting::Length(0.1);
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("f_1.npy");
+    spherule_formats::write::npy::write(&file, &[glam::Vec3::ZERO]).expect("a file");
+    let input = spherule_formats::SequenceInput::from_path(&file);
+    let sequence = Sequence::open(&input).expect("a frame");
+    let question = crate::resolve::question(&manifest);
+    let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
+    crate::resolve::setup(&manifest, &survey).expect("pictures")
+}
+
+#[test]
+fn more_of_anything_needs_more() {
+    let setup = setup();
+    let model = MemoryModel::new(&setup);
+    let total = |frames: &[FrameSize]| model.peak(frames).total();
+    assert!(total(&[plain(4_000_000)]) < total(&[plain(8_000_000)]));
+    assert!(total(&[plain(8_000_000)]) < total(&[plain(8_000_000); 2]));
+    // Memory is flat over a sequence.
+    assert_eq!(
+        total(&[plain(8_000_000); 3]),
+        total(&[plain(8_000_000); 30])
+    );
+    let mut larger = setup.clone();
+    larger.render.width *= 2;
+    let more = MemoryModel::new(&larger).alone(&plain(1000)).images;
+    assert_eq!(more, 2 * model.alone(&plain(1000)).images);
+}
+
+#[test]
+fn limits_leave_out_what_does_not_fit_alone() {
+    let setup = setup();
+    let model = MemoryModel::new(&setup);
+    let frames = [plain(1000), plain(20_000_000), plain(1000)];
+    let small = model.peak(&[frames[0], frames[2]]).total();
+    let schedule = model.schedule(&frames, Some(small), None);
+    let left_out: Vec<usize> = schedule.too_large.iter().map(|(place, _)| *place).collect();
+    assert_eq!(left_out, [1]);
+    assert_eq!(schedule.overlap, Overlap::Stages);
+    assert_eq!(schedule.need.total(), small);
+
+    let alone = model.alone(&frames[1]).total();
+    let schedule = model.schedule(&frames, Some(alone), None);
+    assert!(schedule.too_large.is_empty());
+    let schedule = model.schedule(&[frames[1]; 2], Some(alone), None);
+    assert_eq!(schedule.overlap, Overlap::None);
+    assert_eq!(schedule.need.total(), alone);
+    // Less is free: nothing is refused for that here, frames only go alone.
+    let schedule = model.schedule(&frames, None, Some(alone / 2));
+    assert!(schedule.too_large.is_empty() && schedule.overlap == Overlap::None);
+}
+
+#[test]
+fn frames_are_judged_by_the_length_of_their_files() {
+    let known = FrameWeight {
+        particles: 100,
+        stored: 1000,
+        content: 2000,
+        raw: 1600,
+        positions: 1200,
+        files: 1,
+        ..FrameWeight::default()
+    };
+    let size = FrameSize::estimate(500, false, Some(&known));
+    assert_eq!((size.particles, size.content, size.raw), (50, 1000, 800));
+    assert_eq!(FrameSize::estimate(1200, false, None).particles, 100);
+    let huge = FrameSize::estimate(u64::MAX, false, Some(&known));
+    assert_eq!(huge.raw, u64::MAX);
+}

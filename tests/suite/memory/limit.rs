@@ -1,0 +1,106 @@
+//! `--memory-limit`: what does not fit is refused before it starts, and the rest goes on.
+
+use crate::harness::{Workshop, images, ledger};
+
+use super::{AWAY, vtk};
+
+/// Three frames of which the second is heavy.
+fn one_heavy() -> Workshop {
+    let workshop = Workshop::new();
+    for (frame, count) in [(1, 1000), (2, 500_000), (3, 1000)] {
+        vtk(&workshop.join(format!("in/f_{frame}.vtk")), count, false);
+    }
+    workshop
+}
+
+#[test]
+fn what_cannot_fit_is_not_begun() {
+    let workshop = Workshop::new();
+    vtk(&workshop.join("in/f_1.vtk"), 1000, false);
+    vtk(&workshop.join("in/f_2.vtk"), 1000, false);
+    let ran = workshop.render(&["--memory-limit", "1MiB"]).expect(2);
+    let ran = ran
+        .tells("no frame fits into memory: frame 1: it needs about")
+        .tells("render.memory_limit is 1.00 MiB")
+        .tells("raise the limit");
+    assert!(ran.errors().contains("images"), "{}", ran.errors());
+    assert!(
+        !workshop.join("out").exists(),
+        "a refused job leaves nothing"
+    );
+    let images = [
+        "--memory-limit",
+        "30MiB",
+        "--width",
+        "2000",
+        "--height",
+        "2000",
+    ];
+    let images = [&["render", "in", "-o", "out/f.####.exr"][..], &images].concat();
+    workshop
+        .run(&images)
+        .expect(2)
+        .tells("make the image smaller or ask for fewer channels");
+    assert!(
+        !workshop.join("out").exists(),
+        "a refused job leaves nothing"
+    );
+}
+
+#[test]
+fn sizes_that_are_none() {
+    let workshop = Workshop::new();
+    vtk(&workshop.join("in/f_1.vtk"), 10, false);
+    for size in ["0", "", "-5", "much", "4 gallons", "1e3"] {
+        workshop
+            .render(&["--memory-limit", size])
+            .expect(2)
+            .tells("--memory-limit: render.memory_limit: wants a size above 0, as \"4GiB\"");
+    }
+    for size in ["2GiB", "2G", "2048m", "2147483648"] {
+        workshop.render(&["--memory-limit", size]).expect(0);
+    }
+    workshop
+        .render(&["--force", "--set", "render.memory_limit=2147483648"])
+        .expect(0);
+}
+
+#[test]
+fn one_heavy_frame_costs_one_frame() {
+    let workshop = one_heavy();
+    let ran = workshop
+        .render(&["--memory-limit", "16MiB"])
+        .expect(1)
+        .tells("frame 2: it needs about");
+    assert_eq!(ran.rendered(), [1, 3]);
+    let lines = ledger(&workshop.join("out")).lines;
+    let failed = lines.iter().find(|l| l["status"] == "failed");
+    let reason = failed.expect("one failed")["reason"].as_str();
+    assert!(reason.expect("a reason").contains("reading"), "{reason:?}");
+    // The limit is no property of the images.
+    let ran = workshop.render(&["--memory-limit", "1GiB"]).expect(0);
+    assert_eq!(ran.rendered(), [2]);
+}
+
+#[test]
+fn frames_go_one_at_a_time_where_that_fits() {
+    let workshop = Workshop::new();
+    for frame in 1..=3 {
+        vtk(&workshop.join(format!("in/f_{frame}.vtk")), 1000, false);
+    }
+    // Two images side by side and one being encoded need 100 MiB, one at a time 70.
+    let large = ["--width", "1280", "--height", "720", "--samples", "1"];
+    let run = |out: &str, options: &[&str]| {
+        let pattern = format!("{out}/f.####.exr");
+        let start = ["render", "in", "-o", &pattern];
+        workshop.run(&[&start[..], &large, &AWAY, options].concat())
+    };
+    run("free", &[]).expect(0);
+    run("tight", &["--memory-limit", "85MiB"])
+        .expect(0)
+        .tells("one frame at a time, to take less memory");
+    assert_eq!(
+        images(&workshop.join("free")),
+        images(&workshop.join("tight"))
+    );
+}

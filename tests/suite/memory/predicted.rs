@@ -1,0 +1,90 @@
+//! What `check` predicts is what `render` takes: within 15 % of the peak of anonymous memory.
+
+use std::fs;
+use std::path::Path;
+
+use glam::DVec3;
+use spherule_formats::{ParticleFrame, Positions, RawParticles, native, write};
+
+use super::{AWAY, answer, particles, report, vtk};
+use crate::harness::Workshop;
+
+/// Runs both over three frames like `first` and compares.
+#[track_caller]
+fn compare(name: &str, make: impl Fn(&Path), options: &[&str]) {
+    let workshop = Workshop::new();
+    fs::create_dir(workshop.join("in")).expect("a directory");
+    let first = workshop.join(format!("in/f_1.{name}"));
+    make(&first);
+    for other in [2, 3] {
+        fs::hard_link(&first, workshop.join(format!("in/f_{other}.{name}"))).expect("a link");
+    }
+    let common = [
+        "in",
+        "-o",
+        "out/f.####.exr",
+        "--samples",
+        "1",
+        "--threads",
+        "2",
+    ];
+    let arguments = |command| [&[command], &common[..], &AWAY, options].concat();
+    let check = workshop
+        .run(&[&arguments("check")[..], &["--json"]].concat())
+        .expect(0);
+    workshop.run(&arguments("render")).expect(0);
+    let predicted = &answer(&check)["memory"];
+    let total = predicted["total"].as_f64().expect("bytes");
+    let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64();
+    let measured = measured.expect("bytes");
+    let part = total / measured;
+    assert!(
+        (0.85..=1.15).contains(&part),
+        "{name} {options:?}: predicted {total}, measured {measured}, {part}: {predicted}"
+    );
+}
+
+fn spf(path: &Path, count: usize) {
+    let raw = RawParticles {
+        positions: Positions::F32(particles(count)),
+        attributes: Vec::new(),
+        time: None,
+        step: None,
+    };
+    native::write(path, &ParticleFrame::from_raw(raw, DVec3::ZERO), None).expect("a file");
+}
+
+fn npy(path: &Path, count: usize) {
+    write::npy::write(path, &particles(count)).expect("a file");
+}
+
+const SMALL: [&str; 6] = ["--width", "320", "--height", "180", "--channels", "RGBA"];
+const LARGE: [&str; 4] = ["--width", "1280", "--height", "720"];
+const ALL: [&str; 2] = ["--channels", "RGBA,Z,N,id,P,V,albedo"];
+
+#[test]
+fn few_particles_in_a_large_image() {
+    compare("npy", |path| npy(path, 100_000), &LARGE);
+}
+
+#[test]
+fn many_attributes_and_all_channels() {
+    let options = [&LARGE[..], &ALL].concat();
+    compare("vtk", |path| vtk(path, 300_000, true), &options);
+}
+
+#[test]
+fn many_particles_in_a_small_image() {
+    compare("spf", |path| spf(path, 1_000_000), &SMALL);
+    compare("vtk", |path| vtk(path, 1_000_000, false), &SMALL);
+}
+
+#[test]
+#[ignore = "takes half a minute"]
+fn very_many_particles() {
+    compare("npy", |path| npy(path, 4_000_000), &SMALL);
+    compare("spf", |path| spf(path, 4_000_000), &LARGE);
+    compare("vtk", |path| vtk(path, 4_000_000, false), &SMALL);
+    let options = [&SMALL[..4], &ALL].concat();
+    compare("vtk", |path| vtk(path, 4_000_000, true), &options);
+}
