@@ -23,8 +23,8 @@ const SELECT_LEN: usize = 256 * 1024;
 /// Most particles of the sample that an axis is chosen by.
 const AXIS_LEN: usize = 512;
 /// Width of a bracket to either side, standard deviations of the rank. They leave room for the cuts
-/// above, whose places are guesses too: at 3.5 most builds over 10^7 particles took a second pass, at
-/// 4.5 few do.
+/// above, whose places are guesses too: at 3.5 builds over 10^7 particles took several passes, at
+/// 4.5 a single one.
 const DEVIATIONS: f64 = 4.5;
 /// A task for less than this costs more than it saves.
 const PARALLEL_LEN: usize = 4096;
