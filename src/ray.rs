@@ -31,3 +31,90 @@ impl Ray {
         self.origin + self.direction * t
     }
 }
+
+/// Rays of a packet: as many as a 512-bit register has lanes.
+pub const PACKET_SIZE: usize = 16;
+
+/// Up to 16 rays to be traced together, one array per component. Worth while for rays that lie close
+/// to one another and point nearly the same way; any others are just as right.
+#[derive(Debug, Clone, Copy, PartialEq)]
+#[repr(align(64))]
+pub struct RayPacket {
+    pub(crate) origin: [[f32; PACKET_SIZE]; 3],
+    pub(crate) direction: [[f32; PACKET_SIZE]; 3],
+    pub(crate) t_min: [f32; PACKET_SIZE],
+    pub(crate) t_max: [f32; PACKET_SIZE],
+    len: usize,
+}
+
+impl Default for RayPacket {
+    fn default() -> Self {
+        Self {
+            origin: [[0.0; PACKET_SIZE]; 3],
+            direction: [[0.0; PACKET_SIZE]; 3],
+            t_min: [0.0; PACKET_SIZE],
+            t_max: [0.0; PACKET_SIZE],
+            len: 0,
+        }
+    }
+}
+
+impl RayPacket {
+    /// Adds a ray.
+    ///
+    /// # Panics
+    /// If there are 16 already.
+    #[inline]
+    pub fn push(&mut self, ray: &Ray) {
+        let lane = self.len;
+        assert!(lane < PACKET_SIZE, "a packet holds 16 rays");
+        for axis in 0..3 {
+            self.origin[axis][lane] = ray.origin[axis];
+            self.direction[axis][lane] = ray.direction[axis];
+        }
+        self.t_min[lane] = ray.t_min;
+        self.t_max[lane] = ray.t_max;
+        self.len += 1;
+    }
+
+    /// Removes all rays.
+    pub fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Rays in the packet.
+    pub fn len(&self) -> usize {
+        self.len
+    }
+
+    /// Whether there is no ray.
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Whether there is no room for another ray.
+    pub fn is_full(&self) -> bool {
+        self.len == PACKET_SIZE
+    }
+
+    /// The ray in `lane`.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    #[inline]
+    pub fn ray(&self, lane: usize) -> Ray {
+        assert!(lane < self.len, "the packet has fewer rays");
+        let vector = |v: &[[f32; PACKET_SIZE]; 3]| Vec3::new(v[0][lane], v[1][lane], v[2][lane]);
+        Ray {
+            origin: vector(&self.origin),
+            direction: vector(&self.direction),
+            t_min: self.t_min[lane],
+            t_max: self.t_max[lane],
+        }
+    }
+
+    /// All rays in order.
+    pub fn rays(&self) -> impl Iterator<Item = Ray> + '_ {
+        (0..self.len).map(|lane| self.ray(lane))
+    }
+}

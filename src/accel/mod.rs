@@ -19,6 +19,7 @@ mod kdtree;
 mod lbvh;
 mod linked;
 mod node;
+mod packet;
 mod partition;
 mod ploc;
 mod predict;

@@ -13,6 +13,8 @@ use super::{
 };
 use crate::ray::Ray;
 
+mod packets;
+
 /// A scene that owns its numbers.
 #[derive(Debug, Clone)]
 struct Scene {

@@ -2,8 +2,8 @@
 //! instructions test nodes and blocks.
 
 use super::block::BLOCK_SIZE;
-use super::node::WIDTH;
-use super::simd::{Kernel, KernelTask, SLAB_SLACK, finite_inverse};
+use super::node::{Node, WIDTH};
+use super::simd::{Kernel, KernelTask, PacketKernel, SLAB_SLACK, finite_inverse};
 use super::topology::{Implicit, Linked, Place, Topology};
 use super::wide::{MAX_LEVELS, WideTree};
 use crate::ray::Ray;
@@ -130,17 +130,19 @@ impl WideTree {
     }
 
     /// Who comes first of two particles hit at the same distance: the lower index in the frame, or
-    /// where indices were not kept, the lower centre (so that it never depends on the structure).
+    /// where indices were not kept, the lower centre (so that it never depends on the structure). Equal
+    /// ones go by slot, so that it does not depend on the order of visits either.
     #[cold]
-    fn tie_order(&self, a: u32, b: u32) -> std::cmp::Ordering {
+    pub(super) fn tie_order(&self, a: u32, b: u32) -> std::cmp::Ordering {
         if !self.indices.is_empty() {
-            return self.particle(a).cmp(&self.particle(b));
+            return self.particle(a).cmp(&self.particle(b)).then(a.cmp(&b));
         }
         let center = |slot| self.sphere(slot).0;
-        let (a, b) = (center(a), center(b));
-        a.x.total_cmp(&b.x)
-            .then(a.y.total_cmp(&b.y))
-            .then(a.z.total_cmp(&b.z))
+        let (p, q) = (center(a), center(b));
+        p.x.total_cmp(&q.x)
+            .then(p.y.total_cmp(&q.y))
+            .then(p.z.total_cmp(&q.z))
+            .then(a.cmp(&b))
     }
 }
 
@@ -165,14 +167,15 @@ impl Pending {
     }
 }
 
-/// Visits the blocks whose boxes the ray enters before `limit`, nearest boxes first. `visit` gets
-/// each block's number and the limit, and returns the new limit; negative ends the walk.
+/// Visits the blocks whose boxes are entered before `limit`, nearest boxes first. `test` is
+/// [`Kernel::test_node`] for whatever walks: a ray or a beam of them. `visit` gets each block's number
+/// and the limit, and returns the new limit; negative ends the walk.
 #[inline(always)]
-fn walk<K: Kernel, T: Topology>(
+pub(super) fn walk<K: Kernel, T: Topology>(
     kernel: K,
     tree: &WideTree,
     topology: T,
-    ray: &K::Ray,
+    test: impl Fn(&Node, f32) -> (usize, K::Keys),
     mut limit: f32,
     mut visit: impl FnMut(usize, f32) -> f32,
 ) {
@@ -191,7 +194,7 @@ fn walk<K: Kernel, T: Topology>(
                 }
             }
             Place::Node(index) => {
-                let (found, keys) = kernel.test_node(ray, &tree.nodes[index], limit);
+                let (found, keys) = test(&tree.nodes[index], limit);
                 let below = Below {
                     tree,
                     topology,
@@ -289,7 +292,7 @@ impl<T: Topology> KernelTask for Nearest<'_, T> {
     type Output = Option<TreeHit>;
 
     #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> Option<TreeHit> {
+    fn run<K: PacketKernel>(self, kernel: K) -> Option<TreeHit> {
         let Self {
             tree,
             topology,
@@ -302,7 +305,7 @@ impl<T: Topology> KernelTask for Nearest<'_, T> {
             kernel,
             tree,
             topology,
-            &prepared,
+            |node, limit| kernel.test_node(&prepared, node, limit),
             ray.t_max.next_down(),
             |block, limit| {
                 let Some((t, lanes)) = kernel.nearest_in_block(
@@ -355,7 +358,7 @@ impl<T: Topology> KernelTask for AnyHit<'_, T> {
     type Output = bool;
 
     #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) -> bool {
+    fn run<K: PacketKernel>(self, kernel: K) -> bool {
         let Self {
             tree,
             topology,
@@ -367,7 +370,7 @@ impl<T: Topology> KernelTask for AnyHit<'_, T> {
             kernel,
             tree,
             topology,
-            &prepared,
+            |node, limit| kernel.test_node(&prepared, node, limit),
             ray.t_max.next_down(),
             |block, limit| {
                 found = kernel.any_in_block(
@@ -394,7 +397,7 @@ impl<T: Topology> KernelTask for Crossings<'_, T> {
     type Output = ();
 
     #[inline(always)]
-    fn run<K: Kernel>(self, kernel: K) {
+    fn run<K: PacketKernel>(self, kernel: K) {
         let Self {
             tree,
             topology,
@@ -407,7 +410,7 @@ impl<T: Topology> KernelTask for Crossings<'_, T> {
             kernel,
             tree,
             topology,
-            &prepared,
+            |node, limit| kernel.test_node(&prepared, node, limit),
             ray.t_max.next_down(),
             |block, limit| {
                 let found =

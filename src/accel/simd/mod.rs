@@ -10,11 +10,17 @@ use super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::node::{Node, WIDTH};
 use crate::ray::Ray;
 
+mod beam;
+mod loop_packet;
 #[cfg(target_arch = "aarch64")]
 mod neon;
+mod packet;
 mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
+
+pub(super) use beam::{Beam, lanes_near};
+pub(super) use packet::{LaneHits, PacketKernel, PacketSphere};
 
 /// Instructions to trace with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -184,7 +190,7 @@ pub(super) trait KernelTask {
     type Output;
 
     /// Does it.
-    fn run<K: Kernel>(self, kernel: K) -> Self::Output;
+    fn run<K: PacketKernel>(self, kernel: K) -> Self::Output;
 }
 
 /// A level that this machine was asked for and has: proof that its kernel may run.

@@ -11,6 +11,7 @@ use std::arch::asm;
 
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
+use super::loop_packet::LoopPackets;
 use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
 
@@ -150,6 +151,10 @@ impl NeonRay {
             (store(t), bits(vandq_u32(hit, inside)))
         }
     }
+}
+
+impl LoopPackets for Neon {
+    const FUSED: bool = true;
 }
 
 impl Kernel for Neon {

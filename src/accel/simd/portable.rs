@@ -5,6 +5,7 @@ use glam::Vec3;
 
 use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
 use super::super::node::{Node, WIDTH};
+use super::loop_packet::LoopPackets;
 use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
 
@@ -53,6 +54,30 @@ impl PreparedRay {
     }
 }
 
+/// Keys of the children whose boxes are entered no later than left, and how many they are.
+pub(super) fn keys_of(
+    node: &Node,
+    near: &[f32; WIDTH],
+    far: &[f32; WIDTH],
+) -> (usize, [u32; WIDTH]) {
+    let mut keys = [0; WIDTH];
+    let mut found = 0;
+    for slot in 0..node.child_count() {
+        if near[slot] <= far[slot] {
+            #[expect(clippy::cast_possible_truncation, reason = "slots are under eight")]
+            {
+                keys[found] = (near[slot].to_bits() & !7) | slot as u32;
+            }
+            found += 1;
+        }
+    }
+    (found, keys)
+}
+
+impl LoopPackets for Portable {
+    const FUSED: bool = false;
+}
+
 impl Kernel for Portable {
     type Ray = PreparedRay;
     type Keys = [u32; WIDTH];
@@ -67,7 +92,6 @@ impl Kernel for Portable {
     }
 
     fn test_node(self, ray: &PreparedRay, node: &Node, limit: f32) -> (usize, [u32; WIDTH]) {
-        let mut keys = [0; WIDTH];
         let mut near = [ray.ray.t_min.max(0.0); WIDTH];
         let mut far = [limit; WIDTH];
         for axis in 0..3 {
@@ -84,17 +108,7 @@ impl Kernel for Portable {
                 far[slot] = far[slot].min(leave);
             }
         }
-        let mut found = 0;
-        for slot in 0..node.child_count() {
-            if near[slot] <= far[slot] {
-                #[expect(clippy::cast_possible_truncation, reason = "slots are under eight")]
-                {
-                    keys[found] = (near[slot].to_bits() & !7) | slot as u32;
-                }
-                found += 1;
-            }
-        }
-        (found, keys)
+        keys_of(node, &near, &far)
     }
 
     fn first_two(self, keys: [u32; WIDTH]) -> [u32; 2] {

@@ -1,0 +1,139 @@
+//! Packets in plain loops, for kernels that have no packet tests of their own.
+
+use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
+use super::super::node::{Node, WIDTH};
+use super::portable::keys_of;
+use super::{Beam, Kernel, LaneHits, PacketKernel, PacketSphere, SLAB_SLACK};
+use crate::ray::{PACKET_SIZE, RayPacket};
+
+/// A kernel whose packets are tested in loops over lanes.
+pub(super) trait LoopPackets: Kernel<Keys = [u32; WIDTH]> {
+    /// Whether its test of one ray multiplies and adds in one step; that of packets must do likewise.
+    const FUSED: bool;
+}
+
+/// `a * b + c`, rounded once or twice.
+#[inline(always)]
+fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
+    if FUSED { a.mul_add(b, c) } else { a * b + c }
+}
+
+/// The crossing of the ray in `lane` with `sphere` that counts, if it lies in `t_min..=limit`. The
+/// operations are those of the kernels' tests of one ray.
+#[inline(always)]
+fn distance<const FUSED: bool>(
+    packet: &RayPacket,
+    lane: usize,
+    sphere: &PacketSphere,
+    limit: f32,
+) -> Option<f32> {
+    let [ox, oy, oz] = [0, 1, 2].map(|axis| sphere.center[axis] - packet.origin[axis][lane]);
+    let [dx, dy, dz] = [0, 1, 2].map(|axis| packet.direction[axis][lane]);
+    let dot = |a: [f32; 3], b: [f32; 3]| {
+        let xy = multiply_add::<FUSED>(a[1], b[1], a[0] * b[0]);
+        multiply_add::<FUSED>(a[2], b[2], xy)
+    };
+    let middle = dot([ox, oy, oz], [dx, dy, dz]);
+    let across = [(ox, dx), (oy, dy), (oz, dz)].map(|(o, d)| multiply_add::<FUSED>(-middle, d, o));
+    let half = (sphere.radius_squared - dot(across, across)).sqrt();
+    let near = middle - half;
+    let t_min = packet.t_min[lane];
+    let t = if near >= t_min { near } else { middle + half };
+    // False for NaN, where the ray misses.
+    (t >= t_min && t <= limit).then_some(t)
+}
+
+#[inline(always)]
+fn nearest<const FUSED: bool>(
+    packet: &RayPacket,
+    sphere: &PacketSphere,
+    hits: &mut LaneHits,
+) -> u32 {
+    let mut tied = 0;
+    for lane in 0..PACKET_SIZE {
+        let Some(t) = distance::<FUSED>(packet, lane, sphere, hits.limit[lane]) else {
+            continue;
+        };
+        if t == hits.limit[lane] && hits.slot[lane] != LaneHits::NO_SLOT {
+            tied |= 1 << lane;
+        } else {
+            hits.limit[lane] = t;
+            hits.slot[lane] = sphere.slot;
+        }
+    }
+    tied
+}
+
+#[inline(always)]
+fn any<const FUSED: bool>(packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+    (0..PACKET_SIZE)
+        .filter(|lane| distance::<FUSED>(packet, *lane, sphere, hits.limit[*lane]).is_some())
+        .fold(0, |lanes, lane| lanes | 1 << lane)
+}
+
+impl<K: LoopPackets> PacketKernel for K {
+    fn test_node_with_beam(self, beam: &Beam, node: &Node, limit: f32) -> (usize, [u32; WIDTH]) {
+        let mut near = [beam.t_min; WIDTH];
+        let mut far = [limit; WIDTH];
+        for axis in 0..3 {
+            let step = f32::from_bits(u32::from(node.exponent[axis]) << 23);
+            let from_near = node.origin[axis] - beam.origin_near[axis];
+            let from_far = node.origin[axis] - beam.origin_far[axis];
+            let terms = from_near.abs().max(from_far.abs()) + 255.0 * step;
+            let slack = (terms * SLAB_SLACK + beam.padding) * beam.sign[axis];
+            let [least, greatest] = [beam.inverse[0][axis], beam.inverse[1][axis]];
+            let side = beam.near_side[axis];
+            for slot in 0..WIDTH {
+                let first = f32::from(node.planes[axis][side][slot]) * step + (from_near - slack);
+                let second =
+                    f32::from(node.planes[axis][1 - side][slot]) * step + (from_far + slack);
+                near[slot] = near[slot].max((first * least).min(first * greatest));
+                far[slot] = far[slot].min((second * least).max(second * greatest));
+            }
+        }
+        keys_of(node, &near, &far)
+    }
+
+    fn spheres_in_beam(
+        self,
+        beam: &Beam,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> u32 {
+        let mut lanes = 0;
+        for lane in 0..BLOCK_SIZE {
+            let radius = radii.map_or(beam.radius, |r| r.0[lane]);
+            let to_center = block.center(lane) - beam.center;
+            let middle = to_center.dot(beam.axis);
+            let across = (to_center - beam.axis * middle).length_squared();
+            let tip = radius + beam.spread;
+            let reach = tip + beam.growth * (middle + tip).max(0.0);
+            // Said so that NaN stays, for the rays' own tests to judge.
+            let outside = across > reach * reach || middle - reach > limit;
+            lanes |= u32::from(!outside) << lane;
+        }
+        lanes
+    }
+
+    fn nearest_of_packet(
+        self,
+        packet: &RayPacket,
+        sphere: &PacketSphere,
+        hits: &mut LaneHits,
+    ) -> u32 {
+        if K::FUSED {
+            nearest::<true>(packet, sphere, hits)
+        } else {
+            nearest::<false>(packet, sphere, hits)
+        }
+    }
+
+    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+        if K::FUSED {
+            any::<true>(packet, sphere, hits)
+        } else {
+            any::<false>(packet, sphere, hits)
+        }
+    }
+}

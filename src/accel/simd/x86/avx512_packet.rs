@@ -1,0 +1,144 @@
+//! Packets in the 512-bit kernel: a register holds a value of each ray.
+
+use std::arch::x86_64::*;
+
+use super::super::super::block::{Block, BlockRadii};
+use super::super::super::node::Node;
+use super::super::{Beam, LaneHits, PacketKernel, PacketSphere};
+use super::avx512::Avx512;
+use super::beam;
+use super::lanes::keys_of;
+use crate::ray::RayPacket;
+
+/// The crossing of each ray with `sphere` that counts, and the lanes where it lies in
+/// `t_min..=limit`. The operations on each pair of ray and sphere are those of the test of one ray.
+///
+/// # Safety
+/// The caller's machine has AVX-512 F.
+#[inline(always)]
+unsafe fn distances(
+    packet: &RayPacket,
+    sphere: &PacketSphere,
+    hits: &LaneHits,
+) -> (__m512, __mmask16) {
+    let load = |lanes: &[f32; 16]| {
+        // SAFETY: AVX-512 by contract; 16 values are read from an array of 16.
+        unsafe { _mm512_loadu_ps(lanes.as_ptr()) }
+    };
+    // SAFETY: AVX-512 by contract.
+    unsafe {
+        let [x, y, z] = sphere.center;
+        let cx = _mm512_sub_ps(_mm512_set1_ps(x), load(&packet.origin[0]));
+        let cy = _mm512_sub_ps(_mm512_set1_ps(y), load(&packet.origin[1]));
+        let cz = _mm512_sub_ps(_mm512_set1_ps(z), load(&packet.origin[2]));
+        let dx = load(&packet.direction[0]);
+        let dy = load(&packet.direction[1]);
+        let dz = load(&packet.direction[2]);
+        let middle = _mm512_fmadd_ps(cz, dz, _mm512_fmadd_ps(cy, dy, _mm512_mul_ps(cx, dx)));
+        let ax = _mm512_fnmadd_ps(middle, dx, cx);
+        let ay = _mm512_fnmadd_ps(middle, dy, cy);
+        let az = _mm512_fnmadd_ps(middle, dz, cz);
+        let across = _mm512_fmadd_ps(az, az, _mm512_fmadd_ps(ay, ay, _mm512_mul_ps(ax, ax)));
+        let discriminant = _mm512_sub_ps(_mm512_set1_ps(sphere.radius_squared), across);
+        let zero = _mm512_setzero_ps();
+        let hit = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(discriminant, zero);
+        if hit == 0 {
+            return (zero, 0);
+        }
+        let chord = _mm512_sqrt_ps(_mm512_max_ps(discriminant, zero));
+        let t_min = load(&packet.t_min);
+        let near = _mm512_sub_ps(middle, chord);
+        let far = _mm512_add_ps(middle, chord);
+        let ahead = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(near, t_min);
+        let t = _mm512_mask_blend_ps(ahead, far, near);
+        let after = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(hit, t, t_min);
+        let before = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(after, t, load(&hits.limit));
+        (t, before)
+    }
+}
+
+impl PacketKernel for Avx512 {
+    #[inline(always)]
+    fn test_node_with_beam(self, beam: &Beam, node: &Node, limit: f32) -> (usize, __m256i) {
+        // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL.
+        unsafe {
+            let (near, far) = beam::test(beam, node, limit);
+            let mask = _mm256_mask_cmp_ps_mask::<_CMP_LE_OQ>(node.child_mask, near, far);
+            let packed = _mm256_maskz_compress_epi32(mask, keys_of(near));
+            (mask.count_ones() as usize, packed)
+        }
+    }
+
+    #[inline(always)]
+    fn spheres_in_beam(
+        self,
+        beam: &Beam,
+        block: &Block,
+        radii: Option<&BlockRadii>,
+        limit: f32,
+    ) -> u32 {
+        let (o, d) = (beam.center, beam.axis);
+        // SAFETY: this kernel is only used inside functions with AVX-512; the loads are of arrays of
+        // 16 aligned to 64 bytes.
+        unsafe {
+            let cx = _mm512_sub_ps(_mm512_load_ps(block.x.as_ptr()), _mm512_set1_ps(o.x));
+            let cy = _mm512_sub_ps(_mm512_load_ps(block.y.as_ptr()), _mm512_set1_ps(o.y));
+            let cz = _mm512_sub_ps(_mm512_load_ps(block.z.as_ptr()), _mm512_set1_ps(o.z));
+            let (dx, dy, dz) = (
+                _mm512_set1_ps(d.x),
+                _mm512_set1_ps(d.y),
+                _mm512_set1_ps(d.z),
+            );
+            let middle = _mm512_fmadd_ps(cz, dz, _mm512_fmadd_ps(cy, dy, _mm512_mul_ps(cx, dx)));
+            let ax = _mm512_fnmadd_ps(middle, dx, cx);
+            let ay = _mm512_fnmadd_ps(middle, dy, cy);
+            let az = _mm512_fnmadd_ps(middle, dz, cz);
+            let across = _mm512_fmadd_ps(az, az, _mm512_fmadd_ps(ay, ay, _mm512_mul_ps(ax, ax)));
+            let radius = match radii {
+                Some(radii) => _mm512_load_ps(radii.0.as_ptr()),
+                None => _mm512_set1_ps(beam.radius),
+            };
+            let tip = _mm512_add_ps(radius, _mm512_set1_ps(beam.spread));
+            let ahead = _mm512_max_ps(_mm512_add_ps(middle, tip), _mm512_setzero_ps());
+            let reach = _mm512_fmadd_ps(ahead, _mm512_set1_ps(beam.growth), tip);
+            // Said so that NaN stays, for the rays' own tests to judge.
+            let inside = _mm512_cmp_ps_mask::<_CMP_NGT_UQ>(across, _mm512_mul_ps(reach, reach));
+            let start = _mm512_sub_ps(middle, reach);
+            let limit = _mm512_set1_ps(limit);
+            u32::from(_mm512_mask_cmp_ps_mask::<_CMP_NGT_UQ>(inside, start, limit))
+        }
+    }
+
+    #[inline(always)]
+    fn nearest_of_packet(
+        self,
+        packet: &RayPacket,
+        sphere: &PacketSphere,
+        hits: &mut LaneHits,
+    ) -> u32 {
+        // SAFETY: this kernel is only used inside functions with AVX-512; loads and stores are of
+        // arrays of 16.
+        unsafe {
+            let (t, lanes) = distances(packet, sphere, hits);
+            if lanes == 0 {
+                return 0;
+            }
+            let limit = _mm512_loadu_ps(hits.limit.as_ptr());
+            let held = _mm512_loadu_si512(hits.slot.as_ptr().cast());
+            let none = _mm512_set1_epi32(LaneHits::NO_SLOT.cast_signed());
+            let equal = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(lanes, t, limit);
+            let tied = _mm512_mask_cmpneq_epi32_mask(equal, held, none);
+            let nearer = lanes & !tied;
+            let slot = _mm512_set1_epi32(sphere.slot.cast_signed());
+            _mm512_mask_storeu_ps(hits.limit.as_mut_ptr(), nearer, t);
+            _mm512_mask_storeu_epi32(hits.slot.as_mut_ptr().cast(), nearer, slot);
+            u32::from(tied)
+        }
+    }
+
+    #[inline(always)]
+    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+        // SAFETY: this kernel is only used inside functions with AVX-512.
+        unsafe { u32::from(distances(packet, sphere, hits).1) }
+    }
+}

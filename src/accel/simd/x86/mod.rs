@@ -1,0 +1,59 @@
+//! Hand-written AVX2 and AVX-512 tests, and the doors to code compiled with them.
+//!
+//! The traits' methods are inlined into the functions at the end, which carry the target features;
+//! those are only called after the machine was asked.
+#![expect(unsafe_code, reason = "intrinsics; every block says why it is sound")]
+
+use super::{KernelTask, SimdLevel, Supported};
+
+mod avx2;
+mod avx2_packet;
+mod avx512;
+mod avx512_packet;
+mod beam;
+mod lanes;
+mod slab;
+
+use avx2::Avx2;
+use avx512::Avx512;
+
+pub(super) fn has_avx2() -> bool {
+    is_x86_feature_detected!("avx2")
+        && is_x86_feature_detected!("fma")
+        && is_x86_feature_detected!("popcnt")
+        && is_x86_feature_detected!("bmi1")
+}
+
+pub(super) fn has_avx512() -> bool {
+    has_avx2()
+        && is_x86_feature_detected!("avx512f")
+        && is_x86_feature_detected!("avx512bw")
+        && is_x86_feature_detected!("avx512dq")
+        && is_x86_feature_detected!("avx512vl")
+}
+
+/// A task compiled with a kernel's instructions.
+macro_rules! compiled {
+    ($run:ident, $kernel:expr, $level:path, $features:literal) => {
+        /// # Panics
+        /// If `proof` is of another level.
+        pub(super) fn $run<T: KernelTask>(proof: Supported, task: T) -> T::Output {
+            #[target_feature(enable = $features)]
+            fn with_features<T: KernelTask>(task: T) -> T::Output {
+                task.run($kernel)
+            }
+            assert_eq!(proof.level(), $level);
+            // SAFETY: a `Supported` is only made for a level whose features the machine was found
+            // to have, and this one is for the level of these features.
+            unsafe { with_features(task) }
+        }
+    };
+}
+
+compiled!(run_avx2, Avx2, SimdLevel::Avx2, "avx2,fma,popcnt,bmi1");
+compiled!(
+    run_avx512,
+    Avx512,
+    SimdLevel::Avx512,
+    "avx2,fma,popcnt,bmi1,avx512f,avx512bw,avx512dq,avx512vl"
+);

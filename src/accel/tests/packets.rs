@@ -1,0 +1,205 @@
+//! Packets against single rays: the same to the bit.
+
+use super::*;
+use crate::accel::node::Node;
+use crate::accel::topology::Link;
+use crate::accel::traverse::TreeHit;
+use crate::accel::wide::WideTree;
+use crate::ray::{PACKET_SIZE, RayPacket};
+
+/// How the rays of a packet lie to one another.
+#[derive(Debug, Clone, Copy)]
+enum Shape {
+    /// From one point through a square.
+    Camera,
+    /// From points near one another to one point.
+    Shadow,
+    /// Next to one another, as far apart as the scene is wide.
+    Wide,
+    /// From within a particle, every way.
+    Inside,
+    /// Along an axis or nearly, to both sides of it.
+    Axis,
+    /// As they come.
+    Any,
+}
+
+const SHAPES: [Shape; 6] = [
+    Shape::Camera,
+    Shape::Shadow,
+    Shape::Wide,
+    Shape::Inside,
+    Shape::Axis,
+    Shape::Any,
+];
+
+/// 1 to 16 rays at a particle of `scene`.
+fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPacket {
+    let index = (random.next() * scene.centers.len() as f32) as usize;
+    let target = scene.centers.get(index).copied().unwrap_or(Vec3::ZERO);
+    let radius = scene.typical_radius();
+    let mut way = (random.point() * 2.0 - 1.0).normalize_or(Vec3::X);
+    if let Shape::Axis = shape {
+        way = [Vec3::X, -Vec3::Y, Vec3::Z][index % 3];
+    }
+    let width = radius * 10.0_f32.powf(random.next() * 3.0 - 2.0);
+    let eye = target - way * (radius * 6.0).max(3.0);
+    let mut near = |width: f32| target + (random.point() * 2.0 - 1.0) * width;
+    let rays: Vec<Ray> = (0..PACKET_SIZE)
+        .map(|_| {
+            let (from, to) = match shape {
+                Shape::Camera => (eye, near(width)),
+                Shape::Shadow => (near(width) - way * radius, target + way * 4.0),
+                Shape::Wide => {
+                    let start = near(1.0) - way * 3.0;
+                    (start, start + way)
+                }
+                Shape::Inside => (near(0.3 * radius), near(radius)),
+                Shape::Axis => (eye, near(1e-7)),
+                Shape::Any => (near(2.0), near(radius)),
+            };
+            Ray::new(from, (to - from).normalize_or(Vec3::X))
+        })
+        .collect();
+    let len = 1 + (random.next() * 1.5 * PACKET_SIZE as f32) as usize;
+    let mut packet = RayPacket::default();
+    for ray in rays.iter().take(len) {
+        // Some end early or begin late.
+        let choice = (random.next() * 8.0) as u32;
+        let distance = (target - ray.origin).length();
+        packet.push(&Ray {
+            t_max: if choice == 0 { distance } else { ray.t_max },
+            t_min: if choice == 1 { distance } else { ray.t_min },
+            ..*ray
+        });
+    }
+    packet
+}
+
+/// Returns how many rays hit.
+#[track_caller]
+fn check_packet(tree: &WideTree, packet: &RayPacket, what: &str) -> usize {
+    let hits = tree.nearest_packet(packet);
+    let met = tree.any_hit_packet(packet);
+    for (lane, hit) in hits.iter().enumerate() {
+        let ray = (lane < packet.len()).then(|| packet.ray(lane));
+        let alone = ray.and_then(|ray| tree.nearest(&ray));
+        // Which of several copies is found depends on the leaves that were visited.
+        let sphere = |slot| {
+            if tree.has_copies {
+                tree.particle(slot)
+            } else {
+                slot
+            }
+        };
+        let bits = |hit: &Option<TreeHit>| hit.map(|hit| (hit.t.to_bits(), sphere(hit.slot)));
+        assert_eq!(bits(hit), bits(&alone), "{what}, lane {lane} of {packet:?}");
+        let any = ray.is_some_and(|ray| tree.any_hit(&ray));
+        assert_eq!(
+            met >> lane & 1 == 1,
+            any,
+            "{what}, lane {lane} of {packet:?}"
+        );
+    }
+    hits.iter().flatten().count()
+}
+
+/// The same tree with links.
+fn linked(tree: &WideTree) -> Vec<Link> {
+    let ends = tree
+        .level_starts
+        .iter()
+        .skip(1)
+        .map(|start| *start as usize);
+    let ends = ends.chain([tree.nodes.len()]).take(tree.level_starts.len());
+    let mut links = Vec::new();
+    for (level, end) in ends.enumerate() {
+        let start = tree.level_starts[level] as usize;
+        for (index, node) in tree.nodes[start..end].iter().enumerate() {
+            let first = tree.first_child(level as u32, index);
+            links.push(match tree.level_starts.get(level + 1) {
+                Some(below) => Link::new(*below as usize + first, Node::child_count(node), 0),
+                None => Link::new(0, 0, first),
+            });
+        }
+    }
+    links
+}
+
+#[test]
+fn packets_find_what_single_rays_find() {
+    for scene in awkward_scenes() {
+        for settings in all_settings() {
+            for keep_indices in [true, false] {
+                let settings = BuildSettings {
+                    keep_indices,
+                    ..settings
+                };
+                let mut builder = TreeBuilder::new();
+                builder.build(&scene.spheres(), &settings);
+                let mut hits = check_shapes(&scene, builder.tree_mut());
+                if builder.tree().links.is_empty() {
+                    builder.tree_mut().links = linked(builder.tree());
+                    hits += check_shapes(&scene, builder.tree_mut());
+                }
+                assert!(hits > 1000 || scene.centers.is_empty(), "{}", scene.name);
+            }
+        }
+    }
+}
+
+/// Returns how many rays hit, over all levels.
+#[track_caller]
+fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
+    let mut hits = 0;
+    for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+        tree.set_simd(level);
+        for shape in SHAPES {
+            let mut random = Random(17);
+            for _ in 0..25 {
+                let packet = packet(scene, shape, &mut random);
+                let what = format!("{} {level:?} {shape:?}", scene.name);
+                hits += check_packet(tree, &packet, &what);
+            }
+        }
+    }
+    hits
+}
+
+#[test]
+fn an_empty_packet_finds_nothing() {
+    let scene = Scene::common("one", vec![Vec3::ZERO], 1.0);
+    let mut builder = TreeBuilder::new();
+    builder.build(&scene.spheres(), &BuildSettings::default());
+    let nothing = RayPacket::default();
+    assert!(
+        builder
+            .tree()
+            .nearest_packet(&nothing)
+            .iter()
+            .all(Option::is_none)
+    );
+    assert_eq!(builder.tree().any_hit_packet(&nothing), 0);
+}
+
+#[test]
+fn ties_in_a_packet_go_to_the_lower_index() {
+    let scene = Scene::common("coincident", vec![Vec3::splat(0.25); 100], 0.5);
+    let mut builder = TreeBuilder::new();
+    builder.build(&scene.spheres(), &BuildSettings::default());
+    let mut packet = RayPacket::default();
+    for lane in 0..PACKET_SIZE {
+        let aim = Vec3::new(0.25, 0.2, 0.2 + 0.005 * lane as f32);
+        packet.push(&Ray::new(
+            Vec3::NEG_X * 5.0,
+            (aim + Vec3::X * 5.0).normalize(),
+        ));
+    }
+    for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+        builder.tree_mut().set_simd(level);
+        for hit in builder.tree().nearest_packet(&packet) {
+            let slot = hit.expect("aimed at it").slot;
+            assert_eq!(builder.tree().particle(slot), 0, "{level:?}");
+        }
+    }
+}
