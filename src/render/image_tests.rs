@@ -8,9 +8,12 @@ use super::{
     brute::{Ball, Balls},
     *,
 };
+use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
+use crate::ray::Ray;
 use crate::scene::{
     Background, Bounds, Camera, CameraView, Framing, Ground, Material, default_lights,
 };
+use crate::surface::{Crossing, SurfaceHit, spheres::SphereSurface};
 
 /// A heap of balls, some overlapping, all different.
 fn heap(count: u32) -> Balls {
@@ -189,4 +192,51 @@ fn interruption_and_bad_settings_are_errors() {
     wild.material.transmission = 2.0;
     let result = render(&nothing, &wild, &source, &settings(), &never);
     assert!(matches!(result, Err(RenderError::Material(_))));
+}
+
+/// A surface without packets of its own.
+struct OneByOne<'a>(SphereSurface<'a>);
+
+impl Surface for OneByOne<'_> {
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.0.nearest(ray)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.0.occluded(ray)
+    }
+
+    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
+        self.0.crossings(ray, crossings);
+    }
+}
+
+#[test]
+fn packets_make_the_same_film_as_single_rays() {
+    let heap = heap(3000);
+    let centers: Vec<Vec3> = heap.0.iter().map(|ball| ball.center).collect();
+    let radii: Vec<f32> = heap.0.iter().map(|ball| 0.2 * ball.radius).collect();
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    let never = AtomicBool::new(false);
+    let mut builder = TreeBuilder::new();
+    for radius in [SphereRadius::Common(0.05), SphereRadius::Each(&radii)] {
+        let spheres = Spheres {
+            centers: &centers,
+            radius,
+        };
+        builder.build(&spheres, &BuildSettings::default());
+        let surface = SphereSurface::new(builder.tree());
+        for (samples, transmission) in [(1, 0.0), (5, 0.0), (16, 0.0), (2, 0.8)] {
+            let scene = heap_scene(transmission);
+            let settings = RenderSettings {
+                samples,
+                ..settings()
+            };
+            let packets = render(&surface, &scene, &source, &settings, &never).unwrap();
+            let single = OneByOne(surface);
+            let singles = render(&single, &scene, &source, &settings, &never).unwrap();
+            assert!(packets.1.shadow > 0 && packets.1.primary == 75 * 50 * u64::from(samples));
+            assert_eq!(packets, singles, "{samples} samples, {transmission}");
+        }
+    }
 }

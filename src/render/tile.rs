@@ -1,6 +1,6 @@
 //! A square of pixels rendered by one thread.
 
-use glam::{Vec2, Vec3};
+use glam::{Vec2, Vec4};
 
 use super::{
     RayCounts, RenderSettings, ShadeSource,
@@ -9,6 +9,7 @@ use super::{
     sampler::PixelSampler,
     whitted::{Scratch, Tracer},
 };
+use crate::ray::PACKET_SIZE;
 use crate::surface::Surface;
 
 /// Pixels along a tile's side: enough work to hide the scheduling, small enough to share evenly.
@@ -45,7 +46,8 @@ impl Tile {
         }
     }
 
-    /// Renders all pixels.
+    /// Renders all pixels. Samples go in packets of 16, pixel after pixel along a Z-order curve: a
+    /// packet is a square of 4x4 pixels, or the samples of a smaller one.
     pub(super) fn render<S: Surface, C: ShadeSource>(
         &self,
         tracer: &Tracer<'_, S, C>,
@@ -53,30 +55,85 @@ impl Tile {
     ) -> RenderedTile {
         let mut scratch = Scratch::default();
         let mut sampler = PixelSampler::new(settings.samples);
-        let mut pixels = Vec::with_capacity(self.width as usize * self.height as usize);
+        let count = self.width as usize * self.height as usize;
+        let mut pixels = vec![(Vec4::ZERO, DataSample::MISS); count];
+        let mut packet = SamplePacket::default();
+        let mut flush = |packet: &mut SamplePacket| {
+            tracer.samples(packet.films(), &mut scratch, |lane, sample| {
+                let (sum, data) = &mut pixels[packet.pixels[lane]];
+                *sum += sample.color.extend(sample.coverage);
+                data.keep_nearest(&sample.data);
+            });
+            packet.len = 0;
+        };
         let size = Vec2::new(settings.width as f32, settings.height as f32);
-        let share = 1.0 / settings.samples as f32;
-        for y in self.top..self.top + self.height {
-            for x in self.left..self.left + self.width {
-                let mut sum = Vec3::ZERO;
-                let mut coverage = 0.0;
-                let mut data = DataSample::MISS;
-                sampler.for_each(x, y, |point| {
-                    let film_point = (Vec2::new(x as f32, y as f32) + point) / size;
-                    let sample = tracer.sample(film_point, &mut scratch);
-                    sum += sample.color;
-                    coverage += sample.coverage;
-                    data.keep_nearest(&sample.data);
-                });
-                let color = (sum * share).extend(coverage * share);
-                pixels.push((color.to_array(), data));
-            }
+        for (column, row) in z_order().filter(|(x, y)| *x < self.width && *y < self.height) {
+            let pixel = (row * self.width + column) as usize;
+            let (x, y) = (self.left + column, self.top + row);
+            sampler.for_each(x, y, |point| {
+                let film = (Vec2::new(x as f32, y as f32) + point) / size;
+                packet.push(pixel, film);
+                if packet.len == PACKET_SIZE {
+                    flush(&mut packet);
+                }
+            });
         }
+        flush(&mut packet);
+        let share = 1.0 / settings.samples as f32;
+        let mean = |(sum, data): (Vec4, DataSample)| ((sum * share).to_array(), data);
         RenderedTile {
             left: self.left,
             width: self.width,
-            pixels,
+            pixels: pixels.into_iter().map(mean).collect(),
             counts: scratch.counts,
         }
+    }
+}
+
+/// Samples to be traced together.
+#[derive(Default)]
+struct SamplePacket {
+    /// The pixel of each, within the tile.
+    pixels: [usize; PACKET_SIZE],
+    films: [Vec2; PACKET_SIZE],
+    len: usize,
+}
+
+impl SamplePacket {
+    fn push(&mut self, pixel: usize, film: Vec2) {
+        self.pixels[self.len] = pixel;
+        self.films[self.len] = film;
+        self.len += 1;
+    }
+
+    fn films(&self) -> &[Vec2] {
+        &self.films[..self.len]
+    }
+}
+
+/// Column and row of the places in a whole tile, so that every aligned square of a power of two is
+/// finished before the next one is begun.
+fn z_order() -> impl Iterator<Item = (u32, u32)> {
+    const { assert!(SIDE == 16, "four bits for each axis") };
+    let every_other_bit = |code: u32| (0..4).fold(0, |v, bit| v | (code >> bit & 1 << bit));
+    (0..SIDE * SIDE).map(move |code| (every_other_bit(code), every_other_bit(code >> 1)))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sixteen_places_are_a_square() {
+        let places: Vec<_> = z_order().collect();
+        for packet in places.chunks(PACKET_SIZE) {
+            let (x, y) = packet[0];
+            assert_eq!((x % 4, y % 4), (0, 0));
+            assert!(packet.iter().all(|(a, b)| a - x < 4 && b - y < 4));
+        }
+        let mut sorted = places;
+        sorted.sort_unstable();
+        sorted.dedup();
+        assert_eq!(sorted.len(), 256);
     }
 }

@@ -14,7 +14,7 @@ use super::{
     aov::{DataSample, NO_ID},
 };
 use crate::{
-    ray::Ray,
+    ray::{PACKET_SIZE, Ray, RayPacket},
     scene::{
         Ground, Scene, ground,
         light::Incident,
@@ -28,6 +28,8 @@ use crate::{
 pub(super) struct Scratch {
     pub(super) counts: RayCounts,
     crossings: Vec<Crossing>,
+    /// For each light, the rays of a packet whose places it reaches.
+    lit: Vec<u32>,
 }
 
 /// One sample of a pixel.
@@ -56,7 +58,26 @@ enum Met {
     Nothing,
 }
 
+/// What a packet of camera rays meets.
+#[derive(Default)]
+struct Seen {
+    /// Up to the floor.
+    rays: RayPacket,
+    floors: [Option<GroundHit>; PACKET_SIZE],
+    hits: [Option<SurfaceHit>; PACKET_SIZE],
+}
+
+/// Which lights reach the place that a ray of a packet met.
+#[derive(Clone, Copy)]
+struct Lit<'a> {
+    /// The ray's lane.
+    lane: usize,
+    /// For each light, a bit for each lane that it reaches.
+    lights: &'a [u32],
+}
+
 /// A visible piece of floor.
+#[derive(Clone, Copy)]
 struct GroundHit {
     ground: Ground,
     t: f32,
@@ -102,43 +123,135 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         }
     }
 
-    /// The light and the data that the camera sees at `film`.
-    pub(super) fn sample(&self, film: Vec2, scratch: &mut Scratch) -> PixelSample {
+    /// The light and the data that the camera sees at each place of `films`, at most a packet of them.
+    /// They are what each would be alone; it is only faster for places close together.
+    pub(super) fn samples(
+        &self,
+        films: &[Vec2],
+        scratch: &mut Scratch,
+        mut each: impl FnMut(usize, PixelSample),
+    ) {
+        scratch.counts.primary += films.len() as u64;
+        let mut seen = Seen::default();
+        for film in films {
+            let ray = self.scene.camera.ray(*film);
+            let floor = self.floor(&ray);
+            let t_max = floor.as_ref().map_or(ray.t_max, |hit| hit.t);
+            seen.rays.push(&Ray { t_max, ..ray });
+            seen.floors[seen.rays.len() - 1] = floor;
+        }
+        seen.hits = self.surface.nearest_packet(&seen.rays);
+        // Rays through transmissive bodies ask for crossings, one by one.
+        let mut lit = std::mem::take(&mut scratch.lit);
+        let known = self.scene.material.transmission <= 0.0;
+        if known {
+            self.light_up(&seen, &mut lit, scratch);
+        }
+        for lane in 0..films.len() {
+            let ray = seen.rays.ray(lane);
+            let lit = known.then_some(Lit { lane, lights: &lit });
+            let sample = match seen.met(lane) {
+                Met::Nothing => self.missed_sample(&ray),
+                Met::Ground(hit) => self.ground_sample(&ray, &hit, lit, scratch),
+                Met::Particle(hit) => self.particle_sample(&ray, &hit, lit, scratch),
+            };
+            each(lane, sample);
+        }
+        scratch.lit = lit;
+    }
+
+    /// Finds for each light which of the places that are `seen` it reaches, with packets of shadow rays.
+    fn light_up(&self, seen: &Seen, lit: &mut Vec<u32>, scratch: &mut Scratch) {
+        let mut places = [None; PACKET_SIZE];
+        for (lane, place) in places.iter_mut().enumerate().take(seen.rays.len()) {
+            *place = match seen.met(lane) {
+                Met::Nothing => None,
+                Met::Ground(hit) => Some((hit.start(), hit.ground.up)),
+                Met::Particle(hit) => {
+                    let normal = facing(hit.normal, seen.rays.ray(lane).direction);
+                    Some((hit.point + hit.offset * normal, normal))
+                }
+            };
+        }
+        lit.clear();
+        for light in &self.scene.lights {
+            let mut rays = RayPacket::default();
+            let mut lanes = [0; PACKET_SIZE];
+            for (lane, place) in places.iter().enumerate() {
+                let Some((start, normal)) = *place else {
+                    continue;
+                };
+                let Some(incident) = light.at(start) else {
+                    continue;
+                };
+                if !light.casts_shadow || normal.dot(incident.to_light) <= 0.0 {
+                    continue;
+                }
+                scratch.counts.shadow += 1;
+                let ray = shadow_ray(start, &incident);
+                if !self.is_under_ground(&ray) {
+                    lanes[rays.len()] = lane;
+                    rays.push(&ray);
+                }
+            }
+            let occluded = if rays.is_empty() {
+                0
+            } else {
+                self.surface.occluded_packet(&rays)
+            };
+            let reached = lanes[..rays.len()]
+                .iter()
+                .enumerate()
+                .filter(|(ray, _)| occluded >> ray & 1 == 0);
+            lit.push(reached.fold(0, |lit, (_, lane)| lit | 1 << lane));
+        }
+    }
+
+    fn missed_sample(&self, ray: &Ray) -> PixelSample {
+        PixelSample {
+            color: if self.transparent_background {
+                Vec3::ZERO
+            } else {
+                self.scene.background.color(ray.direction)
+            },
+            coverage: 0.0,
+            data: DataSample::MISS,
+        }
+    }
+
+    fn particle_sample(
+        &self,
+        ray: &Ray,
+        hit: &SurfaceHit,
+        lit: Option<Lit<'_>>,
+        scratch: &mut Scratch,
+    ) -> PixelSample {
         const FIRST: Level = Level {
             depth: 1,
             weight: 1.0,
         };
-        let camera = &self.scene.camera;
-        let ray = camera.ray(film);
-        scratch.counts.primary += 1;
-        match self.meet(&ray) {
-            Met::Nothing => PixelSample {
-                color: if self.transparent_background {
-                    Vec3::ZERO
-                } else {
-                    self.scene.background.color(ray.direction)
-                },
-                coverage: 0.0,
-                data: DataSample::MISS,
-            },
-            Met::Ground(hit) => self.ground_sample(&ray, &hit, scratch),
-            Met::Particle(hit) => PixelSample {
-                color: self.shade(&ray, &hit, FIRST, scratch),
-                coverage: 1.0,
-                data: DataSample {
-                    z: camera.depth(&ray, hit.t),
-                    normal: facing(hit.normal, ray.direction),
-                    position: self.world(hit.point),
-                    velocity: self.source.velocity(hit.particle),
-                    albedo: self.source.color(hit.particle),
-                    id: self.source.id(hit.particle),
-                },
+        PixelSample {
+            color: self.shade(ray, hit, FIRST, lit, scratch),
+            coverage: 1.0,
+            data: DataSample {
+                z: self.scene.camera.depth(ray, hit.t),
+                normal: facing(hit.normal, ray.direction),
+                position: self.world(hit.point),
+                velocity: self.source.velocity(hit.particle),
+                albedo: self.source.color(hit.particle),
+                id: self.source.id(hit.particle),
             },
         }
     }
 
-    fn ground_sample(&self, ray: &Ray, hit: &GroundHit, scratch: &mut Scratch) -> PixelSample {
-        let lit = self.shade_ground(hit, scratch);
+    fn ground_sample(
+        &self,
+        ray: &Ray,
+        hit: &GroundHit,
+        lit: Option<Lit<'_>>,
+        scratch: &mut Scratch,
+    ) -> PixelSample {
+        let lit = self.shade_ground(hit, lit, scratch);
         let (color, coverage) = if self.transparent_background {
             (hit.presence * lit, hit.presence)
         } else {
@@ -164,40 +277,47 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         (self.scene.origin + point.as_dvec3()).as_vec3()
     }
 
+    /// The floor where `ray` meets it, if anything is left of it there.
+    fn floor(&self, ray: &Ray) -> Option<GroundHit> {
+        let ground = self.scene.ground?;
+        let t = ground.hit(ray)?;
+        let point = ray.at(t);
+        let presence = ground.presence(point);
+        (presence > 0.0).then_some(GroundHit {
+            ground,
+            t,
+            point,
+            presence,
+        })
+    }
+
     fn meet(&self, ray: &Ray) -> Met {
-        let floor = self.scene.ground.and_then(|ground| {
-            let t = ground.hit(ray)?;
-            let point = ray.at(t);
-            let presence = ground.presence(point);
-            (presence > 0.0).then_some(GroundHit {
-                ground,
-                t,
-                point,
-                presence,
-            })
-        });
+        let floor = self.floor(ray);
         let t_max = floor.as_ref().map_or(ray.t_max, |hit| hit.t);
-        match (self.surface.nearest(&Ray { t_max, ..*ray }), floor) {
-            (Some(hit), _) => Met::Particle(hit),
-            (None, Some(floor)) => Met::Ground(floor),
-            (None, None) => Met::Nothing,
-        }
+        Met::nearer(self.surface.nearest(&Ray { t_max, ..*ray }), floor)
     }
 
     /// Light that comes back along `ray`.
     fn radiance(&self, ray: &Ray, level: Level, scratch: &mut Scratch) -> Vec3 {
         match self.meet(ray) {
             Met::Nothing => self.scene.background.color(ray.direction),
-            Met::Particle(hit) => self.shade(ray, &hit, level, scratch),
+            Met::Particle(hit) => self.shade(ray, &hit, level, None, scratch),
             Met::Ground(hit) => {
                 let background = self.scene.background.color(ray.direction);
-                background.lerp(self.shade_ground(&hit, scratch), hit.presence)
+                background.lerp(self.shade_ground(&hit, None, scratch), hit.presence)
             }
         }
     }
 
-    /// Eq. 4.1 at `hit`.
-    fn shade(&self, ray: &Ray, hit: &SurfaceHit, level: Level, scratch: &mut Scratch) -> Vec3 {
+    /// Eq. 4.1 at `hit`; `lit` where that is known.
+    fn shade(
+        &self,
+        ray: &Ray,
+        hit: &SurfaceHit,
+        level: Level,
+        lit: Option<Lit<'_>>,
+        scratch: &mut Scratch,
+    ) -> Vec3 {
         let material = &self.scene.material;
         let direction = ray.direction;
         let entering = direction.dot(hit.normal) < 0.0;
@@ -208,7 +328,7 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
             start: hit.point + hit.offset * normal,
             base: self.source.color(hit.particle),
         };
-        let mut intensity = self.direct(&face, scratch);
+        let mut intensity = self.direct(&face, lit, scratch);
 
         let ratio = if entering {
             1.0 / material.ior
@@ -255,10 +375,10 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
     }
 
     /// Ambient light and Blinn-Phong for every light that gets through.
-    fn direct(&self, face: &Face, scratch: &mut Scratch) -> Vec3 {
+    fn direct(&self, face: &Face, lit: Option<Lit<'_>>, scratch: &mut Scratch) -> Vec3 {
         let material = &self.scene.material;
         let mut sum = material.ambient * self.scene.ambient_light * face.base;
-        for (light, cosine, visible) in self.lights(face.start, face.normal, scratch) {
+        for (light, cosine, visible) in self.lights(face.start, face.normal, lit, scratch) {
             let half = (light.to_light + face.to_viewer).normalize_or(face.normal);
             let highlight = face.normal.dot(half).max(0.0).powf(material.shininess);
             let reflected = material.diffuse * cosine * face.base + material.specular * highlight;
@@ -267,11 +387,10 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         sum
     }
 
-    fn shade_ground(&self, hit: &GroundHit, scratch: &mut Scratch) -> Vec3 {
+    fn shade_ground(&self, hit: &GroundHit, lit: Option<Lit<'_>>, scratch: &mut Scratch) -> Vec3 {
         let up = hit.ground.up;
-        let start = hit.point + hit.ground.offset(hit.point, hit.t) * up;
         let mut light_sum = ground::AMBIENT * self.scene.ambient_light;
-        for (light, cosine, visible) in self.lights(start, up, scratch) {
+        for (light, cosine, visible) in self.lights(hit.start(), up, lit, scratch) {
             light_sum += ground::DIFFUSE * cosine * visible * light.radiance;
         }
         hit.ground.color * light_sum
@@ -282,18 +401,20 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         &self,
         start: Vec3,
         normal: Vec3,
+        lit: Option<Lit<'_>>,
         scratch: &mut Scratch,
     ) -> impl Iterator<Item = (Incident, f32, f32)> {
-        self.scene.lights.iter().filter_map(move |light| {
+        let lights = self.scene.lights.iter().enumerate();
+        lights.filter_map(move |(number, light)| {
             let incident = light.at(start)?;
             let cosine = normal.dot(incident.to_light);
             if cosine <= 0.0 {
                 return None;
             }
-            let visible = if light.casts_shadow {
-                self.visibility(start, &incident, scratch)
-            } else {
-                1.0
+            let visible = match lit {
+                _ if !light.casts_shadow => 1.0,
+                Some(lit) => lit.by(number),
+                None => self.visibility(start, &incident, scratch),
             };
             (visible > 0.0).then_some((incident, cosine, visible))
         })
@@ -301,12 +422,9 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
 
     /// Part of a light's radiance that gets to `start`.
     fn visibility(&self, start: Vec3, light: &Incident, scratch: &mut Scratch) -> f32 {
-        let ray = Ray {
-            t_max: light.distance,
-            ..Ray::new(start, light.to_light)
-        };
+        let ray = shadow_ray(start, light);
         scratch.counts.shadow += 1;
-        if self.scene.ground.is_some_and(|g| g.hit(&ray).is_some()) {
+        if self.is_under_ground(&ray) {
             return 0.0;
         }
         let transmission = self.scene.material.transmission;
@@ -320,6 +438,55 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         self.surface.crossings(&ray, &mut scratch.crossings);
         let through = |c: &Crossing| transmission * (1.0 - schlick(self.r0, c.cosine));
         scratch.crossings.iter().map(through).product()
+    }
+
+    /// Whether the floor stands in the way of `ray`.
+    fn is_under_ground(&self, ray: &Ray) -> bool {
+        self.scene.ground.is_some_and(|g| g.hit(ray).is_some())
+    }
+}
+
+/// The ray from `start` to a light.
+fn shadow_ray(start: Vec3, light: &Incident) -> Ray {
+    Ray {
+        t_max: light.distance,
+        ..Ray::new(start, light.to_light)
+    }
+}
+
+impl Met {
+    /// A particle, which was looked for only before the floor, or else the floor.
+    fn nearer(hit: Option<SurfaceHit>, floor: Option<GroundHit>) -> Self {
+        match (hit, floor) {
+            (Some(hit), _) => Self::Particle(hit),
+            (None, Some(floor)) => Self::Ground(floor),
+            (None, None) => Self::Nothing,
+        }
+    }
+}
+
+impl GroundHit {
+    /// A point just off the floor, where shadow rays start.
+    fn start(&self) -> Vec3 {
+        self.point + self.ground.offset(self.point, self.t) * self.ground.up
+    }
+}
+
+impl Seen {
+    /// What the ray in `lane` meets first.
+    fn met(&self, lane: usize) -> Met {
+        Met::nearer(self.hits[lane], self.floors[lane])
+    }
+}
+
+impl Lit<'_> {
+    /// Part of light `number` that gets here.
+    fn by(self, number: usize) -> f32 {
+        if self.lights[number] >> self.lane & 1 == 1 {
+            1.0
+        } else {
+            0.0
+        }
     }
 }
 

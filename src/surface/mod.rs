@@ -4,7 +4,7 @@
 
 use glam::Vec3;
 
-use crate::ray::Ray;
+use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 pub mod spheres;
 
@@ -45,4 +45,19 @@ pub trait Surface: Sync {
     /// Replaces `crossings` by all meetings in `ray.t_min..ray.t_max`, both entering and leaving,
     /// in order of distance (equal distances: lower particle index first).
     fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>);
+
+    /// [`Surface::nearest`] of each ray, the same to the bit. For rays that are close together.
+    fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {
+        let mut hits = [None; PACKET_SIZE];
+        for (hit, ray) in hits.iter_mut().zip(packet.rays()) {
+            *hit = self.nearest(&ray);
+        }
+        hits
+    }
+
+    /// [`Surface::occluded`] of each ray: a bit for each lane.
+    fn occluded_packet(&self, packet: &RayPacket) -> u32 {
+        let bit = |(lane, ray): (u32, Ray)| u32::from(self.occluded(&ray)) << lane;
+        (0..).zip(packet.rays()).map(bit).sum()
+    }
 }

@@ -5,9 +5,9 @@ use std::cell::RefCell;
 use glam::Vec3;
 
 use super::{Crossing, Surface, SurfaceHit};
-use crate::accel::traverse::TreeCrossing;
+use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::wide::WideTree;
-use crate::ray::Ray;
+use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 /// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
 /// was put back onto its sphere, small enough not to be seen.
@@ -26,12 +26,9 @@ impl<'a> SphereSurface<'a> {
     pub fn new(tree: &'a WideTree) -> Self {
         Self { tree }
     }
-}
 
-impl Surface for SphereSurface<'_> {
     #[inline]
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
-        let hit = self.tree.nearest(ray)?;
+    fn surface_hit(&self, ray: &Ray, hit: TreeHit) -> SurfaceHit {
         let (center, radius) = self.tree.sphere(hit.slot);
         let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
         let point = center + normal * radius;
@@ -39,18 +36,37 @@ impl Surface for SphereSurface<'_> {
             .abs()
             .max_element()
             .max(ray.origin.abs().max_element());
-        Some(SurfaceHit {
+        SurfaceHit {
             t: hit.t,
             point,
             normal,
             particle: self.tree.particle(hit.slot),
             offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
-        })
+        }
+    }
+}
+
+impl Surface for SphereSurface<'_> {
+    #[inline]
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+        Some(self.surface_hit(ray, self.tree.nearest(ray)?))
     }
 
     #[inline]
     fn occluded(&self, ray: &Ray) -> bool {
         self.tree.any_hit(ray)
+    }
+
+    fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {
+        let hits = self.tree.nearest_packet(packet);
+        std::array::from_fn(|lane| {
+            let hit = hits[lane]?;
+            Some(self.surface_hit(&packet.ray(lane), hit))
+        })
+    }
+
+    fn occluded_packet(&self, packet: &RayPacket) -> u32 {
+        self.tree.any_hit_packet(packet)
     }
 
     fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
