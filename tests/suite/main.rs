@@ -10,4 +10,5 @@ mod memory;
 mod resume;
 mod samples;
 mod scale;
+mod structures;
 mod thesis;
