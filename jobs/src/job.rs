@@ -240,7 +240,7 @@ impl Job {
                 len: metadata.len(),
             });
         }
-        let mut entry = self.state.ledger.next_entry(frame, Status::Done, details);
+        let mut entry = self.state.ledger.next_entry(frame, Status::Done, &details);
         entry.outputs = files;
         self.record(entry, FrameState::Done)
     }
@@ -255,7 +255,10 @@ impl Job {
         reason: &str,
         details: Value,
     ) -> Result<(), JobError> {
-        let mut entry = self.state.ledger.next_entry(frame, Status::Failed, details);
+        let mut entry = self
+            .state
+            .ledger
+            .next_entry(frame, Status::Failed, &details);
         entry.reason = Some(reason.to_owned());
         self.record(entry, FrameState::Failed)
     }

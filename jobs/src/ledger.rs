@@ -13,6 +13,7 @@ use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use serde_json::value::RawValue;
 
 use crate::JobError;
 
@@ -54,7 +55,39 @@ pub struct Entry {
     pub reason: Option<String>,
     /// Means something to the caller only: timings, counts.
     #[serde(default)]
-    pub details: Value,
+    pub details: Details,
+}
+
+/// JSON that means something to the caller only. Kept as text: as a tree of values it would take
+/// several times the memory, for every frame of the job.
+#[derive(Debug, Clone, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Details(Box<RawValue>);
+
+impl Details {
+    /// As a tree.
+    pub fn value(&self) -> Value {
+        serde_json::from_str(self.0.get()).expect("it was JSON when it was read or made")
+    }
+}
+
+impl Default for Details {
+    fn default() -> Self {
+        Self(RawValue::NULL.to_owned())
+    }
+}
+
+impl From<&Value> for Details {
+    fn from(value: &Value) -> Self {
+        let text = value.to_string();
+        Self(RawValue::from_string(text).expect("a value is written as JSON"))
+    }
+}
+
+impl PartialEq for Details {
+    fn eq(&self, other: &Self) -> bool {
+        self.value() == other.value()
+    }
 }
 
 /// The last word on every frame, merged from all workers.
@@ -111,7 +144,7 @@ impl Ledger {
     }
 
     /// An entry that comes after all known ones.
-    pub(crate) fn next_entry(&self, frame: i64, status: Status, details: Value) -> Entry {
+    pub(crate) fn next_entry(&self, frame: i64, status: Status, details: &Value) -> Entry {
         let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
         Entry {
             seq: self.next_seq,
@@ -120,7 +153,7 @@ impl Ledger {
             status,
             outputs: Vec::new(),
             reason: None,
-            details,
+            details: details.into(),
         }
     }
 }
@@ -261,7 +294,7 @@ mod tests {
         let ledger = Ledger::read(dir).unwrap();
         let mut writer = LedgerWriter::open(dir, worker).unwrap();
         writer.cut_torn_line().unwrap();
-        let entry = ledger.next_entry(frame, status, json!({ "by": worker }));
+        let entry = ledger.next_entry(frame, status, &json!({ "by": worker }));
         writer.append(&entry).unwrap();
     }
 
@@ -282,7 +315,10 @@ mod tests {
         let frames: Vec<i64> = ledger.entries().map(|e| e.frame).collect();
         assert_eq!(frames, [-2, 1]);
         assert_eq!(ledger.entry(1).unwrap().status, Status::Done);
-        assert_eq!(ledger.entry(1).unwrap().details, json!({ "by": "a" }));
+        assert_eq!(
+            ledger.entry(1).unwrap().details.value(),
+            json!({ "by": "a" })
+        );
         assert_eq!(ledger.entry(-2).unwrap().status, Status::Failed);
     }
 

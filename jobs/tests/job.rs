@@ -137,7 +137,7 @@ fn runs_resumes_and_retries_what_failed() {
     let state = Job::read(&place.dir()).unwrap().unwrap();
     assert_eq!(state.summary().done, 4);
     assert_eq!(
-        state.ledger().entry(0).unwrap().details,
+        state.ledger().entry(0).unwrap().details.value(),
         json!({ "particles": 5 })
     );
 }

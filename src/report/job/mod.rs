@@ -152,7 +152,7 @@ impl JobFrame {
     }
 
     fn of(number: i64, image: Option<String>, status: Status, entry: Option<&Entry>) -> Self {
-        let details = entry.map_or(Value::Null, |entry| entry.details.clone());
+        let details = entry.map_or(Value::Null, |entry| entry.details.value());
         let report = serde_json::from_value(details.clone()).ok();
         Self {
             number,
