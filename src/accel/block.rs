@@ -55,7 +55,7 @@ impl Block {
 
     /// Box of the spheres.
     pub fn sphere_bounds(&self, radii: &BlockRadii) -> Aabb {
-        (0..BLOCK_SIZE).fold(Aabb::EMPTY, |b, lane| {
+        let rounded = (0..BLOCK_SIZE).fold(Aabb::EMPTY, |b, lane| {
             let center = self.center(lane);
             b.union(
                 Aabb {
@@ -64,6 +64,7 @@ impl Block {
                 }
                 .padded(radii.0[lane]),
             )
-        })
+        });
+        rounded.rounded_outwards()
     }
 }

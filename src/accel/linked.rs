@@ -68,9 +68,12 @@ pub(super) fn gather_blocks(
 pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> Vec<Aabb> {
     let own = |place: usize| match tree.radii.get(place) {
         Some(radii) => tree.blocks[place].sphere_bounds(radii),
-        None => tree.blocks[place]
+        // Padded only where boxes hold spheres.
+        None if tree.padding == 0.0 && tree.radius > 0.0 => tree.blocks[place]
             .bounds()
-            .padded(tree.radius - tree.padding),
+            .padded(tree.radius)
+            .rounded_outwards(),
+        None => tree.blocks[place].bounds(),
     };
     (0..tree.blocks.len())
         .into_par_iter()
@@ -120,9 +123,9 @@ pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aa
     tree.level_starts = level_starts;
     tree.mapped.clear();
     tree.mapped_level = u32::MAX;
-    tree.bounds = boxes
-        .first()
-        .map_or(Aabb::EMPTY, |root| root.padded(tree.padding));
+    tree.bounds = boxes.first().map_or(Aabb::EMPTY, |root| {
+        root.padded(tree.padding).rounded_outwards()
+    });
     super::wide::sah_cost(areas, tree.bounds)
 }
 

@@ -247,7 +247,7 @@ impl WideTree {
             }
         }
         self.bounds = match boxes.first() {
-            Some(root) => root.padded(self.padding),
+            Some(root) => root.padded(self.padding).rounded_outwards(),
             None => Aabb::EMPTY,
         };
         sah_cost(areas, self.bounds)
