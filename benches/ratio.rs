@@ -15,7 +15,9 @@ use spherule::accel::{Structure, TreeBuilder};
 mod support;
 
 use support::obvhs::ObvhsBuilder;
-use support::rays::{trace_primary, trace_reflection, trace_shadow};
+use support::rays::{
+    trace_primary, trace_primary_packets, trace_reflection, trace_shadow, trace_shadow_packets,
+};
 use support::{Case, build_ours, is_quick_run, particle_counts, structures};
 
 /// Turns per row; an odd number has a median.
@@ -138,6 +140,12 @@ impl Table<'_> {
         );
         let unit = Unit::MillionsOf(scene.pixels.len());
         self.print_row("primary, Mrays/s", &turns.text(unit));
+        let turns = Turns::take(
+            self.rounds,
+            || trace_primary_packets(tree, scene, &mut records),
+            || trace_primary(obvhs, scene, &mut others),
+        );
+        self.print_row("in packets", &turns.text(unit));
 
         let unit = Unit::MillionsOf(points.len());
         let turns = Turns::take(
@@ -146,6 +154,12 @@ impl Table<'_> {
             || trace_shadow(obvhs, points),
         );
         self.print_row("shadow, Mrays/s", &turns.text(unit));
+        let turns = Turns::take(
+            self.rounds,
+            || trace_shadow_packets(tree, points),
+            || trace_shadow(obvhs, points),
+        );
+        self.print_row("in packets", &turns.text(unit));
         let turns = Turns::take(
             self.rounds,
             || trace_reflection(tree, points),

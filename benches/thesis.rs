@@ -13,7 +13,9 @@ use spherule::accel::{Structure, TreeBuilder};
 mod support;
 
 use support::obvhs::ObvhsBuilder;
-use support::rays::{trace_primary, trace_reflection, trace_shadow};
+use support::rays::{
+    trace_primary, trace_primary_packets, trace_reflection, trace_shadow, trace_shadow_packets,
+};
 use support::{Case, build_ours, is_quick_run, particle_counts, structures};
 
 /// A particle count with all trees, ready to trace.
@@ -82,6 +84,10 @@ fn primary(criterion: &mut Criterion, cases: &[Built]) {
             group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
                 bencher.iter(|| trace_primary(builder.tree(), scene, &mut records));
             });
+            let packets = format!("{structure}-packets");
+            group.bench_function(BenchmarkId::new(packets, particles), |bencher| {
+                bencher.iter(|| trace_primary_packets(builder.tree(), scene, &mut records));
+            });
         }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
             bencher.iter(|| trace_primary(&case.obvhs, scene, &mut records));
@@ -99,6 +105,10 @@ fn shadow(criterion: &mut Criterion, cases: &[Built]) {
         for (structure, builder) in ours {
             group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
                 bencher.iter(|| trace_shadow(builder.tree(), points));
+            });
+            let packets = format!("{structure}-packets");
+            group.bench_function(BenchmarkId::new(packets, particles), |bencher| {
+                bencher.iter(|| trace_shadow_packets(builder.tree(), points));
             });
         }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {

@@ -86,6 +86,17 @@ impl Case {
         let [lit, hits] = count_secondary(tree, &self.points);
         check_agreement("shadow", [lit, self.secondary[0]], self.points.len());
         check_agreement("reflection", [hits, self.secondary[1]], self.points.len());
+        let mut others = Vec::new();
+        rays::trace_primary_packets(tree, &self.scene, &mut others);
+        let distances = |records: &[HitRecord]| -> Vec<f32> {
+            records.iter().map(HitRecord::distance).collect()
+        };
+        assert_eq!(distances(&records), distances(&others), "packets");
+        assert_eq!(
+            lit,
+            rays::trace_shadow_packets(tree, &self.points),
+            "packets"
+        );
         builder
     }
 }

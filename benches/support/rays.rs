@@ -6,7 +6,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule::accel::wide::WideTree;
-use spherule::ray::Ray;
+use spherule::ray::{PACKET_SIZE, Ray, RayPacket};
 
 use super::scene::{Scene, TILE_SIDE};
 
@@ -68,6 +68,20 @@ pub(crate) struct SurfacePoint {
     normal: Vec3,
     /// Direction of the ray that came here.
     incoming: Vec3,
+    /// The square of pixels that it was seen through.
+    square: usize,
+}
+
+impl SurfacePoint {
+    /// The ray to the light; None where the surface faces away from it.
+    fn to_light(self) -> Option<Ray> {
+        let to_light = LIGHT - self.position;
+        let distance = to_light.length();
+        (self.normal.dot(to_light) > 0.0).then(|| Ray {
+            t_max: distance,
+            ..Ray::new(self.position, to_light / distance)
+        })
+    }
 }
 
 /// One ray through every pixel, the hits recorded in `records`. Returns how many hit.
@@ -105,8 +119,9 @@ pub(crate) fn surface_points<T: Tracer>(
 ) -> Vec<SurfacePoint> {
     let pairs = scene.pixels.par_iter().zip(records);
     pairs
-        .filter(|(_, record)| record.t < f32::INFINITY)
-        .map(|(pixel, record)| {
+        .enumerate()
+        .filter(|(_, (_, record))| record.t < f32::INFINITY)
+        .map(|(place, (pixel, record))| {
             let ray = scene.camera.ray(*pixel);
             let center = tracer.center(record.sphere);
             let normal = (ray.at(record.t) - center).normalize();
@@ -114,6 +129,7 @@ pub(crate) fn surface_points<T: Tracer>(
                 position: center + normal * (scene.radius * (1.0 + LIFT)),
                 normal,
                 incoming: ray.direction,
+                square: place / PACKET_SIZE,
             }
         })
         .collect()
@@ -122,17 +138,62 @@ pub(crate) fn surface_points<T: Tracer>(
 /// A shadow ray from every point that faces the light. Returns how many points are lit.
 pub(crate) fn trace_shadow<T: Tracer>(tracer: &T, points: &[SurfacePoint]) -> usize {
     let is_lit = |point: &&SurfacePoint| {
-        let to_light = LIGHT - point.position;
-        if point.normal.dot(to_light) <= 0.0 {
-            return false;
-        }
-        let distance = to_light.length();
-        !tracer.any_hit(&Ray {
-            t_max: distance,
-            ..Ray::new(point.position, to_light / distance)
-        })
+        let ray = point.to_light();
+        ray.is_some_and(|ray| !tracer.any_hit(&ray))
     };
     count_in_chunks(points, is_lit)
+}
+
+/// The same as [`trace_primary`], the rays of a square of pixels as one packet.
+pub(crate) fn trace_primary_packets(
+    tree: &WideTree,
+    scene: &Scene,
+    records: &mut Vec<HitRecord>,
+) -> usize {
+    records.resize(scene.pixels.len(), HitRecord::MISS);
+    let squares = scene.pixels.par_chunks(PACKET_SIZE);
+    squares
+        .zip(records.par_chunks_mut(PACKET_SIZE))
+        .with_min_len(CHUNK / PACKET_SIZE)
+        .map(|(pixels, records)| {
+            let mut packet = RayPacket::default();
+            for pixel in pixels {
+                packet.push(&scene.camera.ray(*pixel));
+            }
+            let mut hits = 0;
+            for (record, hit) in records.iter_mut().zip(tree.nearest_packet(&packet)) {
+                hits += usize::from(hit.is_some());
+                *record = hit.map_or(HitRecord::MISS, |hit| HitRecord {
+                    t: hit.t,
+                    sphere: hit.slot,
+                });
+            }
+            hits
+        })
+        .sum()
+}
+
+/// The same as [`trace_shadow`], the rays from a square of pixels as one packet.
+pub(crate) fn trace_shadow_packets(tree: &WideTree, points: &[SurfacePoint]) -> usize {
+    points
+        .par_chunks(CHUNK)
+        .map(|chunk| {
+            let squares = chunk.chunk_by(|a, b| a.square == b.square);
+            squares
+                .map(|square| lit_of_square(tree, square))
+                .sum::<usize>()
+        })
+        .sum()
+}
+
+fn lit_of_square(tree: &WideTree, points: &[SurfacePoint]) -> usize {
+    let mut packet = RayPacket::default();
+    let mut rays = 0;
+    for ray in points.iter().filter_map(|point| point.to_light()) {
+        packet.push(&ray);
+        rays += 1;
+    }
+    rays - tree.any_hit_packet(&packet).count_ones() as usize
 }
 
 /// A ray mirrored at every point. Returns how many hit.

@@ -1,7 +1,7 @@
 //! The thesis's experiment: the filled box, the still camera and the order of the pixels.
 
 use glam::Vec3;
-use spherule::ray::Ray;
+use spherule::ray::{PACKET_SIZE, Ray};
 use spherule_formats::generate::{BoxSettings, fill_box};
 
 /// Image size in pixels.
@@ -9,6 +9,8 @@ const WIDTH: u16 = 1920;
 const HEIGHT: u16 = 1080;
 /// Pixels along a side of the tiles in which the image is traced.
 pub(crate) const TILE_SIDE: usize = 16;
+/// Side of a square of pixels whose rays go as a packet.
+const SQUARE_SIDE: usize = 4;
 /// Volume of the thesis's box.
 const BOX_VOLUME: f32 = 48.0;
 /// Every machine measures the same particles.
@@ -23,7 +25,7 @@ pub(crate) struct Scene {
     pub(crate) radius: f32,
     /// Makes the primary rays.
     pub(crate) camera: Camera,
-    /// All pixels as x and y, tile after tile.
+    /// All pixels as x and y, tile after tile, each in squares of [`PACKET_SIZE`].
     pub(crate) pixels: Vec<[u16; 2]>,
 }
 
@@ -73,15 +75,29 @@ impl Camera {
     }
 }
 
+/// Tile after tile, and in a tile one square after another.
 fn pixels_by_tile() -> Vec<[u16; 2]> {
     let mut pixels = Vec::with_capacity(usize::from(WIDTH) * usize::from(HEIGHT));
-    let side = u16::try_from(TILE_SIDE).expect("a tile is smaller than an image");
-    for top in (0..HEIGHT).step_by(TILE_SIDE) {
-        for left in (0..WIDTH).step_by(TILE_SIDE) {
-            for y in top..(top + side).min(HEIGHT) {
-                pixels.extend((left..(left + side).min(WIDTH)).map(|x| [x, y]));
-            }
+    let image = [0, WIDTH, 0, HEIGHT];
+    for tile in parts(image, TILE_SIDE) {
+        for square in parts(tile, SQUARE_SIDE) {
+            let [left, right, top, bottom] = square;
+            pixels.extend((top..bottom).flat_map(|y| (left..right).map(move |x| [x, y])));
         }
     }
     pixels
 }
+
+/// Cuts a rectangle (left, right, top, bottom) into squares of so many pixels.
+fn parts([left, right, top, bottom]: [u16; 4], side: usize) -> Vec<[u16; 4]> {
+    let side = u16::try_from(side).expect("smaller than an image");
+    let mut parts = Vec::new();
+    for y in (top..bottom).step_by(side.into()) {
+        for x in (left..right).step_by(side.into()) {
+            parts.push([x, (x + side).min(right), y, (y + side).min(bottom)]);
+        }
+    }
+    parts
+}
+
+const _: () = assert!(SQUARE_SIDE * SQUARE_SIDE == PACKET_SIZE);
