@@ -14,9 +14,9 @@
 //! | blocks, fast | 0.060 s | 1.04 | 1.09 | 1.09 | 13.6, 27 |
 //! | blocks, medium | 0.060 s | 1.06 | 1.09 | 1.09 | 13.7, 27 |
 //! | blocks, high | 0.080 s | 1.05 | 1.10 | 1.08 | 13.5, 27 |
-//! | particles, medium | 15 to 32 x lbvh | 1.07 to 1.12 | 1.1 to 1.2 | 1.1 to 1.2 | 25.8, 208 |
+//! | particles, medium | 15 to 32 x lbvh | 1.07 to 1.12 | 0.97 to 1.20 | 1.08 to 1.22 | 25.8, 208 |
 //!
-//! So presets make no difference there; nor does more than the first one pay for itself.
+//! So over blocks more than the first preset does not pay.
 
 use obvhs::ploc::SortPrecision;
 use rayon::prelude::*;

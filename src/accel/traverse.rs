@@ -66,11 +66,10 @@ impl WideTree {
     /// distances by particle index.
     pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
         crossings.clear();
-        if self.links.is_empty() {
-            self.crossings_in(Implicit::of(self), ray, crossings);
-        } else {
-            self.crossings_in(Linked::of(self), ray, crossings);
-        }
+        self.visit_crossings(ray, |crossing| {
+            crossings.push(crossing);
+            true
+        });
         crossings.sort_unstable_by(|a, b| {
             a.t.total_cmp(&b.t)
                 .then_with(|| self.tie_order(a.slot, b.slot))
@@ -101,12 +100,33 @@ impl WideTree {
         })
     }
 
-    fn crossings_in<T: Topology>(&self, topology: T, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
+    /// Whether a particle may be met in several slots, so that [`WideTree::visit_crossings`] brings the
+    /// same crossing several times.
+    pub(crate) fn has_copies(&self) -> bool {
+        self.has_copies
+    }
+
+    /// Gives `visit` every crossing within `ray.t_min..ray.t_max`, in the order of the walk, until it
+    /// returns false.
+    pub(crate) fn visit_crossings(&self, ray: &Ray, visit: impl FnMut(TreeCrossing) -> bool) {
+        if self.links.is_empty() {
+            self.visit_crossings_in(Implicit::of(self), ray, visit);
+        } else {
+            self.visit_crossings_in(Linked::of(self), ray, visit);
+        }
+    }
+
+    fn visit_crossings_in<T: Topology>(
+        &self,
+        topology: T,
+        ray: &Ray,
+        visit: impl FnMut(TreeCrossing) -> bool,
+    ) {
         self.simd.run(Crossings {
             tree: self,
             topology,
             ray,
-            crossings,
+            visit,
         });
     }
 
@@ -386,14 +406,15 @@ impl<T: Topology> KernelTask for AnyHit<'_, T> {
     }
 }
 
-struct Crossings<'a, T> {
+struct Crossings<'a, T, F> {
     tree: &'a WideTree,
     topology: T,
     ray: &'a Ray,
-    crossings: &'a mut Vec<TreeCrossing>,
+    /// Gets every crossing; false ends the walk.
+    visit: F,
 }
 
-impl<T: Topology> KernelTask for Crossings<'_, T> {
+impl<T: Topology, F: FnMut(TreeCrossing) -> bool> KernelTask for Crossings<'_, T, F> {
     type Output = ();
 
     #[inline(always)]
@@ -402,7 +423,7 @@ impl<T: Topology> KernelTask for Crossings<'_, T> {
             tree,
             topology,
             ray,
-            crossings,
+            mut visit,
         } = self;
         let prepared = kernel.prepare(ray, tree.radius, tree.padding);
         let slots = tree.slot_count();
@@ -429,8 +450,9 @@ impl<T: Topology> KernelTask for Crossings<'_, T> {
                     )]
                     let slot = slot as u32;
                     for t in [found.near[lane], found.far[lane]] {
-                        if t >= ray.t_min && t < ray.t_max {
-                            crossings.push(TreeCrossing { t, slot });
+                        let is_within = t >= ray.t_min && t < ray.t_max;
+                        if is_within && !visit(TreeCrossing { t, slot }) {
+                            return -1.0;
                         }
                     }
                 }

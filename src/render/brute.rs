@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     ray::Ray,
-    surface::{Crossing, Surface, SurfaceHit},
+    surface::{Surface, SurfaceHit},
 };
 
 /// Centre and radius.
@@ -74,12 +74,8 @@ impl Surface for Balls {
         self.all(ray).next().is_some()
     }
 
-    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
-        crossings.clear();
-        crossings.extend(self.all(ray).map(|hit| Crossing {
-            t: hit.t,
-            cosine: hit.normal.dot(ray.direction).abs(),
-        }));
-        crossings.sort_by(|a, b| a.t.total_cmp(&b.t));
+    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
+        let cosine = |hit: SurfaceHit| hit.normal.dot(ray.direction).abs();
+        self.all(ray).map(|hit| kept(cosine(hit))).product()
     }
 }

@@ -13,7 +13,7 @@ use crate::ray::Ray;
 use crate::scene::{
     Background, Bounds, Camera, CameraView, Framing, Ground, Material, default_lights,
 };
-use crate::surface::{Crossing, SurfaceHit, spheres::SphereSurface};
+use crate::surface::{SurfaceHit, spheres::SphereSurface};
 
 /// A heap of balls, some overlapping, all different.
 fn heap(count: u32) -> Balls {
@@ -206,8 +206,8 @@ impl Surface for OneByOne<'_> {
         self.0.occluded(ray)
     }
 
-    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
-        self.0.crossings(ray, crossings);
+    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
+        self.0.transmittance(ray, kept)
     }
 }
 

@@ -20,14 +20,13 @@ use crate::{
         light::Incident,
         material::{reflect, refract, schlick},
     },
-    surface::{Crossing, Surface, SurfaceHit},
+    surface::{Surface, SurfaceHit},
 };
 
 /// What a tile's rays leave behind: counts, and memory for the next ray.
 #[derive(Debug, Default)]
 pub(super) struct Scratch {
     pub(super) counts: RayCounts,
-    crossings: Vec<Crossing>,
     /// For each light, the rays of a packet whose places it reaches.
     lit: Vec<u32>,
 }
@@ -435,9 +434,8 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
                 1.0
             };
         }
-        self.surface.crossings(&ray, &mut scratch.crossings);
-        let through = |c: &Crossing| transmission * (1.0 - schlick(self.r0, c.cosine));
-        scratch.crossings.iter().map(through).product()
+        let kept = |cosine: f32| transmission * (1.0 - schlick(self.r0, cosine));
+        self.surface.transmittance(&ray, kept)
     }
 
     /// Whether the floor stands in the way of `ray`.

@@ -6,7 +6,10 @@ use glam::Vec3;
 
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
+mod dimming;
 pub mod spheres;
+
+pub(crate) use dimming::Dimming;
 
 /// One meeting of a ray with the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -24,15 +27,6 @@ pub struct SurfaceHit {
     pub offset: f32,
 }
 
-/// A place where a shadow ray passes through the surface of a transmissive body.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Crossing {
-    /// Distance along the ray.
-    pub t: f32,
-    /// Absolute cosine between ray and normal.
-    pub cosine: f32,
-}
-
 /// Anything a ray can meet. Answers do not depend on threads or on the accelerator.
 pub trait Surface: Sync {
     /// The nearest meeting with distance in `ray.t_min..ray.t_max`; equal distances go to the
@@ -42,9 +36,10 @@ pub trait Surface: Sync {
     /// Whether anything at all lies in `ray.t_min..ray.t_max`.
     fn occluded(&self, ray: &Ray) -> bool;
 
-    /// Replaces `crossings` by all meetings in `ray.t_min..ray.t_max`, both entering and leaving,
-    /// in order of distance (equal distances: lower particle index first).
-    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>);
+    /// How much of a light's radiance comes along `ray` through transmissive bodies: the product over
+    /// all meetings in `ray.t_min..ray.t_max`, entering and leaving, of what `kept` makes of the
+    /// absolute cosine between ray and normal.
+    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32;
 
     /// [`Surface::nearest`] of each ray, the same to the bit. For rays that are close together.
     fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {

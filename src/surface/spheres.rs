@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use glam::Vec3;
 
-use super::{Crossing, Surface, SurfaceHit};
+use super::{Dimming, Surface, SurfaceHit};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::wide::WideTree;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
@@ -69,22 +69,38 @@ impl Surface for SphereSurface<'_> {
         self.tree.any_hit_packet(packet)
     }
 
-    fn crossings(&self, ray: &Ray, crossings: &mut Vec<Crossing>) {
+    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
+        let mut dimming = Dimming::default();
+        if self.tree.has_copies() {
+            self.each_crossing_once(ray, |crossing| {
+                dimming.by(kept(self.cosine(ray, &crossing)))
+            });
+        } else {
+            self.tree.visit_crossings(ray, |crossing| {
+                dimming.by(kept(self.cosine(ray, &crossing)))
+            });
+        }
+        dimming.product()
+    }
+}
+
+impl SphereSurface<'_> {
+    /// Absolute cosine between the ray and the normal where it passes through a sphere.
+    fn cosine(&self, ray: &Ray, crossing: &TreeCrossing) -> f32 {
+        let (center, radius) = self.tree.sphere(crossing.slot);
+        let normal = outward(ray.at(crossing.t) - center, radius, ray.direction);
+        normal.dot(ray.direction).abs()
+    }
+
+    /// Crossings where one may be found several times: all of them must be there first.
+    fn each_crossing_once(&self, ray: &Ray, mut visit: impl FnMut(TreeCrossing) -> bool) {
         thread_local! {
             /// Shadow rays of a thread follow one another: one buffer serves them all.
             static FOUND: RefCell<Vec<TreeCrossing>> = const { RefCell::new(Vec::new()) };
         }
         FOUND.with_borrow_mut(|found| {
             self.tree.crossings(ray, found);
-            crossings.clear();
-            crossings.extend(found.iter().map(|crossing| {
-                let (center, radius) = self.tree.sphere(crossing.slot);
-                let normal = outward(ray.at(crossing.t) - center, radius, ray.direction);
-                Crossing {
-                    t: crossing.t,
-                    cosine: normal.dot(ray.direction).abs(),
-                }
-            }));
+            let _is_dark = !found.iter().all(|crossing| visit(*crossing));
         });
     }
 }
