@@ -43,8 +43,17 @@ pub enum ResolveError {
         has: String,
     },
     /// Neither the frames nor their spacing tell a radius.
-    #[error("input.radius: the frames bring none and are too sparse to estimate it; give a length")]
+    #[error(
+        "input.radius: the frames bring none, and particles that are few, in one place or far apart \
+         do not tell it; give a length with --radius"
+    )]
     NoRadius,
+    /// Squares of lengths would be no numbers any more.
+    #[error(
+        "input.radius: {0:e} is too small to trace in single precision, whose squares end at 1e-38; \
+         write the particles in a smaller unit of length"
+    )]
+    TinyRadius(f32),
     /// The image would not fit into memory.
     #[error(
         "image.width, image.height: an image of {width}x{height} needs about {need} MiB, \
@@ -89,6 +98,7 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
 /// See [`ResolveError`]; the messages name the manifest's keys.
 pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError> {
     let radius = radius_rule(manifest, survey)?;
+    check_radius(&radius)?;
     let color = color_rule(manifest, survey)?;
     let up = up(manifest, survey);
     // Spheres reach beyond their centres.
@@ -215,6 +225,20 @@ fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, Resol
             None => return Err(ResolveError::NoRadius),
         },
     })
+}
+
+/// Least radius whose square, and that of distances a little smaller, f32 still tells from zero.
+const TRACEABLE_RADIUS: f32 = 1e-16;
+
+fn check_radius(rule: &RadiusRule) -> Result<(), ResolveError> {
+    match rule {
+        RadiusRule::Common(radius) | RadiusRule::FileOr(radius)
+            if *radius > 0.0 && *radius < TRACEABLE_RADIUS =>
+        {
+            Err(ResolveError::TinyRadius(*radius))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// How far the spheres reach beyond their centres.

@@ -64,7 +64,7 @@ pub struct Survey {
 pub struct FrameWeight {
     /// Particles, those included that are not finite.
     pub particles: u64,
-    /// Bytes of its files on disk.
+    /// Bytes of its files, unpacked if by gzip.
     pub stored: u64,
     /// Bytes of the largest of its files, uncompressed.
     pub content: u64,
@@ -345,7 +345,7 @@ impl FrameWeight {
         let raw = &loaded.particles;
         Self {
             particles: raw.positions.len() as u64,
-            stored: loaded.stored_bytes,
+            stored: loaded.all_bytes,
             content: loaded.content_bytes,
             raw: raw.byte_len(),
             positions: raw.positions.byte_len(),

@@ -4,7 +4,7 @@
 //! read is told as such, because a simulation that is still running is the usual cause.
 
 use std::fs::{self, File};
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::GzDecoder;
@@ -168,6 +168,28 @@ fn regular_len(path: &Path) -> Result<u64, FrameError> {
         "no regular file; copy it to one first"
     };
     Err(ParseError::unsupported(what).in_file(path))
+}
+
+/// Bytes of the file at `path` once unpacked, by the last four bytes of a gzip file (RFC 1952), without
+/// reading the rest. A guess where those lie: with several members, or beyond 4 GiB.
+///
+/// # Errors
+/// The file cannot be read.
+pub fn unpacked_len(path: &Path) -> io::Result<u64> {
+    let mut file = File::open(path)?;
+    let len = file.metadata()?.len();
+    let mut start = [0; 4];
+    let mut end = [0; 4];
+    if len < 18 {
+        return Ok(len);
+    }
+    file.read_exact(&mut start)?;
+    if !is_gzip(&start) {
+        return Ok(len);
+    }
+    file.seek(io::SeekFrom::End(-4))?;
+    file.read_exact(&mut end)?;
+    Ok(u64::from(u32::from_le_bytes(end)).max(len))
 }
 
 /// Magic, deflate, no reserved flags: four bytes, so that raw floats do not look like it.

@@ -64,7 +64,8 @@ pub(super) struct ManifestArgs {
     /// Parts of a step to keep where it has several files: fluid,oil.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub(super) parts: Option<Vec<String>>,
-    /// Acceleration structure.
+    /// Acceleration structure: auto, lbvh (fastest to build), kdtree (fastest to trace), bvh or sbvh. The
+    /// picture is the same; auto goes by the rays for each particle.
     #[arg(long, value_name = "NAME")]
     pub(super) accelerator: Option<String>,
     /// Most memory to take: 4GiB, 512MiB. Frames that need more fail, the rest goes on.

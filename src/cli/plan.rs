@@ -327,8 +327,8 @@ fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
         MemoryModel::new(&setup).alone(frame).total() <= limit.0
     });
     ways.extend(others.map(|other| format!("choose --accelerator {other}")));
-    let images = MemoryModel::new(setup).alone(&FrameSize::default());
-    if 4 * images.total() > limit.0 {
+    let empty = MemoryModel::new(setup).alone(&FrameSize::default());
+    if 4 * (empty.images + empty.encoding) > limit.0 {
         ways.push("make the image smaller or ask for fewer channels".to_owned());
     }
     ways.push("raise the limit".to_owned());

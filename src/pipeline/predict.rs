@@ -8,9 +8,9 @@
 //! the survey found heaviest.
 
 use std::fmt;
-use std::fs;
 
 use serde::Serialize;
+use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
 use super::setup::{ColorRule, RadiusRule, Setup};
@@ -39,14 +39,14 @@ pub struct FrameSize {
 impl FrameSize {
     /// Of frame `index` of `sequence`, by the length of its files and a known frame.
     pub fn of(sequence: &Sequence, index: usize, known: Option<&FrameWeight>) -> Self {
-        let sizes = sequence.inputs(index).into_iter().map(fs::metadata);
-        let stored = sizes.filter_map(|m| Some(m.ok()?.len())).sum();
+        let sizes = sequence.inputs(index).into_iter().map(unpacked_len);
+        let stored = sizes.filter_map(Result::ok).sum();
         let parts = sequence.frames().get(index).map(|f| f.parts.as_slice());
         let is_shared = parts.is_some_and(|parts| parts.iter().any(|p| p.step.is_some()));
         Self::estimate(stored, is_shared, known)
     }
 
-    /// Of a frame whose files have `stored` bytes on disk, in proportion to a known one. Nothing is
+    /// Of a frame whose files have `stored` bytes once unpacked, in proportion to a known one. Nothing is
     /// known in jobs of the first versions: then as for plain single-precision positions.
     pub fn estimate(stored: u64, is_shared: bool, known: Option<&FrameWeight>) -> Self {
         let Some(known) = known.filter(|k| k.stored > 0) else {

@@ -104,8 +104,8 @@ pub struct Loaded {
     pub particles: RawParticles,
     /// Oddities of the files, and what got lost in merging.
     pub notes: Vec<String>,
-    /// Bytes of all its files on disk.
-    pub stored_bytes: u64,
+    /// Bytes of all its files, uncompressed.
+    pub all_bytes: u64,
     /// Bytes of the largest of its files, uncompressed: one is in memory at a time.
     pub content_bytes: u64,
 }
@@ -247,14 +247,15 @@ impl Sequence {
     pub fn load_measured(&self, index: usize) -> Result<Loaded, FrameError> {
         let frame = &self.frames[index];
         let mut notes = Vec::new();
-        let (mut stored_bytes, mut content_bytes) = (0, 0);
+        let (mut all_bytes, mut content_bytes) = (0, 0);
         let mut parts = Vec::with_capacity(frame.parts.len());
         for part in &frame.parts {
             let (file, step) = self.file_of(part)?;
             parts.push((part.part, file.read(step)?));
             notes.extend_from_slice(file.notes());
-            stored_bytes += file.stored_len();
-            content_bytes = content_bytes.max(file.bytes().len() as u64);
+            let bytes = file.bytes().len() as u64;
+            all_bytes += bytes;
+            content_bytes = content_bytes.max(bytes);
         }
         let only = if self.parts.len() < 2 {
             parts.pop().map(|(_, only)| only)
@@ -265,7 +266,7 @@ impl Sequence {
         Ok(Loaded {
             particles,
             notes,
-            stored_bytes,
+            all_bytes,
             content_bytes,
         })
     }

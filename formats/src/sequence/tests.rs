@@ -205,7 +205,7 @@ fn frames_are_loaded_and_parts_merged() {
     assert!(loaded.notes.is_empty());
     let on_disk = |path: &std::path::Path| std::fs::metadata(path).expect("a file").len();
     let sizes: Vec<u64> = sequence.inputs(2).into_iter().map(on_disk).collect();
-    assert_eq!(loaded.stored_bytes, sizes.iter().sum::<u64>());
+    assert_eq!(loaded.all_bytes, sizes.iter().sum::<u64>());
     assert_eq!(Some(&loaded.content_bytes), sizes.iter().max());
     let last = loaded.particles;
     assert_eq!(last.byte_len(), 3 * 12 + 3 * 4);

@@ -82,7 +82,9 @@ fn a_single_particle_is_in_the_middle() {
     not_rendered(
         &workshop,
         &[],
-        &["input.radius: the frames bring none and are too sparse to estimate it; give a length"],
+        &[
+            "input.radius: the frames bring none, and particles that are few, in one place or far apart do not tell it; give a length with --radius",
+        ],
     );
     workshop
         .render(&[&["--radius", "0.1"][..], &BACKGROUND].concat())
