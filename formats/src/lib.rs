@@ -12,10 +12,12 @@ mod frame;
 mod origin;
 mod scalar;
 
+pub mod blocks;
 pub mod detect;
 pub mod generate;
 pub mod native;
 pub mod open;
+pub mod order;
 pub mod read;
 pub mod sequence;
 pub mod stats;

@@ -21,12 +21,12 @@
 use obvhs::ploc::SortPrecision;
 use rayon::prelude::*;
 
-use super::block::Block;
 use super::collapse::{Collapsed, Content, collapse};
 use super::ploc::{Clustered, Effort, cluster};
 use super::report::PhaseClock;
 use super::wide::WideTree;
 use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure, lbvh};
+use spherule_formats::blocks::Block;
 
 /// How much is spent on the tree. Each stands for parameters of `obvhs`, whose presets of about the
 /// same names they follow.

@@ -6,14 +6,14 @@
 //! (`linked.rs`).
 
 use super::binary::BinaryTree;
-use super::block::BLOCK_SIZE;
 use super::linked::{block_boxes, build_nodes, gather_blocks, permute_blocks};
-use super::partition::index_u32;
 use super::report::PhaseClock;
 use super::trim::{Trim, TrimmedTree};
 use super::wide::WideTree;
 use super::widen::widen;
 use super::{SphereRadius, Spheres};
+use spherule_formats::blocks::BLOCK_SIZE;
+use spherule_formats::order::index_u32;
 
 /// What the references of a binary tree stand for.
 #[derive(Debug, Clone, Copy)]

@@ -3,13 +3,13 @@
 use glam::Vec3;
 
 use super::binary::{BinaryNode, BinaryTree};
-use super::block::{BLOCK_SIZE, Block};
 use super::collapse::{self, Collapsed, Content};
-use super::partition::index_u32;
 use super::report::PhaseClock;
 use super::wide::{MAX_LEVELS, WideTree};
 use super::{Aabb, BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use crate::ray::Ray;
+use spherule_formats::blocks::{BLOCK_SIZE, Block};
+use spherule_formats::order::index_u32;
 
 fn collapse(tree: &mut WideTree, binary: BinaryTree, content: &Content) -> Collapsed {
     collapse::collapse(tree, binary, content, &mut PhaseClock::new())

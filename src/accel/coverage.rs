@@ -6,10 +6,10 @@
 
 use glam::DVec3;
 
-use super::block::BLOCK_SIZE;
 use super::topology::{Linked, Place, Topology};
 use super::wide::WideTree;
 use super::{SphereRadius, Spheres};
+use spherule_formats::blocks::BLOCK_SIZE;
 
 /// Sampled points of a sphere.
 const POINTS: usize = 26;
@@ -47,8 +47,10 @@ impl WideTree {
                 }
                 Place::Node(node) => {
                     for slot in 0..self.nodes[node].child_count() {
-                        let child = topology
-                            .child(topology.children(code), super::partition::index_u32(slot));
+                        let child = topology.child(
+                            topology.children(code),
+                            spherule_formats::order::index_u32(slot),
+                        );
                         pending.push((child, self.cell_of_child(node, slot, cell)));
                     }
                 }

@@ -8,11 +8,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
-use super::partition::{Cells, scatter};
 use super::report::PhaseClock;
 use super::wide::{UpperLevels, WideTree};
 use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
+use spherule_formats::order::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
+use spherule_formats::order::partition::{Cells, scatter};
 
 /// Curve levels that the sort inside a cell looks at; finer differences keep the input's order.
 const CELL_LEVELS: u32 = 12;
@@ -235,7 +235,7 @@ fn sort_large_cell(grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &
         .map(|(i, p)| {
             let levels = AXIS_BITS - top_levels;
             let (place, _) = hilbert(grid.morton(*p), top_levels, levels, state);
-            (place, super::partition::index_u32(i))
+            (place, spherule_formats::order::index_u32(i))
         })
         .collect();
     keys.par_sort_unstable();

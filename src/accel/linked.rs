@@ -1,15 +1,14 @@
 //! Writes a tree with links: blocks and nodes to their places, boxes made anew from the blocks up.
 
-use glam::Vec3;
 use rayon::prelude::*;
 
-use super::block::{BLOCK_SIZE, Block};
-use super::node::{Node, WIDTH};
 use super::topology::Link;
 use super::trim::TrimmedTree;
 use super::wide::WideTree;
 use super::widen::Layout;
 use super::{Aabb, SphereRadius, Spheres};
+use spherule_formats::blocks::BLOCK_SIZE;
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// Brings the blocks of `tree` into the order of `layout`.
 pub(super) fn permute_blocks(tree: &mut WideTree, trimmed: &TrimmedTree, layout: &Layout) {
@@ -173,13 +172,5 @@ impl Level<'_> {
         nodes.copy_from_slice(&self.below[first_node..][..nodes.len()]);
         blocks.copy_from_slice(&self.block_boxes[link.first_block()..][..blocks.len()]);
         (boxes, count)
-    }
-}
-
-impl Block {
-    fn set_center(&mut self, lane: usize, center: Vec3) {
-        self.x[lane] = center.x;
-        self.y[lane] = center.y;
-        self.z[lane] = center.z;
     }
 }

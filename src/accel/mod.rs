@@ -6,21 +6,16 @@
 
 use glam::Vec3;
 
-mod aabb;
 mod binary;
-pub mod block;
 mod builder;
 mod bvh;
 mod choose;
 mod collapse;
 mod coverage;
-pub mod curve;
 mod kdtree;
 mod lbvh;
 mod linked;
-mod node;
 mod packet;
-mod partition;
 mod ploc;
 mod predict;
 mod report;
@@ -34,13 +29,13 @@ mod validate;
 pub mod wide;
 mod widen;
 
-pub use aabb::Aabb;
 pub use builder::{BuildSettings, Structure, TreeBuilder};
 pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
 pub use choose::choose;
 pub use predict::{BuildBytes, predicted_bytes};
 pub use report::{BuildReport, Phase};
 pub use sbvh::SbvhSettings;
+pub use spherule_formats::blocks::Aabb;
 
 /// Index of a particle in the frame that was built over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]

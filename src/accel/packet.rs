@@ -3,12 +3,12 @@
 //! Nodes and blocks are tested with the beam, and only the spheres inside it with the rays, all of them
 //! at once. What each ray finds is what it would find alone, to the bit.
 
-use super::block::BLOCK_SIZE;
 use super::simd::{Beam, KernelTask, LaneHits, PacketKernel, PacketSphere, lanes_near};
 use super::topology::{Implicit, Linked, Topology};
 use super::traverse::{TreeHit, walk};
 use super::wide::WideTree;
 use crate::ray::{PACKET_SIZE, RayPacket};
+use spherule_formats::blocks::BLOCK_SIZE;
 
 impl WideTree {
     /// [`WideTree::nearest`] of each ray.

@@ -21,8 +21,8 @@ use rayon::prelude::*;
 use super::Aabb;
 use super::binary::{BinaryNode, BinaryTree};
 use super::bvh::BvhPreset;
-use super::partition::index_u32;
 use super::report::PhaseClock;
+use spherule_formats::order::index_u32;
 
 /// Shift of a box, as a part of its longest edge: far below what matters to the cost, far above
 /// where areas are rounded.

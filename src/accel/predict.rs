@@ -3,11 +3,11 @@
 //! The same sums that [`super::BuildReport`] makes afterwards, from counts alone. Where a builder's
 //! need depends on where the particles are, an even spread is assumed.
 
-use super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::node::{Node, WIDTH};
-use super::partition;
 use super::topology::Link;
-use super::{Aabb, BuildSettings, BvhLeaves, BvhPreset, Structure, kdtree};
+use super::{Aabb, BuildSettings, BvhLeaves, BvhPreset, Structure};
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
+use spherule_formats::order::{kd, partition};
 
 /// Bytes of a build.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -70,7 +70,7 @@ impl Size {
 
     /// As lbvh, without another order of the upper levels; but first the upper cuts are found.
     fn kdtree(&self) -> BuildBytes {
-        let cuts = if self.particles > kdtree::CELL_LEN as u64 {
+        let cuts = if self.particles > kd::CELL_LEN as u64 {
             CUT_BYTES * self.particles
         } else {
             0

@@ -4,7 +4,6 @@
 use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
-use super::node::Node;
 use super::oracle::ParticleTree;
 use super::simd::SimdLevel;
 use super::{
@@ -12,6 +11,7 @@ use super::{
     Structure, TreeBuilder,
 };
 use crate::ray::Ray;
+use spherule_formats::blocks::Node;
 
 mod packets;
 

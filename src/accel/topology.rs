@@ -6,8 +6,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::node::WIDTH;
 use super::wide::WideTree;
+use spherule_formats::blocks::WIDTH;
 
 /// What a code stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,12 +1,12 @@
 //! The one traversal: how a ray finds spheres in a [`WideTree`], whatever built it and whatever
 //! instructions test nodes and blocks.
 
-use super::block::BLOCK_SIZE;
-use super::node::{Node, WIDTH};
 use super::simd::{Kernel, KernelTask, PacketKernel, SLAB_SLACK, finite_inverse};
 use super::topology::{Implicit, Linked, Place, Topology};
 use super::wide::{MAX_LEVELS, WideTree};
 use crate::ray::Ray;
+use spherule_formats::blocks::BLOCK_SIZE;
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// A ray's meeting with a sphere of the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]

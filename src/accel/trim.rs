@@ -6,7 +6,7 @@
 
 use super::Aabb;
 use super::binary::{BinaryNode, BinaryTree};
-use super::partition::index_u32;
+use spherule_formats::order::index_u32;
 
 /// A binary tree over blocks.
 #[derive(Debug, Default)]

@@ -9,7 +9,7 @@
 use rayon::prelude::*;
 
 use super::Aabb;
-use super::node::WIDTH;
+use spherule_formats::order::kd::aligned_middle;
 
 /// Below this a task of its own costs more than it saves.
 const PARALLEL_LEN: usize = 4096;
@@ -22,7 +22,7 @@ pub(super) fn kd_order(boxes: &[Aabb]) -> Vec<u32> {
         .map(|(place, bounds)| Item {
             // Twice the centre, which orders as well.
             center: (bounds.min + bounds.max).to_array(),
-            place: super::partition::index_u32(place),
+            place: spherule_formats::order::index_u32(place),
         })
         .collect();
     split(&mut items);
@@ -54,17 +54,6 @@ fn split(items: &mut [Item]) {
     }
 }
 
-/// Where to cut `len` subtrees (or blocks) in two so that both sides are whole nodes: a multiple of
-/// the largest power of 8 below `len`. 0 when there is nothing to cut.
-pub(super) fn aligned_middle(len: usize) -> usize {
-    let mut unit = 1;
-    while unit * WIDTH < len {
-        unit *= WIDTH;
-    }
-    let children = len.div_ceil(unit);
-    (children / 2) * unit
-}
-
 fn widest_axis(items: &[Item]) -> usize {
     let (mut min, mut max) = ([f32::INFINITY; 3], [f32::NEG_INFINITY; 3]);
     for item in items {
@@ -88,18 +77,6 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-
-    #[test]
-    fn cuts_keep_nodes_whole() {
-        assert_eq!(aligned_middle(0), 0);
-        assert_eq!(aligned_middle(1), 0);
-        assert_eq!(aligned_middle(2), 1);
-        assert_eq!(aligned_middle(8), 4);
-        assert_eq!(aligned_middle(9), 8);
-        assert_eq!(aligned_middle(64), 32);
-        assert_eq!(aligned_middle(65), 64);
-        assert_eq!(aligned_middle(9766), 2 * 4096 / 2);
-    }
 
     #[test]
     fn every_place_once_and_runs_compact() {

@@ -1,10 +1,10 @@
 //! Proof that a tree is sound: every child inside its own parent, every particle in the tree
 //! exactly once, or its parts covering it (`coverage.rs`). Debug builds run it after each build.
 
-use super::block::BLOCK_SIZE;
 use super::topology::{Linked, Place, Topology};
 use super::wide::{MAX_LEVELS, WideTree};
 use super::{Aabb, SphereRadius, Spheres};
+use spherule_formats::blocks::BLOCK_SIZE;
 
 impl WideTree {
     /// Checks the tree against the spheres that it was built over.
@@ -63,7 +63,7 @@ impl WideTree {
             .map_or(self.nodes.len(), |s| *s as usize);
         let mut own = Vec::with_capacity(end - start);
         let mut reached = vec![false; below.len()];
-        let number = super::partition::index_u32(level);
+        let number = spherule_formats::order::index_u32(level);
         for (index, node) in self.nodes[start..end].iter().enumerate() {
             let mut bounds = Aabb::EMPTY;
             for slot in 0..node.child_count() {
@@ -129,7 +129,7 @@ impl WideTree {
         }
         let node = &self.nodes[index];
         let mut own = Aabb::EMPTY;
-        for slot in 0..super::partition::index_u32(node.child_count()) {
+        for slot in 0..spherule_formats::order::index_u32(node.child_count()) {
             let child = topology.child(topology.children(code), slot);
             let place = topology.place(child);
             reached

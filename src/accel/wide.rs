@@ -11,11 +11,11 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::node::{Node, WIDTH};
 use super::simd::{SimdLevel, Supported};
 use super::topology::Link;
 use super::{Aabb, BuildReport, Phase, Structure};
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// Node levels at most. Whole levels need ten: 8^10 blocks of 16 are more particles than 32 bits
 /// count. Builders of other shapes keep to it by balancing what would grow deeper.
@@ -60,12 +60,6 @@ pub struct WideTree {
     pub(super) count: usize,
     pub(super) bounds: Aabb,
     pub(super) simd: Supported,
-}
-
-impl Default for Aabb {
-    fn default() -> Self {
-        Self::EMPTY
-    }
 }
 
 impl WideTree {
@@ -217,7 +211,8 @@ impl WideTree {
         self.level_starts.clear();
         let mut total = 0_usize;
         for count in &counts {
-            self.level_starts.push(super::partition::index_u32(total));
+            self.level_starts
+                .push(spherule_formats::order::index_u32(total));
             total += count;
         }
         self.nodes.resize(total, bytemuck::Zeroable::zeroed());
@@ -225,7 +220,7 @@ impl WideTree {
             UpperLevels::InOrder => None,
             UpperLevels::Mapped => mapped_level(counts.len()),
         };
-        self.mapped_level = mapped_level.map_or(u32::MAX, super::partition::index_u32);
+        self.mapped_level = mapped_level.map_or(u32::MAX, spherule_formats::order::index_u32);
         self.mapped.clear();
         let (mut boxes, mut areas) = (Vec::new(), 0.0);
         let mut rest = &mut self.nodes[..];
@@ -280,7 +275,7 @@ impl WideTree {
             references: self.reference_count(),
             nodes: self.nodes.len() as u64,
             leaves: self.blocks.len() as u64,
-            depth: super::partition::index_u32(self.level_starts.len()),
+            depth: spherule_formats::order::index_u32(self.level_starts.len()),
             sah_cost,
             position_bytes,
             structure_bytes,

@@ -6,11 +6,11 @@
 
 use rayon::prelude::*;
 
-use super::node::WIDTH;
-use super::partition::index_u32;
 use super::topology::Link;
 use super::trim::TrimmedTree;
 use super::wide::MAX_LEVELS;
+use spherule_formats::blocks::WIDTH;
+use spherule_formats::order::index_u32;
 
 /// The shape of a wide tree: level by level, the children of a node together.
 #[derive(Debug, Default)]

@@ -5,7 +5,7 @@
 //! 2016, "Parallel spatial splits in bounding volume hierarchies"). So memory is bounded, threads
 //! never ask each other, and the tree does not depend on them.
 
-use super::super::block::BLOCK_SIZE;
+use spherule_formats::blocks::BLOCK_SIZE;
 
 /// References that there is room for: `particles`, and `budget` times as many on top.
 pub(super) fn room(particles: usize, budget: f32) -> usize {

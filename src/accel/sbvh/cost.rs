@@ -5,8 +5,8 @@
 //! `ceil(n / 16)`, times the area of its box, which also makes the lower splits fall where blocks
 //! are full.
 
-use super::super::block::BLOCK_SIZE;
 use super::reference::Bounds;
+use spherule_formats::blocks::BLOCK_SIZE;
 
 /// One more binary node: seven of them make a wide node when it is full, five as they usually are.
 pub(super) const INNER_NODE: f64 = 0.2;

@@ -5,8 +5,6 @@
 //! not depend on who built what.
 
 use super::super::binary::{BinaryNode, BinaryTree};
-use super::super::block::BLOCK_SIZE;
-use super::super::partition::index_u32;
 use super::cost;
 use super::divide::{Roomed, by_number, by_split};
 use super::object::BinnedObjectSplit;
@@ -14,6 +12,8 @@ use super::reference::{Bounds, Parts};
 use super::spatial::SpatialSplit;
 use super::split::{Set, Split, SplitRule};
 use super::sweep::{SWEEP_LEN, SweptObjectSplit};
+use spherule_formats::blocks::BLOCK_SIZE;
+use spherule_formats::order::index_u32;
 
 /// Below this a task of its own costs more than it saves.
 const SUBTREE: usize = 4096;

@@ -20,13 +20,13 @@ use rayon::prelude::*;
 
 use super::binary::{BinaryNode, BinaryTree};
 use super::collapse::{Content, collapse};
-use super::partition::index_u32;
 use super::report::PhaseClock;
 use super::wide::WideTree;
 use super::{BuildReport, BuildSettings, Spheres, Structure};
 use divide::Roomed;
 use grow::{Grower, Grown};
 use reference::{Parts, Reference};
+use spherule_formats::order::index_u32;
 
 mod budget;
 mod cost;

@@ -1,10 +1,10 @@
 //! Packets in plain loops, for kernels that have no packet tests of their own.
 
-use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::super::node::{Node, WIDTH};
 use super::portable::keys_of;
 use super::{Beam, Kernel, LaneHits, PacketKernel, PacketSphere, SLAB_SLACK};
 use crate::ray::{PACKET_SIZE, RayPacket};
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// A kernel whose packets are tested in loops over lanes.
 pub(super) trait LoopPackets: Kernel<Keys = [u32; WIDTH]> {

@@ -6,9 +6,9 @@
 
 use glam::Vec3;
 
-use super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::node::{Node, WIDTH};
 use crate::ray::Ray;
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 mod beam;
 mod loop_packet;

@@ -9,11 +9,11 @@
 use std::arch::aarch64::*;
 use std::arch::asm;
 
-use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::super::node::{Node, WIDTH};
 use super::loop_packet::LoopPackets;
 use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// Lanes of a register.
 const LANES: usize = 4;

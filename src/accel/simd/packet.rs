@@ -1,9 +1,9 @@
 //! What tracing 16 rays together needs of the machine.
 
-use super::super::block::{Block, BlockRadii};
-use super::super::node::Node;
 use super::{Beam, Kernel};
 use crate::ray::{PACKET_SIZE, RayPacket};
+use spherule_formats::blocks::Node;
+use spherule_formats::blocks::{Block, BlockRadii};
 
 /// A sphere that each ray of a packet is to be tested with.
 #[derive(Debug, Clone, Copy)]

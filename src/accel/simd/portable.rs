@@ -3,11 +3,11 @@
 
 use glam::Vec3;
 
-use super::super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::super::node::{Node, WIDTH};
 use super::loop_packet::LoopPackets;
 use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// See the module.
 #[derive(Debug, Clone, Copy)]

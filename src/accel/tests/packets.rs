@@ -1,11 +1,11 @@
 //! Packets against single rays: the same to the bit.
 
 use super::*;
-use crate::accel::node::Node;
 use crate::accel::topology::Link;
 use crate::accel::traverse::TreeHit;
 use crate::accel::wide::WideTree;
 use crate::ray::{PACKET_SIZE, RayPacket};
+use spherule_formats::blocks::Node;
 
 /// How the rays of a packet lie to one another.
 #[derive(Debug, Clone, Copy)]

@@ -2,12 +2,12 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::super::super::node::{Node, WIDTH};
 use super::super::{BlockCrossings, Kernel};
 use super::lanes::{first_two, keys_of, keys_to_array, prefetch_line};
 use super::slab::SlabRay;
 use crate::ray::Ray;
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// 256-bit kernel.
 #[derive(Debug, Clone, Copy)]

@@ -2,12 +2,12 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::block::{BLOCK_SIZE, Block, BlockRadii};
-use super::super::super::node::Node;
 use super::super::{Beam, LaneHits, PacketKernel, PacketSphere};
 use super::avx2::{Avx2, packed_keys};
 use super::beam;
 use crate::ray::{PACKET_SIZE, RayPacket};
+use spherule_formats::blocks::Node;
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 
 /// The crossing of each ray in lanes `half * 8 .. half * 8 + 8` with `sphere` that counts, and the
 /// lanes where it lies in `t_min..=limit`. The operations on each pair of ray and sphere are those of

@@ -2,12 +2,12 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::block::{Block, BlockRadii};
-use super::super::super::node::{Node, WIDTH};
 use super::super::{BlockCrossings, Kernel};
 use super::lanes::{first_two, keys_of, keys_to_array, prefetch_line};
 use super::slab::SlabRay;
 use crate::ray::Ray;
+use spherule_formats::blocks::{Block, BlockRadii};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// 512-bit kernel.
 #[derive(Debug, Clone, Copy)]

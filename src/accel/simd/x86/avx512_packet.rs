@@ -2,13 +2,13 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::block::{Block, BlockRadii};
-use super::super::super::node::Node;
 use super::super::{Beam, LaneHits, PacketKernel, PacketSphere};
 use super::avx512::Avx512;
 use super::beam;
 use super::lanes::keys_of;
 use crate::ray::RayPacket;
+use spherule_formats::blocks::Node;
+use spherule_formats::blocks::{Block, BlockRadii};
 
 /// The crossing of each ray with `sphere` that counts, and the lanes where it lies in
 /// `t_min..=limit`. The operations on each pair of ray and sphere are those of the test of one ray.

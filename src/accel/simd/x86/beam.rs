@@ -2,9 +2,9 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::node::Node;
 use super::super::{Beam, SLAB_SLACK};
 use super::lanes::{absolute, planes, spread};
+use spherule_formats::blocks::Node;
 
 /// Where the first ray may enter and the last one leave each child of `node`, within the beam's start
 /// and `limit`.

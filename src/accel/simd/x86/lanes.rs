@@ -2,7 +2,7 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::node::WIDTH;
+use spherule_formats::blocks::WIDTH;
 
 /// Eight planes as floats.
 ///

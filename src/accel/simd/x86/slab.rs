@@ -2,10 +2,10 @@
 
 use std::arch::x86_64::*;
 
-use super::super::super::node::Node;
 use super::super::{SLAB_SLACK, finite_inverse};
 use super::lanes::{absolute, planes, spread};
 use crate::ray::Ray;
+use spherule_formats::blocks::Node;
 
 /// What the slab test needs of a ray: one lane per axis, the fourth unused.
 #[derive(Clone, Copy)]

@@ -8,20 +8,21 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::curve::TopCells;
+use super::index_u32;
 
 /// Wanted particles a cell: large enough to amortise the cell, small enough for the L2 cache.
 const CELL_TARGET: usize = 4096;
 
 /// Where the particles of each cell are.
 #[derive(Debug, Default)]
-pub(super) struct Cells {
+pub struct Cells {
     /// First particle of each cell, and the particle count at the end.
-    pub(super) starts: Vec<usize>,
+    pub starts: Vec<usize>,
 }
 
 impl Cells {
     /// Levels for `count` particles: the fewest that bring an even spread near the target.
-    pub(super) fn levels_for(count: usize) -> u32 {
+    pub fn levels_for(count: usize) -> u32 {
         let mut levels = 0;
         while levels < TopCells::MAX_LEVELS && (count >> (3 * levels)) > 8 * CELL_TARGET {
             levels += 1;
@@ -30,7 +31,7 @@ impl Cells {
     }
 
     /// The memory of each cell: its points, and its indices unless there are none at all.
-    pub(super) fn slices_of<'a>(
+    pub fn slices_of<'a>(
         &self,
         mut points: &'a mut [Vec3],
         mut indices: &'a mut [u32],
@@ -57,7 +58,7 @@ fn chunk_len(count: usize) -> usize {
 
 /// Bytes of the tables that scattering `count` particles makes: for each chunk and cell a count and
 /// two slices.
-pub(super) fn table_bytes(count: u64) -> u64 {
+pub fn table_bytes(count: u64) -> u64 {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     let cells = 1_u64 << (3 * Cells::levels_for(count));
     let chunks = count.div_ceil(chunk_len(count)) as u64;
@@ -69,7 +70,7 @@ pub(super) fn table_bytes(count: u64) -> u64 {
 ///
 /// # Panics
 /// If `points` (or a non-empty `indices`) is shorter than `centers`.
-pub(super) fn scatter(
+pub fn scatter(
     centers: &[Vec3],
     cell_count: usize,
     cell_of: impl Fn(usize, Vec3) -> usize + Sync,
@@ -114,11 +115,6 @@ pub(super) fn scatter(
             }
         });
     Cells { starts }
-}
-
-/// A particle index as stored.
-pub(super) fn index_u32(index: usize) -> u32 {
-    u32::try_from(index).expect("a frame holds fewer than 2^32 particles, checked by the builder")
 }
 
 fn cell_starts(counts: &[Vec<u32>], cell_count: usize) -> Vec<usize> {

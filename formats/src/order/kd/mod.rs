@@ -1,5 +1,4 @@
-//! `kdtree`: a k-d tree (Bentley 1975) with medians of the widest axis down to a block, folded into
-//! implicit 8-wide levels: the fastest to trace.
+//! The order of a k-d tree (Bentley 1975): medians of the widest axis down to a block.
 //!
 //! Cuts are at whole nodes ([`aligned_middle`]), so each aligned run of 16, 128, 1024... particles is a
 //! cell of the tree and nothing but the order has to be found. The upper cuts are made without
@@ -9,76 +8,61 @@
 //! cells are cut further one by one (`cell.rs`). All of it is parallel, and the cells are of equal
 //! size however the particles are spread.
 //!
-//! Equal coordinates go by the particle's index, so the tree is one whatever the threads.
+//! Equal coordinates go by the particle's index, so the order is one whatever the threads.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::block::BLOCK_SIZE;
 use super::partition::{Cells, scatter};
-use super::report::PhaseClock;
-use super::upper::aligned_middle;
-use super::wide::{UpperLevels, WideTree};
-use super::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
+use crate::blocks::{BLOCK_SIZE, WIDTH};
 
 mod assign;
 mod cell;
 mod item;
 mod plan;
 
-pub(in crate::accel) use plan::CELL_LEN;
+pub use plan::CELL_LEN;
 
 use cell::CellScratch;
 use plan::CutPlan;
 
-/// Builds over `spheres` in the memory of `tree`.
-pub(super) fn build(
-    tree: &mut WideTree,
-    spheres: &Spheres,
-    settings: &BuildSettings,
-) -> BuildReport {
-    let mut clock = PhaseClock::new();
-    let centers = spheres.centers;
-    let common = match spheres.radius {
-        SphereRadius::Common(radius) => Some(radius),
-        SphereRadius::Each(_) => None,
-    };
-    // Radii of their own follow by index, so then the indices are needed while building.
-    let indexed = settings.keep_indices || common.is_none();
-    tree.reset(centers.len(), common, indexed);
-
+/// Writes `centers` into `points` in the order of the tree, and their indices into `indices` unless
+/// that is empty. `lap` is told when a phase ends: `sample`, `cuts`, `scatter`, `cells`. Returns the
+/// most bytes held beside the two.
+///
+/// # Panics
+/// If `points` (or a non-empty `indices`) is shorter than `centers`, or there are 2^32 or more.
+pub fn order_into(
+    centers: &[Vec3],
+    points: &mut [Vec3],
+    indices: &mut [u32],
+    mut lap: impl FnMut(&'static str),
+) -> u64 {
     let plan = CutPlan::from_sample(centers);
-    clock.lap("sample");
+    lap("sample");
     let assigned = assign::assign(centers, plan);
-    clock.lap("cuts");
+    lap("cuts");
 
-    let (points, indices) = tree.points_mut();
     let cell_of = |index: usize, _: Vec3| assigned.cell(index);
     let cells = scatter(centers, assigned.cell_count, cell_of, points, indices);
     let scratch_bytes = assigned.bytes;
     drop(assigned);
-    clock.lap("scatter");
+    lap("scatter");
 
     sort_cells(&cells, points, indices);
-    clock.lap("cells");
+    lap("cells");
+    scratch_bytes
+}
 
-    tree.pad_last_block();
-    if let SphereRadius::Each(radii) = spheres.radius {
-        tree.gather_radii(radii);
+/// Where to cut `len` subtrees (or blocks) in two so that both sides are whole nodes: a multiple of
+/// the largest power of 8 below `len`. 0 when there is nothing to cut.
+pub fn aligned_middle(len: usize) -> usize {
+    let mut unit = 1;
+    while unit * WIDTH < len {
+        unit *= WIDTH;
     }
-    let sah_cost = tree.finish(UpperLevels::InOrder);
-    if !settings.keep_indices {
-        tree.drop_indices();
-    }
-    clock.lap("nodes");
-
-    tree.report(
-        Structure::Kdtree,
-        "k-d, medians of the widest axis",
-        sah_cost,
-        scratch_bytes,
-        clock.finish(),
-    )
+    let children = len.div_ceil(unit);
+    (children / 2) * unit
 }
 
 /// Where to cut `len` particles in two so that nodes stay whole; 0 when they fit a block.
@@ -94,4 +78,21 @@ fn sort_cells(cells: &Cells, points: &mut [Vec3], indices: &mut [u32]) {
         .for_each_init(CellScratch::default, |scratch, (points, indices)| {
             scratch.sort(points, indices);
         });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn cuts_keep_nodes_whole() {
+        assert_eq!(aligned_middle(0), 0);
+        assert_eq!(aligned_middle(1), 0);
+        assert_eq!(aligned_middle(2), 1);
+        assert_eq!(aligned_middle(8), 4);
+        assert_eq!(aligned_middle(9), 8);
+        assert_eq!(aligned_middle(64), 32);
+        assert_eq!(aligned_middle(65), 64);
+        assert_eq!(aligned_middle(9766), 2 * 4096 / 2);
+    }
 }

@@ -11,6 +11,12 @@ pub struct Aabb {
     pub max: Vec3,
 }
 
+impl Default for Aabb {
+    fn default() -> Self {
+        Self::EMPTY
+    }
+}
+
 impl Aabb {
     /// The box that holds nothing.
     pub const EMPTY: Self = Self {
@@ -19,12 +25,14 @@ impl Aabb {
     };
 
     /// The smallest box around `points`.
+    #[inline]
     pub fn around(points: &[Vec3]) -> Self {
         points.iter().fold(Self::EMPTY, |b, p| b.extend(*p))
     }
 
     /// This box grown to hold `point`.
     #[must_use]
+    #[inline]
     pub fn extend(self, point: Vec3) -> Self {
         Self {
             min: self.min.min(point),
@@ -34,6 +42,7 @@ impl Aabb {
 
     /// The smallest box around both.
     #[must_use]
+    #[inline]
     pub fn union(self, other: Self) -> Self {
         Self {
             min: self.min.min(other.min),
@@ -43,6 +52,7 @@ impl Aabb {
 
     /// What both have in common; empty if nothing.
     #[must_use]
+    #[inline]
     pub fn intersection(self, other: Self) -> Self {
         Self {
             min: self.min.max(other.min),
@@ -52,6 +62,7 @@ impl Aabb {
 
     /// This box grown by `length` on every side.
     #[must_use]
+    #[inline]
     pub fn padded(self, length: f32) -> Self {
         Self {
             min: self.min - length,
@@ -62,6 +73,7 @@ impl Aabb {
     /// This box with every face moved out by one step of f32: holds what it would have held without
     /// rounding.
     #[must_use]
+    #[inline]
     pub fn rounded_outwards(self) -> Self {
         Self {
             min: self.min.map(f32::next_down),
@@ -70,21 +82,25 @@ impl Aabb {
     }
 
     /// True if it holds nothing.
+    #[inline]
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()
     }
 
     /// Edge lengths; zero for the empty box.
+    #[inline]
     pub fn size(&self) -> Vec3 {
         (self.max - self.min).max(Vec3::ZERO)
     }
 
     /// True if `other` lies inside, borders included.
+    #[inline]
     pub fn contains(&self, other: &Self) -> bool {
         self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
     }
 
     /// Surface area in f64, so that sums over many boxes keep their digits.
+    #[inline]
     pub fn area(&self) -> f64 {
         let s = self.size().as_dvec3();
         2.0 * (s.x * s.y + s.y * s.z + s.z * s.x)

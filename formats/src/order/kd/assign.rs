@@ -7,7 +7,7 @@ use rayon::prelude::*;
 
 use super::item::{Item, key};
 use super::plan::{Bracket, CutPlan, Way, descend};
-use crate::accel::partition::index_u32;
+use crate::order::index_u32;
 
 /// Fewest particles that a task is made for.
 const TASK_LEN: usize = 16 * 1024;

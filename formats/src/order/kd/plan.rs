@@ -10,10 +10,10 @@ use rayon::prelude::*;
 
 use super::item::{Item, widest};
 use super::middle_of;
-use crate::accel::partition::index_u32;
+use crate::order::index_u32;
 
 /// Particles in a cell that is left to `cell.rs`: both of its buffers fit an L2 cache.
-pub(in crate::accel) const CELL_LEN: usize = 32 * 1024;
+pub const CELL_LEN: usize = 32 * 1024;
 /// Cuts above one another at most: their leaves are numbered in 16 bits.
 const MAX_DEPTH: u32 = 15;
 /// One of so many particles is in the sample.

@@ -6,30 +6,32 @@ use bytemuck::{Pod, Zeroable};
 use super::Aabb;
 
 /// Children of a node.
-pub(super) const WIDTH: usize = 8;
+pub const WIDTH: usize = 8;
 
 /// Eight quantised child boxes. Plane `q` of axis `a` lies at `origin[a] + q * 2^(exponent[a]-127)`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
-pub(super) struct Node {
+pub struct Node {
     /// Lower corner of the node's own box.
-    pub(super) origin: [f32; 3],
+    pub origin: [f32; 3],
     /// Biased power of two of the quantisation step, per axis.
-    pub(super) exponent: [u8; 3],
+    pub exponent: [u8; 3],
     /// A bit for each child in use; they are the first ones.
-    pub(super) child_mask: u8,
+    pub child_mask: u8,
     /// Per axis: the eight lower planes, then the eight upper ones.
-    pub(super) planes: [[[u8; WIDTH]; 2]; 3],
+    pub planes: [[[u8; WIDTH]; 2]; 3],
 }
 
 impl Node {
     /// Children in use.
-    pub(super) fn child_count(&self) -> usize {
+    #[inline]
+    pub fn child_count(&self) -> usize {
         self.child_mask.count_ones() as usize
     }
 
     /// Encloses up to eight `children`; every quantised box holds its child.
-    pub(super) fn enclosing(children: &[Aabb]) -> Self {
+    #[inline]
+    pub fn enclosing(children: &[Aabb]) -> Self {
         debug_assert!(!children.is_empty() && children.len() <= WIDTH);
         let own = children.iter().fold(Aabb::EMPTY, |b, c| b.union(*c));
         let mut node = Self::zeroed();
@@ -53,13 +55,15 @@ impl Node {
     }
 
     /// Lower and upper plane of child `slot` on `axis`, exact.
-    pub(super) fn interval(&self, slot: usize, axis: usize) -> [f64; 2] {
+    #[inline]
+    pub fn interval(&self, slot: usize, axis: usize) -> [f64; 2] {
         let step = decode_step(self.exponent[axis]);
         [0, 1].map(|side| plane_at(self.origin[axis], step, self.planes[axis][side][slot]))
     }
 
     /// Whether `bounds` lies inside the quantised box of child `slot`.
-    pub(super) fn child_holds(&self, slot: usize, bounds: &Aabb) -> bool {
+    #[inline]
+    pub fn child_holds(&self, slot: usize, bounds: &Aabb) -> bool {
         (0..3).all(|axis| {
             let [lower, upper] = self.interval(slot, axis);
             lower <= f64::from(bounds.min[axis]) && f64::from(bounds.max[axis]) <= upper

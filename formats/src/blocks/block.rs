@@ -29,7 +29,8 @@ pub struct BlockRadii(pub [f32; BLOCK_SIZE]);
 
 impl Block {
     /// Turns a block whose memory still holds 16 consecutive points into one array per axis.
-    pub(super) fn transpose_points(&mut self) {
+    #[inline]
+    pub fn transpose_points(&mut self) {
         let points: [Vec3; BLOCK_SIZE] = bytemuck::cast(*self);
         for (lane, p) in points.iter().enumerate() {
             self.x[lane] = p.x;
@@ -39,11 +40,19 @@ impl Block {
     }
 
     /// Centre of the particle in `lane`.
+    #[inline]
     pub fn center(&self, lane: usize) -> Vec3 {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])
     }
 
+    /// Puts the particle in `lane` to `center`.
+    #[inline]
+    pub fn set_center(&mut self, lane: usize, center: Vec3) {
+        (self.x[lane], self.y[lane], self.z[lane]) = (center.x, center.y, center.z);
+    }
+
     /// Box of the centres.
+    #[inline]
     pub fn bounds(&self) -> Aabb {
         let min = |v: &[f32; BLOCK_SIZE]| v.iter().fold(f32::INFINITY, |a, b| a.min(*b));
         let max = |v: &[f32; BLOCK_SIZE]| v.iter().fold(f32::NEG_INFINITY, |a, b| a.max(*b));
@@ -54,6 +63,7 @@ impl Block {
     }
 
     /// Box of the spheres.
+    #[inline]
     pub fn sphere_bounds(&self, radii: &BlockRadii) -> Aabb {
         let rounded = (0..BLOCK_SIZE).fold(Aabb::EMPTY, |b, lane| {
             let center = self.center(lane);
