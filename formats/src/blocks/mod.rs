@@ -3,8 +3,12 @@
 
 mod aabb;
 mod block;
+mod compact;
 mod node;
+mod stored;
 
 pub use aabb::Aabb;
 pub use block::{BLOCK_SIZE, Block, BlockRadii};
+pub use compact::{BlockFrame, CompactBlock, Q10Block, Q16Block};
 pub use node::{Node, WIDTH};
+pub use stored::{CompactBlocks, StoredBlocks, StoredLeaves, StoredRadii};
