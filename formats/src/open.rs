@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 use flate2::bufread::GzDecoder;
 
 use crate::detect::{Format, HEAD_LEN};
+use crate::native::{self, MappedFile};
 use crate::read::Step;
 use crate::{FrameError, ParseError, RawParticles};
 
@@ -17,11 +18,28 @@ use crate::{FrameError, ParseError, RawParticles};
 #[derive(Debug)]
 pub struct FrameFile {
     path: PathBuf,
-    bytes: Vec<u8>,
+    content: Content,
     format: Format,
     steps: Vec<Step>,
     stored_len: u64,
     notes: Vec<String>,
+}
+
+/// Where the bytes of a file are.
+#[derive(Debug)]
+enum Content {
+    Memory(Vec<u8>),
+    /// Native frames are read where they lie.
+    Mapped(MappedFile),
+}
+
+impl Content {
+    fn bytes(&self) -> &[u8] {
+        match self {
+            Self::Memory(bytes) => bytes,
+            Self::Mapped(file) => file.bytes(),
+        }
+    }
 }
 
 impl FrameFile {
@@ -32,6 +50,11 @@ impl FrameFile {
     /// [`FrameError::Unsupported`] for a known format that is not read (or no regular file), and
     /// [`FrameError::Malformed`] for everything that breaks its own format.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
+        if is_native(path)? {
+            let file = MappedFile::open(path)?;
+            let stored_len = file.bytes().len() as u64;
+            return Self::new(path, Content::Mapped(file), stored_len, Vec::new());
+        }
         Self::from_bytes(path, read_stable(path)?)
     }
 
@@ -48,11 +71,21 @@ impl FrameFile {
         } else {
             bytes
         };
-        let format = Format::detect(&bytes, path).map_err(in_file)?;
-        let steps = format.steps(&bytes).map_err(in_file)?;
+        Self::new(path, Content::Memory(bytes), stored_len, notes)
+    }
+
+    fn new(
+        path: &Path,
+        content: Content,
+        stored_len: u64,
+        notes: Vec<String>,
+    ) -> Result<Self, FrameError> {
+        let in_file = |e: ParseError| e.in_file(path);
+        let format = Format::detect(content.bytes(), path).map_err(in_file)?;
+        let steps = format.steps(content.bytes()).map_err(in_file)?;
         Ok(Self {
             path: path.to_owned(),
-            bytes,
+            content,
             format,
             steps,
             stored_len,
@@ -77,7 +110,15 @@ impl FrameFile {
 
     /// The uncompressed content.
     pub fn bytes(&self) -> &[u8] {
-        &self.bytes
+        self.content.bytes()
+    }
+
+    /// Bytes of it that are held in memory: none of a file that is mapped.
+    pub fn held_len(&self) -> u64 {
+        match &self.content {
+            Content::Memory(bytes) => bytes.len() as u64,
+            Content::Mapped(_) => 0,
+        }
     }
 
     /// Bytes on disk, compressed if it was.
@@ -101,11 +142,29 @@ impl FrameFile {
                 "step {index} was asked for, the file holds {}",
                 self.steps.len()
             );
-            ParseError::malformed(self.bytes.len(), what).in_file(&self.path)
+            ParseError::malformed(self.bytes().len(), what).in_file(&self.path)
         })?;
-        self.format
-            .read(&self.bytes, step)
-            .map_err(|e| e.in_file(&self.path))
+        let read = self
+            .format
+            .read(self.bytes(), step)
+            .map_err(|e| e.in_file(&self.path));
+        if let Content::Mapped(file) = &self.content {
+            // What was read while somebody cut the file short means nothing.
+            file.check()?;
+        }
+        read
+    }
+}
+
+/// Whether the file at `path` begins as a native frame.
+fn is_native(path: &Path) -> Result<bool, FrameError> {
+    regular_len(path)?;
+    let mut start = [0; native::MAGIC.len()];
+    let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));
+    match read {
+        Ok(()) => Ok(start == *native::MAGIC),
+        Err(e) if e.kind() == io::ErrorKind::UnexpectedEof => Ok(false),
+        Err(e) => Err(FrameError::io(path, e)),
     }
 }
 

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //!   0  magic `SPHERULE`
-//!   8  u32 version, 1             12  u32 length of this header, 64
+//!   8  u32 version, 2             12  u32 length of this header, 64
 //!  16  u64 length of the file
 //!  24  u64 offset of the index    32  u64 length of the index   40  u64 xxh3 of the index
 //!  48  u64 zero                   56  u64 xxh3 of bytes 0..56
@@ -13,43 +13,93 @@
 //! Opening looks at header and index only, whatever the particle count. Nothing here trusts a
 //! number: lengths follow from counts by checked arithmetic and must fit before the index.
 
+use std::fmt;
+use std::str::FromStr;
+
 use rkyv::rancor;
 use rkyv::util::AlignedVec;
 use xxhash_rust::xxh3::xxh3_64;
 
-use crate::{ParseError, ScalarType};
+use super::stored::{RadiusCode, StoredType};
+use crate::ParseError;
+use crate::blocks::{BLOCK_SIZE, Block, Node, Q10Block, Q16Block, WIDTH};
 
 /// The first bytes of every native frame.
 pub const MAGIC: &[u8; 8] = b"SPHERULE";
 /// Version that is written and read.
-pub const VERSION: u32 = 1;
+pub const VERSION: u32 = 2;
 /// Length of the header in bytes.
 pub const HEADER_LEN: usize = 64;
 /// Alignment of sections: a cache line, and an AVX-512 vector.
 pub const ALIGN: u64 = 64;
-/// Particles in a position block.
-pub const BLOCK: usize = 16;
 
-/// Positions of [`BLOCK`] particles, one array an axis, relative to the frame's origin. The last
-/// block of a frame is filled up with its last particle.
-#[derive(Debug, Clone, Copy, PartialEq, bytemuck::Pod, bytemuck::Zeroable)]
-#[repr(C, align(64))]
-pub struct PositionBlock {
-    /// x of each particle.
-    pub x: [f32; BLOCK],
-    /// y of each particle.
-    pub y: [f32; BLOCK],
-    /// z of each particle.
-    pub z: [f32; BLOCK],
+/// How positions are stored.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum Encoding {
+    /// As they are, 12 bytes a particle.
+    #[default]
+    F32,
+    /// 16 bits an axis in the box of their block, 6 bytes.
+    Q16,
+    /// 11, 11 and 10 bits in the box of their block, 4 bytes.
+    Q10,
 }
 
-/// Encoding code of plain f32 blocks, the only one so far.
-pub const ENCODING_F32: u32 = 0;
-/// Order code: as in the file that the particles came from.
-pub const ORDER_FILE: u32 = 0;
+impl Encoding {
+    /// All there are, the most exact first.
+    pub const ALL: [Self; 3] = [Self::F32, Self::Q16, Self::Q10];
+
+    /// Its name on the command line and in reports.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::F32 => "f32",
+            Self::Q16 => "q16",
+            Self::Q10 => "q10",
+        }
+    }
+
+    /// Bytes of a block of 16 particles.
+    pub const fn block_len(self) -> usize {
+        match self {
+            Self::F32 => size_of::<Block>(),
+            Self::Q16 => size_of::<Q16Block>(),
+            Self::Q10 => size_of::<Q10Block>(),
+        }
+    }
+
+    /// The number that stands for it in the index.
+    pub const fn code(self) -> u32 {
+        self as u32
+    }
+
+    /// What the number of an index stands for.
+    pub fn of_code(code: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|e| e.code() == code)
+    }
+}
+
+impl fmt::Display for Encoding {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.pad(self.name())
+    }
+}
+
+impl FromStr for Encoding {
+    type Err = String;
+
+    fn from_str(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|e| e.name() == name);
+        found.ok_or_else(|| {
+            let names = Self::ALL.map(Self::name).join(", ");
+            format!("no encoding {name:?}; there are {names}")
+        })
+    }
+}
 
 /// Where a section is, and the xxh3 of its bytes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
+#[derive(
+    Debug, Clone, Copy, PartialEq, Eq, Default, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize,
+)]
 pub struct Section {
     /// From the start of the file.
     pub offset: u64,
@@ -66,19 +116,39 @@ pub enum RadiusIndex {
     None,
     /// All particles alike.
     Common(f32),
-    /// One f32 a particle; may be the section of an attribute.
-    PerParticle(Section),
+    /// One a particle.
+    PerParticle(RadiiIndex),
 }
 
-/// One attribute: values interleaved as in memory.
+/// Radii that differ, in blocks of 16 like the positions: f32, or `low + code * step` where `step` is
+/// `(high - low)` divided by the largest code.
+#[derive(Debug, Clone, Copy, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
+pub struct RadiiIndex {
+    /// How they are stored, see [`RadiusCode`].
+    pub code: u32,
+    /// The smallest.
+    pub low: f32,
+    /// The largest.
+    pub high: f32,
+    /// Largest difference of a stored radius from the true one.
+    pub max_error: f32,
+    /// The numbers.
+    pub section: Section,
+}
+
+/// One attribute: values interleaved as in memory, in the order of the positions.
 #[derive(Debug, Clone, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct AttributeIndex {
     /// Name.
     pub name: String,
-    /// Code of the type, see [`scalar_code`].
-    pub scalar: u32,
+    /// Code of the type, see [`StoredType`].
+    pub stored: u32,
     /// Numbers a particle.
     pub components: u32,
+    /// For each component the values of code 0 and of code 255; empty but for 8-bit codes.
+    pub ranges: Vec<[f64; 2]>,
+    /// Largest difference of a stored value from the true one; 0 where they are stored as they were.
+    pub max_error: f64,
     /// The numbers.
     pub section: Section,
 }
@@ -90,9 +160,9 @@ pub struct FrameIndex {
     pub count: u64,
     /// Particles in a position block, 16.
     pub block: u32,
-    /// How positions are stored, [`ENCODING_F32`].
+    /// How positions are stored, the code of an [`Encoding`].
     pub encoding: u32,
-    /// How particles are ordered; [`ORDER_FILE`], others are for tracing in place.
+    /// How particles are ordered, [`ORDER_KD`].
     pub order: u32,
     /// World position of the zero of the stored positions.
     pub origin: [f64; 3],
@@ -100,10 +170,14 @@ pub struct FrameIndex {
     pub min: [f32; 3],
     /// Largest stored position; minus infinity if there are no particles.
     pub max: [f32; 3],
-    /// Largest distance of a stored position from the true one; 0 for f32.
+    /// No stored position is farther than this from the true one, scene units.
     pub max_error: f64,
     /// Position blocks.
     pub positions: Section,
+    /// Blocks that are kept as f32 because they would be too coarse; none with f32.
+    pub wide: Section,
+    /// A node of the tree for each eight blocks.
+    pub nodes: Section,
     /// Radii.
     pub radius: RadiusIndex,
     /// Attributes.
@@ -116,44 +190,49 @@ pub struct FrameIndex {
     pub dropped: u64,
 }
 
-/// The number that stands for a type in the index.
-pub const fn scalar_code(kind: ScalarType) -> u32 {
-    match kind {
-        ScalarType::I8 => 1,
-        ScalarType::U8 => 2,
-        ScalarType::I16 => 3,
-        ScalarType::U16 => 4,
-        ScalarType::I32 => 5,
-        ScalarType::U32 => 6,
-        ScalarType::I64 => 7,
-        ScalarType::U64 => 8,
-        ScalarType::F32 => 9,
-        ScalarType::F64 => 10,
+/// Order code: k-d cuts inside runs of a space-filling curve, at whole nodes.
+pub const ORDER_KD: u32 = 1;
+
+impl FrameIndex {
+    /// How positions are stored.
+    ///
+    /// # Panics
+    /// Never for an index that was parsed or written.
+    pub fn encoding(&self) -> Encoding {
+        Encoding::of_code(self.encoding).expect("checked when the index was read")
+    }
+
+    /// All sections and what they hold.
+    pub fn sections(&self) -> Vec<(String, &Section)> {
+        let mut sections = vec![
+            ("the positions".to_owned(), &self.positions),
+            ("the wide blocks".to_owned(), &self.wide),
+            ("the nodes".to_owned(), &self.nodes),
+        ];
+        if let RadiusIndex::PerParticle(radii) = &self.radius {
+            sections.push(("the radii".to_owned(), &radii.section));
+        }
+        for attribute in &self.attributes {
+            sections.push((format!("attribute {}", attribute.name), &attribute.section));
+        }
+        sections
     }
 }
 
-/// The type that a number of the index stands for.
-pub const fn scalar_of(code: u32) -> Option<ScalarType> {
-    Some(match code {
-        1 => ScalarType::I8,
-        2 => ScalarType::U8,
-        3 => ScalarType::I16,
-        4 => ScalarType::U16,
-        5 => ScalarType::I32,
-        6 => ScalarType::U32,
-        7 => ScalarType::I64,
-        8 => ScalarType::U64,
-        9 => ScalarType::F32,
-        10 => ScalarType::F64,
-        _ => return None,
-    })
+/// Bytes of the position blocks of `count` particles.
+pub fn positions_len(count: u64, encoding: Encoding) -> Option<u64> {
+    blocks_of(count).checked_mul(encoding.block_len() as u64)
 }
 
-/// Bytes of the position blocks of `count` particles.
-pub fn positions_len(count: u64) -> Option<u64> {
-    count
-        .div_ceil(BLOCK as u64)
-        .checked_mul(size_of::<PositionBlock>() as u64)
+/// Bytes of the nodes over `count` particles.
+pub fn nodes_len(count: u64) -> Option<u64> {
+    let nodes = blocks_of(count).div_ceil(WIDTH as u64);
+    nodes.checked_mul(size_of::<Node>() as u64)
+}
+
+/// Blocks that `count` particles fill.
+pub const fn blocks_of(count: u64) -> u64 {
+    count.div_ceil(BLOCK_SIZE as u64)
 }
 
 /// The header in front of `file_len` bytes that end in `index`.
@@ -252,51 +331,127 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
 
 /// Checks every section against the particle count and the bytes before the index at `end`.
 fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
-    let bad = |what: String| ParseError::malformed(end, what);
-    if index.encoding != ENCODING_F32 || index.block as usize != BLOCK {
-        return Err(ParseError::unsupported(format!(
-            "positions in encoding {} with blocks of {}, which this version does not read",
-            index.encoding, index.block
-        )));
+    let encoding = Encoding::of_code(index.encoding)
+        .filter(|_| index.block as usize == BLOCK_SIZE && index.order == ORDER_KD)
+        .ok_or_else(|| {
+            ParseError::unsupported(format!(
+                "positions in encoding {} and order {} with blocks of {}, which this version does not \
+                 read",
+                index.encoding, index.order, index.block
+            ))
+        })?;
+    let check = SectionCheck {
+        count: index.count,
+        end,
+    };
+    let positions = positions_len(index.count, encoding);
+    check.length("the positions", &index.positions, positions)?;
+    check.length("the nodes", &index.nodes, nodes_len(index.count))?;
+    let most = match encoding {
+        Encoding::F32 => 0,
+        Encoding::Q16 | Encoding::Q10 => blocks_of(index.count),
+    };
+    let wide = index.wide.len / size_of::<Block>() as u64;
+    let is_whole = index.wide.len.is_multiple_of(size_of::<Block>() as u64) && wide <= most;
+    check.length(
+        "the wide blocks",
+        &index.wide,
+        is_whole.then_some(index.wide.len),
+    )?;
+    let numbers = index.origin.iter().chain([&index.max_error]);
+    let is_box = |i: usize| index.min[i].is_finite() && index.min[i] <= index.max[i];
+    if numbers.into_iter().any(|n| !n.is_finite()) || index.count > 0 && !(0..3).all(is_box) {
+        return Err(ParseError::malformed(
+            end,
+            "the index is damaged: origin or bounds are no numbers",
+        ));
     }
-    let check = |what: &str, section: &Section, expected: Option<u64>| {
-        let fits = section
-            .offset
-            .checked_add(section.len)
-            .is_some_and(|e| e <= end as u64);
+    check_radius(index, check)?;
+    index
+        .attributes
+        .iter()
+        .try_for_each(|attribute| check_attribute(attribute, check))
+}
+
+fn check_radius(index: &FrameIndex, check: SectionCheck) -> Result<(), ParseError> {
+    let bad = |what: &str| Err(ParseError::malformed(check.end, what));
+    match &index.radius {
+        RadiusIndex::None => Ok(()),
+        RadiusIndex::Common(radius) if radius.is_finite() => Ok(()),
+        RadiusIndex::Common(_) => bad("the radius is no number"),
+        RadiusIndex::PerParticle(radii) => {
+            let Some(code) = RadiusCode::of_code(radii.code) else {
+                return Err(ParseError::unsupported(format!(
+                    "radii of type {}, which this version does not know",
+                    radii.code
+                )));
+            };
+            if !(radii.low.is_finite() && radii.high.is_finite() && radii.low <= radii.high) {
+                return bad("the range of the radii is no range");
+            }
+            let lanes = blocks_of(check.count).checked_mul(BLOCK_SIZE as u64);
+            let len = lanes.and_then(|lanes| lanes.checked_mul(code.size() as u64));
+            check.length("the radii", &radii.section, len)
+        }
+    }
+}
+
+fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<(), ParseError> {
+    let stored = StoredType::of_code(attribute.stored).ok_or_else(|| {
+        ParseError::unsupported(format!(
+            "attribute {} has type code {}, which this version does not know",
+            attribute.name, attribute.stored
+        ))
+    })?;
+    let bad = |what: &str| {
+        let what = format!("attribute {} {what}", attribute.name);
+        Err(ParseError::malformed(check.end, what))
+    };
+    let width = u64::from(attribute.components) * stored.size() as u64;
+    if width == 0 {
+        return bad("has no components");
+    }
+    let ranges = match stored {
+        StoredType::Ranged => attribute.components as usize,
+        _ => 0,
+    };
+    let is_finite = attribute.ranges.iter().flatten().all(|v| v.is_finite());
+    if attribute.ranges.len() != ranges || !is_finite {
+        return bad("has ranges that do not fit its type");
+    }
+    let what = format!("attribute {}", attribute.name);
+    check.length(&what, &attribute.section, check.count.checked_mul(width))
+}
+
+/// Checks where sections lie.
+#[derive(Clone, Copy)]
+struct SectionCheck {
+    /// Particles.
+    count: u64,
+    /// Where the index begins.
+    end: usize,
+}
+
+impl SectionCheck {
+    /// `section` must have the `expected` bytes (none fit if that could not be computed).
+    fn length(
+        &self,
+        what: &str,
+        section: &Section,
+        expected: Option<u64>,
+    ) -> Result<(), ParseError> {
+        let ends = section.offset.checked_add(section.len);
+        let fits = ends.is_some_and(|e| e <= self.end as u64);
         let placed = section.offset >= HEADER_LEN as u64 && section.offset.is_multiple_of(ALIGN);
         if expected == Some(section.len) && fits && placed {
             return Ok(());
         }
-        Err(bad(format!(
-            "{what} of {} particles cannot be the {} bytes at {}",
-            index.count, section.len, section.offset
-        )))
-    };
-    check(
-        "the positions",
-        &index.positions,
-        positions_len(index.count),
-    )?;
-    if let RadiusIndex::PerParticle(section) = &index.radius {
-        check("the radii", section, index.count.checked_mul(4))?;
+        Err(ParseError::malformed(
+            self.end,
+            format!(
+                "{what} of {} particles cannot be the {} bytes at {}",
+                self.count, section.len, section.offset
+            ),
+        ))
     }
-    for attribute in &index.attributes {
-        let kind = scalar_of(attribute.scalar).ok_or_else(|| {
-            ParseError::unsupported(format!(
-                "attribute {} has type code {}, which this version does not know",
-                attribute.name, attribute.scalar
-            ))
-        })?;
-        let width = u64::from(attribute.components) * kind.size() as u64;
-        if width == 0 {
-            return Err(bad(format!(
-                "attribute {} has no components",
-                attribute.name
-            )));
-        }
-        let what = format!("attribute {}", attribute.name);
-        check(&what, &attribute.section, index.count.checked_mul(width))?;
-    }
-    Ok(())
 }

@@ -3,8 +3,11 @@
 use std::fs;
 use std::path::PathBuf;
 
+use glam::{DVec3, Vec3};
+
+use super::layout::{RadiiIndex, RadiusIndex};
 use super::*;
-use crate::{FrameError, ParticleFrame, Radius};
+use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Positions, Radius, RawParticles};
 
 fn frame(count: u8, origin: DVec3) -> ParticleFrame {
     let positions: Vec<Vec3> = (0..count)
@@ -54,17 +57,38 @@ fn read_back(bytes: &[u8]) -> Result<RawParticles, ParseError> {
     read(bytes, &steps[0])
 }
 
+/// Positions and velocities of the particles by their ids, which count down from the largest.
+fn by_id(raw: &RawParticles, count: usize) -> Vec<(DVec3, [f64; 3])> {
+    let named = |name: &str| {
+        let found = raw.attributes.iter().find(|a| a.name == name);
+        &found.expect("kept").data
+    };
+    let AttributeData::U64(ids) = named("id") else {
+        panic!("ids changed their type")
+    };
+    let mut all = vec![None; count];
+    for (i, id) in ids.iter().enumerate() {
+        let velocity = [0, 1, 2].map(|c| named("velocity").get_f64(3 * i + c));
+        let place = usize::try_from(u64::MAX - id).expect("an id of ours");
+        assert!(
+            all[place]
+                .replace((raw.positions.get(i), velocity))
+                .is_none()
+        );
+    }
+    all.into_iter().map(|p| p.expect("every id once")).collect()
+}
+
 #[test]
-fn frames_come_back_as_they_were() {
+fn frames_come_back_in_another_order() {
     for count in [0, 1, 15, 16, 17, 100] {
         let frame = frame(count, DVec3::ZERO);
         let raw = read_back(&bytes(&frame)).expect("whole");
-        assert_eq!(
-            raw.positions,
-            Positions::F32(frame.positions.clone()),
-            "{count}"
-        );
-        assert_eq!(raw.attributes, frame.attributes);
+        assert!(matches!(raw.positions, Positions::F32(_)));
+        for (i, (position, velocity)) in by_id(&raw, frame.len()).into_iter().enumerate() {
+            let expected = frame.positions[i].as_dvec3();
+            assert_eq!((position, velocity), (expected, expected.to_array()));
+        }
         assert_eq!((raw.time, raw.step), (Some(0.25), Some(7)));
     }
 }
@@ -74,24 +98,29 @@ fn the_origin_is_added_again() {
     let origin = DVec3::new(1e6, 0.0, -3.0);
     let frame = frame(3, origin);
     let raw = read_back(&bytes(&frame)).expect("whole");
-    assert_eq!(raw.positions.get(2), frame.positions[2].as_dvec3() + origin);
-    let again = ParticleFrame::from_raw(raw, origin);
-    assert_eq!(again.positions[0], frame.positions[0]);
+    let positions = by_id(&raw, 3);
+    assert_eq!(positions[2].0, frame.positions[2].as_dvec3() + origin);
 }
 
 #[test]
 fn radii_come_back() {
-    for radius in [
-        Radius::Common(0.5),
-        Radius::PerParticle(vec![0.5, 0.25, 0.125]),
-    ] {
-        let mut frame = frame(3, DVec3::ZERO);
-        frame.radius = Some(radius.clone());
-        let raw = read_back(&bytes(&frame)).expect("whole");
-        assert_eq!(
-            ParticleFrame::from_raw(raw, DVec3::ZERO).radius,
-            Some(radius)
-        );
+    let mut common = frame(3, DVec3::ZERO);
+    common.radius = Some(Radius::Common(0.5));
+    let raw = read_back(&bytes(&common)).expect("whole");
+    let again = ParticleFrame::from_raw(raw, DVec3::ZERO);
+    assert_eq!(again.radius, Some(Radius::Common(0.5)));
+
+    let mut own = frame(40, DVec3::ZERO);
+    let radii: Vec<f32> = (1..=40u8).map(f32::from).collect();
+    own.radius = Some(Radius::PerParticle(radii.clone()));
+    let raw = read_back(&bytes(&own)).expect("whole");
+    let again = ParticleFrame::from_raw(raw, DVec3::ZERO);
+    let Some(Radius::PerParticle(found)) = &again.radius else {
+        panic!("radii of their own")
+    };
+    // x is the number of the particle.
+    for (position, radius) in again.positions.iter().zip(found) {
+        assert_eq!(*radius, position.x + 1.0);
     }
 }
 
@@ -104,26 +133,31 @@ fn radii_that_an_attribute_has_are_stored_once() {
         components: 1,
         data: AttributeData::F32(radii.clone()),
     });
-    let without = bytes(&frame).len();
     frame.radius = Some(Radius::PerParticle(radii));
-    assert_eq!(bytes(&frame).len(), without);
+    let with = read_back(&bytes(&frame)).expect("whole");
+    frame.attributes.pop();
+    assert_eq!(read_back(&bytes(&frame)).expect("whole"), with);
+    let radius = with.attributes.iter().filter(|a| a.name == "radius");
+    assert_eq!(radius.count(), 1);
 }
 
 #[test]
-fn mapped_and_read_files_give_blocks_in_place() {
+fn mapped_and_read_files_give_leaves_in_place() {
     let frame = frame(17, DVec3::ZERO);
     let written = written(&frame);
     for access in [Access::Map, Access::Read] {
         let file = NativeFile::open(&written.path, access).expect("whole");
         let view = file.frame().expect("unchanged");
         view.verify().expect("undamaged");
-        let blocks = view.blocks().expect("little-endian and aligned");
-        assert_eq!(blocks.len(), 2);
-        assert_eq!((blocks[1].x, blocks[0].z[1]), ([16.0; 16], 0.5));
+        let leaves = view.leaves().expect("little-endian and aligned");
+        assert_eq!((leaves.block_count(), leaves.nodes.len()), (2, 1));
         assert_eq!((view.index().count, view.index().dropped), (17, 3));
         assert_eq!((view.index().min[0], view.index().max[0]), (0.0, 16.0));
-        let id = view.attribute("id").expect("named").expect("whole");
-        assert_eq!(id.data, frame.attributes[1].data);
+        let id = view.attribute("ID").expect("named alike");
+        let x = leaves.center(5).x;
+        assert_eq!(id.low_bits(5), Some(u32::MAX - x as u32));
+        let velocity = view.attribute("velocity").expect("named");
+        assert_eq!(velocity.get(5, 0), f64::from(x));
         assert!(view.attribute("none").is_none());
     }
 }
@@ -199,11 +233,24 @@ fn an_index_that_lies_is_an_error() {
     malformed(forged(|i| i.attributes[0].components = u32::MAX));
     malformed(forged(|i| i.attributes[0].components = 0));
     malformed(forged(|i| i.attributes[1].section.len -= 8));
-    malformed(forged(|i| i.radius = RadiusIndex::PerParticle(i.positions)));
+    malformed(forged(|i| i.nodes.len += 64));
+    malformed(forged(|i| i.wide.len = 192));
+    malformed(forged(|i| i.min[1] = f32::NAN));
+    malformed(forged(|i| i.origin[2] = f64::INFINITY));
+    malformed(forged(|i| i.attributes[0].ranges = vec![[0.0, 1.0]]));
+    malformed(forged(|i| {
+        i.radius = RadiusIndex::PerParticle(RadiiIndex {
+            code: RadiusCode::F32.code(),
+            low: 1.0,
+            high: 2.0,
+            max_error: 0.0,
+            section: i.positions,
+        });
+    }));
     let unsupported = |e: ParseError| assert!(matches!(e, ParseError::Unsupported { .. }), "{e}");
-    unsupported(forged(|i| i.encoding = 2));
+    unsupported(forged(|i| i.encoding = 3));
     unsupported(forged(|i| i.block = 32));
-    unsupported(forged(|i| i.attributes[0].scalar = 99));
+    unsupported(forged(|i| i.attributes[0].stored = 99));
 }
 
 #[test]
@@ -212,5 +259,211 @@ fn frames_that_do_not_fit_together_are_not_written() {
     let mut frame = frame(3, DVec3::ZERO);
     frame.attributes[1].data = AttributeData::U64(vec![1]);
     assert!(write(&dir.path().join("a.spf"), &frame, None).is_err());
+    let mut frame = self::frame(3, DVec3::ZERO);
+    frame.positions[1].y = f32::NAN;
+    assert!(write(&dir.path().join("a.spf"), &frame, None).is_err());
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 0);
+}
+
+/// Particles in a few clusters, some of them flat, and far outliers.
+fn clustered(count: u32) -> Vec<Vec3> {
+    let unit = |i: u32, k: u32| {
+        let hash = (i * 3 + k).wrapping_mul(0x9e37_79b9).rotate_left(13);
+        hash.wrapping_mul(0x85eb_ca6b) as f32 / u32::MAX as f32
+    };
+    let place = |i: u32| {
+        let inside = Vec3::new(unit(i, 0), unit(i, 1), unit(i, 2));
+        match i % 100 {
+            0 => 1e4 * (inside - 0.5),
+            1..20 => inside * Vec3::new(1.0, 1.0, 0.0) + 50.0,
+            20..50 => Vec3::new(-300.0, 2.0, 7.0) + 0.01 * inside,
+            _ => inside,
+        }
+    };
+    (0..count).map(place).collect()
+}
+
+/// Stores `positions` with ids and reads them back; they must be as near as the file says.
+fn stored_within(
+    positions: Vec<Vec3>,
+    radius: Option<Radius>,
+    settings: StoreSettings,
+) -> FrameIndex {
+    let ids = (0..positions.len() as u64).collect();
+    let frame = ParticleFrame {
+        attributes: vec![Attribute {
+            name: "id".into(),
+            components: 1,
+            data: AttributeData::U64(ids),
+        }],
+        positions,
+        origin: DVec3::ZERO,
+        radius,
+        time: None,
+        dropped: 0,
+        file_index: None,
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let path = dir.path().join("a.spf");
+    let index = store(&path, &frame, None, &settings).expect("writable");
+    let file = NativeFile::open(&path, Access::Map).expect("whole");
+    assert_eq!(file.index(), &index);
+    let view = file.frame().expect("unchanged");
+    view.verify().expect("undamaged");
+    let leaves = view.leaves().expect("in place");
+    let raw = view.to_raw().expect("whole");
+    let AttributeData::U64(ids) = &raw.attributes[0].data else {
+        panic!("ids changed their type")
+    };
+    let mut seen = vec![false; frame.len()];
+    let mut largest = 0.0_f64;
+    for (slot, id) in ids.iter().enumerate() {
+        let id = usize::try_from(*id).expect("an id of ours");
+        assert!(!std::mem::replace(&mut seen[id], true));
+        let found = raw.positions.get(slot);
+        assert_eq!(found, leaves.center(slot).as_dvec3());
+        largest = largest.max(found.distance(frame.positions[id].as_dvec3()));
+        let (node, block) = (slot / 128, slot / 16);
+        let center = leaves.center(slot);
+        let own = leaves.radii.load(block).map_or(0.0, |r| r.0[slot % 16]);
+        let sphere = crate::blocks::Aabb {
+            min: center,
+            max: center,
+        }
+        .padded(own);
+        let sphere = if own > 0.0 {
+            sphere.rounded_outwards()
+        } else {
+            sphere
+        };
+        assert!(leaves.nodes[node].child_holds(block % 8, &sphere), "{slot}");
+        if let Some(Radius::PerParticle(radii)) = &frame.radius {
+            let RadiusIndex::PerParticle(coded) = index.radius else {
+                panic!("radii of their own")
+            };
+            assert!((own - radii[id]).abs() <= coded.max_error);
+        }
+    }
+    assert!(seen.into_iter().all(|s| s));
+    assert!(largest <= index.max_error, "{largest} {}", index.max_error);
+    index
+}
+
+#[test]
+fn no_particle_is_farther_than_the_file_says() {
+    for encoding in Encoding::ALL {
+        for count in [0, 1, 2, 15, 16, 17, 127, 128, 129, 1025, 20_000] {
+            for bound in [Bound::None, Bound::Length(1e-4), Bound::OfRadius(0.02)] {
+                let settings = StoreSettings {
+                    encoding: Some(encoding),
+                    bound,
+                };
+                let radius = Some(Radius::Common(0.01));
+                let index = stored_within(clustered(count), radius, settings);
+                assert!(index.max_error <= bound.length(Some(0.01)));
+                assert!(encoding != Encoding::F32 || index.max_error == 0.0);
+            }
+        }
+    }
+}
+
+#[test]
+fn radii_of_their_own_are_held_and_bounded() {
+    let radii = |count: u32| (0..count).map(|i| 0.001 * 100_f32.powf((i % 97) as f32 / 97.0));
+    for encoding in Encoding::ALL {
+        for bound in [Bound::None, Bound::OfRadius(0.1), Bound::OfRadius(0.001)] {
+            let settings = StoreSettings {
+                encoding: Some(encoding),
+                bound,
+            };
+            let own = Some(Radius::PerParticle(radii(5000).collect()));
+            let index = stored_within(clustered(5000), own, settings);
+            let RadiusIndex::PerParticle(coded) = index.radius else {
+                panic!("radii of their own")
+            };
+            assert!(f64::from(coded.max_error) <= bound.length(Some(0.001)));
+            assert!(encoding != Encoding::F32 || coded.max_error == 0.0);
+        }
+    }
+}
+
+#[test]
+fn flat_and_coincident_particles_are_stored() {
+    let sets = [
+        vec![Vec3::splat(0.3); 300],
+        (0..300u16)
+            .map(|i| Vec3::new(f32::from(i), 0.1, 0.7))
+            .collect(),
+        (0..300u16)
+            .map(|i| Vec3::splat(1e6 + f32::from(i) * 1e-3))
+            .collect(),
+    ];
+    for positions in sets {
+        for encoding in Encoding::ALL {
+            let settings = StoreSettings {
+                encoding: Some(encoding),
+                bound: Bound::None,
+            };
+            stored_within(positions.clone(), None, settings);
+        }
+    }
+}
+
+#[test]
+fn the_smallest_encoding_within_the_bound_is_taken() {
+    let even = crate::generate::fill_box(&crate::generate::BoxSettings::thesis(50_000, 1));
+    let taken = |bound: Bound| {
+        let settings = StoreSettings {
+            encoding: None,
+            bound,
+        };
+        let index = stored_within(even.clone(), Some(Radius::Common(0.05)), settings);
+        (
+            index.encoding(),
+            index.max_error <= bound.length(Some(0.05)),
+        )
+    };
+    assert_eq!(taken(Bound::OfRadius(0.02)), (Encoding::Q10, true));
+    assert_eq!(taken(Bound::OfRadius(2e-4)), (Encoding::Q16, true));
+    assert_eq!(taken(Bound::Length(0.0)), (Encoding::F32, true));
+}
+
+#[test]
+fn a_file_does_not_depend_on_threads() {
+    let bytes = |threads: usize| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let path = dir.path().join("a.spf");
+        let mut frame = frame(0, DVec3::ZERO);
+        frame.attributes.clear();
+        frame.positions = clustered(100_000);
+        let settings = StoreSettings {
+            encoding: Some(Encoding::Q10),
+            bound: Bound::Length(1e-3),
+        };
+        let stored = || store(&path, &frame, None, &settings).expect("writable");
+        pool.expect("threads").install(stored);
+        fs::read(path).expect("readable")
+    };
+    assert!(bytes(1) == bytes(3));
+}
+
+/// A file cut while it is mapped: what is gone reads as zeros, and is found out.
+#[cfg(all(target_os = "linux", not(miri)))]
+#[test]
+fn pages_that_are_gone_are_zeros_and_told() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let path = dir.path().join("a.spf");
+    let mut frame = frame(0, DVec3::ZERO);
+    frame.attributes.clear();
+    frame.positions = clustered(50_000);
+    write(&path, &frame, None).expect("writable");
+    let file = NativeFile::open(&path, Access::Map).expect("whole");
+    let view = file.frame().expect("unchanged");
+    let handle = fs::OpenOptions::new().write(true).open(&path);
+    handle.and_then(|h| h.set_len(8192)).expect("writable");
+    let leaves = view.leaves().expect("lengths fit");
+    assert_eq!(leaves.center(40_000), Vec3::ZERO);
+    let error = file.check().expect_err("cut").to_string();
+    assert!(error.contains("8192 now"), "{error}");
 }

@@ -5,39 +5,90 @@ use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU32, Ordering};
 
+/// A file under a temporary name beside its own. Dropped before it is published, it is removed.
+#[derive(Debug)]
+pub(crate) struct Unpublished {
+    path: PathBuf,
+    part: PathBuf,
+    file: File,
+    is_published: bool,
+}
+
+impl Unpublished {
+    /// Begins the file that will be `path`.
+    ///
+    /// # Errors
+    /// Whatever creating says.
+    pub(crate) fn create(path: &Path) -> io::Result<Self> {
+        let part = temporary_name(path)?;
+        let file = OpenOptions::new()
+            .write(true)
+            .create_new(true)
+            .open(&part)?;
+        Ok(Self {
+            path: path.to_owned(),
+            part,
+            file,
+            is_published: false,
+        })
+    }
+
+    /// Writes `bytes` from byte `at` of the file on.
+    ///
+    /// # Errors
+    /// Whatever writing says.
+    #[cfg(unix)]
+    pub(crate) fn write_all_at(&self, bytes: &[u8], at: u64) -> io::Result<()> {
+        std::os::unix::fs::FileExt::write_all_at(&self.file, bytes, at)
+    }
+
+    /// Writes `bytes` from byte `at` of the file on.
+    ///
+    /// # Errors
+    /// Whatever writing says.
+    #[cfg(not(unix))]
+    pub(crate) fn write_all_at(&self, bytes: &[u8], at: u64) -> io::Result<()> {
+        use std::io::{Seek, SeekFrom};
+        let mut file = &self.file;
+        file.seek(SeekFrom::Start(at))?;
+        file.write_all(bytes)
+    }
+
+    /// Syncs the file and gives it its name.
+    ///
+    /// # Errors
+    /// Whatever syncing or renaming says; the temporary file is removed then.
+    pub(crate) fn publish(mut self) -> io::Result<()> {
+        self.file.sync_all()?;
+        fs::rename(&self.part, &self.path)?;
+        self.is_published = true;
+        sync_directory(&self.path)
+    }
+}
+
+impl Drop for Unpublished {
+    fn drop(&mut self) {
+        if !self.is_published {
+            // Why it was not published is what is told.
+            let _ = fs::remove_file(&self.part);
+        }
+    }
+}
+
 /// Fills a file under a temporary name beside `path`, syncs it and renames it to `path`.
 ///
 /// # Errors
 /// Whatever creating, writing, syncing or renaming says; the temporary file is removed then.
 pub(crate) fn publish(
     path: &Path,
-    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
+    fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
 ) -> io::Result<()> {
-    let part = temporary_name(path)?;
-    let file = OpenOptions::new()
-        .write(true)
-        .create_new(true)
-        .open(&part)?;
-    let written = write_and_rename(file, &part, path, fill);
-    if written.is_err() {
-        // The first error is the one to tell.
-        let _ = fs::remove_file(&part);
-    }
-    written
-}
-
-fn write_and_rename(
-    file: File,
-    part: &Path,
-    path: &Path,
-    fill: impl FnOnce(&mut BufWriter<File>) -> io::Result<()>,
-) -> io::Result<()> {
-    let mut writer = BufWriter::with_capacity(1 << 18, file);
+    let file = Unpublished::create(path)?;
+    let mut writer = BufWriter::with_capacity(1 << 18, &file.file);
     fill(&mut writer)?;
     writer.flush()?;
-    writer.get_ref().sync_all()?;
-    fs::rename(part, path)?;
-    sync_directory(path)
+    drop(writer);
+    file.publish()
 }
 
 /// Hidden and ending in `.part`, so that no listing takes it for a frame; distinct for each

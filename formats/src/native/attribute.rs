@@ -1,0 +1,123 @@
+//! An attribute of a native frame in place: values are decoded as they are asked for.
+
+use super::layout::AttributeIndex;
+use super::stored::StoredType;
+use crate::{Attribute, AttributeData, Endian, ParseError, ScalarType};
+
+/// The values of an attribute where they lie.
+#[derive(Debug, Clone, Copy)]
+pub struct AttributeView<'a> {
+    index: &'a AttributeIndex,
+    stored: StoredType,
+    bytes: &'a [u8],
+}
+
+impl<'a> AttributeView<'a> {
+    pub(super) const fn new(
+        index: &'a AttributeIndex,
+        stored: StoredType,
+        bytes: &'a [u8],
+    ) -> Self {
+        Self {
+            index,
+            stored,
+            bytes,
+        }
+    }
+
+    /// Name.
+    pub fn name(&self) -> &'a str {
+        &self.index.name
+    }
+
+    /// How values are stored.
+    pub const fn stored(&self) -> StoredType {
+        self.stored
+    }
+
+    /// Numbers a particle.
+    pub const fn components(&self) -> usize {
+        self.index.components as usize
+    }
+
+    /// Component `component` of particle `index`; NaN if there is none.
+    #[inline]
+    pub fn get(&self, index: usize, component: usize) -> f64 {
+        let range = self.index.ranges.get(component).copied();
+        self.bytes_of(index, component).map_or(f64::NAN, |bytes| {
+            self.stored.value(bytes, range.unwrap_or_default())
+        })
+    }
+
+    /// The value of particle `index`, of vectors the length, as [`Attribute::magnitude`] has it.
+    #[inline]
+    pub fn magnitude(&self, index: usize) -> f64 {
+        if self.components() == 1 {
+            return self.get(index, 0);
+        }
+        let squares = (0..self.components()).map(|component| {
+            let value = self.get(index, component);
+            value * value
+        });
+        squares.sum::<f64>().sqrt()
+    }
+
+    /// The low 32 bits of a whole number, as ids are shown; `None` if there is no such particle or its
+    /// value is no whole number.
+    pub fn low_bits(&self, index: usize) -> Option<u32> {
+        let bytes = self.bytes_of(index, 0)?;
+        let StoredType::Plain(kind) = self.stored else {
+            return None;
+        };
+        let is_negative = bytes.last().is_some_and(|top| top & 0x80 != 0);
+        let fill = match kind {
+            ScalarType::F32 | ScalarType::F64 => return None,
+            ScalarType::I8 | ScalarType::I16 | ScalarType::I32 | ScalarType::I64 if is_negative => {
+                0xff
+            }
+            _ => 0,
+        };
+        let byte = |i: usize| bytes.get(i).copied().unwrap_or(fill);
+        Some(u32::from_le_bytes(std::array::from_fn(byte)))
+    }
+
+    /// A copy of all values: in the type they are stored in, codes of fewer bits as f32.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] if there are too few bytes.
+    pub fn to_attribute(&self) -> Result<Attribute, ParseError> {
+        let data = match self.stored {
+            StoredType::Plain(kind) => kind.decode(Endian::Little, self.bytes)?,
+            StoredType::Half | StoredType::Ranged => AttributeData::F32(self.decoded()),
+        };
+        Ok(Attribute {
+            name: self.index.name.clone(),
+            components: self.components(),
+            data,
+        })
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "values of 16 bits and fewer are shown in f32"
+    )]
+    fn decoded(&self) -> Vec<f32> {
+        let components = self.components();
+        let values = self.bytes.chunks_exact(self.stored.size()).enumerate();
+        let value = |(place, bytes): (usize, &[u8])| {
+            let range = self.index.ranges.get(place % components).copied();
+            self.stored.value(bytes, range.unwrap_or_default()) as f32
+        };
+        values.map(value).collect()
+    }
+
+    #[inline]
+    fn bytes_of(&self, index: usize, component: usize) -> Option<&'a [u8]> {
+        let size = self.stored.size();
+        let place = index
+            .checked_mul(self.components())?
+            .checked_add(component)?;
+        let start = place.checked_mul(size)?;
+        self.bytes.get(start..start.checked_add(size)?)
+    }
+}

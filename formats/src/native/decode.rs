@@ -1,0 +1,143 @@
+//! Native frames as plain particles: for those who do not trace in place.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::layout::RadiusIndex;
+use super::view::NativeFrame;
+use crate::blocks::{BLOCK_SIZE, StoredLeaves};
+use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
+
+impl NativeFrame<'_> {
+    /// Everything, in the order of the file, in world coordinates: f32 where the origin is zero, else f64.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] if a section is not what the index says, [`ParseError::Unsupported`] as
+    /// [`Self::leaves`].
+    pub fn to_raw(&self) -> Result<RawParticles, ParseError> {
+        let leaves = self.leaves()?;
+        let mut attributes = Vec::with_capacity(self.index().attributes.len());
+        for attribute in self.attributes() {
+            attributes.push(attribute.to_attribute()?);
+        }
+        attributes.extend(self.radius_attribute(&attributes, &leaves)?);
+        Ok(RawParticles {
+            positions: self.positions(&leaves)?,
+            attributes,
+            time: self.index().time,
+            step: self.index().step,
+        })
+    }
+
+    /// Every so many particles, at most `most` and whole blocks of them, in world coordinates, with their
+    /// attributes and radii: enough to tell percentiles by without reading all of a large frame.
+    ///
+    /// # Errors
+    /// As [`Self::to_raw`].
+    pub fn sample(&self, most: usize) -> Result<RawParticles, ParseError> {
+        let leaves = self.leaves()?;
+        let count = self.len()?;
+        let blocks = count.div_ceil(BLOCK_SIZE);
+        let stride = blocks.div_ceil((most / BLOCK_SIZE).max(1)).max(1);
+        let chosen: Vec<usize> = (0..blocks)
+            .step_by(stride)
+            .flat_map(|block| block * BLOCK_SIZE..count.min((block + 1) * BLOCK_SIZE))
+            .collect();
+        let origin = DVec3::from_array(self.index().origin);
+        let position = |i: &usize| leaves.center(*i).as_dvec3() + origin;
+        let mut attributes: Vec<Attribute> = Vec::new();
+        for view in self.attributes() {
+            let components = view.components();
+            let of = |i: usize| (0..components).map(move |c| (i, c));
+            let values = chosen.iter().copied().flat_map(of);
+            attributes.push(Attribute {
+                name: view.name().to_owned(),
+                components: view.components(),
+                data: AttributeData::F64(values.map(|(i, c)| view.get(i, c)).collect()),
+            });
+        }
+        if wants_radius(&attributes)
+            && let Some(radius) = self.radius_of(&leaves)
+        {
+            attributes.push(radii(chosen.iter().map(|i| radius(*i)).collect()));
+        }
+        Ok(RawParticles {
+            positions: Positions::F64(chosen.iter().map(position).collect()),
+            attributes,
+            time: self.index().time,
+            step: self.index().step,
+        })
+    }
+
+    /// Particles, as many as fit the memory.
+    fn len(&self) -> Result<usize, ParseError> {
+        let count = usize::try_from(self.index().count);
+        count.map_err(|_| ParseError::unsupported("more particles than this machine can count"))
+    }
+
+    fn positions(&self, leaves: &StoredLeaves) -> Result<Positions, ParseError> {
+        let count = self.len()?;
+        let origin = DVec3::from_array(self.index().origin);
+        let lanes = |block: usize| {
+            let block = leaves.block(block);
+            (0..BLOCK_SIZE).map(move |lane| block.center(lane))
+        };
+        Ok(if origin == DVec3::ZERO {
+            let mut positions = vec![Vec3::ZERO; count];
+            let blocks = positions.par_chunks_mut(BLOCK_SIZE).enumerate();
+            blocks.with_min_len(1024).for_each(|(block, to)| {
+                to.iter_mut().zip(lanes(block)).for_each(|(to, p)| *to = p);
+            });
+            Positions::F32(positions)
+        } else {
+            let mut positions = vec![DVec3::ZERO; count];
+            let blocks = positions.par_chunks_mut(BLOCK_SIZE).enumerate();
+            blocks.with_min_len(1024).for_each(|(block, to)| {
+                let world = lanes(block).map(|p| p.as_dvec3() + origin);
+                to.iter_mut().zip(world).for_each(|(to, p)| *to = p);
+            });
+            Positions::F64(positions)
+        })
+    }
+
+    /// The radius of a particle, if the frame tells.
+    fn radius_of<'s>(&self, leaves: &'s StoredLeaves) -> Option<impl Fn(usize) -> f32 + 's> {
+        let common = match &self.index().radius {
+            RadiusIndex::None => return None,
+            RadiusIndex::Common(radius) => *radius,
+            RadiusIndex::PerParticle(_) => f32::NAN,
+        };
+        Some(move |i: usize| {
+            let own = leaves.radii.load(i / BLOCK_SIZE);
+            own.map_or(common, |block| block.0[i % BLOCK_SIZE])
+        })
+    }
+
+    /// Radii that no attribute of the name carries, as the attribute that readers look for.
+    fn radius_attribute(
+        &self,
+        attributes: &[Attribute],
+        leaves: &StoredLeaves,
+    ) -> Result<Option<Attribute>, ParseError> {
+        if !wants_radius(attributes) {
+            return Ok(None);
+        }
+        let count = self.len()?;
+        let all = |radius: &dyn Fn(usize) -> f32| (0..count).map(radius).collect();
+        Ok(self.radius_of(leaves).map(|radius| radii(all(&radius))))
+    }
+}
+
+fn wants_radius(attributes: &[Attribute]) -> bool {
+    !attributes
+        .iter()
+        .any(|a| a.name.eq_ignore_ascii_case("radius"))
+}
+
+fn radii(values: Vec<f32>) -> Attribute {
+    Attribute {
+        name: "radius".to_owned(),
+        components: 1,
+        data: AttributeData::F32(values),
+    }
+}

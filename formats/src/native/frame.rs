@@ -1,0 +1,207 @@
+//! A frame in memory becomes a native file in one go.
+
+use std::io;
+use std::path::Path;
+
+use bytemuck::Pod;
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run};
+use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks};
+use crate::attribute::with_values;
+use crate::blocks::Block;
+use crate::order::kd;
+use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius};
+
+/// How a frame is stored.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StoreSettings {
+    /// How positions are stored; `None` takes what needs the fewest bytes within the bound.
+    pub encoding: Option<Encoding>,
+    /// How far stored positions may be from the true ones, and radii likewise.
+    pub bound: Bound,
+}
+
+impl StoreSettings {
+    /// Everything as it is.
+    pub const EXACT: Self = Self {
+        encoding: Some(Encoding::F32),
+        bound: Bound::None,
+    };
+}
+
+/// Writes `frame` to `path` in tree order, everything as it is.
+///
+/// # Errors
+/// As [`store`].
+pub fn write(path: &Path, frame: &ParticleFrame, step: Option<i64>) -> Result<(), FrameError> {
+    store(path, frame, step, &StoreSettings::EXACT).map(|_| ())
+}
+
+/// Writes `frame` to `path` in tree order.
+///
+/// # Errors
+/// [`FrameError::Io`] if attributes or radii do not fit the particles, one of them is not finite, or the
+/// file cannot be written; nothing is left behind then.
+pub fn store(
+    path: &Path,
+    frame: &ParticleFrame,
+    step: Option<i64>,
+    settings: &StoreSettings,
+) -> Result<FrameIndex, FrameError> {
+    check(frame)
+        .and_then(|()| store_checked(path, frame, step, settings))
+        .map_err(|e| FrameError::io(path, e))
+}
+
+fn store_checked(
+    path: &Path,
+    frame: &ParticleFrame,
+    step: Option<i64>,
+    settings: &StoreSettings,
+) -> io::Result<FrameIndex> {
+    let is_kept = |a: &&Attribute| frame.radius.is_none() || !is_radius(a);
+    let kept: Vec<&Attribute> = frame.attributes.iter().filter(is_kept).collect();
+    let own_radii = match &frame.radius {
+        Some(Radius::PerParticle(radii)) => Some(&radii[..]),
+        _ => None,
+    };
+    let mut positions = vec![Vec3::ZERO; frame.len()];
+    let is_followed = own_radii.is_some() || !kept.is_empty();
+    let mut indices = vec![0; if is_followed { frame.len() } else { 0 }];
+    kd::order_into(&frame.positions, &mut positions, &mut indices, |_| ());
+    arrange(&mut positions, &mut indices);
+
+    let radii: Option<Vec<f32>> = own_radii.map(|radii| gather(radii, 1, &indices));
+    let common = match &frame.radius {
+        Some(Radius::Common(radius)) => Some(*radius),
+        _ => radii.as_deref().map(smallest),
+    };
+    let encoding = settings
+        .encoding
+        .unwrap_or_else(|| smallest_encoding(&positions, settings.bound, common));
+    let spec = FrameSpec {
+        count: frame.len() as u64,
+        encoding,
+        bound: settings.bound,
+        origin: frame.origin,
+        rounding: 0.0,
+        radius: match (&frame.radius, radii.as_deref()) {
+            (Some(Radius::Common(radius)), _) => RadiusSpec::Common(*radius),
+            (_, Some(radii)) => RadiusSpec::PerParticle(radius_range(radii, encoding, settings)),
+            _ => RadiusSpec::None,
+        },
+        attributes: kept.iter().map(|a| spec_of(a)).collect::<io::Result<_>>()?,
+        time: frame.time,
+        step,
+        dropped: frame.dropped,
+    };
+    let values: Vec<Vec<u8>> = kept.iter().map(|a| in_order(a, &indices)).collect();
+    let mut writer = FrameWriter::create(path, spec)?;
+    writer.push(&Run {
+        positions: &positions,
+        radii: radii.as_deref(),
+        attributes: &values.iter().map(Vec::as_slice).collect::<Vec<_>>(),
+    })?;
+    writer.finish()
+}
+
+/// The encoding with the fewest bytes, blocks over the bound counted as they will be kept.
+pub fn smallest_encoding(positions: &[Vec3], bound: Bound, radius: Option<f32>) -> Encoding {
+    let blocks = positions.len().div_ceil(crate::blocks::BLOCK_SIZE);
+    let bytes = |encoding: &Encoding| {
+        let wide = wide_blocks(positions, *encoding, bound, radius);
+        blocks * encoding.block_len() + wide * size_of::<Block>()
+    };
+    let best = Encoding::ALL.into_iter().min_by_key(bytes);
+    best.unwrap_or_default()
+}
+
+/// Radii are coded where positions are.
+fn radius_range(radii: &[f32], encoding: Encoding, settings: &StoreSettings) -> RadiusRange {
+    let low = smallest(radii);
+    let high = radii.iter().copied().fold(0.0, f32::max);
+    let bound = match (encoding, settings.bound) {
+        (Encoding::F32, _) => 0.0,
+        (_, Bound::None) => f64::INFINITY,
+        (_, bound) => bound.length(Some(low)),
+    };
+    RadiusRange::within(low, high.max(low), bound)
+}
+
+fn smallest(radii: &[f32]) -> f32 {
+    let low = radii.iter().copied().fold(f32::INFINITY, f32::min);
+    if low.is_finite() { low } else { 0.0 }
+}
+
+/// Whether radii are read from this attribute first, so that it need not be stored beside them.
+fn is_radius(attribute: &Attribute) -> bool {
+    let is_float = matches!(
+        attribute.data,
+        AttributeData::F32(_) | AttributeData::F64(_)
+    );
+    is_float && attribute.components == 1 && attribute.name.eq_ignore_ascii_case("radius")
+}
+
+fn spec_of(attribute: &Attribute) -> io::Result<AttributeSpec> {
+    Ok(AttributeSpec {
+        name: attribute.name.clone(),
+        components: u32::try_from(attribute.components).map_err(io::Error::other)?,
+        stored: StoredType::Plain(attribute.data.scalar_type()),
+        ranges: Vec::new(),
+        max_error: 0.0,
+    })
+}
+
+/// The values of `attribute` in the order of `indices`, little-endian.
+fn in_order(attribute: &Attribute, indices: &[u32]) -> Vec<u8> {
+    let components = attribute.components;
+    with_values!(&attribute.data, values => {
+        let ordered = gather(values, components, indices);
+        ordered.iter().flat_map(|value| value.to_le_bytes()).collect()
+    })
+}
+
+/// The values of the particles with these indices, one after the other.
+fn gather<T: Pod + Send + Sync>(values: &[T], components: usize, indices: &[u32]) -> Vec<T> {
+    let mut ordered = vec![T::zeroed(); values.len()];
+    ordered
+        .par_chunks_mut(components)
+        .zip(indices)
+        .with_min_len(4096)
+        .for_each(|(to, index)| {
+            to.copy_from_slice(&values[*index as usize * components..][..components]);
+        });
+    ordered
+}
+
+fn check(frame: &ParticleFrame) -> io::Result<()> {
+    let bad = |what: String| Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+    for a in &frame.attributes {
+        if a.components == 0 || frame.len().checked_mul(a.components) != Some(a.data.len()) {
+            return bad(format!(
+                "attribute {} has {} values of {} components for {} particles",
+                a.name,
+                a.data.len(),
+                a.components,
+                frame.len()
+            ));
+        }
+    }
+    if let Some(Radius::PerParticle(radii)) = &frame.radius {
+        if radii.len() != frame.len() {
+            let (radii, particles) = (radii.len(), frame.len());
+            return bad(format!("{radii} radii for {particles} particles"));
+        }
+        if !radii.iter().all(|r| r.is_finite() && *r >= 0.0) {
+            return bad(
+                "a radius is negative or no number; give one for all (--radius)".to_owned(),
+            );
+        }
+    }
+    if !frame.positions.par_iter().all(|p| p.is_finite()) {
+        return bad("a position is not finite".to_owned());
+    }
+    Ok(())
+}

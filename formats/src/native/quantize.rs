@@ -1,0 +1,358 @@
+//! Positions in tree order become the stored leaves of a tree: nodes, coded blocks, and those blocks as
+//! they are that codes would make too coarse.
+//!
+//! The grid of a block follows from its node, and the node from its blocks' boxes, so eight blocks are
+//! done together. A decoded position never leaves the box that its node holds, whatever was rounded:
+//! codes at the border move inwards, and the error that is stored is measured after that.
+
+use bytemuck::Zeroable;
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+
+use super::Bound;
+use super::radii::CodedRadii;
+use crate::blocks::{Aabb, BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, WIDTH};
+use crate::order::index_u32;
+
+/// Particles under one node.
+pub(super) const GROUP: usize = WIDTH * BLOCK_SIZE;
+/// Groups that a task takes.
+const TASK: usize = 64;
+
+/// Leaves over a run of particles.
+#[derive(Debug, Default)]
+pub(super) struct Leaves<B> {
+    /// A node for each eight blocks.
+    pub(super) nodes: Vec<Node>,
+    /// Blocks, coded or referring to `wide` (counted from the run's first).
+    pub(super) blocks: Vec<B>,
+    /// Blocks as they are.
+    pub(super) wide: Vec<Block>,
+    /// Largest distance of a stored position from the given one.
+    pub(super) max_error: f64,
+    /// Box of the stored positions.
+    pub(super) bounds: Aabb,
+}
+
+/// What encoding needs to know of the frame.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Allowed {
+    /// The largest error of a position.
+    pub(super) bound: Bound,
+    /// The radius of all particles, if they have one.
+    pub(super) radius: Option<f32>,
+}
+
+/// A block as it will be stored.
+pub(super) trait StoredBlock: Copy + Send + Sync + bytemuck::Pod {
+    /// Whether every block is stored as it is.
+    const IS_EXACT: bool;
+
+    /// `block` in the grid `frame`, with its largest error; none if a position would leave the grid's box or
+    /// the block cannot be told from a reference.
+    fn encode(block: &Block, node: &Node, slot: usize) -> Option<(Self, f64)>;
+
+    /// A reference to a block that is kept as it is; `None` if this encoding keeps all of them so.
+    fn reference(index: u32) -> Option<Self>;
+
+    /// The block's positions as they will be read, where they were coded.
+    fn stored(&self, frame: &BlockFrame) -> Block;
+
+    /// Itself, or a reference to a block that is kept `by` places later.
+    #[must_use]
+    fn shifted(self, by: u32) -> Self;
+
+    /// Half a step of the grid as a part of its extent, on each axis: how far a coded position can be from
+    /// the true one.
+    fn half_steps() -> Vec3;
+}
+
+impl StoredBlock for Block {
+    const IS_EXACT: bool = true;
+
+    fn encode(block: &Block, _node: &Node, _slot: usize) -> Option<(Self, f64)> {
+        Some((*block, 0.0))
+    }
+
+    fn reference(_index: u32) -> Option<Self> {
+        None
+    }
+
+    fn stored(&self, _frame: &BlockFrame) -> Block {
+        *self
+    }
+
+    fn shifted(self, _by: u32) -> Self {
+        self
+    }
+
+    fn half_steps() -> Vec3 {
+        Vec3::ZERO
+    }
+}
+
+impl<B: CompactBlock + Send + Sync> StoredBlock for B {
+    const IS_EXACT: bool = false;
+
+    fn encode(block: &Block, node: &Node, slot: usize) -> Option<(Self, f64)> {
+        let frame = node.child_frame(slot);
+        let steps = B::steps(&frame);
+        let mut codes = [[0; BLOCK_SIZE]; 3];
+        let axes = [&block.x, &block.y, &block.z];
+        for (axis, (codes, values)) in codes.iter_mut().zip(axes).enumerate() {
+            let grid = Grid {
+                base: frame.base[axis],
+                step: steps[axis],
+                largest: B::LARGEST[axis],
+                planes: node.interval(slot, axis),
+            };
+            for (code, value) in codes.iter_mut().zip(values) {
+                *code = grid.code(*value)?;
+            }
+        }
+        let coded = Self::from_codes(&codes);
+        if coded.wide_index().is_some() {
+            // The particles are not arranged as a coded block's are.
+            return None;
+        }
+        let error = largest_distance(&coded.decode(&frame), block);
+        Some((coded, error))
+    }
+
+    fn reference(index: u32) -> Option<Self> {
+        Some(Self::referring_to(index))
+    }
+
+    fn stored(&self, frame: &BlockFrame) -> Block {
+        self.decode(frame)
+    }
+
+    fn shifted(self, by: u32) -> Self {
+        match self.wide_index() {
+            Some(index) => Self::referring_to(index + by),
+            None => self,
+        }
+    }
+
+    fn half_steps() -> Vec3 {
+        Vec3::from_array(B::LARGEST.map(|largest| 0.5 / largest as f32))
+    }
+}
+
+/// The codes of a block on one axis.
+struct Grid {
+    base: f32,
+    step: f32,
+    largest: u32,
+    /// The planes of the block's box.
+    planes: [f64; 2],
+}
+
+impl Grid {
+    /// The code nearest to `value` whose position is inside the box; the next ones inwards are tried
+    /// where rounding leads outside.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "a cast saturates, and NaN is 0"
+    )]
+    fn code(&self, value: f32) -> Option<u32> {
+        let exact = (f64::from(value) - f64::from(self.base)) / f64::from(self.step);
+        let nearest = (exact.round() as u32).min(self.largest);
+        let lower = (nearest + 1).min(self.largest);
+        [nearest, nearest.saturating_sub(1), lower]
+            .into_iter()
+            .find(|code| {
+                let place = f64::from(self.base + *code as f32 * self.step);
+                self.planes[0] <= place && place <= self.planes[1]
+            })
+    }
+}
+
+fn largest_distance(a: &Block, b: &Block) -> f64 {
+    let distance = |lane: usize| {
+        let [a, b] = [a, b].map(|block| block.center(lane).as_dvec3());
+        DVec3::distance_squared(a, b)
+    };
+    let largest = (0..BLOCK_SIZE).map(distance).fold(0.0, f64::max);
+    largest.sqrt()
+}
+
+/// The leaves over `positions`, which are in tree order; all groups but the last of a frame are full.
+pub(super) fn encode<B: StoredBlock>(
+    positions: &[Vec3],
+    radii: Option<&CodedRadii>,
+    allowed: Allowed,
+) -> Leaves<B> {
+    let parts: Vec<Leaves<B>> = positions
+        .par_chunks(TASK * GROUP)
+        .enumerate()
+        .map(|(task, positions)| {
+            let radii = radii.map(|r| &r.blocks[task * TASK * WIDTH..]);
+            encode_task(positions, radii, allowed)
+        })
+        .collect();
+    let mut all = Leaves {
+        nodes: Vec::with_capacity(positions.len().div_ceil(GROUP)),
+        blocks: Vec::with_capacity(positions.len().div_ceil(BLOCK_SIZE)),
+        ..Leaves::empty()
+    };
+    for part in parts {
+        all.append(part);
+    }
+    all
+}
+
+fn encode_task<B: StoredBlock>(
+    positions: &[Vec3],
+    radii: Option<&[BlockRadii]>,
+    allowed: Allowed,
+) -> Leaves<B> {
+    let mut leaves = Leaves::empty();
+    for (group, positions) in positions.chunks(GROUP).enumerate() {
+        let radii = radii.map(|radii| &radii[group * WIDTH..]);
+        leaves.push_group(positions, radii, allowed);
+    }
+    leaves
+}
+
+impl<B: StoredBlock> Leaves<B> {
+    fn empty() -> Self {
+        Self {
+            nodes: Vec::new(),
+            blocks: Vec::new(),
+            wide: Vec::new(),
+            max_error: 0.0,
+            bounds: Aabb::EMPTY,
+        }
+    }
+
+    /// Takes in up to eight blocks under one node.
+    fn push_group(&mut self, positions: &[Vec3], radii: Option<&[BlockRadii]>, allowed: Allowed) {
+        let mut blocks = [Block::zeroed(); WIDTH];
+        let mut boxes = [Aabb::EMPTY; WIDTH];
+        let chunks = positions.chunks(BLOCK_SIZE);
+        let used = chunks.len();
+        for (slot, chunk) in chunks.enumerate() {
+            blocks[slot] = block_of(chunk);
+            boxes[slot] = match radii {
+                None => blocks[slot].bounds(),
+                Some(radii) => room_for_spheres::<B>(&blocks[slot], &radii[slot]),
+            };
+        }
+        let node = Node::enclosing(&boxes[..used]);
+        for (slot, block) in blocks[..used].iter().enumerate() {
+            let own = radii.map(|radii| &radii[slot]);
+            self.push_block(block, &node, slot, own, allowed);
+        }
+        self.nodes.push(node);
+    }
+
+    fn push_block(
+        &mut self,
+        block: &Block,
+        node: &Node,
+        slot: usize,
+        radii: Option<&BlockRadii>,
+        allowed: Allowed,
+    ) {
+        let smallest = |r: &BlockRadii| r.0.iter().copied().fold(f32::INFINITY, f32::min);
+        let radius = radii.map(smallest).or(allowed.radius);
+        let most = allowed.bound.length(radius);
+        let frame = node.child_frame(slot);
+        let coded = B::encode(block, node, slot).filter(|(coded, error)| {
+            let fits = |radii: &BlockRadii| {
+                node.child_holds(slot, &coded.stored(&frame).sphere_bounds(radii))
+            };
+            B::IS_EXACT || *error <= most && radii.is_none_or(fits)
+        });
+        if let Some((coded, error)) = coded {
+            self.max_error = self.max_error.max(error);
+            self.bounds = self.bounds.union(coded.stored(&frame).bounds());
+            self.blocks.push(coded);
+            return;
+        }
+        self.bounds = self.bounds.union(block.bounds());
+        let reference = B::reference(index_u32(self.wide.len()));
+        // What is stored as it is was never refused.
+        self.blocks
+            .push(reference.expect("only coded blocks are refused"));
+        self.wide.push(*block);
+    }
+
+    /// Takes in what comes after.
+    fn append(&mut self, next: Self) {
+        let first = index_u32(self.wide.len());
+        let has_references = first > 0 && !next.wide.is_empty();
+        if has_references {
+            let shifted = next.blocks.into_iter().map(|block| block.shifted(first));
+            self.blocks.extend(shifted);
+        } else {
+            self.blocks.extend(next.blocks);
+        }
+        self.nodes.extend(next.nodes);
+        self.wide.extend(next.wide);
+        self.max_error = self.max_error.max(next.max_error);
+        self.bounds = self.bounds.union(next.bounds);
+    }
+
+    /// Counts references from the first of `before` blocks that are kept already.
+    pub(super) fn shift(&mut self, before: u32) {
+        if before > 0 && !self.wide.is_empty() {
+            let blocks = self.blocks.par_iter_mut();
+            blocks.for_each(|block| *block = block.shifted(before));
+        }
+    }
+}
+
+/// The box of the spheres, wherever in its reach a code puts them.
+fn room_for_spheres<B: StoredBlock>(block: &Block, radii: &BlockRadii) -> Aabb {
+    let spheres = block.sphere_bounds(radii);
+    // The box that the node will hold is larger by up to two of its planes' steps, and so is the grid.
+    let reach = 1.25 * B::half_steps() * spheres.size();
+    Aabb {
+        min: spheres.min - reach,
+        max: spheres.max + reach,
+    }
+}
+
+/// Up to 16 positions; lanes that are left repeat the last one.
+fn block_of(positions: &[Vec3]) -> Block {
+    let mut block = Block::zeroed();
+    for lane in 0..BLOCK_SIZE {
+        block.set_center(lane, positions[lane.min(positions.len() - 1)]);
+    }
+    block
+}
+
+/// Brings each block of `positions` into the arrangement that coded blocks need (z of the first particle
+/// not above that of the last), and `indices` likewise unless that is empty. Before attributes follow by the
+/// indices.
+pub fn arrange(positions: &mut [Vec3], indices: &mut [u32]) {
+    let arrange_block = |positions: &mut [Vec3]| {
+        let last = positions.len() - 1;
+        let is_wrong = positions[0].z > positions[last].z;
+        if is_wrong {
+            positions.swap(0, last);
+        }
+        is_wrong
+    };
+    if indices.is_empty() {
+        positions
+            .par_chunks_mut(BLOCK_SIZE)
+            .with_min_len(1024)
+            .for_each(|block| {
+                arrange_block(block);
+            });
+        return;
+    }
+    positions
+        .par_chunks_mut(BLOCK_SIZE)
+        .zip(indices.par_chunks_mut(BLOCK_SIZE))
+        .with_min_len(1024)
+        .for_each(|(positions, indices)| {
+            if arrange_block(positions) {
+                indices.swap(0, positions.len() - 1);
+            }
+        });
+}

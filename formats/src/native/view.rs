@@ -1,0 +1,135 @@
+//! A checked view of the bytes of a native frame: its parts in place.
+
+use bytemuck::Pod;
+
+use super::attribute::AttributeView;
+use super::layout::{AttributeIndex, Encoding, FrameIndex, RadiiIndex, RadiusIndex, Section};
+use super::stored::{RadiusCode, StoredType};
+use super::{section_of, verify_section};
+use crate::ParseError;
+use crate::blocks::{CompactBlocks, StoredBlocks, StoredLeaves, StoredRadii};
+
+/// A checked view of the bytes of a native frame.
+#[derive(Debug, Clone, Copy)]
+pub struct NativeFrame<'a> {
+    bytes: &'a [u8],
+    index: &'a FrameIndex,
+}
+
+impl<'a> NativeFrame<'a> {
+    /// A view of `bytes`, from which `index` was parsed by [`super::layout::parse`].
+    pub(super) const fn with_index(bytes: &'a [u8], index: &'a FrameIndex) -> Self {
+        Self { bytes, index }
+    }
+
+    /// What the frame holds.
+    pub const fn index(&self) -> &'a FrameIndex {
+        self.index
+    }
+
+    /// The particles in place. Only lengths are checked, not what is in the sections.
+    ///
+    /// # Errors
+    /// [`ParseError::Unsupported`] on a big-endian machine, or for bytes that are not aligned to 64 (those
+    /// of a [`super::NativeFile`] are).
+    pub fn leaves(&self) -> Result<StoredLeaves<'a>, ParseError> {
+        let index = self.index;
+        Ok(StoredLeaves {
+            count: index.count,
+            nodes: self.plain(&index.nodes)?,
+            blocks: match index.encoding() {
+                Encoding::F32 => StoredBlocks::F32(self.plain(&index.positions)?),
+                Encoding::Q16 => StoredBlocks::Q16(self.compact()?),
+                Encoding::Q10 => StoredBlocks::Q10(self.compact()?),
+            },
+            radii: match &index.radius {
+                RadiusIndex::None | RadiusIndex::Common(_) => StoredRadii::None,
+                RadiusIndex::PerParticle(radii) => self.radii(radii)?,
+            },
+        })
+    }
+
+    /// The attribute `name` in place, exactly or failing that without regard to case.
+    pub fn attribute(&self, name: &str) -> Option<AttributeView<'a>> {
+        let attributes = &self.index.attributes;
+        let exact = attributes.iter().find(|a| a.name == name);
+        let alike = || {
+            attributes
+                .iter()
+                .find(|a| a.name.eq_ignore_ascii_case(name))
+        };
+        self.view(exact.or_else(alike)?).ok()
+    }
+
+    /// All attributes in place, as listed in the index.
+    pub fn attributes(&self) -> Vec<AttributeView<'a>> {
+        let views = self.index.attributes.iter().map(|a| self.view(a));
+        views.filter_map(Result::ok).collect()
+    }
+
+    /// Compares every section with its checksum, which opening does not do.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] at the first section that differs.
+    pub fn verify(&self) -> Result<(), ParseError> {
+        let sections = self.index.sections();
+        let mut sections = sections.iter();
+        sections.try_for_each(|(what, section)| verify_section(self.bytes, what, section))
+    }
+
+    /// Compares the nodes with their checksum: all of a frame that is read before rays are traced.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] if they differ.
+    pub fn verify_nodes(&self) -> Result<(), ParseError> {
+        verify_section(self.bytes, "the nodes", &self.index.nodes)
+    }
+
+    fn view(&self, attribute: &'a AttributeIndex) -> Result<AttributeView<'a>, ParseError> {
+        let stored = StoredType::of_code(attribute.stored)
+            .ok_or_else(|| ParseError::unsupported("an attribute type that is not known"))?;
+        Ok(AttributeView::new(
+            attribute,
+            stored,
+            section_of(self.bytes, &attribute.section)?,
+        ))
+    }
+
+    fn compact<B: Pod>(&self) -> Result<CompactBlocks<'a, B>, ParseError> {
+        Ok(CompactBlocks {
+            blocks: self.plain(&self.index.positions)?,
+            wide: self.plain(&self.index.wide)?,
+        })
+    }
+
+    fn radii(&self, radii: &RadiiIndex) -> Result<StoredRadii<'a>, ParseError> {
+        let code = RadiusCode::of_code(radii.code)
+            .ok_or_else(|| ParseError::unsupported("a type of radii that is not known"))?;
+        let (low, step) = (radii.low, code.step(radii.low, radii.high));
+        Ok(match code {
+            RadiusCode::F32 => StoredRadii::F32(self.plain(&radii.section)?),
+            RadiusCode::U16 => StoredRadii::U16 {
+                codes: self.plain(&radii.section)?,
+                low,
+                step,
+            },
+            RadiusCode::U8 => StoredRadii::U8 {
+                codes: self.plain(&radii.section)?,
+                low,
+                step,
+            },
+        })
+    }
+
+    fn plain<T: Pod>(&self, section: &Section) -> Result<&'a [T], ParseError> {
+        let bytes = section_of(self.bytes, section)?;
+        let slice = (!cfg!(target_endian = "big"))
+            .then(|| bytemuck::try_cast_slice(bytes).ok())
+            .flatten();
+        slice.ok_or_else(|| {
+            ParseError::unsupported(
+                "a native frame in memory that is not aligned, or on a big-endian machine",
+            )
+        })
+    }
+}
