@@ -8,9 +8,10 @@ use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use flate2::bufread::GzDecoder;
+use rkyv::util::AlignedVec;
 
 use crate::detect::{Format, HEAD_LEN};
-use crate::native::{self, MappedFile};
+use crate::native;
 use crate::read::Step;
 use crate::{FrameError, ParseError, RawParticles};
 
@@ -28,16 +29,16 @@ pub struct FrameFile {
 /// Where the bytes of a file are.
 #[derive(Debug)]
 enum Content {
-    Memory(Vec<u8>),
-    /// Native frames are read where they lie.
-    Mapped(MappedFile),
+    Plain(Vec<u8>),
+    /// Native frames: their sections are used as they lie.
+    Aligned(AlignedVec<64>),
 }
 
 impl Content {
     fn bytes(&self) -> &[u8] {
         match self {
-            Self::Memory(bytes) => bytes,
-            Self::Mapped(file) => file.bytes(),
+            Self::Plain(bytes) => bytes,
+            Self::Aligned(bytes) => bytes,
         }
     }
 }
@@ -51,9 +52,9 @@ impl FrameFile {
     /// [`FrameError::Malformed`] for everything that breaks its own format.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
         if is_native(path)? {
-            let file = MappedFile::open(path)?;
-            let stored_len = file.bytes().len() as u64;
-            return Self::new(path, Content::Mapped(file), stored_len, Vec::new());
+            let bytes = native::read_aligned(path)?;
+            let stored_len = bytes.len() as u64;
+            return Self::new(path, Content::Aligned(bytes), stored_len, Vec::new());
         }
         Self::from_bytes(path, read_stable(path)?)
     }
@@ -71,7 +72,7 @@ impl FrameFile {
         } else {
             bytes
         };
-        Self::new(path, Content::Memory(bytes), stored_len, notes)
+        Self::new(path, Content::Plain(bytes), stored_len, notes)
     }
 
     fn new(
@@ -113,14 +114,6 @@ impl FrameFile {
         self.content.bytes()
     }
 
-    /// Bytes of it that are held in memory: none of a file that is mapped.
-    pub fn held_len(&self) -> u64 {
-        match &self.content {
-            Content::Memory(bytes) => bytes.len() as u64,
-            Content::Mapped(_) => 0,
-        }
-    }
-
     /// Bytes on disk, compressed if it was.
     pub const fn stored_len(&self) -> u64 {
         self.stored_len
@@ -144,15 +137,9 @@ impl FrameFile {
             );
             ParseError::malformed(self.bytes().len(), what).in_file(&self.path)
         })?;
-        let read = self
-            .format
+        self.format
             .read(self.bytes(), step)
-            .map_err(|e| e.in_file(&self.path));
-        if let Content::Mapped(file) = &self.content {
-            // What was read while somebody cut the file short means nothing.
-            file.check()?;
-        }
-        read
+            .map_err(|e| e.in_file(&self.path))
     }
 }
 

@@ -180,8 +180,9 @@ mod tests {
         }
         let block = B::from_codes(&codes);
         assert_eq!(block.wide_index(), None);
-        for lane in 0..BLOCK_SIZE {
-            assert_eq!(block.codes(lane), [0, 1, 2].map(|axis| codes[axis][lane]));
+        let [x, y, z] = codes;
+        for (lane, ((x, y), z)) in x.into_iter().zip(y).zip(z).enumerate() {
+            assert_eq!(block.codes(lane), [x, y, z]);
         }
     }
 
@@ -212,9 +213,10 @@ mod tests {
         let node = Node::enclosing(&[other, child]);
         let frame = node.child_frame(1);
         for axis in 0..3 {
-            let [lower, upper] = node.interval(1, axis).map(|plane| plane as f32);
-            assert_eq!(frame.base[axis], lower);
-            assert_eq!(frame.base[axis] + frame.extent[axis], upper);
+            let [lower, upper] = node.interval(1, axis);
+            let base = f64::from(frame.base[axis]);
+            assert_eq!(base, lower);
+            assert_eq!(base + f64::from(frame.extent[axis]), upper);
         }
         let mut codes = [[0; BLOCK_SIZE]; 3];
         codes[0][3] = 2047;

@@ -186,8 +186,11 @@ impl Bytes {
     }
 }
 
-/// The whole file, aligned.
-fn read(path: &Path) -> Result<AlignedVec<64>, FrameError> {
+/// The whole file, aligned as its sections are.
+///
+/// # Errors
+/// [`FrameError`] if it cannot be read or is no regular file.
+pub(crate) fn read(path: &Path) -> Result<AlignedVec<64>, FrameError> {
     let io = |e| FrameError::io(path, e);
     let mut file = File::open(path).map_err(io)?;
     let meta = file.metadata().map_err(io)?;

@@ -155,7 +155,8 @@ fn mapped_and_read_files_give_leaves_in_place() {
         assert_eq!((view.index().min[0], view.index().max[0]), (0.0, 16.0));
         let id = view.attribute("ID").expect("named alike");
         let x = leaves.center(5).x;
-        assert_eq!(id.low_bits(5), Some(u32::MAX - x as u32));
+        let place = id.low_bits(5).map(|bits| f64::from(u32::MAX - bits));
+        assert_eq!(place, Some(f64::from(x)));
         let velocity = view.attribute("velocity").expect("named");
         assert_eq!(velocity.get(5, 0), f64::from(x));
         assert!(view.attribute("none").is_none());

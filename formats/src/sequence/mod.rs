@@ -255,7 +255,7 @@ impl Sequence {
             notes.extend_from_slice(file.notes());
             let bytes = file.bytes().len() as u64;
             all_bytes += bytes;
-            content_bytes = content_bytes.max(file.held_len());
+            content_bytes = content_bytes.max(bytes);
         }
         let only = if self.parts.len() < 2 {
             parts.pop().map(|(_, only)| only)
