@@ -2,6 +2,7 @@
 //! renderer wants them (finite, f32, relative to the sequence's origin).
 
 use glam::{DVec3, Vec3};
+use rayon::prelude::*;
 
 use crate::{Attribute, AttributeData};
 
@@ -34,6 +35,21 @@ impl Positions {
             Self::F32(v) => size_of_val(&v[..]) as u64,
             Self::F64(v) => size_of_val(&v[..]) as u64,
         }
+    }
+
+    /// The largest distance that a position moves when it is rounded to f32 relative to `origin`, as
+    /// [`ParticleFrame::from_raw`] does; those that are not finite then do not count.
+    pub fn rounding(&self, origin: DVec3) -> f64 {
+        if matches!(self, Self::F32(_)) && origin == DVec3::ZERO {
+            return 0.0;
+        }
+        let moved = |i: usize| {
+            let (position, rounded) = (self.get(i), (self.get(i) - origin).as_vec3());
+            let distance = (rounded.as_dvec3() + origin).distance(position);
+            if rounded.is_finite() { distance } else { 0.0 }
+        };
+        let all = (0..self.len()).into_par_iter().with_min_len(4096);
+        all.map(moved).reduce(|| 0.0, f64::max)
     }
 
     /// Position `index` in f64.

@@ -6,6 +6,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::{Value, json};
+use spherule_formats::blocks::Block;
+use spherule_formats::detect::Format;
+use spherule_formats::native::{FrameIndex, layout};
 use spherule_formats::sequence::lone_frame_number;
 use spherule_formats::stats::{AttributeStats, FrameStats, Number};
 use spherule_formats::{FrameError, FrameFile, Positions, RawParticles, Sequence, SequenceInput};
@@ -30,6 +33,8 @@ struct Inspected<'a> {
     raw: &'a RawParticles,
     stats: FrameStats,
     stored: f64,
+    /// What a native frame says of itself.
+    native: Option<FrameIndex>,
 }
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
@@ -123,6 +128,9 @@ fn inspect(
             frame: step.number.or(if several { running } else { number }),
             stored: file.stored_len() as f64
                 * (step.span.len() as f64 / file.bytes().len().max(1) as f64),
+            native: (file.format() == Format::Spf)
+                .then(|| layout::parse(file.bytes()).ok())
+                .flatten(),
             raw: &raw,
             stats,
         };
@@ -140,6 +148,9 @@ fn inspect(
 
 impl Inspected<'_> {
     fn encoding(&self) -> &'static str {
+        if let Some(index) = &self.native {
+            return index.encoding().name();
+        }
         match self.raw.positions {
             Positions::F32(_) => "f32",
             Positions::F64(_) => "f64",
@@ -172,7 +183,7 @@ impl Inspected<'_> {
             "mean": stats.mean.map(|m| m.to_array()),
             "attributes": stats.attributes.iter().map(attribute_json).collect::<Vec<_>>(),
             "encoding": self.encoding(),
-            "error_bound": 0.0,
+            "error_bound": self.native.as_ref().map_or(0.0, |index| index.max_error),
             "bytes_per_particle": self.bytes_per_particle(),
         })
     }
@@ -198,6 +209,14 @@ impl Inspected<'_> {
             self.encoding(),
             stats.count
         )?;
+        if let Some(index) = &self.native {
+            let wide = index.wide.len / size_of::<Block>() as u64;
+            writeln!(
+                out,
+                "  largest error {:e}, {wide} blocks kept as f32, origin {:?}",
+                index.max_error, index.origin
+            )?;
+        }
         if let Some((min, max)) = stats.bounds {
             writeln!(out, "  bounds {min} to {max}")?;
         }

@@ -16,6 +16,7 @@ macro_rules! say {
 }
 
 mod check;
+mod convert;
 mod disk;
 mod errors;
 mod generate;
@@ -48,6 +49,8 @@ enum Command {
     Init(Box<init::InitArgs>),
     /// Print counts, bounds and attributes of particle files.
     Inspect(inspect::InspectArgs),
+    /// Convert particle files to compact native frames (.spf).
+    Convert(Box<convert::ConvertArgs>),
     /// Make particles to measure with.
     Generate(generate::GenerateArgs),
     /// Measure images per second, build time and memory over particle counts and structures.
@@ -70,6 +73,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Inspect(args) => inspect::run(&args),
+        Command::Convert(args) => convert::run(&args),
         Command::Generate(args) => generate::run(&args),
         Command::Scale(args) => scale::run(&args),
         Command::ScaleCell => scale::measure::run(),

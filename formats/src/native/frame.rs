@@ -19,8 +19,10 @@ use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius};
 pub struct StoreSettings {
     /// How positions are stored; `None` takes what needs the fewest bytes within the bound.
     pub encoding: Option<Encoding>,
-    /// How far stored positions may be from the true ones, and radii likewise.
+    /// How far stored positions may be from those of the frame, and radii likewise.
     pub bound: Bound,
+    /// How far those of the frame are from the true ones ([`crate::Positions::rounding`]).
+    pub rounding: f64,
 }
 
 impl StoreSettings {
@@ -28,6 +30,7 @@ impl StoreSettings {
     pub const EXACT: Self = Self {
         encoding: Some(Encoding::F32),
         bound: Bound::None,
+        rounding: 0.0,
     };
 }
 
@@ -86,7 +89,7 @@ fn store_checked(
         encoding,
         bound: settings.bound,
         origin: frame.origin,
-        rounding: 0.0,
+        rounding: settings.rounding,
         radius: match (&frame.radius, radii.as_deref()) {
             (Some(Radius::Common(radius)), _) => RadiusSpec::Common(*radius),
             (_, Some(radii)) => RadiusSpec::PerParticle(radius_range(radii, encoding, settings)),

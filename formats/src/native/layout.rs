@@ -30,6 +30,8 @@ pub const MAGIC: &[u8; 8] = b"SPHERULE";
 pub const VERSION: u32 = 2;
 /// Length of the header in bytes.
 pub const HEADER_LEN: usize = 64;
+/// Numbers that an attribute may have for a particle: far more than any has.
+const MOST_COMPONENTS: u32 = 4096;
 /// Alignment of sections: a cache line, and an AVX-512 vector.
 pub const ALIGN: u64 = 64;
 
@@ -367,6 +369,13 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
         ));
     }
     check_radius(index, check)?;
+    // Sections that lie on each other would be read into more memory than the file has bytes.
+    let lens = index.sections().into_iter().map(|(_, section)| section.len);
+    let sum = lens.fold(0, u64::saturating_add);
+    if sum > end as u64 {
+        let what = format!("the sections have {sum} bytes, more than the file");
+        return Err(ParseError::malformed(end, what));
+    }
     index
         .attributes
         .iter()
@@ -408,8 +417,8 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
         Err(ParseError::malformed(check.end, what))
     };
     let width = u64::from(attribute.components) * stored.size() as u64;
-    if width == 0 {
-        return bad("has no components");
+    if width == 0 || attribute.components > MOST_COMPONENTS {
+        return bad("has no components, or absurdly many");
     }
     let ranges = match stored {
         StoredType::Ranged => attribute.components as usize,

@@ -211,14 +211,19 @@ fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
     let whole = bytes(&frame(17, DVec3::ZERO));
     let mut index = layout::parse(&whole).expect("whole");
     change(&mut index);
-    let index = rkyv::to_bytes::<rkyv::rancor::Error>(&index).expect("memory");
+    forge(&whole, &index).expect_err("a lie")
+}
+
+/// `whole` with another index under valid checksums, read.
+fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
+    let index = rkyv::to_bytes::<rkyv::rancor::Error>(index).expect("memory");
     let offset = 24..32;
     let offset = u64::from_le_bytes(whole[offset].try_into().expect("8 bytes"));
     let mut forged = whole[..usize::try_from(offset).expect("small")].to_vec();
     forged.extend_from_slice(&index);
     let header = layout::header(forged.len() as u64, offset, &index);
     forged[..layout::HEADER_LEN].copy_from_slice(&header);
-    read_back(&forged).expect_err("a lie")
+    read_back(&forged)
 }
 
 #[test]
@@ -235,6 +240,10 @@ fn an_index_that_lies_is_an_error() {
     malformed(forged(|i| i.attributes[0].components = 0));
     malformed(forged(|i| i.attributes[1].section.len -= 8));
     malformed(forged(|i| i.nodes.len += 64));
+    malformed(forged(|i| {
+        let twice = i.attributes[0].clone();
+        i.attributes.extend(vec![twice; 1000]);
+    }));
     malformed(forged(|i| i.wide.len = 192));
     malformed(forged(|i| i.min[1] = f32::NAN));
     malformed(forged(|i| i.origin[2] = f64::INFINITY));
@@ -358,6 +367,7 @@ fn no_particle_is_farther_than_the_file_says() {
                 let settings = StoreSettings {
                     encoding: Some(encoding),
                     bound,
+                    rounding: 0.0,
                 };
                 let radius = Some(Radius::Common(0.01));
                 let index = stored_within(clustered(count), radius, settings);
@@ -376,6 +386,7 @@ fn radii_of_their_own_are_held_and_bounded() {
             let settings = StoreSettings {
                 encoding: Some(encoding),
                 bound,
+                rounding: 0.0,
             };
             let own = Some(Radius::PerParticle(radii(5000).collect()));
             let index = stored_within(clustered(5000), own, settings);
@@ -404,6 +415,7 @@ fn flat_and_coincident_particles_are_stored() {
             let settings = StoreSettings {
                 encoding: Some(encoding),
                 bound: Bound::None,
+                rounding: 0.0,
             };
             stored_within(positions.clone(), None, settings);
         }
@@ -417,6 +429,7 @@ fn the_smallest_encoding_within_the_bound_is_taken() {
         let settings = StoreSettings {
             encoding: None,
             bound,
+            rounding: 0.0,
         };
         let index = stored_within(even.clone(), Some(Radius::Common(0.05)), settings);
         (
@@ -441,6 +454,7 @@ fn a_file_does_not_depend_on_threads() {
         let settings = StoreSettings {
             encoding: Some(Encoding::Q10),
             bound: Bound::Length(1e-3),
+            rounding: 0.0,
         };
         let stored = || store(&path, &frame, None, &settings).expect("writable");
         pool.expect("threads").install(stored);
@@ -467,4 +481,15 @@ fn pages_that_are_gone_are_zeros_and_told() {
     assert_eq!(leaves.center(40_000), Vec3::ZERO);
     let error = file.check().expect_err("cut").to_string();
     assert!(error.contains("8192 now"), "{error}");
+}
+
+#[test]
+fn an_empty_frame_cannot_ask_for_memory() {
+    let whole = bytes(&frame(0, DVec3::ZERO));
+    let mut index = layout::parse(&whole).expect("whole");
+    index.attributes[0].components = u32::MAX;
+    assert!(matches!(
+        forge(&whole, &index),
+        Err(ParseError::Malformed { .. })
+    ));
 }

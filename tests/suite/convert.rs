@@ -1,0 +1,99 @@
+//! `spherule convert` from outside: foreign frames become native ones and still show the same.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::harness::{Workshop, dam_break};
+
+/// What `inspect --json` says of the file.
+fn inspected(shop: &Workshop, file: &str) -> Value {
+    let ran = shop.run(&["inspect", "--json", file]).expect(0);
+    serde_json::from_str(&ran.text()).expect("one line of JSON")
+}
+
+fn number(value: &Value) -> f64 {
+    value.as_f64().expect("a number")
+}
+
+#[test]
+fn native_frames_hold_what_the_foreign_ones_did() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=2);
+    for (encoding, options) in [
+        ("f32", &["--encoding", "f32"][..]),
+        ("q16", &["--encoding", "q16"][..]),
+        ("q10", &["--encoding", "q10", "--max-error", "0.05"][..]),
+    ] {
+        let arguments = [&["convert", "in", "-o", encoding][..], options].concat();
+        shop.run(&arguments).expect(0).tells("2 of 2 frames");
+        let mut foreign: Vec<_> = fs::read_dir(shop.join("in"))
+            .expect("readable")
+            .map(|entry| entry.expect("readable").path())
+            .collect();
+        foreign.sort();
+        let mut native: Vec<_> = fs::read_dir(shop.join(encoding))
+            .expect("readable")
+            .map(|entry| entry.expect("readable").path())
+            .collect();
+        native.sort();
+        assert_eq!(native.len(), 2, "{native:?}");
+        for (from, to) in foreign.iter().zip(&native) {
+            let from = inspected(&shop, from.to_str().expect("a name"));
+            let to = inspected(&shop, to.to_str().expect("a name"));
+            assert_eq!(
+                (&to["format"], &to["count"]),
+                (&"spf".into(), &from["count"])
+            );
+            assert_eq!(to["encoding"], encoding);
+            let bound = number(&to["error_bound"]);
+            assert_eq!(bound == 0.0, encoding == "f32");
+            for axis in 0..3 {
+                for side in ["min", "max"] {
+                    let [a, b] = [&from, &to].map(|i| number(&i["bounds"][side][axis]));
+                    assert!((a - b).abs() <= bound, "{side} {axis}: {a} {b}, {bound}");
+                }
+            }
+            let names = |of: &Value| {
+                let attributes = of["attributes"].as_array().expect("a list");
+                let named = attributes.iter().map(|a| a["name"].to_string());
+                named.filter(|n| n != "\"radius\"").collect::<Vec<_>>()
+            };
+            assert_eq!(names(&from), names(&to));
+        }
+    }
+}
+
+#[test]
+fn renders_of_exact_frames_are_those_of_the_originals() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=1);
+    shop.run(&["convert", "in", "-o", "native", "--radius", "0.02"])
+        .expect(0);
+    let pixels = |input: &str| {
+        let image = format!("{input}-out/f.#.exr");
+        let size = ["--width", "64", "--height", "36", "--samples", "1"];
+        let options = ["--radius", "0.02", "--up", "y", "--channels", "RGBA,Z,N"];
+        let arguments = [&["render", input, "-o", &image][..], &size, &options].concat();
+        shop.run(&arguments).expect(0);
+        let found = fs::read_dir(shop.join(format!("{input}-out"))).expect("readable");
+        let png = found
+            .map(|entry| entry.expect("readable").path())
+            .find(|path| path.extension().is_some_and(|e| e == "png"));
+        fs::read(png.expect("a preview")).expect("readable")
+    };
+    assert!(pixels("in") == pixels("native"));
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused() {
+    let shop = Workshop::new();
+    shop.run(&["convert", "nothing", "-o", "x"]).expect(2);
+    dam_break(&shop.join("in"), 1..=1);
+    shop.run(&["convert", "in", "-o", "x", "--encoding", "q11"])
+        .expect(2)
+        .tells("f32, q16, q10");
+    shop.run(&["convert", "in", "-o", "x", "--max-error", "-1"])
+        .expect(2);
+    assert!(!shop.join("x").exists());
+}
