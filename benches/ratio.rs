@@ -130,7 +130,7 @@ impl Table<'_> {
     fn print_rays(&self) {
         let case = self.case;
         let builder = case.tree(self.structure);
-        let (tree, obvhs) = (builder.tree(), &case.obvhs);
+        let (tree, obvhs) = (&builder.tree().view(), &case.obvhs);
         let (scene, points) = (&case.scene, &case.points);
         let (mut records, mut others) = (Vec::new(), Vec::new());
         let turns = Turns::take(

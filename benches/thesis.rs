@@ -82,11 +82,11 @@ fn primary(criterion: &mut Criterion, cases: &[Built]) {
         group.throughput(Throughput::Elements(scene.pixels.len() as u64));
         for (structure, builder) in ours {
             group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
-                bencher.iter(|| trace_primary(builder.tree(), scene, &mut records));
+                bencher.iter(|| trace_primary(&builder.tree().view(), scene, &mut records));
             });
             let packets = format!("{structure}-packets");
             group.bench_function(BenchmarkId::new(packets, particles), |bencher| {
-                bencher.iter(|| trace_primary_packets(builder.tree(), scene, &mut records));
+                bencher.iter(|| trace_primary_packets(&builder.tree().view(), scene, &mut records));
             });
         }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
@@ -104,11 +104,11 @@ fn shadow(criterion: &mut Criterion, cases: &[Built]) {
         group.throughput(Throughput::Elements(points.len() as u64));
         for (structure, builder) in ours {
             group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
-                bencher.iter(|| trace_shadow(builder.tree(), points));
+                bencher.iter(|| trace_shadow(&builder.tree().view(), points));
             });
             let packets = format!("{structure}-packets");
             group.bench_function(BenchmarkId::new(packets, particles), |bencher| {
-                bencher.iter(|| trace_shadow_packets(builder.tree(), points));
+                bencher.iter(|| trace_shadow_packets(&builder.tree().view(), points));
             });
         }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {
@@ -126,7 +126,7 @@ fn reflection(criterion: &mut Criterion, cases: &[Built]) {
         group.throughput(Throughput::Elements(points.len() as u64));
         for (structure, builder) in ours {
             group.bench_function(BenchmarkId::new(structure.name(), particles), |bencher| {
-                bencher.iter(|| trace_reflection(builder.tree(), points));
+                bencher.iter(|| trace_reflection(&builder.tree().view(), points));
             });
         }
         group.bench_function(BenchmarkId::new("obvhs", particles), |bencher| {

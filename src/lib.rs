@@ -15,7 +15,7 @@
 //! let spheres = Spheres { centers: &centers, radius: SphereRadius::Common(0.5) };
 //! let mut builder = TreeBuilder::new();
 //! builder.build(&spheres, &BuildSettings::default());
-//! let tree = builder.tree();
+//! let tree = builder.tree().view();
 //! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("straight at it");
 //! assert_eq!(hit.t, 1.5);
 //! assert_eq!(tree.particle(hit.slot), 0);

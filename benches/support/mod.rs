@@ -74,7 +74,7 @@ impl Case {
     pub(crate) fn tree(&self, structure: Structure) -> TreeBuilder {
         let mut builder = TreeBuilder::new();
         build_ours(structure, &mut builder, &self.scene);
-        let tree = builder.tree();
+        let tree = &builder.tree().view();
         let mut records = Vec::new();
         check_primary(structure.name(), &self.scene, tree, &mut records);
         let same = |(a, b): &(&HitRecord, &HitRecord)| {

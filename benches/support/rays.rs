@@ -5,7 +5,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
-use spherule::accel::wide::WideTree;
+use spherule::accel::view::TreeView;
 use spherule::ray::{PACKET_SIZE, Ray, RayPacket};
 
 use super::scene::{Scene, TILE_SIDE};
@@ -27,13 +27,13 @@ pub(crate) trait Tracer: Sync {
     fn center(&self, sphere: u32) -> Vec3;
 }
 
-impl Tracer for WideTree {
+impl Tracer for TreeView<'_> {
     fn nearest(&self, ray: &Ray) -> Option<(f32, u32)> {
-        WideTree::nearest(self, ray).map(|hit| (hit.t, hit.slot))
+        TreeView::nearest(self, ray).map(|hit| (hit.t, hit.slot))
     }
 
     fn any_hit(&self, ray: &Ray) -> bool {
-        WideTree::any_hit(self, ray)
+        TreeView::any_hit(self, ray)
     }
 
     fn center(&self, sphere: u32) -> Vec3 {
@@ -146,7 +146,7 @@ pub(crate) fn trace_shadow<T: Tracer>(tracer: &T, points: &[SurfacePoint]) -> us
 
 /// The same as [`trace_primary`], the rays of a square of pixels as one packet.
 pub(crate) fn trace_primary_packets(
-    tree: &WideTree,
+    tree: &TreeView,
     scene: &Scene,
     records: &mut Vec<HitRecord>,
 ) -> usize {
@@ -174,7 +174,7 @@ pub(crate) fn trace_primary_packets(
 }
 
 /// The same as [`trace_shadow`], the rays from a square of pixels as one packet.
-pub(crate) fn trace_shadow_packets(tree: &WideTree, points: &[SurfacePoint]) -> usize {
+pub(crate) fn trace_shadow_packets(tree: &TreeView, points: &[SurfacePoint]) -> usize {
     points
         .par_chunks(CHUNK)
         .map(|chunk| {
@@ -186,7 +186,7 @@ pub(crate) fn trace_shadow_packets(tree: &WideTree, points: &[SurfacePoint]) -> 
         .sum()
 }
 
-fn lit_of_square(tree: &WideTree, points: &[SurfacePoint]) -> usize {
+fn lit_of_square(tree: &TreeView, points: &[SurfacePoint]) -> usize {
     let mut packet = RayPacket::default();
     let mut rays = 0;
     for ray in points.iter().filter_map(|point| point.to_light()) {

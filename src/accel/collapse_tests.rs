@@ -4,8 +4,10 @@ use glam::Vec3;
 
 use super::binary::{BinaryNode, BinaryTree};
 use super::collapse::{self, Collapsed, Content};
+use super::levels::MAX_LEVELS;
 use super::report::PhaseClock;
-use super::wide::{MAX_LEVELS, WideTree};
+use super::view::TreeView;
+use super::wide::WideTree;
 use super::{Aabb, BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Block};
@@ -161,21 +163,19 @@ fn clipped_spheres_are_found_from_either_side_and_once() {
     assert!(tree.blocks.len() > whole.len(), "copies were kept");
     let mut other = TreeBuilder::new();
     other.build(&spheres(&centers), &BuildSettings::default());
+    let (tree, other) = (tree.view(), other.tree().view());
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
     let mut met = 0;
     for (i, target) in centers.iter().enumerate() {
         let away = Vec3::new(1.0, 0.3 * (i % 7) as f32 - 1.0, 0.1 * (i % 11) as f32);
         let ray = Ray::new(*target + away, -away.normalize());
         tree.crossings(&ray, &mut ours);
-        other.tree().crossings(&ray, &mut theirs);
+        other.crossings(&ray, &mut theirs);
         let told =
-            |tree: &WideTree, c: &super::traverse::TreeCrossing| (c.t, tree.particle(c.slot));
+            |tree: &TreeView, c: &super::traverse::TreeCrossing| (c.t, tree.particle(c.slot));
         assert_eq!(
             ours.iter().map(|c| told(&tree, c)).collect::<Vec<_>>(),
-            theirs
-                .iter()
-                .map(|c| told(other.tree(), c))
-                .collect::<Vec<_>>(),
+            theirs.iter().map(|c| told(&other, c)).collect::<Vec<_>>(),
             "ray {i}"
         );
         let hit = tree.nearest(&ray).map(|hit| hit.t);

@@ -36,9 +36,10 @@ impl WideTree {
         };
         let mut pending = Vec::new();
         pending.extend((!self.nodes.is_empty()).then_some((Linked::ROOT, everywhere)));
-        let (topology, directions) = (Linked::of(self), directions());
+        let (view, directions) = (self.view(), directions());
+        let topology = Linked::of(&view);
         while let Some((code, cell)) = pending.pop() {
-            match topology.place(code) {
+            match Linked::number(code) {
                 Place::Block(block) => {
                     for index in &self.indices[block * BLOCK_SIZE..][..BLOCK_SIZE] {
                         let index = *index as usize;

@@ -5,8 +5,9 @@
 
 use spherule_formats::order::kd;
 
+use super::levels::UpperLevels;
 use super::report::PhaseClock;
-use super::wide::{UpperLevels, WideTree};
+use super::wide::WideTree;
 use super::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
 
 /// Builds over `spheres` in the memory of `tree`.

@@ -8,8 +8,9 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::levels::UpperLevels;
 use super::report::PhaseClock;
-use super::wide::{UpperLevels, WideTree};
+use super::wide::WideTree;
 use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
 use spherule_formats::order::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
 use spherule_formats::order::partition::{Cells, scatter};

@@ -2,6 +2,7 @@
 
 use rayon::prelude::*;
 
+use super::levels::sah_cost;
 use super::topology::Link;
 use super::trim::TrimmedTree;
 use super::wide::WideTree;
@@ -125,7 +126,7 @@ pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aa
     tree.bounds = boxes.first().map_or(Aabb::EMPTY, |root| {
         root.padded(tree.padding).rounded_outwards()
     });
-    super::wide::sah_cost(areas, tree.bounds)
+    sah_cost(areas, tree.bounds)
 }
 
 /// What the nodes of one level are made from.

@@ -2,7 +2,7 @@
 //!
 //! One traversal, several builders: every structure ends as a [`wide::WideTree`] (8-wide nodes of
 //! one cache line over blocks of 16 particles), is rebuilt for every frame in buffers that live on,
-//! and reports itself in one [`BuildReport`]. Shading, files and jobs are none of its business.
+//! is traced through a [`view::TreeView`] and reports itself in one [`BuildReport`]. Shading, files and jobs are none of its business.
 
 use glam::Vec3;
 
@@ -14,6 +14,8 @@ mod collapse;
 mod coverage;
 mod kdtree;
 mod lbvh;
+mod leaves;
+mod levels;
 mod linked;
 mod packet;
 mod ploc;
@@ -26,6 +28,8 @@ pub mod traverse;
 mod trim;
 mod upper;
 mod validate;
+pub mod view;
+mod walk;
 pub mod wide;
 mod widen;
 

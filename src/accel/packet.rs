@@ -3,52 +3,26 @@
 //! Nodes and blocks are tested with the beam, and only the spheres inside it with the rays, all of them
 //! at once. What each ray finds is what it would find alone, to the bit.
 
-use super::simd::{Beam, KernelTask, LaneHits, PacketKernel, PacketSphere, lanes_near};
-use super::topology::{Implicit, Linked, Topology};
-use super::traverse::{TreeHit, walk};
-use super::wide::WideTree;
+use std::borrow::Borrow;
+
+use super::leaves::{Leaves, LoadedRadii};
+use super::simd::{Beam, LaneHits, PacketKernel, PacketSphere, lanes_near};
+use super::topology::Topology;
+use super::traverse::TreeHit;
+use super::view::{Resolved, TreeTask, TreeView};
+use super::walk::walk;
 use crate::ray::{PACKET_SIZE, RayPacket};
-use spherule_formats::blocks::BLOCK_SIZE;
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 
-impl WideTree {
-    /// [`WideTree::nearest`] of each ray.
+impl TreeView<'_> {
+    /// [`TreeView::nearest`] of each ray.
     pub fn nearest_packet(&self, packet: &RayPacket) -> [Option<TreeHit>; PACKET_SIZE] {
-        if self.links.is_empty() {
-            self.nearest_packet_in(Implicit::of(self), packet)
-        } else {
-            self.nearest_packet_in(Linked::of(self), packet)
-        }
+        self.run(NearestOfPacket { packet })
     }
 
-    /// [`WideTree::any_hit`] of each ray, a bit for each lane.
+    /// [`TreeView::any_hit`] of each ray, a bit for each lane.
     pub fn any_hit_packet(&self, packet: &RayPacket) -> u32 {
-        if self.links.is_empty() {
-            self.any_hit_packet_in(Implicit::of(self), packet)
-        } else {
-            self.any_hit_packet_in(Linked::of(self), packet)
-        }
-    }
-
-    #[inline]
-    fn nearest_packet_in<T: Topology>(
-        &self,
-        topology: T,
-        packet: &RayPacket,
-    ) -> [Option<TreeHit>; PACKET_SIZE] {
-        self.simd.run(NearestOfPacket {
-            tree: self,
-            topology,
-            packet,
-        })
-    }
-
-    #[inline]
-    fn any_hit_packet_in<T: Topology>(&self, topology: T, packet: &RayPacket) -> u32 {
-        self.simd.run(AnyOfPacket {
-            tree: self,
-            topology,
-            packet,
-        })
+        self.run(AnyOfPacket { packet })
     }
 }
 
@@ -85,60 +59,77 @@ fn unmet(packet: &RayPacket, lanes: u32) -> LaneHits {
     }
 }
 
-/// The sphere in `lane` of `block`.
-#[inline(always)]
-fn sphere(tree: &WideTree, block: usize, lane: usize) -> PacketSphere {
-    let centers = &tree.blocks[block];
-    let radius = tree.radii.get(block).map_or(tree.radius, |r| r.0[lane]);
-    #[expect(
-        clippy::cast_possible_truncation,
-        reason = "slots are counted in 32 bits"
-    )]
-    PacketSphere {
-        center: [centers.x[lane], centers.y[lane], centers.z[lane]],
-        radius_squared: radius * radius,
-        slot: (block * BLOCK_SIZE + lane) as u32,
+/// A block for a packet.
+struct PacketBlock<'a> {
+    index: usize,
+    centers: &'a Block,
+    radii: Option<&'a BlockRadii>,
+    /// The common radius.
+    radius: f32,
+}
+
+impl PacketBlock<'_> {
+    /// The sphere in `lane`.
+    #[inline(always)]
+    fn sphere(&self, lane: usize) -> PacketSphere {
+        let centers = self.centers;
+        let radius = self.radii.map_or(self.radius, |r| r.0[lane]);
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "slots are counted in 32 bits"
+        )]
+        PacketSphere {
+            center: [centers.x[lane], centers.y[lane], centers.z[lane]],
+            radius_squared: radius * radius,
+            slot: (self.index * BLOCK_SIZE + lane) as u32,
+        }
     }
 }
 
-struct NearestOfPacket<'a, T> {
-    tree: &'a WideTree,
-    topology: T,
-    packet: &'a RayPacket,
+struct NearestOfPacket<'r> {
+    packet: &'r RayPacket,
 }
 
-impl<T: Topology> KernelTask for NearestOfPacket<'_, T> {
+impl TreeTask for NearestOfPacket<'_> {
     type Output = [Option<TreeHit>; PACKET_SIZE];
 
     #[inline(always)]
-    fn run<K: PacketKernel>(self, kernel: K) -> Self::Output {
-        let Self {
-            tree,
-            topology,
-            packet,
-        } = self;
-        let lanes = lanes_near(packet, &tree.bounds);
+    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        self,
+        kernel: K,
+        tree: Resolved<'a, T, L>,
+    ) -> Self::Output {
+        let (packet, view) = (self.packet, tree.view);
+        let lanes = lanes_near(packet, &view.bounds);
         if lanes == 0 {
             return [None; PACKET_SIZE];
         }
         let mut hits = unmet(packet, lanes);
-        let Some(beam) = Beam::around(packet, lanes, tree.radius, tree.padding) else {
-            return nearest_one_by_one(tree, packet, &hits);
+        let Some(beam) = Beam::around(packet, lanes, view.radius, view.padding) else {
+            return nearest_one_by_one(view, packet, &hits);
         };
         let mut blocks_left = MOST_BLOCKS;
         walk(
             kernel,
             tree,
-            topology,
             |node, limit| kernel.test_node_with_beam(&beam, node, limit),
             hits.farthest(),
-            |block, limit| {
-                let (spheres, radii) = (&tree.blocks[block], tree.radii.get(block));
-                for lane in lanes_of(kernel.spheres_in_beam(&beam, spheres, radii, limit)) {
-                    let sphere = sphere(tree, block, lane);
+            |index, limit| {
+                let centers = tree.leaves.load(kernel, index);
+                let radii = LoadedRadii::of(&view.radii, index);
+                let (centers, radii) = (centers.borrow(), radii.as_ref());
+                let found = kernel.spheres_in_beam(&beam, centers, radii, limit);
+                let block = PacketBlock {
+                    index,
+                    centers,
+                    radii,
+                    radius: view.radius,
+                };
+                for lane in lanes_of(found) {
+                    let sphere = block.sphere(lane);
                     let tied = kernel.nearest_of_packet(packet, &sphere, &mut hits);
                     if tied != 0 {
-                        settle_ties(tree, tied, sphere.slot, &mut hits);
+                        settle_ties(view, tied, sphere.slot, &mut hits);
                     }
                 }
                 blocks_left -= 1;
@@ -149,7 +140,7 @@ impl<T: Topology> KernelTask for NearestOfPacket<'_, T> {
             },
         );
         if blocks_left == 0 {
-            return nearest_one_by_one(tree, packet, &hits);
+            return nearest_one_by_one(view, packet, &hits);
         }
         std::array::from_fn(|lane| {
             let (t, slot) = (hits.limit[lane], hits.slot[lane]);
@@ -160,7 +151,7 @@ impl<T: Topology> KernelTask for NearestOfPacket<'_, T> {
 
 /// Gives `slot` to those of the `tied` lanes in which it comes before what they have.
 #[cold]
-fn settle_ties(tree: &WideTree, tied: u32, slot: u32, hits: &mut LaneHits) {
+fn settle_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut LaneHits) {
     for lane in lanes_of(tied) {
         let held = &mut hits.slot[lane];
         if tree.tie_order(slot, *held).is_lt() {
@@ -173,7 +164,7 @@ fn settle_ties(tree: &WideTree, tied: u32, slot: u32, hits: &mut LaneHits) {
 /// where boxes are rounded, that could lose a hit just in front of one.
 #[cold]
 fn nearest_one_by_one(
-    tree: &WideTree,
+    tree: &TreeView,
     packet: &RayPacket,
     hits: &LaneHits,
 ) -> [Option<TreeHit>; PACKET_SIZE] {
@@ -186,43 +177,49 @@ fn nearest_one_by_one(
     found
 }
 
-struct AnyOfPacket<'a, T> {
-    tree: &'a WideTree,
-    topology: T,
-    packet: &'a RayPacket,
+struct AnyOfPacket<'r> {
+    packet: &'r RayPacket,
 }
 
-impl<T: Topology> KernelTask for AnyOfPacket<'_, T> {
+impl TreeTask for AnyOfPacket<'_> {
     type Output = u32;
 
     #[inline(always)]
-    fn run<K: PacketKernel>(self, kernel: K) -> u32 {
-        let Self {
-            tree,
-            topology,
-            packet,
-        } = self;
-        let lanes = lanes_near(packet, &tree.bounds);
+    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        self,
+        kernel: K,
+        tree: Resolved<'a, T, L>,
+    ) -> u32 {
+        let (packet, view) = (self.packet, tree.view);
+        let lanes = lanes_near(packet, &view.bounds);
         if lanes == 0 {
             return 0;
         }
         let mut hits = unmet(packet, lanes);
-        let Some(beam) = Beam::around(packet, lanes, tree.radius, tree.padding) else {
-            return any_one_by_one(tree, packet, &hits);
+        let Some(beam) = Beam::around(packet, lanes, view.radius, view.padding) else {
+            return any_one_by_one(view, packet, &hits);
         };
         let mut met = 0;
         let mut blocks_left = MOST_BLOCKS;
         walk(
             kernel,
             tree,
-            topology,
             |node, limit| kernel.test_node_with_beam(&beam, node, limit),
             hits.farthest(),
-            |block, mut limit| {
-                let (spheres, radii) = (&tree.blocks[block], tree.radii.get(block));
+            |index, mut limit| {
+                let centers = tree.leaves.load(kernel, index);
+                let radii = LoadedRadii::of(&view.radii, index);
+                let (centers, radii) = (centers.borrow(), radii.as_ref());
+                let inside = kernel.spheres_in_beam(&beam, centers, radii, limit);
+                let block = PacketBlock {
+                    index,
+                    centers,
+                    radii,
+                    radius: view.radius,
+                };
                 let mut found = 0;
-                for lane in lanes_of(kernel.spheres_in_beam(&beam, spheres, radii, limit)) {
-                    found |= kernel.any_of_packet(packet, &sphere(tree, block, lane), &hits);
+                for lane in lanes_of(inside) {
+                    found |= kernel.any_of_packet(packet, &block.sphere(lane), &hits);
                 }
                 if found != 0 {
                     met |= found;
@@ -234,7 +231,7 @@ impl<T: Topology> KernelTask for AnyOfPacket<'_, T> {
             },
         );
         if blocks_left == 0 {
-            met |= any_one_by_one(tree, packet, &hits);
+            met |= any_one_by_one(view, packet, &hits);
         }
         met
     }
@@ -242,7 +239,7 @@ impl<T: Topology> KernelTask for AnyOfPacket<'_, T> {
 
 /// Tests those rays alone that a packet left undecided.
 #[cold]
-fn any_one_by_one(tree: &WideTree, packet: &RayPacket, hits: &LaneHits) -> u32 {
+fn any_one_by_one(tree: &TreeView, packet: &RayPacket, hits: &LaneHits) -> u32 {
     (0..PACKET_SIZE)
         .filter(|lane| hits.limit[*lane] >= 0.0 && tree.any_hit(&packet.ray(*lane)))
         .fold(0, |met, lane| met | 1 << lane)

@@ -41,7 +41,10 @@ pub struct BuildReport {
     pub position_bytes: u64,
     /// Bytes of the nodes and of the way back to the frame's order.
     pub structure_bytes: u64,
-    /// Most bytes held at any time while building, the input not counted.
+    /// The part of these two that lies in a mapped file, whose pages the system may drop.
+    pub file_bytes: u64,
+    /// Most bytes held at any time while building, the input not counted unless it is traced where it
+    /// lies.
     pub peak_bytes: u64,
     /// The instruction set that rays are traced with.
     pub simd: &'static str,

@@ -233,7 +233,7 @@ fn check_ray(
     indexed: bool,
     level: SimdLevel,
 ) -> bool {
-    let tree = builder.tree();
+    let tree = builder.tree().view();
     let mut nearest: Option<(f64, usize)> = None;
     let mut doubtful = false;
     let mut certain_crossings = 0;
@@ -329,7 +329,7 @@ fn levels_with_fused_multiply_add_agree_to_the_bit() {
             for ray in rays(&scene, 2000, 5) {
                 let [a, b] = fused.map(|level| {
                     builder.tree_mut().set_simd(level);
-                    builder.tree().nearest(&ray)
+                    builder.tree().view().nearest(&ray)
                 });
                 assert_eq!(a, b, "{} {settings:?} {ray:?}", scene.name);
             }
@@ -350,9 +350,10 @@ fn fused_kernels_of_all_processors_agree_to_the_bit() {
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut crossings = Vec::new();
         for ray in rays(&scene, 2000, 22) {
-            builder.tree().crossings(&ray, &mut crossings);
+            builder.tree().view().crossings(&ray, &mut crossings);
             let nearest = builder
                 .tree()
+                .view()
                 .nearest(&ray)
                 .map_or(0, |hit| hit.t.to_bits());
             let all = crossings.iter().map(|c| c.t.to_bits());
@@ -523,9 +524,13 @@ fn large_scenes_match_a_particle_tree() {
                 }
                 judged += 1;
                 let what = format!("{} {settings:?} {ray:?}", scene.name);
-                let hit = builder.tree().nearest(ray);
+                let hit = builder.tree().view().nearest(ray);
                 assert_eq!(hit.is_some(), nearest.is_some(), "{what}");
-                assert_eq!(builder.tree().any_hit(ray), nearest.is_some(), "{what}");
+                assert_eq!(
+                    builder.tree().view().any_hit(ray),
+                    nearest.is_some(),
+                    "{what}"
+                );
                 if let (Some(hit), Some((t, _))) = (hit, nearest) {
                     assert!((f64::from(hit.t) - t).abs() < 1e-4, "{what}: {} {t}", hit.t);
                 }

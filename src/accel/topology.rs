@@ -6,20 +6,20 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::wide::WideTree;
-use spherule_formats::blocks::WIDTH;
+use super::view::{LEVEL_CODES, TreeView};
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// What a code stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place {
-    /// A node, by its place in `WideTree::nodes`.
-    Node(usize),
-    /// A block, by its place in `WideTree::blocks`.
+pub(super) enum Place<N> {
+    /// A node.
+    Node(N),
+    /// A block, by its number.
     Block(usize),
 }
 
 /// The shape of a tree.
-pub(super) trait Topology: Copy {
+pub(super) trait Topology<'a>: Copy {
     /// What is known of a node's children before one is chosen.
     type Children: Copy;
 
@@ -27,7 +27,7 @@ pub(super) trait Topology: Copy {
     const ROOT: u32 = 0;
 
     /// What `code` stands for.
-    fn place(self, code: u32) -> Place;
+    fn place(self, code: u32) -> Place<&'a Node>;
 
     /// The children of the node with `code`.
     fn children(self, code: u32) -> Self::Children;
@@ -41,34 +41,50 @@ const INDEX_BITS: u32 = 28;
 const INDEX_MASK: u32 = (1 << INDEX_BITS) - 1;
 /// Most nodes or blocks that a code can tell apart.
 pub(super) const MAX_INDEX: usize = 1 << INDEX_BITS;
+const _: () = assert!(LEVEL_CODES == 1 << (u32::BITS - INDEX_BITS));
 
 /// Whole levels: child `c` of node `i` is node `8 i + c` one level down, but on the one level that is
 /// mapped. A code is the level in the upper bits, the number in the level under it.
 #[derive(Clone, Copy)]
 pub(super) struct Implicit<'a> {
-    tree: &'a WideTree,
-    levels: u32,
+    levels: &'a [&'a [Node]; LEVEL_CODES],
+    depth: u32,
+    mapped_level: u32,
+    mapped: &'a [u32],
 }
 
 impl<'a> Implicit<'a> {
-    pub(super) fn of(tree: &'a WideTree) -> Self {
-        #[expect(clippy::cast_possible_truncation, reason = "ten levels at most")]
-        let levels = tree.level_starts.len() as u32;
-        Self { tree, levels }
+    pub(super) fn of(tree: &'a TreeView<'a>) -> Self {
+        Self {
+            levels: &tree.levels,
+            depth: tree.depth,
+            mapped_level: tree.mapped_level,
+            mapped: tree.mapped,
+        }
+    }
+
+    /// Number of the first child of node `index` on `level`, among the nodes (or blocks) below.
+    #[inline(always)]
+    pub(super) fn first_child(self, level: u32, index: usize) -> usize {
+        if level == self.mapped_level {
+            self.mapped[index] as usize * WIDTH
+        } else {
+            index * WIDTH
+        }
     }
 }
 
-impl Topology for Implicit<'_> {
+impl<'a> Topology<'a> for Implicit<'a> {
     /// Code of the first child.
     type Children = u32;
 
     #[inline(always)]
-    fn place(self, code: u32) -> Place {
+    fn place(self, code: u32) -> Place<&'a Node> {
         let (level, index) = (code >> INDEX_BITS, (code & INDEX_MASK) as usize);
-        if level == self.levels {
+        if level == self.depth {
             Place::Block(index)
         } else {
-            Place::Node(self.tree.level_starts[level as usize] as usize + index)
+            Place::Node(&self.levels[level as usize][index])
         }
     }
 
@@ -76,7 +92,7 @@ impl Topology for Implicit<'_> {
     #[expect(clippy::cast_possible_truncation, reason = "fewer than 2^28 blocks")]
     fn children(self, code: u32) -> u32 {
         let (level, index) = (code >> INDEX_BITS, (code & INDEX_MASK) as usize);
-        let first = self.tree.first_child(level, index) as u32;
+        let first = self.first_child(level, index) as u32;
         ((level + 1) << INDEX_BITS) | first
     }
 
@@ -138,30 +154,43 @@ const BLOCK: u32 = 1 << 31;
 /// set.
 #[derive(Clone, Copy)]
 pub(super) struct Linked<'a> {
-    tree: &'a WideTree,
+    nodes: &'a [Node],
+    links: &'a [Link],
 }
 
 impl<'a> Linked<'a> {
-    pub(super) fn of(tree: &'a WideTree) -> Self {
-        Self { tree }
+    pub(super) fn of(tree: &TreeView<'a>) -> Self {
+        Self {
+            nodes: tree.levels[0],
+            links: tree.links,
+        }
     }
-}
 
-impl Topology for Linked<'_> {
-    type Children = Link;
-
+    /// What `code` stands for, a node by its number.
     #[inline(always)]
-    fn place(self, code: u32) -> Place {
+    pub(super) fn number(code: u32) -> Place<usize> {
         if code & BLOCK != 0 {
             Place::Block((code & !BLOCK) as usize)
         } else {
             Place::Node(code as usize)
         }
     }
+}
+
+impl<'a> Topology<'a> for Linked<'a> {
+    type Children = Link;
+
+    #[inline(always)]
+    fn place(self, code: u32) -> Place<&'a Node> {
+        match Self::number(code) {
+            Place::Block(block) => Place::Block(block),
+            Place::Node(node) => Place::Node(&self.nodes[node]),
+        }
+    }
 
     #[inline(always)]
     fn children(self, code: u32) -> Link {
-        self.tree.links[code as usize]
+        self.links[code as usize]
     }
 
     #[inline(always)]
@@ -177,6 +206,7 @@ impl Topology for Linked<'_> {
 
 #[cfg(test)]
 mod tests {
+    use super::super::wide::WideTree;
     use super::*;
 
     #[test]
@@ -185,9 +215,10 @@ mod tests {
             links: vec![Link::new(MAX_INDEX - 1, 1, 7), Link::new(0, 0, 3)],
             ..WideTree::default()
         };
-        let linked = Linked::of(&tree);
+        let view = tree.view();
+        let linked = Linked::of(&view);
         let places = |code: u32| {
-            [0, 1, 2].map(|slot| linked.place(linked.child(linked.children(code), slot)))
+            [0, 1, 2].map(|slot| Linked::number(linked.child(linked.children(code), slot)))
         };
         assert_eq!(
             places(0),

@@ -1,8 +1,10 @@
 //! Proof that a tree is sound: every child inside its own parent, every particle in the tree
 //! exactly once, or its parts covering it (`coverage.rs`). Debug builds run it after each build.
 
-use super::topology::{Linked, Place, Topology};
-use super::wide::{MAX_LEVELS, WideTree};
+use super::levels::MAX_LEVELS;
+use super::topology::{Implicit, Linked, Place, Topology};
+use super::view::TreeView;
+use super::wide::WideTree;
 use super::{Aabb, SphereRadius, Spheres};
 use spherule_formats::blocks::BLOCK_SIZE;
 
@@ -41,12 +43,14 @@ impl WideTree {
 
     /// Checks whole levels from the blocks up.
     fn validate_levels(&self) -> Result<(), String> {
+        let view = self.view();
+        let topology = Implicit::of(&view);
         let levels = self.level_starts.len();
         let mut below: Vec<Aabb> = (0..self.blocks.len())
             .map(|b| self.block_bounds(b))
             .collect();
         for level in (0..levels).rev() {
-            below = self.validate_level(level, &below)?;
+            below = self.validate_level(level, topology, &below)?;
         }
         if levels > 0 && below.len() != 1 {
             return Err(format!("{} roots", below.len()));
@@ -55,7 +59,12 @@ impl WideTree {
     }
 
     /// Checks one level over the boxes of the next, and returns its own boxes.
-    fn validate_level(&self, level: usize, below: &[Aabb]) -> Result<Vec<Aabb>, String> {
+    fn validate_level(
+        &self,
+        level: usize,
+        topology: Implicit,
+        below: &[Aabb],
+    ) -> Result<Vec<Aabb>, String> {
         let start = self.level_starts[level] as usize;
         let end = self
             .level_starts
@@ -67,7 +76,7 @@ impl WideTree {
         for (index, node) in self.nodes[start..end].iter().enumerate() {
             let mut bounds = Aabb::EMPTY;
             for slot in 0..node.child_count() {
-                let place = self.first_child(number, index) + slot;
+                let place = topology.first_child(number, index) + slot;
                 let Some(child) = below.get(place) else {
                     return Err(format!("level {level} node {index}: no child {slot}"));
                 };
@@ -108,7 +117,7 @@ impl WideTree {
             return reached.all();
         }
         reached.nodes[0] = true;
-        self.validate_below(Linked::ROOT, MAX_LEVELS, &mut reached)?;
+        self.validate_below(&self.view(), Linked::ROOT, MAX_LEVELS, &mut reached)?;
         reached.all()
     }
 
@@ -116,12 +125,13 @@ impl WideTree {
     /// box of what is in it.
     fn validate_below(
         &self,
+        view: &TreeView,
         code: u32,
         levels: usize,
         reached: &mut Reached,
     ) -> Result<Aabb, String> {
-        let topology = Linked::of(self);
-        let Place::Node(index) = topology.place(code) else {
+        let topology = Linked::of(view);
+        let Place::Node(index) = Linked::number(code) else {
             return Err(format!("code {code} is no node"));
         };
         if levels == 0 {
@@ -131,13 +141,13 @@ impl WideTree {
         let mut own = Aabb::EMPTY;
         for slot in 0..spherule_formats::order::index_u32(node.child_count()) {
             let child = topology.child(topology.children(code), slot);
-            let place = topology.place(child);
+            let place = Linked::number(child);
             reached
                 .mark(place)
                 .map_err(|fault| format!("node {index}, child {slot}: {fault}"))?;
             let bounds = match place {
                 Place::Block(block) => self.block_bounds(block),
-                Place::Node(_) => self.validate_below(child, levels - 1, reached)?,
+                Place::Node(_) => self.validate_below(view, child, levels - 1, reached)?,
             };
             // Of clipped spheres, whether parts cover them is seen from above (`coverage.rs`).
             if !self.is_clipped && !node.child_holds(slot as usize, &bounds) {
@@ -159,7 +169,7 @@ impl WideTree {
             };
         }
         let mut seen = vec![false; self.count];
-        for slot in 0..self.slot_count() {
+        for slot in 0..self.view().slot_count() {
             let index = self.indices[slot] as usize;
             match seen.get_mut(index) {
                 Some(seen) if self.has_copies || !*seen => *seen = true,
@@ -190,7 +200,7 @@ struct Reached {
 }
 
 impl Reached {
-    fn mark(&mut self, place: Place) -> Result<(), String> {
+    fn mark(&mut self, place: Place<usize>) -> Result<(), String> {
         let mark = match place {
             Place::Node(node) => self.nodes.get_mut(node),
             Place::Block(block) => self.blocks.get_mut(block),

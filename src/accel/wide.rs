@@ -11,26 +11,17 @@
 use glam::Vec3;
 use rayon::prelude::*;
 
+use super::levels::{Child, UpperLevels, build_levels, level_counts, level_starts, sah_cost};
 use super::simd::{SimdLevel, Supported};
 use super::topology::Link;
+use super::view::{LEVEL_CODES, TieOrder, TreeView, split_levels};
 use super::{Aabb, BuildReport, Phase, Structure};
-use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
-use spherule_formats::blocks::{Node, WIDTH};
+use spherule_formats::blocks::{
+    BLOCK_SIZE, Block, BlockRadii, Node, StoredBlocks, StoredRadii, WIDTH,
+};
+use spherule_formats::order::index_u32;
 
-/// Node levels at most. Whole levels need ten: 8^10 blocks of 16 are more particles than 32 bits
-/// count. Builders of other shapes keep to it by balancing what would grow deeper.
-pub(super) const MAX_LEVELS: usize = 12;
-
-/// The order of the levels above subtrees of about a thousand particles.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum UpperLevels {
-    /// That of the particles.
-    InOrder,
-    /// One of their own, where that of the particles makes no compact nodes (see `upper.rs`).
-    Mapped,
-}
-
-/// A tree over spheres. See [`WideTree::nearest`] and its neighbours.
+/// A tree over spheres that owns all of it. Rays see its [`WideTree::view`].
 #[derive(Debug, Default)]
 pub struct WideTree {
     pub(super) nodes: Vec<Node>,
@@ -63,19 +54,39 @@ pub struct WideTree {
 }
 
 impl WideTree {
-    /// Box of the spheres; empty without particles.
-    pub fn bounds(&self) -> Aabb {
-        self.bounds
-    }
-
-    /// Particles.
-    pub fn len(&self) -> usize {
-        self.count
-    }
-
-    /// True if there is nothing to hit.
-    pub fn is_empty(&self) -> bool {
-        self.count == 0
+    /// The tree as rays see it.
+    pub fn view(&self) -> TreeView<'_> {
+        let mut levels: [&[Node]; LEVEL_CODES] = [&[]; LEVEL_CODES];
+        if self.links.is_empty() {
+            split_levels(&self.nodes, &self.level_starts, &mut levels);
+        } else {
+            levels[0] = &self.nodes;
+        }
+        TreeView {
+            levels,
+            depth: index_u32(self.level_starts.len()),
+            mapped_level: self.mapped_level,
+            mapped: &self.mapped,
+            links: &self.links,
+            blocks: StoredBlocks::F32(&self.blocks),
+            radii: if self.radii.is_empty() {
+                StoredRadii::None
+            } else {
+                StoredRadii::F32(&self.radii)
+            },
+            radius: self.radius,
+            padding: self.padding,
+            has_copies: self.has_copies,
+            indices: &self.indices,
+            ties: if self.indices.is_empty() {
+                TieOrder::Center
+            } else {
+                TieOrder::Index
+            },
+            count: self.count,
+            bounds: self.bounds,
+            simd: self.simd,
+        }
     }
 
     /// The instruction set that rays are traced with.
@@ -86,25 +97,6 @@ impl WideTree {
     /// Traces with `level` from now on, or with the best the machine has if it lacks that.
     pub fn set_simd(&mut self, level: SimdLevel) {
         self.simd = Supported::or_best(level);
-    }
-
-    /// Number of the first child of node `index` on `level`, among the nodes (or blocks) below.
-    #[inline(always)]
-    pub(super) fn first_child(&self, level: u32, index: usize) -> usize {
-        if level == self.mapped_level {
-            self.mapped[index] as usize * WIDTH
-        } else {
-            index * WIDTH
-        }
-    }
-
-    /// Slots that hold particles to be told apart: all, or those before the last block's padding.
-    pub(super) fn slot_count(&self) -> usize {
-        if self.has_copies {
-            self.blocks.len() * BLOCK_SIZE
-        } else {
-            self.count
-        }
     }
 
     /// Lanes in use. Where there may be copies, those that fill a block up repeat its last particle,
@@ -120,19 +112,6 @@ impl WideTree {
         };
         let blocks = self.indices.par_chunks_exact(BLOCK_SIZE);
         blocks.map(|block| used(block) as u64).sum()
-    }
-
-    /// Index in the frame of the particle in `slot` (tree order), or the slot itself when the way
-    /// back was not kept.
-    pub fn particle(&self, slot: u32) -> u32 {
-        self.indices.get(slot as usize).copied().unwrap_or(slot)
-    }
-
-    /// Centre and radius of the particle in `slot`.
-    pub fn sphere(&self, slot: u32) -> (Vec3, f32) {
-        let (block, lane) = (slot as usize / BLOCK_SIZE, slot as usize % BLOCK_SIZE);
-        let radius = self.radii.get(block).map_or(self.radius, |r| r.0[lane]);
-        (self.blocks[block].center(lane), radius)
     }
 
     /// Makes room for `count` particles; what was there is gone, memory stays.
@@ -208,44 +187,30 @@ impl WideTree {
             .with_min_len(256)
             .for_each(Block::transpose_points);
         let counts = level_counts(self.blocks.len());
-        self.level_starts.clear();
-        let mut total = 0_usize;
-        for count in &counts {
-            self.level_starts
-                .push(spherule_formats::order::index_u32(total));
-            total += count;
-        }
-        self.nodes.resize(total, bytemuck::Zeroable::zeroed());
-        let mapped_level = match upper {
-            UpperLevels::InOrder => None,
-            UpperLevels::Mapped => mapped_level(counts.len()),
+        self.level_starts = level_starts(&counts);
+        self.nodes
+            .resize(counts.iter().sum(), bytemuck::Zeroable::zeroed());
+        let mapped_level = upper.mapped_level(counts.len());
+        self.mapped_level = mapped_level.map_or(u32::MAX, index_u32);
+        let (blocks, radii) = (&self.blocks, &self.radii);
+        let child = |index: usize| {
+            let block = blocks.get(index)?;
+            Some(Child {
+                bounds: match radii.get(index) {
+                    Some(radii) => block.sphere_bounds(radii),
+                    None => block.bounds(),
+                },
+                inner_area: 0.0,
+            })
         };
-        self.mapped_level = mapped_level.map_or(u32::MAX, spherule_formats::order::index_u32);
-        self.mapped.clear();
-        let (mut boxes, mut areas) = (Vec::new(), 0.0);
-        let mut rest = &mut self.nodes[..];
-        for (depth, count) in counts.iter().enumerate().rev() {
-            let (upper, level) = rest.split_at_mut(rest.len() - count);
-            rest = upper;
-            let below = std::mem::take(&mut boxes);
-            let children = if depth + 1 == counts.len() {
-                Children::Blocks(&self.blocks, &self.radii)
-            } else {
-                Children::Nodes(&below)
-            };
-            let (level_boxes, child_areas) = build_level(level, &children, self.padding);
-            boxes = level_boxes;
-            areas += child_areas;
-            if Some(depth) == mapped_level {
-                self.mapped = super::upper::kd_order(&boxes);
-                bring_into_order(level, &mut boxes, &self.mapped);
-            }
-        }
-        self.bounds = match boxes.first() {
-            Some(root) => root.padded(self.padding).rounded_outwards(),
-            None => Aabb::EMPTY,
+        let nodes = &mut self.nodes[..];
+        let built = build_levels(nodes, &counts, mapped_level, self.padding, child);
+        self.mapped = built.mapped;
+        self.bounds = match blocks.is_empty() {
+            true => Aabb::EMPTY,
+            false => built.bounds.padded(self.padding).rounded_outwards(),
         };
-        sah_cost(areas, self.bounds)
+        sah_cost(built.child_areas, self.bounds)
     }
 
     /// The report of the build that just ended.
@@ -275,104 +240,13 @@ impl WideTree {
             references: self.reference_count(),
             nodes: self.nodes.len() as u64,
             leaves: self.blocks.len() as u64,
-            depth: spherule_formats::order::index_u32(self.level_starts.len()),
+            depth: index_u32(self.level_starts.len()),
             sah_cost,
             position_bytes,
             structure_bytes,
+            file_bytes: 0,
             peak_bytes: position_bytes + structure_bytes + boxes.max(sort_bytes),
             simd: self.simd().name(),
         }
     }
-}
-
-/// Expected tests of a ray that meets the `root` box, over children whose areas are summed up.
-pub(super) fn sah_cost(child_areas: f64, root: Aabb) -> f64 {
-    let root_area = root.area();
-    if root_area > 0.0 {
-        1.0 + child_areas / root_area
-    } else {
-        1.0
-    }
-}
-
-/// Levels of nodes that stay in the order of the particles: subtrees of 8 * 8 blocks.
-const LOWER_LEVELS: usize = 2;
-
-/// The level of the roots of those subtrees, if there are levels above it to gain by another order.
-fn mapped_level(levels: usize) -> Option<usize> {
-    levels.checked_sub(LOWER_LEVELS).filter(|level| *level > 0)
-}
-
-/// Puts the nodes of a level and their boxes into `order`.
-fn bring_into_order(level: &mut [Node], boxes: &mut Vec<Aabb>, order: &[u32]) {
-    let old = level.to_vec();
-    for (node, place) in level.iter_mut().zip(order) {
-        *node = old[*place as usize];
-    }
-    *boxes = order.iter().map(|place| boxes[*place as usize]).collect();
-}
-
-/// What the nodes of a level enclose.
-enum Children<'a> {
-    Blocks(&'a [Block], &'a [BlockRadii]),
-    Nodes(&'a [Aabb]),
-}
-
-impl Children<'_> {
-    fn bounds(&self, index: usize) -> Option<Aabb> {
-        match self {
-            Self::Blocks(blocks, radii) => {
-                let block = blocks.get(index)?;
-                Some(match radii.get(index) {
-                    Some(radii) => block.sphere_bounds(radii),
-                    None => block.bounds(),
-                })
-            }
-            Self::Nodes(boxes) => boxes.get(index).copied(),
-        }
-    }
-}
-
-/// Nodes of each level, root level first; empty without blocks.
-fn level_counts(blocks: usize) -> Vec<usize> {
-    let mut counts = Vec::new();
-    let mut count = blocks;
-    while count > 1 || (count == 1 && counts.is_empty()) {
-        count = count.div_ceil(WIDTH);
-        counts.push(count);
-    }
-    counts.reverse();
-    counts
-}
-
-/// Fills `level`; returns the box of each node and the summed area of the children.
-fn build_level(level: &mut [Node], children: &Children, radius: f32) -> (Vec<Aabb>, f64) {
-    // Areas are summed by runs of a fixed length, so that the sum does not depend on the threads.
-    const RUN: usize = 1024;
-    let mut boxes = vec![Aabb::EMPTY; level.len()];
-    let areas: Vec<f64> = level
-        .par_chunks_mut(RUN)
-        .zip(boxes.par_chunks_mut(RUN))
-        .enumerate()
-        .map(|(run, (nodes, boxes))| {
-            let mut area = 0.0;
-            for (offset, (node, own)) in nodes.iter_mut().zip(boxes).enumerate() {
-                let first = (run * RUN + offset) * WIDTH;
-                let mut bounds = [Aabb::EMPTY; WIDTH];
-                let mut used = 0;
-                while let Some(child) = (used < WIDTH)
-                    .then(|| children.bounds(first + used))
-                    .flatten()
-                {
-                    area += child.padded(radius).area();
-                    *own = own.union(child);
-                    bounds[used] = child;
-                    used += 1;
-                }
-                *node = Node::enclosing(&bounds[..used]);
-            }
-            area
-        })
-        .collect();
-    (boxes, areas.iter().sum())
 }

@@ -6,9 +6,9 @@
 
 use rayon::prelude::*;
 
+use super::levels::MAX_LEVELS;
 use super::topology::Link;
 use super::trim::TrimmedTree;
-use super::wide::MAX_LEVELS;
 use spherule_formats::blocks::WIDTH;
 use spherule_formats::order::index_u32;
 

@@ -131,7 +131,7 @@ impl FrameTracer {
             ids: frame.ids.as_deref(),
             velocities: frame.velocities.as_deref(),
         };
-        let surface = SphereSurface::new(self.builder.tree());
+        let surface = SphereSurface::new(self.builder.tree().view());
         render(&surface, &setup.scene, &source, &setup.render, stop)
     }
 }

@@ -225,7 +225,7 @@ fn packets_make_the_same_film_as_single_rays() {
             radius,
         };
         builder.build(&spheres, &BuildSettings::default());
-        let surface = SphereSurface::new(builder.tree());
+        let surface = SphereSurface::new(builder.tree().view());
         for (samples, transmission) in [(1, 0.0), (5, 0.0), (16, 0.0), (2, 0.8)] {
             let scene = heap_scene(transmission);
             let settings = RenderSettings {

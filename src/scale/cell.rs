@@ -124,7 +124,7 @@ struct Images {
 fn trace(builder: &TreeBuilder, request: &CellRequest, peaks: &Peaks) -> Result<Images, String> {
     let settings = render_settings(request);
     let aspect = f64::from(request.width) / f64::from(request.height);
-    let surface = SphereSurface::new(builder.tree());
+    let surface = SphereSurface::new(builder.tree().view());
     let shading = ParticleShading::constant(DEFAULT_COLOR);
     let never = AtomicBool::new(false);
     let mut images = Images {

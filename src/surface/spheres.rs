@@ -1,4 +1,4 @@
-//! Opaque or transmissive spheres, each a body of its own, found through a [`WideTree`].
+//! Opaque or transmissive spheres, each a body of its own, found through a [`TreeView`].
 
 use std::cell::RefCell;
 
@@ -6,7 +6,7 @@ use glam::Vec3;
 
 use super::{Dimming, Surface, SurfaceHit};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
-use crate::accel::wide::WideTree;
+use crate::accel::view::TreeView;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 /// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
@@ -18,12 +18,12 @@ const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 /// The spheres of a tree.
 #[derive(Debug, Clone, Copy)]
 pub struct SphereSurface<'a> {
-    tree: &'a WideTree,
+    tree: TreeView<'a>,
 }
 
 impl<'a> SphereSurface<'a> {
     /// The spheres of `tree`.
-    pub fn new(tree: &'a WideTree) -> Self {
+    pub fn new(tree: TreeView<'a>) -> Self {
         Self { tree }
     }
 

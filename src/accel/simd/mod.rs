@@ -7,8 +7,9 @@
 use glam::Vec3;
 
 use crate::ray::Ray;
-use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
-use spherule_formats::blocks::{Node, WIDTH};
+use spherule_formats::blocks::{
+    BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, Q10Block, Q16Block, WIDTH,
+};
 
 mod beam;
 mod loop_packet;
@@ -92,6 +93,8 @@ impl SimdLevel {
 /// Slack of the slab test, as a fraction of the larger terms: covers the rounding of planes,
 /// inverses and products (about five roundings of 2^-24), so that no sphere is lost at a box's edge.
 pub(super) const SLAB_SLACK: f32 = 1e-6;
+/// Bytes of a cache line.
+const LINE: usize = 64;
 /// Directions are kept this far from zero in the slab test, so that their inverses are finite.
 const MIN_DIRECTION: f32 = 1e-7;
 
@@ -157,11 +160,20 @@ pub(super) trait Kernel: Copy {
         radii: Option<&BlockRadii>,
     ) -> BlockCrossings;
 
-    /// Asks for a node's memory ahead of time.
-    fn prefetch_node(self, node: &Node);
+    /// [`CompactBlock::decode`], the same to the bit.
+    #[inline(always)]
+    fn decode_q10(self, block: &Q10Block, frame: &BlockFrame) -> Block {
+        block.decode(frame)
+    }
 
-    /// Asks for a block's memory ahead of time.
-    fn prefetch_block(self, block: &Block);
+    /// [`CompactBlock::decode`], the same to the bit.
+    #[inline(always)]
+    fn decode_q16(self, block: &Q16Block, frame: &BlockFrame) -> Block {
+        block.decode(frame)
+    }
+
+    /// Asks for the memory of a node or block ahead of time.
+    fn prefetch<T>(self, value: &T);
 }
 
 /// Both crossings of each sphere of a block with the line of a ray.

@@ -10,7 +10,7 @@ use std::arch::aarch64::*;
 use std::arch::asm;
 
 use super::loop_packet::LoopPackets;
-use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
+use super::{BlockCrossings, Kernel, LINE, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
@@ -261,13 +261,8 @@ impl Kernel for Neon {
     }
 
     #[inline(always)]
-    fn prefetch_node(self, node: &Node) {
-        prefetch_line(node, 0);
-    }
-
-    #[inline(always)]
-    fn prefetch_block(self, block: &Block) {
-        (0..3).for_each(|line| prefetch_line(block, line));
+    fn prefetch<T>(self, value: &T) {
+        (0..size_of::<T>().div_ceil(LINE)).for_each(|line| prefetch_line(value, line));
     }
 }
 
@@ -312,7 +307,7 @@ fn planes(bytes: &[u8; WIDTH]) -> [float32x4_t; 2] {
 fn prefetch_line<T>(value: &T, line: usize) {
     let address = std::ptr::from_ref(value)
         .cast::<u8>()
-        .wrapping_add(64 * line);
+        .wrapping_add(LINE * line);
     // SAFETY: a prefetch never faults, whatever the address, and changes nothing that Rust sees.
     unsafe {
         asm!("prfm pldl1keep, [{0}]", in(reg) address, options(nostack, preserves_flags, readonly));

@@ -167,7 +167,5 @@ impl Kernel for Portable {
         found
     }
 
-    fn prefetch_node(self, _node: &Node) {}
-
-    fn prefetch_block(self, _block: &Block) {}
+    fn prefetch<T>(self, _value: &T) {}
 }

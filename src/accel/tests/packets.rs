@@ -1,8 +1,9 @@
 //! Packets against single rays: the same to the bit.
 
 use super::*;
-use crate::accel::topology::Link;
+use crate::accel::topology::{Implicit, Link};
 use crate::accel::traverse::TreeHit;
+use crate::accel::view::TreeView;
 use crate::accel::wide::WideTree;
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::Node;
@@ -78,7 +79,7 @@ fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPacket {
 
 /// Returns how many rays hit.
 #[track_caller]
-fn check_packet(tree: &WideTree, packet: &RayPacket, what: &str) -> usize {
+fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> usize {
     let hits = tree.nearest_packet(packet);
     let met = tree.any_hit_packet(packet);
     for (lane, hit) in hits.iter().enumerate() {
@@ -112,11 +113,12 @@ fn linked(tree: &WideTree) -> Vec<Link> {
         .skip(1)
         .map(|start| *start as usize);
     let ends = ends.chain([tree.nodes.len()]).take(tree.level_starts.len());
+    let view = tree.view();
     let mut links = Vec::new();
     for (level, end) in ends.enumerate() {
         let start = tree.level_starts[level] as usize;
         for (index, node) in tree.nodes[start..end].iter().enumerate() {
-            let first = tree.first_child(level as u32, index);
+            let first = Implicit::of(&view).first_child(level as u32, index);
             links.push(match tree.level_starts.get(level + 1) {
                 Some(below) => Link::new(*below as usize + first, Node::child_count(node), 0),
                 None => Link::new(0, 0, first),
@@ -159,7 +161,7 @@ fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
             for _ in 0..25 {
                 let packet = packet(scene, shape, &mut random);
                 let what = format!("{} {level:?} {shape:?}", scene.name);
-                hits += check_packet(tree, &packet, &what);
+                hits += check_packet(&tree.view(), &packet, &what);
             }
         }
     }
@@ -175,11 +177,12 @@ fn an_empty_packet_finds_nothing() {
     assert!(
         builder
             .tree()
+            .view()
             .nearest_packet(&nothing)
             .iter()
             .all(Option::is_none)
     );
-    assert_eq!(builder.tree().any_hit_packet(&nothing), 0);
+    assert_eq!(builder.tree().view().any_hit_packet(&nothing), 0);
 }
 
 #[test]
@@ -197,9 +200,9 @@ fn ties_in_a_packet_go_to_the_lower_index() {
     }
     for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
         builder.tree_mut().set_simd(level);
-        for hit in builder.tree().nearest_packet(&packet) {
+        for hit in builder.tree().view().nearest_packet(&packet) {
             let slot = hit.expect("aimed at it").slot;
-            assert_eq!(builder.tree().particle(slot), 0, "{level:?}");
+            assert_eq!(builder.tree().view().particle(slot), 0, "{level:?}");
         }
     }
 }

@@ -45,7 +45,7 @@ fn trace(shot: &Shot, simd: SimdLevel) -> Film {
         ids: shot.ids.as_deref(),
         velocities: shot.velocities.as_deref(),
     };
-    let surface = SphereSurface::new(builder.tree());
+    let surface = SphereSurface::new(builder.tree().view());
     let never = AtomicBool::new(false);
     let (film, _) = render(&surface, &shot.scene, &source, &shot.settings, &never).expect("a film");
     film

@@ -3,11 +3,11 @@
 use std::arch::x86_64::*;
 
 use super::super::{BlockCrossings, Kernel};
-use super::lanes::{first_two, keys_of, keys_to_array, prefetch_line};
+use super::decode;
+use super::lanes::{first_two, keys_of, keys_to_array, prefetch};
 use super::slab::SlabRay;
 use crate::ray::Ray;
-use spherule_formats::blocks::{Block, BlockRadii};
-use spherule_formats::blocks::{Node, WIDTH};
+use spherule_formats::blocks::{Block, BlockFrame, BlockRadii, Node, Q10Block, Q16Block, WIDTH};
 
 /// 512-bit kernel.
 #[derive(Debug, Clone, Copy)]
@@ -176,12 +176,19 @@ impl Kernel for Avx512 {
     }
 
     #[inline(always)]
-    fn prefetch_node(self, node: &Node) {
-        prefetch_line(node, 0);
+    fn decode_q10(self, block: &Q10Block, frame: &BlockFrame) -> Block {
+        // SAFETY: this kernel is only used inside functions with AVX-512.
+        unsafe { decode::q10_by_16(block, frame) }
     }
 
     #[inline(always)]
-    fn prefetch_block(self, block: &Block) {
-        (0..3).for_each(|line| prefetch_line(block, line));
+    fn decode_q16(self, block: &Q16Block, frame: &BlockFrame) -> Block {
+        // SAFETY: this kernel is only used inside functions with AVX-512.
+        unsafe { decode::q16_by_16(block, frame) }
+    }
+
+    #[inline(always)]
+    fn prefetch<T>(self, value: &T) {
+        prefetch(value);
     }
 }

@@ -2,6 +2,7 @@
 
 use std::arch::x86_64::*;
 
+use super::super::LINE;
 use spherule_formats::blocks::WIDTH;
 
 /// Eight planes as floats.
@@ -27,15 +28,18 @@ pub(super) unsafe fn spread<const SHUFFLE: i32>(v: __m128) -> __m256 {
     }
 }
 
+/// Asks for all lines of `value`.
 #[inline(always)]
-pub(super) fn prefetch_line<T>(value: &T, line: usize) {
-    // SAFETY: a prefetch never faults, whatever the address; the cast keeps within or just past
-    // `value`, by wrapping arithmetic.
-    unsafe {
-        let address = std::ptr::from_ref(value)
-            .cast::<i8>()
-            .wrapping_add(64 * line);
-        _mm_prefetch::<_MM_HINT_T0>(address);
+pub(super) fn prefetch<T>(value: &T) {
+    for line in 0..size_of::<T>().div_ceil(LINE) {
+        // SAFETY: a prefetch never faults, whatever the address; the cast keeps within or just past
+        // `value`, by wrapping arithmetic.
+        unsafe {
+            let address = std::ptr::from_ref(value)
+                .cast::<i8>()
+                .wrapping_add(LINE * line);
+            _mm_prefetch::<_MM_HINT_T0>(address);
+        }
     }
 }
 

@@ -11,6 +11,7 @@ mod avx2_packet;
 mod avx512;
 mod avx512_packet;
 mod beam;
+mod decode;
 mod lanes;
 mod slab;
 
