@@ -23,6 +23,7 @@ mod predict;
 mod report;
 mod sbvh;
 pub mod simd;
+pub mod stored;
 mod topology;
 pub mod traverse;
 mod trim;

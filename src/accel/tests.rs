@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::oracle::ParticleTree;
 use super::simd::SimdLevel;
+use super::view::TreeView;
 use super::{
     BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SbvhSettings, SphereRadius, Spheres,
     Structure, TreeBuilder,
@@ -13,7 +14,9 @@ use super::{
 use crate::ray::Ray;
 use spherule_formats::blocks::Node;
 
+mod encode;
 mod packets;
+mod stored;
 
 /// A scene that owns its numbers.
 #[derive(Debug, Clone)]
@@ -216,7 +219,7 @@ fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
         for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
             builder.tree_mut().set_simd(level);
             for ray in rays(scene, ray_count, 11) {
-                let certain = check_ray(scene, &builder, &ray, keep_indices, level);
+                let certain = check_ray(scene, &builder.tree().view(), &ray, keep_indices, level);
                 judged += usize::from(certain && level == SimdLevel::best() && keep_indices);
             }
         }
@@ -226,14 +229,7 @@ fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
 
 /// The distances where f32 and f64 may differ: rounding of coordinates of this size, which a grazing
 /// ray turns into the root of it.
-fn check_ray(
-    scene: &Scene,
-    builder: &TreeBuilder,
-    ray: &Ray,
-    indexed: bool,
-    level: SimdLevel,
-) -> bool {
-    let tree = builder.tree().view();
+fn check_ray(scene: &Scene, tree: &TreeView, ray: &Ray, indexed: bool, level: SimdLevel) -> bool {
     let mut nearest: Option<(f64, usize)> = None;
     let mut doubtful = false;
     let mut certain_crossings = 0;

@@ -3,14 +3,13 @@
 use super::*;
 use crate::accel::topology::{Implicit, Link};
 use crate::accel::traverse::TreeHit;
-use crate::accel::view::TreeView;
 use crate::accel::wide::WideTree;
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::Node;
 
 /// How the rays of a packet lie to one another.
 #[derive(Debug, Clone, Copy)]
-enum Shape {
+pub(super) enum Shape {
     /// From one point through a square.
     Camera,
     /// From points near one another to one point.
@@ -25,7 +24,7 @@ enum Shape {
     Any,
 }
 
-const SHAPES: [Shape; 6] = [
+pub(super) const SHAPES: [Shape; 6] = [
     Shape::Camera,
     Shape::Shadow,
     Shape::Wide,
@@ -35,7 +34,7 @@ const SHAPES: [Shape; 6] = [
 ];
 
 /// 1 to 16 rays at a particle of `scene`.
-fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPacket {
+pub(super) fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPacket {
     let index = (random.next() * scene.centers.len() as f32) as usize;
     let target = scene.centers.get(index).copied().unwrap_or(Vec3::ZERO);
     let radius = scene.typical_radius();
@@ -79,7 +78,7 @@ fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPacket {
 
 /// Returns how many rays hit.
 #[track_caller]
-fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> usize {
+pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> usize {
     let hits = tree.nearest_packet(packet);
     let met = tree.any_hit_packet(packet);
     for (lane, hit) in hits.iter().enumerate() {
