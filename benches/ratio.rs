@@ -10,10 +10,15 @@ use std::hint::black_box;
 use std::process::Command;
 use std::time::Instant;
 
+use spherule::accel::stored::{StoredSettings, StoredTree};
+use spherule::accel::view::TreeView;
 use spherule::accel::{Structure, TreeBuilder};
 
+#[path = "support/stored.rs"]
+mod stored;
 mod support;
 
+use stored::{Encoding, OwnedLeaves};
 use support::obvhs::ObvhsBuilder;
 use support::rays::{
     trace_primary, trace_primary_packets, trace_reflection, trace_shadow, trace_shadow_packets,
@@ -41,7 +46,13 @@ fn main() {
                 rounds,
             };
             table.print_builds();
-            table.print_rays();
+            let builder = case.tree(structure);
+            table.print_rays(structure.name(), &builder.tree().view());
+            if matches!(structure, Structure::Lbvh | Structure::Kdtree) {
+                for encoding in Encoding::ALL {
+                    table.print_stored(&builder, encoding);
+                }
+            }
         }
     }
 }
@@ -67,7 +78,7 @@ fn print_machine(rounds: usize) {
     );
     println!("ratio: obvhs / ours in time or bytes, of the best (median of the turns' ratios)");
     println!(
-        "{:>9}  {:<7} {:<21} {:>15} {:>15} {:>14}",
+        "{:>9}  {:<10} {:<21} {:>15} {:>15} {:>14}",
         "particles", "", "", "ours", "obvhs", "ratio"
     );
 }
@@ -101,6 +112,7 @@ struct Table<'a> {
 
 impl Table<'_> {
     fn print_builds(&self) {
+        let name = self.structure.name();
         let (scene, spheres) = (&self.case.scene, &self.case.spheres);
         let build = |builder: &mut TreeBuilder| build_ours(self.structure, builder, scene);
         let turns = Turns::take(
@@ -108,7 +120,7 @@ impl Table<'_> {
             || build(&mut TreeBuilder::new()).nodes,
             || ObvhsBuilder::new().build(spheres),
         );
-        self.print_row("build, new memory, s", &turns.text(Unit::Seconds));
+        self.print_row(name, "build, new memory, s", &turns.text(Unit::Seconds));
 
         let (mut ours, mut theirs) = (TreeBuilder::new(), ObvhsBuilder::new());
         let report = build(&mut ours);
@@ -118,19 +130,39 @@ impl Table<'_> {
             || build(&mut ours).nodes,
             || theirs.build(spheres),
         );
-        self.print_row("build, kept memory, s", &turns.text(Unit::Seconds));
+        self.print_row(name, "build, kept memory, s", &turns.text(Unit::Seconds));
 
         // Positions and structure; neither keeps the way back to the particles' order.
         let our_bytes = report.position_bytes + report.structure_bytes;
         let their_bytes = (size_of_val(&scene.centers[..]) + node_bytes) as u64;
-        self.print_bytes("bytes a particle", our_bytes, Some(their_bytes));
-        self.print_bytes("  while building", report.peak_bytes, None);
+        self.print_bytes(name, "bytes a particle", our_bytes, Some(their_bytes));
+        self.print_bytes(name, "  while building", report.peak_bytes, None);
     }
 
-    fn print_rays(&self) {
-        let case = self.case;
-        let builder = case.tree(self.structure);
-        let (tree, obvhs) = (&builder.tree().view(), &case.obvhs);
+    /// The same particles in the same order, traced as a native frame stores them.
+    fn print_stored(&self, builder: &TreeBuilder, encoding: Encoding) {
+        let owned = OwnedLeaves::of(&builder.tree().view(), encoding);
+        let (leaves, spheres) = (owned.leaves(), &self.case.spheres);
+        let settings = StoredSettings {
+            structure: self.structure,
+            radius: Some(self.case.scene.radius),
+            keep_indices: false,
+        };
+        let name = format!("{} {}", self.structure, encoding.name());
+        let (mut ours, mut theirs) = (StoredTree::new(), ObvhsBuilder::new());
+        let mut build = || ours.build(&leaves, settings).expect("sound leaves");
+        let report = build();
+        let turns = Turns::take(self.rounds, || build().nodes, || theirs.build(spheres));
+        self.print_row(&name, "build, kept memory, s", &turns.text(Unit::Seconds));
+        let bytes = report.position_bytes + report.structure_bytes;
+        self.print_bytes(&name, "bytes a particle", bytes, None);
+        let held = report.peak_bytes - report.file_bytes;
+        self.print_bytes(&name, "  while building", held, None);
+        self.print_rays(&name, &ours.view(&leaves));
+    }
+
+    fn print_rays(&self, name: &str, tree: &TreeView) {
+        let (case, obvhs) = (self.case, &self.case.obvhs);
         let (scene, points) = (&case.scene, &case.points);
         let (mut records, mut others) = (Vec::new(), Vec::new());
         let turns = Turns::take(
@@ -139,13 +171,13 @@ impl Table<'_> {
             || trace_primary(obvhs, scene, &mut others),
         );
         let unit = Unit::MillionsOf(scene.pixels.len());
-        self.print_row("primary, Mrays/s", &turns.text(unit));
+        self.print_row(name, "primary, Mrays/s", &turns.text(unit));
         let turns = Turns::take(
             self.rounds,
             || trace_primary_packets(tree, scene, &mut records),
             || trace_primary(obvhs, scene, &mut others),
         );
-        self.print_row("in packets", &turns.text(unit));
+        self.print_row(name, "in packets", &turns.text(unit));
 
         let unit = Unit::MillionsOf(points.len());
         let turns = Turns::take(
@@ -153,34 +185,34 @@ impl Table<'_> {
             || trace_shadow(tree, points),
             || trace_shadow(obvhs, points),
         );
-        self.print_row("shadow, Mrays/s", &turns.text(unit));
+        self.print_row(name, "shadow, Mrays/s", &turns.text(unit));
         let turns = Turns::take(
             self.rounds,
             || trace_shadow_packets(tree, points),
             || trace_shadow(obvhs, points),
         );
-        self.print_row("in packets", &turns.text(unit));
+        self.print_row(name, "in packets", &turns.text(unit));
         let turns = Turns::take(
             self.rounds,
             || trace_reflection(tree, points),
             || trace_reflection(obvhs, points),
         );
-        self.print_row("reflection, Mrays/s", &turns.text(unit));
+        self.print_row(name, "reflection, Mrays/s", &turns.text(unit));
     }
 
-    fn print_row(&self, what: &str, figures: &str) {
-        let (particles, name) = (self.case.scene.centers.len(), self.structure.name());
-        println!("{particles:>9}  {name:<7} {what:<21} {figures}");
+    fn print_row(&self, name: &str, what: &str, figures: &str) {
+        let particles = self.case.scene.centers.len();
+        println!("{particles:>9}  {name:<10} {what:<21} {figures}");
     }
 
-    fn print_bytes(&self, what: &str, ours: u64, theirs: Option<u64>) {
+    fn print_bytes(&self, name: &str, what: &str, ours: u64, theirs: Option<u64>) {
         #[expect(clippy::cast_precision_loss, reason = "a figure for people")]
         let each = |bytes: u64| bytes as f64 / self.case.scene.centers.len() as f64;
         let ours = each(ours);
         let compared = theirs.map_or_else(String::new, |theirs| {
             format!("{:>15.2} {:>7.2}", each(theirs), each(theirs) / ours)
         });
-        self.print_row(what, format!("{ours:>15.2} {compared}").trim_end());
+        self.print_row(name, what, format!("{ours:>15.2} {compared}").trim_end());
     }
 }
 
