@@ -13,6 +13,7 @@ mod origin;
 mod scalar;
 
 pub mod blocks;
+pub mod convert;
 pub mod detect;
 pub mod generate;
 pub mod native;
