@@ -61,16 +61,34 @@ pub struct BuildSummary {
     pub phases: Vec<(String, f64)>,
 }
 
-/// Bytes by purpose.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+/// Bytes by part: what a traced frame holds, in anonymous memory or in a mapped file, and what its build
+/// needed beside that.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrameBytes {
     /// Positions and radii in tree order.
     pub positions: u64,
     /// Nodes and the way back to the file's order.
     pub structure: u64,
-    /// Most held while building, the frame as read not counted.
+    /// Attributes that images are made of.
+    pub attributes: u64,
+    /// Held while building and let go then, beside positions and structure.
+    pub scratch: u64,
+    /// Most held while building, the frame as read not counted unless it is traced where it lies.
     pub build_peak: u64,
+    /// How much of positions, structure and attributes lies in a mapped file.
+    pub file: FileBytes,
+}
+
+/// Bytes by part in a mapped file. They are not anonymous memory: the system may drop their pages and
+/// read them again.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(default)]
+#[expect(missing_docs, reason = "see `FrameBytes`")]
+pub struct FileBytes {
+    pub positions: u64,
+    pub structure: u64,
+    pub attributes: u64,
 }
 
 /// Rays by purpose.
@@ -134,11 +152,7 @@ impl FrameReport {
                 .map(|p| (p.name.to_owned(), p.time.as_secs_f64()))
                 .collect(),
         };
-        self.bytes = FrameBytes {
-            positions: report.position_bytes,
-            structure: report.structure_bytes,
-            build_peak: report.peak_bytes,
-        };
+        self.bytes.set_build(report);
     }
 
     /// Sum of the stages.
@@ -179,6 +193,37 @@ impl FrameReport {
     }
 }
 
+impl FrameBytes {
+    /// Takes over what the builder says; attributes are not its business and stay.
+    fn set_build(&mut self, report: &BuildReport) {
+        self.positions = report.position_bytes;
+        self.structure = report.structure_bytes;
+        let lasting = report.position_bytes + report.structure_bytes;
+        self.scratch = report.peak_bytes.saturating_sub(lasting);
+        self.build_peak = report.peak_bytes;
+        // Positions that are traced where they lie do so as a whole; of the nodes, the lowest.
+        self.file.positions = report.file_bytes.min(report.position_bytes);
+        self.file.structure = report.file_bytes - self.file.positions;
+    }
+
+    /// Held while tracing: positions, structure and attributes.
+    pub const fn held(&self) -> u64 {
+        self.positions + self.structure + self.attributes
+    }
+
+    /// The part of [`Self::held`] that lies in anonymous memory.
+    pub const fn anonymous(&self) -> u64 {
+        self.held().saturating_sub(self.file.total())
+    }
+}
+
+impl FileBytes {
+    /// Of all parts.
+    pub const fn total(&self) -> u64 {
+        self.positions + self.structure + self.attributes
+    }
+}
+
 fn ratio(of: u64, to: f64) -> Option<f64> {
     (to > 0.0).then(|| float(of) / to)
 }
@@ -186,4 +231,45 @@ fn ratio(of: u64, to: f64) -> Option<f64> {
 #[expect(clippy::cast_precision_loss, reason = "for people and ratios")]
 const fn float(count: u64) -> f64 {
     count as f64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::accel::Structure;
+
+    fn built(file_bytes: u64) -> BuildReport {
+        BuildReport {
+            structure: Structure::Kdtree,
+            order: "",
+            total: Duration::ZERO,
+            phases: Vec::new(),
+            particles: 100,
+            references: 100,
+            nodes: 1,
+            leaves: 7,
+            depth: 1,
+            sah_cost: 1.0,
+            position_bytes: 400,
+            structure_bytes: 60,
+            file_bytes,
+            peak_bytes: 470,
+            simd: "",
+        }
+    }
+
+    #[test]
+    fn bytes_are_in_the_file_or_in_anonymous_memory() {
+        let mut report = FrameReport::default();
+        report.bytes.attributes = 800;
+        report.set_build(&built(450));
+        let bytes = report.bytes;
+        assert_eq!((bytes.file.positions, bytes.file.structure), (400, 50));
+        assert_eq!((bytes.held(), bytes.anonymous()), (1260, 810));
+        assert_eq!((bytes.scratch, bytes.build_peak), (10, 470));
+        // A built tree after one in place.
+        report.set_build(&built(0));
+        assert_eq!(report.bytes.file, FileBytes::default());
+        assert_eq!(report.bytes.anonymous(), 1260);
+    }
 }

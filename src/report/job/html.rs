@@ -121,6 +121,14 @@ impl JobReport {
             ("SAH cost", short(build.sah_cost)),
             ("Positions", bytes(report.bytes.positions)),
             ("Nodes and indices", bytes(report.bytes.structure)),
+            ("Attributes", bytes(report.bytes.attributes)),
+            (
+                "Of these in anonymous memory, in the mapped file",
+                [report.bytes.anonymous(), report.bytes.file.total()]
+                    .map(bytes)
+                    .join(", "),
+            ),
+            ("Scratch while building", bytes(report.bytes.scratch)),
             ("Peak while building", bytes(report.bytes.build_peak)),
         ]);
         let table = phases(report);

@@ -21,6 +21,7 @@ fn done(number: i64, particles: u64) -> JobFrame {
             positions: 12 * particles,
             structure: 2 * particles,
             build_peak: 20 * particles,
+            ..FrameBytes::default()
         },
         rays: RaySummary {
             primary: 1000,

@@ -8,6 +8,7 @@ fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
         positions: 12_000,
         structure: 600,
         build_peak: 24_000,
+        ..FrameBytes::default()
     };
     CellMeasurement {
         images: 3,

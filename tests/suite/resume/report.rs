@@ -133,7 +133,9 @@ fn done_frame(frame: &Value) {
         &["read", "build", "trace", "encode", "wall"],
     );
     has(&frame["build"], &["order", "nodes"]);
-    has(&frame["bytes"], &["positions", "structure", "build_peak"]);
+    let parts = ["positions", "structure", "attributes", "scratch"];
+    has(&frame["bytes"], &parts);
+    has(&frame["bytes"], &["build_peak", "file", "per_particle"]);
     has(
         &frame["rays"],
         &["primary", "shadow", "reflection", "refraction"],
