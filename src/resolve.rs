@@ -1,6 +1,7 @@
 //! From what was asked ([`Manifest`]) and what was found ([`Survey`]) to pictures ([`Setup`]).
 
 use glam::{DVec3, Vec3};
+use spherule_formats::native::Access;
 
 use crate::accel::BvhSettings;
 use crate::manifest::{
@@ -165,6 +166,11 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             exposure: output.preview_exposure,
             backdrop,
         },
+        access: match manifest.input.mmap {
+            true => Access::Map,
+            false => Access::Read,
+        },
+        verify: manifest.input.verify,
         weight: survey.weight,
         view,
         scene,

@@ -144,7 +144,7 @@ impl FrameFile {
 }
 
 /// Whether the file at `path` begins as a native frame.
-fn is_native(path: &Path) -> Result<bool, FrameError> {
+pub(crate) fn is_native(path: &Path) -> Result<bool, FrameError> {
     regular_len(path)?;
     let mut start = [0; native::MAGIC.len()];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));

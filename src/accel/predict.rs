@@ -36,6 +36,19 @@ pub fn predicted_bytes(settings: &BuildSettings, particles: u64, own_radii: bool
     }
 }
 
+/// What a [`super::stored::StoredTree`] over `particles` will hold beside the frame.
+pub fn predicted_stored_bytes(particles: u64) -> BuildBytes {
+    let blocks = particles.div_ceil(BLOCK_SIZE as u64);
+    let stored = blocks.div_ceil(WIDTH as u64);
+    let (levels, places) = whole_levels(blocks);
+    let levels = levels - stored * size_of::<Node>() as u64;
+    let ordered = stored.div_ceil(WIDTH as u64);
+    BuildBytes {
+        tree: levels + places,
+        scratch: ordered * (size_of::<Node>() + 2 * size_of::<Aabb>()) as u64,
+    }
+}
+
 /// Nodes for each block of a tree of links: eight blocks or nodes under each would be 0.14, but
 /// nodes made of binary ones have 3.8 children on average (thesis's box, 1e5 to 1e7).
 const NODES_PER_BLOCK: f64 = 0.357;

@@ -61,6 +61,9 @@ pub(super) struct ManifestArgs {
     /// A ground plane under the particles.
     #[arg(long)]
     pub(super) ground: bool,
+    /// Read native frames instead of mapping them: where files may be cut short while they are used.
+    #[arg(long)]
+    pub(super) no_mmap: bool,
     /// Parts of a step to keep where it has several files: fluid,oil.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub(super) parts: Option<Vec<String>>,
@@ -205,6 +208,9 @@ impl ManifestArgs {
         }
         if self.ground {
             list.push(over("render.ground", true, "--ground")?);
+        }
+        if self.no_mmap {
+            list.push(over("input.mmap", false, "--no-mmap")?);
         }
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(CliError::Other)?);

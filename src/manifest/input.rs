@@ -68,6 +68,11 @@ pub struct Input {
     /// Which axis points up; None is what the format's users are used to: y for BGEO and
     /// SPlisHSPlasH, else z.
     pub up: Option<UpAxis>,
+    /// Whether native frames are mapped, not read: false where files may be cut short while they are used.
+    pub mmap: bool,
+    /// Whether all that is used of native frames is compared with its checksums (true), or only the nodes
+    /// (false); None goes by the size.
+    pub verify: Option<bool>,
 }
 
 impl Input {
@@ -79,6 +84,8 @@ impl Input {
             parts: None,
             radius: RadiusSetting::Auto,
             up: None,
+            mmap: true,
+            verify: None,
         }
     }
 
@@ -96,6 +103,8 @@ impl Input {
             parts: section.optional("parts", |f| names(f, "a list of names, as [\"fluid\"]")),
             radius: section.value("radius", RadiusSetting::Auto, RadiusSetting::read),
             up: section.value("up", None, read_up),
+            mmap: section.value("mmap", true, Field::bool),
+            verify: section.value("verify", None, read_verify),
         };
         section.finish();
         input
@@ -138,7 +147,32 @@ impl Input {
         );
         let up = self.up.map_or("auto", UpAxis::name);
         out.put("up", up, "auto | x | y | z | -x | -y | -z");
+        out.put(
+            "mmap",
+            &self.mmap,
+            "false reads native frames where they may be cut short meanwhile",
+        );
+        // Neither changes the pictures.
+        out.depends_on(None);
+        let verify = Raw(self.verify.map_or("auto".toml(), |all| all.toml()));
+        out.put(
+            "verify",
+            &verify,
+            "checksums of native frames: auto (up to 1 GiB) | true | false",
+        );
+        out.depends_on(None);
     }
+}
+
+#[expect(
+    clippy::option_option,
+    reason = "the outer one is a problem, the inner one is `auto`"
+)]
+fn read_verify(field: &Field<'_>) -> Option<Option<bool>> {
+    if field.as_text() == Some("auto") {
+        return Some(None);
+    }
+    field.bool().map(Some)
 }
 
 fn read_up(field: &Field<'_>) -> Option<Option<UpAxis>> {

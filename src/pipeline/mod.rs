@@ -16,7 +16,9 @@ use std::thread;
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{Interrupt, Job, JobError};
 
+mod decoded;
 mod encode;
+mod in_place;
 mod load;
 mod predict;
 mod probe;
@@ -25,14 +27,16 @@ mod schedule;
 mod setup;
 mod trace;
 
+pub use decoded::{DecodedFrame, DecodedShading};
 pub use encode::encode_frame;
+pub use in_place::{StoredFrame, StoredShading};
 pub(crate) use load::attribute_list;
-pub use load::{LoadError, LoadedFrame, load_frame};
+pub use load::{LoadError, LoadedFrame, LoadedParticles, load_frame};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, probe};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, RadiusRule, Setup};
-pub use trace::{BuiltFrame, FrameTracer, TracedFrame};
+pub use trace::{BuiltFrame, FrameTracer, TraceError, TracedFrame};
 
 use crate::report::FrameReport;
 
@@ -213,7 +217,8 @@ impl TraceStage<'_> {
                 Passed::Frame(frame) => {
                     let task = frame.task.clone();
                     (self.watch)(Event::Entered(task.frame, Stage::Trace));
-                    (task, guarded(|| Ok(tracer.build(self.setup, frame))))
+                    let build = || tracer.build(self.setup, frame);
+                    (task, guarded(|| build().map_err(|e| e.to_string())))
                 }
                 Passed::Failed(task, reason) => (task, Err(reason)),
             };

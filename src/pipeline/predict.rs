@@ -3,18 +3,19 @@
 //!
 //! It adds up what the stages hold at once (see the module above): while the tree over frame i is
 //! built, frame i-1 is encoded; while frame i is traced, frame i+1 is read and frame i-1 may still be
-//! encoded. What is counted is anonymous memory; files are read, not mapped. Particle counts of
+//! encoded. What is counted is anonymous memory, not the pages of mapped files. Particle counts of
 //! frames that nobody has looked at are estimated from the length of their files and the frame that
-//! the survey found heaviest.
+//! the survey found heaviest. Native frames that are traced where they lie take next to nothing.
 
 use std::fmt;
 
 use serde::Serialize;
+use spherule_formats::native::Access;
 use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
 use super::setup::{ColorRule, RadiusRule, Setup};
-use crate::accel::{BuildBytes, predicted_bytes};
+use crate::accel::{BuildBytes, predicted_bytes, predicted_stored_bytes};
 use crate::render::{Film, band_bytes};
 use crate::report::Bytes;
 use crate::survey::FrameWeight;
@@ -138,6 +139,7 @@ pub struct MemoryModel<'a> {
     own_radii: bool,
     has_ids: bool,
     has_velocities: bool,
+    in_place: bool,
 }
 
 /// Code and data of the program, its threads' stacks and small allocations, and what the allocator
@@ -163,6 +165,7 @@ impl<'a> MemoryModel<'a> {
             },
             has_ids: known.ids,
             has_velocities: known.velocities,
+            in_place: known.in_place && setup.traces_in_place(),
         }
     }
 
@@ -186,6 +189,23 @@ impl<'a> MemoryModel<'a> {
 
     /// What reading a frame takes at its peak.
     pub fn reading(&self, frame: &FrameSize) -> u64 {
+        if self.in_place {
+            self.held_file(frame)
+        } else {
+            self.decoding(frame)
+        }
+    }
+
+    /// The bytes of a native frame where they are not those of a map.
+    fn held_file(&self, frame: &FrameSize) -> u64 {
+        match self.setup.access {
+            Access::Map => 0,
+            Access::Read => frame.content,
+        }
+    }
+
+    /// What reading a frame into plain particles takes at its peak.
+    pub fn decoding(&self, frame: &FrameSize) -> u64 {
         let n = frame.particles;
         // Several files are read in turn and then put together.
         let files = if frame.files > 1 {
@@ -215,12 +235,18 @@ impl<'a> MemoryModel<'a> {
 
     /// What is kept of a frame that was read, until its tree is built.
     fn kept(&self, frame: &FrameSize) -> u64 {
+        if self.in_place {
+            return self.held_file(frame);
+        }
         let radii = if self.own_radii { 4 } else { 0 };
         frame.particles * (12 + radii) + self.shading(frame)
     }
 
     /// What is kept of it while it is traced.
     fn shading(&self, frame: &FrameSize) -> u64 {
+        if self.in_place {
+            return self.held_file(frame);
+        }
         let channels = self.setup.render.channels;
         let values = matches!(self.setup.color, ColorRule::Attribute { .. });
         let each = [
@@ -233,6 +259,9 @@ impl<'a> MemoryModel<'a> {
     }
 
     fn build(&self, frame: &FrameSize) -> BuildBytes {
+        if self.in_place {
+            return predicted_stored_bytes(frame.particles);
+        }
         let values = matches!(self.setup.color, ColorRule::Attribute { .. });
         let count = usize::try_from(frame.particles).unwrap_or(usize::MAX);
         let settings = self.setup.build_settings(count, values);

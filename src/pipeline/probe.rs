@@ -48,7 +48,7 @@ pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Pro
     let loaded = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
     let read = loaded.read_time.as_secs_f64();
     let mut tracer = FrameTracer::new();
-    let frame = tracer.build(setup, loaded);
+    let frame = tracer.build(setup, loaded).map_err(|e| e.to_string())?;
     let full = &setup.render;
     let rays = |width: u32, height: u32| f64::from(width) * f64::from(height);
     let mut width = FIRST_WIDTH.min(full.width);

@@ -1,6 +1,7 @@
 //! Everything about a job's pictures that is the same for every frame.
 
 use glam::{DVec3, Vec3};
+use spherule_formats::native::Access;
 
 use super::rays::expected_rays;
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
@@ -69,6 +70,11 @@ pub struct Setup {
     pub exr: ExrOptions,
     /// How the PNG is made.
     pub preview: PreviewOptions,
+    /// How the bytes of native frames come into memory.
+    pub access: Access,
+    /// Whether all that is used of native frames is compared with its checksums, or no more than nodes;
+    /// None goes by their size.
+    pub verify: Option<bool>,
     /// What frames weigh, as far as is known.
     pub weight: Option<FrameWeight>,
 }
@@ -78,15 +84,30 @@ impl Setup {
     /// them by.
     pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {
         let channels = self.render.channels;
-        let structure = self.accelerator.unwrap_or_else(|| {
-            let threads = rayon::current_num_threads();
-            choose(particles, expected_rays(self), threads)
-        });
+        let structure = self.structure_for(particles);
         BuildSettings {
             keep_indices: channels.id || channels.velocity || has_values,
             bvh: self.bvh,
             sbvh: self.sbvh,
             ..BuildSettings::new(structure)
         }
+    }
+
+    /// Whether native frames relative to [`Self::origin`] are traced where they lie.
+    pub fn traces_in_place(&self) -> bool {
+        let in_order = matches!(self.stored_structure(), Structure::Lbvh | Structure::Kdtree);
+        in_order && !matches!(self.radius, RadiusRule::Attribute { .. })
+    }
+
+    /// Whose tree a native frame in place is said to be: its order is that of k-d cells.
+    pub fn stored_structure(&self) -> Structure {
+        self.accelerator.unwrap_or(Structure::Kdtree)
+    }
+
+    fn structure_for(&self, particles: usize) -> Structure {
+        self.accelerator.unwrap_or_else(|| {
+            let threads = rayon::current_num_threads();
+            choose(particles, expected_rays(self), threads)
+        })
     }
 }

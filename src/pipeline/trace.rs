@@ -1,19 +1,43 @@
 //! Second stage: the tree is built and the image traced.
 
+use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use glam::Vec3;
-use spherule_formats::Radius;
+use spherule_formats::{FrameError, Radius};
 
 use super::ImageTask;
-use super::load::LoadedFrame;
+use super::decoded::{DecodedFrame, DecodedShading};
+use super::in_place::StoredFrame;
+use super::load::{LoadedFrame, LoadedParticles};
 use super::setup::{ColorRule, Setup};
-use crate::accel::{SphereRadius, Spheres, TreeBuilder};
-use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, render};
+use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
+use crate::accel::view::TreeView;
+use crate::accel::{BuildReport, SphereRadius, Spheres, TreeBuilder};
+use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, ShadeSource, render};
 use crate::report::FrameReport;
+use crate::report::frame::FileBytes;
 use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::spheres::SphereSurface;
+
+/// Why there is no image of a frame that was read.
+#[derive(Debug, thiserror::Error)]
+pub enum TraceError {
+    /// Rendering was interrupted, or a setting makes no image.
+    #[error(transparent)]
+    Render(#[from] RenderError),
+    /// The nodes of a native frame cannot be traced.
+    #[error("{}: {fault}; convert the frame again", path.display())]
+    Stored {
+        /// The frame.
+        path: PathBuf,
+        /// What is wrong with it.
+        fault: StoredFault,
+    },
+    /// A native frame changed while it was traced, or cannot be used on this machine.
+    #[error(transparent)]
+    File(#[from] FrameError),
+}
 
 /// An image in memory.
 #[derive(Debug)]
@@ -32,17 +56,25 @@ pub struct TracedFrame {
 #[derive(Debug)]
 pub struct BuiltFrame {
     pub(super) task: ImageTask,
-    values: Vec<f32>,
-    ids: Option<Vec<u32>>,
-    velocities: Option<Vec<Vec3>>,
+    particles: BuiltParticles,
     time: Option<f64>,
     pub(super) report: FrameReport,
+}
+
+/// What is left of a frame's particles beside the tree.
+#[derive(Debug)]
+enum BuiltParticles {
+    /// The tree has copied the rest.
+    Decoded(DecodedShading),
+    /// All of it: the tree's leaves are here.
+    Stored(StoredFrame),
 }
 
 /// Traces frame after frame in the same buffers.
 #[derive(Debug, Default)]
 pub struct FrameTracer {
     builder: TreeBuilder,
+    stored: StoredTree,
 }
 
 impl FrameTracer {
@@ -51,47 +83,86 @@ impl FrameTracer {
         Self::default()
     }
 
-    /// Builds the tree over `frame`, whose positions are let go: the tree has its own copy.
-    pub fn build(&mut self, setup: &Setup, frame: LoadedFrame) -> BuiltFrame {
+    /// Builds the tree over `frame`. Positions in memory are let go, as the tree has its own copy; over a
+    /// native frame only the levels above what it stores are built.
+    ///
+    /// # Errors
+    /// [`TraceError::Stored`] if the nodes of a native frame are damaged, [`TraceError::File`] if it cannot be
+    /// used.
+    pub fn build(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError> {
         let mut report = FrameReport {
-            particles: frame.centers.len() as u64,
+            particles: frame.particles.count(),
             dropped: frame.dropped,
             clamped_radii: frame.clamped_radii,
             ..FrameReport::default()
         };
         report.seconds.read = frame.read_time.as_secs_f64();
+        let particles = match frame.particles {
+            LoadedParticles::Decoded(decoded) => {
+                report.set_build(&self.build_copy(setup, &decoded));
+                report.bytes.attributes = decoded.shading.byte_len();
+                BuiltParticles::Decoded(decoded.shading)
+            }
+            LoadedParticles::Stored(stored) => {
+                report.set_build(&self.build_above(setup, &stored)?);
+                report.bytes.attributes = stored.attribute_bytes();
+                report.bytes.file.attributes = stored.attribute_bytes();
+                if !stored.is_mapped() {
+                    report.bytes.file = FileBytes::default();
+                }
+                BuiltParticles::Stored(stored)
+            }
+        };
+        Ok(BuiltFrame {
+            task: frame.task,
+            particles,
+            time: frame.time,
+            report,
+        })
+    }
+
+    fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame) -> BuildReport {
         let radius = match &frame.radius {
             Radius::Common(radius) => SphereRadius::Common(*radius),
             Radius::PerParticle(radii) => SphereRadius::Each(radii),
         };
-        let settings = setup.build_settings(frame.centers.len(), !frame.values.is_empty());
+        let has_values = !frame.shading.values.is_empty();
+        let settings = setup.build_settings(frame.centers.len(), has_values);
         let spheres = Spheres {
             centers: &frame.centers,
             radius,
         };
-        let build = self.builder.build(&spheres, &settings);
-        report.set_build(&build);
-        BuiltFrame {
-            task: frame.task,
-            values: frame.values,
-            ids: frame.ids,
-            velocities: frame.velocities,
-            time: frame.time,
-            report,
-        }
+        self.builder.build(&spheres, &settings)
+    }
+
+    fn build_above(
+        &mut self,
+        setup: &Setup,
+        frame: &StoredFrame,
+    ) -> Result<BuildReport, TraceError> {
+        let settings = StoredSettings {
+            structure: frame.structure(),
+            radius: frame.radius(),
+            keep_indices: frame.needs_indices(setup),
+        };
+        let built = self.stored.build(&frame.leaves()?, settings);
+        built.map_err(|fault| TraceError::Stored {
+            path: frame.path().to_owned(),
+            fault,
+        })
     }
 
     /// Renders `frame`, the one that was built last.
     ///
     /// # Errors
-    /// [`RenderError::Interrupted`] once `stop` is set; the others are settings that were checked
-    /// before.
+    /// [`RenderError::Interrupted`] once `stop` is set, [`TraceError::File`] if a native frame changed
+    /// meanwhile; the others are settings that were checked before.
     pub fn trace(
         &self,
         setup: &Setup,
         frame: BuiltFrame,
         stop: &AtomicBool,
-    ) -> Result<TracedFrame, RenderError> {
+    ) -> Result<TracedFrame, TraceError> {
         let start = Instant::now();
         let (film, rays) = self.image(setup, &frame, stop)?;
         let BuiltFrame {
@@ -119,20 +190,46 @@ impl FrameTracer {
         setup: &Setup,
         frame: &BuiltFrame,
         stop: &AtomicBool,
-    ) -> Result<(Film, RayCounts), RenderError> {
-        let values = &frame.values;
-        let colors = match &setup.color {
-            ColorRule::Constant(color) => Colors::Constant(*color),
-            ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
-            ColorRule::Attribute { map, .. } => Colors::Mapped { values, map },
-        };
-        let source = ParticleShading {
-            colors,
-            ids: frame.ids.as_deref(),
-            velocities: frame.velocities.as_deref(),
-        };
-        let surface = SphereSurface::new(self.builder.tree().view());
-        render(&surface, &setup.scene, &source, &setup.render, stop)
+    ) -> Result<(Film, RayCounts), TraceError> {
+        match &frame.particles {
+            BuiltParticles::Decoded(shading) => {
+                let source = particle_shading(&setup.color, shading);
+                let tree = self.builder.tree().view();
+                Ok(draw(setup, tree, &source, stop)?)
+            }
+            BuiltParticles::Stored(stored) => {
+                let leaves = stored.leaves()?;
+                let source = stored.shading(&setup.color, DEFAULT_COLOR);
+                let drawn = draw(setup, self.stored.view(&leaves), &source, stop)?;
+                // Before anyone believes what was seen.
+                stored.check()?;
+                Ok(drawn)
+            }
+        }
+    }
+}
+
+fn draw<C: ShadeSource>(
+    setup: &Setup,
+    tree: TreeView,
+    source: &C,
+    stop: &AtomicBool,
+) -> Result<(Film, RayCounts), RenderError> {
+    let surface = SphereSurface::new(tree);
+    render(&surface, &setup.scene, source, &setup.render, stop)
+}
+
+fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> ParticleShading<'a> {
+    let values = &shading.values;
+    let colors = match color {
+        ColorRule::Constant(color) => Colors::Constant(*color),
+        ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
+        ColorRule::Attribute { map, .. } => Colors::Mapped { values, map },
+    };
+    ParticleShading {
+        colors,
+        ids: shading.ids.as_deref(),
+        velocities: shading.velocities.as_deref(),
     }
 }
 

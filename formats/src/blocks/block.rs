@@ -45,6 +45,12 @@ impl Block {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])
     }
 
+    /// All centres, those included that fill a last block up.
+    #[inline]
+    pub fn centers(self) -> impl Iterator<Item = Vec3> {
+        (0..BLOCK_SIZE).map(move |lane| self.center(lane))
+    }
+
     /// Puts the particle in `lane` to `center`.
     #[inline]
     pub fn set_center(&mut self, lane: usize, center: Vec3) {

@@ -69,6 +69,31 @@ impl NativeFrame<'_> {
         })
     }
 
+    /// Distances from `queries` particles, evenly spread, to the nearest other particle that is not in the same
+    /// place, among those around them in the file: in tree order a neighbour is seldom farther away, so
+    /// that few of these distances are too long.
+    ///
+    /// # Errors
+    /// As [`Self::to_raw`].
+    pub fn neighbour_distances(&self, queries: usize) -> Result<Vec<f32>, ParseError> {
+        /// Particles on either side of the one asked for: a cell of the order and half the next.
+        const AROUND: usize = 1536;
+        let leaves = self.leaves()?;
+        let count = self.len()?;
+        let stride = count.div_ceil(queries.max(1)).max(1);
+        let distance = |i: usize| {
+            let from = leaves.center(i);
+            let blocks =
+                i.saturating_sub(AROUND) / BLOCK_SIZE..(i + AROUND).min(count).div_ceil(BLOCK_SIZE);
+            let others = blocks.flat_map(|block| leaves.block(block).centers());
+            let distances = others.map(|to| from.distance_squared(to));
+            let nearest = distances.filter(|d| *d > 0.0).fold(f32::INFINITY, f32::min);
+            nearest.is_finite().then(|| nearest.sqrt())
+        };
+        let asked: Vec<usize> = (0..count).step_by(stride).collect();
+        Ok(asked.into_par_iter().filter_map(distance).collect())
+    }
+
     /// Particles, as many as fit the memory.
     fn len(&self) -> Result<usize, ParseError> {
         let count = usize::try_from(self.index().count);
@@ -78,10 +103,7 @@ impl NativeFrame<'_> {
     fn positions(&self, leaves: &StoredLeaves) -> Result<Positions, ParseError> {
         let count = self.len()?;
         let origin = DVec3::from_array(self.index().origin);
-        let lanes = |block: usize| {
-            let block = leaves.block(block);
-            (0..BLOCK_SIZE).map(move |lane| block.center(lane))
-        };
+        let lanes = |block: usize| leaves.block(block).centers();
         Ok(if origin == DVec3::ZERO {
             let mut positions = vec![Vec3::ZERO; count];
             let blocks = positions.par_chunks_mut(BLOCK_SIZE).enumerate();

@@ -206,6 +206,15 @@ impl FrameIndex {
 
     /// All sections and what they hold.
     pub fn sections(&self) -> Vec<(String, &Section)> {
+        let mut sections = self.tree_sections();
+        for attribute in &self.attributes {
+            sections.push((format!("attribute {}", attribute.name), &attribute.section));
+        }
+        sections
+    }
+
+    /// The sections of positions, nodes and radii.
+    pub fn tree_sections(&self) -> Vec<(String, &Section)> {
         let mut sections = vec![
             ("the positions".to_owned(), &self.positions),
             ("the wide blocks".to_owned(), &self.wide),
@@ -213,9 +222,6 @@ impl FrameIndex {
         ];
         if let RadiusIndex::PerParticle(radii) = &self.radius {
             sections.push(("the radii".to_owned(), &radii.section));
-        }
-        for attribute in &self.attributes {
-            sections.push((format!("attribute {}", attribute.name), &attribute.section));
         }
         sections
     }

@@ -1,6 +1,7 @@
 //! A checked view of the bytes of a native frame: its parts in place.
 
 use bytemuck::Pod;
+use rayon::prelude::*;
 
 use super::attribute::AttributeView;
 use super::layout::{AttributeIndex, Encoding, FrameIndex, RadiiIndex, RadiusIndex, Section};
@@ -83,6 +84,32 @@ impl<'a> NativeFrame<'a> {
     /// [`ParseError::Malformed`] if they differ.
     pub fn verify_nodes(&self) -> Result<(), ParseError> {
         verify_section(self.bytes, "the nodes", &self.index.nodes)
+    }
+
+    /// Compares what is used of a frame with its checksums: all that tracing reads, and the attributes of
+    /// these names.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] at the first section, in the order of the file, that differs.
+    pub fn verify_used(&self, attributes: &[&str]) -> Result<(), ParseError> {
+        let sections = self.used(attributes);
+        let all = sections.par_iter();
+        let found =
+            all.find_map_first(|(what, section)| verify_section(self.bytes, what, section).err());
+        found.map_or(Ok(()), Err)
+    }
+
+    /// Bytes that [`Self::verify_used`] reads.
+    pub fn used_bytes(&self, attributes: &[&str]) -> u64 {
+        self.used(attributes).iter().map(|(_, s)| s.len).sum()
+    }
+
+    fn used(&self, attributes: &[&str]) -> Vec<(String, &'a Section)> {
+        let mut sections = self.index.tree_sections();
+        let all = self.index.attributes.iter();
+        let used = all.filter(|a| attributes.contains(&a.name.as_str()));
+        sections.extend(used.map(|a| (format!("attribute {}", a.name), &a.section)));
+        sections
     }
 
     fn view(&self, attribute: &'a AttributeIndex) -> Result<AttributeView<'a>, ParseError> {

@@ -215,6 +215,16 @@ impl Sequence {
         parts.iter().map(|p| p.path.as_path()).collect()
     }
 
+    /// The file of frame `index` if that is one native frame, which can be used where it lies.
+    pub fn native_file(&self, index: usize) -> Option<&Path> {
+        let [part] = self.frames.get(index)?.parts.as_slice() else {
+            return None;
+        };
+        let is_alone = self.parts.len() < 2 && part.step.is_none();
+        // What cannot be looked at is told when it is read.
+        (is_alone && crate::open::is_native(&part.path).unwrap_or(false)).then_some(&part.path)
+    }
+
     /// Reads frame `index`: finite particles, relative to `origin`.
     ///
     /// # Errors

@@ -7,24 +7,22 @@
 
 use std::collections::BTreeSet;
 
-use glam::{DVec3, Vec3};
-use rayon::prelude::*;
+use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use spherule_formats::sequence::{Loaded, Sequence};
-use spherule_formats::{Attribute, FrameError, ParticleFrame, Positions, Radius, choose_origin};
+use spherule_formats::native::AttributeView;
+use spherule_formats::sequence::Sequence;
+use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin};
 
 use crate::scene::Bounds;
 
+mod look;
+mod robust;
+
+use look::Look;
+use robust::{estimate_radius, narrow, robust_bounds, robust_largest, robust_range};
+
 /// Frames looked at; evenly spread, first and last among them. All of a shorter sequence.
 const FRAMES: usize = 24;
-/// Particles of a frame that percentiles are taken from.
-const SAMPLE: usize = 20_000;
-/// Fewest particles of which one alone may count as escaped: of a handful each matters.
-const ESCAPE_MIN: usize = 16;
-/// Distances to the nearest neighbour that the radius is estimated from.
-const NEIGHBOUR_QUERIES: usize = 512;
-/// Distance computations that the estimate may cost: half a second for a frame of 1e7.
-const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 /// Names under which simulations write velocities.
 const VELOCITY_NAMES: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];
 
@@ -80,6 +78,10 @@ pub struct FrameWeight {
     pub ids: bool,
     /// Whether it brings velocities.
     pub velocities: bool,
+    /// Whether it is a native frame relative to the origin of the sequence, which can be traced where it
+    /// lies.
+    #[serde(default)]
+    pub in_place: bool,
 }
 
 /// An attribute and the range its colours span.
@@ -137,6 +139,28 @@ struct Totals {
     most_particles: usize,
     frames: usize,
     weight: Option<FrameWeight>,
+    origin: Origins,
+}
+
+/// What the coordinates of native frames are relative to.
+#[derive(Clone, Copy, PartialEq)]
+enum Origins {
+    /// There was none yet.
+    None,
+    /// The same in all.
+    Shared(DVec3),
+    /// Different ones, or there are frames of another kind, too.
+    Mixed,
+}
+
+impl Origins {
+    fn and(self, origin: Option<DVec3>) -> Self {
+        match (self, origin) {
+            (Self::None, Some(origin)) => Self::Shared(origin),
+            (Self::Shared(shared), Some(origin)) if shared == origin => self,
+            _ => Self::Mixed,
+        }
+    }
 }
 
 impl Survey {
@@ -170,14 +194,12 @@ impl Survey {
             most_particles: 0,
             frames: 0,
             weight: None,
+            origin: Origins::None,
         };
         let mut failure = None;
         for index in indices {
-            match sequence.load_measured(index) {
-                Ok(loaded) => {
-                    let files = sequence.inputs(index).len() as u64;
-                    totals.take_in(loaded, files, question);
-                }
+            match Look::at(sequence, index) {
+                Ok(look) => totals.take_in(look, question),
                 Err(error) => {
                     failure.get_or_insert(error);
                 }
@@ -202,12 +224,40 @@ impl Survey {
     }
 }
 
-/// The attribute of `frame` that holds velocities, if any does.
-pub fn velocity_of(attributes: &[Attribute]) -> Option<&Attribute> {
+/// An attribute by name and components, wherever its values are.
+pub trait Named {
+    /// Its name.
+    fn name(&self) -> &str;
+    /// Numbers a particle.
+    fn components(&self) -> usize;
+}
+
+impl Named for Attribute {
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn components(&self) -> usize {
+        self.components
+    }
+}
+
+impl Named for AttributeView<'_> {
+    fn name(&self) -> &str {
+        self.name()
+    }
+
+    fn components(&self) -> usize {
+        self.components()
+    }
+}
+
+/// The one of `attributes` that holds velocities, if any does.
+pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
     VELOCITY_NAMES.iter().find_map(|name| {
         attributes
             .iter()
-            .find(|a| a.components == 3 && a.name.eq_ignore_ascii_case(name))
+            .find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
     })
 }
 
@@ -217,15 +267,15 @@ const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
 
 /// The attribute that holds ids, if any does: exactly by name, or failing that without regard to
 /// case.
-pub fn id_of(attributes: &[Attribute]) -> Option<&Attribute> {
+pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
     ID_NAMES.iter().find_map(|name| {
-        let exact = attributes.iter().find(|a| a.name == *name);
+        let exact = attributes.iter().find(|a| a.name() == *name);
         let alike = || {
             attributes
                 .iter()
-                .find(|a| a.name.eq_ignore_ascii_case(name))
+                .find(|a| a.name().eq_ignore_ascii_case(name))
         };
-        exact.or_else(alike).filter(|a| a.components == 1)
+        exact.or_else(alike).filter(|a| a.components() == 1)
     })
 }
 
@@ -240,13 +290,20 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
-    fn take_in(&mut self, loaded: Loaded, files: u64, question: Question) {
+    fn take_in(&mut self, look: Look, question: Question) {
         self.frames += 1;
-        let mut weight = FrameWeight::of(&loaded, files);
-        let raw = loaded.particles;
+        self.origin = self.origin.and(look.origin);
+        let Look {
+            particles: raw,
+            count,
+            extremes,
+            spacing,
+            mut weight,
+            ..
+        } = look;
         self.attributes
             .extend(raw.attributes.iter().map(|a| a.name.clone()));
-        if let Some((min, max)) = robust_bounds(&raw.positions) {
+        if let Some((min, max)) = robust_bounds(&raw.positions, extremes) {
             self.bounds = Some(match self.bounds {
                 Some((low, high)) => (low.min(min), high.max(max)),
                 None => (min, max),
@@ -255,32 +312,24 @@ impl Totals {
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
         }
-        let wanted = match question.color {
-            ColorQuestion::None => None,
-            ColorQuestion::Speed => self.velocity.clone(),
-            ColorQuestion::Attribute(name) => Some(name.to_owned()),
-        };
         let origin = self
             .bounds
             .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
+        let seen = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
-        self.most_particles = self.most_particles.max(frame.len());
-        weight.own_radii = matches!(frame.radius, Some(Radius::PerParticle(_)));
+        // Of a part, none is known not to be finite.
+        let count = count - (seen - frame.len());
+        self.most_particles = self.most_particles.max(count);
+        if !weight.in_place {
+            weight.own_radii = matches!(frame.radius, Some(Radius::PerParticle(_)));
+        }
         if self.weight.is_none_or(|heaviest| weight.raw > heaviest.raw) {
             self.weight = Some(weight);
         }
-        if let Some(name) = wanted {
-            if let Some(attribute) = frame.attribute(&name)
-                && let Some((low, high)) = robust_range(attribute)
-            {
-                let (a, b) = self.range.unwrap_or((low, high));
-                self.range = Some((a.min(low), b.max(high)));
-            }
-            self.color = Some(name);
-        }
+        self.take_in_color(&frame, question.color);
         match question.radius {
             RadiusQuestion::None => {}
-            RadiusQuestion::Auto => self.take_in_radius(&frame),
+            RadiusQuestion::Auto => self.take_in_radius(&frame, count, spacing),
             RadiusQuestion::Attribute(name, scale) => {
                 if let Some(attribute) = frame.attribute(name) {
                     let radius = |i| narrow(attribute.magnitude(i) * scale);
@@ -290,7 +339,23 @@ impl Totals {
         }
     }
 
-    fn take_in_radius(&mut self, frame: &ParticleFrame) {
+    fn take_in_color(&mut self, frame: &ParticleFrame, question: ColorQuestion) {
+        let wanted = match question {
+            ColorQuestion::None => None,
+            ColorQuestion::Speed => self.velocity.clone(),
+            ColorQuestion::Attribute(name) => Some(name.to_owned()),
+        };
+        let Some(name) = wanted else { return };
+        if let Some(attribute) = frame.attribute(&name)
+            && let Some((low, high)) = robust_range(attribute)
+        {
+            let (a, b) = self.range.unwrap_or((low, high));
+            self.range = Some((a.min(low), b.max(high)));
+        }
+        self.color = Some(name);
+    }
+
+    fn take_in_radius(&mut self, frame: &ParticleFrame, count: usize, spacing: Option<f32>) {
         match &frame.radius {
             Some(Radius::Common(radius)) => {
                 self.has_radii = true;
@@ -302,9 +367,10 @@ impl Totals {
             }
             None => {
                 // The fullest frame knows the spacing best.
-                let fuller = self.radius.is_none_or(|(count, _)| frame.len() > count);
-                if fuller && let Some(radius) = estimate_radius(&frame.positions) {
-                    self.radius = Some((frame.len(), radius));
+                let fuller = self.radius.is_none_or(|(known, _)| count > known);
+                let estimate = || spacing.or_else(|| estimate_radius(&frame.positions));
+                if fuller && let Some(radius) = estimate() {
+                    self.radius = Some((count, radius));
                 }
             }
         }
@@ -322,8 +388,16 @@ impl Totals {
                 high,
             }
         });
+        // Native frames have settled it already; another one would be in the way of tracing them as they
+        // are.
+        let origin = match self.origin {
+            Origins::Shared(origin) => origin,
+            Origins::None | Origins::Mixed => choose_origin(min, max),
+        };
+        let in_place = self.origin == Origins::Shared(origin);
+        let weight = self.weight.map(|weight| FrameWeight { in_place, ..weight });
         Survey {
-            origin: choose_origin(min, max),
+            origin,
             min,
             max,
             radius: self.radius.map(|(_, radius)| radius),
@@ -334,156 +408,7 @@ impl Totals {
             attributes: self.attributes.into_iter().collect(),
             most_particles: self.most_particles,
             frames: self.frames,
-            weight: self.weight,
+            weight,
         }
-    }
-}
-
-impl FrameWeight {
-    /// All but the radii, which are looked for later.
-    fn of(loaded: &Loaded, files: u64) -> Self {
-        let raw = &loaded.particles;
-        Self {
-            particles: raw.positions.len() as u64,
-            stored: loaded.all_bytes,
-            content: loaded.content_bytes,
-            raw: raw.byte_len(),
-            positions: raw.positions.byte_len(),
-            files,
-            own_radii: false,
-            ids: id_of(&raw.attributes).is_some(),
-            velocities: velocity_of(&raw.attributes).is_some(),
-        }
-    }
-}
-
-/// The box of the particles, except that on each axis it reaches beyond the middle 98 % by at most
-/// half their extent. None without finite particles.
-///
-/// Below 100 particles, where that would leave none out, the outermost on each side of an axis is
-/// not of the middle, and the box may reach beyond by the longest side of the middle: one of a few
-/// particles that lies off the others' plane belongs to the picture.
-fn robust_bounds(positions: &Positions) -> Option<(DVec3, DVec3)> {
-    let count = positions.len();
-    let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
-    let stride = count.div_ceil(SAMPLE).max(1);
-    let mut sample: Vec<DVec3> = (0..count).step_by(stride).filter_map(finite).collect();
-    let (min, max) = (0..count)
-        .into_par_iter()
-        .filter_map(finite)
-        .map(|p| (p, p))
-        .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))?;
-    let few = sample.len() < 100;
-    let outside = match sample.len() / 100 {
-        0 => usize::from(sample.len() >= ESCAPE_MIN),
-        percent => percent,
-    };
-    let (mut first, mut last) = (min, max);
-    for axis in 0..3 {
-        sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
-        let above = (sample.len() - outside).saturating_sub(1);
-        if let (Some(low), Some(high)) = (sample.get(outside), sample.get(above)) {
-            (first[axis], last[axis]) = (low[axis], high[axis]);
-        }
-    }
-    let extent = last - first;
-    let margin = if few {
-        DVec3::splat(extent.max_element())
-    } else {
-        0.5 * extent
-    };
-    Some((min.max(first - margin), max.min(last + margin)))
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
-fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
-/// The 99th percentile of `count` radii; 0 without finite ones.
-fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32 {
-    let stride = count.div_ceil(SAMPLE).max(1);
-    let mut radii: Vec<f32> = (0..count)
-        .step_by(stride)
-        .map(radius)
-        .filter(|r| r.is_finite() && *r > 0.0)
-        .collect();
-    radii.sort_unstable_by(f32::total_cmp);
-    let place = (radii.len() - radii.len() / 100).saturating_sub(1);
-    radii.get(place).copied().unwrap_or(0.0)
-}
-
-/// The middle 99 % of an attribute's values (vectors by magnitude, from zero up).
-fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
-    let count = attribute.count();
-    let stride = count.div_ceil(SAMPLE).max(1);
-    let mut values: Vec<f64> = (0..count)
-        .step_by(stride)
-        .map(|i| attribute.magnitude(i))
-        .filter(|v| v.is_finite())
-        .collect();
-    values.sort_unstable_by(f64::total_cmp);
-    let low = *values.get(values.len() / 200)?;
-    let high = *values.get((values.len() - values.len() / 200).saturating_sub(1))?;
-    let is_vector = attribute.components > 1;
-    Some((if is_vector { 0.0 } else { low }, high))
-}
-
-/// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
-fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
-    let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
-    let stride = positions.len().div_ceil(queries).max(1);
-    let mut distances: Vec<f32> = positions
-        .iter()
-        .step_by(stride)
-        .filter_map(|from| {
-            let nearest = positions
-                .par_chunks(64 * 1024)
-                .map(|chunk| {
-                    chunk
-                        .iter()
-                        .map(|to| from.distance_squared(*to))
-                        .filter(|d| *d > 0.0)
-                        .fold(f32::INFINITY, f32::min)
-                })
-                .reduce(|| f32::INFINITY, f32::min);
-            nearest.is_finite().then(|| nearest.sqrt())
-        })
-        .collect();
-    distances.sort_unstable_by(f32::total_cmp);
-    distances.get(distances.len() / 2).map(|d| 0.5 * d)
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// `side` by `side` particles in the unit square of a plane, and one more.
-    fn plane_and(side: u8, other: DVec3) -> (DVec3, DVec3) {
-        let step = |i: u8| f64::from(i) / f64::from(side - 1);
-        let mut all: Vec<DVec3> = (0..side)
-            .flat_map(|i| (0..side).map(move |j| DVec3::new(step(i), step(j), 0.0)))
-            .collect();
-        all.push(other);
-        robust_bounds(&Positions::F64(all)).unwrap()
-    }
-
-    #[test]
-    fn one_escaped_particle_is_left_out_of_many_and_of_few() {
-        for side in [5, 20] {
-            for escaped in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
-                let (min, max) = plane_and(side, 1e4 * escaped);
-                assert!(min.min_element() >= -1.0, "{side} {escaped}: {min}");
-                assert!(max.max_element() <= 2.0, "{side} {escaped}: {max}");
-                assert!(min.x <= 0.0 && min.y <= 0.0 && max.x >= 1.0 && max.y >= 1.0);
-            }
-        }
-    }
-
-    #[test]
-    fn one_of_few_that_lies_near_is_kept() {
-        assert_eq!(plane_and(5, DVec3::new(0.5, 0.5, 0.9)).1.z, 0.9);
-        // Of less than sixteen none is left out.
-        assert_eq!(plane_and(3, DVec3::new(0.5, 0.5, 1e4)).1.z, 1e4);
     }
 }

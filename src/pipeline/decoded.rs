@@ -1,0 +1,168 @@
+//! A frame as plain particles: what foreign files become, and native frames that cannot be traced as they
+//! are.
+
+use glam::Vec3;
+use rayon::prelude::*;
+use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius};
+
+use super::load::{LoadError, missing};
+use super::setup::{ColorRule, RadiusRule, Setup};
+use crate::survey::{id_of, velocity_of};
+
+/// A frame in memory, ready for the tree.
+#[derive(Debug)]
+pub struct DecodedFrame {
+    /// Centres relative to the origin.
+    pub centers: Vec<Vec3>,
+    /// Radii.
+    pub radius: Radius,
+    /// What shading needs.
+    pub shading: DecodedShading,
+}
+
+/// What shading needs of particles, in their order.
+#[derive(Debug, Default)]
+pub struct DecodedShading {
+    /// Numbers for the colour map, one a particle; empty with a constant colour, and in a frame
+    /// that lacks an attribute which nobody asked for.
+    pub values: Vec<f32>,
+    /// Numbers for the `id` channel; None if the particle's index serves.
+    pub ids: Option<Vec<u32>>,
+    /// Velocities for the `V` channel.
+    pub velocities: Option<Vec<Vec3>>,
+}
+
+impl DecodedFrame {
+    /// Takes of `frame`, which was read from `file`, what `setup` asks for; tells how many radii were
+    /// raised.
+    pub(super) fn of(
+        setup: &Setup,
+        frame: ParticleFrame,
+        file: &str,
+    ) -> Result<(Self, u64), LoadError> {
+        let (radius, clamped) = radii(setup, &frame, file)?;
+        let values = match &setup.color {
+            ColorRule::Constant(_) => Vec::new(),
+            ColorRule::Attribute { name, required, .. } => {
+                let found = if *required {
+                    attribute(&frame, name, "colour", file)?
+                } else {
+                    frame.attribute(name)
+                };
+                found.map_or_else(Vec::new, |attribute| magnitudes(attribute, 1.0))
+            }
+        };
+        let channels = setup.render.channels;
+        let ids = if channels.id { ids(&frame) } else { None };
+        let velocities = if channels.velocity {
+            velocity_of(&frame.attributes).map(vectors)
+        } else {
+            None
+        };
+        let decoded = Self {
+            centers: frame.positions,
+            radius,
+            shading: DecodedShading {
+                values,
+                ids,
+                velocities,
+            },
+        };
+        Ok((decoded, clamped))
+    }
+}
+
+impl DecodedShading {
+    /// Bytes of all of it.
+    pub fn byte_len(&self) -> u64 {
+        let ids = self.ids.as_deref().unwrap_or_default();
+        let velocities = self.velocities.as_deref().unwrap_or_default();
+        (size_of_val(&self.values[..]) + size_of_val(ids) + size_of_val(velocities)) as u64
+    }
+}
+
+/// The attribute `name`; None in a frame without particles, which need not declare any.
+fn attribute<'a>(
+    frame: &'a ParticleFrame,
+    name: &str,
+    purpose: &'static str,
+    file: &str,
+) -> Result<Option<&'a Attribute>, LoadError> {
+    let found = frame.attribute(name);
+    if found.is_none() && !frame.is_empty() {
+        let has = frame.attributes.iter().map(|a| a.name.as_str());
+        return Err(missing(name, purpose, file, has));
+    }
+    Ok(found)
+}
+
+/// The radii of a frame and how many had to be raised.
+fn radii(setup: &Setup, frame: &ParticleFrame, file: &str) -> Result<(Radius, u64), LoadError> {
+    let mut radius = match &setup.radius {
+        RadiusRule::Common(radius) => Radius::Common(*radius),
+        RadiusRule::FileOr(radius) => frame.radius.clone().unwrap_or(Radius::Common(*radius)),
+        RadiusRule::Attribute { name, scale } => {
+            match attribute(frame, name, "the radius", file)? {
+                Some(attribute) => Radius::PerParticle(magnitudes(attribute, f64::from(*scale))),
+                None => Radius::Common(setup.least_radius),
+            }
+        }
+    };
+    if frame.is_empty() {
+        return Ok((radius, 0));
+    }
+    let least = setup.least_radius;
+    let mut clamped = 0;
+    let mut raise = |radius: &mut f32| {
+        // Also true for NaN.
+        if !(*radius >= least && radius.is_finite()) {
+            *radius = least;
+            clamped += 1;
+        }
+    };
+    match &mut radius {
+        Radius::Common(radius) => raise(radius),
+        Radius::PerParticle(radii) => radii.iter_mut().for_each(raise),
+    }
+    Ok((radius, clamped))
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "colours need no more than f32"
+)]
+fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
+    (0..attribute.count())
+        .into_par_iter()
+        .map(|i| (attribute.magnitude(i) * scale) as f32)
+        .collect()
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "the channel is f32")]
+fn vectors(attribute: &Attribute) -> Vec<Vec3> {
+    let value = |i: usize| attribute.data.get_f64(i) as f32;
+    (0..attribute.count())
+        .into_par_iter()
+        .map(|i| Vec3::new(value(3 * i), value(3 * i + 1), value(3 * i + 2)))
+        .collect()
+}
+
+/// The particles' ids, or the place in the file of particles that others were dropped between.
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "the channel has 32 bits; larger ids keep their low ones"
+)]
+fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
+    Some(match id_of(&frame.attributes).map(|a| &a.data) {
+        Some(AttributeData::U32(v)) => v.clone(),
+        Some(AttributeData::I32(v)) => v.iter().map(|id| id.cast_unsigned()).collect(),
+        Some(AttributeData::U64(v)) => v.iter().map(|id| *id as u32).collect(),
+        Some(AttributeData::I64(v)) => v.iter().map(|id| *id as u32).collect(),
+        Some(AttributeData::U16(v)) => v.iter().map(|id| u32::from(*id)).collect(),
+        Some(AttributeData::I16(v)) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
+        Some(AttributeData::U8(v)) => v.iter().map(|id| u32::from(*id)).collect(),
+        Some(AttributeData::I8(v)) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
+        _ => return frame.file_index.clone(),
+    })
+}

@@ -1,0 +1,124 @@
+//! What the survey sees of one frame: all of it, or of a large native frame a part, the rest being in its
+//! index.
+
+use glam::DVec3;
+use spherule_formats::native::layout::RadiusIndex;
+use spherule_formats::native::{Access, FrameIndex, NativeFile};
+use spherule_formats::sequence::Sequence;
+use spherule_formats::{FrameError, ParseError, RawParticles};
+
+use super::robust::{NEIGHBOUR_QUERIES, middle};
+use super::{FrameWeight, id_of, velocity_of};
+
+/// Particles that are looked at of a native frame; smaller ones are looked at as a whole.
+const MOST: usize = 1 << 17;
+
+/// What is seen of a frame.
+pub(super) struct Look {
+    /// The particles, or some of them evenly spread.
+    pub(super) particles: RawParticles,
+    /// How many the frame has.
+    pub(super) count: usize,
+    /// Outermost coordinates, if all are told.
+    pub(super) extremes: Option<(DVec3, DVec3)>,
+    /// Half the usual distance of neighbours, where the particles that are seen do not tell it.
+    pub(super) spacing: Option<f32>,
+    /// What the coordinates in a native frame are relative to.
+    pub(super) origin: Option<DVec3>,
+    pub(super) weight: FrameWeight,
+}
+
+impl Look {
+    /// At frame `index` of `sequence`.
+    pub(super) fn at(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
+        match sequence.native_file(index) {
+            Some(path) => {
+                let file = NativeFile::open(path, Access::Map)?;
+                let look = Self::at_native(&file).map_err(|e| e.in_file(path))?;
+                file.check()?;
+                Ok(look)
+            }
+            None => Self::at_files(sequence, index),
+        }
+    }
+
+    fn at_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
+        let loaded = sequence.load_measured(index)?;
+        let raw = &loaded.particles;
+        let weight = FrameWeight {
+            particles: raw.positions.len() as u64,
+            stored: loaded.all_bytes,
+            content: loaded.content_bytes,
+            raw: raw.byte_len(),
+            positions: raw.positions.byte_len(),
+            files: sequence.inputs(index).len() as u64,
+            // Looked for later.
+            own_radii: false,
+            ids: id_of(&raw.attributes).is_some(),
+            velocities: velocity_of(&raw.attributes).is_some(),
+            in_place: false,
+        };
+        Ok(Self {
+            count: raw.positions.len(),
+            extremes: None,
+            spacing: None,
+            origin: None,
+            weight,
+            particles: loaded.particles,
+        })
+    }
+
+    fn at_native(file: &NativeFile) -> Result<Self, ParseError> {
+        let frame = file.frame_unchecked();
+        let index = file.index();
+        let too_many = |_| ParseError::unsupported("more particles than this machine can count");
+        let count = usize::try_from(index.count).map_err(too_many)?;
+        let is_part = count > MOST;
+        if !is_part {
+            // Soon done, and what damage would do to percentiles is never seen.
+            frame.verify()?;
+        }
+        frame.verify_nodes()?;
+        let particles = frame.sample(MOST)?;
+        let spacing = match index.radius {
+            RadiusIndex::None if is_part => {
+                middle(frame.neighbour_distances(NEIGHBOUR_QUERIES)?).map(|d| 0.5 * d)
+            }
+            _ => None,
+        };
+        let origin = DVec3::from_array(index.origin);
+        let corner = |c: [f32; 3]| glam::Vec3::from_array(c).as_dvec3() + origin;
+        Ok(Self {
+            weight: weight(file, &particles),
+            count,
+            extremes: is_part.then(|| (corner(index.min), corner(index.max))),
+            spacing,
+            origin: Some(origin),
+            particles,
+        })
+    }
+}
+
+/// Of a native frame: as if it were read, for those who cannot trace it where it lies.
+fn weight(file: &NativeFile, particles: &RawParticles) -> FrameWeight {
+    let index: &FrameIndex = file.index();
+    let positions = if index.origin == [0.0; 3] { 12 } else { 24 };
+    let attributes = index.attributes.iter().map(|a| a.section.len);
+    let radii = match index.radius {
+        RadiusIndex::None => 0,
+        RadiusIndex::Common(_) | RadiusIndex::PerParticle(_) => 4,
+    };
+    let positions = positions * index.count;
+    FrameWeight {
+        particles: index.count,
+        stored: file.byte_len(),
+        content: file.byte_len(),
+        raw: attributes.fold(positions + radii * index.count, u64::saturating_add),
+        positions,
+        files: 1,
+        own_radii: matches!(index.radius, RadiusIndex::PerParticle(_)),
+        ids: id_of(&particles.attributes).is_some(),
+        velocities: velocity_of(&particles.attributes).is_some(),
+        in_place: true,
+    }
+}

@@ -1,0 +1,155 @@
+//! Percentiles of what is sampled, and the spacing of particles.
+
+use glam::{DVec3, Vec3};
+use rayon::prelude::*;
+use spherule_formats::{Attribute, Positions};
+
+/// Particles of a frame that percentiles are taken from.
+const SAMPLE: usize = 20_000;
+/// Fewest particles of which one alone may count as escaped: of a handful each matters.
+const ESCAPE_MIN: usize = 16;
+/// Distances to the nearest neighbour that the radius is estimated from.
+pub(super) const NEIGHBOUR_QUERIES: usize = 512;
+/// Distance computations that the estimate may cost: half a second for a frame of 1e7.
+const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
+
+/// The box of the particles, except that on each axis it reaches beyond the middle 98 % by at most
+/// half their extent. None without finite particles. The outermost ones are `extremes` where `positions` are
+/// not all.
+///
+/// Below 100 particles, where that would leave none out, the outermost on each side of an axis is
+/// not of the middle, and the box may reach beyond by the longest side of the middle: one of a few
+/// particles that lies off the others' plane belongs to the picture.
+pub(super) fn robust_bounds(
+    positions: &Positions,
+    extremes: Option<(DVec3, DVec3)>,
+) -> Option<(DVec3, DVec3)> {
+    let count = positions.len();
+    let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
+    let stride = count.div_ceil(SAMPLE).max(1);
+    let mut sample: Vec<DVec3> = (0..count).step_by(stride).filter_map(finite).collect();
+    let outermost = || {
+        let all = (0..count).into_par_iter().filter_map(finite);
+        all.map(|p| (p, p))
+            .reduce_with(|a, b| (a.0.min(b.0), a.1.max(b.1)))
+    };
+    let (min, max) = extremes.or_else(outermost)?;
+    let few = sample.len() < 100;
+    let outside = match sample.len() / 100 {
+        0 => usize::from(sample.len() >= ESCAPE_MIN),
+        percent => percent,
+    };
+    let (mut first, mut last) = (min, max);
+    for axis in 0..3 {
+        sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
+        let above = (sample.len() - outside).saturating_sub(1);
+        if let (Some(low), Some(high)) = (sample.get(outside), sample.get(above)) {
+            (first[axis], last[axis]) = (low[axis], high[axis]);
+        }
+    }
+    let extent = last - first;
+    let margin = if few {
+        DVec3::splat(extent.max_element())
+    } else {
+        0.5 * extent
+    };
+    Some((min.max(first - margin), max.min(last + margin)))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
+pub(super) fn narrow(value: f64) -> f32 {
+    value as f32
+}
+
+/// The 99th percentile of `count` radii; 0 without finite ones.
+pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32 {
+    let stride = count.div_ceil(SAMPLE).max(1);
+    let mut radii: Vec<f32> = (0..count)
+        .step_by(stride)
+        .map(radius)
+        .filter(|r| r.is_finite() && *r > 0.0)
+        .collect();
+    radii.sort_unstable_by(f32::total_cmp);
+    let place = (radii.len() - radii.len() / 100).saturating_sub(1);
+    radii.get(place).copied().unwrap_or(0.0)
+}
+
+/// The middle 99 % of an attribute's values (vectors by magnitude, from zero up).
+pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
+    let count = attribute.count();
+    let stride = count.div_ceil(SAMPLE).max(1);
+    let mut values: Vec<f64> = (0..count)
+        .step_by(stride)
+        .map(|i| attribute.magnitude(i))
+        .filter(|v| v.is_finite())
+        .collect();
+    values.sort_unstable_by(f64::total_cmp);
+    let low = *values.get(values.len() / 200)?;
+    let high = *values.get((values.len() - values.len() / 200).saturating_sub(1))?;
+    let is_vector = attribute.components > 1;
+    Some((if is_vector { 0.0 } else { low }, high))
+}
+
+/// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
+pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
+    let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
+    let stride = positions.len().div_ceil(queries).max(1);
+    let distances: Vec<f32> = positions
+        .iter()
+        .step_by(stride)
+        .filter_map(|from| {
+            let nearest = positions
+                .par_chunks(64 * 1024)
+                .map(|chunk| {
+                    chunk
+                        .iter()
+                        .map(|to| from.distance_squared(*to))
+                        .filter(|d| *d > 0.0)
+                        .fold(f32::INFINITY, f32::min)
+                })
+                .reduce(|| f32::INFINITY, f32::min);
+            nearest.is_finite().then(|| nearest.sqrt())
+        })
+        .collect();
+    middle(distances).map(|d| 0.5 * d)
+}
+
+/// The median of `values`.
+pub(super) fn middle(mut values: Vec<f32>) -> Option<f32> {
+    values.sort_unstable_by(f32::total_cmp);
+    values.get(values.len() / 2).copied()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// `side` by `side` particles in the unit square of a plane, and one more.
+    fn plane_and(side: u8, other: DVec3) -> (DVec3, DVec3) {
+        let step = |i: u8| f64::from(i) / f64::from(side - 1);
+        let mut all: Vec<DVec3> = (0..side)
+            .flat_map(|i| (0..side).map(move |j| DVec3::new(step(i), step(j), 0.0)))
+            .collect();
+        all.push(other);
+        robust_bounds(&Positions::F64(all), None).unwrap()
+    }
+
+    #[test]
+    fn one_escaped_particle_is_left_out_of_many_and_of_few() {
+        for side in [5, 20] {
+            for escaped in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
+                let (min, max) = plane_and(side, 1e4 * escaped);
+                assert!(min.min_element() >= -1.0, "{side} {escaped}: {min}");
+                assert!(max.max_element() <= 2.0, "{side} {escaped}: {max}");
+                assert!(min.x <= 0.0 && min.y <= 0.0 && max.x >= 1.0 && max.y >= 1.0);
+            }
+        }
+    }
+
+    #[test]
+    fn one_of_few_that_lies_near_is_kept() {
+        assert_eq!(plane_and(5, DVec3::new(0.5, 0.5, 0.9)).1.z, 0.9);
+        // Of less than sixteen none is left out.
+        assert_eq!(plane_and(3, DVec3::new(0.5, 0.5, 1e4)).1.z, 1e4);
+    }
+}
