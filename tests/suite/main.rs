@@ -7,6 +7,7 @@ mod bad_input;
 mod convert;
 mod damaged;
 mod golden;
+mod in_place;
 mod memory;
 mod resume;
 mod samples;

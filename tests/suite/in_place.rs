@@ -1,0 +1,177 @@
+//! Native frames are traced where they lie: the pictures are those of decoded particles, damage costs the
+//! frame, and memory does not grow with the particles.
+
+use std::fs;
+use std::path::Path;
+
+use glam::Vec3;
+
+use crate::harness::{Ran, Workshop, dam_break, images, npy};
+
+const SMALL: [&str; 6] = ["--width", "96", "--height", "54", "--samples", "2"];
+/// Everything that can be in an image.
+const ALL: [&str; 2] = ["--channels", "RGBA,Z,N,P,V,id,albedo"];
+
+/// Renders `input` into `out`; the options are added.
+fn render(shop: &Workshop, input: &str, out: &str, options: &[&str]) -> Ran {
+    let pattern = format!("{out}/f.####.exr");
+    shop.run(&[&["render", input, "-o", &pattern][..], &SMALL, options].concat())
+}
+
+/// The images of `native` traced in place, read instead of mapped, and decoded for another structure are
+/// the same, to the byte.
+#[track_caller]
+fn same_as_decoded(shop: &Workshop, native: &str, options: &[&str]) {
+    let options = [&ALL[..], options].concat();
+    let mut first = None;
+    for (way, how) in [
+        ("auto", &[][..]),
+        ("lbvh", &["--accelerator", "lbvh"]),
+        ("read", &["--no-mmap"]),
+        ("bvh", &["--accelerator", "bvh"]),
+        ("sbvh", &["--accelerator", "sbvh"]),
+    ] {
+        let out = format!("{native}-{way}");
+        let ran = render(shop, native, &out, &[&options, how].concat()).expect(0);
+        let is_decoded = ran.errors().contains("decoded before they are traced");
+        assert_eq!(is_decoded, way.ends_with("bvh") && way != "lbvh", "{way}");
+        let made = images(&shop.join(&out));
+        assert!(!made.is_empty());
+        let expected = first.get_or_insert_with(|| made.clone());
+        assert!(*expected == made, "{native}: {way} differs");
+    }
+}
+
+#[test]
+fn pictures_are_those_of_decoded_particles() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=1);
+    for encoding in ["f32", "q16", "q10"] {
+        let options = ["--encoding", encoding, "--max-error", "0.05"];
+        shop.run(&[&["convert", "in", "-o", encoding][..], &options].concat())
+            .expect(0);
+        same_as_decoded(&shop, encoding, &["--color-by", "velocity"]);
+    }
+}
+
+/// Radii over a hundredfold, so that boxes hold spheres; ids that are not the places in the file.
+#[test]
+fn radii_and_ids_of_their_own() {
+    let shop = Workshop::new();
+    let mut text = "x,y,z,radius,id\n".to_owned();
+    for i in 0..3_000_u32 {
+        let part = |salt: u32| f64::from((i * 7919 + salt).wrapping_mul(2_654_435_761) >> 8) / 2e7;
+        let radius = if i % 100 == 0 {
+            0.1
+        } else {
+            1e-3 + part(4) * 0.01
+        };
+        text += &format!(
+            "{},{},{},{radius},{}\n",
+            part(1),
+            part(2),
+            part(3),
+            100_000 - i
+        );
+    }
+    fs::create_dir_all(shop.join("in")).expect("a directory");
+    fs::write(shop.join("in/p_1.csv"), text).expect("a file");
+    for encoding in ["f32", "q16", "q10"] {
+        let options = ["--encoding", encoding, "--max-error", "0.05"];
+        shop.run(&[&["convert", "in", "-o", encoding][..], &options].concat())
+            .expect(0);
+        let glass = ["--set", "material.transmission=0.8"];
+        same_as_decoded(&shop, encoding, &glass);
+    }
+}
+
+#[test]
+fn damage_costs_the_frame_and_is_named() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=3);
+    shop.run(&["convert", "in", "-o", "native", "--encoding", "q10"])
+        .expect(0);
+    let file = |number: u32| shop.join(format!("native/frame.{number:04}.spf"));
+    // A byte of the positions, which begin behind the header; then of the attribute at the end.
+    flip(&file(2), 4096 + 100);
+    render(&shop, "native", "out", &[])
+        .expect(1)
+        .tells("frame.0002.spf")
+        .tells("the positions are damaged")
+        .tells("convert again");
+    assert_eq!(images(&shop.join("out")).len(), 2 * 2);
+    // Cut off.
+    let bytes = fs::read(file(3)).expect("readable");
+    fs::write(file(3), &bytes[..bytes.len() / 2]).expect("writable");
+    render(&shop, "native", "cut", &[])
+        .expect(1)
+        .tells("frame.0003.spf");
+    assert_eq!(images(&shop.join("cut")).len(), 2);
+}
+
+fn flip(path: &Path, at: usize) {
+    let mut bytes = fs::read(path).expect("readable");
+    bytes[at] ^= 0x10;
+    fs::write(path, bytes).expect("writable");
+}
+
+#[test]
+fn far_from_zero() {
+    let shop = Workshop::new();
+    for frame in 1..=2 {
+        let path = shop.join(format!("in/f_{frame}.npy"));
+        npy(&path, 500, frame, Vec3::splat(1e6));
+    }
+    shop.run(&["convert", "in", "-o", "native", "--radius", "1"])
+        .expect(0);
+    let ran = render(&shop, "native", "out", &[]).expect(0);
+    assert!(!ran.errors().contains("decoded"), "{}", ran.errors());
+    // Converted apart, each has an origin of its own.
+    npy(&shop.join("in/f_2.npy"), 500, 2, Vec3::splat(-3e6));
+    for frame in ["1", "2"] {
+        let file = format!("in/f_{frame}.npy");
+        shop.run(&["convert", &file, "-o", frame, "--radius", "1"])
+            .expect(0);
+    }
+    for frame in ["1", "2"] {
+        let found = fs::read_dir(shop.join(frame)).expect("readable");
+        let mut found = found.map(|entry| entry.expect("readable").path());
+        let native = found.find(|p| p.extension().is_some_and(|e| e == "spf"));
+        let to = shop.join(format!("apart/frame.{frame}.spf"));
+        fs::create_dir_all(shop.join("apart")).expect("a directory");
+        fs::copy(native.expect("a frame"), &to).expect("copied");
+    }
+    render(&shop, "apart", "apart-out", &[])
+        .expect(0)
+        .tells("another origin");
+}
+
+/// Memory for the program and the image, not for two million particles: as plain numbers they and a tree
+/// over them would take three times as much as is allowed.
+#[cfg(target_os = "linux")]
+#[test]
+fn memory_does_not_grow_with_the_particles() {
+    const PARTICLES: usize = 2_000_000;
+    /// Kibibytes of data and stacks, of which threads reserve 2 MiB each.
+    const ALLOWED: usize = 24 << 10;
+    let shop = Workshop::new();
+    npy(&shop.join("in/f_1.npy"), PARTICLES, 1, Vec3::ZERO);
+    let options = ["--encoding", "q10", "--radius", "0.012"];
+    shop.run(&[&["convert", "in", "-o", "native"][..], &options].concat())
+        .expect(0);
+    let limited = |how: &str| {
+        let program = env!("CARGO_BIN_EXE_spherule");
+        let arguments = "--width 160 --height 90 --samples 1 --threads 2";
+        let command = format!(
+            "ulimit -d {ALLOWED} && exec {program} render native -o {how}/f.#.exr {arguments} {how}"
+        );
+        let mut shell = std::process::Command::new("sh");
+        shell.current_dir(shop.path()).args(["-c", &command]);
+        shell.output().expect("a shell")
+    };
+    let in_place = limited("");
+    assert!(in_place.status.success(), "{in_place:?}");
+    // The same limit is too little where particles are copied.
+    let decoded = limited("--accelerator=bvh");
+    assert!(!decoded.status.success(), "{decoded:?}");
+}
