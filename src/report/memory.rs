@@ -1,9 +1,12 @@
 //! Memory of this process as Linux counts it.
 //!
 //! `VmHWM` is the exact peak of everything resident, mapped files included; the kernel splits only
-//! the present value into anonymous and file-backed pages. What is file-backed here is the program's
-//! own code, a few MiB that only grow, so [`MemoryPeaks`] takes the peak of anonymous memory as
-//! `VmHWM` less the largest `RssFile` seen: nothing between two looks is missed.
+//! the present value into anonymous and file-backed pages. As long as no data are mapped, what is
+//! file-backed is the program's own code, a few MiB that only grow, so [`MemoryPeaks`] takes the peak of
+//! anonymous memory as `VmHWM` less the largest file-backed part seen: nothing between two looks is
+//! missed. Where frames are mapped, their pages come and go and that would count them, so only looks
+//! count: the largest `RssAnon` seen ([`MemoryPeaks::looks_only`]), which is to be looked at where it is
+//! highest, at the ends of phases.
 
 use std::fs;
 
@@ -14,7 +17,7 @@ pub struct MemoryUse {
     pub peak: u64,
     /// Heap and stacks resident now (`RssAnon`).
     pub anonymous: u64,
-    /// Mapped files resident now (`RssFile`).
+    /// Mapped files resident now (`RssFile`, and `RssShmem` for those in a tmpfs).
     pub file: u64,
 }
 
@@ -49,7 +52,7 @@ impl MemoryUse {
         Self {
             peak: bytes("VmHWM"),
             anonymous: bytes("RssAnon"),
-            file: bytes("RssFile"),
+            file: bytes("RssFile") + bytes("RssShmem"),
         }
     }
 }
@@ -57,24 +60,33 @@ impl MemoryUse {
 /// The largest values so far, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryPeaks {
-    /// Heap and stacks: the larger of `total` less `file` and any `RssAnon` seen. A file that was
-    /// mapped and let go between two looks would count here.
+    /// Heap and stacks: the larger of `total` less `file` and any `RssAnon` seen, or the latter alone
+    /// ([`Self::looks_only`]).
     pub anonymous: u64,
-    /// Mapped files, when looked at (`RssFile`).
+    /// Mapped files, when looked at ([`MemoryUse::file`]).
     pub file: u64,
     /// Everything, at any time (`VmHWM`).
     pub total: u64,
     /// Heap and stacks, when looked at.
     seen: u64,
+    looks_only: bool,
 }
 
 impl MemoryPeaks {
+    /// From now on files of data are mapped: anonymous memory is what is seen when looked at.
+    pub fn looks_only(&mut self) {
+        self.looks_only = true;
+    }
+
     /// Takes in how things are `now`.
     pub fn take_in(&mut self, now: MemoryUse) {
         self.file = self.file.max(now.file);
         self.total = self.total.max(now.peak);
         self.seen = self.seen.max(now.anonymous);
-        self.anonymous = self.seen.max(self.total.saturating_sub(self.file));
+        self.anonymous = match self.looks_only {
+            true => self.seen,
+            false => self.seen.max(self.total.saturating_sub(self.file)),
+        };
     }
 }
 
@@ -100,12 +112,27 @@ mod tests {
     }
 
     #[test]
+    fn pages_of_mapped_frames_are_no_anonymous_memory() {
+        let mut peaks = MemoryPeaks::default();
+        peaks.looks_only();
+        // The map was larger between two looks.
+        for (peak, anonymous, file) in [(1000, 50, 600), (1000, 40, 20)] {
+            peaks.take_in(MemoryUse {
+                peak,
+                anonymous,
+                file,
+            });
+        }
+        assert_eq!((peaks.anonymous, peaks.file, peaks.total), (50, 600, 1000));
+    }
+
+    #[test]
     fn reads_the_kernels_table() {
-        let status = "Name:\tx\nVmHWM:\t    2048 kB\nRssAnon:\t 1024 kB\nRssFile:\t   12 kB\n";
+        let status = "Name:\tx\nVmHWM:\t    2048 kB\nRssAnon:\t 1024 kB\nRssFile:\t   12 kB\nRssShmem: 4 kB\n";
         let expected = MemoryUse {
             peak: 2 << 20,
             anonymous: 1 << 20,
-            file: 12 << 10,
+            file: 16 << 10,
         };
         assert_eq!(MemoryUse::parse(status), expected);
         assert_eq!(MemoryUse::parse("nothing here"), MemoryUse::default());
