@@ -1,11 +1,13 @@
 //! Measures one cell in this process.
 
+use std::path::Path;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use super::motion::spread_place;
 use super::peaks::Peaks;
-use super::{Budget, CellRequest, Particles};
+use super::{Budget, CellRequest, Particles, stored};
+use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, TreeBuilder};
 use crate::render::{Film, ParticleShading, RayCounts, RenderSettings, render};
 use crate::report::FrameReport;
@@ -24,41 +26,78 @@ const BUILD_SECONDS: f64 = 2.0;
 /// all sides.
 const LEAST_IMAGES: u32 = 4;
 
-/// Makes or reads the particles, builds, traces.
+/// Makes or reads the particles, builds, traces; or does so in place, in the native frame `file` that
+/// [`super::convert::convert`] has made.
 ///
 /// The first build is in new memory, the others in that of the one before, as in a sequence. They
 /// are repeated up to eleven in all, or until they have taken a quarter of the images' time.
 ///
 /// # Errors
-/// In words: what is asked makes no pictures, or would not fit into memory.
-pub fn measure(request: &CellRequest) -> Result<CellMeasurement, String> {
+/// In words: what is asked makes no pictures, would not fit into memory, or the file cannot be traced.
+pub fn measure(request: &CellRequest, file: Option<&Path>) -> Result<CellMeasurement, String> {
     check_image(request)?;
+    let measured = match file {
+        None => build_and_trace(request)?,
+        Some(path) => stored::trace_in_place(request, path)?,
+    };
+    Ok(measured.report())
+}
+
+/// What a cell has come to.
+pub(super) struct Measured {
+    pub(super) particles: u64,
+    pub(super) load_seconds: f64,
+    pub(super) builds: Builds,
+    pub(super) images: Images,
+    pub(super) peaks: Peaks,
+}
+
+impl Measured {
+    fn report(self) -> CellMeasurement {
+        let mut summary = FrameReport::default();
+        summary.set_build(&self.builds.report);
+        let images = self.images;
+        let rates: Vec<f64> = images.seconds.iter().map(|s| s.recip()).collect();
+        CellMeasurement {
+            images: images.seconds.len() as u64,
+            images_per_second: Spread::of(&rates),
+            image_seconds: Spread::of(&images.seconds),
+            load_seconds: self.load_seconds,
+            conversion: None,
+            build_seconds: BuildTimes::of(&self.builds.seconds),
+            bytes_per_particle: PerParticle::of(&summary.bytes, self.particles),
+            bytes: summary.bytes,
+            build: summary.build,
+            rss: self.peaks.summary(),
+            rays: images.rays.into(),
+            rays_per_second: RayRates::of(images.rays, images.seconds.iter().sum()),
+        }
+    }
+}
+
+fn build_and_trace(request: &CellRequest) -> Result<Measured, String> {
     let peaks = Peaks::default();
     let start = Instant::now();
     let particles = peaks.during(|| Particles::of(request))?;
     let load_seconds = start.elapsed().as_secs_f64();
     let mut builder = TreeBuilder::new();
-    let (build, build_seconds) = peaks.during(|| builds(&mut builder, &particles, request));
+    let settings = BuildSettings {
+        // One colour for all: nobody asks which particle a ray has met.
+        keep_indices: false,
+        ..BuildSettings::new(request.structure)
+    };
+    let spheres = particles.spheres();
+    let builds = peaks
+        .during(|| Builds::repeat(request.budget, || Ok(builder.build(&spheres, &settings))))?;
     // The tree has its own copy; while rays run, only that is needed.
     let count = particles.centers.len() as u64;
     drop(particles);
-    let images = trace(&builder, request, &peaks)?;
-
-    let mut summary = FrameReport::default();
-    summary.set_build(&build);
-    let rates: Vec<f64> = images.seconds.iter().map(|s| s.recip()).collect();
-    Ok(CellMeasurement {
-        images: images.seconds.len() as u64,
-        images_per_second: Spread::of(&rates),
-        image_seconds: Spread::of(&images.seconds),
+    Ok(Measured {
+        particles: count,
         load_seconds,
-        build_seconds,
-        bytes_per_particle: PerParticle::of(&summary.bytes, count),
-        bytes: summary.bytes,
-        build: summary.build,
-        rss: peaks.summary(),
-        rays: images.rays.into(),
-        rays_per_second: RayRates::of(images.rays, images.seconds.iter().sum()),
+        builds,
+        images: trace(builder.tree().view(), request, &peaks)?,
+        peaks,
     })
 }
 
@@ -86,45 +125,59 @@ fn render_settings(request: &CellRequest) -> RenderSettings {
     }
 }
 
-/// The report of the last build, with the highest peak of all.
-fn builds(
-    builder: &mut TreeBuilder,
-    particles: &Particles,
-    request: &CellRequest,
-) -> (BuildReport, BuildTimes) {
-    let settings = BuildSettings {
-        // One colour for all: nobody asks which particle a ray has met.
-        keep_indices: false,
-        ..BuildSettings::new(request.structure)
-    };
-    let allowed = match request.budget {
-        Budget::Seconds(seconds) => BUILD_PART * seconds,
-        Budget::Images(_) => BUILD_SECONDS,
-    };
-    let spheres = particles.spheres();
-    let mut report = builder.build(&spheres, &settings);
-    let mut seconds = vec![report.total.as_secs_f64()];
-    while seconds.len() < BUILDS && seconds.iter().sum::<f64>() < allowed {
-        let peak = report.peak_bytes;
-        report = builder.build(&spheres, &settings);
-        report.peak_bytes = report.peak_bytes.max(peak);
-        seconds.push(report.total.as_secs_f64());
+/// What builds took.
+pub(super) struct Builds {
+    /// Of the last one, with the highest peak of all.
+    report: BuildReport,
+    /// Each one's wall-clock time, in order.
+    seconds: Vec<f64>,
+}
+
+impl Builds {
+    /// Builds as often as a cell of this `budget` does.
+    ///
+    /// # Errors
+    /// That of the first `build` that has one.
+    pub(super) fn repeat(
+        budget: Budget,
+        mut build: impl FnMut() -> Result<BuildReport, String>,
+    ) -> Result<Self, String> {
+        let allowed = match budget {
+            Budget::Seconds(seconds) => BUILD_PART * seconds,
+            Budget::Images(_) => BUILD_SECONDS,
+        };
+        let mut report = build()?;
+        let mut seconds = vec![report.total.as_secs_f64()];
+        while seconds.len() < BUILDS && seconds.iter().sum::<f64>() < allowed {
+            let peak = report.peak_bytes;
+            report = build()?;
+            report.peak_bytes = report.peak_bytes.max(peak);
+            seconds.push(report.total.as_secs_f64());
+        }
+        Ok(Self { report, seconds })
     }
-    (report, BuildTimes::of(&seconds))
 }
 
 /// What images took.
-struct Images {
+pub(super) struct Images {
     /// Each one's wall-clock time.
     seconds: Vec<f64>,
     /// All together.
     rays: RayCounts,
 }
 
-fn trace(builder: &TreeBuilder, request: &CellRequest, peaks: &Peaks) -> Result<Images, String> {
+/// Traces as many images as the budget of `request` allows.
+///
+/// # Errors
+/// In words: the camera or an image is not possible.
+pub(super) fn trace(
+    tree: TreeView<'_>,
+    request: &CellRequest,
+    peaks: &Peaks,
+) -> Result<Images, String> {
     let settings = render_settings(request);
     let aspect = f64::from(request.width) / f64::from(request.height);
-    let surface = SphereSurface::new(builder.tree().view());
+    let surface = SphereSurface::new(tree);
     let shading = ParticleShading::constant(DEFAULT_COLOR);
     let never = AtomicBool::new(false);
     let mut images = Images {
@@ -169,7 +222,7 @@ mod tests {
             seed: 1,
             structure,
             motion: Motion::Both,
-            representation: Representation::F32,
+            representation: Representation::Memory,
             stage: Stage::THESIS,
             budget: Budget::Images(3),
             width: 32,
@@ -183,7 +236,7 @@ mod tests {
     #[test]
     fn any_count_can_be_measured() {
         for particles in [0, 1, 2, 500] {
-            let cell = measure(&request(particles, Structure::default())).unwrap();
+            let cell = measure(&request(particles, Structure::default()), None).unwrap();
             assert_eq!(cell.images, 3);
             assert_eq!(cell.rays.primary, 3 * 32 * 18);
             assert_eq!(cell.bytes_per_particle.is_some(), particles > 0);
@@ -194,7 +247,7 @@ mod tests {
 
     #[test]
     fn all_structures_trace_the_same_rays() {
-        let rays = Structure::ALL.map(|s| measure(&request(2000, s)).unwrap().rays);
+        let rays = Structure::ALL.map(|s| measure(&request(2000, s), None).unwrap().rays);
         assert!(rays.iter().all(|r| *r == rays[0]), "{rays:?}");
         assert!(rays[0].reflection > 0);
     }
@@ -203,7 +256,10 @@ mod tests {
     fn time_ends_a_cell_after_a_few_images_at_least() {
         let mut request = request(10, Structure::default());
         request.budget = Budget::Seconds(1e-9);
-        assert_eq!(measure(&request).unwrap().images, u64::from(LEAST_IMAGES));
+        assert_eq!(
+            measure(&request, None).unwrap().images,
+            u64::from(LEAST_IMAGES)
+        );
     }
 
     #[test]

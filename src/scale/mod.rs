@@ -3,8 +3,8 @@
 //!
 //! The unit is a *cell*: one particle count, one structure, one motion, one representation. What is
 //! asked of a cell is a [`CellRequest`], what comes out is in `report::scale`. A cell measures the
-//! memory of its whole process, so whoever wants several runs each in a process of its own; that,
-//! and all printing, is left to the caller.
+//! memory of its whole process, so whoever wants several runs each in a process of its own, and so is
+//! the native frame made that some are traced from; that, and all printing, is left to the caller.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -12,14 +12,17 @@ use std::str::FromStr;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
+use spherule_formats::native::Encoding;
 
 use crate::accel::Structure;
 
 pub mod cell;
+pub mod convert;
 mod motion;
 mod particles;
 mod peaks;
 mod stage;
+mod stored;
 
 pub use motion::Motion;
 pub use particles::{FrameSurvey, Particles};
@@ -92,22 +95,86 @@ pub enum Budget {
     Images(u32),
 }
 
-/// How positions are held in memory.
+/// How positions are held while rays are traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Representation {
-    /// Three f32 a particle.
+    /// In memory, three f32 a particle, in a tree that is built there.
+    Memory,
+    /// In a native frame of f32, mapped and traced where it lies.
     F32,
+    /// The same with 16 bits an axis.
+    Q16,
+    /// The same with 11, 11 and 10 bits.
+    Q10,
 }
 
 impl Representation {
     /// All there are.
-    pub const ALL: [Self; 1] = [Self::F32];
+    pub const ALL: [Self; 4] = [Self::Memory, Self::F32, Self::Q16, Self::Q10];
 
     /// Its name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Memory => "memory",
             Self::F32 => "f32",
+            Self::Q16 => "q16",
+            Self::Q10 => "q10",
+        }
+    }
+
+    /// That of the native frame; None in memory.
+    pub const fn encoding(self) -> Option<Encoding> {
+        match self {
+            Self::Memory => None,
+            Self::F32 => Some(Encoding::F32),
+            Self::Q16 => Some(Encoding::Q16),
+            Self::Q10 => Some(Encoding::Q10),
+        }
+    }
+
+    /// Whether there are cells of both. Every structure is built in memory; a native frame lies in k-d
+    /// order and is no other tree than that where it lies.
+    pub fn goes_with(self, structure: Structure) -> bool {
+        self == Self::Memory || structure == Structure::Kdtree
+    }
+
+    /// Where positions are, for people.
+    pub const fn place(self) -> &'static str {
+        match self {
+            Self::Memory => "in memory",
+            Self::F32 => "in an f32 file",
+            Self::Q16 => "in a q16 file",
+            Self::Q10 => "in a q10 file",
+        }
+    }
+}
+
+/// What a process of its own is asked to do.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Task {
+    /// Make the native frame that cells like this one are traced from ([`convert::convert`]).
+    Convert {
+        /// One of them.
+        request: CellRequest,
+        /// Where to.
+        path: PathBuf,
+    },
+    /// Measure a cell ([`cell::measure`]).
+    Measure {
+        /// Which.
+        request: CellRequest,
+        /// Its native frame, where it has one.
+        file: Option<PathBuf>,
+    },
+}
+
+impl Task {
+    /// Threads to use.
+    pub const fn threads(&self) -> usize {
+        match self {
+            Self::Convert { request, .. } | Self::Measure { request, .. } => request.threads,
         }
     }
 }

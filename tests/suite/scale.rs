@@ -179,7 +179,11 @@ fn options_have_ranges() {
             "rotate",
             "wants one of rotation, translation, both",
         ),
-        ("--representations", "f16", "wants one of f32"),
+        (
+            "--representations",
+            "f16",
+            "wants one of memory, f32, q16, q10",
+        ),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
         ("--width", "0", "0 is not in 1..=65536"),
@@ -274,7 +278,7 @@ fn a_cell_that_does_not_fit_is_shown_as_failed() {
         .expect("a shell");
     let ran = Ran(output)
         .expect(1)
-        .tells("error: 4000000000 particles, lbvh f32, both: out of memory: ");
+        .tells("error: 4000000000 particles, lbvh in memory, both: out of memory: ");
     assert!(
         ran.text().contains("failed: 4000000000 particles"),
         "{}",
@@ -299,7 +303,7 @@ fn interrupted_runs_keep_what_they_have() {
         &["--seconds", "0.5", "--particles", &counts.join(",")],
     ];
     let mut running = workshop.start(&arguments.concat());
-    assert!(running.wait_for_line("[1/30] 10 particles, lbvh f32, both: build "));
+    assert!(running.wait_for_line("[1/30] 10 particles, lbvh in memory, both: build "));
     running.signal("TERM");
     let (told, status) = running.end();
     assert_eq!(status.code(), Some(75), "{told}");

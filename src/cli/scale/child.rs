@@ -1,8 +1,7 @@
-//! One cell in a process of its own: this program again, under a hidden command.
+//! One task in a process of its own: this program again, under a hidden command.
 //!
-//! The request is one line on the child's standard input, which stays open: a child whose input
-//! ends has lost its parent and ends itself. The outcome is one line on its standard output. The
-//! child has its own process group, so that Ctrl-C reaches the parent alone.
+//! The task is one line on the child's standard input, which stays open: a child whose input ends has
+//! lost its parent and ends itself. What came of it is one line on its standard output. The child has its own process group, so that Ctrl-C reaches the parent alone.
 
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
@@ -10,11 +9,11 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use serde::de::DeserializeOwned;
 use spherule_jobs::Interrupt;
 
 use super::measure::COMMAND;
-use crate::report::scale::CellOutcome;
-use crate::scale::CellRequest;
+use crate::scale::Task;
 
 /// Between two looks at the child; short against any cell.
 const INTERVAL: Duration = Duration::from_millis(10);
@@ -22,19 +21,26 @@ const INTERVAL: Duration = Duration::from_millis(10);
 const REASON: usize = 400;
 
 /// How a child ended.
-pub(super) enum Ended {
-    /// With a result, or with a failure that is one.
-    Told(CellOutcome),
+pub(super) enum Ended<T> {
+    /// With a result, failures included.
+    Told(T),
     /// We have ended it because we were asked to.
     Interrupted,
 }
 
-/// Runs the cell of `request`; whatever goes wrong in it is its outcome.
-pub(super) fn measure(request: &CellRequest, interrupt: &Interrupt) -> Ended {
+/// Has `task` done; whatever goes wrong is told as the reason.
+pub(super) fn run<T: DeserializeOwned>(
+    task: &Task,
+    interrupt: &Interrupt,
+) -> Ended<Result<T, String>> {
     if interrupt.is_raised() {
         return Ended::Interrupted;
     }
-    let failed = |reason: String| Ended::Told(CellOutcome::Failed { reason });
+    let failed = |reason: String| Ended::Told(Err(reason));
+    let line = match serde_json::to_string(task) {
+        Ok(line) => line,
+        Err(e) => return failed(format!("cannot be told to a process: {e}")),
+    };
     let mut child = match spawn() {
         Ok(child) => child,
         Err(e) => return failed(format!("cannot start a process: {e}")),
@@ -42,7 +48,7 @@ pub(super) fn measure(request: &CellRequest, interrupt: &Interrupt) -> Ended {
     let output = reader(child.stdout.take());
     let errors = reader(child.stderr.take());
     let mut input = child.stdin.take();
-    if let (Some(input), Ok(line)) = (&mut input, serde_json::to_string(request)) {
+    if let Some(input) = &mut input {
         // A child that is dead already tells by its status why.
         let _ = writeln!(input, "{line}");
     }
@@ -63,7 +69,7 @@ pub(super) fn measure(request: &CellRequest, interrupt: &Interrupt) -> Ended {
     let text = |reader: JoinHandle<String>| reader.join().unwrap_or_default();
     let (output, errors) = (text(output), text(errors));
     match serde_json::from_str(&output) {
-        Ok(outcome) if status.success() => Ended::Told(outcome),
+        Ok(told) if status.success() => Ended::Told(told),
         _ => failed(reason(status, &errors)),
     }
 }

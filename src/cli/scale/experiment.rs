@@ -34,7 +34,7 @@ impl Experiment {
             particles: each_once(&args.particles, &[]),
             structures: structures.iter().map(|s| s.name().to_owned()).collect(),
             motions: each_once(&args.motions, &Motion::ALL),
-            representations: each_once(&args.representations, &[Representation::F32]),
+            representations: each_once(&args.representations, &[Representation::Memory]),
             budget: match (args.seconds, args.images) {
                 (_, Some(images)) => Budget::Images(images),
                 (seconds, None) => Budget::Seconds(seconds.unwrap_or(SECONDS)),
@@ -48,6 +48,7 @@ impl Experiment {
                 .threads
                 .map_or_else(rayon::current_num_threads, usize::from),
         };
+        check_pairs(&structures, &settings.representations)?;
         let mut source = Source::Box;
         let mut stage = Stage::THESIS;
         if let Some(path) = &args.input {
@@ -75,7 +76,8 @@ impl Experiment {
         let mut cells = Vec::new();
         for &particles in &s.particles {
             for &structure in &self.structures {
-                for &representation in &s.representations {
+                let together = |r: &&Representation| r.goes_with(structure);
+                for &representation in s.representations.iter().filter(together) {
                     for &motion in &s.motions {
                         cells.push(CellRequest {
                             source: self.source.clone(),
@@ -98,6 +100,33 @@ impl Experiment {
         }
         cells
     }
+}
+
+/// Sees that every representation has a structure to go with, and tells where not all do.
+fn check_pairs(
+    structures: &[Structure],
+    representations: &[Representation],
+) -> Result<(), CliError> {
+    let in_place: Vec<&str> = representations
+        .iter()
+        .filter(|r| r.encoding().is_some())
+        .map(|r| r.name())
+        .collect();
+    let goes = |s: &Structure| representations.iter().all(|r| r.goes_with(*s));
+    let names = in_place.join(", ");
+    if in_place.is_empty() || structures.iter().all(goes) {
+        return Ok(());
+    }
+    if !structures.contains(&Structure::Kdtree) {
+        return Err(CliError::other(format!(
+            "--representations {names}: native frames lie in k-d order and are traced where they lie: \
+             add kdtree to --structures, or measure these structures in memory"
+        )));
+    }
+    say!(
+        "note: native frames ({names}) are traced where they lie, in k-d order: with kdtree alone"
+    );
+    Ok(())
 }
 
 /// What was asked for, once each; all there is if nothing was.

@@ -1,19 +1,20 @@
-//! The hidden command that measures one cell for `spherule scale`.
+//! The hidden command that does one task of `spherule scale`: it measures a cell, or makes its particles.
 
 use std::io::{self, Read};
 use std::thread;
 
+use serde_json::Value;
+
 use crate::cli::{CliError, INTERRUPTED, Outcome, put};
-use crate::report::scale::CellOutcome;
-use crate::scale::{CellRequest, cell};
+use crate::scale::{Task, cell, convert};
 
 /// Its name.
 pub(super) const COMMAND: &str = "scale-cell";
 
-/// Reads the request, measures, prints the outcome.
+/// Reads the task, does it, prints what came of it or why nothing did.
 pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
     let mut line = String::new();
-    let request: CellRequest = io::stdin()
+    let task: Task = io::stdin()
         .read_line(&mut line)
         .map_err(|e| e.to_string())
         .and_then(|_| serde_json::from_str(&line).map_err(|e| e.to_string()))
@@ -24,16 +25,25 @@ pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
         })?;
     thread::spawn(end_with_parent);
     rayon::ThreadPoolBuilder::new()
-        .num_threads(request.threads)
+        .num_threads(task.threads())
         .build_global()
-        .map_err(|e| CliError::other(format!("{} threads: {e}", request.threads)))?;
-    let outcome = match cell::measure(&request) {
-        Ok(measured) => CellOutcome::Done(Box::new(measured)),
-        Err(reason) => CellOutcome::Failed { reason },
-    };
-    let text = serde_json::to_string(&outcome).map_err(|e| CliError::Other(e.to_string()))?;
+        .map_err(|e| CliError::other(format!("{} threads: {e}", task.threads())))?;
+    let told = do_task(&task);
+    let text = serde_json::to_string(&told).map_err(|e| CliError::Other(e.to_string()))?;
     put(&mut io::stdout(), &text);
     Ok(Outcome::Done)
+}
+
+fn do_task(task: &Task) -> Result<Value, String> {
+    let told = match task {
+        Task::Convert { request, path } => {
+            convert::convert(request, path).map(serde_json::to_value)
+        }
+        Task::Measure { request, file } => {
+            cell::measure(request, file.as_deref()).map(serde_json::to_value)
+        }
+    };
+    told?.map_err(|e| e.to_string())
 }
 
 /// Whoever wanted the result is gone once our input ends.

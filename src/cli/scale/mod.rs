@@ -13,16 +13,20 @@ use super::{CliError, Outcome, signals};
 use crate::accel::Structure;
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
-use crate::report::scale::{CellOutcome, CellReport, MADE_BY, ScaleReport, files, table};
-use crate::scale::{Budget, CellRequest, Motion, Representation};
+use crate::report::scale::{
+    CellMeasurement, CellOutcome, CellReport, MADE_BY, ScaleReport, files, table,
+};
+use crate::scale::{Budget, CellRequest, Motion, Representation, Task};
 
 mod child;
 mod experiment;
+mod frames;
 pub(super) mod measure;
 mod words;
 
 use child::Ended;
 use experiment::Experiment;
+use frames::Frames;
 
 #[derive(Debug, Args)]
 pub(super) struct ScaleArgs {
@@ -36,7 +40,8 @@ pub(super) struct ScaleArgs {
     /// Camera motions: rotation, translation, both; default: all.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::motion)]
     motions: Vec<Motion>,
-    /// How positions are held: f32.
+    /// Where positions are: memory, or f32, q16, q10 for a mapped native frame of that encoding, traced
+    /// where it lies (kdtree alone); default: memory.
     #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::representation)]
     representations: Vec<Representation>,
     /// Seconds that the images of a cell are traced for; default: 60.
@@ -146,8 +151,9 @@ fn measure_all(
         start: Instant::now(),
     };
     let mut ended = EndOfRun::default();
+    let mut frames = Frames::in_dir(&args.output);
     for request in cells {
-        let Ended::Told(outcome) = child::measure(request, interrupt) else {
+        let Ended::Told(outcome) = measure_one(request, &mut frames, interrupt) else {
             ended.interrupted = true;
             break;
         };
@@ -158,6 +164,40 @@ fn measure_all(
         ended.unwritten = files::write(&args.output, report).err();
     }
     ended
+}
+
+/// Measures the cell of `request`, in its native frame if it has one.
+fn measure_one(
+    request: &CellRequest,
+    frames: &mut Frames,
+    interrupt: &Interrupt,
+) -> Ended<CellOutcome> {
+    let mut made = None;
+    if request.representation.encoding().is_some() {
+        match frames.of(request, interrupt) {
+            Ended::Interrupted => return Ended::Interrupted,
+            Ended::Told(Ok(frame)) => made = Some(frame),
+            Ended::Told(Err(reason)) => {
+                let reason = format!("no native frame: {reason}");
+                return Ended::Told(CellOutcome::Failed { reason });
+            }
+        }
+    }
+    let task = Task::Measure {
+        request: request.clone(),
+        file: made.map(|(path, _)| path.clone()),
+    };
+    let measured: Result<CellMeasurement, String> = match child::run(&task, interrupt) {
+        Ended::Interrupted => return Ended::Interrupted,
+        Ended::Told(measured) => measured,
+    };
+    Ended::Told(match measured {
+        Err(reason) => CellOutcome::Failed { reason },
+        Ok(measured) => CellOutcome::Done(Box::new(CellMeasurement {
+            conversion: made.map(|(_, conversion)| *conversion),
+            ..measured
+        })),
+    })
 }
 
 fn cell_report(request: &CellRequest, outcome: CellOutcome) -> CellReport {

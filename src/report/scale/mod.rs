@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use super::frame::{BuildSummary, FrameBytes, RaySummary, RssSummary};
 use super::machine::Machine;
+use crate::accel::Structure;
 use crate::render::RayCounts;
 use crate::scale::{Budget, Motion, Representation};
 
@@ -110,9 +111,11 @@ pub struct CellMeasurement {
     pub images_per_second: Spread,
     /// The time of each image.
     pub image_seconds: Spread,
-    /// Making or reading the particles.
+    /// Making or reading the particles; of a native frame, opening and mapping it.
     pub load_seconds: f64,
-    /// Time of the builds.
+    /// How the native frame was made that is traced in place, in a process of its own; None in memory.
+    pub conversion: Option<Conversion>,
+    /// Time of the builds; in place, of the levels above the stored ones.
     pub build_seconds: BuildTimes,
     /// The structure, phases of the last build.
     pub build: BuildSummary,
@@ -126,6 +129,23 @@ pub struct CellMeasurement {
     pub rays: RaySummary,
     /// Rays over the time of all images.
     pub rays_per_second: RayRates,
+}
+
+/// How a native frame was made.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
+pub struct Conversion {
+    /// Making or reading the particles.
+    pub load_seconds: f64,
+    /// Bringing them into order, coding and writing them.
+    pub seconds: f64,
+    /// Length of the file.
+    pub file_bytes: u64,
+    /// The farthest that a stored position is from the true one, world units.
+    pub max_error: f64,
+    /// The same as a part of the smallest radius; None of spheres without one.
+    pub max_error_of_radius: Option<f64>,
+    /// Resident memory of the process that did it.
+    pub rss: RssSummary,
 }
 
 /// Mean and spread of a series.
@@ -160,7 +180,13 @@ pub struct BuildTimes {
 pub struct PerParticle {
     pub positions: f64,
     pub structure: f64,
+    pub attributes: f64,
+    pub scratch: f64,
     pub build_peak: f64,
+    /// Positions, structure and attributes together: those in anonymous memory.
+    pub anonymous: f64,
+    /// And those in a mapped file.
+    pub file: f64,
 }
 
 /// Rays a second by purpose. Kinds are traced in turns within an image, so these add up to the
@@ -216,7 +242,11 @@ impl PerParticle {
         (particles > 0).then(|| Self {
             positions: share(bytes.positions),
             structure: share(bytes.structure),
+            attributes: share(bytes.attributes),
+            scratch: share(bytes.scratch),
             build_peak: share(bytes.build_peak),
+            anonymous: share(bytes.anonymous()),
+            file: share(bytes.file.total()),
         })
     }
 }
@@ -252,22 +282,24 @@ impl CellReport {
 }
 
 impl ScaleReport {
-    /// The columns of tables: every structure in every representation, with a name for people.
+    /// The columns of tables: every structure in every representation that it goes with, with a name for
+    /// people.
     pub fn columns(&self) -> Vec<Column> {
-        let one = self.settings.representations.len() == 1;
         let structures = self.settings.structures.iter();
-        structures
-            .flat_map(|structure| {
-                let column = move |representation: &Representation| Column {
-                    structure: structure.clone(),
-                    representation: *representation,
-                    title: if one {
-                        structure.clone()
-                    } else {
-                        format!("{structure} {representation}")
-                    },
-                };
-                self.settings.representations.iter().map(column)
+        let pairs = structures.flat_map(|name| {
+            let structure: Option<Structure> = name.parse().ok();
+            let all = self.settings.representations.iter();
+            all.filter(move |r| structure.is_some_and(|s| r.goes_with(s)))
+                .map(move |r| (name, *r))
+        });
+        pairs
+            .map(|(structure, representation)| Column {
+                structure: structure.clone(),
+                representation,
+                title: match representation.encoding() {
+                    None => structure.clone(),
+                    Some(encoding) => format!("{structure}, {encoding} file"),
+                },
             })
             .collect()
     }

@@ -85,7 +85,10 @@ pub fn conditions(report: &ScaleReport) -> String {
 pub fn cell_name(cell: &CellReport) -> String {
     format!(
         "{} particles, {} {}, {}",
-        cell.particles, cell.structure, cell.representation, cell.motion
+        cell.particles,
+        cell.structure,
+        cell.representation.place(),
+        cell.motion
     )
 }
 

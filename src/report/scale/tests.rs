@@ -15,6 +15,7 @@ fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
         images_per_second: Spread::of(&[rate - 1.0, rate, rate + 1.0]),
         image_seconds: Spread::of(&[1.0 / rate]),
         load_seconds: 0.1,
+        conversion: None,
         build_seconds: BuildTimes::of(&[2.0 * build, build, build]),
         build: BuildSummary::default(),
         bytes_per_particle: PerParticle::of(&bytes, 1000),
@@ -35,7 +36,7 @@ fn report() -> ScaleReport {
         particles,
         structure: "lbvh".to_owned(),
         motion,
-        representation: Representation::F32,
+        representation: Representation::Memory,
         outcome,
     };
     let done = |rate, build, peak| CellOutcome::Done(Box::new(measurement(rate, build, peak)));
@@ -47,7 +48,7 @@ fn report() -> ScaleReport {
             particles: vec![1000, 10_000_000],
             structures: vec!["lbvh".to_owned()],
             motions: Motion::ALL.to_vec(),
-            representations: Representation::ALL.to_vec(),
+            representations: vec![Representation::Memory],
             budget: Budget::Images(3),
             width: 64,
             height: 36,
@@ -111,7 +112,7 @@ fn tables_are_laid_out_like_the_thesis_s() {
     assert_eq!(after("Build time")[2], "   10000000   9.000");
     assert_eq!(after("Peak memory")[1], "       1000    120.0");
     assert_eq!(after("Bytes a particle")[1], "       1000   12.60");
-    assert!(text.contains("failed: 10000000 particles, lbvh f32, both: out of memory"));
+    assert!(text.contains("failed: 10000000 particles, lbvh in memory, both: out of memory"));
     assert!(text.contains("interrupted: 1 of 6 cells were not measured"));
 }
 
@@ -159,8 +160,8 @@ fn csv_has_a_row_a_cell_and_quotes() {
     for row in &rows[..5] {
         assert_eq!(row.split(',').count(), columns, "{row}");
     }
-    assert!(rows[1].starts_with("1000,lbvh,rotation,f32,done,,3,20,1,19,21,"));
-    assert!(rows[5].starts_with("10000000,lbvh,both,f32,failed,\"out of memory: 3, \"\"4\"\""));
+    assert!(rows[1].starts_with("1000,lbvh,rotation,memory,done,,3,20,1,19,21,"));
+    assert!(rows[5].starts_with("10000000,lbvh,both,memory,failed,\"out of memory: 3, \"\"4\"\""));
     assert!(rows[6].starts_with("or more\",,,"));
 }
 

@@ -1,0 +1,89 @@
+//! Native frames for cells that trace in place: made once for all cells of a particle count and an
+//! encoding, one at a time, in a directory of ours beside the results, which is gone in the end. What a run
+//! that was killed has left of it goes with the next run.
+
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+use spherule_jobs::Interrupt;
+
+use super::child::{self, Ended};
+use crate::report::scale::Conversion;
+use crate::scale::{CellRequest, Representation, Task};
+
+/// Name of the directory.
+const DIR: &str = ".scale-frames";
+/// Name of the frame in it.
+const FILE: &str = "particles.spf";
+
+/// A native frame, and how it was made; or why there is none.
+pub(super) type Made = Result<(PathBuf, Conversion), String>;
+
+/// The frame that is there now.
+pub(super) struct Frames {
+    dir: PathBuf,
+    now: Option<(usize, Representation, Made)>,
+}
+
+impl Frames {
+    /// Clears away what an earlier run has left in `output`.
+    pub(super) fn in_dir(output: &Path) -> Self {
+        let dir = output.join(DIR);
+        remove(&dir);
+        Self { dir, now: None }
+    }
+
+    /// That of the cell of `request`, whose representation has one.
+    pub(super) fn of(&mut self, request: &CellRequest, interrupt: &Interrupt) -> Ended<&Made> {
+        let key = (request.particles, request.representation);
+        let is_there =
+            |(particles, representation, _): &(_, _, Made)| (*particles, *representation) == key;
+        if !self.now.as_ref().is_some_and(is_there) {
+            // First, so that there is never room for two needed.
+            self.now = None;
+            remove(&self.dir);
+            let made = match self.make(request, interrupt) {
+                Ended::Told(made) => made,
+                Ended::Interrupted => return Ended::Interrupted,
+            };
+            self.now = Some((key.0, key.1, made));
+        }
+        match &self.now {
+            Some((_, _, made)) => Ended::Told(made),
+            None => Ended::Interrupted,
+        }
+    }
+
+    fn make(&self, request: &CellRequest, interrupt: &Interrupt) -> Ended<Made> {
+        if let Err(e) = fs::create_dir(&self.dir) {
+            let dir = self.dir.display();
+            return Ended::Told(Err(format!("{dir}: {e}")));
+        }
+        let path = self.dir.join(FILE);
+        let task = Task::Convert {
+            request: request.clone(),
+            path: path.clone(),
+        };
+        match child::run(&task, interrupt) {
+            Ended::Told(made) => Ended::Told(made.map(|conversion| (path, conversion))),
+            Ended::Interrupted => Ended::Interrupted,
+        }
+    }
+}
+
+impl Drop for Frames {
+    fn drop(&mut self) {
+        remove(&self.dir);
+    }
+}
+
+/// Removes `dir` with all that is in it, if it is there.
+fn remove(dir: &Path) {
+    match fs::remove_dir_all(dir) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => {
+            say!("note: {}: cannot be removed: {e}", dir.display());
+        }
+        _ => {}
+    }
+}

@@ -1,0 +1,63 @@
+//! Makes the native frame that cells are traced from in place.
+
+use std::path::Path;
+use std::time::Instant;
+
+use spherule_formats::ParticleFrame;
+use spherule_formats::native::layout::RadiusIndex;
+use spherule_formats::native::{self, Bound, StoreSettings};
+
+use super::peaks::Peaks;
+use super::{CellRequest, Particles};
+use crate::report::scale::Conversion;
+
+/// How far compact positions may be from the true ones, as where `convert` is told nothing.
+const BOUND: Bound = Bound::OfRadius(0.02);
+
+/// Makes or reads the particles of `request` and writes them to `path` in its encoding.
+///
+/// # Errors
+/// In words: they would not fit into memory, cannot be read, or the file cannot be written.
+pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String> {
+    let settings = StoreSettings {
+        encoding: request.representation.encoding(),
+        bound: BOUND,
+        rounding: 0.0,
+    };
+    let peaks = Peaks::default();
+    let start = Instant::now();
+    let particles = peaks.during(|| Particles::of(request))?;
+    let load_seconds = start.elapsed().as_secs_f64();
+    let frame = frame_of(particles, request);
+    let start = Instant::now();
+    let index = peaks
+        .during(|| native::store(path, &frame, None, &settings))
+        .map_err(|e| e.to_string())?;
+    let seconds = start.elapsed().as_secs_f64();
+    let meta = path.metadata();
+    let smallest = match index.radius {
+        RadiusIndex::None => 0.0,
+        RadiusIndex::Common(radius) => f64::from(radius),
+        RadiusIndex::PerParticle(radii) => f64::from(radii.low),
+    };
+    Ok(Conversion {
+        load_seconds,
+        seconds,
+        file_bytes: meta.map_err(|e| format!("{}: {e}", path.display()))?.len(),
+        max_error: index.max_error,
+        max_error_of_radius: (smallest > 0.0).then(|| index.max_error / smallest),
+        rss: peaks.summary(),
+    })
+}
+
+fn frame_of(particles: Particles, request: &CellRequest) -> ParticleFrame {
+    ParticleFrame {
+        positions: particles.centers,
+        radius: Some(particles.radius),
+        attributes: Vec::new(),
+        origin: request.stage.origin,
+        time: None,
+        dropped: 0,
+        file_index: None,
+    }
+}

@@ -1,0 +1,51 @@
+//! A cell whose particles stay in a native frame: mapped, traced where they lie.
+
+use std::path::Path;
+use std::time::Instant;
+
+use spherule_formats::native::layout::RadiusIndex;
+use spherule_formats::native::{Access, NativeFile};
+
+use super::CellRequest;
+use super::cell::{Builds, Measured, trace};
+use super::peaks::Peaks;
+use crate::accel::stored::{StoredSettings, StoredTree};
+
+/// Maps the native frame at `path`, builds the levels above its nodes, traces.
+///
+/// # Errors
+/// In words: it cannot be opened or traced, or was changed meanwhile.
+pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measured, String> {
+    let peaks = Peaks::default();
+    let start = Instant::now();
+    let file = NativeFile::open(path, Access::Map).map_err(|e| e.to_string())?;
+    let frame = file.frame().map_err(|e| e.to_string())?;
+    let leaves = frame.leaves().map_err(|e| e.in_file(path).to_string())?;
+    let load_seconds = start.elapsed().as_secs_f64();
+    let settings = StoredSettings {
+        structure: request.structure,
+        radius: match frame.index().radius {
+            RadiusIndex::Common(radius) => Some(radius),
+            RadiusIndex::None | RadiusIndex::PerParticle(_) => None,
+        },
+        // One colour for all: nobody asks which particle a ray has met.
+        keep_indices: false,
+    };
+    let mut tree = StoredTree::new();
+    let builds = peaks.during(|| {
+        Builds::repeat(request.budget, || {
+            let built = tree.build(&leaves, settings);
+            built.map_err(|fault| format!("{}: {fault}", path.display()))
+        })
+    })?;
+    let images = trace(tree.view(&leaves), request, &peaks)?;
+    // What was lost meanwhile read as zeros.
+    file.check().map_err(|e| e.to_string())?;
+    Ok(Measured {
+        particles: leaves.count,
+        load_seconds,
+        builds,
+        images,
+        peaks,
+    })
+}
