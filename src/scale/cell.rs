@@ -213,7 +213,7 @@ pub(super) fn trace(
 mod tests {
     use super::*;
     use crate::accel::Structure;
-    use crate::scale::{Motion, Representation, Source, Stage};
+    use crate::scale::{Motion, Representation, Source, Stage, convert};
 
     fn request(particles: usize, structure: Structure) -> CellRequest {
         CellRequest {
@@ -250,6 +250,54 @@ mod tests {
         let rays = Structure::ALL.map(|s| measure(&request(2000, s), None).unwrap().rays);
         assert!(rays.iter().all(|r| *r == rays[0]), "{rays:?}");
         assert!(rays[0].reflection > 0);
+    }
+
+    /// The cell of the same particles in a native frame.
+    fn in_place(request: &CellRequest, representation: Representation) -> CellMeasurement {
+        let request = CellRequest {
+            representation,
+            ..request.clone()
+        };
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("particles.spf");
+        let conversion = convert::convert(&request, &path).unwrap();
+        let length = path.metadata().unwrap().len();
+        assert_eq!(conversion.file_bytes, length);
+        let error = conversion.max_error_of_radius.unwrap();
+        assert!((0.0..=0.02).contains(&error), "{error}");
+        assert_eq!(error > 0.0, conversion.max_error > 0.0);
+        measure(&request, Some(&path)).unwrap()
+    }
+
+    #[test]
+    fn frames_in_place_trace_as_in_memory() {
+        for particles in [0, 1, 2000] {
+            let request = request(particles, Structure::Kdtree);
+            let memory = measure(&request, None).unwrap();
+            assert_eq!(memory.bytes.file.total(), 0);
+            let exact = in_place(&request, Representation::F32);
+            assert_eq!(exact.rays, memory.rays);
+            for representation in [Representation::Q16, Representation::Q10] {
+                let coded = in_place(&request, representation);
+                assert_eq!(coded.rays.primary, memory.rays.primary);
+                let near = memory.rays.shadow / 20;
+                assert!(coded.rays.shadow.abs_diff(memory.rays.shadow) <= near);
+                assert!(coded.bytes.positions <= exact.bytes.positions);
+                assert_eq!(coded.bytes.file.positions, coded.bytes.positions);
+                // All that lies in memory is what was built above the stored nodes.
+                let built = coded.bytes.structure - coded.bytes.file.structure;
+                assert_eq!(coded.bytes.anonymous(), built);
+            }
+        }
+    }
+
+    #[test]
+    fn a_file_that_is_no_frame_is_told() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("particles.spf");
+        std::fs::write(&path, "no frame").unwrap();
+        let told = measure(&request(10, Structure::Kdtree), Some(&path)).unwrap_err();
+        assert!(told.contains("particles.spf"), "{told}");
     }
 
     #[test]

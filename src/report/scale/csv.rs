@@ -15,7 +15,7 @@ const CELL: [&str; 6] = [
 ];
 
 /// Columns of numbers; empty where a cell has none. Seconds and bytes.
-const NUMBERS: [(&str, Value); 29] = [
+const NUMBERS: [(&str, Value); 43] = [
     ("images", |m| Some(m.images as f64)),
     ("images_per_second_mean", |m| Some(m.images_per_second.mean)),
     ("images_per_second_sd", |m| m.images_per_second.sd),
@@ -34,6 +34,17 @@ const NUMBERS: [(&str, Value); 29] = [
     ("sah_cost", |m| Some(m.build.sah_cost)),
     ("position_bytes", |m| Some(m.bytes.positions as f64)),
     ("structure_bytes", |m| Some(m.bytes.structure as f64)),
+    ("attribute_bytes", |m| Some(m.bytes.attributes as f64)),
+    ("scratch_bytes", |m| Some(m.bytes.scratch as f64)),
+    ("file_position_bytes", |m| {
+        Some(m.bytes.file.positions as f64)
+    }),
+    ("file_structure_bytes", |m| {
+        Some(m.bytes.file.structure as f64)
+    }),
+    ("file_attribute_bytes", |m| {
+        Some(m.bytes.file.attributes as f64)
+    }),
     ("build_peak_bytes", |m| Some(m.bytes.build_peak as f64)),
     ("position_bytes_per_particle", |m| {
         Some(m.bytes_per_particle?.positions)
@@ -41,9 +52,32 @@ const NUMBERS: [(&str, Value); 29] = [
     ("structure_bytes_per_particle", |m| {
         Some(m.bytes_per_particle?.structure)
     }),
+    ("attribute_bytes_per_particle", |m| {
+        Some(m.bytes_per_particle?.attributes)
+    }),
+    ("scratch_bytes_per_particle", |m| {
+        Some(m.bytes_per_particle?.scratch)
+    }),
+    ("anonymous_bytes_per_particle", |m| {
+        Some(m.bytes_per_particle?.anonymous)
+    }),
+    ("file_bytes_per_particle", |m| {
+        Some(m.bytes_per_particle?.file)
+    }),
     ("rss_anonymous_peak", |m| Some(m.rss.anonymous_peak as f64)),
     ("rss_file_peak", |m| Some(m.rss.file_peak as f64)),
     ("rss_total_peak", |m| Some(m.rss.total_peak as f64)),
+    ("conversion_load_seconds", |m| {
+        Some(m.conversion?.load_seconds)
+    }),
+    ("conversion_seconds", |m| Some(m.conversion?.seconds)),
+    ("conversion_file_bytes", |m| {
+        Some(m.conversion?.file_bytes as f64)
+    }),
+    ("conversion_max_error", |m| Some(m.conversion?.max_error)),
+    ("conversion_max_error_of_radius", |m| {
+        m.conversion?.max_error_of_radius
+    }),
     ("primary_rays_per_second", |m| {
         Some(m.rays_per_second.primary)
     }),

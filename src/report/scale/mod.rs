@@ -12,6 +12,7 @@ use crate::scale::{Budget, Motion, Representation};
 pub mod csv;
 pub mod files;
 pub mod page;
+pub mod parts;
 pub mod table;
 pub mod thesis;
 
@@ -331,6 +332,22 @@ impl ScaleReport {
         let cells = self.cells_of(particles, column);
         cells
             .filter_map(|c| Some(c.measured()?.rss.total_peak))
+            .max()
+    }
+
+    /// The highest peak over motions of anonymous memory, bytes.
+    pub fn anonymous_peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
+        let cells = self.cells_of(particles, column);
+        cells
+            .filter_map(|c| Some(c.measured()?.rss.anonymous_peak))
+            .max()
+    }
+
+    /// The same of mapped files.
+    pub fn file_peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
+        let cells = self.cells_of(particles, column);
+        cells
+            .filter_map(|c| Some(c.measured()?.rss.file_peak))
             .max()
     }
 

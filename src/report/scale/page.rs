@@ -1,13 +1,11 @@
 //! `scale.html`: the tables with the thesis's figures beside ours, and plots against the particle
 //! count on logarithmic axes.
 
-use super::table::{self, MISSING};
-use super::{CellMeasurement, Column, MADE_BY, ScaleReport, files, thesis};
+use super::table::{self, MIB, MISSING};
+use super::{CellMeasurement, Column, MADE_BY, ScaleReport, files, parts, thesis};
 use crate::report::page::{Page, Table};
 use crate::report::plots::{Axis, Line, Plot, Series};
 use crate::scale::Motion;
-
-const MIB: f64 = 1_048_576.0;
 
 /// The whole file.
 pub fn html(report: &ScaleReport) -> String {
@@ -18,7 +16,8 @@ pub fn html(report: &ScaleReport) -> String {
     page.section("plots", "Against the particle count");
     page.text(
         "An image's time is one over the mean rate, which is what is known of the thesis. Bytes a \
-         particle are those of the tree, not of the process.",
+         particle are those of the tree, in memory or in the mapped file, not of the process; the \
+         thesis's are of its process.",
     );
     page.plots(&plots(report));
     for motion in &report.settings.motions {
@@ -53,6 +52,7 @@ pub fn html(report: &ScaleReport) -> String {
         table::peak,
         &thesis::PEAK_MIB,
     ));
+    put_parts(&mut page, report);
     page.section("cells", "All cells");
     page.fold("Every cell, with its rays and its memory by purpose");
     page.table(&cells(report));
@@ -60,6 +60,41 @@ pub fn html(report: &ScaleReport) -> String {
     page.link("The same for programs:", files::JSON);
     page.link("And for spreadsheets:", files::CSV);
     page.html()
+}
+
+/// Memory by part, and the native frames if there are some.
+fn put_parts(page: &mut Page, report: &ScaleReport) {
+    page.section("parts", "Memory by part");
+    page.text(&format!(
+        "Held are {}. Positions include radii; nodes include the way back to the frame's order. Anonymous \
+         memory and mapped pages are looked at often while building and after every image. What lies in \
+         a mapped file is no anonymous memory: the system may drop its pages, and only those that rays came to \
+         were ever read.",
+        parts::note()
+    ));
+    put_rows(page, "parts-table", &parts::HEADS, parts::rows(report));
+    let conversions = parts::conversions(report);
+    if !conversions.is_empty() {
+        page.section("conversions", "Native frames");
+        page.text(
+            "Particles traced in place were written to a native frame first, once for all motions, in a \
+             process of its own; compact positions are kept within 0.02 radius. Times do not count above.",
+        );
+        put_rows(
+            page,
+            "conversions-table",
+            &parts::CONVERSION_HEADS,
+            conversions,
+        );
+    }
+}
+
+fn put_rows(page: &mut Page, id: &str, heads: &[&str], rows: Vec<Vec<String>>) {
+    let mut table = Table::new(id, heads);
+    for row in rows {
+        table.row(row);
+    }
+    page.table(&table);
 }
 
 fn introduce(page: &mut Page, report: &ScaleReport) {
@@ -197,7 +232,7 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
                 let share = measured(r, n, c, None)?.bytes_per_particle?;
                 Some(share.positions + share.structure)
             },
-            &[],
+            &thesis::BYTES_PER_PARTICLE,
         ),
     ];
     for &motion in &report.settings.motions {
@@ -280,7 +315,7 @@ fn measured<'a>(
 const CELL_HEADS: [&str; 18] = [
     "particles",
     "structure",
-    "positions as",
+    "positions",
     "motion",
     "images",
     "images a second",
@@ -304,7 +339,7 @@ fn cells(report: &ScaleReport) -> Table {
         let names = [
             cell.particles.to_string(),
             cell.structure.clone(),
-            cell.representation.to_string(),
+            cell.representation.place().to_owned(),
             cell.motion.to_string(),
         ];
         match cell.measured() {

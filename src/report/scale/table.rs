@@ -3,11 +3,11 @@
 
 use std::fmt::Write as _;
 
-use super::{CellMeasurement, CellReport, Column, ScaleReport, Spread};
+use super::{CellMeasurement, CellReport, Column, ScaleReport, Spread, parts};
 use crate::scale::{Budget, Motion};
 
 /// Bytes in the thesis's "MB".
-const MIB: f64 = 1_048_576.0;
+pub(super) const MIB: f64 = 1_048_576.0;
 /// What stands where a cell has failed.
 pub(super) const FAILED: &str = "failed";
 /// What stands where nothing was measured.
@@ -39,6 +39,7 @@ pub fn text(report: &ScaleReport) -> String {
     put(&mut text, report, heading, |particles, column| {
         summed(report, particles, column, bytes(report, particles, column))
     });
+    put_parts(&mut text, report);
     for (cell, reason) in report.failed() {
         let _ = write!(text, "\nfailed: {}: {reason}", cell_name(cell));
     }
@@ -112,10 +113,32 @@ fn put(
                 .collect(),
         );
     }
+    put_rows(text, heading, &rows);
+}
+
+/// Memory by part, and the native frames if there are some.
+fn put_parts(text: &mut String, report: &ScaleReport) {
+    let with_heads = |heads: &[&str], rows: Vec<Vec<String>>| -> Vec<Vec<String>> {
+        let heads = heads.iter().map(|head| (*head).to_owned()).collect();
+        std::iter::once(heads).chain(rows).collect()
+    };
+    let heading = format!("Memory by part: {}", parts::note());
+    let rows = with_heads(&parts::HEADS, parts::rows(report));
+    put_rows(text, &heading, &rows);
+    let conversions = parts::conversions(report);
+    if !conversions.is_empty() {
+        let rows = with_heads(&parts::CONVERSION_HEADS, conversions);
+        put_rows(text, "Native frames, made once for all motions", &rows);
+    }
+}
+
+/// `rows` under `heading`, as wide as they need to be; the first has as many cells as any.
+fn put_rows(text: &mut String, heading: &str, rows: &[Vec<String>]) {
+    let columns = rows.first().map_or(0, Vec::len);
     let width = |place: usize| rows.iter().map(|r| r[place].len()).max().unwrap_or(0);
-    let widths: Vec<usize> = (0..=columns.len()).map(width).collect();
+    let widths: Vec<usize> = (0..columns).map(width).collect();
     let _ = writeln!(text, "\n{heading}");
-    for row in &rows {
+    for row in rows {
         let cells = row.iter().zip(&widths);
         let cells: Vec<String> = cells.map(|(c, width)| format!("{c:>width$}")).collect();
         let _ = writeln!(text, "  {}", cells.join("   "));
