@@ -105,6 +105,118 @@ fn tables_and_files_of_a_tiny_run() {
 }
 
 #[test]
+fn native_frames_are_traced_where_they_lie() {
+    let workshop = Workshop::new();
+    let counts = ["--particles", "0,1,1e4"];
+    let representations = ["--representations", "memory,f32,q16,q10"];
+    let structures = ["--structures", "lbvh,kdtree"];
+    let ran = run(&workshop, &[counts, representations, structures].concat()).expect(0);
+    let ran = ran.tells("native frames (f32, q16, q10) are traced where they lie");
+    for wanted in ["kdtree, q10 file", "Memory by part", "Native frames, made"] {
+        assert!(ran.text().contains(wanted), "{}", ran.text());
+    }
+    let report = report(&workshop);
+    let cells = report["cells"].as_array().expect("cells");
+    assert_eq!(cells.len(), 3 * 5);
+    for cell in cells {
+        assert_eq!(cell["status"], "done", "{cell}");
+        let in_memory = cell["representation"] == "memory";
+        assert_eq!(cell["conversion"].is_null(), in_memory, "{cell}");
+        assert!(in_memory || cell["structure"] == "kdtree");
+        if !in_memory {
+            assert!(cell["conversion"]["file_bytes"].as_u64() > Some(0));
+            assert!(cell["conversion"]["seconds"].as_f64() > Some(0.0));
+        }
+    }
+    // The parts add up, and only levels above the stored nodes are in memory.
+    let large = |name: &str| {
+        let is = |c: &&Value| c["particles"] == 10_000 && c["representation"] == name;
+        cells.iter().rfind(is).expect("a cell")
+    };
+    let share = |name: &str, part: &str| {
+        let shares = &large(name)["bytes_per_particle"];
+        shares[part].as_f64().expect("a number")
+    };
+    for (name, least, most) in [("f32", 12.0, 12.8), ("q16", 6.0, 6.9), ("q10", 4.0, 4.9)] {
+        let held = share(name, "anonymous") + share(name, "file");
+        let parts = ["positions", "structure", "attributes"].map(|part| share(name, part));
+        assert!((held - parts.iter().sum::<f64>()).abs() < 1e-9, "{name}");
+        assert!((least..most).contains(&held), "{name}: {held}");
+        assert!(share(name, "anonymous") < 0.2, "{name}");
+        assert!(share(name, "file") >= share(name, "positions"), "{name}");
+        let error = &large(name)["conversion"]["max_error_of_radius"];
+        assert!(error.as_f64().expect("a number") <= 0.02, "{name}");
+    }
+    assert_eq!(share("memory", "file"), 0.0);
+    assert_eq!(large("f32")["rays"], large("memory")["rays"]);
+    let names: Vec<String> = files(&workshop.join("scale")).into_keys().collect();
+    assert_eq!(names, ["scale.csv", "scale.html", "scale.json"]);
+    no_leftovers(&workshop.join("scale"));
+}
+
+#[test]
+fn frames_of_one_s_own_are_traced_where_they_lie() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=1);
+    // What a run that was killed has left goes.
+    let left = workshop.join("scale/.scale-frames");
+    fs::create_dir_all(&left).expect("a directory");
+    fs::write(left.join("particles.spf"), "half").expect("a file");
+    let options = ["--input", "in", "--particles", "500,1e7"];
+    let representations = ["--representations", "q10"];
+    run(&workshop, &[&options[..], &representations].concat()).expect(0);
+    let report = report(&workshop);
+    let cells = report["cells"].as_array().expect("cells");
+    assert_eq!(cells.len(), 2);
+    for cell in cells {
+        assert_eq!(cell["structure"], "kdtree");
+        assert!(cell["rays"]["shadow"].as_u64() > Some(0), "{cell}");
+    }
+    no_leftovers(&workshop.join("scale"));
+}
+
+#[test]
+fn representations_need_a_structure() {
+    let workshop = Workshop::new();
+    refused(
+        &workshop,
+        &[
+            "--structures",
+            "bvh,sbvh",
+            "--representations",
+            "memory,q10",
+        ],
+        "--representations q10: native frames lie in k-d order and are traced where they lie: add \
+         kdtree to --structures",
+    );
+}
+
+/// A disk that is full costs the cells that need it.
+#[cfg(target_os = "linux")]
+#[test]
+fn a_frame_that_cannot_be_written_is_told() {
+    let workshop = Workshop::new();
+    let program = env!("CARGO_BIN_EXE_spherule");
+    // Files of at most 512 blocks: reports fit, a frame of 1e5 does not.
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 512 && exec {program} scale --particles 1e5 --structures kdtree \
+         --representations memory,q16 --motions both --images 1 --width 16 --height 9"
+    );
+    let output = std::process::Command::new("sh")
+        .args(["-c", &script])
+        .current_dir(workshop.path())
+        .output()
+        .expect("a shell");
+    Ran(output)
+        .expect(1)
+        .tells("error: 100000 particles, kdtree in a q16 file, both: no native frame: ");
+    let report = report(&workshop);
+    assert_eq!(report["cells"][0]["status"], "done");
+    assert_eq!(report["cells"][1]["status"], "failed");
+    no_leftovers(&workshop.join("scale"));
+}
+
+#[test]
 fn particles_of_one_s_own() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
