@@ -66,11 +66,11 @@ pub fn html(report: &ScaleReport) -> String {
 fn put_parts(page: &mut Page, report: &ScaleReport) {
     page.section("parts", "Memory by part");
     page.text(&format!(
-        "Held are {}. Positions include radii; nodes include the way back to the frame's order. Anonymous \
-         memory and mapped pages are looked at often while building and after every image. What lies in \
-         a mapped file is no anonymous memory: the system may drop its pages, and only those that rays came to \
-         were ever read.",
-        parts::note()
+        "In {}. Positions include radii. What lies in a mapped file is no anonymous memory: pages are \
+         read when rays come to them, and the system may drop them. The peaks are the highest RssAnon and \
+         RssFile, looked at every few milliseconds while loading and building and after each image. The \
+         thesis's figure is that of its whole process.",
+        parts::NOTE
     ));
     put_rows(page, "parts-table", &parts::HEADS, parts::rows(report));
     let conversions = parts::conversions(report);

@@ -31,16 +31,23 @@ pub(super) const CONVERSION_HEADS: [&str; 7] = [
 ];
 
 /// What the columns of bytes mean.
-pub(super) fn note() -> String {
-    format!(
-        "bytes a particle while tracing, and scratch while building; of the process the highest RssAnon \
-         and RssFile seen, images included; the thesis: about {:.0} bytes a particle at 1e7",
-        thesis::BYTES_PER_PARTICLE[0].value
-    )
+pub(super) const NOTE: &str = "bytes a particle while tracing (positions to in the file) and while building \
+    (scratch); peaks of the process as seen, with images and the program itself";
+
+/// The rows of the table of bytes, the thesis's in the end.
+pub(super) fn rows(report: &ScaleReport) -> Vec<Vec<String>> {
+    let mut rows = our_rows(report);
+    if report.settings.input.is_none() {
+        let mut theirs = vec![MISSING.to_owned(); HEADS.len()];
+        theirs[0] = thesis::RATE_PARTICLES.to_string();
+        theirs[1] = "the thesis, about".to_owned();
+        theirs[5] = format!("{:.0}", thesis::BYTES_PER_PARTICLE[0].value);
+        rows.push(theirs);
+    }
+    rows
 }
 
-/// The rows of the table of bytes.
-pub(super) fn rows(report: &ScaleReport) -> Vec<Vec<String>> {
+fn our_rows(report: &ScaleReport) -> Vec<Vec<String>> {
     rows_of(report, |particles, column| {
         let mut cells = report.cells_of(particles, column).peekable();
         let empty = match cells.peek() {

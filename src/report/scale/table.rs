@@ -122,7 +122,7 @@ fn put_parts(text: &mut String, report: &ScaleReport) {
         let heads = heads.iter().map(|head| (*head).to_owned()).collect();
         std::iter::once(heads).chain(rows).collect()
     };
-    let heading = format!("Memory by part: {}", parts::note());
+    let heading = format!("Memory by part: {}", parts::NOTE);
     let rows = with_heads(&parts::HEADS, parts::rows(report));
     put_rows(text, &heading, &rows);
     let conversions = parts::conversions(report);

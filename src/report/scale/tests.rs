@@ -1,7 +1,7 @@
 //! Reports made by hand, and what tables and files must say of them.
 
 use super::*;
-use crate::report::frame::FrameBytes;
+use crate::report::frame::{FileBytes, FrameBytes};
 
 fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
     let bytes = FrameBytes {
@@ -116,6 +116,85 @@ fn tables_are_laid_out_like_the_thesis_s() {
     assert!(text.contains("interrupted: 1 of 6 cells were not measured"));
 }
 
+/// As [`report`], with its last count in a q10 file too, whose cells have 4 bytes of positions there.
+fn report_in_place() -> ScaleReport {
+    let mut report = report();
+    report.settings.structures.push("kdtree".to_owned());
+    report.settings.representations.push(Representation::Q10);
+    let mut measured = measurement(3.0, 0.001, 300);
+    measured.bytes = FrameBytes {
+        positions: 4000,
+        structure: 600,
+        scratch: 70,
+        file: FileBytes {
+            positions: 4000,
+            structure: 500,
+            attributes: 0,
+        },
+        ..FrameBytes::default()
+    };
+    measured.bytes_per_particle = PerParticle::of(&measured.bytes, 1000);
+    measured.rss.anonymous_peak = 7 << 20;
+    measured.rss.file_peak = 60 << 20;
+    measured.conversion = Some(Conversion {
+        load_seconds: 0.25,
+        seconds: 1.5,
+        file_bytes: 46 << 20,
+        max_error: 1e-4,
+        max_error_of_radius: Some(0.0125),
+        rss: RssSummary::default(),
+    });
+    report.cells.push(CellReport {
+        particles: 10_000_000,
+        structure: "kdtree".to_owned(),
+        motion: Motion::Rotation,
+        representation: Representation::Q10,
+        outcome: CellOutcome::Done(Box::new(measured)),
+    });
+    report
+}
+
+#[test]
+fn memory_by_part_tells_the_file_from_memory() {
+    let report = report_in_place();
+    let titles: Vec<String> = report.columns().into_iter().map(|c| c.title).collect();
+    // No other structure is traced in place.
+    assert_eq!(titles, ["lbvh", "kdtree", "kdtree, q10 file"]);
+    let rows = parts::rows(&report);
+    let row = |title: &str| rows.iter().rfind(|row| row[1] == title).expect("a row");
+    assert_eq!(
+        row("kdtree, q10 file")[2..],
+        [
+            "4.00", "0.00", "0.60", "4.60", "0.10", "4.50", "0.07", "7.0", "60.0"
+        ]
+    );
+    assert_eq!(
+        rows[0][2..8],
+        ["12.00", "0.00", "0.60", "12.60", "12.60", "0.00"]
+    );
+    // Nothing was measured there.
+    assert!(row("kdtree")[2..].iter().all(|cell| cell == table::MISSING));
+    assert_eq!(row("the thesis, about")[5], "350");
+    assert!(rows.iter().all(|row| row.len() == parts::HEADS.len()));
+    assert_eq!(
+        parts::conversions(&report),
+        [[
+            "10000000",
+            "kdtree, q10 file",
+            "0.250",
+            "1.500",
+            "46.0",
+            "0.0125",
+            "0.0"
+        ]]
+    );
+    let text = table::text(&report);
+    assert!(text.contains("Native frames"), "{text}");
+    assert!(!table::text(&self::report()).contains("Native frames"));
+    let html = page::html(&report);
+    assert!(html.contains("id=\"conversions-table\"") && html.contains("in a q10 file"));
+}
+
 #[test]
 fn a_figure_that_there_cannot_be_is_no_failure() {
     let mut report = report();
@@ -140,7 +219,7 @@ fn a_figure_that_there_cannot_be_is_no_failure() {
 
 #[test]
 fn json_comes_back() {
-    let report = report();
+    let report = report_in_place();
     let json = serde_json::json!(report);
     assert_eq!(json["made_by"], MADE_BY);
     assert_eq!(json["cells"][0]["status"], "done");
@@ -178,6 +257,7 @@ fn the_page_has_everything_beside_the_thesis() {
         "rate-rotation-table",
         "build-table",
         "memory-table",
+        "parts-table",
         "cells-table",
     ] {
         assert_eq!(html.matches(&format!("id=\"{id}\"")).count(), 1, "{id}");
