@@ -24,7 +24,7 @@ pub mod sequence;
 pub mod stats;
 pub mod write;
 
-pub use attribute::{Attribute, AttributeData};
+pub use attribute::{Attribute, AttributeData, ID_NAMES};
 pub use error::{FrameError, ParseError};
 pub use frame::{ParticleFrame, Positions, Radius, RawParticles};
 pub use open::FrameFile;

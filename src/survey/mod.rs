@@ -11,7 +11,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin};
+use spherule_formats::{Attribute, FrameError, ID_NAMES, ParticleFrame, Radius, choose_origin};
 
 use crate::scene::Bounds;
 
@@ -260,10 +260,6 @@ pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
             .find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
     })
 }
-
-/// Names under which simulations write ids, the usual one first: also numpy's plural and
-/// DualSPHysics'.
-const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
 
 /// The attribute that holds ids, if any does: exactly by name, or failing that without regard to
 /// case.
