@@ -203,7 +203,7 @@ fn check_stable(before: u64, read: u64, after: u64) -> io::Result<()> {
 }
 
 /// Length of a regular file: reading a pipe or a device could take forever.
-fn regular_len(path: &Path) -> Result<u64, FrameError> {
+pub(crate) fn regular_len(path: &Path) -> Result<u64, FrameError> {
     let meta = fs::metadata(path).map_err(|e| FrameError::io(path, e))?;
     if meta.is_file() {
         return Ok(meta.len());
@@ -239,7 +239,7 @@ pub fn unpacked_len(path: &Path) -> io::Result<u64> {
 }
 
 /// Magic, deflate, no reserved flags: four bytes, so that raw floats do not look like it.
-fn is_gzip(bytes: &[u8]) -> bool {
+pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b, 8]) && bytes.get(3).is_none_or(|flags| flags & 0xe0 == 0)
 }
 

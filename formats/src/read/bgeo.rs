@@ -6,8 +6,8 @@
 //! name. Gzip around the file is undone by the caller. Layout after partio's `BGEO.cpp`.
 
 use super::Step;
-use super::columns::{self, Column, Lane};
-use crate::{AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType};
+use super::columns::{self, Column, Lane, ParticleLayout};
+use crate::{Endian, ParseError, RawParticles, ScalarType};
 
 #[cfg(test)]
 mod tests;
@@ -20,8 +20,6 @@ const VERSION: i32 = 5;
 const POSITION_BYTES: usize = 16;
 /// Widest attribute listed for a file without points.
 const MAX_EMPTY_COMPONENTS: usize = 16;
-/// Column of the homogeneous coordinate, taken out again after decoding.
-const W: &str = "w of P";
 
 /// The time steps that `bytes` hold: one.
 ///
@@ -42,6 +40,14 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// As [`steps`]; [`ParseError::Malformed`] if the definitions or points do not fit the file, and
 /// [`ParseError::Unsupported`] for point attributes of type string.
 pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
+    layout(bytes)?.particles(bytes)
+}
+
+/// Where the points are.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
     check_kind(bytes)?;
     let mut cursor = Cursor { bytes, at: 9 };
     let count = cursor.count("points")?;
@@ -63,13 +69,13 @@ pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
         definitions.retain(|d| d.components <= MAX_EMPTY_COMPONENTS);
     }
     columns::check_room(start, count, stride, bytes.len())?;
-    let particles = columns::particles(
-        bytes,
-        count,
-        vec![column("P", ScalarType::F32, 3, start, stride)],
-        attribute_columns(definitions, start, stride),
-    )?;
-    Ok(divide_by_w(particles))
+    let axes = vec![column("P", ScalarType::F32, 3, start, stride)];
+    let attributes = attribute_columns(definitions, start, stride);
+    let weight = column("w of P", ScalarType::F32, 1, start + 12, stride);
+    Ok(ParticleLayout {
+        weight: Some(weight),
+        ..ParticleLayout::new(count, axes, attributes)
+    })
 }
 
 /// Tells classic BGEO of version 5 from its relatives.
@@ -136,10 +142,10 @@ fn column(
     }
 }
 
-/// w first, then the attributes in the order of the file.
+/// The attributes in the order of the file.
 fn attribute_columns(definitions: Vec<Definition>, start: usize, stride: usize) -> Vec<Column> {
     let mut at = start + POSITION_BYTES;
-    let mut columns = vec![column(W, ScalarType::F32, 1, at - 4, stride)];
+    let mut columns = Vec::with_capacity(definitions.len());
     for Definition {
         name,
         components,
@@ -150,20 +156,6 @@ fn attribute_columns(definitions: Vec<Definition>, start: usize, stride: usize) 
         at += 4 * components;
     }
     columns
-}
-
-/// Takes the column of w out again and applies it.
-fn divide_by_w(mut particles: RawParticles) -> RawParticles {
-    let w = particles.attributes.remove(0);
-    debug_assert_eq!(w.name, W);
-    if let (AttributeData::F32(w), Positions::F32(positions)) = (w.data, &mut particles.positions) {
-        for (position, w) in positions.iter_mut().zip(w) {
-            if w != 1.0 && w != 0.0 {
-                *position /= w;
-            }
-        }
-    }
-    particles
 }
 
 /// Walks the header; every step is checked against the end of the file.

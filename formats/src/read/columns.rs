@@ -4,8 +4,11 @@
 //! and plain rows are all the same to it: a [`Column`] says for each of its components where the
 //! first number is and how far it is to the next particle's. Parsing headers is left to the readers.
 
+mod fill;
+
 use glam::{DVec3, Vec3};
 
+use self::fill::fill;
 use crate::{Attribute, AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType};
 
 /// Particles decoded for all columns before moving on: the bytes of a block stay in the cache, so
@@ -14,24 +17,24 @@ const BLOCK: usize = 4096;
 
 /// Where one component is: particle `i` has it at byte `start + i * stride`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Lane {
+pub(crate) struct Lane {
     /// Byte of particle 0.
-    pub(super) start: usize,
+    pub(crate) start: usize,
     /// Bytes from one particle to the next.
-    pub(super) stride: usize,
+    pub(crate) stride: usize,
 }
 
 /// One property of all particles.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Column {
+pub(crate) struct Column {
     /// Name in the file.
-    pub(super) name: String,
+    pub(crate) name: String,
     /// Stored type of every component.
-    pub(super) scalar: ScalarType,
+    pub(crate) scalar: ScalarType,
     /// Stored byte order of every component.
-    pub(super) endian: Endian,
+    pub(crate) endian: Endian,
     /// One per component.
-    pub(super) lanes: Vec<Lane>,
+    pub(crate) lanes: Vec<Lane>,
 }
 
 impl Column {
@@ -79,38 +82,111 @@ pub(super) fn check_room(
     }
 }
 
-/// Reads `axes` (two or three components in all, x first) as positions and `attributes` as they
-/// are. A missing third component is 0: a run in the plane.
+/// Where the particles of one time step are, without a look at their values.
+#[derive(Debug, Clone, PartialEq)]
+pub(crate) struct ParticleLayout {
+    /// Particles.
+    pub(crate) count: usize,
+    /// Positions: two or three components in all, x first. A missing third is 0: a run in the plane.
+    pub(crate) axes: Vec<Column>,
+    /// The homogeneous coordinate, one f32, by which positions of f32 are divided unless it is 0 or 1.
+    pub(crate) weight: Option<Column>,
+    /// What else there is, each of at least one component.
+    pub(crate) attributes: Vec<Column>,
+    /// Simulation time, if the file tells.
+    pub(crate) time: Option<f64>,
+    /// Step number, if the file tells.
+    pub(crate) step: Option<i64>,
+}
+
+impl ParticleLayout {
+    /// `count` particles with these `axes` and `attributes`; those without components are left out.
+    pub(crate) fn new(count: usize, axes: Vec<Column>, mut attributes: Vec<Column>) -> Self {
+        attributes.retain(|column| !column.lanes.is_empty());
+        Self {
+            count,
+            axes: join_alike(axes),
+            weight: None,
+            attributes,
+            time: None,
+            step: None,
+        }
+    }
+
+    /// Refuses columns that reach past the end of a file of `len` bytes.
+    ///
+    /// # Errors
+    /// [`ParseError::Malformed`] at the end of the file, with the name of the column.
+    pub(crate) fn check(&self, len: usize) -> Result<(), ParseError> {
+        let columns = self.axes.iter().chain(&self.weight);
+        check_columns(columns.chain(&self.attributes), self.count, len)
+    }
+
+    /// Reads everything: positions in the precision of the file, attributes as they are.
+    ///
+    /// # Errors
+    /// As [`Self::check`].
+    pub(super) fn particles(self, bytes: &[u8]) -> Result<RawParticles, ParseError> {
+        self.check(bytes.len())?;
+        let axes = self.axes.len();
+        let mut columns = self.axes;
+        columns.extend(self.attributes);
+        let first_attribute = axes + usize::from(self.weight.is_some());
+        columns.splice(axes..axes, self.weight);
+        let mut gathered = gather(bytes, self.count, &columns);
+        let data = gathered.split_off(first_attribute);
+        let weight = gathered.split_off(axes).pop();
+        let attributes = columns
+            .drain(first_attribute..)
+            .zip(data)
+            .map(|(column, data)| Attribute {
+                name: column.name,
+                components: column.lanes.len(),
+                data,
+            })
+            .collect();
+        let mut positions = positions(gathered, self.count);
+        if let Some(weight) = weight {
+            divide(&mut positions, weight);
+        }
+        Ok(RawParticles {
+            positions,
+            attributes,
+            time: self.time,
+            step: self.step,
+        })
+    }
+}
+
+/// Applies the homogeneous coordinate.
+fn divide(positions: &mut Positions, weight: AttributeData) {
+    if let (AttributeData::F32(weight), Positions::F32(positions)) = (weight, positions) {
+        for (position, w) in positions.iter_mut().zip(weight) {
+            *position = divided(*position, w);
+        }
+    }
+}
+
+fn divided(position: Vec3, w: f32) -> Vec3 {
+    if w != 1.0 && w != 0.0 {
+        position / w
+    } else {
+        position
+    }
+}
+
+/// Reads one column by itself.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] if a column reaches past the end of `bytes`.
-pub(super) fn particles(
+/// As [`ParticleLayout::check`].
+pub(super) fn values(
     bytes: &[u8],
     count: usize,
-    axes: Vec<Column>,
-    attributes: Vec<Column>,
-) -> Result<RawParticles, ParseError> {
-    let mut columns = join_alike(axes);
-    let axes = columns.len();
-    columns.extend(attributes);
-    let mut gathered = gather(bytes, count, &columns)?;
-    let data = gathered.split_off(axes);
-    let attributes = columns
-        .drain(axes..)
-        .zip(data)
-        .filter(|(column, _)| !column.lanes.is_empty())
-        .map(|(column, data)| Attribute {
-            name: column.name,
-            components: column.lanes.len(),
-            data,
-        })
-        .collect();
-    Ok(RawParticles {
-        positions: positions(gathered, count),
-        attributes,
-        time: None,
-        step: None,
-    })
+    column: &Column,
+) -> Result<AttributeData, ParseError> {
+    check_columns([column], count, bytes.len())?;
+    let mut gathered = gather(bytes, count, std::slice::from_ref(column));
+    Ok(gathered.pop().expect("one column was gathered"))
 }
 
 /// x, y and z of one type become one column, which decodes without a detour.
@@ -125,18 +201,22 @@ fn join_alike(axes: Vec<Column>) -> Vec<Column> {
     }
 }
 
-/// Decodes all `columns` of `count` particles.
-fn gather(
-    bytes: &[u8],
+fn check_columns<'c>(
+    columns: impl IntoIterator<Item = &'c Column>,
     count: usize,
-    columns: &[Column],
-) -> Result<Vec<AttributeData>, ParseError> {
-    if let Some(column) = columns.iter().find(|c| !c.fits(count, bytes.len())) {
-        return Err(ParseError::malformed(
-            bytes.len(),
+    len: usize,
+) -> Result<(), ParseError> {
+    match columns.into_iter().find(|c| !c.fits(count, len)) {
+        None => Ok(()),
+        Some(column) => Err(ParseError::malformed(
+            len,
             format!("file ends before {} of {count} particles", column.name),
-        ));
+        )),
     }
+}
+
+/// Decodes all `columns` of `count` particles, which fit.
+fn gather(bytes: &[u8], count: usize, columns: &[Column]) -> Vec<AttributeData> {
     let mut gathered: Vec<AttributeData> = columns
         .iter()
         .map(|c| zeros(c.scalar, c.lanes.len() * count))
@@ -147,7 +227,7 @@ fn gather(
             fill(data, bytes, column, first, end);
         }
     }
-    Ok(gathered)
+    gathered
 }
 
 /// The storage of a column; untouched pages cost nothing yet.
@@ -164,87 +244,6 @@ fn zeros(scalar: ScalarType, len: usize) -> AttributeData {
         ScalarType::F32 => AttributeData::F32(vec![0.0; len]),
         ScalarType::F64 => AttributeData::F64(vec![0.0; len]),
     }
-}
-
-/// Decodes particles `first..end` of a column that [`Column::fits`].
-fn fill(data: &mut AttributeData, bytes: &[u8], column: &Column, first: usize, end: usize) {
-    macro_rules! fill {
-        ($v:expr, $ty:ty) => {{
-            let width = column.lanes.len();
-            let block = $v
-                .get_mut(first * width..end * width)
-                .expect("gather made room for every particle");
-            match column.endian {
-                Endian::Little => {
-                    fill_block(block, bytes, &column.lanes, first, <$ty>::from_le_bytes)
-                }
-                Endian::Big => fill_block(block, bytes, &column.lanes, first, <$ty>::from_be_bytes),
-            }
-        }};
-    }
-    match data {
-        AttributeData::I8(v) => fill!(v, i8),
-        AttributeData::U8(v) => fill!(v, u8),
-        AttributeData::I16(v) => fill!(v, i16),
-        AttributeData::U16(v) => fill!(v, u16),
-        AttributeData::I32(v) => fill!(v, i32),
-        AttributeData::U32(v) => fill!(v, u32),
-        AttributeData::I64(v) => fill!(v, i64),
-        AttributeData::U64(v) => fill!(v, u64),
-        AttributeData::F32(v) => fill!(v, f32),
-        AttributeData::F64(v) => fill!(v, f64),
-    }
-}
-
-/// Writes the block that starts at particle `first`; `S` is the size of a stored number.
-fn fill_block<T, const S: usize>(
-    block: &mut [T],
-    bytes: &[u8],
-    lanes: &[Lane],
-    first: usize,
-    decode: impl Fn([u8; S]) -> T,
-) {
-    let width = lanes.len();
-    let tail = |lane: &Lane| {
-        bytes
-            .get(lane.start + first * lane.stride..)
-            .unwrap_or_default()
-    };
-    match adjacent_run::<S>(lanes) {
-        Some(run) if run.stride == width * S => {
-            for (number, stored) in block.iter_mut().zip(tail(&run).as_chunks().0) {
-                *number = decode(*stored);
-            }
-        }
-        Some(run) => {
-            let records = tail(&run).chunks(run.stride.max(1));
-            for (group, record) in block.chunks_exact_mut(width).zip(records) {
-                for (number, stored) in group.iter_mut().zip(record.as_chunks().0) {
-                    *number = decode(*stored);
-                }
-            }
-        }
-        None => {
-            for (component, lane) in lanes.iter().enumerate() {
-                let numbers = block.iter_mut().skip(component).step_by(width);
-                let records = tail(lane).chunks(lane.stride.max(1));
-                for (number, record) in numbers.zip(records) {
-                    if let Some(stored) = record.first_chunk() {
-                        *number = decode(*stored);
-                    }
-                }
-            }
-        }
-    }
-}
-
-/// The first lane, if the others follow it byte by byte within a record.
-fn adjacent_run<const S: usize>(lanes: &[Lane]) -> Option<Lane> {
-    let first = *lanes.first()?;
-    let adjacent = lanes.iter().enumerate().all(|(component, lane)| {
-        lane.stride == first.stride && lane.start == first.start + component * S
-    });
-    (adjacent && lanes.len() * S <= first.stride).then_some(first)
 }
 
 /// Positions from decoded components, x first; two components lie in the plane z = 0.

@@ -8,7 +8,7 @@
 use std::ops::Range;
 
 pub mod bgeo;
-mod columns;
+pub(crate) mod columns;
 pub mod csv;
 #[cfg(test)]
 mod damage;

@@ -3,6 +3,7 @@
 use proptest::prelude::*;
 
 use super::*;
+use crate::AttributeData;
 use crate::read::damage::{Reader, attribute, coordinates, mutate, names, numbers, sample};
 
 const READER: Reader = Reader { steps, read };

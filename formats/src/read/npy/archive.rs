@@ -265,5 +265,14 @@ fn time_of(times: Option<&Attribute>, frame: usize) -> Option<f64> {
 
 /// One column by itself.
 fn decode(bytes: &[u8], count: usize, column: Column) -> Result<Option<Attribute>, ParseError> {
-    columns::particles(bytes, count, Vec::new(), vec![column]).map(|mut p| p.attributes.pop())
+    let components = column.lanes.len();
+    if components == 0 {
+        return Ok(None);
+    }
+    let data = columns::values(bytes, count, &column)?;
+    Ok(Some(Attribute {
+        name: column.name,
+        components,
+        data,
+    }))
 }

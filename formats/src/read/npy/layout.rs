@@ -4,7 +4,7 @@
 use super::dtype::{Dtype, Field, MAX_COMPONENTS, Number};
 use super::header::{Header, show};
 use crate::ParseError;
-use crate::read::columns::{self, Column, Lane};
+use crate::read::columns::{self, Column, Lane, ParticleLayout};
 
 /// Names under which positions are saved, the surest first.
 pub(super) const POSITION_NAMES: [&str; 9] = [
@@ -31,12 +31,6 @@ pub(super) struct Layout {
     pub(super) count: usize,
     /// Coordinates come before particles: shape (3, N).
     pub(super) planes: bool,
-}
-
-/// Columns of one time step.
-pub(super) struct Columns {
-    pub(super) axes: Vec<Column>,
-    pub(super) attributes: Vec<Column>,
 }
 
 impl Layout {
@@ -95,20 +89,22 @@ impl Layout {
         }
     }
 
-    /// The columns of time step `frame` (0 if there is only one).
+    /// Where the particles of time step `frame` (0 if there is only one) are.
     ///
     /// # Errors
     /// [`ParseError::Unsupported`] if a structure has no positions among its fields.
-    pub(super) fn columns(&self, header: &Header, frame: usize) -> Result<Columns, ParseError> {
+    pub(super) fn columns(
+        &self,
+        header: &Header,
+        frame: usize,
+    ) -> Result<ParticleLayout, ParseError> {
         match &header.item.dtype {
             Dtype::Record(fields) => self.record_columns(header, fields, frame),
             _ => {
                 let column = self.attribute("P", header, frame);
                 // Only shape (0,) has no column, and no particles.
-                Ok(Columns {
-                    axes: column.into_iter().collect(),
-                    attributes: Vec::new(),
-                })
+                let axes = column.into_iter().collect();
+                Ok(ParticleLayout::new(self.count, axes, Vec::new()))
             }
         }
     }
@@ -118,7 +114,7 @@ impl Layout {
         header: &Header,
         fields: &[Field],
         frame: usize,
-    ) -> Result<Columns, ParseError> {
+    ) -> Result<ParticleLayout, ParseError> {
         let strides = header.strides();
         let (start, stride) = match strides.as_slice() {
             [frames, particles] => (header.data + frame * frames, *particles),
@@ -143,7 +139,7 @@ impl Layout {
             .enumerate()
             .filter(|(place, _)| !places.contains(place));
         let attributes = columns::group_vectors(others.map(|(_, field)| column(field)).collect());
-        Ok(Columns { axes, attributes })
+        Ok(ParticleLayout::new(self.count, axes, attributes))
     }
 
     /// An array of numbers beside (or with) the positions, if it has one group for each particle of

@@ -17,7 +17,7 @@ mod tests;
 use self::header::Header;
 use self::layout::Layout;
 use super::Step;
-use super::columns;
+use super::columns::ParticleLayout;
 use crate::{ParseError, RawParticles};
 
 /// The time steps that `bytes` hold: as many as the first dimension of (frames, N, 3), else one.
@@ -49,13 +49,33 @@ pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
     read_array(bytes, &header, step.index)
 }
 
+/// Where the particles of an array of one step are; none for archives and for several steps.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+    if archive::is_zip(bytes) {
+        return Ok(None);
+    }
+    let header = Header::parse(bytes)?;
+    header.check_items(bytes.len())?;
+    match Layout::of(&header)?.frames {
+        None | Some(1) => array_layout(bytes.len(), &header, 0).map(Some),
+        Some(_) => Ok(None),
+    }
+}
+
 /// The particles of one array in step `frame`.
 fn read_array(bytes: &[u8], header: &Header, frame: usize) -> Result<RawParticles, ParseError> {
-    header.check_items(bytes.len())?;
+    array_layout(bytes.len(), header, frame)?.particles(bytes)
+}
+
+/// Where they are, in a file of `len` bytes.
+fn array_layout(len: usize, header: &Header, frame: usize) -> Result<ParticleLayout, ParseError> {
+    header.check_items(len)?;
     let layout = Layout::of(header)?;
     check_frame(&layout, frame)?;
-    let columns = layout.columns(header, frame)?;
-    columns::particles(bytes, layout.count, columns.axes, columns.attributes)
+    layout.columns(header, frame)
 }
 
 fn check_frame(layout: &Layout, frame: usize) -> Result<(), ParseError> {

@@ -13,7 +13,7 @@ mod tests;
 use self::body::Records;
 use self::header::{Element, Encoding, Header};
 use super::Step;
-use super::columns::{self, Column, Lane};
+use super::columns::{self, Column, Lane, ParticleLayout};
 use crate::{Endian, ParseError, RawParticles};
 
 /// The time steps that `bytes` hold: one.
@@ -39,11 +39,33 @@ pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
     let header = Header::parse(bytes)?;
     let vertices = vertices(&header)?;
     let records = body::vertex_records(bytes, &header, vertices)?;
+    records_layout(&header, vertices, &records)?.particles(&records.bytes)
+}
+
+/// Where the vertices are; none if they are text, or have lists between their numbers.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+    let header = Header::parse(bytes)?;
+    let vertices = vertices(&header)?;
+    if header.encoding == Encoding::Ascii || vertices.has_lists() {
+        return Ok(None);
+    }
+    let records = body::vertex_records(bytes, &header, vertices)?;
+    records_layout(&header, vertices, &records).map(Some)
+}
+
+fn records_layout(
+    header: &Header,
+    vertices: &Element,
+    records: &Records<'_>,
+) -> Result<ParticleLayout, ParseError> {
     let endian = match header.encoding {
         Encoding::Ascii => Endian::Little,
         Encoding::Binary(endian) => endian,
     };
-    let mut properties = vertex_columns(vertices, &records, endian);
+    let mut properties = vertex_columns(vertices, records, endian);
     let mut axes = Vec::with_capacity(3);
     for axis in ["x", "y", "z"] {
         let Some(index) = properties.iter().position(|c| is_named(c, axis)) else {
@@ -54,7 +76,7 @@ pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
         axes.push(properties.remove(index));
     }
     let attributes = columns::group_vectors(properties);
-    columns::particles(&records.bytes, vertices.count, axes, attributes)
+    Ok(ParticleLayout::new(vertices.count, axes, attributes))
 }
 
 fn is_named(column: &Column, name: &str) -> bool {

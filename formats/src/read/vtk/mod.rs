@@ -21,12 +21,16 @@ pub(in crate::read) use ascii::parse_values;
 pub(in crate::read) use positions::positions;
 
 use super::Step;
-use crate::{ParseError, RawParticles};
-use walk::{Until, Walker};
+use super::columns::{Column, ParticleLayout};
+use crate::{Attribute, ParseError, RawParticles};
+use walk::{PointArray, Until, Walker};
 
 /// More than any tensor or spectrum has. With no particles nothing else bounds the number, and
 /// callers keep something for each component.
 pub(in crate::read) const MOST_COMPONENTS: usize = 1 << 16;
+
+/// So many numbers of a particle can be listed however few the particles are.
+const FEW_COMPONENTS: usize = 4096;
 
 /// The one time step that `bytes` hold, with the time if a dataset-level FIELD before the points
 /// tells it. A damaged file is reported by [`read`], not here.
@@ -51,16 +55,50 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
     let mut walker = Walker::begin(bytes)?;
     walker.walk(Until::End)?;
-    let Some(positions) = walker.positions else {
-        return Err(ParseError::malformed(
-            bytes.len(),
-            "the file ends before POINTS",
-        ));
+    let points = walker.points.ok_or_else(|| no_points(bytes))?;
+    let attribute = |array: PointArray| {
+        Ok(Attribute {
+            name: array.name,
+            components: array.components,
+            data: array.numbers.decode(bytes)?,
+        })
     };
+    let attributes: Result<_, ParseError> = walker.arrays.into_iter().map(attribute).collect();
     Ok(RawParticles {
-        positions,
-        attributes: walker.attributes,
+        positions: positions(points.numbers.decode(bytes)?),
+        attributes: attributes?,
         time: walker.time,
         step: None,
     })
+}
+
+/// Where the particles of a binary file are; none if some of it is text or bits, or if a particle has more
+/// numbers than there are particles, so that arrays of no length cannot claim many.
+///
+/// # Errors
+/// As [`read`].
+pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+    let mut walker = Walker::begin(bytes)?;
+    if walker.is_text() {
+        return Ok(None);
+    }
+    walker.walk(Until::End)?;
+    let points = walker.points.ok_or_else(|| no_points(bytes))?;
+    let components = walker.arrays.iter().map(|array| array.components);
+    if components.fold(0, usize::saturating_add) > FEW_COMPONENTS.max(points.count) {
+        return Ok(None);
+    }
+    let column = |array: PointArray| array.numbers.column(array.name, array.components);
+    let attributes: Option<Vec<Column>> = walker.arrays.into_iter().map(column).collect();
+    let axes = points.numbers.column("POINTS".to_owned(), 3);
+    Ok(axes
+        .zip(attributes)
+        .map(|(axes, attributes)| ParticleLayout {
+            time: walker.time,
+            ..ParticleLayout::new(points.count, vec![axes], attributes)
+        }))
+}
+
+fn no_points(bytes: &[u8]) -> ParseError {
+    ParseError::malformed(bytes.len(), "the file ends before POINTS")
 }

@@ -4,6 +4,7 @@
 use super::ascii::{parse_values, skip_words};
 use super::cursor::{Cursor, shown};
 use super::keywords::is_section_start;
+use crate::read::columns::{Column, Lane};
 use crate::{AttributeData, Endian, ParseError, ScalarType};
 
 /// How the file stores numbers; line 3 of it.
@@ -74,17 +75,73 @@ pub(super) fn value_count(
     })
 }
 
-/// Reads `count` numbers at the cursor. `what` names them in errors.
+/// The numbers of an array, in binary files where they lie.
+pub(super) enum Numbers {
+    /// Of text.
+    Decoded(AttributeData),
+    /// Big-endian ones.
+    Binary {
+        /// First byte.
+        at: usize,
+        scalar: ScalarType,
+        count: usize,
+    },
+    /// Eight to a byte.
+    Bits {
+        /// First byte.
+        at: usize,
+        count: usize,
+    },
+}
+
+impl Numbers {
+    /// The numbers themselves; `bytes` are the file in which they were found.
+    ///
+    /// # Errors
+    /// Malformed if they are not there.
+    pub(super) fn decode(self, bytes: &[u8]) -> Result<AttributeData, ParseError> {
+        let stored = |at: usize, len: usize| {
+            let rest = bytes.get(at..).and_then(|rest| rest.get(..len));
+            rest.ok_or_else(|| ParseError::malformed(at, format!("{len} bytes are not there")))
+        };
+        match self {
+            Self::Decoded(data) => Ok(data),
+            Self::Binary { at, scalar, count } => {
+                scalar.decode(Endian::Big, stored(at, count * scalar.size())?)
+            }
+            Self::Bits { at, count } => Ok(unpack_bits(stored(at, count.div_ceil(8))?, count)),
+        }
+    }
+
+    /// The numbers, `components` a particle, as a column; none for text and bits.
+    pub(super) fn column(&self, name: String, components: usize) -> Option<Column> {
+        let Self::Binary { at, scalar, .. } = *self else {
+            return None;
+        };
+        let lane = |component: usize| Lane {
+            start: at + component * scalar.size(),
+            stride: components * scalar.size(),
+        };
+        Some(Column {
+            name,
+            scalar,
+            endian: Endian::Big,
+            lanes: (0..components).map(lane).collect(),
+        })
+    }
+}
+
+/// Finds `count` numbers at the cursor, and reads them if they are text. `what` names them in errors.
 ///
 /// # Errors
 /// Malformed if the file is too short for them or a text is no number; Unsupported for text.
-pub(super) fn read_values(
+pub(super) fn take_values(
     cursor: &mut Cursor<'_>,
     encoding: Encoding,
     stored: Stored,
     count: usize,
     what: &str,
-) -> Result<AttributeData, ParseError> {
+) -> Result<Numbers, ParseError> {
     if encoding == Encoding::Ascii {
         let scalar = match stored {
             Stored::Scalar(scalar) => scalar,
@@ -95,22 +152,20 @@ pub(super) fn read_values(
         };
         let (data, end) = parse_values(cursor.bytes(), cursor.at(), count, scalar)?;
         cursor.go_to(end);
-        return Ok(data);
+        return Ok(Numbers::Decoded(data));
     }
+    let at = cursor.at();
     let scalar = match stored {
         Stored::Scalar(scalar) => scalar,
         Stored::Either(usual, other) => likelier(cursor, usual, other, count),
-        Stored::Bit => return read_bits(cursor, count, what),
+        Stored::Bit => {
+            read_bit_bytes(cursor, count, what)?;
+            return Ok(Numbers::Bits { at, count });
+        }
         Stored::Text => return Err(text_is_no_number(what)),
     };
-    let at = cursor.at();
-    let bytes = take_numbers(cursor, scalar, count, what)?;
-    scalar
-        .decode(Endian::Big, bytes)
-        .map_err(|error| match error {
-            ParseError::Malformed { what, .. } => ParseError::malformed(at, what),
-            other => other,
-        })
+    take_numbers(cursor, scalar, count, what)?;
+    Ok(Numbers::Binary { at, scalar, count })
 }
 
 /// Moves the cursor behind `count` values without keeping them.
@@ -199,18 +254,13 @@ fn read_bit_bytes<'a>(
 }
 
 /// Bits as bytes of 0 or 1; the first is the highest of its byte.
-fn read_bits(
-    cursor: &mut Cursor<'_>,
-    count: usize,
-    what: &str,
-) -> Result<AttributeData, ParseError> {
-    let packed = read_bit_bytes(cursor, count, what)?;
+fn unpack_bits(packed: &[u8], count: usize) -> AttributeData {
     let mut bits = Vec::with_capacity(count);
     for byte in packed {
         bits.extend((0..8).rev().map(|shift| byte >> shift & 1));
     }
     bits.truncate(count);
-    Ok(AttributeData::U8(bits))
+    AttributeData::U8(bits)
 }
 
 /// Strings: a line each, or in binary a length of 1, 2, 4 or 8 bytes (told by the two highest bits)

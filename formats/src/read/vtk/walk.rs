@@ -4,9 +4,10 @@ use super::MOST_COMPONENTS;
 use super::attributes::{Header, count, field_array, keyword_array};
 use super::cursor::{Cursor, Line, shown};
 use super::keywords::{is_keyword, is_section_start, is_time_name, parse_version};
-use super::payload::{Encoding, Stored, read_values, skip_values, stored_type, value_count};
-use super::positions::positions;
-use crate::{Attribute, ParseError, Positions};
+use super::payload::{
+    Encoding, Numbers, Stored, skip_values, stored_type, take_values, value_count,
+};
+use crate::ParseError;
 
 /// How far to walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +27,20 @@ enum Section {
     Cells(usize),
 }
 
+/// The points.
+pub(super) struct Points {
+    pub(super) count: usize,
+    /// Three a point.
+    pub(super) numbers: Numbers,
+}
+
+/// Point data.
+pub(super) struct PointArray {
+    pub(super) name: String,
+    pub(super) components: usize,
+    pub(super) numbers: Numbers,
+}
+
 /// The walk through the file and what it has found so far.
 pub(super) struct Walker<'a> {
     cursor: Cursor<'a>,
@@ -35,8 +50,8 @@ pub(super) struct Walker<'a> {
     dataset_named: bool,
     /// Components of the array just passed: METADATA may name each on a line.
     components: usize,
-    pub(super) positions: Option<Positions>,
-    pub(super) attributes: Vec<Attribute>,
+    pub(super) points: Option<Points>,
+    pub(super) arrays: Vec<PointArray>,
     pub(super) time: Option<f64>,
 }
 
@@ -66,10 +81,15 @@ impl<'a> Walker<'a> {
             section: Section::Dataset,
             dataset_named: false,
             components: 1,
-            positions: None,
-            attributes: Vec::new(),
+            points: None,
+            arrays: Vec::new(),
             time: None,
         })
+    }
+
+    /// Whether numbers are text.
+    pub(super) fn is_text(&self) -> bool {
+        self.encoding == Encoding::Ascii
     }
 
     pub(super) fn walk(&mut self, until: Until) -> Result<(), ParseError> {
@@ -129,23 +149,23 @@ impl<'a> Walker<'a> {
         if !self.dataset_named {
             return Err(ParseError::malformed(line.at, "POINTS before DATASET"));
         }
-        if self.positions.is_some() {
+        if self.points.is_some() {
             return Err(ParseError::malformed(line.at, "POINTS for the second time"));
         }
         let words = line.words();
-        let particles = count(line, words.get(1))?;
+        let count = count(line, words.get(1))?;
         let name = words.get(2).copied().unwrap_or_default();
         let stored = stored_type(line.at, name)?;
-        let numbers = value_count(line.at, particles, 3)?;
-        let data = read_values(&mut self.cursor, self.encoding, stored, numbers, "POINTS")?;
-        self.positions = Some(positions(data));
+        let values = value_count(line.at, count, 3)?;
+        let numbers = take_values(&mut self.cursor, self.encoding, stored, values, "POINTS")?;
+        self.points = Some(Points { count, numbers });
         self.components = 3;
         Ok(())
     }
 
     fn point_data(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
         let stated = count(line, line.words().get(1))?;
-        match self.positions.as_ref().map(Positions::len) {
+        match self.points.as_ref().map(|points| points.count) {
             Some(particles) if particles == stated => {
                 self.section = Section::Points(particles);
                 Ok(())
@@ -250,7 +270,7 @@ impl<'a> Walker<'a> {
             tuples,
             stored,
         } = header;
-        let particles = self.positions.as_ref().map(Positions::len);
+        let particles = self.points.as_ref().map(|points| points.count);
         // Some writers leave POINT_DATA out; outside a FIELD that is what they mean.
         let section = match self.section {
             Section::Points(n) | Section::Cells(n) => Some(n),
@@ -280,14 +300,14 @@ impl<'a> Walker<'a> {
         if stored == Stored::Text || components == 0 || !(is_ours || is_time) {
             return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
         }
-        let data = read_values(&mut self.cursor, self.encoding, stored, values, &what)?;
+        let numbers = take_values(&mut self.cursor, self.encoding, stored, values, &what)?;
         if is_time {
-            self.time = Some(data.get_f64(0));
+            self.time = Some(numbers.decode(self.cursor.bytes())?.get_f64(0));
         } else {
-            self.attributes.push(Attribute {
+            self.arrays.push(PointArray {
                 name,
                 components,
-                data,
+                numbers,
             });
         }
         Ok(())

@@ -4,12 +4,11 @@
 //! (the columns named in the comment line); and bare text with a point a line, which is read as a
 //! table ([`super::csv`]).
 
-use glam::Vec3;
-
+use super::columns::{Column, Lane, ParticleLayout};
 use super::table::CUT_SHORT;
 use super::text::{self, Lines};
 use super::{Step, csv};
-use crate::{ParseError, Positions, RawParticles};
+use crate::{Endian, ParseError, RawParticles, ScalarType};
 
 mod comment;
 mod molecular;
@@ -98,27 +97,32 @@ pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
         return Err(ParseError::malformed(bytes.len(), what));
     }
     match kind(bytes)? {
-        Kind::Raw => Ok(raw(bytes)),
+        Kind::Raw => raw_layout(bytes).particles(bytes),
         Kind::Molecular => molecular::read(bytes, step.span.clone()),
         Kind::Bare => csv::read(bytes, step),
     }
 }
 
-fn raw(bytes: &[u8]) -> RawParticles {
-    let (triples, _) = bytes.as_chunks::<TRIPLE>();
-    let positions = triples
-        .iter()
-        .map(|triple| {
-            let (axes, _) = triple.as_chunks::<4>();
-            Vec3::from_array(std::array::from_fn(|axis| f32::from_le_bytes(axes[axis])))
-        })
-        .collect();
-    RawParticles {
-        positions: Positions::F32(positions),
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-    }
+/// Where the particles of a raw file are; none if it is text.
+///
+/// # Errors
+/// As [`kind`].
+pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+    Ok((kind(bytes)? == Kind::Raw).then(|| raw_layout(bytes)))
+}
+
+fn raw_layout(bytes: &[u8]) -> ParticleLayout {
+    let lane = |axis: usize| Lane {
+        start: axis * size_of::<f32>(),
+        stride: TRIPLE,
+    };
+    let axes = Column {
+        name: "the positions".to_owned(),
+        scalar: ScalarType::F32,
+        endian: Endian::Little,
+        lanes: (0..3).map(lane).collect(),
+    };
+    ParticleLayout::new(bytes.len() / TRIPLE, vec![axes], Vec::new())
 }
 
 /// Offset of the text behind a byte order mark.

@@ -1,4 +1,5 @@
 use super::*;
+use crate::Positions;
 use crate::read::text_samples::*;
 use glam::DVec3;
 use proptest::prelude::*;

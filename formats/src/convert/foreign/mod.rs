@@ -1,0 +1,55 @@
+//! Files of other programs as sources of particles that are never in memory as a whole.
+//!
+//! Which files can be is decided here, by format: their numbers must lie at fixed steps in the file itself.
+//! Text, compressed files and files of several steps are read whole by [`crate::FrameFile`] instead.
+
+use std::path::Path;
+
+use super::ParticleSource;
+use crate::detect::Format;
+use crate::native::MappedFile;
+use crate::open::{is_gzip, regular_len};
+use crate::read::columns::ParticleLayout;
+use crate::read::{bgeo, npy, ply, vtk, xyz};
+use crate::{FrameError, ParseError};
+
+mod columns;
+
+use columns::ColumnSource;
+
+/// The particles of the file at `path`, where they lie. None if they cannot be used so: then
+/// [`crate::FrameFile`] reads them, or says why not.
+///
+/// # Errors
+/// As [`crate::FrameFile::open`] and [`crate::FrameFile::read`] of the same file.
+pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, FrameError> {
+    regular_len(path)?;
+    let file = MappedFile::open(path)?;
+    if is_gzip(file.bytes()) {
+        return Ok(None);
+    }
+    let layout = layout_of(file.bytes(), path);
+    // Zeros for bytes that are gone must not be told as a fault of the file.
+    file.check()?;
+    let layout = layout.map_err(|e| e.in_file(path))?;
+    Ok(layout.map(|layout| Box::new(ColumnSource::new(file, layout)) as Box<dyn ParticleSource>))
+}
+
+/// Where the particles of the file `bytes`, called `path`, are, if all are at fixed steps in it.
+fn layout_of(bytes: &[u8], path: &Path) -> Result<Option<ParticleLayout>, ParseError> {
+    let layout = match Format::detect(bytes, path)? {
+        Format::VtkLegacy => vtk::layout(bytes)?,
+        Format::Bgeo => Some(bgeo::layout(bytes)?),
+        Format::Ply => ply::layout(bytes)?,
+        Format::Xyz => xyz::layout(bytes)?,
+        Format::Npy => npy::layout(bytes)?,
+        Format::Spf | Format::VtkXml | Format::Lammps | Format::Npz | Format::Csv => None,
+    };
+    if let Some(layout) = &layout {
+        layout.check(bytes.len())?;
+    }
+    Ok(layout)
+}
+
+#[cfg(test)]
+mod tests;
