@@ -118,7 +118,7 @@ impl ConvertArgs {
             store: StoreSettings {
                 encoding: self.encoding.or((!is_bounded).then_some(Encoding::F32)),
                 bound,
-                rounding: 0.0,
+                ..StoreSettings::EXACT
             },
             origin: survey.origin,
             radius: self.radius,
@@ -133,7 +133,7 @@ fn convert(plan: &Plan, sequence: &Sequence, index: usize, path: &Path) -> Resul
     let step = raw.step;
     let settings = StoreSettings {
         rounding: raw.positions.rounding(plan.origin),
-        ..plan.store
+        ..plan.store.clone()
     };
     let mut frame = ParticleFrame::from_raw(raw, plan.origin);
     if let Some(radius) = plan.radius {

@@ -367,7 +367,7 @@ fn no_particle_is_farther_than_the_file_says() {
                 let settings = StoreSettings {
                     encoding: Some(encoding),
                     bound,
-                    rounding: 0.0,
+                    ..StoreSettings::EXACT
                 };
                 let radius = Some(Radius::Common(0.01));
                 let index = stored_within(clustered(count), radius, settings);
@@ -386,7 +386,7 @@ fn radii_of_their_own_are_held_and_bounded() {
             let settings = StoreSettings {
                 encoding: Some(encoding),
                 bound,
-                rounding: 0.0,
+                ..StoreSettings::EXACT
             };
             let own = Some(Radius::PerParticle(radii(5000).collect()));
             let index = stored_within(clustered(5000), own, settings);
@@ -415,7 +415,7 @@ fn flat_and_coincident_particles_are_stored() {
             let settings = StoreSettings {
                 encoding: Some(encoding),
                 bound: Bound::None,
-                rounding: 0.0,
+                ..StoreSettings::EXACT
             };
             stored_within(positions.clone(), None, settings);
         }
@@ -429,7 +429,7 @@ fn the_smallest_encoding_within_the_bound_is_taken() {
         let settings = StoreSettings {
             encoding: None,
             bound,
-            rounding: 0.0,
+            ..StoreSettings::EXACT
         };
         let index = stored_within(even.clone(), Some(Radius::Common(0.05)), settings);
         (
@@ -454,7 +454,7 @@ fn a_file_does_not_depend_on_threads() {
         let settings = StoreSettings {
             encoding: Some(Encoding::Q10),
             bound: Bound::Length(1e-3),
-            rounding: 0.0,
+            ..StoreSettings::EXACT
         };
         let stored = || store(&path, &frame, None, &settings).expect("writable");
         pool.expect("threads").install(stored);
