@@ -92,7 +92,6 @@ impl Column {
 #[expect(
     clippy::cast_precision_loss,
     clippy::cast_lossless,
-    clippy::unnecessary_cast,
     reason = "one body for ten types, and no wider type to keep integers of 64 bits in"
 )]
 fn fill_f64(to: &mut [f64], bytes: &[u8], column: &Column, lanes: &[Lane], first: usize) {
