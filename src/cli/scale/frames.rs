@@ -23,7 +23,13 @@ pub(super) type Made = Result<(PathBuf, Conversion), String>;
 /// The frame that is there now.
 pub(super) struct Frames {
     dir: PathBuf,
-    now: Option<(usize, Representation, Made)>,
+    now: Option<Now>,
+}
+
+struct Now {
+    /// Particle count and representation.
+    key: (usize, Representation),
+    made: Made,
 }
 
 impl Frames {
@@ -37,22 +43,18 @@ impl Frames {
     /// That of the cell of `request`, whose representation has one.
     pub(super) fn of(&mut self, request: &CellRequest, interrupt: &Interrupt) -> Ended<&Made> {
         let key = (request.particles, request.representation);
-        let is_there =
-            |(particles, representation, _): &(_, _, Made)| (*particles, *representation) == key;
-        if !self.now.as_ref().is_some_and(is_there) {
-            // First, so that there is never room for two needed.
-            self.now = None;
-            remove(&self.dir);
-            let made = match self.make(request, interrupt) {
-                Ended::Told(made) => made,
-                Ended::Interrupted => return Ended::Interrupted,
-            };
-            self.now = Some((key.0, key.1, made));
-        }
-        match &self.now {
-            Some((_, _, made)) => Ended::Told(made),
-            None => Ended::Interrupted,
-        }
+        let now = match self.now.take() {
+            Some(now) if now.key == key => now,
+            _ => {
+                // First, so that there is never room for two needed.
+                remove(&self.dir);
+                match self.make(request, interrupt) {
+                    Ended::Told(made) => Now { key, made },
+                    Ended::Interrupted => return Ended::Interrupted,
+                }
+            }
+        };
+        Ended::Told(&self.now.insert(now).made)
     }
 
     fn make(&self, request: &CellRequest, interrupt: &Interrupt) -> Ended<Made> {
