@@ -114,20 +114,20 @@ impl OutputError {
 /// If an attribute cannot be stored or the encoder refuses the image.
 pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, OutputError> {
     let mut file = Cursor::new(Vec::new());
-    let clamped = write_exr(film, options, &mut file)?;
+    let clamped = write_exr(film.clone(), options, &mut file)?;
     Ok(EncodedExr {
         bytes: file.into_inner(),
         clamped,
     })
 }
 
-/// Writes `film` as an OpenEXR file, block by block: the file is never in memory as a whole.
-/// Returns [`EncodedExr::clamped`].
+/// Writes `film` as an OpenEXR file, block by block: the file is never in memory as a whole, and planes are
+/// let go once the file has its own. Returns [`EncodedExr::clamped`].
 ///
 /// # Errors
 /// If an attribute cannot be stored, the encoder refuses the image, or `file` does.
 pub fn write_exr(
-    film: &Film,
+    film: Film,
     options: &ExrOptions,
     file: &mut (impl Write + Seek),
 ) -> Result<u64, OutputError> {
@@ -197,8 +197,9 @@ fn text(value: &str) -> Text {
 
 type ChannelList = SmallVec<[AnyChannel<FlatSamples>; 4]>;
 
-/// The film's planes as the file wants them, and how many values had to be clamped.
-fn channels(film: &Film) -> (AnyChannels<FlatSamples>, u64) {
+/// The film's planes as the file wants them, and how many values had to be clamped. Each is let go before
+/// the next is turned.
+fn channels(film: Film) -> (AnyChannels<FlatSamples>, u64) {
     let mut list = ChannelList::new();
     let mut clamped = 0;
     for (component, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
@@ -206,21 +207,22 @@ fn channels(film: &Film) -> (AnyChannels<FlatSamples>, u64) {
         let halves = values.map(|value| to_half(value, &mut clamped)).collect();
         list.push(AnyChannel::new(name, FlatSamples::F16(halves)));
     }
-    if let Some(depth) = &film.depth {
-        list.push(AnyChannel::new("Z", FlatSamples::F32(depth.clone())));
+    drop(film.color);
+    if let Some(depth) = film.depth {
+        list.push(AnyChannel::new("Z", FlatSamples::F32(depth)));
     }
-    push_vectors(&mut list, ["N.X", "N.Y", "N.Z"], film.normal.as_deref());
-    push_vectors(&mut list, ["P.X", "P.Y", "P.Z"], film.position.as_deref());
-    push_vectors(&mut list, ["V.X", "V.Y", "V.Z"], film.velocity.as_deref());
+    push_vectors(&mut list, ["N.X", "N.Y", "N.Z"], film.normal);
+    push_vectors(&mut list, ["P.X", "P.Y", "P.Z"], film.position);
+    push_vectors(&mut list, ["V.X", "V.Y", "V.Z"], film.velocity);
     let albedo = ["albedo.R", "albedo.G", "albedo.B"];
-    push_vectors(&mut list, albedo, film.albedo.as_deref());
-    if let Some(id) = &film.id {
-        list.push(AnyChannel::new("id.I", FlatSamples::U32(id.clone())));
+    push_vectors(&mut list, albedo, film.albedo);
+    if let Some(id) = film.id {
+        list.push(AnyChannel::new("id.I", FlatSamples::U32(id)));
     }
     (AnyChannels::sort(list), clamped)
 }
 
-fn push_vectors(list: &mut ChannelList, names: [&str; 3], plane: Option<&[Vec3]>) {
+fn push_vectors(list: &mut ChannelList, names: [&str; 3], plane: Option<Vec<Vec3>>) {
     let Some(plane) = plane else {
         return;
     };

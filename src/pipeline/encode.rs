@@ -1,6 +1,6 @@
 //! Third stage: images are encoded, published under their final names, and recorded.
 
-use std::io;
+use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, SyncSender};
 use std::time::Instant;
@@ -108,10 +108,19 @@ fn write_frame(
         let png = encode_preview(&frame.film, &setup.preview)?;
         publish(path, &png).map_err(at(path))?;
     }
+    if report.bytes.file.total() > 0 {
+        peaks.looks_only();
+    }
+    peaks.take_in(frame.memory);
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
+    let mut looking = Looking {
+        out: &mut file,
+        peaks,
+        looks: 0,
+    };
     let options = exr_options(setup, &frame);
     report.clamped_pixels =
-        write_exr(&frame.film, &options, &mut file).map_err(|e| match e.into_io() {
+        write_exr(frame.film, &options, &mut looking).map_err(|e| match e.into_io() {
             Ok(source) => at(&task.image)(source),
             Err(error) => error.into(),
         })?;
@@ -126,6 +135,36 @@ fn write_frame(
         anonymous: now.anonymous,
     };
     Ok(report)
+}
+
+/// Looks at memory when the first bytes come through: then all that encoding takes is there.
+struct Looking<'a, W> {
+    out: &'a mut W,
+    peaks: &'a mut MemoryPeaks,
+    looks: u32,
+}
+
+/// Writes looked at: the header is written before blocks are compressed.
+const LOOKS: u32 = 16;
+
+impl<W: Write> Write for Looking<'_, W> {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.looks < LOOKS {
+            self.looks += 1;
+            self.peaks.take_in(MemoryUse::now());
+        }
+        self.out.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.out.flush()
+    }
+}
+
+impl<W: Seek> Seek for Looking<'_, W> {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.out.seek(to)
+    }
 }
 
 /// The EXR of `frame` in memory.

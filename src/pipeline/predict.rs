@@ -325,18 +325,18 @@ impl<'a> MemoryModel<'a> {
         first_read.larger(building).larger(tracing).larger(encoding)
     }
 
-    /// What encoding an image takes beside its planes: a copy of them with the colours in half
-    /// precision, and the blocks that are compressed just then; or, before, the bytes of the preview
-    /// plain, filtered and compressed.
+    /// What encoding an image takes beside its planes: one of them turned into what the file has, and the
+    /// blocks that are compressed just then; or, before, the bytes of the preview plain, filtered and
+    /// compressed.
     fn encoding(&self) -> u64 {
         let render = &self.setup.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
-        let copy = film - 8 * pixels;
         // Blocks have 16 rows at most; each is there plain and compressed.
-        let rows = 16 * copy / u64::from(render.height.max(16));
+        let rows = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
         let in_hand = rayon::current_num_threads() as u64 + 2;
-        (copy + 2 * rows * in_hand).max(9 * pixels)
+        // Vectors have three floats; colours are kept in half precision.
+        (12 * pixels).max(2 * rows * in_hand)
     }
 }
 

@@ -15,8 +15,8 @@ use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, SphereRadius, Spheres, TreeBuilder};
 use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, ShadeSource, render};
-use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
+use crate::report::{FrameReport, MemoryUse};
 use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::spheres::SphereSurface;
 
@@ -50,6 +50,8 @@ pub struct TracedFrame {
     pub time: Option<f64>,
     /// The report so far.
     pub report: FrameReport,
+    /// Memory when the image was finished and everything it was made of still there.
+    pub memory: MemoryUse,
 }
 
 /// A frame whose tree stands in the tracer; what shading needs beside it.
@@ -165,6 +167,7 @@ impl FrameTracer {
     ) -> Result<TracedFrame, TraceError> {
         let start = Instant::now();
         let (film, rays) = self.image(setup, &frame, stop)?;
+        let memory = MemoryUse::now();
         let BuiltFrame {
             task,
             time,
@@ -178,6 +181,7 @@ impl FrameTracer {
             film,
             time,
             report,
+            memory,
         })
     }
 
