@@ -1,0 +1,116 @@
+//! Targets behind a checksum, which mutation alone would never get past: the archive and the gzip
+//! stream are made here, around bytes that the fuzzer may change freely.
+
+use std::io::{Cursor, Write};
+use std::path::Path;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+use spherule_formats::detect::Format;
+use spherule_formats::{FrameError, FrameFile};
+use zip::write::SimpleFileOptions;
+use zip::{CompressionMethod, ZipWriter};
+
+use super::{DEFLATE_RATIO, check_message, check_particles, prepare, read_all};
+
+/// Names that mean something to the reader; the byte before an array picks one.
+const MEMBERS: [&str; 8] = ["positions", "x", "y", "z", "time", "velocity", "id", "meta"];
+/// Set in that byte: the member is deflated, not stored.
+const DEFLATED: u8 = 0x10;
+const NUMPY: &[u8] = b"\x93NUMPY";
+
+/// An NPZ: the bytes as they are if they begin like a zip archive, else the arrays among them,
+/// each with a byte before it that tells name and compression.
+pub fn npz(bytes: &[u8]) -> usize {
+    if bytes.starts_with(b"PK") {
+        return read_all(Format::Npz, bytes, DEFLATE_RATIO);
+    }
+    read_all(Format::Npz, &archive(bytes), DEFLATE_RATIO)
+}
+
+fn archive(bytes: &[u8]) -> Vec<u8> {
+    let starts: Vec<usize> = bytes
+        .windows(NUMPY.len())
+        .enumerate()
+        .filter(|(at, window)| *at > 0 && *window == NUMPY)
+        .map(|(at, _)| at)
+        .collect();
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    for (number, start) in starts.iter().enumerate() {
+        // The byte before the next array is that array's.
+        let end = starts.get(number + 1).map_or(bytes.len(), |next| next - 1);
+        let tag = bytes[start - 1];
+        let method = match tag & DEFLATED {
+            0 => CompressionMethod::Stored,
+            _ => CompressionMethod::Deflated,
+        };
+        let options = SimpleFileOptions::default().compression_method(method);
+        let name = MEMBERS[usize::from(tag) % MEMBERS.len()];
+        // A name that was there before is refused by the writer; the reader has targets for that.
+        if zip.start_file(format!("{name}.npy"), options).is_ok() {
+            zip.write_all(&bytes[*start..end.max(*start)])
+                .expect("memory takes all");
+        }
+    }
+    zip.finish().expect("memory takes all").into_inner()
+}
+
+/// File names that promise something, or nothing; the first byte picks one.
+const NAMES: [&str; 12] = [
+    "a", "a.vtk", "a.vtu", "a.bgeo", "a.ply", "a.xyz", "dump.7", "a.npy", "a.npz", "a.csv",
+    "a.spf", "a.bin",
+];
+
+/// Detection and gzip: the first byte picks a name, the others are the file. The same bytes in gzip
+/// must be understood alike.
+pub fn open(bytes: &[u8]) -> usize {
+    let Some((name, bytes)) = bytes.split_first() else {
+        return 0;
+    };
+    let path = Path::new(NAMES[usize::from(*name) % NAMES.len()]);
+    let plain = opened(path, bytes.to_vec());
+    if !bytes.starts_with(&[0x1f, 0x8b]) {
+        match (&plain, &opened(path, gzip(bytes))) {
+            (Ok(a), Ok(b)) => {
+                assert_eq!(a.bytes(), b.bytes());
+                assert_eq!((a.format(), a.steps()), (b.format(), b.steps()));
+            }
+            (Err(a), Err(b)) => assert_eq!(a.to_string(), b.to_string()),
+            (a, b) => panic!("plain {a:?}, in gzip {b:?}"),
+        }
+    }
+    plain.map_or(0, |file| usize::from(read_first(&file)))
+}
+
+fn opened(path: &Path, bytes: Vec<u8>) -> Result<FrameFile, FrameError> {
+    let opened = FrameFile::from_bytes(path, bytes);
+    match &opened {
+        Ok(file) => file.notes().iter().for_each(|note| check_message(note)),
+        Err(error) => check_message(&error.to_string()),
+    }
+    opened
+}
+
+/// True if the file has a step and its first can be read.
+fn read_first(file: &FrameFile) -> bool {
+    if file.steps().is_empty() {
+        return false;
+    }
+    match file.read(0) {
+        Ok(particles) => {
+            check_particles(&particles, file.bytes().len() as u64 * super::XZ_RATIO);
+            prepare(particles);
+            true
+        }
+        Err(error) => {
+            check_message(&error.to_string());
+            false
+        }
+    }
+}
+
+fn gzip(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).expect("memory takes all");
+    encoder.finish().expect("memory takes all")
+}
