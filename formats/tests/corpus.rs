@@ -4,6 +4,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use glam::{DVec3, Vec3};
+use spherule_formats::native::{Bound, Encoding, RadiusCode, StoreSettings, StoredType, layout};
 use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, native};
 
 #[path = "../../fuzz/src/lib.rs"]
@@ -49,9 +50,10 @@ fn every_folder_has_its_target() {
     assert_eq!(found, wanted);
 }
 
+/// What the seeds hold: a row of particles (`count` of them), a few far off.
 fn frame(radius: Option<Radius>, origin: DVec3, count: u8) -> ParticleFrame {
     let positions: Vec<Vec3> = (0..count)
-        .map(|i| Vec3::new(f32::from(i), -0.5, 1.0))
+        .map(|i| Vec3::new(f32::from(i), -0.5, if i == 40 { 1e4 } else { 1.0 }))
         .collect();
     ParticleFrame {
         attributes: vec![
@@ -75,20 +77,92 @@ fn frame(radius: Option<Radius>, origin: DVec3, count: u8) -> ParticleFrame {
     }
 }
 
+fn own_radii(count: u8) -> Radius {
+    Radius::PerParticle((0..count).map(|i| 0.5 / f32::from(i + 1)).collect())
+}
+
+/// A frame of attributes in fewer bits.
+fn shrunk(path: &Path) {
+    let range = [[-1.0, 1.0]].to_vec();
+    let attribute = |name: &str, stored, ranges| native::AttributeSpec {
+        name: name.into(),
+        stored,
+        components: 1,
+        ranges,
+        max_error: 0.01,
+    };
+    let spec = native::FrameSpec {
+        count: 3,
+        encoding: Encoding::Q10,
+        bound: Bound::None,
+        origin: DVec3::ZERO,
+        rounding: 0.0,
+        radius: native::RadiusSpec::None,
+        attributes: vec![
+            attribute("half", StoredType::Half, Vec::new()),
+            attribute("coded", StoredType::Ranged, range),
+        ],
+        time: None,
+        step: None,
+        dropped: 0,
+    };
+    let mut writer = native::FrameWriter::create(path, spec).expect("writable");
+    let run = native::Run {
+        positions: &[Vec3::ZERO, Vec3::X, Vec3::ONE],
+        radii: None,
+        attributes: &[&[0, 60, 0, 56, 0, 188], &[0, 128, 255]],
+    };
+    writer.push(&run).expect("writable");
+    writer.finish().expect("writable");
+}
+
 /// After a change of the native layout: `cargo test -p spherule-formats --test corpus -- --ignored`.
 #[test]
 #[ignore = "writes into the corpus"]
 fn write_the_native_corpus() {
-    let origin = DVec3::new(1e6, 0.0, -3.0);
-    let radii = Radius::PerParticle(vec![0.5, 0.25, 0.125]);
-    for (name, frame) in [
-        ("plain", frame(None, DVec3::ZERO, 17)),
-        ("origin", frame(Some(Radius::Common(0.5)), origin, 2)),
-        ("radii", frame(Some(radii), DVec3::ZERO, 3)),
-        ("zero", frame(None, DVec3::ZERO, 0)),
+    let dir = corpus().join("native");
+    fs::create_dir_all(&dir).expect("writable");
+    let far = DVec3::new(1e6, 0.0, -3.0);
+    let coded = |encoding, bound| StoreSettings {
+        encoding: Some(encoding),
+        bound,
+        rounding: 0.0,
+    };
+    let exact = StoreSettings::EXACT;
+    let common = Some(Radius::Common(0.5));
+    for (name, frame, settings) in [
+        ("plain", frame(None, DVec3::ZERO, 17), exact),
+        ("origin", frame(common.clone(), far, 2), exact),
+        ("radii", frame(Some(own_radii(3)), DVec3::ZERO, 3), exact),
+        ("zero", frame(None, DVec3::ZERO, 0), exact),
+        (
+            "wide",
+            frame(common, DVec3::ZERO, 50),
+            coded(Encoding::Q10, Bound::Length(1e-2)),
+        ),
+        (
+            "coded_radii",
+            frame(Some(own_radii(20)), DVec3::ZERO, 20),
+            coded(Encoding::Q16, Bound::Length(1e-2)),
+        ),
     ] {
-        let dir = corpus().join("native");
-        fs::create_dir_all(&dir).expect("writable");
-        native::write(&dir.join(name), &frame, Some(7)).expect("writable");
+        native::store(&dir.join(name), &frame, Some(7), &settings).expect("writable");
     }
+    shrunk(&dir.join("shrunk"));
+}
+
+/// The seeds reach what the target looks at: blocks kept as they are, radii in codes.
+#[test]
+fn the_native_corpus_has_every_kind_of_block() {
+    let index = |name: &str| {
+        let bytes = fs::read(corpus().join("native").join(name)).expect("readable");
+        layout::parse(&bytes).expect("whole")
+    };
+    let wide = index("wide");
+    assert!(wide.encoding() == Encoding::Q10 && wide.wide.len > 0);
+    let coded = index("coded_radii");
+    let is_coded = |radii: &layout::RadiiIndex| radii.code != RadiusCode::F32.code();
+    assert_eq!(coded.encoding(), Encoding::Q16);
+    assert!(matches!(&coded.radius, layout::RadiusIndex::PerParticle(radii) if is_coded(radii)));
+    assert_eq!(index("shrunk").attributes.len(), 2);
 }
