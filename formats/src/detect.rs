@@ -384,6 +384,8 @@ mod tests {
             "give the blocks",
         );
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
+        let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
+        refused("a.vti", odd, r"type a\n\u{1b}[2J holds");
         refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
         refused("a.abc", b"Ogawa\0", "Alembic");
         refused("a.bgeo", b"\x7fNSJ", "bhclassic");

@@ -2,9 +2,14 @@
 //!
 //! Parsers work on bytes and report an offset ([`ParseError`]); the edge that opened the file adds
 //! the path ([`FrameError`]).
+//!
+//! What an error says may quote the file, so it is made one line of bounded length where the error is
+//! made, for all readers.
 
 use std::io;
 use std::path::{Path, PathBuf};
+
+use crate::message::one_line;
 
 /// A fault in the bytes of a frame, without the path that only the opener knows.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -30,13 +35,27 @@ impl ParseError {
     pub fn malformed(at: usize, what: impl Into<String>) -> Self {
         Self::Malformed {
             at: at as u64,
-            what: what.into(),
+            what: one_line(what.into()),
         }
     }
 
     /// A [`ParseError::Unsupported`].
     pub fn unsupported(what: impl Into<String>) -> Self {
-        Self::Unsupported { what: what.into() }
+        Self::Unsupported {
+            what: one_line(what.into()),
+        }
+    }
+
+    /// The same fault at the same place, told as `tell` has it.
+    #[must_use]
+    pub fn retold(self, tell: impl FnOnce(&str) -> String) -> Self {
+        match self {
+            Self::Malformed { at, what } => Self::Malformed {
+                at,
+                what: one_line(tell(&what)),
+            },
+            Self::Unsupported { what } => Self::unsupported(tell(&what)),
+        }
     }
 
     /// Adds the path of the file that the bytes came from.
@@ -87,5 +106,29 @@ impl FrameError {
             path: path.to_owned(),
             source,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_errors_quote_stays_in_its_line() {
+        let name = "a\nb\u{1b}[2J";
+        let errors = [
+            ParseError::malformed(3, name),
+            ParseError::unsupported(name),
+            ParseError::unsupported("it").retold(|it| format!("{name}: {it}")),
+            ParseError::malformed(3, "it").retold(|it| format!("{name}: {it}")),
+        ];
+        for error in errors {
+            let text = error.to_string();
+            assert!(text.contains(r"a\nb\u{1b}[2J"), "{text}");
+            let path = Path::new("a.ply");
+            assert_eq!(error.in_file(path).to_string(), format!("a.ply: {text}"));
+        }
+        let long = ParseError::malformed(0, "x".repeat(1 << 20));
+        assert!(long.to_string().len() < 1000);
     }
 }

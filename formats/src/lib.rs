@@ -9,6 +9,7 @@
 mod attribute;
 mod error;
 mod frame;
+mod message;
 mod origin;
 mod scalar;
 

@@ -7,7 +7,7 @@ use spherule_formats::blocks::{BLOCK_SIZE, WIDTH};
 use spherule_formats::detect::Format;
 use spherule_formats::native::{Access, MAGIC, NativeFile, NativeFrame, layout};
 
-use super::{check_error, check_message, check_particles, prepare, read_all};
+use super::{check_error, check_particles, prepare, read_all};
 
 /// Particles that a sample of a frame takes.
 const SAMPLE: usize = 100;

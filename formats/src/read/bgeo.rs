@@ -169,8 +169,9 @@ impl Cursor<'_> {
         let end = self.at.checked_add(len);
         let taken = end.and_then(|end| self.bytes.get(self.at..end));
         let Some(taken) = taken else {
+            // The cursor jumps to fixed places, which a short file does not have.
             return Err(ParseError::malformed(
-                self.at,
+                self.at.min(self.bytes.len()),
                 format!("file ends within {what}"),
             ));
         };

@@ -18,10 +18,10 @@ pub(super) struct Reader {
 impl Reader {
     /// All steps, or the first error. Checks what holds for whatever a reader returns.
     pub(super) fn all(self, bytes: &[u8]) -> Result<Vec<RawParticles>, ParseError> {
-        let steps = (self.steps)(bytes)?;
+        let steps = (self.steps)(bytes).map_err(fit_to_show)?;
         let mut all = Vec::new();
         for step in steps.iter().take(4) {
-            let particles = (self.read)(bytes, step)?;
+            let particles = (self.read)(bytes, step).map_err(fit_to_show)?;
             for attribute in &particles.attributes {
                 assert!(attribute.components > 0, "{} is empty", attribute.name);
                 assert_eq!(
@@ -47,7 +47,17 @@ impl Reader {
     /// The message of the error that `read` gives for the first step, whatever `steps` says.
     #[track_caller]
     pub(super) fn error(self, bytes: &[u8]) -> ParseError {
-        (self.read)(bytes, &Step::whole(bytes.len())).expect_err("a bad file")
+        fit_to_show((self.read)(bytes, &Step::whole(bytes.len())).expect_err("a bad file"))
+    }
+
+    /// The same, of a file without compression: the place is one of its bytes, or its end.
+    #[track_caller]
+    pub(super) fn error_inside(self, bytes: &[u8]) -> ParseError {
+        let error = self.error(bytes);
+        if let ParseError::Malformed { at, .. } = &error {
+            assert!(*at <= bytes.len() as u64, "{error}: {} bytes", bytes.len());
+        }
+        error
     }
 
     /// Cuts the file at every 97th byte and at `sections`. The first `needed` bytes are all that a
@@ -59,6 +69,14 @@ impl Reader {
             assert!(cut >= needed || result.is_err(), "cut at {cut} was read");
         }
     }
+}
+
+/// The same error, if a terminal can show it in one line that is not too long.
+fn fit_to_show(error: ParseError) -> ParseError {
+    let text = error.to_string();
+    assert!(!text.contains(char::is_control), "{text:?}");
+    assert!(text.len() < 4000, "{} bytes", text.len());
+    error
 }
 
 /// A file of `tests/data`, inflated if it is gzipped.

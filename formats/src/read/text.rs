@@ -4,6 +4,7 @@
 //! [`super::table`] builds the parallel row parser on this; which line means what is left to the
 //! format's own module.
 
+use std::borrow::Cow;
 use std::ops::Range;
 
 use memchr::memchr;
@@ -105,6 +106,20 @@ impl<'a> Iterator for Lines<'a> {
 pub(super) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
+}
+
+/// `bytes` as text of the same length, so that places in it are places in the file: each byte that is no
+/// UTF-8 becomes a question mark.
+pub(super) fn same_length(bytes: &[u8]) -> Cow<'_, str> {
+    if let Ok(text) = str::from_utf8(bytes) {
+        return Cow::Borrowed(text);
+    }
+    let mut text = String::with_capacity(bytes.len());
+    for chunk in bytes.utf8_chunks() {
+        text.push_str(chunk.valid());
+        text.extend(chunk.invalid().iter().map(|_| '?'));
+    }
+    Cow::Owned(text)
 }
 
 /// Bytes of a file as a message can show them: quoted, lossy, at most 24 characters.

@@ -3,6 +3,7 @@
 use glam::DVec3;
 
 use crate::attribute::with_values;
+use crate::message::one_line;
 use crate::{Attribute, AttributeData, Positions, RawParticles, ScalarType};
 
 /// Name of the attribute that tells the parts apart: an index into the sequence's part names.
@@ -94,10 +95,10 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
     lost.sort();
     lost.dedup();
     if !lost.is_empty() {
-        notes.push(format!(
+        notes.push(one_line(format!(
             "not in all parts, so left out: {}",
             lost.join(", ")
-        ));
+        )));
     }
     merged
 }

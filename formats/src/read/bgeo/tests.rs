@@ -210,6 +210,20 @@ fn absurd_counts_are_refused() {
 }
 
 #[test]
+fn places_are_inside_files_that_end_in_their_header() {
+    let whole = file(1, 1, &definition("s", 1, 0), &[]);
+    for len in 5..whole.len() {
+        READER.error_inside(&whole[..len]);
+    }
+}
+
+#[test]
+fn names_of_the_file_do_not_reach_a_terminal() {
+    let error = READER.error(&file(0, 1, &definition("\u{1b}[2J\n", 1, 77), &[]));
+    assert!(error.to_string().contains(r"`\u{1b}[2J\n`"), "{error}");
+}
+
+#[test]
 fn width_without_points_is_not_believed() {
     let mut wide = definition("s", 0, 4);
     wide[3..5].copy_from_slice(&u16::MAX.to_be_bytes());

@@ -92,13 +92,12 @@ impl Fault {
     pub(super) fn explain(self, bytes: &[u8], step: &Step) -> ParseError {
         match self {
             Self::Ends(at) => cut_short(bytes, step, at, "the header of the step ends here"),
-            Self::Wrong(ParseError::Malformed { at, what })
+            Self::Wrong(error @ ParseError::Malformed { at, .. })
                 if usize::try_from(at).is_ok_and(|at| {
                     memchr::memchr(b'\n', bytes.get(at..).unwrap_or_default()).is_none()
                 }) =>
             {
-                let what = format!("{what}: {CUT_SHORT}");
-                ParseError::Malformed { at, what }
+                error.retold(|what| format!("{what}: {CUT_SHORT}"))
             }
             Self::Wrong(error) => error,
         }

@@ -4,6 +4,7 @@
 use super::dtype::{self, Dtype, Item};
 use super::literal::{self, Value};
 use crate::ParseError;
+use crate::read::text::same_length;
 
 /// First bytes of every NPY file.
 pub(super) const MAGIC: &[u8] = b"\x93NUMPY";
@@ -77,12 +78,13 @@ impl Header {
             .get(start..data)
             .ok_or_else(|| ParseError::malformed(bytes.len(), "file ends within the npy header"))?;
         // Before version 3 the text is latin-1, whose bytes are the first code points.
-        let text = if major == 3 {
-            String::from_utf8_lossy(text).into_owned()
+        let (text, bytes_of): (_, fn(&str) -> usize) = if major == 3 {
+            (same_length(text), str::len)
         } else {
-            text.iter().copied().map(char::from).collect()
+            let text: String = text.iter().copied().map(char::from).collect();
+            (text.into(), |text| text.chars().count())
         };
-        let Value::Dict(entries) = literal::parse(&text, start)? else {
+        let Value::Dict(entries) = literal::parse(&text, |before| start + bytes_of(before))? else {
             return Err(ParseError::malformed(start, "npy header is no dictionary"));
         };
         let entry = |name: &str| {

@@ -23,12 +23,14 @@ pub(super) enum Value {
     Dict(Vec<(Value, Value)>),
 }
 
-/// Parses one literal; white space may follow it. `base` is the offset of `text` in the file.
+/// Parses one literal; white space may follow it. `place` gives the offset in the file of what follows a
+/// part of `text`.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] at the character that does not fit.
-pub(super) fn parse(text: &str, base: usize) -> Result<Value, ParseError> {
-    let mut parser = Parser { text, at: 0, base };
+pub(super) fn parse(text: &str, place: impl Fn(&str) -> usize) -> Result<Value, ParseError> {
+    let place = &place;
+    let mut parser = Parser { text, at: 0, place };
     let value = parser.value(0)?;
     parser.skip_space();
     if parser.at < text.len() {
@@ -40,14 +42,15 @@ pub(super) fn parse(text: &str, base: usize) -> Result<Value, ParseError> {
 struct Parser<'a> {
     text: &'a str,
     at: usize,
-    base: usize,
+    place: &'a dyn Fn(&str) -> usize,
 }
 
 impl Parser<'_> {
     fn error(&self, expected: &str) -> ParseError {
         let found: String = self.rest().chars().take(20).collect();
+        let before = self.text.get(..self.at).unwrap_or(self.text);
         ParseError::malformed(
-            self.base + self.at,
+            (self.place)(before),
             format!("npy header: expected {expected}, found `{found}`"),
         )
     }

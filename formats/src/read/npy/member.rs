@@ -125,15 +125,11 @@ fn place(offset: u64) -> usize {
 
 /// Names the member that an error is about; its offsets count from the start of the member.
 pub(super) fn in_member(error: ParseError, name: &str) -> ParseError {
-    match error {
-        ParseError::Malformed { at, what } => ParseError::Malformed {
-            at,
-            what: format!("of member {name}: {what}"),
-        },
-        ParseError::Unsupported { what } => {
-            ParseError::unsupported(format!("npz member {name}: {what}"))
-        }
-    }
+    let begin = match error {
+        ParseError::Malformed { .. } => "of member",
+        ParseError::Unsupported { .. } => "npz member",
+    };
+    error.retold(|what| format!("{begin} {name}: {what}"))
 }
 
 pub(super) fn zip_error(error: &ZipError, what: &str) -> ParseError {

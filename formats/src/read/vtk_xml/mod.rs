@@ -15,6 +15,7 @@ mod merge;
 mod tests;
 
 use super::Step;
+use super::text::same_length;
 use super::vtk::{MOST_COMPONENTS, parse_values};
 use crate::{AttributeData, Endian, ParseError, RawParticles, ScalarType};
 use appended::Appended;
@@ -43,6 +44,7 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
 pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
     parse(bytes, Until::End, |document, appended| {
+        check_shares(&document, appended)?;
         Ok(RawParticles {
             positions: merge::positions(&document, appended)?,
             attributes: merge::attributes(&document, appended)?,
@@ -61,7 +63,7 @@ fn parse<T>(
     let cut = appended::find(bytes);
     let head = bytes.get(..cut.unwrap_or(bytes.len())).unwrap_or_default();
     // Names in another encoding than UTF-8 are no reason to refuse the numbers.
-    let head = String::from_utf8_lossy(head);
+    let head = same_length(head);
     let document = Document::parse(&head, cut.is_some(), until)?;
     check_total(&document, bytes.len())?;
     let appended = cut.map(|tag| Appended::parse(bytes, tag)).transpose()?;
@@ -87,6 +89,44 @@ fn check_total(document: &Document<'_>, file: usize) -> Result<(), ParseError> {
             format!("the pieces state more particles than a file of {file} bytes can hold"),
         )),
     }
+}
+
+/// Refuses appended arrays that together need more than the appended bytes can hold: they share bytes, and
+/// a small file with many such arrays would fill the memory.
+fn check_shares(document: &Document<'_>, appended: Option<Appended<'_>>) -> Result<(), ParseError> {
+    let Some(appended) = appended else {
+        return Ok(());
+    };
+    let len = appended.blob.len();
+    let most = match document.encoding.compressor {
+        Some(compressor) => compressor.most_output(len),
+        None => len,
+    };
+    let mut need = 0_usize;
+    for piece in &document.pieces {
+        let coordinates = piece.coordinates.iter().map(|array| (array, 3));
+        let data = piece.point_data.iter();
+        let data = data.map(|array| (array, array.components.unwrap_or(1)));
+        for (array, components) in coordinates.chain(data) {
+            let is_appended = matches!(array.place, Place::Appended(_));
+            let Some(scalar) = scalar_type(&array.type_name).filter(|_| is_appended) else {
+                continue;
+            };
+            let values = piece.points.saturating_mul(components);
+            need = need.saturating_add(values.saturating_mul(scalar.size()));
+            if need > most {
+                return Err(ParseError::malformed(
+                    array.at,
+                    format!(
+                        "array `{}` and those before it need {need} bytes, more than the {len} bytes \
+                         appended can hold; each array needs bytes of its own",
+                        short(&array.name)
+                    ),
+                ));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// The simulation time, if a field tells one. It is extra: a damaged field costs only the time.

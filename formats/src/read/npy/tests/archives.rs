@@ -157,3 +157,12 @@ fn damaged_archives_are_refused() {
     let error = READER.error(&other_method);
     assert!(matches!(error, ParseError::Unsupported { .. }), "{error}");
 }
+
+#[test]
+fn names_of_members_do_not_reach_a_terminal() {
+    let name = format!("\u{1b}[2J\n{}.npy", "x".repeat(5000));
+    for array in [b"\x93NUMPY\x09".to_vec(), b"\x93NUMPY\x01".to_vec()] {
+        let text = READER.error(&stored(&[(&name, array)])).to_string();
+        assert!(text.contains(r"member \u{1b}[2J\nxxx"), "{text}");
+    }
+}

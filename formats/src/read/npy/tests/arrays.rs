@@ -233,7 +233,7 @@ fn structures_are_flattened() {
 #[test]
 fn strings_keep_their_escapes() {
     let text = r#"{u'a\'b\\': "c\x41\u00e9", b'n': None, 't': (True, -3, [])}"#;
-    let parsed = literal::parse(text, 0).unwrap();
+    let parsed = literal::parse(text, str::len).unwrap();
     let text = |s: &str| literal::Value::Text(s.to_owned());
     let items = vec![
         literal::Value::Bool(true),
@@ -246,4 +246,44 @@ fn strings_keep_their_escapes() {
         (text("t"), literal::Value::Sequence(items)),
     ];
     assert_eq!(parsed, literal::Value::Dict(expected));
+}
+
+#[test]
+fn places_count_bytes_and_not_characters() {
+    // Bytes above 127: one character each before version 3, of two bytes in memory.
+    let place = |version: u8| {
+        let text = format!("{{'{}': ?", "\u{e9}".repeat(20));
+        let mut bytes = npy_version(version, "", &[]);
+        let text: Vec<u8> = match version {
+            1 => text
+                .chars()
+                .map(|c| u8::try_from(u32::from(c)).unwrap())
+                .collect(),
+            _ => [text.as_bytes(), b"\xff"].concat(),
+        };
+        let start = if version == 1 { 10 } else { 12 };
+        bytes.truncate(start);
+        bytes[8..10].copy_from_slice(&u16::try_from(text.len()).unwrap().to_le_bytes());
+        bytes.extend(&text);
+        let ParseError::Malformed { at, what } = READER.error_inside(&bytes) else {
+            panic!("a header that breaks off");
+        };
+        assert!(what.contains("expected a value"), "{what}");
+        bytes[usize::try_from(at).unwrap()]
+    };
+    assert_eq!((place(1), place(3)), (b'?', b'?'));
+}
+
+#[test]
+fn names_of_the_file_do_not_reach_a_terminal() {
+    let dtype = r"[('a\n\x1b[2J', '<f4'), ('b', '<f4')]";
+    let text = READER.error(&npy(dtype, "(1,)", &[0; 8])).to_string();
+    assert!(text.contains(r"[a\n\u{1b}[2J, b]"), "{text}");
+    let fields: String = (0..9000).map(|i| format!("('{i}', '<f4'), ")).collect();
+    let text = READER.error(&npy_version(
+        2,
+        &format!("{{'descr': [{fields}], 'fortran_order': False, 'shape': (0,)}}"),
+        &[],
+    ));
+    assert!(text.to_string().contains("characters left out"), "{text}");
 }

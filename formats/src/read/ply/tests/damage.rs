@@ -127,3 +127,16 @@ fn broken_text_is_named() {
     let whole = READER.one(&points("1", &["property uchar id"], "1 2 3 255.0\n"));
     assert_eq!(attribute(&whole, "id").data, AttributeData::U8(vec![255]));
 }
+
+#[test]
+fn names_of_the_file_do_not_reach_a_terminal() {
+    let bad = points("1", &["property uchar \u{1b}[2J"], "1 2 3 x\n");
+    let text = READER.error(&bad).to_string();
+    assert!(text.contains(r"\u{1b}[2J is `x`"), "{text}");
+    let elements = format!("element {} 0", "x".repeat(1 << 16));
+    let text = READER.error(&ascii(&[&elements], "")).to_string();
+    assert!(
+        text.contains("characters left out] ") && text.ends_with("as vertices"),
+        "{text}"
+    );
+}

@@ -137,6 +137,6 @@ fn foreign_text_around_the_numbers_does_not_matter() {
         found.positions,
         Positions::F32(vec![Vec3::new(1.0, 2.0, 3.0)])
     );
-    assert_eq!(found.attributes[0].name, "H\u{fffd}he");
+    assert_eq!(found.attributes[0].name, "H?he");
     assert_eq!(found.attributes[0].data, AttributeData::I16(vec![5]));
 }

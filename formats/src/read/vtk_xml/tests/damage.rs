@@ -88,6 +88,52 @@ fn compressed_bombs_are_refused() {
     assert!(what.contains("zlib"), "{what}");
 }
 
+#[test]
+fn arrays_that_share_bytes_cannot_fill_the_memory() {
+    let values = AttributeData::F32(vec![0.5; 300]);
+    let style = Style::RAW;
+    let file = Made::new(style)
+        .xml("<Piece NumberOfPoints=\"100\"><Points>")
+        .array("p", 3, &values)
+        .xml("</Points><PointData></PointData></Piece>")
+        .end();
+    let share = |count: usize| {
+        let arrays: String = (0..count)
+            .map(|i| {
+                format!(
+                    "<DataArray type=\"Float32\" Name=\"a{i}\" NumberOfComponents=\"3\" \
+                     format=\"appended\" offset=\"0\"/>"
+                )
+            })
+            .collect();
+        replace(&file, "<PointData>", &format!("<PointData>{arrays}"))
+    };
+    assert_eq!(good(&share(0)).attributes.len(), 0);
+    let what = malformed(&share(1));
+    assert!(
+        what.starts_with("array `a0` and those before it need 2400"),
+        "{what}"
+    );
+    malformed(&share(1000));
+}
+
+#[test]
+fn places_are_those_of_the_file_whatever_its_names() {
+    let name = [0xff; 1000];
+    let file = [
+        b"<VTKFile type='PolyData'><PolyData><Piece NumberOfPoints='1'><Points>\
+          <DataArray type='Float32' NumberOfComponents='3' Name='"
+            .as_slice(),
+        &name,
+        b"'>1 2 x</DataArray></Points></Piece></PolyData></VTKFile>",
+    ]
+    .concat();
+    let Err(ParseError::Malformed { at, .. }) = parse_file(&file) else {
+        panic!("x is no number");
+    };
+    assert_eq!(file[usize::try_from(at).unwrap()], b'x');
+}
+
 /// The first byte of the appended data.
 fn blob_at(file: &[u8]) -> usize {
     let tag = appended::find(file).unwrap();

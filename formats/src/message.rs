@@ -1,0 +1,81 @@
+//! Text from files, made fit for a line of a message.
+
+/// Characters that are kept of the start of a long message.
+const START: usize = 560;
+/// Characters that are kept of its end, where the remedy is.
+const END: usize = 240;
+/// Messages of so many characters are left whole: a shortened one is, with what it says of the gap.
+const MOST: usize = START + END + 60;
+
+/// `text` as one line of bounded length that a terminal shows as it is: characters that control it,
+/// break the line or turn its direction are written as escapes.
+pub(crate) fn one_line(text: String) -> String {
+    if !text.contains(is_unfit) {
+        return shortened(text);
+    }
+    let mut line = String::with_capacity(text.len());
+    for c in text.chars() {
+        if is_unfit(c) {
+            line.extend(c.escape_default());
+        } else {
+            line.push(c);
+        }
+    }
+    shortened(line)
+}
+
+/// Control characters, line and paragraph separators, and those that reorder text.
+fn is_unfit(c: char) -> bool {
+    c.is_control()
+        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+}
+
+fn shortened(text: String) -> String {
+    if text.len() <= MOST {
+        return text;
+    }
+    let count = text.chars().count();
+    if count <= MOST {
+        return text;
+    }
+    let gap = format!(" [{} characters left out] ", count - START - END);
+    let start = text.chars().take(START);
+    let end = text.chars().skip(count - END);
+    start.chain(gap.chars()).chain(end).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[track_caller]
+    fn shown(text: &str, expected: &str) {
+        let once = one_line(text.to_owned());
+        assert_eq!(once, expected);
+        assert_eq!(one_line(once.clone()), once);
+    }
+
+    #[test]
+    fn what_would_control_a_terminal_is_escaped() {
+        shown("a `b\\c` d", "a `b\\c` d");
+        shown("größe \u{3b1}", "größe \u{3b1}");
+        shown("a\nb\r\tc", "a\\nb\\r\\tc");
+        shown(
+            "\u{1b}[2Jx\0\u{7f}\u{9b}",
+            "\\u{1b}[2Jx\\u{0}\\u{7f}\\u{9b}",
+        );
+        shown("a\u{202e}b\u{2028}c", "a\\u{202e}b\\u{2028}c");
+    }
+
+    #[test]
+    fn long_text_keeps_its_start_and_its_remedy() {
+        let text = format!("start {}; remedy", "\u{3b1}\n".repeat(10_000));
+        let line = one_line(text);
+        assert!(line.starts_with("start \u{3b1}\\n") && line.ends_with("\\n; remedy"));
+        assert!(line.contains("29214 characters left out"), "{line}");
+        assert!(line.chars().count() < MOST);
+        shown(&line, &line);
+        let fits = "\u{3b1}".repeat(MOST);
+        shown(&fits, &fits);
+    }
+}
