@@ -269,11 +269,16 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     // rkyv wants its alignment, which a slice does not promise; the index is small.
     let mut aligned = AlignedVec::<16>::with_capacity(index.len());
     aligned.extend_from_slice(index);
-    let damaged =
-        |e: rancor::Error| ParseError::malformed(offset, format!("the index is damaged: {e}"));
+    let damaged = |e: rancor::Error| {
+        ParseError::malformed(
+            offset,
+            format!("the index is damaged: {e}; convert it again"),
+        )
+    };
     let archived = rkyv::access::<ArchivedFrameIndex, rancor::Error>(&aligned).map_err(damaged)?;
     let index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
-    check_index(&index, offset)?;
+    let again = |error: ParseError| error.retold(|what| format!("{what}; convert it again"));
+    check_index(&index, offset).map_err(again)?;
     Ok(index)
 }
 
@@ -297,7 +302,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
     if word(56) != xxh3_64(&header[..56]) {
         return Err(ParseError::malformed(
             56,
-            "the header is damaged: its checksum differs",
+            "the header is damaged: its checksum differs; copy or convert it again",
         ));
     }
     let version = u32::from_le_bytes(std::array::from_fn(|i| header[8 + i]));
@@ -327,11 +332,13 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
         )
         .filter(|(start, end)| *start >= HEADER_LEN && *start <= *end && *end == bytes.len())
         .map(|(start, end)| start..end)
-        .ok_or_else(|| ParseError::malformed(24, "the index lies outside the file"))?;
+        .ok_or_else(|| {
+            ParseError::malformed(24, "the index lies outside the file; convert it again")
+        })?;
     if word(40) != xxh3_64(&bytes[index.clone()]) {
         return Err(ParseError::malformed(
             index.start,
-            "the index is damaged: its checksum differs",
+            "the index is damaged: its checksum differs; copy or convert it again",
         ));
     }
     Ok(index)

@@ -1,0 +1,49 @@
+//! Files that are cut short while they are mapped: pages that are gone are zeros, and it is found out.
+#![cfg(all(target_os = "linux", not(miri)))]
+
+use super::*;
+
+/// Cuts a mapped file down to each length and looks at all of it.
+#[test]
+fn everything_can_be_touched_after_a_cut() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    for stored in frames::all() {
+        let len = stored.bytes.len() as u64;
+        for cut in [0, 1, 63, 64, 4095, 4096, 4097, len - 1] {
+            let path = dir.path().join("a.spf");
+            fs::write(&path, &stored.bytes).expect("writable");
+            let file = NativeFile::open(&path, Access::Map).expect("whole");
+            let frame = file.frame().expect("unchanged");
+            let handle = fs::OpenOptions::new().write(true).open(&path);
+            handle.and_then(|h| h.set_len(cut)).expect("writable");
+            touch(frame);
+            let error = file.check().expect_err("cut").to_string();
+            assert!(error.contains(&format!("has {cut} now")), "{error}");
+            assert!(error.contains("--no-mmap"), "{error}");
+            assert!(file.frame().is_err());
+        }
+    }
+}
+
+/// A file that is put back to its length has lost its bytes all the same.
+#[test]
+fn what_was_lost_stays_lost() {
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let path = dir.path().join("a.spf");
+    for stored in frames::all() {
+        fs::write(&path, &stored.bytes).expect("writable");
+        let file = NativeFile::open(&path, Access::Map).expect("whole");
+        let modified = fs::metadata(&path).and_then(|m| m.modified());
+        let frame = file.frame().expect("unchanged");
+        let handle = fs::OpenOptions::new().write(true).open(&path);
+        let handle = handle.expect("writable");
+        handle.set_len(0).expect("writable");
+        touch(frame);
+        handle.set_len(stored.bytes.len() as u64).expect("writable");
+        handle
+            .set_modified(modified.expect("told"))
+            .expect("writable");
+        let error = file.check().expect_err("lost").to_string();
+        assert!(error.contains("cut short while it was mapped"), "{error}");
+    }
+}
