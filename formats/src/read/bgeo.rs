@@ -54,6 +54,7 @@ pub(crate) fn layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
     cursor.at = 25;
     let definition_count = cursor.count("point attributes")?;
     cursor.at = HEADER;
+    cursor.take(0, "the header")?;
     let mut definitions = Vec::new();
     for _ in 0..definition_count {
         definitions.push(cursor.definition()?);

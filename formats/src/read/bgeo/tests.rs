@@ -211,9 +211,12 @@ fn absurd_counts_are_refused() {
 
 #[test]
 fn places_are_inside_files_that_end_in_their_header() {
-    let whole = file(1, 1, &definition("s", 1, 0), &[]);
-    for len in 5..whole.len() {
-        READER.error_inside(&whole[..len]);
+    let one = file(1, 1, &definition("s", 1, 0), &[]);
+    let none = file(1, 0, &[], &[]);
+    for whole in [one, none] {
+        for len in 5..whole.len() {
+            READER.error_inside(&whole[..len]);
+        }
     }
 }
 
