@@ -186,6 +186,7 @@ fn faults_have_names() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn cut_files_are_no_panic() {
     for name in ["paraview", "dualsphysics", "plain"] {
         cut_everywhere(&sample(&format!("single_frames/{name}.csv")), steps, read);

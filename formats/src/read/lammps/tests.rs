@@ -346,6 +346,7 @@ fn a_step_of_another_file_is_an_error() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn cut_files_are_no_panic() {
     cut_everywhere(&sample("lammps_drop/drop_2frames.lammpstrj"), steps, read);
 }

@@ -69,6 +69,7 @@ fn whole_numbers_give_way_to_fractions_and_text() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn many_pieces_are_joined_in_order() {
     let rows = 400_000_u32;
     let mut text = String::new();

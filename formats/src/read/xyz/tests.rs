@@ -232,6 +232,7 @@ fn absurd_counts_allocate_nothing() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn cut_files_are_no_panic() {
     for name in ["raw", "mol", "ext"] {
         cut_everywhere(&sample(&format!("single_frames/{name}.xyz")), steps, read);

@@ -279,7 +279,7 @@ fn names_of_the_file_do_not_reach_a_terminal() {
     let dtype = r"[('a\n\x1b[2J', '<f4'), ('b', '<f4')]";
     let text = READER.error(&npy(dtype, "(1,)", &[0; 8])).to_string();
     assert!(text.contains(r"[a\n\u{1b}[2J, b]"), "{text}");
-    let fields: String = (0..9000).map(|i| format!("('{i}', '<f4'), ")).collect();
+    let fields: String = (0..300).map(|i| format!("('{i}', '<f4'), ")).collect();
     let text = READER.error(&npy_version(
         2,
         &format!("{{'descr': [{fields}], 'fortran_order': False, 'shape': (0,)}}"),

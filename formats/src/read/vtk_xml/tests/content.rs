@@ -8,6 +8,7 @@ use crate::read::vtk;
 use crate::{AttributeData, ParseError, Positions};
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn every_encoding_of_every_size_is_read() {
     for style in all_styles() {
         for sizes in [&[0][..], &[1], &[4], &[5], &[0, 3, 0, 2], &[1, 1, 1], &[]] {

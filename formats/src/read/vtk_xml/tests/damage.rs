@@ -10,6 +10,7 @@ use crate::read::vtk_xml::{read, steps};
 use crate::{AttributeData, ParseError};
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn absurd_counts_are_refused_without_allocation() {
     for style in all_styles() {
         let file = made(style, &[3]);
@@ -163,6 +164,7 @@ fn check_cuts(bytes: &[u8], cuts: impl Iterator<Item = usize>) {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn truncation_is_noticed() {
     for place in [Where::Ascii, Where::Inline, Where::Base64, Where::Raw] {
         for pack in [Pack::Plain, Pack::Zlib(12, true)] {
