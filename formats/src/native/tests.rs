@@ -2,6 +2,7 @@
 
 use std::fs;
 use std::path::PathBuf;
+use std::sync::LazyLock;
 
 use glam::{DVec3, Vec3};
 
@@ -213,10 +214,10 @@ fn every_flipped_byte_is_an_error_or_padding() {
 /// An index that lies, under valid checksums.
 #[track_caller]
 fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
-    let whole = bytes(&frame(17, DVec3::ZERO));
-    let mut index = layout::parse(&whole).expect("whole");
+    static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| bytes(&frame(17, DVec3::ZERO)));
+    let mut index = layout::parse(&WHOLE).expect("whole");
     change(&mut index);
-    forge(&whole, &index).expect_err("a lie")
+    forge(&WHOLE, &index).expect_err("a lie")
 }
 
 /// `whole` with another index under valid checksums, read.
