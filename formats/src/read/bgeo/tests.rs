@@ -82,6 +82,7 @@ fn indexed_strings_are_their_indices() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn names_keep_their_spaces_and_velocity_is_a_vector() {
     let particles = READER.one(&sample("emitter_sph/ParticleData_Fluid_3.bgeo"));
     assert_eq!(
@@ -106,6 +107,7 @@ fn a_file_before_the_emitter_starts_is_empty() {
 }
 
 #[test]
+#[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
 fn reads_the_splashsurf_dam_break() {
     let bytes = sample("public_splashsurf/dam_break_frame_9_6859_particles.bgeo");
     let particles = READER.one(&bytes);
