@@ -118,7 +118,7 @@ fn check_kinds(frames: &[Stored]) {
 /// 150 particles: two nodes, the second one not full; a few far off, whose blocks are wide.
 fn frame(radius: Option<Radius>, origin: DVec3) -> ParticleFrame {
     let mut numbers = Numbers(1);
-    let mut unit = || f32::from(numbers.below(1 << 16) as u16) / 65_536.0;
+    let mut unit = || numbers.below(1 << 16) as f32 / 65_536.0;
     let positions: Vec<Vec3> = (0..150)
         .map(|i| {
             let inside = Vec3::new(unit(), unit(), unit());
