@@ -25,6 +25,7 @@
 pub mod accel;
 pub mod cli;
 pub mod manifest;
+mod mishap;
 pub mod output;
 pub mod pipeline;
 pub mod ray;

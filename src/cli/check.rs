@@ -5,7 +5,7 @@ use std::path::Path;
 
 use clap::Args;
 use spherule_formats::Sequence;
-use spherule_jobs::{Foreseen, FrameState, Job};
+use spherule_jobs::{Foreseen, FrameState, Job, Mode};
 
 use super::plan::{Plan, RunArgs, one_fits};
 use super::{CliError, Outcome, disk};
@@ -26,7 +26,7 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
-    args.run.use_threads()?;
+    args.run.work.use_threads()?;
     let asked = args.run.manifest.manifest()?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
@@ -95,8 +95,8 @@ impl<'a> Check<'a> {
     }
 
     fn look(&mut self, args: &RunArgs) {
-        if self.look_at_place(args.force) {
-            let request = self.plan.request(self.sequence, args.mode());
+        if self.look_at_place(args.work.mode()) {
+            let request = self.plan.request(self.sequence, args.work.mode());
             let foreseen = Job::foresee(&self.plan.dir, &request).map_err(CliError::from);
             self.foreseen = self.noted(foreseen);
         }
@@ -123,11 +123,11 @@ impl<'a> Check<'a> {
     }
 
     /// Looks at where the images go; whether that is, or could be, a directory.
-    fn look_at_place(&mut self, force: bool) -> bool {
-        if self.noted(self.plan.guard_directory()).is_none() {
+    fn look_at_place(&mut self, mode: Mode) -> bool {
+        if self.noted(self.plan.guard_directory(mode)).is_none() {
             return false;
         }
-        self.noted(self.plan.guard_manifest(force));
+        self.noted(self.plan.guard_manifest(mode == Mode::Force));
         let there = disk::existing(&self.plan.dir);
         self.free_disk = disk::free(&there);
         if let Err(error) = disk::writable(&there) {

@@ -28,6 +28,7 @@ mod progress;
 mod render;
 mod scale;
 mod signals;
+mod work;
 
 use errors::CliError;
 

@@ -6,10 +6,11 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{DEFAULT_WORKER, FrameRequest, Job, JobRequest, Mode, publish};
+use spherule_jobs::{DEFAULT_WORKER, Job, JobRequest, Mode, publish};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
+use super::work::{WorkArgs, chosen, guard_directory, guard_kind, requests};
 use crate::accel::Structure;
 use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
@@ -26,37 +27,8 @@ const JOB_FILE: &str = "job.toml";
 pub(super) struct RunArgs {
     #[command(flatten)]
     pub(super) manifest: ManifestArgs,
-    /// Start over, whatever was rendered here before.
-    #[arg(long)]
-    pub(super) force: bool,
-    /// Keep finished images although settings or inputs have changed.
-    #[arg(long, conflicts_with = "force")]
-    pub(super) keep_done: bool,
-    /// Threads to use; default: all.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
-}
-
-impl RunArgs {
-    /// What to do with what an earlier run left.
-    pub(super) const fn mode(&self) -> Mode {
-        match (self.force, self.keep_done) {
-            (true, _) => Mode::Force,
-            (_, true) => Mode::KeepDone,
-            _ => Mode::Resume,
-        }
-    }
-
-    /// Uses as many threads as asked for from now on.
-    pub(super) fn use_threads(&self) -> Result<(), CliError> {
-        let Some(threads) = self.threads else {
-            return Ok(());
-        };
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()
-            .map_err(|e| CliError::other(format!("--threads {threads}: {e}")))
-    }
+    #[command(flatten)]
+    pub(super) work: WorkArgs,
 }
 
 /// A job before anything is written.
@@ -77,21 +49,9 @@ impl Plan {
     pub(super) fn new(asked: Asked, sequence: &Sequence) -> Result<Self, CliError> {
         let base = asked.absolute_base()?;
         let mut manifest = asked.manifest;
-        let chosen = match &manifest.input.frames {
-            None => sequence.frames().len(),
-            Some(range) => {
-                let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
-                let chosen = range.select(&numbers).len();
-                if chosen == 0 {
-                    return Err(CliError::other(format!(
-                        "input.frames: {range} has none of the frames that there are: {}",
-                        list(&numbers)
-                    )));
-                }
-                chosen
-            }
-        };
-        manifest.check_frame_count(chosen)?;
+        let range = manifest.input.frames.as_ref();
+        let chosen = chosen(sequence, range, "input.frames")?;
+        manifest.check_frame_count(chosen.len())?;
         let shown_output = PathBuf::from(manifest.output.path.as_str());
         let dir = real_dir(&base.join(manifest.output.path.dir()));
         move_into(&mut manifest, &base, &dir)?;
@@ -132,15 +92,10 @@ impl Plan {
         }
     }
 
-    /// Refuses a directory that cannot be because a file is in its place.
-    pub(super) fn guard_directory(&self) -> Result<(), CliError> {
-        match self.dir.ancestors().find(|p| p.exists()) {
-            Some(found) if !found.is_dir() => Err(CliError::other(format!(
-                "{}: is a file where a directory for the images should be; choose another output",
-                found.display()
-            ))),
-            _ => Ok(()),
-        }
+    /// Refuses a directory that cannot be, or that has a job of another kind.
+    pub(super) fn guard_directory(&self, mode: Mode) -> Result<(), CliError> {
+        guard_directory(&self.dir, "images")?;
+        guard_kind(&self.dir, None, mode)
     }
 
     /// Refuses to overwrite a `job.toml` that belongs to no job of ours.
@@ -170,26 +125,14 @@ impl Plan {
 
     /// What is asked of the job.
     pub(super) fn request(&self, sequence: &Sequence, mode: Mode) -> JobRequest {
-        let frames = sequence
-            .frames()
-            .iter()
-            .enumerate()
-            .map(|(index, frame)| FrameRequest {
-                number: frame.number,
-                inputs: sequence
-                    .inputs(index)
-                    .into_iter()
-                    .map(Path::to_owned)
-                    .collect(),
-                outputs: std::iter::once(self.image(frame.number))
-                    .chain(self.preview(frame.number))
-                    .collect(),
-            })
-            .collect();
+        let outputs = |frame| {
+            let image = std::iter::once(self.image(frame));
+            image.chain(self.preview(frame)).collect()
+        };
         JobRequest {
             worker: DEFAULT_WORKER.to_owned(),
             settings: self.manifest.settings(),
-            frames,
+            frames: requests(sequence, outputs),
             selection: self.manifest.input.frames.clone(),
             mode,
         }
@@ -344,10 +287,4 @@ fn move_into(manifest: &mut Manifest, base: &Path, dir: &Path) -> Result<(), Cli
             OutputPattern::parse(manifest.output.path.file_name()).map_err(CliError::Other)?;
     }
     Ok(())
-}
-
-/// Frame numbers as a range.
-pub(super) fn list(frames: &[i64]) -> String {
-    spherule_jobs::FrameRange::from_frames(frames.iter().copied())
-        .map_or_else(String::new, |r| r.to_string())
 }

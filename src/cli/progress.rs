@@ -2,16 +2,15 @@
 //! programs.
 
 use std::io::{IsTerminal, stderr, stdout};
+use std::path::Path;
 use std::sync::Mutex;
 use std::time::Instant;
 
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
-use serde_json::json;
+use serde_json::{Value, json};
 
 use super::put;
-use crate::pipeline::{Event, Stage};
-use crate::report::FrameReport;
 
 /// How progress is shown.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -71,31 +70,39 @@ impl Progress {
         }
     }
 
-    /// Shows `event`. Called from all stages.
-    pub(super) fn show(&self, event: &Event) {
-        match event {
-            Event::Entered(frame, stage) => self.entered(*frame, *stage),
-            Event::Done(task, report) => {
-                let done = self.count(None);
-                let image = task.image.display().to_string();
-                self.line(
-                    done,
-                    &format!("frame {}: {image} ({})", task.frame, told(report)),
-                    &json!({"frame": task.frame, "status": "done", "image": image,
-                        "done": done, "total": self.total, "seconds": report.seconds}),
-                );
-            }
-            Event::Failed(frame, reason) => {
-                let done = self.count(Some(*frame));
-                self.warn(&format!("error: frame {frame}: {reason}"));
-                self.line(
-                    done,
-                    "",
-                    &json!({"frame": frame, "status": "failed", "reason": reason,
-                        "done": done, "total": self.total}),
-                );
-            }
-            Event::Note(note) => self.warn(&format!("note: {note}")),
+    /// A frame is in hand: `doing` says what is being done with it.
+    pub(super) fn entered(&self, frame: i64, doing: &str) {
+        if let Show::Bar(bar) = &self.show {
+            bar.set_message(format!("{doing} frame {frame}"));
+        }
+    }
+
+    /// `frame` has become the file `output`: `told` for people, `facts` for programs.
+    pub(super) fn done(&self, frame: i64, output: &Path, told: &str, facts: Value) {
+        let done = self.count(None);
+        let output = output.display().to_string();
+        let plain = format!("frame {frame}: {output} ({told})");
+        let mut json = json!({"frame": frame, "status": "done", "done": done, "total": self.total});
+        if let (Value::Object(json), Value::Object(facts)) = (&mut json, facts) {
+            json.extend(facts);
+        }
+        self.line(done, &plain, &json);
+    }
+
+    /// `frame` could not be made.
+    pub(super) fn failed(&self, frame: i64, reason: &str) {
+        let done = self.count(Some(frame));
+        self.note(&format!("error: frame {frame}: {reason}"));
+        let json = json!({"frame": frame, "status": "failed", "reason": reason,
+            "done": done, "total": self.total});
+        self.line(done, "", &json);
+    }
+
+    /// A line for people, whatever the mode.
+    pub(super) fn note(&self, text: &str) {
+        match &self.show {
+            Show::Bar(bar) => bar.suspend(|| say!("{text}")),
+            _ => say!("{text}"),
         }
     }
 
@@ -115,17 +122,6 @@ impl Progress {
         ended.count
     }
 
-    fn entered(&self, frame: i64, stage: Stage) {
-        if let Show::Bar(bar) = &self.show {
-            let what = match stage {
-                Stage::Read => "reading",
-                Stage::Trace => "tracing",
-                Stage::Write => "writing",
-            };
-            bar.set_message(format!("{what} frame {frame}"));
-        }
-    }
-
     /// One frame has ended, well or badly.
     fn line(&self, done: usize, plain: &str, json: &serde_json::Value) {
         match &self.show {
@@ -135,13 +131,6 @@ impl Progress {
             Show::Json => say!("{json}"),
             Show::Openjd => openjd(done, self.total, plain),
             Show::Nothing => {}
-        }
-    }
-
-    fn warn(&self, text: &str) {
-        match &self.show {
-            Show::Bar(bar) => bar.suspend(|| say!("{text}")),
-            _ => say!("{text}"),
         }
     }
 
@@ -169,14 +158,6 @@ fn bar(total: usize) -> ProgressBar {
     let bar = ProgressBar::new(total as u64).with_style(style);
     bar.enable_steady_tick(std::time::Duration::from_millis(200));
     bar
-}
-
-fn told(report: &FrameReport) -> String {
-    let s = &report.seconds;
-    format!(
-        "{} particles, {} built in {:.3} s, trace {:.2} s",
-        report.particles, report.build.structure, s.build, s.trace
-    )
 }
 
 /// Seconds as a person says them.

@@ -1,13 +1,15 @@
 //! `spherule render`: a sequence, or the job of a manifest, to images.
 
 use clap::Args;
+use serde_json::json;
 use spherule_formats::Sequence;
 
-use super::plan::{Plan, RunArgs, list, one_fits};
-use super::progress::{Progress, ProgressMode, duration};
+use super::plan::{Plan, RunArgs, one_fits};
+use super::progress::{Progress, ProgressMode};
+use super::work::{Finished, tell_kept};
 use super::{CliError, Outcome, signals};
-use crate::pipeline::{self, Event, Overlap, RadiusRule, Setup};
-use crate::report;
+use crate::pipeline::{self, Event, Overlap, RadiusRule, Setup, Stage};
+use crate::report::{self, FrameReport};
 use crate::survey::Survey;
 
 #[derive(Debug, Args)]
@@ -27,34 +29,32 @@ const WORDS: signals::Words = signals::Words {
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
     let RenderArgs { run, progress } = args;
-    run.use_threads()?;
+    run.work.use_threads()?;
+    let mode = run.work.mode();
     let asked = run.manifest.manifest()?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
         say!("note: {note}");
     }
     let plan = Plan::new(asked, &sequence)?;
-    plan.guard_directory()?;
-    plan.guard_manifest(run.force)?;
-    let mut job = plan.open(&sequence, run.mode())?;
+    plan.guard_directory(mode)?;
+    plan.guard_manifest(run.work.force)?;
+    let mut job = plan.open(&sequence, mode)?;
     let (survey, setup) = plan.settle(job.resolved())?;
     let mut tasks = plan.tasks(&sequence, &job.pending());
     let schedule = plan.fit(&sequence, &setup, &mut tasks);
     one_fits(&tasks)?;
-    plan.write_manifest(run.force || run.keep_done)?;
+    plan.write_manifest(run.work.force || run.work.keep_done)?;
     tell(&sequence, &survey, &setup);
     if schedule.overlap == Overlap::None && tasks.len() > 1 {
         say!("note: one frame at a time, to take less memory");
     }
-    let kept = job.selected().len() - tasks.len();
-    if kept > 0 {
-        say!("{kept} of {} frames are done already", job.selected().len());
-    }
+    tell_kept(&job, tasks.len());
     let progress = Progress::new(*progress, tasks.len());
     let start = std::time::Instant::now();
     let interrupt = signals.at_work();
     let overlap = schedule.overlap;
-    let watch = |event: Event| progress.show(&event);
+    let watch = |event: Event| show(&progress, &event);
     let result = pipeline::run(
         &setup, &sequence, &tasks, overlap, &mut job, interrupt, &watch,
     );
@@ -65,27 +65,44 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     });
     // What ended the run explains why there is no report either.
     let result = result.map_err(CliError::from).and(reported);
-    let summary = job.summary();
-    say!(
-        "{} of {} frames done in {}: {}",
-        summary.done,
-        summary.total,
-        duration(start.elapsed().as_secs_f64()),
-        plan.shown_output.display()
-    );
-    // Frames that failed earlier and were not tried again are still to be done.
-    if !ended.failed.is_empty() {
-        say!("failed: {}", list(&ended.failed));
-    }
-    match result {
-        Err(error) => {
-            say!("error: {error}");
-            Ok(Outcome::SomeFailed)
+    let finished = Finished {
+        job: &job,
+        tasks: tasks.len(),
+        ended,
+        start,
+        interrupt,
+        output: &plan.shown_output,
+    };
+    Ok(finished.tell(result))
+}
+
+/// Shows an event of the pipeline. Called from all its stages.
+fn show(progress: &Progress, event: &Event) {
+    match event {
+        Event::Entered(frame, stage) => progress.entered(
+            *frame,
+            match stage {
+                Stage::Read => "reading",
+                Stage::Trace => "tracing",
+                Stage::Write => "writing",
+            },
+        ),
+        Event::Done(task, report) => {
+            let image = task.image.display().to_string();
+            let facts = json!({"image": image, "seconds": report.seconds});
+            progress.done(task.frame, &task.image, &told(report), facts);
         }
-        Ok(()) if interrupt.is_raised() && ended.count < tasks.len() => Ok(Outcome::Interrupted),
-        Ok(()) if summary.done < summary.total => Ok(Outcome::SomeFailed),
-        Ok(()) => Ok(Outcome::Done),
+        Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Note(note) => progress.note(&format!("note: {note}")),
     }
+}
+
+fn told(report: &FrameReport) -> String {
+    let s = &report.seconds;
+    format!(
+        "{} particles, {} built in {:.3} s, trace {:.2} s",
+        report.particles, report.build.structure, s.build, s.trace
+    )
 }
 
 /// What was decided for the user, so that nothing is a surprise.

@@ -11,6 +11,7 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 use super::setup::Setup;
 use super::trace::TracedFrame;
 use super::{Event, Passed, Stage, Watch};
+use crate::mishap::is_disk_full;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
@@ -31,14 +32,6 @@ pub(super) enum WriteError {
         /// The operating system's reason.
         source: io::Error,
     },
-}
-
-/// Whether all further images would fail for the same reason.
-fn is_disk_full(error: &io::Error) -> bool {
-    matches!(
-        error.kind(),
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
-    )
 }
 
 pub(super) fn write_stage(

@@ -10,6 +10,7 @@ use super::decoded::DecodedFrame;
 use super::in_place::{Opened, StoredFrame};
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
+use crate::mishap::may_be_unfinished;
 use crate::report::memory::available;
 
 /// Why a frame cannot be drawn.
@@ -159,13 +160,8 @@ impl LoadedFrame {
 
 /// A damaged frame that is the last of the sequence may still be growing.
 fn newest(error: LoadError, sequence: &Sequence, task: &ImageTask) -> LoadError {
-    let is_newest = task.index + 1 == sequence.frames().len();
     match error {
-        LoadError::Frame(error)
-            if is_newest
-                && matches!(error, FrameError::Malformed { .. })
-                && !error.to_string().contains("being written") =>
-        {
+        LoadError::Frame(error) if may_be_unfinished(sequence, task.index, &error) => {
             LoadError::Newest(error)
         }
         other => other,

@@ -7,7 +7,7 @@
 //! the picture looks like is settled before, in [`Setup`].
 
 use std::collections::HashSet;
-use std::panic::{self, AssertUnwindSafe};
+use std::panic;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
@@ -38,6 +38,7 @@ pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, RadiusRule, Setup};
 pub use trace::{BuiltFrame, FrameTracer, TraceError, TracedFrame};
 
+use crate::mishap::guarded;
 use crate::report::FrameReport;
 
 /// One image to make.
@@ -247,18 +248,4 @@ impl TraceStage<'_> {
             }
         }
     }
-}
-
-/// Runs the work of one frame; a panic in it is a fault of ours that costs this frame and no other.
-fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
-    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| {
-        let text = fault
-            .downcast_ref::<String>()
-            .map(String::as_str)
-            .or_else(|| fault.downcast_ref::<&str>().copied())
-            .unwrap_or("no reason given");
-        Err(format!(
-            "a fault in spherule itself, please report it: {text}"
-        ))
-    })
 }

@@ -5,9 +5,9 @@ use spherule_jobs::FrameState;
 
 use super::{Check, whole};
 use crate::accel::Structure;
-use crate::cli::plan::list;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
+use crate::cli::work::list;
 use crate::pipeline::{ColorRule, Overlap, RadiusRule, Setup};
 use crate::report::Bytes;
 use crate::survey::Survey;

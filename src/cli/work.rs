@@ -1,0 +1,177 @@
+//! What the commands that work as jobs have in common: how an earlier run is gone on with, where the
+//! files go, and how the end is told.
+
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use spherule_formats::Sequence;
+use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, Mode};
+
+use super::progress::{Ended, duration};
+use super::{CliError, Outcome};
+
+/// The setting that says what a job makes; jobs that render have none.
+pub(super) const KIND: &str = "job";
+
+/// How a job is gone about; no property of what it makes.
+#[derive(Debug, Args)]
+pub(super) struct WorkArgs {
+    /// Start over, whatever was made here before.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Keep finished frames although settings or inputs have changed.
+    #[arg(long, conflicts_with = "force")]
+    pub(super) keep_done: bool,
+    /// Threads to use; default: all.
+    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
+    threads: Option<u16>,
+}
+
+impl WorkArgs {
+    /// What to do with what an earlier run left.
+    pub(super) const fn mode(&self) -> Mode {
+        match (self.force, self.keep_done) {
+            (true, _) => Mode::Force,
+            (_, true) => Mode::KeepDone,
+            _ => Mode::Resume,
+        }
+    }
+
+    /// Uses as many threads as asked for from now on.
+    pub(super) fn use_threads(&self) -> Result<(), CliError> {
+        let Some(threads) = self.threads else {
+            return Ok(());
+        };
+        rayon::ThreadPoolBuilder::new()
+            .num_threads(usize::from(threads))
+            .build_global()
+            .map_err(|e| CliError::other(format!("--threads {threads}: {e}")))
+    }
+}
+
+/// The frames that `range` has of `sequence`, or all; `shown` is what the range was given by.
+pub(super) fn chosen(
+    sequence: &Sequence,
+    range: Option<&FrameRange>,
+    shown: &str,
+) -> Result<Vec<i64>, CliError> {
+    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    let Some(range) = range else {
+        return Ok(numbers);
+    };
+    let chosen = range.select(&numbers);
+    if chosen.is_empty() {
+        return Err(CliError::other(format!(
+            "{shown}: {range} has none of the frames that there are: {}",
+            list(&numbers)
+        )));
+    }
+    Ok(chosen)
+}
+
+/// All frames of `sequence`, made into `outputs` of their number.
+pub(super) fn requests(
+    sequence: &Sequence,
+    outputs: impl Fn(i64) -> Vec<PathBuf>,
+) -> Vec<FrameRequest> {
+    let request = |(index, number)| FrameRequest {
+        number,
+        inputs: sequence
+            .inputs(index)
+            .into_iter()
+            .map(Path::to_owned)
+            .collect(),
+        outputs: outputs(number),
+    };
+    let numbers = sequence.frames().iter().map(|frame| frame.number);
+    numbers.enumerate().map(request).collect()
+}
+
+/// Refuses a directory that cannot be because a file is in its place; `what` is to go there.
+pub(super) fn guard_directory(dir: &Path, what: &str) -> Result<(), CliError> {
+    match dir.ancestors().find(|p| p.exists()) {
+        Some(found) if !found.is_dir() => Err(CliError::other(format!(
+            "{}: is a file where a directory for the {what} should be; choose another output",
+            found.display()
+        ))),
+        _ => Ok(()),
+    }
+}
+
+/// Refuses a directory whose job makes something else; `kind` is the value of [`KIND`], if any.
+pub(super) fn guard_kind(dir: &Path, kind: Option<&str>, mode: Mode) -> Result<(), CliError> {
+    if mode == Mode::Force {
+        return Ok(());
+    }
+    let Some(plan) = Job::peek(dir)? else {
+        return Ok(());
+    };
+    let mut settings = plan.settings().iter();
+    let found = settings.find(|(key, _)| key == KIND).map(|(_, v)| &v[..]);
+    if found == kind {
+        return Ok(());
+    }
+    let what = |kind: Option<&str>| kind.unwrap_or("render").to_owned();
+    Err(CliError::other(format!(
+        "{}: holds a job of `{}`, not of `{}`; choose another directory, or forget that job with --force",
+        dir.display(),
+        what(found),
+        what(kind)
+    )))
+}
+
+/// Tells how many frames of the run are done before it begins.
+pub(super) fn tell_kept(job: &Job, tasks: usize) {
+    let selected = job.selected().len();
+    if selected > tasks {
+        say!("{} of {selected} frames are done already", selected - tasks);
+    }
+}
+
+/// A run that is over.
+pub(super) struct Finished<'a> {
+    pub(super) job: &'a Job,
+    /// Frames that it was to make.
+    pub(super) tasks: usize,
+    /// How they ended.
+    pub(super) ended: Ended,
+    pub(super) start: Instant,
+    pub(super) interrupt: &'a Interrupt,
+    /// Where the files went, as the user named it.
+    pub(super) output: &'a Path,
+}
+
+impl Finished<'_> {
+    /// Tells what was done and what was not; `result` is what ended the run.
+    pub(super) fn tell(&self, result: Result<(), CliError>) -> Outcome {
+        let summary = self.job.summary();
+        say!(
+            "{} of {} frames done in {}: {}",
+            summary.done,
+            summary.total,
+            duration(self.start.elapsed().as_secs_f64()),
+            self.output.display()
+        );
+        // Frames that failed earlier and were not tried again are still to be done.
+        if !self.ended.failed.is_empty() {
+            say!("failed: {}", list(&self.ended.failed));
+        }
+        match result {
+            Err(error) => {
+                say!("error: {error}");
+                Outcome::SomeFailed
+            }
+            Ok(()) if self.interrupt.is_raised() && self.ended.count < self.tasks => {
+                Outcome::Interrupted
+            }
+            Ok(()) if summary.done < summary.total => Outcome::SomeFailed,
+            Ok(()) => Outcome::Done,
+        }
+    }
+}
+
+/// Frame numbers as a range.
+pub(super) fn list(frames: &[i64]) -> String {
+    FrameRange::from_frames(frames.iter().copied()).map_or_else(String::new, |r| r.to_string())
+}

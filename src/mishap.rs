@@ -1,0 +1,36 @@
+//! What may befall the work on one frame, and how far it reaches.
+
+use std::io;
+use std::panic::{self, AssertUnwindSafe};
+
+use spherule_formats::{FrameError, Sequence};
+
+/// Runs the work of one frame; a panic in it is a fault of ours that costs this frame and no other.
+pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| {
+        let text = fault
+            .downcast_ref::<String>()
+            .map(String::as_str)
+            .or_else(|| fault.downcast_ref::<&str>().copied())
+            .unwrap_or("no reason given");
+        Err(format!(
+            "a fault in spherule itself, please report it: {text}"
+        ))
+    })
+}
+
+/// Whether all further files would fail for the same reason.
+pub(crate) fn is_disk_full(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+    )
+}
+
+/// Whether frame `index` may be damaged only because the simulation is still writing it, and the
+/// `error` does not say so itself.
+pub(crate) fn may_be_unfinished(sequence: &Sequence, index: usize, error: &FrameError) -> bool {
+    let is_newest = index + 1 == sequence.frames().len();
+    let is_damage = matches!(error, FrameError::Malformed { .. });
+    is_newest && is_damage && !error.to_string().contains("being written")
+}
