@@ -24,6 +24,7 @@
 
 pub mod accel;
 pub mod cli;
+pub mod conversion;
 pub mod manifest;
 mod mishap;
 pub mod output;

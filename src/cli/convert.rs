@@ -1,27 +1,39 @@
-//! `spherule convert`: a sequence becomes native frames.
+//! `spherule convert`: a sequence becomes native frames, in a directory that is a job.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use glam::DVec3;
-use spherule_formats::native::{self, Bound, Encoding, FrameIndex, StoreSettings};
+use serde_json::{Value, json};
+use spherule_formats::SequenceInput;
+use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{ParticleFrame, Radius, SequenceInput};
+use spherule_jobs::{DEFAULT_WORKER, FrameRange, Job, JobRequest, Mode};
 
+use super::job::{absolute, apart};
+use super::progress::{Progress, ProgressMode};
+use super::work::{
+    Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
+    tell_kept,
+};
 use super::{CliError, Outcome, signals};
-use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
+use crate::manifest::real_dir;
+use crate::report::Bytes;
+use crate::survey::Survey;
 
 /// The bound that coded positions keep if none is given: a fraction of the radius.
 const USUAL_BOUND: f64 = 0.02;
+/// What the job of a conversion is called in its plan.
+const CONVERT: &str = "convert";
 
 #[derive(Debug, Args)]
 pub(super) struct ConvertArgs {
     /// A directory, a pattern (dump.#.vtk), or files.
     #[arg(required = true)]
     input: Vec<PathBuf>,
-    /// Directory for the frames, which are called frame.NUMBER.spf; those that are there are replaced.
+    /// Directory for the frames, which are called frame.NUMBER.spf; those that are there are replaced. The
+    /// same command goes on where it was stopped.
     #[arg(short, long)]
     output: PathBuf,
     /// How positions are stored: f32 (12 bytes a particle), q16 (6) or q10 (4). Without this, f32, or with
@@ -37,141 +49,201 @@ pub(super) struct ConvertArgs {
     /// Radius of all particles. Without this, that of the files, or half the usual distance of neighbours.
     #[arg(long, value_parser = positive)]
     radius: Option<f32>,
+    /// How attributes are stored: velocity:f16,density:u8,id:keep,*:off. Ways are keep (as they are), f32,
+    /// f16, u8 (8 bits over the range) and off; * are all that are not named, kept if nothing is said.
+    #[arg(long, value_name = "NAME:HOW,...")]
+    attributes: Option<AttributeChoices>,
+    /// Store no attributes: positions and radii only.
+    #[arg(long, conflicts_with = "attributes")]
+    no_attributes: bool,
+    /// Frames to convert: 7 | 1-10 | 1-10x2 | 1-5,8.
+    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+    frames: Option<FrameRange>,
+    /// Most memory to take: 4GiB, 512MiB.
+    #[arg(long, value_name = "SIZE")]
+    memory: Option<Bytes>,
+    #[command(flatten)]
+    work: WorkArgs,
+    /// How progress is shown.
+    #[arg(long, value_enum, default_value = "auto")]
+    progress: ProgressMode,
 }
 
 const WORDS: signals::Words = signals::Words {
     asked: "stopping after the frame in hand; once more stops at once",
-    at_once: "stopped",
+    at_once: "stopped; the same command goes on from here",
 };
-
-/// What holds for all frames.
-struct Plan {
-    store: StoreSettings,
-    origin: DVec3,
-    /// Replaces the radii of the files.
-    radius: Option<f32>,
-    /// Stands where the files bring none.
-    estimate: Option<f32>,
-}
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
-    let sequence = Sequence::open(&SequenceInput::from_paths(args.input.clone()))?;
+    args.work.use_threads()?;
+    let input = SequenceInput::from_paths(args.input.clone());
+    let sequence = apart(|| Sequence::open(&input))?;
     for note in sequence.notes() {
         say!("note: {note}");
     }
-    let question = Question {
-        color: ColorQuestion::None,
-        radius: args
-            .radius
-            .map_or(RadiusQuestion::Auto, |_| RadiusQuestion::None),
+    let plan = Plan {
+        args,
+        dir: real_dir(&absolute(&args.output)?),
+        settings: args.settings(),
+        sequence,
     };
-    let survey = Survey::of(&sequence, question)?;
-    let plan = args.plan(&survey);
-    fs::create_dir_all(&args.output).map_err(CliError::io(&args.output))?;
+    plan.guard()?;
+    let mut job = plan.open()?;
+    let (survey, conversion) = plan.settle(job.resolved())?;
+    let tasks = plan.tasks(&job.pending());
+    if let (Some(radius), false) = (conversion.estimate, survey.has_radii) {
+        say!("radius {radius}, half the usual distance of neighbours; --radius sets another");
+    }
+    tell_kept(&job, tasks.len());
+    let progress = Progress::new(args.progress, tasks.len());
+    let start = Instant::now();
     let interrupt = signals.at_work();
-    let mut failed = 0;
-    for (index, frame) in sequence.frames().iter().enumerate() {
-        if interrupt.is_raised() {
-            return Ok(Outcome::Interrupted);
+    let result = conversion::run(
+        &conversion,
+        &plan.sequence,
+        &tasks,
+        &mut job,
+        interrupt,
+        &|event| show(&progress, &event),
+    );
+    let finished = Finished {
+        job: &job,
+        tasks: tasks.len(),
+        ended: progress.finish(),
+        start,
+        interrupt,
+        output: &args.output,
+    };
+    Ok(finished.tell(result.map_err(CliError::from)))
+}
+
+fn show(progress: &Progress, event: &Event) {
+    match event {
+        Event::Entered(frame) => progress.entered(*frame, "converting"),
+        Event::Done(task, converted) => {
+            let mut facts = json!(converted);
+            facts["output"] = json!(task.output.display().to_string());
+            progress.done(task.frame, &task.output, &converted.to_string(), facts);
         }
-        let path = args.output.join(format!("frame.{:04}.spf", frame.number));
-        let start = Instant::now();
-        match convert(&plan, &sequence, index, &path) {
-            Ok(converted) => say!(
-                "frame {}: {converted}, {:.2} s",
-                frame.number,
-                start.elapsed().as_secs_f64()
-            ),
-            Err(error) => {
-                failed += 1;
-                say!("frame {} failed: {error}", frame.number);
+        Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Note(note) => progress.note(&format!("note: {note}")),
+    }
+}
+
+/// A job before anything is written.
+struct Plan<'a> {
+    args: &'a ConvertArgs,
+    /// Where the frames go, absolute.
+    dir: PathBuf,
+    settings: ConvertSettings,
+    sequence: Sequence,
+}
+
+impl Plan<'_> {
+    const fn mode(&self) -> Mode {
+        self.args.work.mode()
+    }
+
+    fn output(&self, frame: i64) -> PathBuf {
+        self.dir.join(format!("frame.{frame:04}.spf"))
+    }
+
+    /// Refuses what cannot be before anything is written.
+    fn guard(&self) -> Result<(), CliError> {
+        chosen(&self.sequence, self.args.frames.as_ref(), "--frames")?;
+        guard_directory(&self.dir, "frames")?;
+        guard_kind(&self.dir, Some(CONVERT), self.mode())?;
+        for (index, frame) in self.sequence.frames().iter().enumerate() {
+            let output = self.output(frame.number);
+            let is_output = |path: &&Path| path.canonicalize().is_ok_and(|real| real == output);
+            if let Some(input) = self.sequence.inputs(index).into_iter().find(is_output) {
+                return Err(CliError::other(format!(
+                    "{}: would be overwritten by its own conversion; choose another output directory",
+                    input.display()
+                )));
             }
         }
+        Ok(())
     }
-    let all = sequence.frames().len();
-    say!(
-        "{} of {all} frames are in {}",
-        all - failed,
-        args.output.display()
-    );
-    Ok(if failed > 0 {
-        Outcome::SomeFailed
-    } else {
-        Outcome::Done
-    })
+
+    fn request(&self) -> JobRequest {
+        let mut settings = vec![(KIND.to_owned(), CONVERT.to_owned())];
+        settings.extend(self.settings.settings());
+        JobRequest {
+            worker: DEFAULT_WORKER.to_owned(),
+            settings,
+            frames: requests(&self.sequence, |frame| vec![self.output(frame)]),
+            selection: self.args.frames.clone(),
+            mode: self.mode(),
+        }
+    }
+
+    fn open(&self) -> Result<Job, CliError> {
+        // A new job is begun, and an old one forgotten, only for frames that can be.
+        let surveyed = if self.mode() == Mode::Force || Job::peek(&self.dir)?.is_none() {
+            Some(self.survey()?)
+        } else {
+            None
+        };
+        Ok(Job::open(&self.dir, self.request(), |_| {
+            surveyed.map_or_else(|| self.survey(), Ok)
+        })?)
+    }
+
+    /// Looks at the sequence: where its zero is, and what radius frames have that bring none.
+    fn survey(&self) -> Result<Value, CliError> {
+        let survey = apart(|| Survey::of(&self.sequence, self.settings.question()))?;
+        self.conversion(&survey)?;
+        serde_json::to_value(&survey).map_err(|e| CliError::Other(e.to_string()))
+    }
+
+    fn conversion(&self, survey: &Survey) -> Result<Conversion, CliError> {
+        Conversion::new(self.settings.clone(), survey).map_err(CliError::Other)
+    }
+
+    /// What holds for all frames, by what was found when the job began.
+    fn settle(&self, resolved: &Value) -> Result<(Survey, Conversion), CliError> {
+        let survey = saved_survey(resolved, &self.dir)?;
+        let conversion = self.conversion(&survey)?;
+        Ok((survey, conversion))
+    }
+
+    fn tasks(&self, pending: &[i64]) -> Vec<ConvertTask> {
+        let frames = self.sequence.frames();
+        let task = |number: &i64| {
+            let index = frames.binary_search_by_key(number, |f| f.number).ok()?;
+            Some(ConvertTask {
+                frame: *number,
+                index,
+                output: self.output(*number),
+            })
+        };
+        pending.iter().filter_map(task).collect()
+    }
 }
 
 impl ConvertArgs {
-    fn plan(&self, survey: &Survey) -> Plan {
+    fn settings(&self) -> ConvertSettings {
         let bound = match (self.max_error, self.max_error_length) {
             (Some(fraction), _) => Bound::OfRadius(fraction),
             (None, Some(length)) => Bound::Length(length),
             (None, None) => Bound::OfRadius(USUAL_BOUND),
         };
         let is_bounded = self.max_error.is_some() || self.max_error_length.is_some();
-        let estimate = survey.radius.filter(|_| self.radius.is_none());
-        if let Some(radius) = estimate {
-            say!("radius {radius}, half the usual distance of neighbours; --radius sets another");
-        }
-        Plan {
-            store: StoreSettings {
-                encoding: self.encoding.or((!is_bounded).then_some(Encoding::F32)),
-                bound,
-                ..StoreSettings::EXACT
-            },
-            origin: survey.origin,
+        let attributes = match (&self.attributes, self.no_attributes) {
+            (_, true) => AttributeChoices::NONE,
+            (Some(choices), false) => choices.clone(),
+            (None, false) => AttributeChoices::default(),
+        };
+        ConvertSettings {
+            encoding: self.encoding.or((!is_bounded).then_some(Encoding::F32)),
+            bound,
             radius: self.radius,
-            estimate,
+            attributes,
+            memory: self.memory,
         }
     }
-}
-
-/// Converts one frame; tells what came of it.
-fn convert(plan: &Plan, sequence: &Sequence, index: usize, path: &Path) -> Result<String, String> {
-    let raw = sequence.load_raw(index).map_err(|e| e.to_string())?;
-    let step = raw.step;
-    let settings = StoreSettings {
-        rounding: raw.positions.rounding(plan.origin),
-        ..plan.store.clone()
-    };
-    let mut frame = ParticleFrame::from_raw(raw, plan.origin);
-    if let Some(radius) = plan.radius {
-        frame.radius = Some(Radius::Common(radius));
-    } else if frame.radius.is_none() {
-        frame.radius = plan.estimate.map(Radius::Common);
-    }
-    let smallest = match &frame.radius {
-        None => None,
-        Some(Radius::Common(radius)) => Some(*radius),
-        Some(Radius::PerParticle(radii)) => radii.iter().copied().reduce(f32::min),
-    };
-    let index = native::store(path, &frame, step, &settings).map_err(|e| e.to_string())?;
-    Ok(describe(&index, smallest))
-}
-
-/// Count, bytes and error of a frame.
-#[expect(clippy::cast_precision_loss, reason = "for people")]
-fn describe(index: &FrameIndex, radius: Option<f32>) -> String {
-    let stored = [&index.positions, &index.wide, &index.nodes];
-    let bytes: u64 = stored.iter().map(|section| section.len).sum();
-    let each = bytes as f64 / index.count.max(1) as f64;
-    let mut text = format!(
-        "{} particles, {}, {each:.2} bytes each for positions and nodes, largest error {:.3e}",
-        index.count,
-        index.encoding(),
-        index.max_error
-    );
-    if let Some(radius) = radius.filter(|r| *r > 0.0) {
-        text += &format!(
-            " ({:.2e} of the smallest radius)",
-            index.max_error / f64::from(radius)
-        );
-    }
-    if index.dropped > 0 {
-        text += &format!(", {} dropped (not finite)", index.dropped);
-    }
-    text
 }
 
 fn not_negative(text: &str) -> Result<f64, String> {

@@ -10,7 +10,7 @@ use spherule_jobs::{DEFAULT_WORKER, Job, JobRequest, Mode, publish};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
-use super::work::{WorkArgs, chosen, guard_directory, guard_kind, requests};
+use super::work::{WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey};
 use crate::accel::Structure;
 use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
@@ -173,12 +173,7 @@ impl Plan {
 
     /// The pictures, by what was found when the job began.
     pub(super) fn settle(&self, resolved: &Value) -> Result<(Survey, Setup), CliError> {
-        let survey: Survey = serde_json::from_value(resolved.clone()).map_err(|e| {
-            CliError::other(format!(
-                "{}: its resolved values cannot be read ({e}); start over with --force",
-                self.dir.join(spherule_jobs::PLAN_FILE).display()
-            ))
-        })?;
+        let survey = saved_survey(resolved, &self.dir)?;
         let setup = self.setup(&survey)?;
         Ok((survey, setup))
     }

@@ -5,11 +5,13 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
+use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, Mode};
+use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, Mode, PLAN_FILE};
 
 use super::progress::{Ended, duration};
 use super::{CliError, Outcome};
+use crate::survey::Survey;
 
 /// The setting that says what a job makes; jobs that render have none.
 pub(super) const KIND: &str = "job";
@@ -119,6 +121,16 @@ pub(super) fn guard_kind(dir: &Path, kind: Option<&str>, mode: Mode) -> Result<(
         what(found),
         what(kind)
     )))
+}
+
+/// What was found when the job in `dir` began.
+pub(super) fn saved_survey(resolved: &Value, dir: &Path) -> Result<Survey, CliError> {
+    serde_json::from_value(resolved.clone()).map_err(|e| {
+        CliError::other(format!(
+            "{}: its resolved values cannot be read ({e}); start over with --force",
+            dir.join(PLAN_FILE).display()
+        ))
+    })
 }
 
 /// Tells how many frames of the run are done before it begins.

@@ -1,4 +1,7 @@
 //! Files that appear whole or not at all.
+//!
+//! A temporary is called `.NAME.PID.N.part` and locked while it is written: by both, whoever resumes work in
+//! a directory knows what a killed process left there.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -23,8 +26,11 @@ impl Unpublished {
         let part = temporary_name(path)?;
         let file = OpenOptions::new()
             .write(true)
-            .create_new(true)
+            .create(true)
+            .truncate(true)
             .open(&part)?;
+        // Where locks are unknown, leftovers are merely not cleaned.
+        let _ = file.try_lock();
         Ok(Self {
             path: path.to_owned(),
             part,
@@ -92,7 +98,7 @@ pub(crate) fn publish(
 }
 
 /// Hidden and ending in `.part`, so that no listing takes it for a frame; distinct for each
-/// process and call.
+/// living process and call.
 fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let name = path
@@ -101,7 +107,7 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     let mut part = std::ffi::OsString::from(".");
     part.push(name);
-    part.push(format!(".{}-{count}.part", std::process::id()));
+    part.push(format!(".{}.{count}.part", std::process::id()));
     Ok(path.with_file_name(part))
 }
 

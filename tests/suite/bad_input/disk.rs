@@ -1,10 +1,13 @@
 //! A disk that is full, played by a small file system in a namespace of its own.
 #![cfg(target_os = "linux")]
 
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+use crate::harness::{SMALL, Workshop, dam_break, images, ledger, natives, no_leftovers};
+
+type Files = BTreeMap<String, Vec<u8>>;
 
 const FRAMES: usize = 5;
 
@@ -55,49 +58,65 @@ fn a_full_disk_is_told_and_nothing_is_half_written() {
     ] {
         let place = Workshop::new();
         dam_break(&place.join("in"), 1..=FRAMES);
-        let status = Command::new("unshare")
-            .args(namespace)
-            .args([
-                "sh",
-                "-c",
-                SCRIPT,
-                "sh",
-                env!("CARGO_BIN_EXE_spherule"),
-                size,
-            ])
-            .args(["render", "in", "-o", "full/f.####.exr"])
-            .args(SMALL)
-            .current_dir(place.path())
-            .status();
-        assert!(status.expect("unshare starts").success());
-        let text = |name: &str| std::fs::read_to_string(place.join(name)).expect(name);
-
-        let errors = text("errors");
-        assert_eq!(text("code").trim(), code.to_string(), "{size}: {errors}");
-        let told: Vec<&str> = errors
-            .lines()
-            .filter(|l| l.starts_with("error: "))
-            .collect();
-        assert_eq!(told.len(), 1, "{size}: {errors}");
-        assert!(told[0].contains("/full/") && told[0].contains(": no space left; free some"));
-        whatever_is_there_is_whole(&place.join("after"), &whole);
-
-        assert_eq!(
-            text("code-again").trim(),
-            "0",
-            "{size}: {}",
-            text("errors-again")
-        );
-        no_leftovers(&place.join("again"));
+        let render = [&["render", "in", "-o", "full/f.####.exr"][..], &SMALL].concat();
+        run_in_small(&place, namespace, size, &render, code);
+        whatever_is_there_is_whole(&place.join("after"), &images(&place.join("after")), &whole);
         assert!(images(&place.join("again")) == whole, "{size}");
     }
 }
 
+#[test]
+#[expect(clippy::print_stderr, reason = "a test that is left out says so")]
+fn a_full_disk_stops_a_conversion_until_there_is_room() {
+    let Some(namespace) = namespace() else {
+        eprintln!("left out: no file system may be mounted here");
+        return;
+    };
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=FRAMES);
+    workshop.run(&["convert", "in", "-o", "whole"]).expect(0);
+    let whole = natives(&workshop.join("whole"));
+    let largest = whole.values().map(Vec::len).max().expect("frames");
+    // Room for the plan only; for some of the first frame; for some frames.
+    for (size, code) in [(8192, 2), (largest / 2, 1), (3 * largest, 1)] {
+        let place = Workshop::new();
+        dam_break(&place.join("in"), 1..=FRAMES);
+        let convert = ["convert", "in", "-o", "full"];
+        run_in_small(&place, namespace, &size.to_string(), &convert, code);
+        whatever_is_there_is_whole(&place.join("after"), &natives(&place.join("after")), &whole);
+        assert!(natives(&place.join("again")) == whole, "{size}");
+    }
+}
+
+/// Runs the program with these arguments in a file system of so many bytes, where it ends with `code`, and
+/// again with more room.
 #[track_caller]
-fn whatever_is_there_is_whole(dir: &Path, whole: &std::collections::BTreeMap<String, Vec<u8>>) {
+fn run_in_small(place: &Workshop, namespace: &[&str], size: &str, arguments: &[&str], code: i32) {
+    let status = Command::new("unshare")
+        .args(namespace)
+        .args(["sh", "-c", SCRIPT, "sh"])
+        .args([env!("CARGO_BIN_EXE_spherule"), size])
+        .args(arguments)
+        .current_dir(place.path())
+        .status();
+    assert!(status.expect("unshare starts").success());
+    let text = |name: &str| std::fs::read_to_string(place.join(name)).expect(name);
+    let errors = text("errors");
+    assert_eq!(text("code").trim(), code.to_string(), "{size}: {errors}");
+    let is_error = |line: &&str| line.starts_with("error: ");
+    let told: Vec<&str> = errors.lines().filter(is_error).collect();
+    assert_eq!(told.len(), 1, "{size}: {errors}");
+    assert!(told[0].contains("/full/") && told[0].contains(": no space left; free some"));
+    let again = text("code-again");
+    assert_eq!(again.trim(), "0", "{size}: {}", text("errors-again"));
+    no_leftovers(&place.join("again"));
+}
+
+/// `made` is what there is in `dir` of `whole`.
+#[track_caller]
+fn whatever_is_there_is_whole(dir: &Path, made: &Files, whole: &Files) {
     no_leftovers(dir);
-    let made = images(dir);
-    for (name, bytes) in &made {
+    for (name, bytes) in made {
         assert!(whole.get(name) == Some(bytes), "{name} is not whole");
     }
     for (name, length) in ledger(dir).done() {
@@ -139,7 +158,8 @@ fn an_image_that_cannot_be_written_costs_one_frame() {
         errors.contains("8 of 9 frames done") && errors.contains("failed: 9"),
         "{errors}"
     );
-    whatever_is_there_is_whole(&workshop.join("out"), &whole);
+    let out = workshop.join("out");
+    whatever_is_there_is_whole(&out, &images(&out), &whole);
     let ran = workshop.render(&[]).expect(0);
     assert_eq!(ran.rendered(), [9]);
     assert!(images(&workshop.join("out")) == whole);

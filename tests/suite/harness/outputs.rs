@@ -23,6 +23,13 @@ pub(crate) fn images(dir: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
+/// The native frames in `dir`, by name.
+pub(crate) fn natives(dir: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = files(dir);
+    all.retain(|name, _| !name.starts_with('.') && name.ends_with(".spf"));
+    all
+}
+
 /// When each file in `dir` was written.
 pub(crate) fn stamps(dir: &Path) -> BTreeMap<String, SystemTime> {
     let stamp = |entry: fs::DirEntry| Some((name(&entry), entry.metadata().ok()?.modified().ok()?));

@@ -1,0 +1,108 @@
+//! A sequence becomes native frames, one after the other, each recorded in the job once its file is in
+//! place.
+//!
+//! What holds for all frames is settled before, in [`Conversion`]; what the user is shown, the caller
+//! decides ([`Event`]).
+
+use std::collections::HashSet;
+use std::path::PathBuf;
+
+use serde_json::json;
+use spherule_formats::{FrameError, Sequence};
+use spherule_jobs::{Interrupt, Job, JobError};
+
+mod attributes;
+mod frame;
+mod settings;
+
+pub use attributes::{AttributeChoices, Storage};
+pub use frame::{ConvertedFrame, convert_frame};
+pub use settings::{Conversion, ConvertSettings};
+
+use crate::mishap::{guarded, is_disk_full, may_be_unfinished};
+
+/// One native frame to make.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct ConvertTask {
+    /// Frame number.
+    pub frame: i64,
+    /// Index in the sequence.
+    pub index: usize,
+    /// The native frame.
+    pub output: PathBuf,
+}
+
+/// What whoever watches is told.
+#[derive(Debug)]
+pub enum Event<'a> {
+    /// A frame is in hand.
+    Entered(i64),
+    /// A frame's file is in place and recorded.
+    Done(&'a ConvertTask, &'a ConvertedFrame),
+    /// A frame could not be converted; it is recorded with this reason and the rest goes on.
+    Failed(i64, &'a str),
+    /// Something the user should know.
+    Note(&'a str),
+}
+
+/// Converts `tasks` in order and records each in `job`. Ends early, with the frame in hand finished, once
+/// `interrupt` is raised.
+///
+/// # Errors
+/// The ledger cannot be written, or the disk is full: nothing further could be recorded.
+pub fn run(
+    conversion: &Conversion,
+    sequence: &Sequence,
+    tasks: &[ConvertTask],
+    job: &mut Job,
+    interrupt: &Interrupt,
+    watch: &dyn Fn(Event),
+) -> Result<(), JobError> {
+    let mut told = HashSet::new();
+    for task in tasks {
+        if interrupt.is_raised() {
+            return Ok(());
+        }
+        watch(Event::Entered(task.frame));
+        match guarded(|| Ok(convert_frame(conversion, sequence, task))) {
+            Ok(Ok(converted)) => {
+                // What is so in every frame is said once.
+                for note in &converted.notes {
+                    if told.insert(note.clone()) {
+                        watch(Event::Note(note));
+                    }
+                }
+                let outputs = std::slice::from_ref(&task.output);
+                job.record_done(task.frame, outputs, json!(converted))?;
+                watch(Event::Done(task, &converted));
+            }
+            // Not the frame's fault: it stays to be done.
+            Ok(Err(FrameError::Io { path, source })) if is_disk_full(&source) => {
+                return Err(JobError::DiskFull { path, source });
+            }
+            Ok(Err(error)) => fail(job, watch, task, &reason(sequence, task, &error))?,
+            Err(fault) => fail(job, watch, task, &fault)?,
+        }
+    }
+    Ok(())
+}
+
+fn fail(
+    job: &mut Job,
+    watch: &dyn Fn(Event),
+    task: &ConvertTask,
+    reason: &str,
+) -> Result<(), JobError> {
+    watch(Event::Failed(task.frame, reason));
+    job.record_failed(task.frame, reason, json!(null))
+}
+
+/// Why a frame cannot be converted, with what may help.
+fn reason(sequence: &Sequence, task: &ConvertTask, error: &FrameError) -> String {
+    if may_be_unfinished(sequence, task.index, error) {
+        return format!(
+            "{error}; it is the newest frame, perhaps still being written: convert again later"
+        );
+    }
+    error.to_string()
+}

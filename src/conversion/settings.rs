@@ -1,0 +1,130 @@
+//! How a sequence is converted: what was asked for, and what was settled by a look at it.
+
+use glam::DVec3;
+use spherule_formats::native::layout::VERSION;
+use spherule_formats::native::{Bound, Encoding};
+
+use super::attributes::{AttributeChoices, Storage};
+use crate::report::Bytes;
+use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+
+/// What was asked for.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ConvertSettings {
+    /// How positions are stored; `None` takes what needs the fewest bytes within the bound.
+    pub encoding: Option<Encoding>,
+    /// How far stored positions may be from the true ones.
+    pub bound: Bound,
+    /// Replaces the radii of the files, scene units.
+    pub radius: Option<f32>,
+    /// Which attributes are stored, and how.
+    pub attributes: AttributeChoices,
+    /// Most memory to take. The frames do not depend on it.
+    pub memory: Option<Bytes>,
+}
+
+impl ConvertSettings {
+    /// All that the frames depend on, for the plan: key and value.
+    pub fn settings(&self) -> Vec<(String, String)> {
+        let encoding = match self.encoding {
+            Some(encoding) => encoding.to_string(),
+            None => "smallest".to_owned(),
+        };
+        let mut settings = vec![
+            ("version".to_owned(), VERSION.to_string()),
+            ("encoding".to_owned(), encoding),
+        ];
+        // Exact positions are the same under any bound.
+        match self.bound {
+            _ if self.encoding == Some(Encoding::F32) => {}
+            Bound::None => {}
+            Bound::OfRadius(fraction) => {
+                settings.push(("max-error".to_owned(), fraction.to_string()));
+            }
+            Bound::Length(length) => {
+                settings.push(("max-error-length".to_owned(), length.to_string()));
+            }
+        }
+        let radius = self
+            .radius
+            .map_or_else(|| "auto".to_owned(), |r| r.to_string());
+        settings.push(("radius".to_owned(), radius));
+        settings.push(("attributes".to_owned(), self.attributes.to_string()));
+        settings
+    }
+
+    /// What a look at the sequence must tell.
+    pub const fn question(&self) -> Question<'static> {
+        Question {
+            color: ColorQuestion::None,
+            radius: match self.radius {
+                Some(_) => RadiusQuestion::None,
+                None => RadiusQuestion::Auto,
+            },
+        }
+    }
+}
+
+/// How the frames of a job are converted.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Conversion {
+    /// What was asked for.
+    pub settings: ConvertSettings,
+    /// World position that stored positions are relative to.
+    pub origin: DVec3,
+    /// Radius of frames that bring none, scene units.
+    pub estimate: Option<f32>,
+}
+
+impl Conversion {
+    /// By what was asked for and what was found when the job began.
+    ///
+    /// # Errors
+    /// If an attribute was named that none of the frames has, or a way to store it that is not there.
+    pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, String> {
+        if let Some(name) = settings.attributes.unknown(&survey.attributes) {
+            let has = crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..]));
+            return Err(format!(
+                "--attributes: no frame has `{name}`; there are {has}"
+            ));
+        }
+        let coded =
+            |(_, storage): &(&str, Storage)| !matches!(storage, Storage::Keep | Storage::Off);
+        if let Some((name, storage)) = settings.attributes.iter().find(coded) {
+            return Err(format!(
+                "--attributes: {name}:{} cannot be written yet; use keep or off",
+                storage.name()
+            ));
+        }
+        Ok(Self {
+            estimate: survey.radius.filter(|_| settings.radius.is_none()),
+            origin: survey.origin,
+            settings,
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn settings(encoding: Option<Encoding>, bound: Bound) -> Vec<(String, String)> {
+        let settings = ConvertSettings {
+            encoding,
+            bound,
+            radius: None,
+            attributes: AttributeChoices::default(),
+            memory: None,
+        };
+        settings.settings()
+    }
+
+    #[test]
+    fn what_makes_no_difference_is_no_setting() {
+        let exact = settings(Some(Encoding::F32), Bound::None);
+        assert_eq!(settings(Some(Encoding::F32), Bound::OfRadius(0.02)), exact);
+        let coded = settings(Some(Encoding::Q16), Bound::OfRadius(0.02));
+        assert_ne!(settings(Some(Encoding::Q16), Bound::Length(0.02)), coded);
+        assert_ne!(settings(None, Bound::OfRadius(0.02)), coded);
+    }
+}

@@ -1,0 +1,147 @@
+//! What can be said to `spherule convert`, and what cannot be meant.
+
+use std::fs;
+
+use super::{convert, inspected};
+use crate::harness::{Workshop, dam_break, files, natives};
+
+fn names(shop: &Workshop, file: &str) -> Vec<String> {
+    let object = inspected(shop, file);
+    let attributes = object["attributes"].as_array().expect("a list");
+    let name = |a: &serde_json::Value| a["name"].as_str().expect("a name").to_owned();
+    let mut names: Vec<String> = attributes.iter().map(name).collect();
+    names.sort();
+    names
+}
+
+#[test]
+fn attributes_are_left_out_by_name_or_all_but_some() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), [1]);
+    convert(&shop, &[]).expect(0);
+    let all = names(&shop, "out/frame.0001.spf");
+    assert!(all.contains(&"density".to_owned()), "{all:?}");
+    for (choices, kept) in [
+        (&["--attributes", "Density:off,*:keep"][..], {
+            let mut all = all.clone();
+            all.retain(|name| name != "density");
+            all
+        }),
+        (
+            &["--attributes", "density:keep,*:off"],
+            vec!["density".to_owned(), "radius".to_owned()],
+        ),
+        (&["--no-attributes"], vec!["radius".to_owned()]),
+    ] {
+        convert(&shop, &[choices, &["--force"]].concat()).expect(0);
+        // The radius is none of them: frames without would be drawn otherwise.
+        assert_eq!(names(&shop, "out/frame.0001.spf"), kept, "{choices:?}");
+    }
+    convert(&shop, &["--attributes", "pressure:off", "--force"])
+        .expect(2)
+        .tells("--attributes: no frame has `pressure`; there are ")
+        .tells("`density`");
+}
+
+#[test]
+fn what_cannot_be_meant_is_refused() {
+    let shop = Workshop::new();
+    shop.run(&["convert", "nothing", "-o", "x"]).expect(2);
+    dam_break(&shop.join("in"), 1..=1);
+    for (options, told) in [
+        (&["--encoding", "q11"][..], "f32, q16, q10"),
+        (&["--max-error", "-1"], "-1"),
+        (&["--attributes", "velocity"], "write NAME:HOW"),
+        (&["--attributes", "velocity:f64"], "keep, f32, f16, u8, off"),
+        (
+            &["--no-attributes", "--attributes", "a:off"],
+            "cannot be used with",
+        ),
+        (&["--memory", "much"], "is no size"),
+        (
+            &["--frames", "7-9"],
+            "--frames: 7-9 has none of the frames that there are: 1",
+        ),
+        (&["--frames", "x"], "--frames"),
+        (&["--force", "--keep-done"], "cannot be used with"),
+    ] {
+        convert(&shop, options).expect(2).tells(told);
+        assert!(!shop.join("out").exists(), "{options:?}");
+    }
+}
+
+#[test]
+fn a_directory_of_something_else_is_refused() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=2);
+    fs::write(shop.join("out"), "a file").expect("a file");
+    convert(&shop, &[])
+        .expect(2)
+        .tells("out: is a file where a directory for the frames should be");
+    fs::remove_file(shop.join("out")).expect("a file");
+
+    // A job that renders, and the other way round.
+    shop.render(&[]).expect(0);
+    let before = files(&shop.join("out"));
+    convert(&shop, &[])
+        .expect(2)
+        .tells("out: holds a job of `render`, not of `convert`; choose another directory");
+    assert!(files(&shop.join("out")) == before);
+    shop.run(&["convert", "in", "-o", "native"]).expect(0);
+    shop.render_to("native", &[])
+        .expect(2)
+        .tells("native: holds a job of `convert`, not of `render`");
+
+    // Frames are not converted onto themselves.
+    let before = natives(&shop.join("native"));
+    fs::remove_file(shop.join("native/job.plan.json")).expect("the plan");
+    fs::remove_file(shop.join("native/job.ledger.main.jsonl")).expect("the ledger");
+    shop.run(&["convert", "native", "-o", "native"])
+        .expect(2)
+        .tells("native/frame.0001.spf: would be overwritten by its own conversion");
+    assert!(natives(&shop.join("native")) == before);
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_place_where_even_root_may_not_write() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=1);
+    shop.run(&["convert", "in", "-o", "/proc/nope/frames"])
+        .expect(2)
+        .tells("error: /proc/nope");
+}
+
+#[test]
+fn progress_is_told_as_it_is_asked_for() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=2);
+    let errors = convert(&shop, &["--progress", "json"]).expect(0).errors();
+    let lines = errors.lines().filter(|line| line.starts_with('{'));
+    let objects: Vec<serde_json::Value> = lines
+        .map(|line| serde_json::from_str(line).expect(line))
+        .collect();
+    assert_eq!(objects.len(), 2, "{errors}");
+    for (object, frame) in objects.iter().zip(1..) {
+        assert_eq!(object["frame"], frame);
+        assert_eq!(object["status"], "done");
+        assert_eq!(
+            (&object["done"], &object["total"]),
+            (&frame.into(), &2.into())
+        );
+        assert!(object["particles"].as_u64() > Some(0), "{object}");
+        let output = object["output"].as_str().expect("a path");
+        assert!(
+            output.ends_with(&format!("/out/frame.000{frame}.spf")),
+            "{output}"
+        );
+    }
+    let ran = convert(&shop, &["--progress", "openjd", "--force"]).expect(0);
+    assert!(
+        ran.text().contains("openjd_progress: 100.0"),
+        "{}",
+        ran.text()
+    );
+    let quiet = convert(&shop, &["--progress", "none", "--force"]).expect(0);
+    assert!(quiet.rendered().is_empty());
+}
