@@ -14,13 +14,9 @@ use super::simd::{SimdLevel, Supported};
 use super::view::{LEVEL_CODES, TieOrder, TreeView, split_levels};
 use super::{Aabb, BuildReport, Structure};
 use spherule_formats::blocks::{
-    BLOCK_SIZE, CompactBlocks, Node, StoredBlocks, StoredLeaves, StoredRadii, WIDTH,
+    BLOCK_SIZE, CompactBlocks, FARTHEST_PLANE, Node, StoredBlocks, StoredLeaves, StoredRadii, WIDTH,
 };
 use spherule_formats::order::index_u32;
-
-/// Planes of stored boxes are no farther out than this, scene units: then sums and differences of two of
-/// them are numbers.
-const FARTHEST_PLANE: f64 = f32::MAX as f64 / 4.0;
 
 /// What the build of a [`StoredTree`] may be told.
 #[derive(Debug, Clone, Copy)]

@@ -10,5 +10,5 @@ mod stored;
 pub use aabb::Aabb;
 pub use block::{BLOCK_SIZE, Block, BlockRadii};
 pub use compact::{BlockFrame, CompactBlock, Q10Block, Q16Block};
-pub use node::{Node, WIDTH};
+pub use node::{FARTHEST_PLANE, Node, WIDTH};
 pub use stored::{CompactBlocks, StoredBlocks, StoredLeaves, StoredRadii};

@@ -8,6 +8,10 @@ use super::Aabb;
 /// Children of a node.
 pub const WIDTH: usize = 8;
 
+/// Planes of stored boxes are no farther out than this, scene units: then sums and differences of two of
+/// them are numbers.
+pub const FARTHEST_PLANE: f64 = f32::MAX as f64 / 4.0;
+
 /// Eight quantised child boxes. Plane `q` of axis `a` lies at `origin[a] + q * 2^(exponent[a]-127)`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]

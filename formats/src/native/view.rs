@@ -1,12 +1,11 @@
 //! A checked view of the bytes of a native frame: its parts in place.
 
 use bytemuck::Pod;
-use rayon::prelude::*;
 
 use super::attribute::AttributeView;
 use super::layout::{AttributeIndex, Encoding, FrameIndex, RadiiIndex, RadiusIndex, Section};
+use super::section_of;
 use super::stored::{RadiusCode, StoredType};
-use super::{section_of, verify_section};
 use crate::ParseError;
 use crate::blocks::{CompactBlocks, StoredBlocks, StoredLeaves, StoredRadii};
 
@@ -21,6 +20,11 @@ impl<'a> NativeFrame<'a> {
     /// A view of `bytes`, from which `index` was parsed by [`super::layout::parse`].
     pub(super) const fn with_index(bytes: &'a [u8], index: &'a FrameIndex) -> Self {
         Self { bytes, index }
+    }
+
+    /// The whole file.
+    pub(super) const fn bytes(&self) -> &'a [u8] {
+        self.bytes
     }
 
     /// What the frame holds.
@@ -66,50 +70,6 @@ impl<'a> NativeFrame<'a> {
     pub fn attributes(&self) -> Vec<AttributeView<'a>> {
         let views = self.index.attributes.iter().map(|a| self.view(a));
         views.filter_map(Result::ok).collect()
-    }
-
-    /// Compares every section with its checksum, which opening does not do.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`] at the first section that differs.
-    pub fn verify(&self) -> Result<(), ParseError> {
-        let sections = self.index.sections();
-        let mut sections = sections.iter();
-        sections.try_for_each(|(what, section)| verify_section(self.bytes, what, section))
-    }
-
-    /// Compares the nodes with their checksum: all of a frame that is read before rays are traced.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`] if they differ.
-    pub fn verify_nodes(&self) -> Result<(), ParseError> {
-        verify_section(self.bytes, "the nodes", &self.index.nodes)
-    }
-
-    /// Compares what is used of a frame with its checksums: all that tracing reads, and the attributes of
-    /// these names.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`] at the first section, in the order of the file, that differs.
-    pub fn verify_used(&self, attributes: &[&str]) -> Result<(), ParseError> {
-        let sections = self.used(attributes);
-        let all = sections.par_iter();
-        let found =
-            all.find_map_first(|(what, section)| verify_section(self.bytes, what, section).err());
-        found.map_or(Ok(()), Err)
-    }
-
-    /// Bytes that [`Self::verify_used`] reads.
-    pub fn used_bytes(&self, attributes: &[&str]) -> u64 {
-        self.used(attributes).iter().map(|(_, s)| s.len).sum()
-    }
-
-    fn used(&self, attributes: &[&str]) -> Vec<(String, &'a Section)> {
-        let mut sections = self.index.tree_sections();
-        let all = self.index.attributes.iter();
-        let used = all.filter(|a| attributes.contains(&a.name.as_str()));
-        sections.extend(used.map(|a| (format!("attribute {}", a.name), &a.section)));
-        sections
     }
 
     fn view(&self, attribute: &'a AttributeIndex) -> Result<AttributeView<'a>, ParseError> {

@@ -1,0 +1,294 @@
+//! Frames with good checksums whose numbers are those of no frame.
+
+use glam::{DVec3, Vec3};
+
+use super::super::layout::{self, FrameIndex};
+use super::super::*;
+use super::*;
+use crate::{Attribute, AttributeData, ParticleFrame, Radius};
+
+/// 300 particles of two sizes of block, so that tight bounds keep some as they are.
+fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
+    let positions: Vec<Vec3> = (0..300_u16)
+        .map(|i| {
+            let far = if i % 50 == 0 { 40.0 } else { 1.0 };
+            Vec3::new(
+                f32::from(i) * 0.37 % 1.0,
+                f32::from(i) * 0.71 % far,
+                f32::from(i) * 1e-3,
+            )
+        })
+        .collect();
+    let radius = if own_radii {
+        let radii = (0..300_u16).map(|i| 0.01 + f32::from(i % 7) * 1e-3);
+        Radius::PerParticle(radii.collect())
+    } else {
+        Radius::Common(0.01)
+    };
+    let frame = ParticleFrame {
+        attributes: vec![Attribute {
+            name: "id".into(),
+            components: 1,
+            data: AttributeData::U8((0..300_u16).map(|i| i.to_le_bytes()[0]).collect()),
+        }],
+        positions,
+        origin: DVec3::ZERO,
+        radius: Some(radius),
+        time: None,
+        dropped: 0,
+        file_index: None,
+    };
+    let dir = tempfile::tempdir().expect("a temporary directory");
+    let path = dir.path().join("a.spf");
+    let settings = StoreSettings {
+        encoding: Some(encoding),
+        bound: Bound::Length(1e-3),
+        rounding: 0.0,
+    };
+    store(&path, &frame, None, &settings).expect("writable");
+    std::fs::read(path).expect("readable")
+}
+
+fn verified(bytes: &[u8]) -> Result<(), ParseError> {
+    let mut aligned = AlignedVec::<64>::new();
+    aligned.extend_from_slice(bytes);
+    let index = layout::parse(&aligned).expect("a good header and index");
+    NativeFrame::with_index(&aligned, &index).verify_all()
+}
+
+/// `bytes` after `harm`, under checksums that fit.
+fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8> {
+    let mut bytes = bytes.to_vec();
+    let mut index = layout::parse(&bytes).expect("whole");
+    harm(&mut index, &mut bytes);
+    let sum = |section: &mut Section| {
+        let found = section_of(&bytes, section).expect("inside");
+        section.xxh3 = xxh3_64(found);
+    };
+    sum(&mut index.positions);
+    sum(&mut index.wide);
+    sum(&mut index.nodes);
+    if let RadiusIndex::PerParticle(radii) = &mut index.radius {
+        sum(&mut radii.section);
+    }
+    for attribute in &mut index.attributes {
+        sum(&mut attribute.section);
+    }
+    let packed = rkyv::to_bytes::<rkyv::rancor::Error>(&index).expect("memory");
+    let offset = u64::from_le_bytes(bytes[24..32].try_into().expect("8 bytes"));
+    bytes.truncate(usize::try_from(offset).expect("small"));
+    bytes.extend_from_slice(&packed);
+    let header = layout::header(bytes.len() as u64, offset, &packed);
+    bytes[..HEADER_LEN].copy_from_slice(&header);
+    bytes
+}
+
+/// Harm is told with these words and this place.
+#[track_caller]
+fn told(
+    bytes: &[u8],
+    words: &str,
+    place: impl Fn(&FrameIndex) -> u64,
+    harm: impl FnOnce(&mut FrameIndex, &mut [u8]),
+) {
+    let bytes = forged(bytes, harm);
+    let expected = place(&layout::parse(&bytes).expect("good"));
+    match verified(&bytes).expect_err(words) {
+        ParseError::Malformed { at, what } => {
+            assert_eq!(at, expected, "{what}");
+            assert!(
+                what.contains(words) && what.ends_with("convert again"),
+                "{what}"
+            );
+        }
+        other => panic!("{other}"),
+    }
+}
+
+fn at(section: &Section, by: usize) -> usize {
+    usize::try_from(section.offset).expect("small") + by
+}
+
+#[test]
+fn whole_frames_are_found_whole() {
+    for encoding in Encoding::ALL {
+        for own_radii in [false, true] {
+            let bytes = stored(encoding, own_radii);
+            verified(&bytes).expect("whole");
+            let again = forged(&bytes, |_, _| ());
+            verified(&again).expect("forging alone does no harm");
+        }
+    }
+}
+
+#[test]
+fn every_flipped_byte_of_a_frame_is_found() {
+    let whole = stored(Encoding::Q10, true);
+    let offset = u64::from_le_bytes(whole[24..32].try_into().expect("8 bytes"));
+    let mut aligned = AlignedVec::<64>::new();
+    for at in HEADER_LEN..usize::try_from(offset).expect("small") {
+        aligned.clear();
+        aligned.extend_from_slice(&whole);
+        aligned[at] ^= 0x10;
+        let index = layout::parse(&aligned).expect("header and index are whole");
+        let result = NativeFrame::with_index(&aligned, &index).verify_all();
+        assert!(
+            matches!(result, Err(ParseError::Malformed { .. })),
+            "byte {at}"
+        );
+    }
+}
+
+#[test]
+fn nodes_that_lead_astray() {
+    let bytes = stored(Encoding::F32, false);
+    let second = |i: &FrameIndex| i.nodes.offset + 64;
+    told(
+        &bytes,
+        "node 1 has children 01111111 for 8 blocks",
+        second,
+        |i, b| {
+            b[at(&i.nodes, 64 + 15)] = 0x7f;
+        },
+    );
+    told(&bytes, "child 0 of node 1 has no box", second, |i, b| {
+        b[at(&i.nodes, 64)..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
+    });
+    told(&bytes, "child 0 of node 1 has no box", second, |i, b| {
+        b[at(&i.nodes, 64 + 12)] = 255;
+    });
+    told(&bytes, "child 3 of node 1 has no box", second, |i, b| {
+        // Lower above upper plane on the last axis.
+        let planes = at(&i.nodes, 64 + 16 + 2 * 16);
+        b[planes + 3] = 200;
+        b[planes + 8 + 3] = 100;
+    });
+}
+
+#[test]
+fn positions_that_cannot_be() {
+    let bytes = stored(Encoding::F32, false);
+    let third = |i: &FrameIndex| i.positions.offset + 2 * 192;
+    let set = |value: f32| {
+        move |i: &mut FrameIndex, b: &mut [u8]| {
+            b[at(&i.positions, 2 * 192 + 4)..][..4].copy_from_slice(&value.to_le_bytes());
+        }
+    };
+    told(
+        &bytes,
+        "block 2 has a position that is not finite",
+        third,
+        set(f32::NAN),
+    );
+    told(
+        &bytes,
+        "block 2 has a position that is not finite",
+        third,
+        set(f32::INFINITY),
+    );
+    told(
+        &bytes,
+        "block 2 has a particle outside its box",
+        third,
+        set(1e6),
+    );
+    let first = |i: &FrameIndex| i.positions.offset;
+    told(
+        &bytes,
+        "block 0 has a particle outside the bounds",
+        first,
+        |i, _| {
+            i.max = i.min;
+        },
+    );
+    // 300 particles: the last block has 12 and four copies of the last.
+    let last = |i: &FrameIndex| i.positions.offset + 18 * 192;
+    told(
+        &bytes,
+        "block 18 has particles beyond the last one",
+        last,
+        |i, b| {
+            let place = at(&i.positions, 18 * 192);
+            let first: [u8; 4] = b[place..place + 4].try_into().expect("4 bytes");
+            b[place + 4 * 15..][..4].copy_from_slice(&first);
+        },
+    );
+}
+
+#[test]
+fn references_to_nowhere() {
+    let bytes = stored(Encoding::Q10, false);
+    let index = layout::parse(&bytes).expect("whole");
+    let wide = index.wide.len / 192;
+    assert!(
+        wide > 0 && wide < 19,
+        "{wide} of 19 blocks are kept as they are"
+    );
+    let reference = (0..19)
+        .find(|block| {
+            let lane = |lane: usize| {
+                let place = at(&index.positions, block * 64 + 4 * lane);
+                u32::from_le_bytes(bytes[place..place + 4].try_into().expect("4 bytes"))
+            };
+            lane(0) >> 22 > lane(15) >> 22
+        })
+        .expect("a reference");
+    let place = |i: &FrameIndex| i.positions.offset + 64 * reference as u64;
+    told(&bytes, "refers to wide block 4096", place, |i, b| {
+        b[at(&i.positions, 64 * reference + 4)..][..4].copy_from_slice(&4096_u32.to_le_bytes());
+    });
+}
+
+#[test]
+fn radii_that_cannot_be() {
+    let bytes = stored(Encoding::F32, true);
+    let section = |i: &FrameIndex| match &i.radius {
+        RadiusIndex::PerParticle(radii) => radii.section,
+        _ => panic!("radii of their own"),
+    };
+    let second = |i: &FrameIndex| section(i).offset + 64;
+    for (value, words) in [
+        (
+            f32::NAN,
+            "block 1 has a radius that is negative or no number",
+        ),
+        (-1.0, "block 1 has a radius that is negative or no number"),
+    ] {
+        told(&bytes, words, second, |i, b| {
+            b[at(&section(i), 64)..][..4].copy_from_slice(&value.to_le_bytes());
+        });
+    }
+    let positions = |i: &FrameIndex| i.positions.offset + 192;
+    told(
+        &bytes,
+        "block 1 has a particle outside its box",
+        positions,
+        |i, b| {
+            b[at(&section(i), 64)..][..4].copy_from_slice(&9.0_f32.to_le_bytes());
+        },
+    );
+}
+
+#[test]
+fn numbers_where_zeros_belong() {
+    let bytes = stored(Encoding::F32, false);
+    let end = |i: &FrameIndex| i.attributes[0].section.offset + i.attributes[0].section.len;
+    told(&bytes, "between the sections", end, |i, b| {
+        b[at(&i.attributes[0].section, 300)] = 1;
+    });
+    told(
+        &bytes,
+        "attribute id lie on the section before",
+        |i| i.positions.offset,
+        |i, _| {
+            i.attributes[0].section.offset = i.positions.offset;
+        },
+    );
+    let last = |i: &FrameIndex| {
+        let ends = i.sections().into_iter().map(|(_, s)| s.offset + s.len);
+        ends.max().expect("sections")
+    };
+    told(&bytes, "a largest error is no number", last, |i, _| {
+        i.attributes[0].max_error = -1.0;
+    });
+}
