@@ -143,8 +143,11 @@ impl FrameFile {
     }
 }
 
-/// Whether the file at `path` begins as a native frame.
-pub(crate) fn is_native(path: &Path) -> Result<bool, FrameError> {
+/// Whether the file at `path` begins as a native frame, not packed by gzip.
+///
+/// # Errors
+/// The file cannot be read, or is no regular file.
+pub fn is_native(path: &Path) -> Result<bool, FrameError> {
     regular_len(path)?;
     let mut start = [0; native::MAGIC.len()];
     let read = File::open(path).and_then(|mut file| file.read_exact(&mut start));

@@ -90,9 +90,9 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     };
     plan.guard()?;
     let mut job = plan.open()?;
-    let (survey, conversion) = plan.settle(job.resolved())?;
+    let conversion = plan.settle(job.resolved())?;
     let tasks = plan.tasks(&job.pending());
-    if let (Some(radius), false) = (conversion.estimate, survey.has_radii) {
+    if let Some(radius) = conversion.estimate {
         say!("radius {radius}, half the usual distance of neighbours; --radius sets another");
     }
     tell_kept(&job, tasks.len());
@@ -203,10 +203,8 @@ impl Plan<'_> {
     }
 
     /// What holds for all frames, by what was found when the job began.
-    fn settle(&self, resolved: &Value) -> Result<(Survey, Conversion), CliError> {
-        let survey = saved_survey(resolved, &self.dir)?;
-        let conversion = self.conversion(&survey)?;
-        Ok((survey, conversion))
+    fn settle(&self, resolved: &Value) -> Result<Conversion, CliError> {
+        self.conversion(&saved_survey(resolved, &self.dir)?)
     }
 
     fn tasks(&self, pending: &[i64]) -> Vec<ConvertTask> {

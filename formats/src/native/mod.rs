@@ -56,6 +56,25 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// # Errors
 /// As [`layout::parse`] and [`NativeFrame::verify`].
 pub fn read(bytes: &[u8], _step: &Step) -> Result<crate::RawParticles, ParseError> {
+    with_frame(bytes, |frame| {
+        frame.verify()?;
+        frame.to_raw()
+    })
+}
+
+/// Checks everything in the native frame `bytes`.
+///
+/// # Errors
+/// As [`layout::parse`] and [`NativeFrame::verify_all`].
+pub fn verify(bytes: &[u8]) -> Result<(), ParseError> {
+    with_frame(bytes, |frame| frame.verify_all())
+}
+
+/// Looks at the native frame `bytes`, or at a copy of them if they are not aligned as sections are.
+fn with_frame<T>(
+    bytes: &[u8],
+    look: impl FnOnce(&NativeFrame) -> Result<T, ParseError>,
+) -> Result<T, ParseError> {
     let index = layout::parse(bytes)?;
     let mut aligned = AlignedVec::<64>::new();
     let bytes = if bytes.as_ptr().align_offset(64) == 0 {
@@ -64,9 +83,7 @@ pub fn read(bytes: &[u8], _step: &Step) -> Result<crate::RawParticles, ParseErro
         aligned.extend_from_slice(bytes);
         &aligned
     };
-    let frame = NativeFrame::with_index(bytes, &index);
-    frame.verify()?;
-    frame.to_raw()
+    look(&NativeFrame::with_index(bytes, &index))
 }
 
 /// The bytes of a section of a file of `bytes`.

@@ -49,13 +49,6 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     std::fs::read(path).expect("readable")
 }
 
-fn verified(bytes: &[u8]) -> Result<(), ParseError> {
-    let mut aligned = AlignedVec::<64>::new();
-    aligned.extend_from_slice(bytes);
-    let index = layout::parse(&aligned).expect("a good header and index");
-    NativeFrame::with_index(&aligned, &index).verify_all()
-}
-
 /// `bytes` after `harm`, under checksums that fit.
 fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
@@ -93,7 +86,7 @@ fn told(
 ) {
     let bytes = forged(bytes, harm);
     let expected = place(&layout::parse(&bytes).expect("good"));
-    match verified(&bytes).expect_err(words) {
+    match super::super::verify(&bytes).expect_err(words) {
         ParseError::Malformed { at, what } => {
             assert_eq!(at, expected, "{what}");
             assert!(
@@ -114,9 +107,9 @@ fn whole_frames_are_found_whole() {
     for encoding in Encoding::ALL {
         for own_radii in [false, true] {
             let bytes = stored(encoding, own_radii);
-            verified(&bytes).expect("whole");
+            super::super::verify(&bytes).expect("whole");
             let again = forged(&bytes, |_, _| ());
-            verified(&again).expect("forging alone does no harm");
+            super::super::verify(&again).expect("forging alone does no harm");
         }
     }
 }

@@ -77,12 +77,12 @@ fn a_full_disk_stops_a_conversion_until_there_is_room() {
     workshop.run(&["convert", "in", "-o", "whole"]).expect(0);
     let whole = natives(&workshop.join("whole"));
     let largest = whole.values().map(Vec::len).max().expect("frames");
-    // Room for the plan only; for some of the first frame; for some frames.
-    for (size, code) in [(8192, 2), (largest / 2, 1), (3 * largest, 1)] {
+    // Room for some of the first frame; for some frames.
+    for size in [largest / 2, 3 * largest] {
         let place = Workshop::new();
         dam_break(&place.join("in"), 1..=FRAMES);
         let convert = ["convert", "in", "-o", "full"];
-        run_in_small(&place, namespace, &size.to_string(), &convert, code);
+        run_in_small(&place, namespace, &size.to_string(), &convert, 1);
         whatever_is_there_is_whole(&place.join("after"), &natives(&place.join("after")), &whole);
         assert!(natives(&place.join("again")) == whole, "{size}");
     }
