@@ -3,6 +3,7 @@
 
 mod far;
 mod inspect;
+mod native;
 mod public;
 mod sequences;
 mod single;

@@ -1,0 +1,184 @@
+//! `spherule inspect`: what is in particle files, for people and (`--json`) for scripts.
+
+use std::collections::HashSet;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use serde_json::json;
+use spherule_formats::detect::Format;
+use spherule_formats::native::{layout, verify};
+use spherule_formats::open::is_native;
+use spherule_formats::sequence::lone_frame_number;
+use spherule_formats::stats::FrameStats;
+use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
+
+use super::{CliError, Outcome};
+
+mod native;
+mod show;
+
+use native::NativeFacts;
+
+#[derive(Debug, Args)]
+pub(super) struct InspectArgs {
+    /// Files, directories or patterns.
+    #[arg(required = true)]
+    files: Vec<PathBuf>,
+    /// One JSON object a particle frame, one a line.
+    #[arg(long)]
+    json: bool,
+    /// Check everything: all sections of native frames, every number of other files.
+    #[arg(long)]
+    verify: bool,
+}
+
+/// One particle frame of a file.
+struct Inspected<'a> {
+    file: &'a Path,
+    format: &'static str,
+    frame: Option<i64>,
+    time: Option<f64>,
+    /// How positions are stored.
+    encoding: &'static str,
+    stats: FrameStats,
+    /// Bytes of the file for each particle; none without particles.
+    bytes_per_particle: Option<f64>,
+    /// What a native frame says of itself.
+    native: Option<NativeFacts>,
+    /// Whether everything was checked because it was asked for.
+    verified: bool,
+}
+
+pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
+    let mut out = io::BufWriter::new(io::stdout().lock());
+    let mut outcome = Outcome::Done;
+    for meant in expand(&args.files) {
+        let inspected = match meant {
+            Meant::File(file, number) => {
+                inspect(&file, number, args, &mut out).map_err(|e| (file, e.to_string()))
+            }
+            Meant::Nothing(argument, why) => Err((argument, why)),
+        };
+        let written = match inspected {
+            Ok(written) => written,
+            Err((file, error)) => {
+                outcome = Outcome::SomeFailed;
+                if args.json {
+                    let shown = file.display().to_string();
+                    writeln!(out, "{}", json!({"file": shown, "error": error}))
+                } else {
+                    say!("error: {error}");
+                    Ok(())
+                }
+            }
+        };
+        match written.and_then(|()| out.flush()) {
+            // Whoever reads has seen enough.
+            Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(outcome),
+            other => other.map_err(CliError::io(Path::new("standard output")))?,
+        }
+    }
+    Ok(outcome)
+}
+
+/// What an argument stands for.
+enum Meant {
+    /// A file, with the frame number that its name tells where it is one of a sequence.
+    File(PathBuf, Option<i64>),
+    /// No file, and why.
+    Nothing(PathBuf, String),
+}
+
+/// All that is meant; an argument that means nothing does not hinder the others.
+fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
+    let mut all = Vec::new();
+    let mut known = HashSet::new();
+    for argument in arguments {
+        match SequenceInput::from_path(argument) {
+            SequenceInput::Files(listed) => {
+                for file in listed {
+                    let number = lone_frame_number(&file);
+                    known.insert(file.clone());
+                    all.push(Meant::File(file, number));
+                }
+            }
+            input => match Sequence::open(&input) {
+                Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
+                Ok(sequence) => {
+                    for frame in sequence.frames() {
+                        // A file with many steps is in many frames.
+                        for part in &frame.parts {
+                            if known.insert(part.path.clone()) {
+                                all.push(Meant::File(part.path.clone(), Some(frame.number)));
+                            }
+                        }
+                    }
+                }
+            },
+        }
+    }
+    all
+}
+
+/// Looks at one file; the outer error is the file's, the inner one the output's.
+fn inspect(
+    path: &Path,
+    number: Option<i64>,
+    args: &InspectArgs,
+    out: &mut impl Write,
+) -> Result<io::Result<()>, FrameError> {
+    if is_native(path)? {
+        let inspected = native::inspect(path, number, args.verify)?;
+        return Ok(inspected.write(args.json, out));
+    }
+    let file = FrameFile::open(path)?;
+    for index in 0..file.steps().len() {
+        let mut inspected = read(&file, index, number)?;
+        if args.verify && inspected.native.is_some() {
+            verify(file.bytes()).map_err(|e| e.in_file(path))?;
+        }
+        inspected.verified = args.verify;
+        let written = inspected.write(args.json, out);
+        if written.is_err() {
+            return Ok(written);
+        }
+    }
+    Ok(Ok(()))
+}
+
+/// Reads step `index` of `file`.
+fn read(file: &FrameFile, index: usize, number: Option<i64>) -> Result<Inspected<'_>, FrameError> {
+    let raw = file.read(index)?;
+    let mut stats = FrameStats::of(&raw);
+    let step = &file.steps()[index];
+    let running = i64::try_from(index).ok();
+    let number = if file.steps().len() > 1 {
+        running
+    } else {
+        number
+    };
+    // A native frame comes here packed by gzip.
+    let native = (file.format() == Format::Spf)
+        .then(|| layout::parse(file.bytes()).ok())
+        .flatten();
+    let all = stats.count + stats.dropped;
+    stats.dropped += native.as_ref().map_or(0, |index| index.dropped);
+    let share = step.span.len() as f64 / file.bytes().len().max(1) as f64;
+    let stored = file.stored_len() as f64 * share;
+    Ok(Inspected {
+        file: file.path(),
+        format: file.format().name(),
+        frame: step.number.or(number),
+        time: raw.time,
+        encoding: match (&native, &raw.positions) {
+            (Some(index), _) => index.encoding().name(),
+            (None, Positions::F32(_)) => "f32",
+            (None, Positions::F64(_)) => "f64",
+        },
+        stats,
+        bytes_per_particle: (all > 0).then(|| stored / all as f64),
+        native: native.map(|index| NativeFacts::new(index, file.bytes().len() as u64, None)),
+        verified: false,
+    })
+}

@@ -1,0 +1,155 @@
+//! What `inspect` prints of a frame.
+
+use std::io::{self, Write};
+
+use serde_json::{Value, json};
+use spherule_formats::stats::{AttributeStats, Number};
+
+use super::Inspected;
+
+impl Inspected<'_> {
+    /// One line of JSON, or several for people.
+    pub(super) fn write(&self, as_json: bool, out: &mut impl Write) -> io::Result<()> {
+        if as_json {
+            writeln!(out, "{}", self.to_json())
+        } else {
+            self.print(out)
+        }
+    }
+
+    fn to_json(&self) -> Value {
+        let stats = &self.stats;
+        let mut object = json!({
+            "file": self.file.display().to_string(),
+            "format": self.format,
+            "frame": self.frame,
+            "time": self.time,
+            "count": stats.count,
+            "dropped": stats.dropped,
+            "radius": match stats.radius {
+                None => Value::Null,
+                Some((low, high)) if low == high => json!(low),
+                Some((low, high)) => json!({"min": low, "max": high}),
+            },
+            "bounds": stats.bounds.map(|(min, max)| {
+                json!({"min": min.to_array(), "max": max.to_array()})
+            }),
+            "mean": stats.mean.map(|m| m.to_array()),
+            "attributes": stats.attributes.iter().map(|a| self.attribute_json(a)).collect::<Vec<_>>(),
+            "encoding": self.encoding,
+            "error_bound": self.native.as_ref().map_or(0.0, |native| native.index.max_error),
+            "bytes_per_particle": self.bytes_per_particle,
+        });
+        if let Some(native) = &self.native {
+            object["native"] = native.to_json();
+        }
+        if self.verified {
+            object["verified"] = json!(true);
+        }
+        object
+    }
+
+    fn print(&self, out: &mut impl Write) -> io::Result<()> {
+        let stats = &self.stats;
+        write!(out, "{}", self.file.display())?;
+        if let Some(frame) = self.frame {
+            write!(out, "  frame {frame}")?;
+        }
+        if let Some(time) = self.time {
+            write!(out, "  time {time}")?;
+        }
+        writeln!(out)?;
+        let dropped = match stats.dropped {
+            0 => String::new(),
+            n => format!(", {n} dropped (not finite)"),
+        };
+        writeln!(
+            out,
+            "  {}, {} positions: {} particles{dropped}",
+            self.format, self.encoding, stats.count
+        )?;
+        if let Some(native) = &self.native {
+            native.print(out)?;
+        }
+        if let Some((min, max)) = stats.bounds {
+            writeln!(out, "  bounds {min} to {max}")?;
+        }
+        match stats.radius {
+            None => writeln!(out, "  radius not in the file")?,
+            Some((low, high)) if low == high => writeln!(out, "  radius {low}")?,
+            Some((low, high)) => writeln!(out, "  radius {low} to {high}")?,
+        }
+        for attribute in &stats.attributes {
+            print_attribute(attribute, out)?;
+        }
+        if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
+            writeln!(
+                out,
+                "  values of attributes are from a sample of {sample} particles"
+            )?;
+        }
+        if self.verified {
+            let what = match self.native {
+                Some(_) => "checksums, nodes, positions, radii and padding are sound",
+                None => "every number could be read",
+            };
+            writeln!(out, "  verified: {what}")?;
+        }
+        Ok(())
+    }
+
+    /// One value a component.
+    fn attribute_json(&self, attribute: &AttributeStats) -> Value {
+        let mut object = attribute_json(attribute);
+        // That of a sample means nothing.
+        if self.native.as_ref().is_some_and(|n| n.sample.is_some()) {
+            object["sum"] = Value::Null;
+        }
+        object
+    }
+}
+
+fn print_attribute(attribute: &AttributeStats, out: &mut impl Write) -> io::Result<()> {
+    write!(
+        out,
+        "  {} ({} x {}):",
+        attribute.name,
+        attribute.scalar_type.name(),
+        attribute.components.len()
+    )?;
+    for component in &attribute.components {
+        match (component.min, component.max) {
+            (Some(min), Some(max)) => write!(out, " [{min} .. {max}]")?,
+            _ => write!(out, " [no values]")?,
+        }
+    }
+    writeln!(out)
+}
+
+fn attribute_json(attribute: &AttributeStats) -> Value {
+    let each = |value: &dyn Fn(&spherule_formats::stats::ComponentStats) -> Value| {
+        attribute.components.iter().map(value).collect::<Vec<_>>()
+    };
+    json!({
+        "name": attribute.name,
+        "type": attribute.scalar_type.name(),
+        "components": attribute.components.len(),
+        "min": each(&|c| c.min.map_or(Value::Null, number_json)),
+        "max": each(&|c| c.max.map_or(Value::Null, number_json)),
+        "mean": each(&|c| json!(c.mean)),
+        "sum": each(&|c| number_json(c.sum)),
+    })
+}
+
+/// Integers stay exact as far as JSON readers go: 64 bits, beyond that as text. JSON has no
+/// infinities; they are null.
+fn number_json(number: Number) -> Value {
+    match number {
+        Number::Float(x) => json!(x),
+        Number::Int(n) => match (i64::try_from(n), u64::try_from(n)) {
+            (Ok(n), _) => json!(n),
+            (_, Ok(n)) => json!(n),
+            _ => json!(n.to_string()),
+        },
+    }
+}
