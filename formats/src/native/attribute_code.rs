@@ -46,47 +46,6 @@ impl AttributeCode {
     }
 }
 
-/// Which attributes are stored in fewer bits, by name.
-#[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct AttributeCodes(Vec<(String, AttributeCode)>);
-
-impl AttributeCodes {
-    /// All as they are.
-    pub const EXACT: Self = Self(Vec::new());
-
-    /// Stores the attribute `name` with `code`; what was said last about a name holds.
-    pub fn set(&mut self, name: &str, code: AttributeCode) {
-        self.0.retain(|(known, _)| known != name);
-        self.0.push((name.to_owned(), code));
-    }
-
-    /// The code of the attribute `name`: that of this name, or failing that without regard to case.
-    pub fn of(&self, name: &str) -> AttributeCode {
-        let exact = self.0.iter().find(|(known, _)| known == name);
-        let found = exact.or_else(|| self.0.iter().find(|(k, _)| k.eq_ignore_ascii_case(name)));
-        found.map_or(AttributeCode::Exact, |(_, code)| *code)
-    }
-
-    /// Whether a frame whose attributes have these names has all that are to be coded.
-    ///
-    /// # Errors
-    /// If one is not there, with those that are.
-    pub fn check(&self, names: &[&str]) -> io::Result<()> {
-        let is_there = |wanted: &str| names.iter().any(|name| name.eq_ignore_ascii_case(wanted));
-        let mut coded = self
-            .0
-            .iter()
-            .filter(|(_, code)| *code != AttributeCode::Exact);
-        match coded.find(|(name, _)| !is_there(name)) {
-            None => Ok(()),
-            Some((name, _)) => Err(invalid(format!(
-                "no attribute {name} to store in fewer bits; there are [{}]",
-                names.join(", ")
-            ))),
-        }
-    }
-}
-
 /// The smallest and the largest value of each component of an attribute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ValueRanges {

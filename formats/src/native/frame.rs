@@ -8,17 +8,14 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run};
-use super::{
-    AttributeCode, AttributeCodes, Bound, Encoding, FrameIndex, RadiusRange, StoredType,
-    ValueRanges, arrange, check_error, encode_run, wide_blocks,
-};
+use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks};
 use crate::attribute::with_values;
 use crate::blocks::Block;
 use crate::order::kd;
 use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius};
 
 /// How a frame is stored.
-#[derive(Debug, Clone, PartialEq, Default)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StoreSettings {
     /// How positions are stored; `None` takes what needs the fewest bytes within the bound.
     pub encoding: Option<Encoding>,
@@ -26,8 +23,6 @@ pub struct StoreSettings {
     pub bound: Bound,
     /// How far those of the frame are from the true ones ([`crate::Positions::rounding`]).
     pub rounding: f64,
-    /// Which attributes are stored in fewer bits. Radii are not among them: they follow the bound.
-    pub attributes: AttributeCodes,
 }
 
 impl StoreSettings {
@@ -36,7 +31,6 @@ impl StoreSettings {
         encoding: Some(Encoding::F32),
         bound: Bound::None,
         rounding: 0.0,
-        attributes: AttributeCodes::EXACT,
     };
 }
 
@@ -51,8 +45,8 @@ pub fn write(path: &Path, frame: &ParticleFrame, step: Option<i64>) -> Result<()
 /// Writes `frame` to `path` in tree order.
 ///
 /// # Errors
-/// [`FrameError::Io`] if attributes or radii do not fit the particles, one of them is not finite, an attribute
-/// cannot be coded as was asked, or the file cannot be written; nothing is left behind then.
+/// [`FrameError::Io`] if attributes or radii do not fit the particles, one of them is not finite, or the
+/// file cannot be written; nothing is left behind then.
 pub fn store(
     path: &Path,
     frame: &ParticleFrame,
@@ -72,8 +66,6 @@ fn store_checked(
 ) -> io::Result<FrameIndex> {
     let is_kept = |a: &&Attribute| frame.radius.is_none() || !is_radius(a);
     let kept: Vec<&Attribute> = frame.attributes.iter().filter(is_kept).collect();
-    let names: Vec<&str> = kept.iter().map(|a| a.name.as_str()).collect();
-    settings.attributes.check(&names)?;
     let own_radii = match &frame.radius {
         Some(Radius::PerParticle(radii)) => Some(&radii[..]),
         _ => None,
@@ -89,14 +81,6 @@ fn store_checked(
         Some(Radius::Common(radius)) => Some(*radius),
         _ => radii.as_deref().map(smallest),
     };
-    let mut values = Vec::with_capacity(kept.len());
-    let mut specs = Vec::with_capacity(kept.len());
-    for attribute in &kept {
-        let bytes = in_order(attribute, &indices);
-        let (spec, bytes) = coded(attribute, bytes, settings.attributes.of(&attribute.name))?;
-        specs.push(spec);
-        values.push(bytes);
-    }
     let encoding = settings
         .encoding
         .unwrap_or_else(|| smallest_encoding(&positions, settings.bound, common));
@@ -111,11 +95,12 @@ fn store_checked(
             (_, Some(radii)) => RadiusSpec::PerParticle(radius_range(radii, encoding, settings)),
             _ => RadiusSpec::None,
         },
-        attributes: specs,
+        attributes: kept.iter().map(|a| spec_of(a)).collect::<io::Result<_>>()?,
         time: frame.time,
         step,
         dropped: frame.dropped,
     };
+    let values: Vec<Vec<u8>> = kept.iter().map(|a| in_order(a, &indices)).collect();
     let mut writer = FrameWriter::create(path, spec)?;
     writer.push(&Run {
         positions: &positions,
@@ -162,34 +147,14 @@ fn is_radius(attribute: &Attribute) -> bool {
     is_float && attribute.components == 1 && attribute.name.eq_ignore_ascii_case("radius")
 }
 
-/// `bytes`, the values of `attribute` in the order of the file, as they are stored with `code`.
-fn coded(
-    attribute: &Attribute,
-    bytes: Vec<u8>,
-    code: AttributeCode,
-) -> io::Result<(AttributeSpec, Vec<u8>)> {
-    let (name, scalar) = (&attribute.name, attribute.data.scalar_type());
-    let stored = code.stored(name, scalar)?;
-    let ranges = match stored {
-        StoredType::Ranged => {
-            ValueRanges::of_run(attribute.components, scalar, &bytes).finish(name)?
-        }
-        StoredType::Plain(_) | StoredType::Half => Vec::new(),
-    };
-    let mut spec = AttributeSpec {
-        name: name.clone(),
+fn spec_of(attribute: &Attribute) -> io::Result<AttributeSpec> {
+    Ok(AttributeSpec {
+        name: attribute.name.clone(),
         components: u32::try_from(attribute.components).map_err(io::Error::other)?,
-        stored,
-        ranges,
+        stored: StoredType::Plain(attribute.data.scalar_type()),
+        ranges: Vec::new(),
         max_error: 0.0,
-    };
-    if stored == StoredType::Plain(scalar) {
-        return Ok((spec, bytes));
-    }
-    let mut codes = Vec::with_capacity(attribute.data.len() * stored.size());
-    spec.max_error = encode_run(stored, &spec.ranges, scalar, &bytes, &mut codes);
-    check_error(name, stored, spec.max_error)?;
-    Ok((spec, codes))
+    })
 }
 
 /// The values of `attribute` in the order of `indices`, little-endian.

@@ -23,7 +23,7 @@ mod view;
 mod write;
 
 pub use attribute::AttributeView;
-pub use attribute_code::{AttributeCode, AttributeCodes, ValueRanges, check_error, encode_run};
+pub use attribute_code::{AttributeCode, ValueRanges, check_error, encode_run};
 pub use bound::Bound;
 pub use frame::{StoreSettings, smallest_encoding, store, write};
 pub use layout::{Encoding, FrameIndex, MAGIC};

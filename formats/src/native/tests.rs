@@ -379,7 +379,7 @@ fn no_particle_is_farther_than_the_file_says() {
                 let settings = StoreSettings {
                     encoding: Some(encoding),
                     bound,
-                    ..StoreSettings::EXACT
+                    rounding: 0.0,
                 };
                 let radius = Some(Radius::Common(0.01));
                 let index = stored_within(clustered(count), radius, settings);
@@ -399,7 +399,7 @@ fn radii_of_their_own_are_held_and_bounded() {
             let settings = StoreSettings {
                 encoding: Some(encoding),
                 bound,
-                ..StoreSettings::EXACT
+                rounding: 0.0,
             };
             let own = Some(Radius::PerParticle(radii(5000).collect()));
             let index = stored_within(clustered(5000), own, settings);
@@ -429,7 +429,7 @@ fn flat_and_coincident_particles_are_stored() {
             let settings = StoreSettings {
                 encoding: Some(encoding),
                 bound: Bound::None,
-                ..StoreSettings::EXACT
+                rounding: 0.0,
             };
             stored_within(positions.clone(), None, settings);
         }
@@ -444,7 +444,7 @@ fn the_smallest_encoding_within_the_bound_is_taken() {
         let settings = StoreSettings {
             encoding: None,
             bound,
-            ..StoreSettings::EXACT
+            rounding: 0.0,
         };
         let index = stored_within(even.clone(), Some(Radius::Common(0.05)), settings);
         (
@@ -470,7 +470,7 @@ fn a_file_does_not_depend_on_threads() {
         let settings = StoreSettings {
             encoding: Some(Encoding::Q10),
             bound: Bound::Length(1e-3),
-            ..StoreSettings::EXACT
+            rounding: 0.0,
         };
         let stored = || store(&path, &frame, None, &settings).expect("writable");
         pool.expect("threads").install(stored);

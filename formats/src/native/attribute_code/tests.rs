@@ -1,11 +1,8 @@
 //! Codes of a few values by hand, and of any values against reading them back.
 
-use glam::{DVec3, Vec3};
 use proptest::prelude::*;
 
 use super::*;
-use crate::native::{Access, NativeFile, StoreSettings, store};
-use crate::{Attribute, AttributeData, ParticleFrame};
 
 fn f32s(values: &[f32]) -> Vec<u8> {
     values.iter().flat_map(|v| v.to_le_bytes()).collect()
@@ -191,108 +188,4 @@ proptest! {
         prop_assert_eq!(all, pieces);
         prop_assert_eq!(error, errors[0].max(errors[1]));
     }
-}
-
-fn frame() -> ParticleFrame {
-    let count = 3000_u16;
-    let at = |i: u16| Vec3::new(f32::from(i).sin(), f32::from(i % 61), f32::from(i).sqrt());
-    let attribute = |name: &str, components: usize, data: AttributeData| Attribute {
-        name: name.to_owned(),
-        components,
-        data,
-    };
-    let velocity = (0..count).flat_map(|i| (at(i) * 7.0).to_array());
-    let density = (0..count).map(|i| 1000.0 + f64::from(i).cos());
-    ParticleFrame {
-        positions: (0..count).map(at).collect(),
-        origin: DVec3::ZERO,
-        radius: None,
-        attributes: vec![
-            attribute("velocity", 3, AttributeData::F32(velocity.collect())),
-            attribute("density", 1, AttributeData::F64(density.collect())),
-            attribute(
-                "material",
-                1,
-                AttributeData::I16((0..count).map(|i| (i % 6).cast_signed()).collect()),
-            ),
-            attribute("id", 1, AttributeData::U16((0..count).collect())),
-        ],
-        time: None,
-        dropped: 0,
-        file_index: None,
-    }
-}
-
-/// Stores the frame with these codes and maps it.
-fn stored(codes: &[(&str, AttributeCode)]) -> Result<(tempfile::TempDir, NativeFile), String> {
-    let mut settings = StoreSettings::EXACT;
-    for (name, code) in codes {
-        settings.attributes.set(name, *code);
-    }
-    let dir = tempfile::tempdir().expect("a temporary directory");
-    let path = dir.path().join("a.spf");
-    let stored = store(&path, &frame(), None, &settings);
-    stored.map_err(|e| e.to_string())?;
-    let file = NativeFile::open(&path, Access::Map).expect("whole");
-    Ok((dir, file))
-}
-
-#[test]
-fn stored_attributes_are_read_back_within_their_error() {
-    let codes = [
-        ("Velocity", AttributeCode::Half),
-        ("density", AttributeCode::Ranged),
-        ("material", AttributeCode::Ranged),
-    ];
-    let (_dir, file) = stored(&codes).expect("writable");
-    let (native, given) = (file.frame().expect("whole"), frame());
-    native.verify().expect("whole");
-    let id = native.attribute("id").expect("kept");
-    for (name, kind, most) in [
-        ("velocity", StoredType::Half, 0.25),
-        ("density", StoredType::Ranged, 2.0 / 510.0 + 1e-4),
-        ("material", StoredType::Ranged, 1e-6),
-        ("id", StoredType::Plain(ScalarType::U16), 0.0),
-    ] {
-        let view = native.attribute(name).expect("kept");
-        assert_eq!(view.stored(), kind);
-        let index = native.index().attributes.iter().find(|a| a.name == name);
-        let max_error = index.expect("kept").max_error;
-        assert!(
-            max_error <= most && (max_error > 0.0 || most < 1e-3),
-            "{name}: {max_error}"
-        );
-        let copy = view.to_attribute().expect("whole");
-        let truth = given.attribute(name).expect("given");
-        for place in 0..given.len() {
-            #[expect(
-                clippy::cast_possible_truncation,
-                clippy::cast_sign_loss,
-                reason = "an id"
-            )]
-            let particle = id.get(place, 0) as usize;
-            for component in 0..truth.components {
-                let value = truth.data.get_f64(particle * truth.components + component);
-                let read = view.get(place, component);
-                assert!((read - value).abs() <= max_error, "{name}: {read} {value}");
-                let read = copy.data.get_f64(place * truth.components + component);
-                assert!((read - value).abs() <= max_error, "{name}: {read} {value}");
-            }
-        }
-    }
-}
-
-#[test]
-fn codes_that_cannot_be_are_refused_by_name() {
-    let no_id = stored(&[("ID", AttributeCode::Half)])
-        .map(|_| ())
-        .expect_err("ids");
-    assert!(no_id.contains("attribute id holds ids"), "{no_id}");
-    let missing = stored(&[("speed", AttributeCode::Ranged)])
-        .map(|_| ())
-        .expect_err("missing");
-    let words =
-        "no attribute speed to store in fewer bits; there are [velocity, density, material, id]";
-    assert!(missing.contains(words), "{missing}");
-    assert!(stored(&[("speed", AttributeCode::Exact)]).is_ok());
 }
