@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use spherule_formats::ParticleFrame;
 use spherule_formats::native::layout::RadiusIndex;
-use spherule_formats::native::{self, AttributeCodes, Bound, StoreSettings};
+use spherule_formats::native::{self, Bound, StoreSettings};
 
 use super::peaks::Peaks;
 use super::{CellRequest, Particles};
@@ -23,7 +23,6 @@ pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String>
         encoding: request.representation.encoding(),
         bound: BOUND,
         rounding: 0.0,
-        attributes: AttributeCodes::EXACT,
     };
     let peaks = Peaks::default();
     let start = Instant::now();

@@ -9,7 +9,6 @@ use crate::ParseError;
 use crate::read::Step;
 
 mod attribute;
-mod attribute_code;
 mod bound;
 mod decode;
 mod frame;
@@ -23,7 +22,6 @@ mod view;
 mod write;
 
 pub use attribute::AttributeView;
-pub use attribute_code::{AttributeCode, ValueRanges, check_error, encode_run};
 pub use bound::Bound;
 pub use frame::{StoreSettings, smallest_encoding, store, write};
 pub use layout::{Encoding, FrameIndex, MAGIC};
