@@ -43,21 +43,20 @@ impl BoxSettings {
 /// assert!(centers.iter().all(|c| c.cmpge(settings.min).all() && c.cmple(settings.max).all()));
 /// ```
 pub fn fill_box(settings: &BoxSettings) -> Vec<Vec3> {
-    let BoxSettings {
-        count,
-        seed,
-        min,
-        max,
-    } = *settings;
-    let size = max - min;
-    // The state only counts up, so every particle can start at its own place.
-    let particle = |index: usize| {
-        let first = (index as u64).wrapping_mul(3);
-        let unit =
-            Vec3::from_array([1, 2, 3].map(|k| unit(splitmix64(seed, first.wrapping_add(k)))));
-        min + unit * size
-    };
-    (0..count).into_par_iter().map(particle).collect()
+    (0..settings.count)
+        .into_par_iter()
+        .map(|index| settings.particle(index as u64))
+        .collect()
+}
+
+impl BoxSettings {
+    /// Particle `index` of [`fill_box`]. The state only counts up, so every particle can start at its own place.
+    #[inline]
+    pub fn particle(&self, index: u64) -> Vec3 {
+        let first = index.wrapping_mul(3);
+        let unit = [1, 2, 3].map(|k| unit(splitmix64(self.seed, first.wrapping_add(k))));
+        self.min + Vec3::from_array(unit) * (self.max - self.min)
+    }
 }
 
 /// Number `n` (from 1) of splitmix64 started at `seed`.
@@ -70,7 +69,7 @@ pub fn splitmix64(seed: u64, n: u64) -> u64 {
 }
 
 /// The upper 24 bits as a number in 0..1, exact in f32.
-fn unit(bits: u64) -> f32 {
+pub(crate) fn unit(bits: u64) -> f32 {
     const SCALE: f32 = 1.0 / 16_777_216.0;
     #[expect(clippy::cast_precision_loss, reason = "24 bits fit")]
     {

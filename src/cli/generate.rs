@@ -1,13 +1,28 @@
 //! `spherule generate`: seeded particles that others can make exactly.
 
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use glam::DVec3;
-use spherule_formats::generate::{BoxSettings, fill_box};
-use spherule_formats::{FrameError, ParticleFrame, Positions, RawParticles, native, write};
+use spherule_formats::convert::{
+    BlockSettings, BlockSource, BoxSource, ConvertError, ConvertSettings, ParticleSource, Phase,
+    Progress, convert,
+};
+use spherule_formats::generate::BoxSettings;
+use spherule_formats::native::{Bound, Encoding};
+use spherule_formats::write;
+use spherule_jobs::Interrupt;
 
-use super::{CliError, Outcome};
+use super::{CliError, Outcome, signals};
+use crate::report::Bytes;
+
+/// The bound that coded positions keep if none is given: a fraction of the radius.
+const USUAL_BOUND: f64 = 0.02;
+
+const WORDS: signals::Words = signals::Words {
+    asked: "stopping",
+    at_once: "stopped",
+};
 
 #[derive(Debug, Args)]
 pub(super) struct GenerateArgs {
@@ -18,59 +33,190 @@ pub(super) struct GenerateArgs {
 #[derive(Debug, Subcommand)]
 enum What {
     /// The thesis's box (3,5,-2)-(7,8,2), filled evenly by splitmix64.
-    Box {
-        /// Particles; 1e6 is understood.
-        #[arg(long, value_parser = count)]
-        particles: usize,
-        /// The generator's first state.
-        #[arg(long, default_value_t = 1)]
-        seed: u64,
-        /// File to write: .spf, .npy or .vtk.
-        #[arg(short, long)]
-        output: PathBuf,
-    },
+    Box(BoxArgs),
+    /// A block of water, about 4:2:1, under a wavy surface: particles two radii apart in a little disorder.
+    Block(BlockArgs),
+}
+
+#[derive(Debug, Args)]
+struct BoxArgs {
+    #[command(flatten)]
+    common: CommonArgs,
+    /// Radius of all particles, which native frames tell.
+    #[arg(long, value_parser = positive)]
+    radius: Option<f32>,
+}
+
+#[derive(Debug, Args)]
+struct BlockArgs {
+    #[command(flatten)]
+    common: CommonArgs,
+    /// Radius of all particles; without one the block is about 1 high.
+    #[arg(long, value_parser = positive)]
+    radius: Option<f32>,
+    /// Gives particles a velocity.
+    #[arg(long)]
+    velocity: bool,
+}
+
+#[derive(Debug, Args)]
+struct CommonArgs {
+    /// Particles; 1e6 is understood.
+    #[arg(long, value_parser = count)]
+    particles: usize,
+    /// The generator's first state.
+    #[arg(long, default_value_t = 1)]
+    seed: u64,
+    /// File to write: .spf, .npy or .vtk.
+    #[arg(short, long)]
+    output: PathBuf,
+    /// How native frames store positions: f32 (12 bytes a particle), q16 (6) or q10 (4). Without this, f32, or
+    /// with a largest error what needs the fewest bytes.
+    #[arg(long)]
+    encoding: Option<Encoding>,
+    /// Largest error of a stored position as a fraction of the radius [default: 0.02 for q16 and q10 where
+    /// there is a radius].
+    #[arg(long, value_name = "FRACTION", value_parser = not_negative)]
+    max_error: Option<f64>,
+    /// Memory that making a native frame may take, beside what the program itself needs; what does not fit
+    /// lies beside the file meanwhile.
+    #[arg(long, value_name = "SIZE", default_value = "2GiB")]
+    memory: Bytes,
 }
 
 pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
-    let What::Box {
+    let (common, radius) = match &args.what {
+        What::Box(args) => (&args.common, args.radius),
+        What::Block(args) => (&args.common, args.radius),
+    };
+    let format = Format::of(&common.output)?;
+    if common.max_error.is_some() && matches!(args.what, What::Box(_)) && radius.is_none() {
+        return Err(CliError::other(
+            "--max-error is a fraction of the radius; say --radius too",
+        ));
+    }
+    let settings = BoxSettings::thesis(common.particles, common.seed);
+    let source: Box<dyn ParticleSource> = match &args.what {
+        What::Box(_) => Box::new(BoxSource::new(settings, radius)),
+        What::Block(args) => Box::new(BlockSource::new(BlockSettings {
+            count: common.particles as u64,
+            seed: common.seed,
+            radius,
+            has_velocity: args.velocity,
+        })),
+    };
+    let signals = signals::listen(WORDS)?;
+    let until = Until(signals.at_work());
+    match write(format, &*source, common, &until) {
+        Err(ConvertError::Interrupted) => return Ok(Outcome::Interrupted),
+        result => result.map_err(|e| CliError::Other(e.to_string()))?,
+    }
+    let CommonArgs {
         particles,
         seed,
         output,
-    } = &args.what;
-    let writer = writer(output)?;
-    let centers = fill_box(&BoxSettings::thesis(*particles, *seed));
-    writer(output, centers).map_err(|e| CliError::Other(e.to_string()))?;
+        ..
+    } = common;
     say!("{}: {particles} particles, seed {seed}", output.display());
     Ok(Outcome::Done)
 }
 
-type Writer = fn(&Path, Vec<glam::Vec3>) -> Result<(), FrameError>;
+/// Goes on until a signal comes.
+struct Until<'a>(&'a Interrupt);
 
-/// By the name, before anything is computed.
-fn writer(path: &Path) -> Result<Writer, CliError> {
-    let extension = path
-        .extension()
-        .and_then(|e| e.to_str())
-        .map(str::to_lowercase);
-    match extension.as_deref() {
-        Some("npy") => Ok(|path, centers| write::npy::write(path, &centers)),
-        Some("vtk") => Ok(|path, centers| write::vtk::write(path, &centers, &[])),
-        Some("spf") => Ok(write_native),
-        _ => Err(CliError::other(format!(
-            "{}: which format? name the file .spf, .npy or .vtk",
-            path.display()
-        ))),
+impl Progress for Until<'_> {
+    fn advanced(&self, _phase: Phase, _done: u64, _total: u64) -> ControlFlow<()> {
+        if self.0.is_raised() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
     }
 }
 
-fn write_native(path: &Path, centers: Vec<glam::Vec3>) -> Result<(), FrameError> {
-    let raw = RawParticles {
-        positions: Positions::F32(centers),
-        attributes: Vec::new(),
-        time: None,
-        step: None,
-    };
-    native::write(path, &ParticleFrame::from_raw(raw, DVec3::ZERO), None)
+#[derive(Debug, Clone, Copy)]
+enum Format {
+    Npy,
+    Vtk,
+    Native,
+}
+
+impl Format {
+    /// By the name, before anything is computed.
+    fn of(path: &Path) -> Result<Self, CliError> {
+        let extension = path.extension().and_then(|e| e.to_str());
+        match extension.map(str::to_lowercase).as_deref() {
+            Some("npy") => Ok(Self::Npy),
+            Some("vtk") => Ok(Self::Vtk),
+            Some("spf") => Ok(Self::Native),
+            _ => Err(CliError::other(format!(
+                "{}: which format? name the file .spf, .npy or .vtk",
+                path.display()
+            ))),
+        }
+    }
+}
+
+fn write(
+    format: Format,
+    source: &dyn ParticleSource,
+    args: &CommonArgs,
+    until: &Until,
+) -> Result<(), ConvertError> {
+    let path = &args.output;
+    match format {
+        Format::Npy => write::npy::stream(path, source, until),
+        Format::Vtk => write::vtk::stream(path, source, until),
+        Format::Native => {
+            let report = convert(source, path, &args.settings(source), until)?;
+            let phases = report.seconds.iter();
+            let seconds = phases.map(|(phase, s)| format!("{} {s:.2} s", phase.name()));
+            say!(
+                "{}, largest error {:.3e}, parts {}, memory {}, put aside {}: {}",
+                report.index.encoding(),
+                report.index.max_error,
+                report.parts,
+                Bytes(report.peak_bytes),
+                Bytes(report.spilled_bytes),
+                seconds.collect::<Vec<_>>().join(", ")
+            );
+            Ok(())
+        }
+    }
+}
+
+impl CommonArgs {
+    fn settings(&self, source: &dyn ParticleSource) -> ConvertSettings {
+        let is_plain = self.max_error.is_none() && self.encoding.is_none();
+        let usual = source.common_radius().map(|_| USUAL_BOUND);
+        ConvertSettings {
+            encoding: self.encoding.or(is_plain.then_some(Encoding::F32)),
+            bound: match self.max_error.or(usual) {
+                Some(fraction) => Bound::OfRadius(fraction),
+                None => Bound::None,
+            },
+            memory: self.memory.0,
+            ..ConvertSettings::default()
+        }
+    }
+}
+
+fn not_negative(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    if value >= 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("`{text}` is no error; 0.02 is one"))
+    }
+}
+
+fn positive(text: &str) -> Result<f32, String> {
+    let value: f32 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    if value > 0.0 && value.is_finite() {
+        Ok(value)
+    } else {
+        Err(format!("`{text}` is no radius"))
+    }
 }
 
 /// A whole number, also as 1e6 or 2_000_000.

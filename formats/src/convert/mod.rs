@@ -1,7 +1,135 @@
 //! Frames of any size become native frames.
+//!
+//! A source ([`ParticleSource`]) is read twice: to survey it (`survey.rs`), and to bring every particle into
+//! tree order. What fits into the memory that the settings allow is ordered at once. A larger source is divided
+//! along a space-filling curve into parts that fit (`divide.rs`), whose particles are kept in chunks in memory
+//! or, beyond it, in a scratch file (`store.rs`). Parts are then ordered one after the other, while the next one
+//! is loaded and the last one written.
+//!
+//! The bytes of a frame depend on source and settings, and with more than one part on how large these are,
+//! which follows from [`ConvertSettings::memory`] and the width of what is kept; never on threads or on what was
+//! put aside on disk.
 
+use std::path::Path;
+use std::time::Instant;
+
+mod account;
+mod batch;
+mod carry;
+mod columns;
+mod curve;
+mod divide;
 mod foreign;
+mod limits;
+mod order;
+mod output;
+mod parts;
+mod scratch;
+mod settings;
 mod source;
+mod sources;
+mod store;
+mod survey;
+mod whole;
+
+use account::Account;
+use columns::Columns;
+use limits::Limits;
+use output::Output;
+use parts::Divided;
+use survey::{Asked, Reading, survey};
 
 pub use foreign::open_source;
+pub use settings::{
+    AttributeChoice, ConvertError, ConvertReport, ConvertSettings, Phase, Progress, RadiusRule,
+};
 pub use source::{ParticleSource, SourceAttribute};
+pub use sources::{BlockSettings, BlockSource, BoxSource, NativeSource, RawSource};
+
+/// Writes what `source` holds to `path` as a native frame.
+///
+/// # Errors
+/// [`ConvertError`]; nothing is left behind then.
+pub fn convert(
+    source: &dyn ParticleSource,
+    path: &Path,
+    settings: &ConvertSettings,
+    progress: &dyn Progress,
+) -> Result<ConvertReport, ConvertError> {
+    let asked = Asked {
+        source,
+        path,
+        settings,
+        progress,
+    };
+    let columns = Columns::choose(source, settings, path)?;
+    let limits = Limits::of(settings, source.count(), columns.width(), columns.widest());
+    convert_within(asked, columns, limits)
+}
+
+/// Converts within `limits`.
+fn convert_within(
+    asked: Asked,
+    columns: Columns,
+    limits: Limits,
+) -> Result<ConvertReport, ConvertError> {
+    let mut clock = Clock::new();
+    let account = Account::default();
+    let reading = Reading {
+        batch_len: limits.batch_len,
+        sample_stride: if limits.is_whole {
+            0
+        } else {
+            asked.source.count().div_ceil(limits.sample_len).max(1)
+        },
+    };
+    let survey = survey(asked, &columns, reading)?;
+    clock.lap(Phase::Survey);
+    let (columns, common) = survey.settled(asked.path, columns)?;
+    let mut output = Output::new(asked, &columns, &survey, common, limits.run_len);
+    let divided = if limits.is_whole {
+        whole::convert(&mut output, &limits, &account)?;
+        Divided {
+            parts: 1,
+            spilled_bytes: 0,
+        }
+    } else {
+        parts::convert(&mut output, &limits, &account, &mut clock)?
+    };
+    clock.lap(Phase::Order);
+    let index = output.finish()?;
+    clock.lap(Phase::Finish);
+    Ok(ConvertReport {
+        index,
+        seconds: clock.seconds,
+        peak_bytes: account.most(),
+        spilled_bytes: divided.spilled_bytes,
+        parts: divided.parts,
+    })
+}
+
+/// Seconds of phases.
+struct Clock {
+    last: Instant,
+    seconds: Vec<(Phase, f64)>,
+}
+
+impl Clock {
+    fn new() -> Self {
+        Self {
+            last: Instant::now(),
+            seconds: Vec::new(),
+        }
+    }
+
+    /// `phase` ends now.
+    fn lap(&mut self, phase: Phase) {
+        let now = Instant::now();
+        let seconds = now.duration_since(self.last).as_secs_f64();
+        self.seconds.push((phase, seconds));
+        self.last = now;
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,5 +1,7 @@
 //! An attribute of a native frame in place: values are decoded as they are asked for.
 
+use std::ops::Range;
+
 use super::layout::AttributeIndex;
 use super::stored::StoredType;
 use crate::{Attribute, AttributeData, Endian, ParseError, ScalarType};
@@ -81,6 +83,23 @@ impl<'a> AttributeView<'a> {
         Some(u32::from_le_bytes(std::array::from_fn(byte)))
     }
 
+    /// Copies the values of the particles at `places` as [`Self::to_attribute`] has them, little-endian; `None`
+    /// if there are too few.
+    pub(crate) fn copy_to(&self, places: Range<usize>, to: &mut [u8]) -> Option<()> {
+        let width = self.components().checked_mul(self.stored.size())?;
+        let bytes = places.start.checked_mul(width)?..places.end.checked_mul(width)?;
+        let values = self.bytes.get(bytes)?;
+        if let StoredType::Plain(_) = self.stored {
+            to.get_mut(..values.len())?.copy_from_slice(values);
+            return Some(());
+        }
+        let (to, _) = to.as_chunks_mut::<4>();
+        for (to, value) in to.iter_mut().zip(self.decoded(values)) {
+            *to = value.to_le_bytes();
+        }
+        Some(())
+    }
+
     /// A copy of all values: in the type they are stored in, codes of fewer bits as f32.
     ///
     /// # Errors
@@ -88,7 +107,9 @@ impl<'a> AttributeView<'a> {
     pub fn to_attribute(&self) -> Result<Attribute, ParseError> {
         let data = match self.stored {
             StoredType::Plain(kind) => kind.decode(Endian::Little, self.bytes)?,
-            StoredType::Half | StoredType::Ranged => AttributeData::F32(self.decoded()),
+            StoredType::Half | StoredType::Ranged => {
+                AttributeData::F32(self.decoded(self.bytes).collect())
+            }
         };
         Ok(Attribute {
             name: self.index.name.clone(),
@@ -101,14 +122,13 @@ impl<'a> AttributeView<'a> {
         clippy::cast_possible_truncation,
         reason = "values of 16 bits and fewer are shown in f32"
     )]
-    fn decoded(&self) -> Vec<f32> {
-        let components = self.components();
-        let values = self.bytes.chunks_exact(self.stored.size()).enumerate();
-        let value = |(place, bytes): (usize, &[u8])| {
-            let range = self.index.ranges.get(place % components).copied();
+    fn decoded(&self, bytes: &'a [u8]) -> impl Iterator<Item = f32> {
+        let (components, ranges) = (self.components(), &self.index.ranges);
+        let values = bytes.chunks_exact(self.stored.size()).enumerate();
+        values.map(move |(place, bytes)| {
+            let range = ranges.get(place % components).copied();
             self.stored.value(bytes, range.unwrap_or_default()) as f32
-        };
-        values.map(value).collect()
+        })
     }
 
     #[inline]

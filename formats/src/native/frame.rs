@@ -92,7 +92,11 @@ fn store_checked(
         rounding: settings.rounding,
         radius: match (&frame.radius, radii.as_deref()) {
             (Some(Radius::Common(radius)), _) => RadiusSpec::Common(*radius),
-            (_, Some(radii)) => RadiusSpec::PerParticle(radius_range(radii, encoding, settings)),
+            (_, Some(radii)) => {
+                let low = smallest(radii);
+                let high = radii.iter().copied().fold(low, f32::max);
+                RadiusSpec::PerParticle(radius_range([low, high], encoding, settings.bound))
+            }
             _ => RadiusSpec::None,
         },
         attributes: kept.iter().map(|a| spec_of(a)).collect::<io::Result<_>>()?,
@@ -121,16 +125,15 @@ pub fn smallest_encoding(positions: &[Vec3], bound: Bound, radius: Option<f32>) 
     best.unwrap_or_default()
 }
 
-/// Radii are coded where positions are.
-fn radius_range(radii: &[f32], encoding: Encoding, settings: &StoreSettings) -> RadiusRange {
-    let low = smallest(radii);
-    let high = radii.iter().copied().fold(0.0, f32::max);
-    let bound = match (encoding, settings.bound) {
+/// The code of radii between the two of `ends`: they are coded where positions are.
+pub(crate) fn radius_range(ends: [f32; 2], encoding: Encoding, bound: Bound) -> RadiusRange {
+    let [low, high] = ends;
+    let bound = match (encoding, bound) {
         (Encoding::F32, _) => 0.0,
         (_, Bound::None) => f64::INFINITY,
         (_, bound) => bound.length(Some(low)),
     };
-    RadiusRange::within(low, high.max(low), bound)
+    RadiusRange::within(low, high, bound)
 }
 
 fn smallest(radii: &[f32]) -> f32 {

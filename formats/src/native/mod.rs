@@ -16,6 +16,7 @@ pub mod layout;
 mod map;
 mod quantize;
 mod radii;
+mod sections;
 mod stored;
 mod verify;
 mod view;
@@ -23,6 +24,7 @@ mod write;
 
 pub use attribute::AttributeView;
 pub use bound::Bound;
+pub(crate) use frame::radius_range;
 pub use frame::{StoreSettings, smallest_encoding, store, write};
 pub use layout::{Encoding, FrameIndex, MAGIC};
 pub(crate) use map::read as read_aligned;
@@ -95,4 +97,4 @@ fn section_of<'a>(bytes: &'a [u8], section: &Section) -> Result<&'a [u8], ParseE
 }
 
 #[cfg(test)]
-mod tests;
+pub(crate) mod tests;

@@ -158,7 +158,8 @@ impl Grid {
     )]
     fn code(&self, value: f32) -> Option<u32> {
         let exact = (f64::from(value) - f64::from(self.base)) / f64::from(self.step);
-        let nearest = (exact.round() as u32).min(self.largest);
+        // Not by `round`, which is a call on machines without an instruction for it.
+        let nearest = ((exact + 0.5) as u32).min(self.largest);
         let lower = (nearest + 1).min(self.largest);
         [nearest, nearest.saturating_sub(1), lower]
             .into_iter()

@@ -282,7 +282,7 @@ fn frames_that_do_not_fit_together_are_not_written() {
 }
 
 /// Particles in a few clusters, some of them flat, and far outliers.
-fn clustered(count: u32) -> Vec<Vec3> {
+pub(crate) fn clustered(count: u32) -> Vec<Vec3> {
     let unit = |i: u32, k: u32| {
         let hash = (i * 3 + k).wrapping_mul(0x9e37_79b9).rotate_left(13);
         hash.wrapping_mul(0x85eb_ca6b) as f32 / u32::MAX as f32

@@ -1,14 +1,12 @@
 //! Makes native frames: sections at places known beforehand, filled run by run in tree order, so that a
 //! frame of any size passes through in pieces.
 
-use std::fmt;
 use std::io;
 use std::path::Path;
 
 use glam::DVec3;
 use glam::Vec3;
 use rkyv::rancor;
-use xxhash_rust::xxh3::Xxh3;
 
 use super::layout::{
     ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,
@@ -16,6 +14,7 @@ use super::layout::{
 };
 use super::quantize::{Allowed, GROUP, Leaves, StoredBlock, encode};
 use super::radii::CodedRadii;
+use super::sections::{Filling, Places, Sections, piece};
 use super::{Bound, RadiusRange, StoredType};
 use crate::blocks::{Aabb, BLOCK_SIZE, Block, Q10Block, Q16Block};
 use crate::order::index_u32;
@@ -83,32 +82,30 @@ pub struct Run<'a> {
     pub attributes: &'a [&'a [u8]],
 }
 
+/// Particles that are coded at once: enough for many threads, so few that codes are still in the cache when they
+/// are written.
+const CODED_LEN: usize = 1 << 18;
+
+/// Numbers of the sections as they lie in the file; attributes follow, and what is kept as it is comes last,
+/// because its length is not known before.
+const POSITIONS: usize = 0;
+const NODES: usize = 1;
+const RADII: usize = 2;
+const ATTRIBUTES: usize = 3;
+
 /// Writes one native frame. Nothing is at its path before [`FrameWriter::finish`], and what there was stays
 /// until then.
 #[derive(Debug)]
 pub struct FrameWriter {
-    file: Unpublished,
+    sections: Sections,
     spec: FrameSpec,
     /// Particles that were pushed.
     pushed: u64,
-    positions: Filling,
-    nodes: Filling,
-    radii: Filling,
-    attributes: Vec<Filling>,
-    /// Kept until the end: few, and their number is not known before.
-    wide: Vec<Block>,
+    /// Blocks that are kept as they are.
+    wide: u64,
     max_error: f64,
     radius_error: f32,
     bounds: Aabb,
-}
-
-/// A section that is being filled.
-struct Filling {
-    offset: u64,
-    /// Bytes when it is full.
-    len: u64,
-    filled: u64,
-    hash: Xxh3,
 }
 
 impl FrameWriter {
@@ -122,37 +119,13 @@ impl FrameWriter {
                 "native frames are written as they lie in the memory of little-endian machines";
             return Err(io::Error::new(io::ErrorKind::Unsupported, what));
         }
-        let too_many = || invalid(format!("{} particles are too many for a frame", spec.count));
-        let mut places = Places {
-            next: HEADER_LEN as u64,
-        };
-        let mut section = |len: Option<u64>| {
-            let filling = len.and_then(|len| places.section(len));
-            filling.ok_or_else(too_many)
-        };
-        if u32::try_from(blocks_of(spec.count)).is_err() {
-            return Err(too_many());
-        }
-        let positions = section(positions_len(spec.count, spec.encoding))?;
-        let nodes = section(nodes_len(spec.count))?;
-        let radii = section(match spec.radius {
-            RadiusSpec::PerParticle(range) => {
-                Some(blocks_of(spec.count) * (BLOCK_SIZE * range.code.size()) as u64)
-            }
-            RadiusSpec::None | RadiusSpec::Common(_) => Some(0),
-        })?;
-        let mut attributes = Vec::with_capacity(spec.attributes.len());
-        for attribute in &spec.attributes {
-            attributes.push(section(spec.count.checked_mul(width(attribute)))?);
-        }
+        let sections = sections_of(&spec)
+            .filter(|_| u32::try_from(blocks_of(spec.count)).is_ok())
+            .ok_or_else(|| invalid(format!("{} particles are too many for a frame", spec.count)))?;
         Ok(Self {
-            file: Unpublished::create(path)?,
+            sections: Sections::begin(Unpublished::create(path)?, sections)?,
             pushed: 0,
-            positions,
-            nodes,
-            radii,
-            attributes,
-            wide: Vec::new(),
+            wide: 0,
             max_error: 0.0,
             radius_error: 0.0,
             bounds: Aabb::EMPTY,
@@ -163,27 +136,20 @@ impl FrameWriter {
     /// Adds the next particles. All runs but the last have a multiple of 128.
     ///
     /// # Errors
-    /// A run that does not fit the frame, or the system's reason why it cannot be written.
+    /// A run that does not fit the frame, or the system's reason why it or an earlier one cannot be written.
     pub fn push(&mut self, run: &Run) -> io::Result<()> {
         self.check(run)?;
-        if run.positions.is_empty() {
-            return Ok(());
-        }
-        let coded = match (self.spec.radius, run.radii) {
-            (RadiusSpec::PerParticle(range), Some(radii)) => Some(range.coded(radii)),
-            _ => None,
-        };
-        match self.spec.encoding {
-            Encoding::F32 => self.push_leaves::<Block>(run.positions, coded.as_ref())?,
-            Encoding::Q16 => self.push_leaves::<Q16Block>(run.positions, coded.as_ref())?,
-            Encoding::Q10 => self.push_leaves::<Q10Block>(run.positions, coded.as_ref())?,
-        }
-        if let Some(coded) = coded {
-            self.radius_error = self.radius_error.max(coded.max_error);
-            self.radii.append(&self.file, &coded.bytes)?;
-        }
-        for (filling, bytes) in self.attributes.iter_mut().zip(run.attributes) {
-            filling.append(&self.file, bytes)?;
+        let mut first = 0;
+        for positions in run.positions.chunks(CODED_LEN) {
+            let end = first + positions.len();
+            let radii = run.radii.map(|radii| &radii[first..end]);
+            self.push_positions(positions, radii)?;
+            for (number, bytes) in run.attributes.iter().enumerate() {
+                let width = bytes.len() / run.positions.len();
+                let own = bytes[first * width..end * width].to_vec();
+                self.sections.append(ATTRIBUTES + number, piece(own))?;
+            }
+            first = end;
         }
         self.pushed += run.positions.len() as u64;
         Ok(())
@@ -194,32 +160,48 @@ impl FrameWriter {
     /// # Errors
     /// If particles are missing, or the file cannot be written.
     pub fn finish(self) -> io::Result<FrameIndex> {
-        if self.pushed != self.spec.count {
-            let (pushed, count) = (self.pushed, self.spec.count);
+        let Self { pushed, .. } = self;
+        if pushed != self.spec.count {
+            let count = self.spec.count;
             return Err(invalid(format!(
                 "{pushed} of {count} particles were written"
             )));
         }
-        let end = [&self.positions, &self.nodes, &self.radii];
-        let ends = end.into_iter().chain(&self.attributes).map(Filling::end);
-        let mut places = Places {
-            next: ends.max().unwrap_or(HEADER_LEN as u64),
+        let filled = self.sections.finish()?;
+        let sections: Vec<Section> = filled.sections.iter().map(Filling::done).collect();
+        let measured = Measured {
+            max_error: self.max_error,
+            radius_error: self.radius_error,
+            bounds: self.bounds,
         };
-        let wide_bytes: &[u8] = bytemuck::cast_slice(&self.wide);
-        let mut wide = places
-            .section(wide_bytes.len() as u64)
-            .ok_or_else(|| invalid("the file is too long".to_owned()))?;
-        wide.append(&self.file, wide_bytes)?;
-        let index = self.index(wide.done());
+        let index = index_of(&self.spec, &measured, &sections);
         let bytes = rkyv::to_bytes::<rancor::Error>(&index).map_err(io::Error::other)?;
-        let offset = places.next;
+        let end = index.wide.offset + index.wide.len;
+        let offset = end.next_multiple_of(ALIGN);
         // Sections end where the next begins but for zeros, which a hole in the file reads as.
-        self.file.write_all_at(&bytes, offset)?;
+        filled.file.write_all_at(&bytes, offset)?;
         let file_len = offset + bytes.len() as u64;
-        self.file
-            .write_all_at(&header(file_len, offset, &bytes), 0)?;
-        self.file.publish()?;
+        let header = header(file_len, offset, &bytes);
+        filled.file.write_all_at(&header, 0)?;
+        filled.file.publish()?;
         Ok(index)
+    }
+
+    fn push_positions(&mut self, positions: &[Vec3], radii: Option<&[f32]>) -> io::Result<()> {
+        let coded = match (self.spec.radius, radii) {
+            (RadiusSpec::PerParticle(range), Some(radii)) => Some(range.coded(radii)),
+            _ => None,
+        };
+        match self.spec.encoding {
+            Encoding::F32 => self.push_leaves::<Block>(positions, coded.as_ref())?,
+            Encoding::Q16 => self.push_leaves::<Q16Block>(positions, coded.as_ref())?,
+            Encoding::Q10 => self.push_leaves::<Q10Block>(positions, coded.as_ref())?,
+        }
+        if let Some(coded) = coded {
+            self.radius_error = self.radius_error.max(coded.max_error);
+            self.sections.append(RADII, piece(coded.bytes))?;
+        }
+        Ok(())
     }
 
     fn push_leaves<B: StoredBlock>(
@@ -235,14 +217,17 @@ impl FrameWriter {
             },
         };
         let mut leaves: Leaves<B> = encode(positions, radii, allowed);
-        leaves.shift(index_u32(self.wide.len()));
-        let blocks = bytemuck::cast_slice(&leaves.blocks);
-        self.positions.append(&self.file, blocks)?;
-        self.nodes
-            .append(&self.file, bytemuck::cast_slice(&leaves.nodes))?;
-        self.wide.append(&mut leaves.wide);
+        // Fewer than blocks, which were counted in 32 bits.
+        leaves.shift(u32::try_from(self.wide).map_err(io::Error::other)?);
+        self.wide += leaves.wide.len() as u64;
         self.max_error = self.max_error.max(leaves.max_error);
         self.bounds = self.bounds.union(leaves.bounds);
+        self.sections.append(POSITIONS, piece(leaves.blocks))?;
+        self.sections.append(NODES, piece(leaves.nodes))?;
+        if !leaves.wide.is_empty() {
+            let wide = ATTRIBUTES + self.spec.attributes.len();
+            self.sections.append(wide, piece(leaves.wide))?;
+        }
         Ok(())
     }
 
@@ -267,50 +252,76 @@ impl FrameWriter {
             self.pushed, self.spec.count
         )))
     }
+}
 
-    fn index(&self, wide: Section) -> FrameIndex {
-        let spec = &self.spec;
-        let attribute = |(spec, filling): (&AttributeSpec, &Filling)| AttributeIndex {
-            name: spec.name.clone(),
-            stored: spec.stored.code(),
-            components: spec.components,
-            ranges: spec.ranges.clone(),
-            max_error: spec.max_error,
-            section: filling.done(),
-        };
-        FrameIndex {
-            count: spec.count,
-            block: index_u32(BLOCK_SIZE),
-            encoding: spec.encoding.code(),
-            order: ORDER_KD,
-            origin: spec.origin.to_array(),
-            min: self.bounds.min.to_array(),
-            max: self.bounds.max.to_array(),
-            max_error: self.max_error + spec.rounding,
-            positions: self.positions.done(),
-            wide,
-            nodes: self.nodes.done(),
-            radius: match spec.radius {
-                RadiusSpec::None => RadiusIndex::None,
-                RadiusSpec::Common(radius) => RadiusIndex::Common(radius),
-                RadiusSpec::PerParticle(range) => RadiusIndex::PerParticle(RadiiIndex {
-                    code: range.code.code(),
-                    low: range.low,
-                    high: range.high,
-                    max_error: self.radius_error,
-                    section: self.radii.done(),
-                }),
-            },
-            attributes: spec
-                .attributes
-                .iter()
-                .zip(&self.attributes)
-                .map(attribute)
-                .collect(),
-            time: spec.time,
-            step: spec.step,
-            dropped: spec.dropped,
+/// The places of all sections; none if the file would be too long.
+fn sections_of(spec: &FrameSpec) -> Option<Vec<Filling>> {
+    let mut places = Places {
+        next: HEADER_LEN as u64,
+    };
+    let radii = match spec.radius {
+        RadiusSpec::PerParticle(range) => {
+            blocks_of(spec.count).checked_mul((BLOCK_SIZE * range.code.size()) as u64)?
         }
+        RadiusSpec::None | RadiusSpec::Common(_) => 0,
+    };
+    let mut sections = vec![
+        places.section(positions_len(spec.count, spec.encoding)?)?,
+        places.section(nodes_len(spec.count)?)?,
+        places.section(radii)?,
+    ];
+    for attribute in &spec.attributes {
+        sections.push(places.section(spec.count.checked_mul(width(attribute))?)?);
+    }
+    sections.push(places.section(0)?);
+    Some(sections)
+}
+
+/// What is known when all is written.
+struct Measured {
+    max_error: f64,
+    radius_error: f32,
+    bounds: Aabb,
+}
+
+fn index_of(spec: &FrameSpec, measured: &Measured, sections: &[Section]) -> FrameIndex {
+    let wide = ATTRIBUTES + spec.attributes.len();
+    let attribute = |(spec, section): (&AttributeSpec, &Section)| AttributeIndex {
+        name: spec.name.clone(),
+        stored: spec.stored.code(),
+        components: spec.components,
+        ranges: spec.ranges.clone(),
+        max_error: spec.max_error,
+        section: *section,
+    };
+    let attributes = spec.attributes.iter().zip(&sections[ATTRIBUTES..wide]);
+    FrameIndex {
+        count: spec.count,
+        block: index_u32(BLOCK_SIZE),
+        encoding: spec.encoding.code(),
+        order: ORDER_KD,
+        origin: spec.origin.to_array(),
+        min: measured.bounds.min.to_array(),
+        max: measured.bounds.max.to_array(),
+        max_error: measured.max_error + spec.rounding,
+        positions: sections[POSITIONS],
+        wide: sections[wide],
+        nodes: sections[NODES],
+        radius: match spec.radius {
+            RadiusSpec::None => RadiusIndex::None,
+            RadiusSpec::Common(radius) => RadiusIndex::Common(radius),
+            RadiusSpec::PerParticle(range) => RadiusIndex::PerParticle(RadiiIndex {
+                code: range.code.code(),
+                low: range.low,
+                high: range.high,
+                max_error: measured.radius_error,
+                section: sections[RADII],
+            }),
+        },
+        attributes: attributes.map(attribute).collect(),
+        time: spec.time,
+        step: spec.step,
+        dropped: spec.dropped,
     }
 }
 
@@ -323,11 +334,13 @@ pub fn wide_blocks(
     radius: Option<f32>,
 ) -> usize {
     let allowed = Allowed { bound, radius };
-    match encoding {
+    let runs = positions.chunks(CODED_LEN);
+    runs.map(|run| match encoding {
         Encoding::F32 => 0,
-        Encoding::Q16 => encode::<Q16Block>(positions, None, allowed).wide.len(),
-        Encoding::Q10 => encode::<Q10Block>(positions, None, allowed).wide.len(),
-    }
+        Encoding::Q16 => encode::<Q16Block>(run, None, allowed).wide.len(),
+        Encoding::Q10 => encode::<Q10Block>(run, None, allowed).wide.len(),
+    })
+    .sum()
 }
 
 /// Bytes of an attribute's values for one particle.
@@ -337,59 +350,4 @@ fn width(attribute: &AttributeSpec) -> u64 {
 
 fn invalid(what: String) -> io::Error {
     io::Error::new(io::ErrorKind::InvalidInput, what)
-}
-
-/// Gives sections their places, one after the other.
-struct Places {
-    next: u64,
-}
-
-impl Places {
-    /// A section of `len` bytes; none if that is beyond 64 bits.
-    fn section(&mut self, len: u64) -> Option<Filling> {
-        let offset = self.next;
-        self.next = offset.checked_add(len)?.checked_next_multiple_of(ALIGN)?;
-        Some(Filling {
-            offset,
-            len,
-            filled: 0,
-            hash: Xxh3::new(),
-        })
-    }
-}
-
-impl fmt::Debug for Filling {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "{} of {} bytes at {}",
-            self.filled, self.len, self.offset
-        )
-    }
-}
-
-impl Filling {
-    fn append(&mut self, file: &Unpublished, bytes: &[u8]) -> io::Result<()> {
-        debug_assert!(
-            self.filled + bytes.len() as u64 <= self.len,
-            "checked before"
-        );
-        file.write_all_at(bytes, self.offset + self.filled)?;
-        self.filled += bytes.len() as u64;
-        self.hash.update(bytes);
-        Ok(())
-    }
-
-    /// Where the next section may begin.
-    fn end(&self) -> u64 {
-        (self.offset + self.len).next_multiple_of(ALIGN)
-    }
-
-    fn done(&self) -> Section {
-        Section {
-            offset: self.offset,
-            len: self.len,
-            xxh3: self.hash.digest(),
-        }
-    }
 }

@@ -85,16 +85,16 @@ impl Drop for Unpublished {
 ///
 /// # Errors
 /// Whatever creating, writing, syncing or renaming says; the temporary file is removed then.
-pub(crate) fn publish(
+pub(crate) fn publish<E: From<io::Error>>(
     path: &Path,
-    fill: impl FnOnce(&mut BufWriter<&File>) -> io::Result<()>,
-) -> io::Result<()> {
+    fill: impl FnOnce(&mut BufWriter<&File>) -> Result<(), E>,
+) -> Result<(), E> {
     let file = Unpublished::create(path)?;
     let mut writer = BufWriter::with_capacity(1 << 18, &file.file);
     fill(&mut writer)?;
     writer.flush()?;
     drop(writer);
-    file.publish()
+    Ok(file.publish()?)
 }
 
 /// Hidden and ending in `.part`, so that no listing takes it for a frame; distinct for each

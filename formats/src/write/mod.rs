@@ -5,3 +5,5 @@ pub(crate) mod atomic;
 
 pub mod npy;
 pub mod vtk;
+
+mod stream;

@@ -6,7 +6,9 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::atomic::publish;
+use super::stream::{publish_stream, write_positions};
 use crate::FrameError;
+use crate::convert::{ConvertError, ParticleSource, Progress};
 
 /// Writes `positions` to `path`, whole or not at all.
 ///
@@ -16,17 +18,24 @@ pub fn write(path: &Path, positions: &[Vec3]) -> Result<(), FrameError> {
     publish(path, |file| fill(file, positions)).map_err(|e| FrameError::io(path, e))
 }
 
+/// Writes the positions of `source` to `path` in its order, rounded to f32, whole or not at all; attributes have
+/// no place in the format.
+///
+/// # Errors
+/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` wants that.
+pub fn stream(
+    path: &Path,
+    source: &dyn ParticleSource,
+    progress: &dyn Progress,
+) -> Result<(), ConvertError> {
+    publish_stream(path, |file| {
+        fill_header(file, source.count())?;
+        write_positions(file, source, progress, f32::to_le_bytes)
+    })
+}
+
 fn fill(file: &mut impl Write, positions: &[Vec3]) -> io::Result<()> {
-    let dict = format!(
-        "{{'descr': '<f4', 'fortran_order': False, 'shape': ({}, 3), }}",
-        positions.len()
-    );
-    // Magic, version and length take 10 bytes; data begin at a multiple of 64, after a newline.
-    let header_len = (10 + dict.len() + 1).next_multiple_of(64) - 10;
-    let length = u16::try_from(header_len).map_err(io::Error::other)?;
-    file.write_all(b"\x93NUMPY\x01\x00")?;
-    file.write_all(&length.to_le_bytes())?;
-    writeln!(file, "{dict:width$}", width = header_len - 1)?;
+    fill_header(file, positions.len() as u64)?;
     for p in positions {
         for value in p.to_array() {
             file.write_all(&value.to_le_bytes())?;
@@ -35,9 +44,21 @@ fn fill(file: &mut impl Write, positions: &[Vec3]) -> io::Result<()> {
     Ok(())
 }
 
+fn fill_header(file: &mut impl Write, count: u64) -> io::Result<()> {
+    let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 3), }}");
+    // Magic, version and length take 10 bytes; data begin at a multiple of 64, after a newline.
+    let header_len = (10 + dict.len() + 1).next_multiple_of(64) - 10;
+    let length = u16::try_from(header_len).map_err(io::Error::other)?;
+    file.write_all(b"\x93NUMPY\x01\x00")?;
+    file.write_all(&length.to_le_bytes())?;
+    writeln!(file, "{dict:width$}", width = header_len - 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::convert::BoxSource;
+    use crate::generate::{BoxSettings, fill_box};
 
     #[test]
     fn the_file_is_what_numpy_writes() {
@@ -58,5 +79,16 @@ mod tests {
                 assert_eq!(bytes[bytes.len() - 4..], (-3.0f32).to_le_bytes());
             }
         }
+    }
+
+    #[test]
+    fn streams_are_the_same_files() {
+        let settings = BoxSettings::thesis(20_000, 3);
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (whole, streamed) = (dir.path().join("a.npy"), dir.path().join("b.npy"));
+        write(&whole, &fill_box(&settings)).expect("writable");
+        stream(&streamed, &BoxSource::new(settings, None), &()).expect("writable");
+        let bytes = |path: &Path| std::fs::read(path).expect("readable");
+        assert!(bytes(&whole) == bytes(&streamed));
     }
 }

@@ -1,4 +1,5 @@
-//! Legacy VTK 4.2, binary POLYDATA: a vertex a particle, attributes as field arrays.
+//! Legacy VTK, binary POLYDATA: a vertex a particle, attributes as field arrays. Version 4.2; 5.1, whose cells
+//! are counted in 64 bits, for more particles than 4.2 can number.
 
 use std::io::{self, Write};
 use std::path::Path;
@@ -6,7 +7,9 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::atomic::publish;
+use super::stream::{Ended, publish_stream, write_numbers, write_positions, write_values};
 use crate::attribute::with_values;
+use crate::convert::{ConvertError, ParticleSource, Progress};
 use crate::{Attribute, FrameError, ScalarType};
 
 /// Writes `positions` and `attributes` (each one value group a particle) to `path`, whole or not
@@ -17,6 +20,91 @@ use crate::{Attribute, FrameError, ScalarType};
 /// 32-bit cells can count.
 pub fn write(path: &Path, positions: &[Vec3], attributes: &[Attribute]) -> Result<(), FrameError> {
     publish(path, |file| fill(file, positions, attributes)).map_err(|e| FrameError::io(path, e))
+}
+
+/// Writes what `source` has to `path` in its order, positions rounded to f32, whole or not at all. Blanks in
+/// names become `_`, as the format wants it.
+///
+/// # Errors
+/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` wants that.
+pub fn stream(
+    path: &Path,
+    source: &dyn ParticleSource,
+    progress: &dyn Progress,
+) -> Result<(), ConvertError> {
+    let cells = if source.count() <= MOST_SHORT {
+        Cells::Short
+    } else {
+        Cells::Long
+    };
+    publish_stream(path, |file| fill_from(file, source, progress, cells))
+}
+
+/// Particles that version 4.2 can number: the list of cells has two i32 a particle and its length is an i32.
+const MOST_SHORT: u64 = (i32::MAX / 2) as u64;
+
+/// How cells are written.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Cells {
+    /// Version 4.2: in each cell its length and its particle, 32 bits.
+    Short,
+    /// Version 5.1: where each cell ends, and the particles, 64 bits.
+    Long,
+}
+
+fn fill_from(
+    file: &mut impl Write,
+    source: &dyn ParticleSource,
+    progress: &dyn Progress,
+    cells: Cells,
+) -> Result<(), Ended> {
+    let count = source.count();
+    let version = match cells {
+        Cells::Short => "4.2",
+        Cells::Long => "5.1",
+    };
+    write!(
+        file,
+        "# vtk DataFile Version {version}\nparticles\nBINARY\nDATASET POLYDATA\nPOINTS {count} float\n"
+    )?;
+    write_positions(file, source, progress, f32::to_be_bytes)?;
+    match cells {
+        Cells::Short => {
+            write!(file, "\nVERTICES {count} {}\n", 2 * count)?;
+            // Both halves of the number: one particle, and which.
+            write_numbers(file, count, progress, |i| ((1 << 32) | i).to_be_bytes())?;
+        }
+        Cells::Long => {
+            write!(
+                file,
+                "\nVERTICES {} {count}\nOFFSETS vtktypeint64\n",
+                count + 1
+            )?;
+            write_numbers(file, count + 1, progress, u64::to_be_bytes)?;
+            write!(file, "\nCONNECTIVITY vtktypeint64\n")?;
+            write_numbers(file, count, progress, u64::to_be_bytes)?;
+        }
+    }
+    writeln!(file)?;
+    let attributes = source.attributes();
+    if attributes.is_empty() {
+        return Ok(());
+    }
+    let arrays = attributes.len();
+    write!(file, "POINT_DATA {count}\nFIELD FieldData {arrays}\n")?;
+    for (number, a) in attributes.iter().enumerate() {
+        let (name, kind) = (word(&a.name), type_name(a.scalar));
+        writeln!(file, "{name} {} {count} {kind}", a.components)?;
+        write_values(file, source, number, progress)?;
+        writeln!(file)?;
+    }
+    Ok(())
+}
+
+/// A name without blanks.
+fn word(name: &str) -> String {
+    let blank_free = |c: char| if c.is_whitespace() { '_' } else { c };
+    name.chars().map(blank_free).collect()
 }
 
 fn fill(file: &mut impl Write, positions: &[Vec3], attributes: &[Attribute]) -> io::Result<()> {
@@ -57,11 +145,7 @@ fn fill(file: &mut impl Write, positions: &[Vec3], attributes: &[Attribute]) -> 
                 a.name
             )));
         }
-        let name: String = a
-            .name
-            .chars()
-            .map(|c| if c.is_whitespace() { '_' } else { c })
-            .collect();
+        let name = word(&a.name);
         let kind = type_name(a.data.scalar_type());
         writeln!(file, "{name} {} {count} {kind}", a.components)?;
         with_values!(&a.data, v => v.iter().try_for_each(|x| file.write_all(&x.to_be_bytes())))?;
@@ -89,7 +173,9 @@ const fn type_name(kind: ScalarType) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::AttributeData;
+    use crate::convert::{BlockSettings, BlockSource};
+    use crate::detect::Format;
+    use crate::{AttributeData, Positions};
 
     fn attribute(values: Vec<u16>) -> Attribute {
         Attribute {
@@ -125,5 +211,42 @@ mod tests {
         assert!(error.to_string().contains("my id") && !path.exists());
         write(&path, &[], &[]).expect("writable");
         assert!(path.exists());
+    }
+
+    #[test]
+    fn streams_hold_what_their_source_has() {
+        let source = BlockSource::new(BlockSettings {
+            count: 40_000,
+            seed: 2,
+            radius: None,
+            has_velocity: true,
+        });
+        let read = |cells: Cells| {
+            let mut bytes = Vec::new();
+            assert!(fill_from(&mut bytes, &source, &(), cells).is_ok());
+            let steps = Format::VtkLegacy.steps(&bytes).expect("whole");
+            Format::VtkLegacy.read(&bytes, &steps[0]).expect("whole")
+        };
+        let (short, long) = (read(Cells::Short), read(Cells::Long));
+        assert_eq!(short, long);
+        let mut expected = vec![glam::DVec3::ZERO; 40_000];
+        source.read_positions(0, &mut expected).expect("made");
+        for (i, expected) in expected.iter().enumerate() {
+            assert_eq!(short.positions.get(i), *expected);
+        }
+        let mut values = vec![0; 12 * 40_000];
+        source.read_values(0, 0, &mut values).expect("made");
+        let velocity = ScalarType::F32.decode(crate::Endian::Little, &values);
+        assert_eq!(short.attributes[0].data, velocity.expect("whole"));
+
+        let Positions::F32(positions) = &short.positions else {
+            panic!("written in f32")
+        };
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let (whole, streamed) = (dir.path().join("a.vtk"), dir.path().join("b.vtk"));
+        write(&whole, positions, &short.attributes).expect("writable");
+        stream(&streamed, &source, &()).expect("writable");
+        let bytes = |path: &Path| std::fs::read(path).expect("readable");
+        assert!(bytes(&whole) == bytes(&streamed));
     }
 }

@@ -12,6 +12,8 @@ use crate::harness::{Ran, Workshop};
 
 mod check;
 #[cfg(target_os = "linux")]
+mod generate;
+#[cfg(target_os = "linux")]
 mod leak;
 mod limit;
 #[cfg(target_os = "linux")]

@@ -1,0 +1,160 @@
+//! A few particles on their way out of the source: finite ones only, relative to the origin, with their rows.
+
+use std::sync::Mutex;
+
+use glam::{DVec3, Vec3};
+
+use super::columns::{Columns, RadiusColumn};
+use super::source::ParticleSource;
+use crate::FrameError;
+
+/// Particles of one stretch of the source, and room to read them.
+#[derive(Debug, Default)]
+pub(super) struct Batch {
+    /// Relative to the origin, finite.
+    pub(super) positions: Vec<Vec3>,
+    /// A row for each of them.
+    pub(super) rows: Vec<u8>,
+    /// Where in the stretch they were; empty if all of it is finite.
+    kept: Vec<u32>,
+    /// As the source gives them.
+    pub(super) world: Vec<DVec3>,
+    pub(super) values: Vec<u8>,
+}
+
+/// A stretch of the source.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Stretch {
+    pub(super) first: u64,
+    pub(super) len: usize,
+}
+
+impl Stretch {
+    /// Stretch number `number` of those of `len` that `count` particles are cut into.
+    pub(super) fn nth(number: u64, len: usize, count: u64) -> Self {
+        let first = number * len as u64;
+        let left = usize::try_from(count - first).unwrap_or(usize::MAX);
+        Self {
+            first,
+            len: left.min(len),
+        }
+    }
+}
+
+impl Batch {
+    /// Reads the positions of `stretch`.
+    pub(super) fn read_positions(
+        &mut self,
+        source: &dyn ParticleSource,
+        origin: DVec3,
+        stretch: Stretch,
+    ) -> Result<(), FrameError> {
+        self.world.resize(stretch.len, DVec3::ZERO);
+        source.read_positions(stretch.first, &mut self.world)?;
+        self.positions.clear();
+        self.kept.clear();
+        let relative = |p: &DVec3| (*p - origin).as_vec3();
+        self.positions.extend(self.world.iter().map(relative));
+        if self.positions.iter().all(|p| p.is_finite()) {
+            return Ok(());
+        }
+        let numbered = (0..).zip(&self.positions);
+        let finite = numbered.filter(|(_, p)| p.is_finite());
+        self.kept.extend(finite.map(|(number, _)| number));
+        self.positions.retain(|p| p.is_finite());
+        Ok(())
+    }
+
+    /// Calls `see` with the place in the stretch of each particle that is kept.
+    pub(super) fn for_each_place(&self, mut see: impl FnMut(usize)) {
+        if self.kept.len() == self.positions.len() {
+            self.kept.iter().for_each(|place| see(*place as usize));
+        } else {
+            (0..self.positions.len()).for_each(see);
+        }
+    }
+
+    /// Reads the values of attribute `attribute`, `width` bytes for each particle of `stretch`.
+    pub(super) fn read_values(
+        &mut self,
+        source: &dyn ParticleSource,
+        attribute: usize,
+        width: usize,
+        stretch: Stretch,
+    ) -> Result<(), FrameError> {
+        self.values.resize(stretch.len * width, 0);
+        source.read_values(attribute, stretch.first, &mut self.values)
+    }
+
+    /// Reads the rows of the particles whose positions were read; `errors` grow to the largest error of each
+    /// attribute.
+    pub(super) fn read_rows(
+        &mut self,
+        source: &dyn ParticleSource,
+        columns: &Columns,
+        stretch: Stretch,
+        errors: &mut [f64],
+    ) -> Result<(), FrameError> {
+        let width = columns.width();
+        self.rows.resize(self.positions.len() * width, 0);
+        if width == 0 {
+            return Ok(());
+        }
+        let mut rows = std::mem::take(&mut self.rows);
+        let mut at = 0;
+        if let Some(radius) = &columns.radius {
+            let size = source.attributes()[radius.attribute].width();
+            self.read_values(source, radius.attribute, size, stretch)?;
+            let mut row = rows.chunks_exact_mut(width);
+            self.for_each_place(|place| {
+                let value = &self.values[place * size..][..size];
+                let own = radius.radii(value).zip(row.next());
+                own.for_each(|(radius, row)| row[..4].copy_from_slice(&radius.to_le_bytes()));
+            });
+            at += RadiusColumn::WIDTH;
+        }
+        for (column, error) in columns.attributes.iter().zip(errors) {
+            let size = column.source_width();
+            match column.attribute {
+                Some(attribute) => self.read_values(source, attribute, size, stretch)?,
+                None => self.fill_places(size, stretch),
+            }
+            let own = at..at + column.width();
+            let mut row = rows.chunks_exact_mut(width);
+            self.for_each_place(|place| {
+                let value = &self.values[place * size..][..size];
+                if let Some(row) = row.next() {
+                    *error = error.max(column.store(value, &mut row[own.clone()]));
+                }
+            });
+            at = own.end;
+        }
+        self.rows = rows;
+        Ok(())
+    }
+
+    /// The places of the particles in the source as values of `size` bytes.
+    fn fill_places(&mut self, size: usize, stretch: Stretch) {
+        self.values.clear();
+        for place in stretch.first..stretch.first + stretch.len as u64 {
+            self.values.extend_from_slice(&place.to_le_bytes()[..size]);
+        }
+    }
+}
+
+/// Things that are used again, as many as are in use at a time: what a thread takes costs no memory that another
+/// has let go.
+#[derive(Debug, Default)]
+pub(super) struct Shelf<T>(Mutex<Vec<T>>);
+
+impl<T: Default> Shelf<T> {
+    pub(super) fn take(&self) -> T {
+        let mut all = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        all.pop().unwrap_or_default()
+    }
+
+    pub(super) fn put(&self, thing: T) {
+        let mut all = self.0.lock().unwrap_or_else(|e| e.into_inner());
+        all.push(thing);
+    }
+}

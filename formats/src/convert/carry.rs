@@ -1,0 +1,123 @@
+//! Nodes are of one part only: what is too much for whole nodes goes on to the next part.
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::curve::Curve;
+use super::order::Part;
+
+/// Particles that a task counts.
+const TASK: usize = 1 << 16;
+
+/// Takes from `part` those particles beyond a multiple of `unit` that are last on `curve`: the next part begins
+/// where they are.
+pub(super) fn carry_last(part: &mut Part, curve: &Curve, width: usize, unit: usize) -> Part {
+    let count = part.len() % unit;
+    let mut carried = last_on(&part.positions, curve, count);
+    carried.sort_unstable();
+    part.take(&carried, width)
+}
+
+/// The numbers of the `count` particles that are last on the curve.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "a part has fewer than 2^32 particles"
+)]
+fn last_on(positions: &[Vec3], curve: &Curve, count: usize) -> Vec<u32> {
+    if count == 0 {
+        return Vec::new();
+    }
+    let counts = count_cells(positions, curve);
+    // The cell that has the first of them; all particles of the cells behind it are among them.
+    let (mut cell, mut behind) = (counts.len() - 1, 0);
+    while behind + counts[cell] < count {
+        behind += counts[cell];
+        cell -= 1;
+    }
+    let numbered = positions.par_iter().enumerate();
+    let in_cells = |low: usize, high: usize| {
+        let is_there = move |(number, position): (usize, &Vec3)| {
+            let own = curve.cell(*position);
+            (low <= own && own < high).then_some(number as u32)
+        };
+        numbered
+            .clone()
+            .with_min_len(TASK)
+            .filter_map(is_there)
+            .collect::<Vec<u32>>()
+    };
+    let mut last = in_cells(cell + 1, usize::MAX);
+    let wanted = count - behind;
+    let mut own = in_cells(cell, cell + 1);
+    let rest = own.len() - wanted;
+    if rest > 0 && own.len() <= positions.len() / 8 {
+        let place = |number: &u32| (curve.place(positions[*number as usize]), *number);
+        let mut places: Vec<(u64, u32)> = own.par_iter().map(place).collect();
+        places.select_nth_unstable(rest);
+        own = places.into_iter().map(|(_, number)| number).collect();
+    }
+    // Of a cell with very many any are taken: they are too close together to matter, and too many to sort.
+    last.extend(&own[rest..]);
+    last
+}
+
+/// Particles in each cell of the curve.
+fn count_cells(positions: &[Vec3], curve: &Curve) -> Vec<usize> {
+    let counted = |positions: &[Vec3]| {
+        let mut counts = vec![0_usize; curve.cells()];
+        positions.iter().for_each(|p| counts[curve.cell(*p)] += 1);
+        counts
+    };
+    let sum = |mut a: Vec<usize>, b: Vec<usize>| {
+        a.iter_mut().zip(b).for_each(|(a, b)| *a += b);
+        a
+    };
+    let none = || vec![0; curve.cells()];
+    positions.par_chunks(TASK).map(counted).reduce(none, sum)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::native::tests::clustered;
+
+    /// Every particle of `all` is in one of `parts`, with its own row: its number.
+    #[track_caller]
+    fn assert_complete(all: &[Vec3], parts: [&Part; 2]) {
+        let mut seen = vec![false; all.len()];
+        for part in parts {
+            assert_eq!(part.rows.len(), 4 * part.len());
+            for (position, row) in part.positions.iter().zip(part.rows.as_chunks().0) {
+                let number = u32::from_le_bytes(*row) as usize;
+                assert_eq!(all[number], *position);
+                assert!(!std::mem::replace(&mut seen[number], true));
+            }
+        }
+        assert!(seen.into_iter().all(|s| s));
+    }
+
+    #[test]
+    fn the_last_on_the_curve_go_on() {
+        let coincident = vec![Vec3::splat(2.0); 3000];
+        for all in [
+            clustered(10_000),
+            clustered(700),
+            clustered(2048),
+            coincident,
+        ] {
+            let curve = Curve::over(&all);
+            let mut part = Part {
+                rows: (0..).take(all.len()).flat_map(u32::to_le_bytes).collect(),
+                positions: all.clone(),
+            };
+            let carried = carry_last(&mut part, &curve, 4, 1024);
+            assert_eq!((part.len() % 1024, carried.len()), (0, all.len() % 1024));
+            assert_complete(&all, [&part, &carried]);
+            let places = |part: &Part| -> Vec<u64> {
+                part.positions.iter().map(|p| curve.place(*p)).collect()
+            };
+            let (before, after) = (places(&part), places(&carried));
+            assert!(before.iter().max() <= after.iter().min() || after.is_empty());
+        }
+    }
+}

@@ -1,0 +1,272 @@
+//! What is kept of a particle beside its position: a row of bytes that goes with it.
+
+use std::path::Path;
+
+use half::f16;
+
+use super::settings::{AttributeChoice, ConvertError, ConvertSettings, RadiusRule};
+use super::source::{ParticleSource, SourceAttribute};
+use crate::ScalarType;
+use crate::native::{AttributeSpec, StoredType};
+
+/// The rows of a conversion: the radius in f32 first where particles have their own, then attributes as they
+/// will be stored.
+#[derive(Debug, Clone)]
+pub(super) struct Columns {
+    pub(super) radius: Option<RadiusColumn>,
+    pub(super) attributes: Vec<Column>,
+}
+
+/// Radii of their own.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RadiusColumn {
+    /// Number of the attribute in the source.
+    pub(super) attribute: usize,
+    scalar: ScalarType,
+    scale: f64,
+}
+
+/// One attribute.
+#[derive(Debug, Clone)]
+pub(super) struct Column {
+    /// Number in the source; `None` for a particle's place in it.
+    pub(super) attribute: Option<usize>,
+    pub(super) name: String,
+    pub(super) components: usize,
+    pub(super) scalar: ScalarType,
+    pub(super) stored: StoredType,
+    /// Of each component, for [`StoredType::Ranged`].
+    pub(super) ranges: Vec<[f64; 2]>,
+}
+
+impl RadiusColumn {
+    pub(super) const WIDTH: usize = size_of::<f32>();
+
+    /// Radii of particles whose values in the source are `values`.
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "radii are f32 in the renderer"
+    )]
+    pub(super) fn radii<'a>(&self, values: &'a [u8]) -> impl Iterator<Item = f32> + use<'a> {
+        let Self { scalar, scale, .. } = *self;
+        let stored = StoredType::Plain(scalar);
+        let values = values.chunks_exact(scalar.size());
+        values.map(move |value| (stored.value(value, [0.0; 2]) * scale) as f32)
+    }
+}
+
+impl Column {
+    /// Bytes of one particle in the source.
+    pub(super) fn source_width(&self) -> usize {
+        self.components * self.scalar.size()
+    }
+
+    /// Bytes of one particle as stored.
+    pub(super) fn width(&self) -> usize {
+        self.components * self.stored.size()
+    }
+
+    /// Stores the values of one particle; returns the largest error.
+    #[inline]
+    pub(super) fn store(&self, values: &[u8], to: &mut [u8]) -> f64 {
+        if let StoredType::Plain(_) = self.stored {
+            to.copy_from_slice(values);
+            return 0.0;
+        }
+        let plain = StoredType::Plain(self.scalar);
+        let values = values.chunks_exact(self.scalar.size());
+        let mut largest = 0.0_f64;
+        match self.stored {
+            StoredType::Plain(_) => {}
+            StoredType::Half => {
+                for (value, to) in values.zip(to.chunks_exact_mut(2)) {
+                    let value = plain.value(value, [0.0; 2]);
+                    let half = f16::from_f64(value);
+                    to.copy_from_slice(&half.to_le_bytes());
+                    largest = largest.max(difference(value, half.to_f64()));
+                }
+            }
+            StoredType::Ranged => {
+                for ((value, to), range) in values.zip(to).zip(&self.ranges) {
+                    let value = plain.value(value, [0.0; 2]);
+                    *to = code_of(value, *range);
+                    let stored = StoredType::Ranged.value(&[*to], *range);
+                    largest = largest.max(difference(value, stored));
+                }
+            }
+        }
+        largest
+    }
+
+    pub(super) fn spec(&self, max_error: f64) -> AttributeSpec {
+        AttributeSpec {
+            name: self.name.clone(),
+            components: u32::try_from(self.components).unwrap_or(u32::MAX),
+            stored: self.stored,
+            ranges: self.ranges.clone(),
+            max_error,
+        }
+    }
+}
+
+/// Infinities and what is no number are stored as such where they can be.
+fn difference(value: f64, stored: f64) -> f64 {
+    let is_same = value == stored || value.is_nan() && stored.is_nan();
+    if is_same { 0.0 } else { (value - stored).abs() }
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "a cast saturates"
+)]
+fn code_of(value: f64, range: [f64; 2]) -> u8 {
+    let (low, step) = StoredType::ranged(range);
+    if step > 0.0 {
+        ((value - low) / step).round() as u8
+    } else {
+        0
+    }
+}
+
+impl Columns {
+    /// What `settings` keep of `source`.
+    pub(super) fn choose(
+        source: &dyn ParticleSource,
+        settings: &ConvertSettings,
+        path: &Path,
+    ) -> Result<Self, ConvertError> {
+        let attributes = source.attributes();
+        check(attributes, settings, path)?;
+        let radius = match settings.radius {
+            RadiusRule::All(_) => None,
+            RadiusRule::Source { .. } => radius_of(attributes),
+        };
+        let has_radius = match settings.radius {
+            RadiusRule::All(_) => true,
+            RadiusRule::Source { otherwise } => {
+                radius.is_some() || source.common_radius().or(otherwise).is_some()
+            }
+        };
+        let mut columns = Vec::new();
+        for (number, attribute) in attributes.iter().enumerate() {
+            let stored = match settings.choice(&attribute.name) {
+                AttributeChoice::AsIs => StoredType::Plain(attribute.scalar),
+                AttributeChoice::Half => StoredType::Half,
+                AttributeChoice::Ranged => StoredType::Ranged,
+                AttributeChoice::LeaveOut => continue,
+            };
+            // Radii are stored once.
+            if has_radius && is_float(attribute) && attribute.name.eq_ignore_ascii_case("radius") {
+                continue;
+            }
+            columns.push(Column {
+                attribute: Some(number),
+                name: attribute.name.clone(),
+                components: attribute.components,
+                scalar: attribute.scalar,
+                stored,
+                ranges: Vec::new(),
+            });
+        }
+        let has_ids = attributes.iter().any(|a| a.name.eq_ignore_ascii_case("id"));
+        if settings.keep_ids && !has_ids {
+            columns.push(place_column(source.count()));
+        }
+        Ok(Self {
+            radius,
+            attributes: columns,
+        })
+    }
+
+    /// Bytes of a row.
+    pub(super) fn width(&self) -> usize {
+        let radius = self.radius.map_or(0, |_| RadiusColumn::WIDTH);
+        radius + self.attributes.iter().map(Column::width).sum::<usize>()
+    }
+
+    /// Most bytes that one particle has for one attribute of the source.
+    pub(super) fn widest(&self) -> usize {
+        let widths = self.attributes.iter().map(Column::source_width);
+        widths.chain([8]).max().unwrap_or(8)
+    }
+}
+
+impl ConvertSettings {
+    fn choice(&self, name: &str) -> AttributeChoice {
+        let named = self.attributes.iter().find(|(n, _)| n == name);
+        named.map_or(self.other_attributes, |(_, choice)| *choice)
+    }
+}
+
+fn place_column(count: u64) -> Column {
+    let is_short = u32::try_from(count).is_ok();
+    let scalar = if is_short {
+        ScalarType::U32
+    } else {
+        ScalarType::U64
+    };
+    Column {
+        attribute: None,
+        name: "id".to_owned(),
+        components: 1,
+        scalar,
+        stored: StoredType::Plain(scalar),
+        ranges: Vec::new(),
+    }
+}
+
+fn is_float(attribute: &SourceAttribute) -> bool {
+    let is_float = matches!(attribute.scalar, ScalarType::F32 | ScalarType::F64);
+    is_float && attribute.components == 1
+}
+
+/// Radii by the names that simulations and Houdini use.
+fn radius_of(attributes: &[SourceAttribute]) -> Option<RadiusColumn> {
+    let named = |(wanted, scale): (&str, f64)| {
+        let is_it = |a: &SourceAttribute| is_float(a) && a.name.eq_ignore_ascii_case(wanted);
+        let attribute = attributes.iter().position(is_it)?;
+        let scalar = attributes[attribute].scalar;
+        Some(RadiusColumn {
+            attribute,
+            scalar,
+            scale,
+        })
+    };
+    [("radius", 1.0), ("pscale", 1.0), ("diameter", 0.5)]
+        .into_iter()
+        .find_map(named)
+}
+
+fn check(
+    attributes: &[SourceAttribute],
+    settings: &ConvertSettings,
+    path: &Path,
+) -> Result<(), ConvertError> {
+    for (name, _) in &settings.attributes {
+        if !attributes.iter().any(|a| a.name == *name) {
+            let there: Vec<&str> = attributes.iter().map(|a| a.name.as_str()).collect();
+            let there = if there.is_empty() {
+                "there are none".to_owned()
+            } else {
+                format!("there are {}", there.join(", "))
+            };
+            let what = format!("no attribute is called {name}; {there}");
+            return Err(ConvertError::refused(path, what));
+        }
+    }
+    if let RadiusRule::All(radius)
+    | RadiusRule::Source {
+        otherwise: Some(radius),
+    } = settings.radius
+        && !is_radius(radius)
+    {
+        let what = format!("{radius} is no radius; give one above zero");
+        return Err(ConvertError::refused(path, what));
+    }
+    Ok(())
+}
+
+pub(super) fn is_radius(radius: f32) -> bool {
+    radius.is_finite() && radius >= 0.0
+}

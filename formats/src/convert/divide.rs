@@ -1,0 +1,236 @@
+//! Particles are brought into the parts of a curve: stretches of the source, or chunks of a part that is too
+//! large, are sorted by part one by one, many at a time, and then appended to their parts in their order.
+
+use std::ops::Range;
+use std::sync::{Arc, Mutex};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::batch::{Batch, Shelf, Stretch};
+use super::curve::Cuts;
+use super::limits::Limits;
+use super::output::Output;
+use super::settings::{ConvertError, Phase};
+use super::store::{Chunk, Held, Store};
+use crate::FrameError;
+
+/// Particles that are together in one stretch of a curve.
+#[derive(Debug)]
+pub(super) struct Pile {
+    pub(super) held: Vec<Held>,
+    pub(super) len: usize,
+    /// The curve that it was cut from.
+    pub(super) cuts: Arc<Cuts>,
+    /// How often it was divided from a larger one.
+    pub(super) depth: u32,
+}
+
+/// A part that is being filled.
+#[derive(Debug, Default)]
+struct Heap {
+    held: Vec<Held>,
+    len: usize,
+    open: Option<Chunk>,
+}
+
+/// Records of a stretch, sorted by part.
+#[derive(Debug, Default)]
+struct Staged {
+    positions: Vec<Vec3>,
+    rows: Vec<u8>,
+    /// Where each part begins, and the end.
+    starts: Vec<u32>,
+    /// Parts of the particles before they were sorted.
+    parts: Vec<u16>,
+}
+
+/// All of the source in parts.
+pub(super) fn divide_source(
+    output: &mut Output,
+    cuts: Cuts,
+    limits: &Limits,
+    store: &Store,
+) -> Result<Vec<Pile>, ConvertError> {
+    let (asked, columns) = (output.asked, output.columns);
+    let width = columns.width();
+    let total = asked.source.count();
+    let stretches = total.div_ceil(limits.batch_len as u64);
+    let (batches, stages) = (Shelf::<Batch>::default(), Shelf::<Staged>::default());
+    let errors = Mutex::new(std::mem::take(&mut output.errors));
+    let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
+    let mut first = 0;
+    while first < stretches {
+        let end = stretches.min(first + limits.window as u64);
+        let staged = (first..end)
+            .into_par_iter()
+            .map(|number| {
+                let (mut batch, mut staged) = (batches.take(), stages.take());
+                let stretch = Stretch::nth(number, limits.batch_len, total);
+                batch.read_positions(asked.source, asked.settings.origin, stretch)?;
+                let mut own_errors = vec![0.0; columns.attributes.len()];
+                batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
+                let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());
+                for (all, own) in errors.iter_mut().zip(own_errors) {
+                    *all = f64::max(*all, own);
+                }
+                drop(errors);
+                staged.sort(&batch.positions, &batch.rows, width, &cuts);
+                batches.put(batch);
+                Ok(staged)
+            })
+            .collect::<Result<Vec<Staged>, ConvertError>>()?;
+        append_all(&mut heaps, &staged, width, store)?;
+        staged.into_iter().for_each(|s| stages.put(s));
+        first = end;
+        let done = total.min(first * limits.batch_len as u64);
+        asked.advance(Phase::Divide, done, total)?;
+    }
+    output.errors = errors.into_inner().unwrap_or_else(|e| e.into_inner());
+    let piles = closed(heaps, cuts, 1, store)?;
+    let found: u64 = piles.iter().map(|pile| pile.len as u64).sum();
+    if found != output.survey.count {
+        return Err(asked.changed());
+    }
+    Ok(piles)
+}
+
+/// `pile` in smaller parts.
+pub(super) fn divide_pile(
+    pile: Pile,
+    cuts: Cuts,
+    width: usize,
+    limits: &Limits,
+    store: &Store,
+) -> Result<Vec<Pile>, ConvertError> {
+    let stages = Shelf::<Staged>::default();
+    let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
+    let together = (limits.window * limits.batch_len / store.chunk_len()).max(1);
+    let mut held = pile.held.into_iter();
+    loop {
+        let some: Vec<Held> = held.by_ref().take(together).collect();
+        if some.is_empty() {
+            break;
+        }
+        let staged = some
+            .into_par_iter()
+            .map(|held| {
+                let mut staged = stages.take();
+                store.give_back(held, |chunk| {
+                    staged.sort(&chunk.positions, &chunk.rows, width, &cuts);
+                })?;
+                Ok(staged)
+            })
+            .collect::<Result<Vec<Staged>, FrameError>>()?;
+        append_all(&mut heaps, &staged, width, store)?;
+        staged.into_iter().for_each(|s| stages.put(s));
+    }
+    closed(heaps, cuts, pile.depth + 1, store)
+}
+
+fn append_all(
+    heaps: &mut [Heap],
+    staged: &[Staged],
+    width: usize,
+    store: &Store,
+) -> Result<(), FrameError> {
+    heaps
+        .par_iter_mut()
+        .enumerate()
+        .try_for_each(|(part, heap)| {
+            staged
+                .iter()
+                .try_for_each(|staged| heap.append(staged, staged.of(part), width, store))
+        })
+}
+
+fn closed(
+    heaps: Vec<Heap>,
+    cuts: Cuts,
+    depth: u32,
+    store: &Store,
+) -> Result<Vec<Pile>, ConvertError> {
+    let cuts = Arc::new(cuts);
+    let mut piles = Vec::with_capacity(heaps.len());
+    for mut heap in heaps {
+        if let Some(open) = heap.open.take() {
+            heap.held.push(store.put(open)?);
+        }
+        piles.push(Pile {
+            held: heap.held,
+            len: heap.len,
+            cuts: Arc::clone(&cuts),
+            depth,
+        });
+    }
+    store.settle()?;
+    Ok(piles)
+}
+
+impl Heap {
+    /// Takes in records `range` of `staged`.
+    fn append(
+        &mut self,
+        staged: &Staged,
+        mut range: Range<usize>,
+        width: usize,
+        store: &Store,
+    ) -> Result<(), FrameError> {
+        self.len += range.len();
+        while !range.is_empty() {
+            let mut open = match self.open.take() {
+                Some(open) => open,
+                None => store.take()?,
+            };
+            let room = store.chunk_len() - open.positions.len();
+            let end = range.end.min(range.start + room);
+            let own = range.start..end;
+            open.rows
+                .extend_from_slice(&staged.rows[own.start * width..own.end * width]);
+            open.positions.extend_from_slice(&staged.positions[own]);
+            if open.positions.len() == store.chunk_len() {
+                self.held.push(store.put(open)?);
+            } else {
+                self.open = Some(open);
+            }
+            range.start = end;
+        }
+        Ok(())
+    }
+}
+
+impl Staged {
+    /// Takes in records, in their order within each part.
+    fn sort(&mut self, positions: &[Vec3], rows: &[u8], width: usize, cuts: &Cuts) {
+        self.parts.clear();
+        self.starts.clear();
+        self.starts.resize(cuts.len() + 1, 0);
+        #[expect(clippy::cast_possible_truncation, reason = "at most 512 parts")]
+        for position in positions {
+            let part = cuts.part(*position);
+            self.parts.push(part as u16);
+            self.starts[part + 1] += 1;
+        }
+        for part in 0..cuts.len() {
+            self.starts[part + 1] += self.starts[part];
+        }
+        self.positions.resize(positions.len(), Vec3::ZERO);
+        self.rows.resize(rows.len(), 0);
+        // Each start moves to the end of its part, which is the next one's start.
+        for (number, part) in self.parts.iter().enumerate() {
+            let slot = &mut self.starts[usize::from(*part)];
+            let to = *slot as usize;
+            *slot += 1;
+            self.positions[to] = positions[number];
+            if width > 0 {
+                self.rows[to * width..][..width].copy_from_slice(&rows[number * width..][..width]);
+            }
+        }
+        self.starts.rotate_right(1);
+        self.starts[0] = 0;
+    }
+
+    fn of(&self, part: usize) -> Range<usize> {
+        self.starts[part] as usize..self.starts[part + 1] as usize
+    }
+}

@@ -1,0 +1,190 @@
+//! Particles of one part come into tree order and go to the file run by run.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::account::Account;
+use super::columns::{Columns, RadiusColumn};
+use crate::native::{FrameWriter, Run, arrange};
+use crate::order::kd;
+
+/// Particles that are ordered together.
+#[derive(Debug, Default)]
+pub(super) struct Part {
+    pub(super) positions: Vec<Vec3>,
+    /// A row for each particle.
+    pub(super) rows: Vec<u8>,
+}
+
+impl Part {
+    pub(super) fn len(&self) -> usize {
+        self.positions.len()
+    }
+
+    pub(super) fn bytes(&self) -> u64 {
+        (self.positions.capacity() * size_of::<Vec3>() + self.rows.capacity()) as u64
+    }
+
+    /// Room for `len` particles with rows of `width` bytes.
+    pub(super) fn with_room(len: usize, width: usize) -> Self {
+        Self {
+            positions: Vec::with_capacity(len),
+            rows: Vec::with_capacity(len * width),
+        }
+    }
+
+    pub(super) fn clear(&mut self) {
+        self.positions.clear();
+        self.rows.clear();
+    }
+
+    /// Takes in all of `other`.
+    pub(super) fn append(&mut self, other: &mut Self) {
+        self.positions.append(&mut other.positions);
+        self.rows.append(&mut other.rows);
+    }
+
+    /// Takes out the particles with these numbers, which increase; the last of those that stay come into their
+    /// places.
+    pub(super) fn take(&mut self, numbers: &[u32], width: usize) -> Self {
+        let mut taken = Self::default();
+        for number in numbers {
+            let number = *number as usize;
+            taken.positions.push(self.positions[number]);
+            taken
+                .rows
+                .extend_from_slice(&self.rows[number * width..][..width]);
+        }
+        let left = self.len() - numbers.len();
+        let holes = numbers.partition_point(|number| (*number as usize) < left);
+        let (holes, gone) = numbers.split_at(holes);
+        let mut gone = gone.iter().map(|number| *number as usize).peekable();
+        let staying = (left..self.len()).filter(|number| gone.next_if_eq(number).is_none());
+        let moves: Vec<(usize, usize)> = staying
+            .zip(holes.iter().map(|hole| *hole as usize))
+            .collect();
+        for (from, to) in moves {
+            self.positions[to] = self.positions[from];
+            self.rows
+                .copy_within(from * width..(from + 1) * width, to * width);
+        }
+        self.positions.truncate(left);
+        self.rows.truncate(left * width);
+        taken
+    }
+}
+
+/// Room to order parts, used again for each.
+#[derive(Debug, Default)]
+pub(super) struct Ordered {
+    /// In tree order.
+    pub(super) positions: Vec<Vec3>,
+    /// Where in the part each of them was; empty if there are no rows.
+    indices: Vec<u32>,
+    /// Rows of a run.
+    rows: Vec<u8>,
+    radii: Vec<f32>,
+    attributes: Vec<Vec<u8>>,
+}
+
+/// Particles of which a task gathers the rows.
+const TASK: usize = 4096;
+
+impl Ordered {
+    /// Room to order parts of `len` particles with rows of `width` bytes.
+    pub(super) fn with_room(len: usize, width: usize) -> Self {
+        Self {
+            positions: Vec::with_capacity(len),
+            indices: Vec::with_capacity(if width > 0 { len } else { 0 }),
+            ..Self::default()
+        }
+    }
+
+    /// Takes in the order of `part`.
+    pub(super) fn order(&mut self, part: &Part, account: &Account) {
+        let len = part.len();
+        self.positions.resize(len, Vec3::ZERO);
+        let is_followed = !part.rows.is_empty();
+        self.indices.resize(if is_followed { len } else { 0 }, 0);
+        let held = self.bytes();
+        account.hold(held);
+        let scratch = kd::order_into(
+            &part.positions,
+            &mut self.positions,
+            &mut self.indices,
+            |_| (),
+        );
+        account.hold(scratch);
+        account.let_go(scratch + held);
+        arrange(&mut self.positions, &mut self.indices);
+    }
+
+    /// Gives particles `run` of `part`, which was ordered, to the file.
+    pub(super) fn push(
+        &mut self,
+        part: &Part,
+        columns: &Columns,
+        run: Range<usize>,
+        writer: &mut FrameWriter,
+    ) -> std::io::Result<()> {
+        self.gather(part, columns, &run);
+        let attributes: Vec<&[u8]> = self.attributes.iter().map(Vec::as_slice).collect();
+        writer.push(&Run {
+            positions: &self.positions[run],
+            radii: columns.radius.map(|_| &self.radii[..]),
+            attributes: &attributes,
+        })
+    }
+
+    fn gather(&mut self, part: &Part, columns: &Columns, run: &Range<usize>) {
+        let width = columns.width();
+        self.attributes.resize(columns.attributes.len(), Vec::new());
+        if width == 0 {
+            return;
+        }
+        self.rows.resize(run.len() * width, 0);
+        self.rows
+            .par_chunks_mut(TASK * width)
+            .zip(self.indices[run.clone()].par_chunks(TASK))
+            .for_each(|(rows, indices)| {
+                for (row, index) in rows.chunks_exact_mut(width).zip(indices) {
+                    row.copy_from_slice(&part.rows[*index as usize * width..][..width]);
+                }
+            });
+        let rows = &self.rows;
+        let mut at = 0;
+        if columns.radius.is_some() {
+            self.radii.resize(run.len(), 0.0);
+            let radii = self.radii.par_chunks_mut(TASK);
+            radii
+                .zip(rows.par_chunks(TASK * width))
+                .for_each(|(radii, rows)| {
+                    for (radius, row) in radii.iter_mut().zip(rows.chunks_exact(width)) {
+                        *radius = f32::from_le_bytes(std::array::from_fn(|i| row[i]));
+                    }
+                });
+            at += RadiusColumn::WIDTH;
+        }
+        for (column, values) in columns.attributes.iter().zip(&mut self.attributes) {
+            let own = at..at + column.width();
+            values.resize(run.len() * own.len(), 0);
+            values
+                .par_chunks_mut(TASK * own.len())
+                .zip(rows.par_chunks(TASK * width))
+                .for_each(|(values, rows)| {
+                    let values = values.chunks_exact_mut(own.len());
+                    for (to, row) in values.zip(rows.chunks_exact(width)) {
+                        to.copy_from_slice(&row[own.clone()]);
+                    }
+                });
+            at = own.end;
+        }
+    }
+
+    fn bytes(&self) -> u64 {
+        let positions = self.positions.capacity() * size_of::<Vec3>();
+        (positions + self.indices.capacity() * size_of::<u32>()) as u64
+    }
+}

@@ -1,0 +1,122 @@
+//! The frame that comes of a conversion, begun when the first part is in order.
+
+use super::columns::Columns;
+use super::order::{Ordered, Part};
+use super::settings::{ConvertError, Phase, RadiusRule};
+use super::survey::{Asked, Survey};
+use crate::FrameError;
+use crate::native::{
+    FrameIndex, FrameSpec, FrameWriter, RadiusSpec, radius_range, smallest_encoding,
+};
+
+/// Takes parts that are in order.
+pub(super) struct Output<'a> {
+    pub(super) asked: Asked<'a>,
+    pub(super) columns: &'a Columns,
+    pub(super) survey: &'a Survey,
+    /// Largest error of each attribute; known before the first part comes.
+    pub(super) errors: Vec<f64>,
+    /// Radius of all particles that have radii of their own, if these are alike.
+    common: Option<f32>,
+    run_len: usize,
+    pushed: u64,
+    writer: Option<FrameWriter>,
+}
+
+impl<'a> Output<'a> {
+    pub(super) fn new(
+        asked: Asked<'a>,
+        columns: &'a Columns,
+        survey: &'a Survey,
+        common: Option<f32>,
+        run_len: usize,
+    ) -> Self {
+        Self {
+            asked,
+            columns,
+            survey,
+            errors: vec![0.0; columns.attributes.len()],
+            common,
+            run_len,
+            pushed: 0,
+            writer: None,
+        }
+    }
+
+    /// Writes `part`, of which `ordered` has the order.
+    pub(super) fn push(&mut self, part: &Part, ordered: &mut Ordered) -> Result<(), ConvertError> {
+        let mut writer = match self.writer.take() {
+            Some(writer) => writer,
+            None => self.begin(ordered)?,
+        };
+        let mut first = 0;
+        while first < part.len() {
+            let end = part.len().min(first + self.run_len);
+            ordered
+                .push(part, self.columns, first..end, &mut writer)
+                .map_err(|e| FrameError::io(self.asked.path, e))?;
+            self.pushed += (end - first) as u64;
+            self.asked
+                .advance(Phase::Order, self.pushed, self.survey.count)?;
+            first = end;
+        }
+        self.writer = Some(writer);
+        Ok(())
+    }
+
+    /// Completes the frame, if the source is what it was all the time.
+    pub(super) fn finish(mut self) -> Result<FrameIndex, ConvertError> {
+        let writer = match self.writer.take() {
+            Some(writer) => writer,
+            None => self.begin(&Ordered::default())?,
+        };
+        self.asked.source.check()?;
+        let total = self.survey.count;
+        self.asked.advance(Phase::Finish, total, total)?;
+        let finished = writer.finish();
+        Ok(finished.map_err(|e| FrameError::io(self.asked.path, e))?)
+    }
+
+    /// Begins the frame, whose first particles are `ordered`.
+    fn begin(&self, ordered: &Ordered) -> Result<FrameWriter, ConvertError> {
+        let Asked {
+            source,
+            settings,
+            path,
+            ..
+        } = self.asked;
+        let own = self.survey.radii.filter(|_| self.columns.radius.is_some());
+        let common = match settings.radius {
+            RadiusRule::All(radius) => Some(radius),
+            RadiusRule::Source { otherwise } => {
+                self.common.or(source.common_radius()).or(otherwise)
+            }
+        };
+        let smallest = own.map(|[low, _]| low).or(common);
+        let encoding = settings
+            .encoding
+            .unwrap_or_else(|| smallest_encoding(&ordered.positions, settings.bound, smallest));
+        let attributes = self.columns.attributes.iter().zip(&self.errors);
+        let spec = FrameSpec {
+            count: self.survey.count,
+            encoding,
+            bound: settings.bound,
+            origin: settings.origin,
+            rounding: self.survey.rounding,
+            radius: match (own, common) {
+                (Some(ends), _) => {
+                    RadiusSpec::PerParticle(radius_range(ends, encoding, settings.bound))
+                }
+                (None, Some(radius)) => RadiusSpec::Common(radius),
+                (None, None) => RadiusSpec::None,
+            },
+            attributes: attributes
+                .map(|(column, error)| column.spec(*error))
+                .collect(),
+            time: source.time(),
+            step: source.step(),
+            dropped: source.count() - self.survey.count,
+        };
+        Ok(FrameWriter::create(path, spec).map_err(|e| FrameError::io(path, e))?)
+    }
+}

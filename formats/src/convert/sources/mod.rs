@@ -1,0 +1,27 @@
+//! Sources of particles: what is in memory already, mapped native frames, and generators.
+
+mod block;
+mod cube;
+mod native;
+mod raw;
+
+pub use block::{BlockSettings, BlockSource};
+pub use cube::BoxSource;
+pub use native::NativeSource;
+pub use raw::RawSource;
+
+use std::io;
+use std::ops::Range;
+use std::path::Path;
+
+use crate::FrameError;
+
+/// The places `first` and following, `len` of them, of `count`.
+fn places(path: &Path, first: u64, len: usize, count: u64) -> Result<Range<usize>, FrameError> {
+    let end = first.checked_add(len as u64).filter(|end| *end <= count);
+    let range = end.and_then(|end| Some(usize::try_from(first).ok()?..usize::try_from(end).ok()?));
+    range.ok_or_else(|| {
+        let what = format!("{len} particles after {first} were asked for, there are {count}");
+        FrameError::io(path, io::Error::new(io::ErrorKind::InvalidInput, what))
+    })
+}

@@ -1,0 +1,98 @@
+//! Particles in memory, as readers leave them.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use glam::DVec3;
+
+use super::places;
+use crate::attribute::with_values;
+use crate::convert::{ParticleSource, SourceAttribute};
+use crate::{Attribute, FrameError, Positions, RawParticles};
+
+/// A step that was read as a whole.
+#[derive(Debug)]
+pub struct RawSource<'a> {
+    path: PathBuf,
+    raw: &'a RawParticles,
+    attributes: Vec<SourceAttribute>,
+}
+
+impl<'a> RawSource<'a> {
+    /// `raw`, which was read from `path`.
+    ///
+    /// # Errors
+    /// If an attribute does not have its components for each particle.
+    pub fn new(path: &Path, raw: &'a RawParticles) -> Result<Self, FrameError> {
+        let count = raw.positions.len();
+        let fits = |a: &&Attribute| {
+            a.components > 0 && count.checked_mul(a.components) == Some(a.data.len())
+        };
+        if let Some(a) = raw.attributes.iter().find(|a| !fits(a)) {
+            let (name, values, components) = (&a.name, a.data.len(), a.components);
+            let what = format!(
+                "attribute {name} has {values} values of {components} components for {count} particles"
+            );
+            let source = io::Error::new(io::ErrorKind::InvalidInput, what);
+            return Err(FrameError::io(path, source));
+        }
+        let attributes = raw.attributes.iter().map(|a| SourceAttribute {
+            name: a.name.clone(),
+            components: a.components,
+            scalar: a.data.scalar_type(),
+        });
+        Ok(Self {
+            path: path.to_owned(),
+            attributes: attributes.collect(),
+            raw,
+        })
+    }
+
+    fn places(&self, first: u64, len: usize) -> Result<std::ops::Range<usize>, FrameError> {
+        places(&self.path, first, len, self.count())
+    }
+}
+
+impl ParticleSource for RawSource<'_> {
+    fn count(&self) -> u64 {
+        self.raw.positions.len() as u64
+    }
+
+    fn attributes(&self) -> &[SourceAttribute] {
+        &self.attributes
+    }
+
+    fn time(&self) -> Option<f64> {
+        self.raw.time
+    }
+
+    fn step(&self) -> Option<i64> {
+        self.raw.step
+    }
+
+    fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), FrameError> {
+        let places = self.places(first, to.len())?;
+        match &self.raw.positions {
+            Positions::F32(all) => {
+                let own = all[places].iter().map(|p| p.as_dvec3());
+                to.iter_mut().zip(own).for_each(|(to, p)| *to = p);
+            }
+            Positions::F64(all) => to.copy_from_slice(&all[places]),
+        }
+        Ok(())
+    }
+
+    fn read_values(&self, attribute: usize, first: u64, to: &mut [u8]) -> Result<(), FrameError> {
+        let width = self.attributes[attribute].width();
+        let places = self.places(first, to.len() / width.max(1))?;
+        let attribute = &self.raw.attributes[attribute];
+        let scalars = places.start * attribute.components..places.end * attribute.components;
+        with_values!(&attribute.data, values => {
+            let size = attribute.data.scalar_type().size();
+            for (to, value) in to.chunks_exact_mut(size).zip(&values[scalars]) {
+                to.copy_from_slice(&value.to_le_bytes());
+            }
+        });
+        Ok(())
+    }
+}

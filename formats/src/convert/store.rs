@@ -1,0 +1,369 @@
+//! Records in chunks of one size: in memory as long as there is room, beyond that in a scratch file.
+//!
+//! Chunks are made once and used again; whoever wants one waits until there is one. Full chunks that find no
+//! more room in memory are written by a thread of their own, the others stay. Those that are being filled, one
+//! for each part, and some on their way to the disk always have room, so that nobody waits for ever.
+
+use std::panic;
+use std::path::PathBuf;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard};
+use std::thread::{self, JoinHandle};
+
+use glam::Vec3;
+
+use super::account::Account;
+use super::order::Part;
+use super::scratch::Scratch;
+use crate::FrameError;
+
+/// Chunks on their way to the disk at most.
+const ON_THE_WAY: usize = 8;
+
+/// Records in memory, one array each for positions and rows.
+#[derive(Debug, Default)]
+pub(super) struct Chunk {
+    pub(super) positions: Vec<Vec3>,
+    pub(super) rows: Vec<u8>,
+}
+
+/// Records that were put away.
+#[derive(Debug)]
+pub(super) enum Held {
+    Here(Chunk),
+    /// In a slot of the scratch file.
+    Away {
+        slot: u64,
+        len: usize,
+    },
+}
+
+impl Held {
+    pub(super) fn len(&self) -> usize {
+        match self {
+            Self::Here(chunk) => chunk.positions.len(),
+            Self::Away { len, .. } => *len,
+        }
+    }
+}
+
+/// Sizes of a store.
+#[derive(Debug, Clone)]
+pub(super) struct StoreSettings {
+    /// Records of a chunk.
+    pub(super) chunk_len: usize,
+    /// Bytes of a row.
+    pub(super) width: usize,
+    /// Chunks that may be in memory.
+    pub(super) chunks: usize,
+    /// Chunks that are being filled at a time.
+    pub(super) open: usize,
+    /// Where the scratch file is made.
+    pub(super) dir: PathBuf,
+}
+
+/// Where records are.
+#[derive(Debug)]
+pub(super) struct Store<'a> {
+    shared: Arc<Shared>,
+    account: &'a Account,
+    writer: Mutex<Option<Writer>>,
+}
+
+#[derive(Debug)]
+struct Shared {
+    settings: StoreSettings,
+    state: Mutex<State>,
+    /// A chunk is free, or there is a fault.
+    freed: Condvar,
+}
+
+#[derive(Debug, Default)]
+struct State {
+    free: Vec<Chunk>,
+    /// Chunks there are.
+    made: usize,
+    /// Chunks that stay in memory.
+    kept: usize,
+    /// On their way to the disk.
+    leaving: usize,
+    free_slots: Vec<u64>,
+    slots: u64,
+    spilled: u64,
+    fault: Option<FrameError>,
+}
+
+#[derive(Debug)]
+struct Writer {
+    scratch: Arc<Scratch>,
+    chunks: SyncSender<(Chunk, u64)>,
+    thread: JoinHandle<()>,
+}
+
+impl<'a> Store<'a> {
+    pub(super) fn new(mut settings: StoreSettings, account: &'a Account) -> Self {
+        // Few, and never so small that nothing could move.
+        settings.chunks = settings.chunks.max(settings.open + ON_THE_WAY + 2);
+        let shared = Shared {
+            settings,
+            state: Mutex::default(),
+            freed: Condvar::new(),
+        };
+        Self {
+            shared: Arc::new(shared),
+            account,
+            writer: Mutex::new(None),
+        }
+    }
+
+    pub(super) fn chunk_len(&self) -> usize {
+        self.shared.settings.chunk_len
+    }
+
+    /// Bytes that were written to the scratch file.
+    pub(super) fn spilled(&self) -> u64 {
+        self.shared.state().spilled
+    }
+
+    /// An empty chunk.
+    ///
+    /// # Errors
+    /// If something could not be put away.
+    pub(super) fn take(&self) -> Result<Chunk, FrameError> {
+        let settings = &self.shared.settings;
+        let mut state = self.shared.state();
+        loop {
+            if let Some(fault) = state.fault.take() {
+                return Err(fault);
+            }
+            if let Some(chunk) = state.free.pop() {
+                return Ok(chunk);
+            }
+            if state.made < settings.chunks || state.leaving == 0 {
+                state.made += 1;
+                drop(state);
+                self.account.hold(settings.bytes());
+                return Ok(Chunk {
+                    positions: Vec::with_capacity(settings.chunk_len),
+                    rows: Vec::with_capacity(settings.chunk_len * settings.width),
+                });
+            }
+            let freed = self.shared.freed.wait(state);
+            state = freed.unwrap_or_else(|e| e.into_inner());
+        }
+    }
+
+    /// Puts a chunk away, to memory or to the scratch file.
+    ///
+    /// # Errors
+    /// If there can be no scratch file, or something could not be put away.
+    pub(super) fn put(&self, chunk: Chunk) -> Result<Held, FrameError> {
+        let settings = &self.shared.settings;
+        let mut state = self.shared.state();
+        let is_full = chunk.positions.len() == settings.chunk_len;
+        if !is_full || state.kept + settings.open + ON_THE_WAY < settings.chunks {
+            state.kept += 1;
+            return Ok(Held::Here(chunk));
+        }
+        drop(state);
+        // Before anything is counted as leaving: others would wait for it.
+        let chunks = self.with_writer(|writer| writer.chunks.clone())?;
+        let mut state = self.shared.state();
+        state.leaving += 1;
+        state.spilled += settings.bytes();
+        let slot = state.free_slots.pop().unwrap_or_else(|| {
+            state.slots += 1;
+            state.slots - 1
+        });
+        drop(state);
+        let len = chunk.positions.len();
+        if chunks.send((chunk, slot)).is_err() {
+            self.shared.left();
+            return Err(self.lost());
+        }
+        Ok(Held::Away { slot, len })
+    }
+
+    /// Calls `see` with the records of `held`, which is free then.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    pub(super) fn give_back<T>(
+        &self,
+        held: Held,
+        see: impl FnOnce(&Chunk) -> T,
+    ) -> Result<T, FrameError> {
+        match held {
+            Held::Here(chunk) => {
+                let seen = see(&chunk);
+                self.shared.state().kept -= 1;
+                self.shared.free(chunk);
+                Ok(seen)
+            }
+            Held::Away { slot, len } => {
+                let mut chunk = self.take()?;
+                let read = self.read(&mut chunk, slot, len);
+                let seen = read.map(|()| see(&chunk));
+                self.shared.free(chunk);
+                self.shared.state().free_slots.push(slot);
+                seen
+            }
+        }
+    }
+
+    /// Calls `see` with the records of `held`, which stay where they are.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    pub(super) fn look<T>(
+        &self,
+        held: &Held,
+        see: impl FnOnce(&Chunk) -> T,
+    ) -> Result<T, FrameError> {
+        match held {
+            Held::Here(chunk) => Ok(see(chunk)),
+            Held::Away { slot, len } => {
+                let mut chunk = self.take()?;
+                let read = self.read(&mut chunk, *slot, *len);
+                let seen = read.map(|()| see(&chunk));
+                self.shared.free(chunk);
+                seen
+            }
+        }
+    }
+
+    /// Moves the records of `held` behind those of `part`.
+    ///
+    /// # Errors
+    /// If they cannot be read.
+    pub(super) fn load(&self, held: Held, part: &mut Part) -> Result<(), FrameError> {
+        self.give_back(held, |chunk| {
+            part.positions.extend_from_slice(&chunk.positions);
+            part.rows.extend_from_slice(&chunk.rows);
+        })
+    }
+
+    /// Waits until all chunks that left are on the disk.
+    ///
+    /// # Errors
+    /// If one could not be put there.
+    pub(super) fn settle(&self) -> Result<(), FrameError> {
+        let mut state = self.shared.state();
+        loop {
+            if let Some(fault) = state.fault.take() {
+                return Err(fault);
+            }
+            if state.leaving == 0 {
+                return Ok(());
+            }
+            let freed = self.shared.freed.wait(state);
+            state = freed.unwrap_or_else(|e| e.into_inner());
+        }
+    }
+
+    fn read(&self, chunk: &mut Chunk, slot: u64, len: usize) -> Result<(), FrameError> {
+        let settings = &self.shared.settings;
+        let scratch = self.with_writer(|writer| Arc::clone(&writer.scratch))?;
+        chunk.positions.resize(len, Vec3::ZERO);
+        chunk.rows.resize(len * settings.width, 0);
+        let at = slot * settings.bytes();
+        let positions: &mut [u8] = bytemuck::cast_slice_mut(&mut chunk.positions);
+        let rows_at = at + positions.len() as u64;
+        scratch.read(positions, at)?;
+        scratch.read(&mut chunk.rows, rows_at)
+    }
+
+    /// The scratch file and the way to it, made when they are first wanted.
+    fn with_writer<T>(&self, ask: impl FnOnce(&Writer) -> T) -> Result<T, FrameError> {
+        let mut writer = self.writer.lock().unwrap_or_else(|e| e.into_inner());
+        let writer = match &mut *writer {
+            Some(writer) => writer,
+            none => none.insert(self.start()?),
+        };
+        Ok(ask(writer))
+    }
+
+    fn start(&self) -> Result<Writer, FrameError> {
+        let dir = &self.shared.settings.dir;
+        let scratch = Arc::new(Scratch::create(dir)?);
+        let (chunks, to_write) = sync_channel(ON_THE_WAY);
+        let (shared, file) = (Arc::clone(&self.shared), Arc::clone(&scratch));
+        let thread = thread::Builder::new()
+            .name("spherule-spill".to_owned())
+            .spawn(move || shared.write_all(&file, &to_write))
+            .map_err(|e| FrameError::io(dir, e))?;
+        Ok(Writer {
+            scratch,
+            chunks,
+            thread,
+        })
+    }
+
+    /// For what cannot be.
+    fn lost(&self) -> FrameError {
+        let what = std::io::Error::other("an earlier part could not be put away");
+        FrameError::io(&self.shared.settings.dir, what)
+    }
+}
+
+impl Drop for Store<'_> {
+    /// The scratch file is gone when this returns.
+    fn drop(&mut self) {
+        let writer = self.writer.get_mut().unwrap_or_else(|e| e.into_inner());
+        if let Some(Writer { chunks, thread, .. }) = writer.take() {
+            drop(chunks);
+            if let Err(fault) = thread.join()
+                && !thread::panicking()
+            {
+                panic::resume_unwind(fault);
+            }
+        }
+    }
+}
+
+impl StoreSettings {
+    /// Bytes of a chunk.
+    fn bytes(&self) -> u64 {
+        (self.chunk_len * (size_of::<Vec3>() + self.width)) as u64
+    }
+}
+
+impl Shared {
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(|e| e.into_inner())
+    }
+
+    /// `chunk` can be used again.
+    fn free(&self, mut chunk: Chunk) {
+        chunk.positions.clear();
+        chunk.rows.clear();
+        self.state().free.push(chunk);
+        self.freed.notify_all();
+    }
+
+    /// A chunk is no longer on its way.
+    fn left(&self) {
+        self.state().leaving -= 1;
+        self.freed.notify_all();
+    }
+
+    /// Writes what comes until nothing does any more; after a fault it only takes in.
+    fn write_all(&self, scratch: &Scratch, chunks: &Receiver<(Chunk, u64)>) {
+        let mut is_sound = true;
+        for (chunk, slot) in chunks {
+            if is_sound && let Err(fault) = self.write(scratch, &chunk, slot) {
+                is_sound = false;
+                self.state().fault = Some(fault);
+            }
+            self.free(chunk);
+            self.left();
+        }
+    }
+
+    fn write(&self, scratch: &Scratch, chunk: &Chunk, slot: u64) -> Result<(), FrameError> {
+        let at = slot * self.settings.bytes();
+        let positions: &[u8] = bytemuck::cast_slice(&chunk.positions);
+        scratch.write(positions, at)?;
+        scratch.write(&chunk.rows, at + positions.len() as u64)
+    }
+}

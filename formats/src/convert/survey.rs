@@ -1,0 +1,247 @@
+//! The first reading: how many particles there are, what their values span, where the bulk of them is.
+
+use std::path::Path;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::batch::{Batch, Shelf, Stretch};
+use super::columns::{Columns, is_radius};
+use super::settings::{ConvertError, ConvertSettings, Phase, Progress};
+use super::source::ParticleSource;
+use crate::native::StoredType;
+
+/// What is known of a source that was read once.
+#[derive(Debug)]
+pub(super) struct Survey {
+    /// Particles with finite positions.
+    pub(super) count: u64,
+    /// The same of each stretch.
+    pub(super) kept: Vec<u32>,
+    /// How far positions move when they are rounded to f32 at most.
+    pub(super) rounding: f64,
+    /// Smallest and largest radius, of particles with radii of their own.
+    pub(super) radii: Option<[f32; 2]>,
+    /// Some of the positions, spread over the source.
+    pub(super) sample: Vec<Vec3>,
+    /// For each column the range of each component, where it is wanted.
+    ranges: Vec<Vec<[f64; 2]>>,
+}
+
+/// How a source is read.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Reading {
+    /// Particles of a stretch.
+    pub(super) batch_len: usize,
+    /// One of so many particles is in the sample; 0 for none.
+    pub(super) sample_stride: u64,
+}
+
+/// What a stretch has.
+#[derive(Debug, Default)]
+struct Found {
+    kept: u32,
+    rounding_squared: f64,
+    radii: Option<[f32; 2]>,
+    bad_radii: bool,
+    sample: Vec<Vec3>,
+    ranges: Vec<Vec<[f64; 2]>>,
+}
+
+/// Everything that a conversion knows before it begins to read.
+#[derive(Clone, Copy)]
+pub(super) struct Asked<'a> {
+    pub(super) source: &'a dyn ParticleSource,
+    pub(super) path: &'a Path,
+    pub(super) settings: &'a ConvertSettings,
+    pub(super) progress: &'a dyn Progress,
+}
+
+impl Asked<'_> {
+    /// Tells how far it is.
+    ///
+    /// # Errors
+    /// If whoever is told wants it to end.
+    pub(super) fn advance(&self, phase: Phase, done: u64, total: u64) -> Result<(), ConvertError> {
+        if self.progress.advanced(phase, done, total).is_break() {
+            return Err(ConvertError::Interrupted);
+        }
+        Ok(())
+    }
+
+    /// What the source gave is not what it gave before.
+    pub(super) fn changed(&self) -> ConvertError {
+        let told = self.source.check().map_err(ConvertError::from);
+        let what = "the source changed while it was converted; convert again when it rests";
+        told.err()
+            .unwrap_or_else(|| ConvertError::refused(self.path, what))
+    }
+}
+
+/// Reads everything once.
+pub(super) fn survey(
+    asked: Asked,
+    columns: &Columns,
+    reading: Reading,
+) -> Result<Survey, ConvertError> {
+    let total = asked.source.count();
+    let stretches = total.div_ceil(reading.batch_len as u64);
+    let (batches, done) = (Shelf::<Batch>::default(), AtomicU64::new(0));
+    let found: Vec<Found> = (0..stretches)
+        .into_par_iter()
+        .map(|number| {
+            let stretch = Stretch::nth(number, reading.batch_len, total);
+            let mut batch = batches.take();
+            let found = look(asked, columns, &mut batch, stretch, reading.sample_stride)?;
+            batches.put(batch);
+            let now = done.fetch_add(stretch.len as u64, Ordering::Relaxed) + stretch.len as u64;
+            asked.advance(Phase::Survey, now, total)?;
+            Ok(found)
+        })
+        .collect::<Result<_, ConvertError>>()?;
+    gathered(asked.path, columns, found)
+}
+
+fn look(
+    asked: Asked,
+    columns: &Columns,
+    batch: &mut Batch,
+    stretch: Stretch,
+    stride: u64,
+) -> Result<Found, ConvertError> {
+    let origin = asked.settings.origin;
+    batch.read_positions(asked.source, origin, stretch)?;
+    let mut found = Found {
+        kept: u32::try_from(batch.positions.len()).unwrap_or(u32::MAX),
+        ..Found::default()
+    };
+    let mut kept = batch.positions.iter();
+    batch.for_each_place(|place| {
+        if let Some(position) = kept.next() {
+            let moved = (position.as_dvec3() + origin).distance_squared(batch.world[place]);
+            found.rounding_squared = found.rounding_squared.max(moved);
+        }
+    });
+    found.sample = sample_of(batch, origin, stretch, stride);
+    if let Some(radius) = &columns.radius {
+        let width = asked.source.attributes()[radius.attribute].width();
+        batch.read_values(asked.source, radius.attribute, width, stretch)?;
+        batch.for_each_place(|place| {
+            for radius in radius.radii(&batch.values[place * width..][..width]) {
+                found.bad_radii |= !is_radius(radius);
+                let [low, high] = found.radii.unwrap_or([radius; 2]);
+                found.radii = Some([low.min(radius), high.max(radius)]);
+            }
+        });
+    }
+    for column in &columns.attributes {
+        let mut ranges = Vec::new();
+        if let (StoredType::Ranged, Some(attribute)) = (column.stored, column.attribute) {
+            let (width, size) = (column.source_width(), column.scalar.size());
+            batch.read_values(asked.source, attribute, width, stretch)?;
+            ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; column.components];
+            batch.for_each_place(|place| {
+                let values = batch.values[place * width..][..width].chunks_exact(size);
+                for (value, [low, high]) in values.zip(&mut ranges) {
+                    let value = StoredType::Plain(column.scalar).value(value, [0.0; 2]);
+                    // What is no number must not pass unseen.
+                    let value = if value.is_nan() { f64::INFINITY } else { value };
+                    (*low, *high) = (low.min(value), high.max(value));
+                }
+            });
+        }
+        found.ranges.push(ranges);
+    }
+    Ok(found)
+}
+
+/// One particle of each run of `stride`, at a place that looks random: sources are often ordered. Which ones
+/// does not depend on how the source is cut.
+fn sample_of(batch: &Batch, origin: glam::DVec3, stretch: Stretch, stride: u64) -> Vec<Vec3> {
+    let mut sample = Vec::new();
+    if stride == 0 {
+        return sample;
+    }
+    let end = stretch.first + stretch.len as u64;
+    for run in stretch.first / stride..end.div_ceil(stride) {
+        let hash = run.wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 32;
+        let place = run * stride + hash % stride;
+        if (stretch.first..end).contains(&place) {
+            #[expect(clippy::cast_possible_truncation, reason = "within a stretch")]
+            let position = batch.world[(place - stretch.first) as usize];
+            sample.push((position - origin).as_vec3());
+        }
+    }
+    sample.retain(|p| p.is_finite());
+    sample
+}
+
+fn gathered(path: &Path, columns: &Columns, found: Vec<Found>) -> Result<Survey, ConvertError> {
+    let mut survey = Survey {
+        count: 0,
+        kept: Vec::with_capacity(found.len()),
+        rounding: 0.0,
+        radii: None,
+        sample: Vec::new(),
+        ranges: vec![Vec::new(); columns.attributes.len()],
+    };
+    for one in found {
+        if one.bad_radii {
+            let what = "a radius is negative or no number; give one for all (--radius)";
+            return Err(ConvertError::refused(path, what));
+        }
+        survey.count += u64::from(one.kept);
+        survey.kept.push(one.kept);
+        survey.rounding = survey.rounding.max(one.rounding_squared);
+        survey.radii = match (survey.radii, one.radii) {
+            (Some(a), Some(b)) => Some([a[0].min(b[0]), a[1].max(b[1])]),
+            (a, b) => a.or(b),
+        };
+        survey.sample.extend(one.sample);
+        for (all, own) in survey.ranges.iter_mut().zip(one.ranges) {
+            if all.is_empty() {
+                *all = own;
+            } else {
+                for (all, own) in all.iter_mut().zip(own) {
+                    *all = [all[0].min(own[0]), all[1].max(own[1])];
+                }
+            }
+        }
+    }
+    survey.rounding = survey.rounding.sqrt();
+    Ok(survey)
+}
+
+impl Survey {
+    /// The columns with the ranges that were found, and without radii that are all alike; these come second.
+    pub(super) fn settled(
+        &self,
+        path: &Path,
+        mut columns: Columns,
+    ) -> Result<(Columns, Option<f32>), ConvertError> {
+        for (column, ranges) in columns.attributes.iter_mut().zip(&self.ranges) {
+            if column.stored != StoredType::Ranged {
+                continue;
+            }
+            let is_finite = |range: &[f64; 2]| (range[1] - range[0]).is_finite();
+            if self.count > 0 && !ranges.iter().all(is_finite) {
+                let name = &column.name;
+                let what = format!(
+                    "attribute {name} has values that are not finite, which 8 bits cannot hold; store it as it is"
+                );
+                return Err(ConvertError::refused(path, what));
+            }
+            column.ranges = if self.count > 0 {
+                ranges.clone()
+            } else {
+                vec![[0.0; 2]; column.components]
+            };
+        }
+        let common = self.radii.filter(|[low, high]| low == high);
+        if common.is_some() || self.count == 0 {
+            columns.radius = None;
+        }
+        Ok((columns, common.map(|[low, _]| low)))
+    }
+}

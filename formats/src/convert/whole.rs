@@ -1,0 +1,70 @@
+//! A source that fits into memory: one part.
+
+use std::sync::Mutex;
+
+use glam::Vec3;
+use rayon::prelude::*;
+
+use super::account::Account;
+use super::batch::{Batch, Shelf, Stretch};
+use super::limits::Limits;
+use super::order::{Ordered, Part};
+use super::output::Output;
+use super::settings::ConvertError;
+
+/// Reads everything, orders and writes it.
+pub(super) fn convert(
+    output: &mut Output,
+    limits: &Limits,
+    account: &Account,
+) -> Result<(), ConvertError> {
+    let part = load(output, limits)?;
+    account.hold(part.bytes());
+    let mut ordered = Ordered::default();
+    ordered.order(&part, account);
+    output.push(&part, &mut ordered)
+}
+
+/// All finite particles in the order of the source.
+fn load(output: &mut Output, limits: &Limits) -> Result<Part, ConvertError> {
+    let (asked, columns) = (output.asked, output.columns);
+    let kept = &output.survey.kept;
+    let (count, width) = (output.survey.count, columns.width());
+    let count = usize::try_from(count).unwrap_or(usize::MAX);
+    let mut part = Part {
+        positions: vec![Vec3::ZERO; count],
+        rows: vec![0; count * width],
+    };
+    let (mut positions, mut rows) = (&mut part.positions[..], &mut part.rows[..]);
+    let mut places = Vec::with_capacity(kept.len());
+    for (number, kept) in (0..).zip(kept) {
+        let own;
+        (own, positions) = positions.split_at_mut(*kept as usize);
+        let own_rows;
+        (own_rows, rows) = rows.split_at_mut(own.len() * width);
+        places.push((number, own, own_rows));
+    }
+    let (batches, errors) = (Shelf::<Batch>::default(), Mutex::new(&mut output.errors));
+    places
+        .into_par_iter()
+        .try_for_each(|(number, positions, rows)| {
+            let mut batch = batches.take();
+            let stretch = Stretch::nth(number, limits.batch_len, asked.source.count());
+            batch.read_positions(asked.source, asked.settings.origin, stretch)?;
+            if batch.positions.len() != positions.len() {
+                return Err(asked.changed());
+            }
+            let mut own_errors = vec![0.0; columns.attributes.len()];
+            batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
+            positions.copy_from_slice(&batch.positions);
+            rows.copy_from_slice(&batch.rows);
+            let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());
+            for (all, own) in errors.iter_mut().zip(own_errors) {
+                *all = all.max(own);
+            }
+            drop(errors);
+            batches.put(batch);
+            Ok(())
+        })?;
+    Ok(part)
+}

@@ -1,0 +1,130 @@
+//! Particles from a source to a file in pieces: read and brought into the file's form by all threads, written in
+//! order.
+
+use std::io::{self, BufWriter, Write};
+use std::ops::ControlFlow;
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+
+use super::atomic::publish;
+use crate::FrameError;
+use crate::convert::{ConvertError, ParticleSource, Phase, Progress};
+
+/// Particles of a piece.
+const PIECE: usize = 1 << 14;
+/// Pieces that are made at once.
+const TOGETHER: usize = 32;
+
+/// Why a file was not written to its end.
+pub(super) enum Ended {
+    /// The file's fault.
+    Io(io::Error),
+    /// Anybody else's.
+    Told(ConvertError),
+}
+
+impl From<io::Error> for Ended {
+    fn from(error: io::Error) -> Self {
+        Self::Io(error)
+    }
+}
+
+impl From<FrameError> for Ended {
+    fn from(error: FrameError) -> Self {
+        Self::Told(error.into())
+    }
+}
+
+/// Fills the file `path` by `fill`, whole or not at all.
+pub(super) fn publish_stream(
+    path: &Path,
+    fill: impl FnOnce(&mut BufWriter<&std::fs::File>) -> Result<(), Ended>,
+) -> Result<(), ConvertError> {
+    publish(path, fill).map_err(|ended| match ended {
+        Ended::Io(error) => FrameError::io(path, error).into(),
+        Ended::Told(error) => error,
+    })
+}
+
+/// Writes what `make` puts behind `bytes` for each stretch of places, in order.
+fn write_pieces(
+    file: &mut impl Write,
+    count: u64,
+    progress: &dyn Progress,
+    make: impl Fn(u64, usize, &mut Vec<u8>) -> Result<(), FrameError> + Sync,
+) -> Result<(), Ended> {
+    let pieces = count.div_ceil(PIECE as u64);
+    let mut made = vec![Vec::new(); TOGETHER];
+    for first in (0..pieces).step_by(TOGETHER) {
+        let end = pieces.min(first + TOGETHER as u64);
+        let used = usize::try_from(end - first).map_or(TOGETHER, |used| used.min(TOGETHER));
+        let together = made[..used].par_iter_mut().enumerate();
+        together.try_for_each(|(number, bytes)| {
+            let place = (first + number as u64) * PIECE as u64;
+            let len = usize::try_from(count - place).map_or(PIECE, |left| left.min(PIECE));
+            bytes.clear();
+            make(place, len, bytes)
+        })?;
+        made[..used]
+            .iter()
+            .try_for_each(|bytes| file.write_all(bytes))?;
+        let done = count.min(end * PIECE as u64);
+        if let ControlFlow::Break(()) = progress.advanced(Phase::Finish, done, count) {
+            return Err(Ended::Told(ConvertError::Interrupted));
+        }
+    }
+    Ok(())
+}
+
+/// Writes all positions as f32 in bytes by `to_bytes`.
+pub(super) fn write_positions(
+    file: &mut impl Write,
+    source: &dyn ParticleSource,
+    progress: &dyn Progress,
+    to_bytes: impl Fn(f32) -> [u8; 4] + Sync,
+) -> Result<(), Ended> {
+    write_pieces(file, source.count(), progress, |first, len, bytes| {
+        let mut positions = vec![DVec3::ZERO; len];
+        source.read_positions(first, &mut positions)?;
+        for position in positions {
+            for value in position.as_vec3().to_array() {
+                bytes.extend_from_slice(&to_bytes(value));
+            }
+        }
+        Ok(())
+    })
+}
+
+/// Writes all values of an attribute, the highest byte of each first.
+pub(super) fn write_values(
+    file: &mut impl Write,
+    source: &dyn ParticleSource,
+    attribute: usize,
+    progress: &dyn Progress,
+) -> Result<(), Ended> {
+    let own = &source.attributes()[attribute];
+    let (width, size) = (own.width(), own.scalar.size());
+    write_pieces(file, source.count(), progress, |first, len, bytes| {
+        bytes.resize(len * width, 0);
+        source.read_values(attribute, first, bytes)?;
+        bytes.chunks_exact_mut(size).for_each(<[u8]>::reverse);
+        Ok(())
+    })
+}
+
+/// Writes what `bytes_of` has for each number below `count`.
+pub(super) fn write_numbers<const N: usize>(
+    file: &mut impl Write,
+    count: u64,
+    progress: &dyn Progress,
+    bytes_of: impl Fn(u64) -> [u8; N] + Sync,
+) -> Result<(), Ended> {
+    write_pieces(file, count, progress, |first, len, bytes| {
+        for number in first..first + len as u64 {
+            bytes.extend_from_slice(&bytes_of(number));
+        }
+        Ok(())
+    })
+}
