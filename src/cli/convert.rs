@@ -56,10 +56,15 @@ pub(super) struct ConvertArgs {
     /// Store no attributes: positions and radii only.
     #[arg(long, conflicts_with = "attributes")]
     no_attributes: bool,
+    /// Keep each particle's place in its file as an attribute `id`, where there is none: native frames are in
+    /// another order.
+    #[arg(long)]
+    ids: bool,
     /// Frames to convert: 7 | 1-10 | 1-10x2 | 1-5,8.
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     frames: Option<FrameRange>,
-    /// Most memory to take: 4GiB, 512MiB.
+    /// Memory that the conversion may hold: 4GiB, 512MiB [default: 2GiB]. A frame that does not fit is ordered
+    /// in parts, which lie on the disk of the output meanwhile. Text and packed files are read whole.
     #[arg(long, value_name = "SIZE")]
     memory: Option<Bytes>,
     #[command(flatten)]
@@ -121,6 +126,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
 fn show(progress: &Progress, event: &Event) {
     match event {
         Event::Entered(frame) => progress.entered(*frame, "converting"),
+        Event::Advanced(frame, phase, done, total) => {
+            let percent = 100 * u128::from(*done) / u128::from(*total).max(1);
+            let doing = format!("converting ({} {percent} %)", phase.name());
+            progress.entered(*frame, &doing);
+        }
         Event::Done(task, converted) => {
             let mut facts = json!(converted);
             facts["output"] = json!(task.output.display().to_string());
@@ -239,6 +249,7 @@ impl ConvertArgs {
             bound,
             radius: self.radius,
             attributes,
+            keep_ids: self.ids,
             memory: self.memory,
         }
     }

@@ -67,6 +67,13 @@ impl AttributeChoices {
         }
     }
 
+    /// Whether the attribute `name` is named.
+    pub fn names(&self, name: &str) -> bool {
+        self.named
+            .keys()
+            .any(|known| known.eq_ignore_ascii_case(name))
+    }
+
     /// All that is said: attributes and how they are stored, those not named last and as `*`.
     pub fn iter(&self) -> impl Iterator<Item = (&str, Storage)> {
         let named = self.named.iter().map(|(name, s)| (name.as_str(), *s));

@@ -4,11 +4,15 @@ use std::fmt;
 use std::time::Instant;
 
 use serde::Serialize;
+use spherule_formats::convert::{
+    self, AttributeChoice, ConvertError, ConvertReport, NativeSource, ParticleSource, Progress,
+    RadiusRule, RawSource, SourceAttribute, convert, open_source,
+};
 use spherule_formats::native::layout::RadiusIndex;
-use spherule_formats::native::{self, FrameIndex, StoreSettings};
-use spherule_formats::{FrameError, ParticleFrame, Radius, Sequence};
+use spherule_formats::native::{Access, NativeFile};
+use spherule_formats::{ScalarType, Sequence};
 
-use super::attributes::Storage;
+use super::attributes::{AttributeChoices, Storage};
 use super::{Conversion, ConvertTask};
 
 /// What came of a frame.
@@ -28,44 +32,105 @@ pub struct ConvertedFrame {
     pub max_error_of_radius: Option<f64>,
     /// Wall time of the conversion, seconds.
     pub seconds: f64,
+    /// Wall time by phase, seconds.
+    pub phases: Vec<(&'static str, f64)>,
+    /// Most anonymous memory that the conversion held, by its own account.
+    pub peak_bytes: u64,
+    /// Bytes that were put aside on disk meanwhile.
+    pub spilled_bytes: u64,
+    /// Parts that were ordered one after the other.
+    pub parts: usize,
     /// What the user should know of the frame.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
 
-/// Converts the frame of `task`: its file appears whole or not at all.
+/// Converts the frame of `task`: its file appears whole or not at all. Binary files are mapped and pass
+/// through in runs; others are read as a whole.
 ///
 /// # Errors
-/// [`FrameError`] if the frame cannot be read, or its file not be written.
+/// [`ConvertError`] if the frame cannot be read, cannot be stored as asked, or its file not be written.
 pub fn convert_frame(
     conversion: &Conversion,
     sequence: &Sequence,
     task: &ConvertTask,
-) -> Result<ConvertedFrame, FrameError> {
+    progress: &dyn Progress,
+) -> Result<ConvertedFrame, ConvertError> {
     let start = Instant::now();
-    let settings = &conversion.settings;
+    let convert = |source: &dyn ParticleSource, notes: Vec<String>| {
+        let settings = conversion.engine_settings(source);
+        let report = convert(source, &task.output, &settings, progress)?;
+        Ok(ConvertedFrame::new(&report, start, notes))
+    };
+    if let Some(path) = sequence.native_file(task.index) {
+        let file = NativeFile::open(path, Access::Map)?;
+        file.frame()?.verify().map_err(|e| e.in_file(path))?;
+        return convert(&NativeSource::new(&file)?, Vec::new());
+    }
+    let streamed = sequence
+        .lone_file(task.index)
+        .map(open_source)
+        .transpose()?;
+    if let Some(source) = streamed.flatten() {
+        return convert(&*source, Vec::new());
+    }
     let loaded = sequence.load_measured(task.index)?;
-    let raw = loaded.particles;
-    let step = raw.step;
-    let store = StoreSettings {
-        encoding: settings.encoding,
-        bound: settings.bound,
-        rounding: raw.positions.rounding(conversion.origin),
-    };
-    let mut frame = ParticleFrame::from_raw(raw, conversion.origin);
-    let own = frame.radius.take();
-    frame.radius = match settings.radius {
-        Some(radius) => Some(Radius::Common(radius)),
-        None => own.or(conversion.estimate.map(Radius::Common)),
-    };
-    let is_stored = |name: &str| settings.attributes.of(name) != Storage::Off;
-    frame.attributes.retain(|a| is_stored(&a.name));
-    let index = native::store(&task.output, &frame, step, &store)?;
-    Ok(ConvertedFrame::new(&index, start, loaded.notes))
+    let inputs = sequence.inputs(task.index);
+    let path = inputs.first().copied().unwrap_or(&task.output);
+    let source = RawSource::new(path, &loaded.particles)?;
+    convert(&source, loaded.notes)
+}
+
+impl Conversion {
+    /// What the engine is told of a frame from `source`.
+    fn engine_settings(&self, source: &dyn ParticleSource) -> convert::ConvertSettings {
+        let asked = &self.settings;
+        let choice = |attribute: &SourceAttribute| {
+            let choice = asked.attributes.choice(attribute);
+            (attribute.name.clone(), choice)
+        };
+        convert::ConvertSettings {
+            encoding: asked.encoding,
+            bound: asked.bound,
+            origin: self.origin,
+            radius: match asked.radius {
+                Some(radius) => RadiusRule::All(radius),
+                None => RadiusRule::Source {
+                    otherwise: self.estimate,
+                },
+            },
+            memory: asked
+                .memory
+                .map_or(convert::ConvertSettings::USUAL_MEMORY, |m| m.0),
+            other_attributes: AttributeChoice::AsIs,
+            attributes: source.attributes().iter().map(choice).collect(),
+            keep_ids: asked.keep_ids,
+            scratch_dir: None,
+        }
+    }
+}
+
+impl AttributeChoices {
+    /// For an attribute of a source. What is said of all that are not named holds for none that would
+    /// suffer: whole numbers and radii.
+    fn choice(&self, attribute: &SourceAttribute) -> AttributeChoice {
+        let storage = self.of(&attribute.name);
+        let is_float = matches!(attribute.scalar, ScalarType::F32 | ScalarType::F64);
+        let is_radius = attribute.name.eq_ignore_ascii_case("radius");
+        let is_meant = self.names(&attribute.name) || is_float && !is_radius;
+        match storage {
+            Storage::Off => AttributeChoice::LeaveOut,
+            Storage::F32 if is_meant => AttributeChoice::Single,
+            Storage::F16 if is_meant => AttributeChoice::Half,
+            Storage::U8 if is_meant => AttributeChoice::Ranged,
+            _ => AttributeChoice::AsIs,
+        }
+    }
 }
 
 impl ConvertedFrame {
-    fn new(index: &FrameIndex, start: Instant, notes: Vec<String>) -> Self {
+    fn new(report: &ConvertReport, start: Instant, notes: Vec<String>) -> Self {
+        let index = &report.index;
         let stored = [&index.positions, &index.wide, &index.nodes];
         let radius = match &index.radius {
             RadiusIndex::None => None,
@@ -81,6 +146,10 @@ impl ConvertedFrame {
             max_error: index.max_error,
             max_error_of_radius: radius.map(|radius| index.max_error / radius),
             seconds: start.elapsed().as_secs_f64(),
+            phases: report.seconds.iter().map(|(p, s)| (p.name(), *s)).collect(),
+            peak_bytes: report.peak_bytes,
+            spilled_bytes: report.spilled_bytes,
+            parts: report.parts,
             notes,
         }
     }

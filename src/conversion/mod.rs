@@ -5,9 +5,11 @@
 //! decides ([`Event`]).
 
 use std::collections::HashSet;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use serde_json::json;
+use spherule_formats::convert::{ConvertError, Phase, Progress};
 use spherule_formats::{FrameError, Sequence};
 use spherule_jobs::{Interrupt, Job, JobError};
 
@@ -37,12 +39,30 @@ pub struct ConvertTask {
 pub enum Event<'a> {
     /// A frame is in hand.
     Entered(i64),
+    /// So many particles of so many have passed a phase of the frame in hand.
+    Advanced(i64, Phase, u64, u64),
     /// A frame's file is in place and recorded.
     Done(&'a ConvertTask, &'a ConvertedFrame),
     /// A frame could not be converted; it is recorded with this reason and the rest goes on.
     Failed(i64, &'a str),
     /// Something the user should know.
     Note(&'a str),
+}
+
+/// Who watches; told from many threads.
+pub type Watch<'a> = &'a (dyn Fn(Event) + Sync);
+
+/// A frame in hand that is watched.
+struct Watched<'a> {
+    frame: i64,
+    watch: Watch<'a>,
+}
+
+impl Progress for Watched<'_> {
+    fn advanced(&self, phase: Phase, done: u64, total: u64) -> ControlFlow<()> {
+        (self.watch)(Event::Advanced(self.frame, phase, done, total));
+        ControlFlow::Continue(())
+    }
 }
 
 /// Converts `tasks` in order and records each in `job`. Ends early, with the frame in hand finished, once
@@ -56,7 +76,7 @@ pub fn run(
     tasks: &[ConvertTask],
     job: &mut Job,
     interrupt: &Interrupt,
-    watch: &dyn Fn(Event),
+    watch: Watch,
 ) -> Result<(), JobError> {
     let mut told = HashSet::new();
     for task in tasks {
@@ -64,7 +84,11 @@ pub fn run(
             return Ok(());
         }
         watch(Event::Entered(task.frame));
-        match guarded(|| Ok(convert_frame(conversion, sequence, task))) {
+        let watched = Watched {
+            frame: task.frame,
+            watch,
+        };
+        match guarded(|| Ok(convert_frame(conversion, sequence, task, &watched))) {
             Ok(Ok(converted)) => {
                 // What is so in every frame is said once.
                 for note in &converted.notes {
@@ -77,7 +101,9 @@ pub fn run(
                 watch(Event::Done(task, &converted));
             }
             // Not the frame's fault: it stays to be done.
-            Ok(Err(FrameError::Io { path, source })) if is_disk_full(&source) => {
+            Ok(Err(ConvertError::Frame(FrameError::Io { path, source })))
+                if is_disk_full(&source) =>
+            {
                 return Err(JobError::DiskFull { path, source });
             }
             Ok(Err(error)) => fail(job, watch, task, &reason(sequence, task, &error))?,
@@ -87,19 +113,16 @@ pub fn run(
     Ok(())
 }
 
-fn fail(
-    job: &mut Job,
-    watch: &dyn Fn(Event),
-    task: &ConvertTask,
-    reason: &str,
-) -> Result<(), JobError> {
+fn fail(job: &mut Job, watch: Watch, task: &ConvertTask, reason: &str) -> Result<(), JobError> {
     watch(Event::Failed(task.frame, reason));
     job.record_failed(task.frame, reason, json!(null))
 }
 
 /// Why a frame cannot be converted, with what may help.
-fn reason(sequence: &Sequence, task: &ConvertTask, error: &FrameError) -> String {
-    if may_be_unfinished(sequence, task.index, error) {
+fn reason(sequence: &Sequence, task: &ConvertTask, error: &ConvertError) -> String {
+    if let ConvertError::Frame(error) = error
+        && may_be_unfinished(sequence, task.index, error)
+    {
         return format!(
             "{error}; it is the newest frame, perhaps still being written: convert again later"
         );

@@ -4,7 +4,7 @@ use glam::DVec3;
 use spherule_formats::native::layout::VERSION;
 use spherule_formats::native::{Bound, Encoding};
 
-use super::attributes::{AttributeChoices, Storage};
+use super::attributes::AttributeChoices;
 use crate::report::Bytes;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
@@ -19,7 +19,10 @@ pub struct ConvertSettings {
     pub radius: Option<f32>,
     /// Which attributes are stored, and how.
     pub attributes: AttributeChoices,
-    /// Most memory to take. The frames do not depend on it.
+    /// Whether each particle's place in its file is kept, where there is no `id`.
+    pub keep_ids: bool,
+    /// Memory that a conversion may hold. Frames that do not fit in it are ordered in parts, whose places
+    /// depend on it.
     pub memory: Option<Bytes>,
 }
 
@@ -50,6 +53,9 @@ impl ConvertSettings {
             .map_or_else(|| "auto".to_owned(), |r| r.to_string());
         settings.push(("radius".to_owned(), radius));
         settings.push(("attributes".to_owned(), self.attributes.to_string()));
+        if self.keep_ids {
+            settings.push(("ids".to_owned(), "true".to_owned()));
+        }
         settings
     }
 
@@ -80,20 +86,12 @@ impl Conversion {
     /// By what was asked for and what was found when the job began.
     ///
     /// # Errors
-    /// If an attribute was named that none of the frames has, or a way to store it that is not there.
+    /// If an attribute was named that none of the frames has.
     pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, String> {
         if let Some(name) = settings.attributes.unknown(&survey.attributes) {
             let has = crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..]));
             return Err(format!(
                 "--attributes: no frame has `{name}`; there are {has}"
-            ));
-        }
-        let coded =
-            |(_, storage): &(&str, Storage)| !matches!(storage, Storage::Keep | Storage::Off);
-        if let Some((name, storage)) = settings.attributes.iter().find(coded) {
-            return Err(format!(
-                "--attributes: {name}:{} cannot be written yet; use keep or off",
-                storage.name()
             ));
         }
         Ok(Self {
@@ -114,6 +112,7 @@ mod tests {
             bound,
             radius: None,
             attributes: AttributeChoices::default(),
+            keep_ids: false,
             memory: None,
         };
         settings.settings()

@@ -159,19 +159,19 @@ fn memory_does_not_grow_with_the_particles() {
     let options = ["--encoding", "q10", "--radius", "0.012"];
     shop.run(&[&["convert", "in", "-o", "native"][..], &options].concat())
         .expect(0);
-    let limited = |how: &str| {
+    let limited = |out: &str, how: &str| {
         let program = env!("CARGO_BIN_EXE_spherule");
         let arguments = "--width 160 --height 90 --samples 1 --threads 2";
         let command = format!(
-            "ulimit -d {ALLOWED} && exec {program} render native -o {how}/f.#.exr {arguments} {how}"
+            "ulimit -d {ALLOWED} && exec {program} render native -o {out}/f.#.exr {arguments} {how}"
         );
         let mut shell = std::process::Command::new("sh");
         shell.current_dir(shop.path()).args(["-c", &command]);
         shell.output().expect("a shell")
     };
-    let in_place = limited("");
+    let in_place = limited("in-place", "");
     assert!(in_place.status.success(), "{in_place:?}");
     // The same limit is too little where particles are copied.
-    let decoded = limited("--accelerator=bvh");
+    let decoded = limited("decoded", "--accelerator=bvh");
     assert!(!decoded.status.success(), "{decoded:?}");
 }

@@ -6,8 +6,8 @@ use half::f16;
 
 use super::settings::{AttributeChoice, ConvertError, ConvertSettings, RadiusRule};
 use super::source::{ParticleSource, SourceAttribute};
-use crate::ScalarType;
 use crate::native::{AttributeSpec, StoredType};
+use crate::{ID_NAMES, ScalarType};
 
 /// The rows of a conversion: the radius in f32 first where particles have their own, then attributes as they
 /// will be stored.
@@ -69,7 +69,7 @@ impl Column {
     /// Stores the values of one particle; returns the largest error.
     #[inline]
     pub(super) fn store(&self, values: &[u8], to: &mut [u8]) -> f64 {
-        if let StoredType::Plain(_) = self.stored {
+        if self.stored == StoredType::Plain(self.scalar) {
             to.copy_from_slice(values);
             return 0.0;
         }
@@ -77,7 +77,15 @@ impl Column {
         let values = values.chunks_exact(self.scalar.size());
         let mut largest = 0.0_f64;
         match self.stored {
-            StoredType::Plain(_) => {}
+            StoredType::Plain(_) => {
+                for (value, to) in values.zip(to.chunks_exact_mut(4)) {
+                    let value = plain.value(value, [0.0; 2]);
+                    #[expect(clippy::cast_possible_truncation, reason = "as asked for")]
+                    let single = value as f32;
+                    to.copy_from_slice(&single.to_le_bytes());
+                    largest = largest.max(difference(value, f64::from(single)));
+                }
+            }
             StoredType::Half => {
                 for (value, to) in values.zip(to.chunks_exact_mut(2)) {
                     let value = plain.value(value, [0.0; 2]);
@@ -152,6 +160,7 @@ impl Columns {
         for (number, attribute) in attributes.iter().enumerate() {
             let stored = match settings.choice(&attribute.name) {
                 AttributeChoice::AsIs => StoredType::Plain(attribute.scalar),
+                AttributeChoice::Single => StoredType::Plain(ScalarType::F32),
                 AttributeChoice::Half => StoredType::Half,
                 AttributeChoice::Ranged => StoredType::Ranged,
                 AttributeChoice::LeaveOut => continue,
@@ -252,6 +261,20 @@ fn check(
                 format!("there are {}", there.join(", "))
             };
             let what = format!("no attribute is called {name}; {there}");
+            return Err(ConvertError::refused(path, what));
+        }
+    }
+    for attribute in attributes {
+        let is_changed = !matches!(
+            settings.choice(&attribute.name),
+            AttributeChoice::AsIs | AttributeChoice::LeaveOut
+        );
+        let is_id = |name: &&str| attribute.name.eq_ignore_ascii_case(name);
+        if is_changed && ID_NAMES.iter().any(is_id) {
+            let what = format!(
+                "attribute {} holds ids, and another number is another particle; keep it as it is or leave it out",
+                attribute.name
+            );
             return Err(ConvertError::refused(path, what));
         }
     }

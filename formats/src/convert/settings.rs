@@ -75,6 +75,8 @@ pub enum AttributeChoice {
     /// In the type of the source.
     #[default]
     AsIs,
+    /// In single precision.
+    Single,
     /// In half precision: 11 bits, up to 65504.
     Half,
     /// In 8 bits over the range of the frame, each component in its own.

@@ -217,12 +217,18 @@ impl Sequence {
 
     /// The file of frame `index` if that is one native frame, which can be used where it lies.
     pub fn native_file(&self, index: usize) -> Option<&Path> {
+        // What cannot be looked at is told when it is read.
+        let is_native = |path: &&Path| crate::open::is_native(path).unwrap_or(false);
+        self.lone_file(index).filter(is_native)
+    }
+
+    /// The file of frame `index` if that is all there is of the frame, and nothing else in the file.
+    pub fn lone_file(&self, index: usize) -> Option<&Path> {
         let [part] = self.frames.get(index)?.parts.as_slice() else {
             return None;
         };
         let is_alone = self.parts.len() < 2 && part.step.is_none();
-        // What cannot be looked at is told when it is read.
-        (is_alone && crate::open::is_native(&part.path).unwrap_or(false)).then_some(&part.path)
+        is_alone.then_some(&part.path)
     }
 
     /// Reads frame `index`: finite particles, relative to `origin`.
