@@ -2,16 +2,21 @@
 //! index.
 
 use glam::DVec3;
+use spherule_formats::convert::{SourceAttribute, open_source};
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, FrameIndex, NativeFile};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParseError, RawParticles};
 
 use super::robust::{NEIGHBOUR_QUERIES, middle};
+use super::stream;
 use super::{FrameWeight, id_of, velocity_of};
 
 /// Particles that are looked at of a native frame; smaller ones are looked at as a whole.
 const MOST: usize = 1 << 17;
+
+/// Particles of a binary foreign file beyond which it is not read for a look.
+const LARGE: u64 = 1 << 24;
 
 /// What is seen of a frame.
 pub(super) struct Look {
@@ -38,8 +43,52 @@ impl Look {
                 file.check()?;
                 Ok(look)
             }
-            None => Self::at_files(sequence, index),
+            None => match Self::at_large(sequence, index)? {
+                Some(look) => Ok(look),
+                None => Self::at_files(sequence, index),
+            },
         }
+    }
+
+    /// At a binary file of many particles; None for others.
+    fn at_large(sequence: &Sequence, index: usize) -> Result<Option<Self>, FrameError> {
+        let Some(path) = sequence.lone_file(index) else {
+            return Ok(None);
+        };
+        let Some(source) = open_source(path)?.filter(|s| s.count() > LARGE) else {
+            return Ok(None);
+        };
+        let particles = stream::sample(&*source, path, MOST)?;
+        let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
+        let spacing = match source.attributes().iter().any(is_radius) {
+            true => None,
+            false => stream::spacing(&*source, &particles.positions)?,
+        };
+        let extremes = stream::extremes(&*source)?;
+        source.check()?;
+        let stored = std::fs::metadata(path).map_or(0, |meta| meta.len());
+        let widths = source.attributes().iter().map(|a| a.width() as u64);
+        let count = source.count();
+        let positions = 12 * count;
+        Ok(Some(Self {
+            weight: FrameWeight {
+                particles: count,
+                stored,
+                content: stored,
+                raw: positions + count.saturating_mul(widths.sum()),
+                positions,
+                files: 1,
+                own_radii: false,
+                ids: id_of(&particles.attributes).is_some(),
+                velocities: velocity_of(&particles.attributes).is_some(),
+                in_place: false,
+            },
+            count: usize::try_from(count).unwrap_or(usize::MAX),
+            extremes,
+            spacing,
+            origin: None,
+            particles,
+        }))
     }
 
     fn at_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {

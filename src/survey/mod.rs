@@ -17,6 +17,7 @@ use crate::scene::Bounds;
 
 mod look;
 mod robust;
+mod stream;
 
 use look::Look;
 use robust::{estimate_radius, narrow, robust_bounds, robust_largest, robust_range};

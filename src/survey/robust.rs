@@ -11,7 +11,7 @@ const ESCAPE_MIN: usize = 16;
 /// Distances to the nearest neighbour that the radius is estimated from.
 pub(super) const NEIGHBOUR_QUERIES: usize = 512;
 /// Distance computations that the estimate may cost: half a second for a frame of 1e7.
-const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
+pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 
 /// The box of the particles, except that on each axis it reaches beyond the middle 98 % by at most
 /// half their extent. None without finite particles. The outermost ones are `extremes` where `positions` are

@@ -1,0 +1,175 @@
+//! A look at a foreign file of many particles without having it in memory: it passes through in runs.
+
+use std::path::Path;
+
+use glam::DVec3;
+use rayon::prelude::*;
+use spherule_formats::convert::{ParticleSource, SourceAttribute};
+use spherule_formats::{Attribute, Endian, FrameError, ParseError, Positions, RawParticles};
+
+use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, middle};
+
+/// Particles that are read at a time.
+const RUN: usize = 1 << 16;
+/// Particles of a run of the sample: enough for a file's pages to be worth reading.
+const SAMPLE_RUN: usize = 64;
+/// Fewest distances that the spacing is told by, whatever they cost.
+const LEAST_QUERIES: usize = 16;
+
+/// Smallest and largest coordinates of all particles that are finite; `None` without any.
+pub(super) fn extremes(source: &dyn ParticleSource) -> Result<Option<(DVec3, DVec3)>, FrameError> {
+    let of_run = |positions: &[DVec3]| {
+        let finite = positions.iter().filter(|p| p.is_finite());
+        finite.fold(None, |box_: Option<(DVec3, DVec3)>, p| {
+            let (min, max) = box_.unwrap_or((*p, *p));
+            Some((min.min(*p), max.max(*p)))
+        })
+    };
+    let join = |a: Option<(DVec3, DVec3)>, b: Option<(DVec3, DVec3)>| match (a, b) {
+        (Some(a), Some(b)) => Some((a.0.min(b.0), a.1.max(b.1))),
+        (a, b) => a.or(b),
+    };
+    each_run(source, of_run, || None, join)
+}
+
+/// At most `most` particles of the file `path`, evenly spread in short runs.
+pub(super) fn sample(
+    source: &dyn ParticleSource,
+    path: &Path,
+    most: usize,
+) -> Result<RawParticles, FrameError> {
+    let runs = source.count().div_ceil(SAMPLE_RUN as u64);
+    let stride = runs.div_ceil((most / SAMPLE_RUN).max(1) as u64).max(1);
+    let starts = || (0..runs).step_by(usize::try_from(stride).unwrap_or(usize::MAX));
+    let run = |number: u64| {
+        let first = number * SAMPLE_RUN as u64;
+        let len = (source.count() - first).min(SAMPLE_RUN as u64);
+        (first, usize::try_from(len).unwrap_or(SAMPLE_RUN))
+    };
+    let mut positions = Vec::new();
+    for (first, len) in starts().map(run) {
+        let start = positions.len();
+        positions.resize(start + len, DVec3::ZERO);
+        source.read_positions(first, &mut positions[start..])?;
+    }
+    let mut attributes = Vec::with_capacity(source.attributes().len());
+    for (number, attribute) in source.attributes().iter().enumerate() {
+        let mut values = Vec::new();
+        for (first, len) in starts().map(run) {
+            let start = values.len();
+            values.resize(start + len * attribute.width(), 0);
+            source.read_values(number, first, &mut values[start..])?;
+        }
+        let decoded = decoded(attribute, &values);
+        attributes.push(decoded.map_err(|e| e.in_file(path))?);
+    }
+    Ok(RawParticles {
+        positions: Positions::F64(positions),
+        attributes,
+        time: source.time(),
+        step: source.step(),
+    })
+}
+
+fn decoded(attribute: &SourceAttribute, values: &[u8]) -> Result<Attribute, ParseError> {
+    Ok(Attribute {
+        name: attribute.name.clone(),
+        components: attribute.components,
+        data: attribute.scalar.decode(Endian::Little, values)?,
+    })
+}
+
+/// Half the median distance to the nearest neighbour of some of the `sample`, among all particles.
+pub(super) fn spacing(
+    source: &dyn ParticleSource,
+    sample: &Positions,
+) -> Result<Option<f32>, FrameError> {
+    let count = usize::try_from(source.count()).unwrap_or(usize::MAX);
+    let queries = (NEIGHBOUR_BUDGET / count.max(1)).clamp(LEAST_QUERIES, NEIGHBOUR_QUERIES);
+    let stride = sample.len().div_ceil(queries).max(1);
+    let asked: Vec<DVec3> = (0..sample.len())
+        .step_by(stride)
+        .map(|i| sample.get(i))
+        .filter(|p| p.is_finite())
+        .collect();
+    let of_run = |positions: &[DVec3]| {
+        let nearest = |from: &DVec3| {
+            let squares = positions.iter().map(|to| from.distance_squared(*to));
+            squares.filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min)
+        };
+        asked.iter().map(nearest).collect::<Vec<f64>>()
+    };
+    let join = |mut a: Vec<f64>, b: Vec<f64>| {
+        a.iter_mut().zip(&b).for_each(|(a, b)| *a = a.min(*b));
+        a
+    };
+    let far = || vec![f64::INFINITY; asked.len()];
+    let nearest = each_run(source, of_run, far, join)?;
+    let finite = nearest.into_iter().filter(|d| d.is_finite());
+    #[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
+    let distances = finite.map(|square| square.sqrt() as f32).collect();
+    Ok(middle(distances).map(|distance| 0.5 * distance))
+}
+
+/// Reads all positions in runs, and joins what `of_run` says of each.
+fn each_run<T: Send>(
+    source: &dyn ParticleSource,
+    of_run: impl Fn(&[DVec3]) -> T + Sync,
+    nothing: impl Fn() -> T + Sync + Send,
+    join: impl Fn(T, T) -> T + Sync + Send,
+) -> Result<T, FrameError> {
+    let runs = source.count().div_ceil(RUN as u64);
+    (0..runs)
+        .into_par_iter()
+        .map_init(
+            || vec![DVec3::ZERO; RUN],
+            |positions, number| {
+                let first = number * RUN as u64;
+                let len = (source.count() - first).min(RUN as u64);
+                let len = usize::try_from(len).unwrap_or(RUN);
+                source.read_positions(first, &mut positions[..len])?;
+                Ok(of_run(&positions[..len]))
+            },
+        )
+        .try_reduce(&nothing, |a, b| Ok(join(a, b)))
+}
+
+#[cfg(test)]
+mod tests {
+    use glam::Vec3;
+    use spherule_formats::convert::{BoxSource, RawSource};
+    use spherule_formats::generate::BoxSettings;
+
+    use super::super::robust::estimate_radius;
+    use super::*;
+
+    #[test]
+    fn what_passes_through_tells_what_is_read_whole() {
+        let source = BoxSource::new(BoxSettings::thesis(200_000, 3));
+        let mut all = vec![DVec3::ZERO; 200_000];
+        source.read_positions(0, &mut all).expect("there");
+        let (min, max) = extremes(&source).expect("there").expect("some");
+        assert!(all.iter().all(|p| p.cmpge(min).all() && p.cmple(max).all()));
+        assert!(all.iter().any(|p| p.x == min.x) && all.iter().any(|p| p.z == max.z));
+        let some = sample(&source, Path::new("box"), 4096).expect("there");
+        assert!((3000..=4096).contains(&some.positions.len()));
+        assert!((0..some.positions.len()).all(|i| all.contains(&some.positions.get(i))));
+        let streamed = spacing(&source, &some.positions).expect("there").expect("some");
+        let single: Vec<Vec3> = all.iter().map(|p| p.as_vec3()).collect();
+        let whole = estimate_radius(&single).expect("some");
+        assert!((streamed / whole - 1.0).abs() < 0.1, "{streamed} {whole}");
+    }
+
+    #[test]
+    fn nothing_and_what_is_no_number() {
+        let raw = RawParticles {
+            positions: Positions::F64(vec![DVec3::NAN; 3]),
+            attributes: Vec::new(),
+            time: None,
+            step: None,
+        };
+        let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
+        assert_eq!(extremes(&source).expect("there"), None);
+        assert_eq!(spacing(&source, &raw.positions).expect("there"), None);
+    }
+}
