@@ -34,21 +34,15 @@ fn last_on(positions: &[Vec3], curve: &Curve, count: usize) -> Vec<u32> {
         behind += counts[cell];
         cell -= 1;
     }
-    let numbered = positions.par_iter().enumerate();
-    let in_cells = |low: usize, high: usize| {
-        let is_there = move |(number, position): (usize, &Vec3)| {
-            let own = curve.cell(*position);
-            (low <= own && own < high).then_some(number as u32)
-        };
-        numbered
-            .clone()
-            .with_min_len(TASK)
-            .filter_map(is_there)
-            .collect::<Vec<u32>>()
+    let is_among = |(number, position): (usize, &Vec3)| {
+        (curve.cell(*position) >= cell).then_some(number as u32)
     };
-    let mut last = in_cells(cell + 1, usize::MAX);
+    let numbered = positions.par_iter().enumerate().with_min_len(TASK);
+    let among: Vec<u32> = numbered.filter_map(is_among).collect();
+    let cell_of = |number: &u32| curve.cell(positions[*number as usize]);
+    let (mut last, mut own): (Vec<u32>, Vec<u32>) =
+        among.into_iter().partition(|number| cell_of(number) > cell);
     let wanted = count - behind;
-    let mut own = in_cells(cell, cell + 1);
     let rest = own.len() - wanted;
     if rest > 0 && own.len() <= positions.len() / 8 {
         let place = |number: &u32| (curve.place(positions[*number as usize]), *number);
@@ -79,6 +73,7 @@ fn count_cells(positions: &[Vec3], curve: &Curve) -> Vec<usize> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::generate::{BoxSettings, fill_box};
     use crate::native::tests::clustered;
 
     /// Every particle of `all` is in one of `parts`, with its own row: its number.
@@ -106,18 +101,32 @@ mod tests {
             coincident,
         ] {
             let curve = Curve::over(&all);
-            let mut part = Part {
-                rows: (0..).take(all.len()).flat_map(u32::to_le_bytes).collect(),
-                positions: all.clone(),
+            let (part, carried) = carried_of(&all, &curve);
+            // Of a cell with very many it does not matter which.
+            let cells = |part: &Part| -> Vec<usize> {
+                part.positions.iter().map(|p| curve.cell(*p)).collect()
             };
-            let carried = carry_last(&mut part, &curve, 4, 1024);
-            assert_eq!((part.len() % 1024, carried.len()), (0, all.len() % 1024));
-            assert_complete(&all, [&part, &carried]);
-            let places = |part: &Part| -> Vec<u64> {
-                part.positions.iter().map(|p| curve.place(*p)).collect()
-            };
-            let (before, after) = (places(&part), places(&carried));
+            let (before, after) = (cells(&part), cells(&carried));
             assert!(before.iter().max() <= after.iter().min() || after.is_empty());
         }
+        let even = fill_box(&BoxSettings::thesis(10_000, 1));
+        let curve = Curve::over(&even);
+        let (part, carried) = carried_of(&even, &curve);
+        let places =
+            |part: &Part| -> Vec<u64> { part.positions.iter().map(|p| curve.place(*p)).collect() };
+        assert!(places(&part).iter().max() <= places(&carried).iter().min());
+    }
+
+    /// What stays and what goes on.
+    #[track_caller]
+    fn carried_of(all: &[Vec3], curve: &Curve) -> (Part, Part) {
+        let mut part = Part {
+            rows: (0..).take(all.len()).flat_map(u32::to_le_bytes).collect(),
+            positions: all.to_vec(),
+        };
+        let carried = carry_last(&mut part, curve, 4, 1024);
+        assert_eq!((part.len() % 1024, carried.len()), (0, all.len() % 1024));
+        assert_complete(all, [&part, &carried]);
+        (part, carried)
     }
 }
