@@ -145,7 +145,7 @@ mod tests {
 
     #[test]
     fn what_passes_through_tells_what_is_read_whole() {
-        let source = BoxSource::new(BoxSettings::thesis(200_000, 3));
+        let source = BoxSource::new(BoxSettings::thesis(200_000, 3), None);
         let mut all = vec![DVec3::ZERO; 200_000];
         source.read_positions(0, &mut all).expect("there");
         let (min, max) = extremes(&source).expect("there").expect("some");
@@ -154,7 +154,9 @@ mod tests {
         let some = sample(&source, Path::new("box"), 4096).expect("there");
         assert!((3000..=4096).contains(&some.positions.len()));
         assert!((0..some.positions.len()).all(|i| all.contains(&some.positions.get(i))));
-        let streamed = spacing(&source, &some.positions).expect("there").expect("some");
+        let streamed = spacing(&source, &some.positions)
+            .expect("there")
+            .expect("some");
         let single: Vec<Vec3> = all.iter().map(|p| p.as_vec3()).collect();
         let whole = estimate_radius(&single).expect("some");
         assert!((streamed / whole - 1.0).abs() < 0.1, "{streamed} {whole}");

@@ -6,7 +6,7 @@ use crate::order::kd;
 /// Most particles that are ordered together when all of them fit into memory: their places have 32 bits, and a
 /// longer order is no better.
 const LARGEST_WHOLE: u64 = 1 << 26;
-/// Most particles of a part: some 200 MiB. With twice as many 10^8 particles took a tenth longer (2 cores).
+/// Most particles of a part: some 200 MiB. One run each of 10^8 took 11.6 s, and 13.5 s with twice as many.
 const LARGEST_PART: usize = 1 << 22;
 const SMALLEST_PART: usize = 1 << 12;
 /// Most particles that are gathered, coded and written together.
