@@ -16,7 +16,7 @@ use super::{FrameWeight, id_of, velocity_of};
 const MOST: usize = 1 << 17;
 
 /// Particles of a binary foreign file beyond which it is not read for a look.
-const LARGE: u64 = 1 << 24;
+const LARGE: u64 = 1 << 20;
 
 /// What is seen of a frame.
 pub(super) struct Look {
@@ -34,8 +34,13 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// At frame `index` of `sequence`.
-    pub(super) fn at(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
+    /// At frame `index` of `sequence`. The spacing of particles takes long to find, and is looked for only if
+    /// somebody `asks_spacing`.
+    pub(super) fn at(
+        sequence: &Sequence,
+        index: usize,
+        asks_spacing: bool,
+    ) -> Result<Self, FrameError> {
         match sequence.native_file(index) {
             Some(path) => {
                 let file = NativeFile::open(path, Access::Map)?;
@@ -43,7 +48,7 @@ impl Look {
                 file.check()?;
                 Ok(look)
             }
-            None => match Self::at_large(sequence, index)? {
+            None => match Self::at_large(sequence, index, asks_spacing)? {
                 Some(look) => Ok(look),
                 None => Self::at_files(sequence, index),
             },
@@ -51,7 +56,11 @@ impl Look {
     }
 
     /// At a binary file of many particles; None for others.
-    fn at_large(sequence: &Sequence, index: usize) -> Result<Option<Self>, FrameError> {
+    fn at_large(
+        sequence: &Sequence,
+        index: usize,
+        asks_spacing: bool,
+    ) -> Result<Option<Self>, FrameError> {
         let Some(path) = sequence.lone_file(index) else {
             return Ok(None);
         };
@@ -60,9 +69,10 @@ impl Look {
         };
         let particles = stream::sample(&*source, path, MOST)?;
         let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
-        let spacing = match source.attributes().iter().any(is_radius) {
-            true => None,
-            false => stream::spacing(&*source, &particles.positions)?,
+        let has_radii = source.attributes().iter().any(is_radius);
+        let spacing = match asks_spacing && !has_radii {
+            true => stream::spacing(&*source, &particles.positions)?,
+            false => None,
         };
         let extremes = stream::extremes(&*source)?;
         source.check()?;

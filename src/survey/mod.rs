@@ -199,7 +199,7 @@ impl Survey {
         };
         let mut failure = None;
         for index in indices {
-            match Look::at(sequence, index) {
+            match Look::at(sequence, index, question.radius == RadiusQuestion::Auto) {
                 Ok(look) => totals.take_in(look, question),
                 Err(error) => {
                     failure.get_or_insert(error);
