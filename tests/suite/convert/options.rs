@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::{convert, inspected};
-use crate::harness::{Workshop, dam_break, files, natives};
+use crate::harness::{Workshop, dam_break, files, natives, npy};
 
 fn names(shop: &Workshop, file: &str) -> Vec<String> {
     let object = inspected(shop, file);
@@ -41,6 +41,47 @@ fn attributes_are_left_out_by_name_or_all_but_some() {
         .expect(2)
         .tells("--attributes: no frame has `pressure`; there are ")
         .tells("`density`");
+}
+
+#[test]
+fn attributes_are_stored_in_fewer_bits() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), [1]);
+    for (choices, stored) in [
+        ("velocity:f16,density:u8", ["i32", "8-bit", "f16"]),
+        ("*:f16", ["i32", "f16", "f16"]),
+        ("*:u8,velocity:keep,id:off", ["", "8-bit", "f32"]),
+    ] {
+        convert(&shop, &["--attributes", choices, "--force"]).expect(0);
+        let object = inspected(&shop, "out/frame.0001.spf");
+        let list = object["native"]["attributes"].as_array().expect("a list");
+        for (name, wanted) in ["id", "density", "velocity"].into_iter().zip(stored) {
+            let found = list.iter().find(|a| a["name"] == name);
+            let found = found.map_or("", |a| a["stored"].as_str().expect("a name"));
+            assert_eq!(found, wanted, "{choices}: {name}");
+        }
+    }
+    convert(&shop, &["--attributes", "id:f16", "--force"])
+        .expect(1)
+        .tells("attribute id holds ids");
+}
+
+/// Native frames are in another order than their files.
+#[test]
+fn places_in_the_file_are_kept_as_ids_if_asked() {
+    let shop = Workshop::new();
+    npy(&shop.join("in/f_1.npy"), 3000, 1, glam::Vec3::ZERO);
+    convert(&shop, &[]).expect(0);
+    assert!(!names(&shop, "out/frame.0001.spf").contains(&"id".to_owned()));
+    convert(&shop, &["--ids", "--force"]).expect(0);
+    let object = inspected(&shop, "out/frame.0001.spf");
+    let list = object["attributes"].as_array().expect("a list");
+    let id = list.iter().find(|a| a["name"] == "id").expect("ids");
+    assert_eq!(
+        (&id["min"][0], &id["max"][0]),
+        (&0.into(), &2999.into()),
+        "{id}"
+    );
 }
 
 #[test]
