@@ -12,13 +12,12 @@ use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, ScalarType};
 
 use super::Inspected;
+use crate::report::scale::thesis;
 
 /// Particles up to which a frame is read whole; of larger ones a sample is.
 const LARGEST_READ: u64 = 4_000_000;
 /// Particles of the sample: pages of a file that is not in memory come at some 20 µs each.
 const SAMPLE: usize = 32_768;
-/// What the thesis took for positions and structure, bytes of GPU memory a particle.
-const THESIS: f64 = 350.0;
 
 /// What a native frame says of itself.
 pub(super) struct NativeFacts {
@@ -198,7 +197,7 @@ impl NativeFacts {
                 "rest": self.each(parts.rest),
                 "all": self.each(parts.all),
                 "positions_and_nodes": self.each(parts.positions + parts.nodes),
-                "thesis_positions_and_structure": THESIS,
+                "thesis_positions_and_structure": thesis::BYTES,
             },
             "sample": self.sample,
         })
@@ -273,8 +272,9 @@ impl NativeFacts {
         writeln!(out, " {all:.2} in all")?;
         writeln!(
             out,
-            "  positions and nodes: {:.2} bytes per particle (thesis: {THESIS} bytes per particle)",
-            each(parts.positions + parts.nodes)
+            "  positions and nodes: {:.2} bytes per particle (thesis: {} bytes per particle)",
+            each(parts.positions + parts.nodes),
+            thesis::BYTES
         )
     }
 }

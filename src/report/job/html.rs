@@ -6,6 +6,7 @@ use super::numbers::{bytes, count, duration, seconds as time, short, shortened};
 use super::{JobReport, Status};
 use crate::report::FrameReport;
 use crate::report::page::{Page, Table};
+use crate::report::scale::thesis;
 
 /// Characters of a list of frame numbers, or of a setting.
 const MOST_TEXT: usize = 300;
@@ -128,6 +129,10 @@ impl JobReport {
                     .map(bytes)
                     .join(", "),
             ),
+            (
+                "Of these for a particle, beside the thesis's program",
+                per_particle(report),
+            ),
             ("Scratch while building", bytes(report.bytes.scratch)),
             ("Peak while building", bytes(report.bytes.build_peak)),
         ]);
@@ -163,4 +168,11 @@ fn phases(report: &FrameReport) -> Table {
 fn list_of(frames: &[i64]) -> String {
     let range = FrameRange::from_frames(frames.iter().copied());
     range.map_or_else(String::new, |r| shortened(&r.to_string(), MOST_TEXT))
+}
+
+/// Bytes a particle in anonymous memory and in the mapped file.
+fn per_particle(report: &FrameReport) -> String {
+    let each = |bytes: u64| short(bytes as f64 / report.particles.max(1) as f64);
+    let held = [report.bytes.anonymous(), report.bytes.file.total()].map(each);
+    format!("{} B (thesis: about {} B)", held.join(", "), thesis::BYTES)
 }
