@@ -92,6 +92,7 @@ fn shrunk(path: &Path) {
         max_error: 0.01,
     };
     let spec = native::FrameSpec {
+        is_y_up: false,
         count: 3,
         encoding: Encoding::Q10,
         bound: Bound::None,

@@ -93,6 +93,7 @@ impl Conversion {
             encoding: asked.encoding,
             bound: asked.bound,
             origin: self.origin,
+            is_y_up: self.is_y_up,
             radius: match asked.radius {
                 Some(radius) => RadiusRule::All(radius),
                 None => RadiusRule::Source {

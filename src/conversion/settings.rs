@@ -78,6 +78,8 @@ pub struct Conversion {
     pub settings: ConvertSettings,
     /// World position that stored positions are relative to.
     pub origin: DVec3,
+    /// Whether y points up for users of the format.
+    pub is_y_up: bool,
     /// Radius of frames that bring none, scene units.
     pub estimate: Option<f32>,
 }
@@ -97,6 +99,7 @@ impl Conversion {
         Ok(Self {
             estimate: survey.radius.filter(|_| settings.radius.is_none()),
             origin: survey.origin,
+            is_y_up: survey.up == DVec3::Y,
             settings,
         })
     }

@@ -98,6 +98,7 @@ impl<'a> Output<'a> {
             .unwrap_or_else(|| smallest_encoding(&ordered.positions, settings.bound, smallest));
         let attributes = self.columns.attributes.iter().zip(&self.errors);
         let spec = FrameSpec {
+            is_y_up: self.asked.settings.is_y_up,
             count: self.survey.count,
             encoding,
             bound: settings.bound,

@@ -18,6 +18,8 @@ pub struct ConvertSettings {
     pub bound: Bound,
     /// World position of the zero of the stored positions.
     pub origin: DVec3,
+    /// Whether y points up for whoever made the particles, so that viewers need not be told.
+    pub is_y_up: bool,
     /// Whose radii.
     pub radius: RadiusRule,
     /// Memory that the conversion may hold, bytes; less than [`Self::LEAST_MEMORY`] is taken as that. What a
@@ -47,6 +49,7 @@ impl Default for ConvertSettings {
             encoding: Some(Encoding::F32),
             bound: Bound::None,
             origin: DVec3::ZERO,
+            is_y_up: false,
             radius: RadiusRule::Source { otherwise: None },
             memory: Self::USUAL_MEMORY,
             other_attributes: AttributeChoice::AsIs,

@@ -85,6 +85,7 @@ fn store_checked(
         .encoding
         .unwrap_or_else(|| smallest_encoding(&positions, settings.bound, common));
     let spec = FrameSpec {
+        is_y_up: false,
         count: frame.len() as u64,
         encoding,
         bound: settings.bound,

@@ -166,6 +166,8 @@ pub struct FrameIndex {
     pub encoding: u32,
     /// How particles are ordered, [`ORDER_KD`].
     pub order: u32,
+    /// Which axis points up for whoever made the particles: 0 if that is not told, or [`UP_Y`].
+    pub up: u32,
     /// World position of the zero of the stored positions.
     pub origin: [f64; 3],
     /// Smallest stored position; infinity if there are no particles.
@@ -194,6 +196,9 @@ pub struct FrameIndex {
 
 /// Order code: k-d cuts inside runs of a space-filling curve, at whole nodes.
 pub const ORDER_KD: u32 = 1;
+
+/// Up code: y, as for users of Houdini.
+pub const UP_Y: u32 = 2;
 
 impl FrameIndex {
     /// How positions are stored.

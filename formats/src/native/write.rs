@@ -10,7 +10,7 @@ use rkyv::rancor;
 
 use super::layout::{
     ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,
-    Section, blocks_of, header, nodes_len, positions_len,
+    Section, UP_Y, blocks_of, header, nodes_len, positions_len,
 };
 use super::quantize::{Allowed, GROUP, Leaves, StoredBlock, encode};
 use super::radii::CodedRadii;
@@ -29,6 +29,8 @@ pub struct FrameSpec {
     pub encoding: Encoding,
     /// How far they may be from the true ones; blocks beyond are stored as they are.
     pub bound: Bound,
+    /// Whether y points up for whoever made the particles; else it is not told.
+    pub is_y_up: bool,
     /// World position of the zero of the positions.
     pub origin: DVec3,
     /// How far the positions that are pushed are from the true ones already, scene units.
@@ -300,6 +302,7 @@ fn index_of(spec: &FrameSpec, measured: &Measured, sections: &[Section]) -> Fram
         block: index_u32(BLOCK_SIZE),
         encoding: spec.encoding.code(),
         order: ORDER_KD,
+        up: if spec.is_y_up { UP_Y } else { 0 },
         origin: spec.origin.to_array(),
         min: measured.bounds.min.to_array(),
         max: measured.bounds.max.to_array(),

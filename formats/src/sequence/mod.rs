@@ -14,6 +14,8 @@ use std::time::SystemTime;
 use glam::DVec3;
 
 use crate::detect::Format;
+use crate::native::layout::UP_Y;
+use crate::native::{Access, NativeFile};
 use crate::open::FrameFile;
 use crate::{FrameError, ParseError, ParticleFrame, RawParticles};
 
@@ -173,7 +175,7 @@ impl Sequence {
     }
 
     /// Whether users of this format are used to y pointing up: Houdini's BGEO, and VTK files that
-    /// SPlisHSPlasH signs in their title. Elsewhere z is. Looks into the first file.
+    /// SPlisHSPlasH signs in their title, and native frames made of either. Elsewhere z is. Looks into the first file.
     pub fn is_y_up(&self) -> bool {
         let first = self.frames.first().and_then(|f| f.parts.first());
         first.is_some_and(|part| y_is_up(&part.path))
@@ -328,6 +330,10 @@ fn y_is_up(path: &Path) -> bool {
     };
     match Format::detect(&head, path) {
         Ok(Format::Bgeo) => true,
+        Ok(Format::Spf) => {
+            let file = NativeFile::open(path, Access::Map);
+            file.is_ok_and(|file| file.index().up == UP_Y)
+        }
         Ok(Format::VtkLegacy) => {
             let mut lines = head.split(|b| *b == b'\n');
             let title = lines.nth(1).unwrap_or_default();

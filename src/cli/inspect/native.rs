@@ -6,7 +6,7 @@ use std::path::Path;
 
 use serde_json::{Value, json};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, Node};
-use spherule_formats::native::layout::{RadiusIndex, VERSION, blocks_of};
+use spherule_formats::native::layout::{RadiusIndex, UP_Y, VERSION, blocks_of};
 use spherule_formats::native::{Access, FrameIndex, NativeFile, RadiusCode, StoredType};
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, ScalarType};
@@ -164,6 +164,7 @@ impl NativeFacts {
         json!({
             "version": VERSION,
             "order": "k-d",
+            "up": (self.index.up == UP_Y).then_some("y"),
             "block_size": BLOCK_SIZE,
             "blocks": blocks,
             "wide_blocks": wide,
