@@ -11,6 +11,7 @@ use spherule_formats::sequence::Sequence;
 use spherule_jobs::{DEFAULT_WORKER, FrameRange, Job, JobRequest, Mode};
 
 use super::job::{absolute, apart};
+use super::numbers::{USUAL_BOUND, not_negative, positive};
 use super::progress::{Progress, ProgressMode};
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
@@ -22,8 +23,6 @@ use crate::manifest::real_dir;
 use crate::report::Bytes;
 use crate::survey::Survey;
 
-/// The bound that coded positions keep if none is given: a fraction of the radius.
-const USUAL_BOUND: f64 = 0.02;
 /// What the job of a conversion is called in its plan.
 const CONVERT: &str = "convert";
 
@@ -252,23 +251,5 @@ impl ConvertArgs {
             keep_ids: self.ids,
             memory: self.memory,
         }
-    }
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("`{text}` is no error; 0.02 is one"))
-    }
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    let value: f32 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("`{text}` is no radius"))
     }
 }

@@ -13,11 +13,9 @@ use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::write;
 use spherule_jobs::Interrupt;
 
+use super::numbers::{USUAL_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
 use crate::report::Bytes;
-
-/// The bound that coded positions keep if none is given: a fraction of the radius.
-const USUAL_BOUND: f64 = 0.02;
 
 const WORDS: signals::Words = signals::Words {
     asked: "stopping",
@@ -198,24 +196,6 @@ impl CommonArgs {
             memory: self.memory.0,
             ..ConvertSettings::default()
         }
-    }
-}
-
-fn not_negative(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("`{text}` is no error; 0.02 is one"))
-    }
-}
-
-fn positive(text: &str) -> Result<f32, String> {
-    let value: f32 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("`{text}` is no radius"))
     }
 }
 

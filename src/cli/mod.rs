@@ -23,6 +23,7 @@ mod generate;
 mod init;
 mod inspect;
 mod job;
+mod numbers;
 mod plan;
 mod progress;
 mod render;
