@@ -79,13 +79,16 @@ impl Look {
         let stored = std::fs::metadata(path).map_or(0, |meta| meta.len());
         let widths = source.attributes().iter().map(|a| a.width() as u64);
         let count = source.count();
-        let positions = 12 * count;
+        let attributes = count.saturating_mul(widths.sum());
+        // A binary file has room for positions in double precision or has them in single.
+        let is_double = stored >= attributes.saturating_add(count.saturating_mul(24));
+        let positions = count.saturating_mul(if is_double { 24 } else { 12 });
         Ok(Some(Self {
             weight: FrameWeight {
                 particles: count,
                 stored,
                 content: stored,
-                raw: positions + count.saturating_mul(widths.sum()),
+                raw: positions.saturating_add(attributes),
                 positions,
                 files: 1,
                 own_radii: false,
