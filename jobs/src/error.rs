@@ -94,11 +94,19 @@ pub enum JobError {
         /// Why.
         what: String,
     },
-    /// Another process holds the job.
-    #[error("{}: another process is at work here; wait for it, or use another directory", path.display())]
+    /// What was asked must not be done while another worker is at the job.
+    #[error("{}: {who} is at work here; wait for it, or stop it first", dir.display())]
     Busy {
-        /// The ledger that it holds.
-        path: PathBuf,
+        /// The job's directory.
+        dir: PathBuf,
+        /// Who works there.
+        who: String,
+    },
+    /// Others have taken this worker for dead, or the directory `job.work` was removed.
+    #[error("{}: this worker gave no sign of life for so long that others have taken it for dead; the same command joins again", dir.display())]
+    TakenForDead {
+        /// The job's directory.
+        dir: PathBuf,
     },
     /// The directory refuses files.
     #[error("{}: cannot be written ({source}); check its permissions, or choose another directory", path.display())]

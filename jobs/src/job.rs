@@ -1,10 +1,10 @@
-//! A job: plan and ledger together, opened for work ([`Job::open`]) or only looked at
+//! A job: plan and ledgers together, opened for work ([`Job::open`]) or only looked at
 //! ([`Job::read`], [`Job::peek`], [`Job::foresee`]).
 //!
-//! One process works in a directory at a time as yet; its ledger is locked. A second worker would
-//! come under a name of its own ([`JobRequest::worker`]) and claim frames.
+//! Any number of processes may have the same job open, on one machine or on several that share its
+//! directory. They agree on who does what by claims ([`Claims`]), each writes a ledger of its own, and
+//! one at a time changes the plan.
 
-use std::collections::{HashMap, HashSet};
 use std::error::Error;
 use std::fs;
 use std::io;
@@ -12,53 +12,16 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use crate::ledger::{Ledger, LedgerWriter, ledger_files};
-use crate::publish::remove_leftovers;
+use crate::ledger::{ENDED, LedgerFile, LedgerWriter, News, fold, ledger_files, remove};
+use crate::planning::{Prints, merged_plan, new_plan, stored_path};
+use crate::work::{Desk, sweep_parts};
 use crate::{
-    Entry, Fingerprint, FrameRange, FrameState, InputChange, JobError, JobState, OutputFile, Plan,
-    PlannedFrame, PlannedInput, Status, Summary,
+    Claims, Entry, FrameState, JobError, JobRequest, JobState, Ledger, Mode, OutputFile, Plan,
+    Status, Summary,
 };
 
-/// Worker name of a process that works alone.
-pub const DEFAULT_WORKER: &str = "main";
-
-/// What to do with what an earlier run left.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Mode {
-    /// Go on with it; refuse if settings, or inputs of finished frames, have changed.
-    #[default]
-    Resume,
-    /// Forget plan and ledgers. Images stay until they are replaced.
-    Force,
-    /// Finished frames stay finished whatever has changed; the rest is done as asked now.
-    KeepDone,
-}
-
-/// What the caller wants done.
-#[derive(Debug, Clone)]
-pub struct JobRequest {
-    /// Name of this worker's ledger: letters, digits, `-`, `_`, `.`.
-    pub worker: String,
-    /// Everything that outputs depend on besides the inputs: dotted key and value.
-    pub settings: Vec<(String, String)>,
-    /// All frames there are, each number and each output once.
-    pub frames: Vec<FrameRequest>,
-    /// Which of them to do in this run, in this order; all if None. Not part of the job's identity.
-    pub selection: Option<FrameRange>,
-    /// What to do with what an earlier run left.
-    pub mode: Mode,
-}
-
-/// One frame of a [`JobRequest`].
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct FrameRequest {
-    /// The frame's number.
-    pub number: i64,
-    /// Files it is made from; they need not be readable.
-    pub inputs: Vec<PathBuf>,
-    /// Files it will be made into.
-    pub outputs: Vec<PathBuf>,
-}
+/// So many ledgers of workers that have ended may lie about before they are brought together in one.
+const LOOSE_LEDGERS: usize = 8;
 
 /// How a job would stand if it were opened.
 #[derive(Debug, Clone)]
@@ -76,6 +39,7 @@ pub struct Foreseen {
 pub struct Job {
     state: JobState,
     writer: LedgerWriter,
+    claims: Claims,
     selected: Vec<i64>,
 }
 
@@ -94,7 +58,7 @@ impl Job {
     /// Trouble reading the directory.
     pub fn has_begun(dir: &Path) -> Result<bool, JobError> {
         let dir = named(dir);
-        Ok(Plan::path_in(dir).exists() || ledger_files(dir)?.iter().any(|(_, len)| *len > 0))
+        Ok(Plan::path_in(dir).exists() || ledger_files(dir)?.iter().any(|file| file.length > 0))
     }
 
     /// How the job in `dir` stands, or None if none has begun there. Touches nothing, and may be
@@ -117,8 +81,9 @@ impl Job {
     /// Those of [`Job::open`] that are known before anything is written.
     pub fn foresee(dir: &Path, request: &JobRequest) -> Result<Foreseen, JobError> {
         let dir = named(dir);
-        check_request(request)?;
-        let selected = select(request);
+        request.check()?;
+        let selected = request.selected();
+        let mut prints = Prints::default();
         let forgotten = request.mode == Mode::Force || !dir.exists();
         let (old, ledger) = if forgotten {
             (None, Ledger::default())
@@ -130,12 +95,12 @@ impl Job {
                 if !forgotten {
                     refuse_ledgers(dir)?;
                 }
-                (new_plan(dir, request, Value::Null)?, ledger, true)
+                (new_plan(dir, request, &mut prints)?, ledger, true)
             }
             Some(old) => {
                 let state = JobState::new(dir, old, ledger);
                 let mut anew = false;
-                let plan = merged_plan(&state, request, &selected, |_| {
+                let plan = merged_plan(&state, request, &selected, &mut prints, |_| {
                     anew = true;
                     Ok::<_, JobError>(Value::Null)
                 })?;
@@ -150,7 +115,7 @@ impl Job {
         })
     }
 
-    /// Begins the job in `dir` (created if need be), or goes on with it.
+    /// Begins the job in `dir` (created if need be), or goes on with it, alone or beside others.
     ///
     /// `resolve` settles what "auto" means. It is called only when that has to be settled: for a
     /// new job with None, and with the saved values when settings have changed under
@@ -159,38 +124,73 @@ impl Job {
     ///
     /// # Errors
     /// See [`JobError`]; after any of them, finished work is as it was, except that
-    /// [`Mode::Force`] may already have emptied the ledgers.
+    /// [`Mode::Force`] may already have removed some of the ledgers.
     pub fn open<E: Into<Box<dyn Error + Send + Sync>>>(
         dir: &Path,
         request: JobRequest,
         resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
     ) -> Result<Self, JobError> {
         let dir = named(dir);
-        check_request(&request)?;
+        request.check()?;
+        let selected = request.selected();
         fs::create_dir_all(dir).map_err(|e| JobError::io(dir, "creating the directory", e))?;
-        let mut writer = LedgerWriter::open(dir, &request.worker)?;
-        clean(dir, &request)?;
+        // The slow part is done before others are kept waiting.
+        let known = match request.mode {
+            Mode::Force => None,
+            Mode::Resume | Mode::KeepDone => Plan::load(dir)?,
+        };
+        let mut prints = Prints::ahead(&request, &selected, known.as_ref());
+        let desk = Desk::take(dir, request.patience)
+            .map_err(|e| JobError::io(dir, "beginning to work in it", e))?;
+        let locking = |e| JobError::io(dir, "agreeing with other workers", e);
+        let lock = desk.lock().map_err(locking)?;
+        clean(dir, &request, &desk)?;
         if request.mode == Mode::Force {
-            start_over(dir, &mut writer)?;
+            alone(dir, &desk)?;
+            start_over(dir)?;
         }
         let old = Plan::load(dir)?;
         let ledger = Ledger::read(dir)?;
-        writer.cut_torn_line()?;
-        let selected = select(&request);
         let state = match old {
-            None => begin(dir, &request, ledger, resolve)?,
-            Some(plan) => go_on(
-                JobState::new(dir, plan, ledger),
-                &request,
-                &selected,
-                resolve,
-            )?,
+            None => begin(dir, &request, ledger, &mut prints, resolve)?,
+            Some(plan) => {
+                let old = JobState::new(dir, plan, ledger);
+                let plan = merged_plan(&old, &request, &selected, &mut prints, resolve)?;
+                go_on(old, plan, &desk)?
+            }
         };
+        let news = if fold_ended(dir, &state.ledger, &desk)? {
+            // Lines have moved from file to file.
+            News::new(dir, desk.worker(), &Ledger::read(dir)?)
+        } else {
+            News::new(dir, desk.worker(), &state.ledger)
+        };
+        lock.end();
         Ok(Self {
+            writer: LedgerWriter::new(dir, desk.worker()),
+            claims: Claims::new(dir, desk, news),
             state,
-            writer,
             selected,
         })
+    }
+
+    /// What the frames of this job are claimed by, before they are worked on.
+    pub fn claims(&self) -> Claims {
+        self.claims.clone()
+    }
+
+    /// Reads again what all workers have planned and said so far.
+    ///
+    /// # Errors
+    /// [`JobError::PlanDamaged`], [`JobError::LedgerDamaged`], or trouble reading.
+    pub fn refresh(&mut self) -> Result<(), JobError> {
+        let dir = self.state.dir.clone();
+        let plan = match Plan::load(&dir)? {
+            Some(plan) => plan,
+            None => self.state.plan.clone(),
+        };
+        self.state = JobState::new(&dir, plan, Ledger::read(&dir)?);
+        Ok(())
     }
 
     /// The job as it stands now.
@@ -240,7 +240,7 @@ impl Job {
                 len: metadata.len(),
             });
         }
-        let mut entry = self.state.ledger.next_entry(frame, Status::Done, &details);
+        let mut entry = Entry::new(self.claims.take_seq(), frame, Status::Done, &details);
         entry.outputs = files;
         self.record(entry, FrameState::Done)
     }
@@ -255,10 +255,7 @@ impl Job {
         reason: &str,
         details: Value,
     ) -> Result<(), JobError> {
-        let mut entry = self
-            .state
-            .ledger
-            .next_entry(frame, Status::Failed, &details);
+        let mut entry = Entry::new(self.claims.take_seq(), frame, Status::Failed, &details);
         entry.reason = Some(reason.to_owned());
         self.record(entry, FrameState::Failed)
     }
@@ -294,10 +291,11 @@ fn begin<E: Into<Box<dyn Error + Send + Sync>>>(
     dir: &Path,
     request: &JobRequest,
     ledger: Ledger,
+    prints: &mut Prints,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<JobState, JobError> {
     refuse_ledgers(dir)?;
-    let mut plan = new_plan(dir, request, Value::Null)?;
+    let mut plan = new_plan(dir, request, prints)?;
     plan.resolve(resolve(None).map_err(|e| JobError::Resolve(e.into()))?);
     plan.store(dir)?;
     Ok(JobState::new(dir, plan, ledger))
@@ -305,159 +303,44 @@ fn begin<E: Into<Box<dyn Error + Send + Sync>>>(
 
 /// Refuses ledgers that no plan explains.
 fn refuse_ledgers(dir: &Path) -> Result<(), JobError> {
-    match ledger_files(dir)?.into_iter().find(|(_, len)| *len > 0) {
-        Some((ledger, _)) => Err(JobError::PlanMissing { ledger }),
+    let mut files = ledger_files(dir)?.into_iter();
+    match files.find(|file| file.length > 0) {
+        Some(LedgerFile { path, .. }) => Err(JobError::PlanMissing { ledger: path }),
         None => Ok(()),
     }
 }
 
-fn new_plan(dir: &Path, request: &JobRequest, resolved: Value) -> Result<Plan, JobError> {
-    let mut frames = plan_frames(dir, request.frames.iter())?;
-    frames.sort_by_key(|f| f.number);
-    Ok(Plan::new(request.settings.clone(), resolved, frames))
+fn go_on(old: JobState, plan: Plan, desk: &Desk) -> Result<JobState, JobError> {
+    if plan == old.plan {
+        return Ok(old);
+    }
+    if plan.settings() != old.plan.settings() {
+        // The others make their images with what they began with.
+        alone(&old.dir, desk)?;
+    }
+    plan.store(&old.dir)?;
+    Ok(JobState::new(&old.dir, plan, old.ledger))
 }
 
-fn go_on<E: Into<Box<dyn Error + Send + Sync>>>(
-    state: JobState,
-    request: &JobRequest,
-    selected: &[i64],
-    resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
-) -> Result<JobState, JobError> {
-    let plan = merged_plan(&state, request, selected, resolve)?;
-    if plan != state.plan {
-        plan.store(&state.dir)?;
+/// Refuses what must not be done while others work.
+fn alone(dir: &Path, desk: &Desk) -> Result<(), JobError> {
+    let others = desk.others();
+    let others = others.map_err(|e| JobError::io(dir, "looking for other workers", e))?;
+    match others.first() {
+        Some(other) => Err(JobError::Busy {
+            dir: dir.to_owned(),
+            who: other.told(),
+        }),
+        None => Ok(()),
     }
-    Ok(JobState::new(&state.dir, plan, state.ledger))
-}
-
-/// Frames outside the selection that the plan knows are not looked at again, so that one of many
-/// runs over a long sequence reads only its own inputs.
-fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
-    state: &JobState,
-    request: &JobRequest,
-    selected: &[i64],
-    resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
-) -> Result<Plan, JobError> {
-    let dir = state.dir.clone();
-    let changes = state.plan.changes_to(&request.settings);
-    if request.mode == Mode::Resume && !changes.is_empty() {
-        return Err(JobError::SettingsChanged { dir, changes });
-    }
-    let selected: HashSet<i64> = selected.iter().copied().collect();
-    let to_plan = request
-        .frames
-        .iter()
-        .filter(|f| selected.contains(&f.number) || state.plan.frame(f.number).is_none());
-    let frames = plan_frames(&dir, to_plan)?;
-    if request.mode == Mode::Resume {
-        let changes = changed_inputs(state, &frames);
-        if !changes.is_empty() {
-            return Err(JobError::InputChanged { dir, changes });
-        }
-    }
-    let resolved = if changes.is_empty() {
-        state.plan.resolved().clone()
-    } else {
-        resolve(Some(state.plan.resolved())).map_err(|e| JobError::Resolve(e.into()))?
-    };
-    let settings = if changes.is_empty() {
-        state.plan.settings().to_vec()
-    } else {
-        request.settings.clone()
-    };
-    let mut plan = Plan::new(settings, resolved, state.plan.frames().to_vec());
-    plan.merge(frames);
-    Ok(plan)
-}
-
-/// Only finished frames can be stale; the others will be made from what is there now.
-fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange> {
-    let mut changes: Vec<InputChange> = frames
-        .iter()
-        .filter(|now| state.is_done(now.number))
-        .filter_map(|now| {
-            let (path, what) = state.plan.frame(now.number)?.changed_input(now)?;
-            Some(InputChange {
-                frame: now.number,
-                path,
-                what,
-            })
-        })
-        .collect();
-    changes.sort_by_key(|c| c.frame);
-    changes
-}
-
-/// Takes fingerprints; a file that many frames share is read once.
-fn plan_frames<'a>(
-    dir: &Path,
-    frames: impl Iterator<Item = &'a FrameRequest>,
-) -> Result<Vec<PlannedFrame>, JobError> {
-    let mut known: HashMap<&Path, Option<Fingerprint>> = HashMap::new();
-    let mut planned = Vec::new();
-    for frame in frames {
-        let mut inputs = Vec::with_capacity(frame.inputs.len());
-        for path in &frame.inputs {
-            let fingerprint = known
-                .entry(path)
-                .or_insert_with(|| Fingerprint::of_file(path).ok());
-            inputs.push(PlannedInput {
-                path: utf8(path)?,
-                fingerprint: fingerprint.clone(),
-            });
-        }
-        let outputs = frame.outputs.iter().map(|path| stored_path(dir, path));
-        planned.push(PlannedFrame {
-            number: frame.number,
-            inputs,
-            outputs: outputs.collect::<Result<_, _>>()?,
-        });
-    }
-    Ok(planned)
-}
-
-fn select(request: &JobRequest) -> Vec<i64> {
-    let all: Vec<i64> = request.frames.iter().map(|f| f.number).collect();
-    match &request.selection {
-        Some(range) => range.select(&all),
-        None => all,
-    }
-}
-
-fn check_request(request: &JobRequest) -> Result<(), JobError> {
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || matches!(c, '-' | '_' | '.');
-    if request.worker.is_empty() || !request.worker.chars().all(is_plain) {
-        let what = format!(
-            "worker `{}`: a name may have letters, digits, `-`, `_` and `.`",
-            request.worker
-        );
-        return Err(JobError::Request(what));
-    }
-    let mut numbers = HashSet::new();
-    let mut outputs = HashMap::new();
-    for frame in &request.frames {
-        if !numbers.insert(frame.number) {
-            let what = format!("frame {} is there twice", frame.number);
-            return Err(JobError::Request(what));
-        }
-        for path in &frame.outputs {
-            if let Some(other) = outputs.insert(path, frame.number) {
-                let what = format!(
-                    "{}: frames {other} and {} would both be written here; put #### into the output's name",
-                    path.display(),
-                    frame.number
-                );
-                return Err(JobError::Request(what));
-            }
-        }
-    }
-    Ok(())
 }
 
 /// Ledgers go first: a plan without them means nothing is done, they without it could be taken
 /// for words on the next plan.
-fn start_over(dir: &Path, writer: &mut LedgerWriter) -> Result<(), JobError> {
-    writer.start_over(dir)?;
+fn start_over(dir: &Path) -> Result<(), JobError> {
+    for file in ledger_files(dir)? {
+        remove(&file)?;
+    }
     let path = Plan::path_in(dir);
     match fs::remove_file(&path) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => {
@@ -467,15 +350,31 @@ fn start_over(dir: &Path, writer: &mut LedgerWriter) -> Result<(), JobError> {
     }
 }
 
+/// Brings ledgers of ended workers together if there are many; whether it did.
+fn fold_ended(dir: &Path, ledger: &Ledger, desk: &Desk) -> Result<bool, JobError> {
+    let names = desk.names();
+    let at_work = names.map_err(|e| JobError::io(dir, "looking for other workers", e))?;
+    let mut files = ledger_files(dir)?;
+    files.retain(|file| !at_work.contains(&file.worker));
+    let loose = files.iter().filter(|file| file.worker != ENDED).count();
+    if loose <= LOOSE_LEDGERS {
+        return Ok(false);
+    }
+    fold(dir, ledger, &files)?;
+    Ok(true)
+}
+
 /// Removes what killed runs left half written, here and where outputs go.
-fn clean(dir: &Path, request: &JobRequest) -> Result<(), JobError> {
+fn clean(dir: &Path, request: &JobRequest, desk: &Desk) -> Result<(), JobError> {
+    let failed = |e| JobError::io(dir, "removing leftovers of a killed run", e);
+    let at_work = desk.sweep().map_err(failed)?;
     let outputs = request.frames.iter().flat_map(|f| &f.outputs);
     let mut dirs: Vec<&Path> = outputs.filter_map(|path| path.parent()).collect();
     dirs.push(dir);
     dirs.sort_unstable();
     dirs.dedup();
     for dir in dirs {
-        match remove_leftovers(dir) {
+        match sweep_parts(dir, &at_work) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => {
                 return Err(JobError::io(dir, "removing leftovers of a killed run", e));
             }
@@ -492,21 +391,4 @@ fn named(dir: &Path) -> &Path {
     } else {
         dir
     }
-}
-
-/// Relative to `dir` where it can be, so that the directory may be moved.
-fn stored_path(dir: &Path, path: &Path) -> Result<String, JobError> {
-    let failed = |e| JobError::io(path, "finding its absolute path", e);
-    let path = std::path::absolute(path).map_err(failed)?;
-    let dir = std::path::absolute(dir).map_err(failed)?;
-    utf8(path.strip_prefix(dir).unwrap_or(&path))
-}
-
-fn utf8(path: &Path) -> Result<String, JobError> {
-    path.to_str().map(str::to_owned).ok_or_else(|| {
-        JobError::Request(format!(
-            "{}: the name is not UTF-8 and cannot go into a plan; rename it",
-            path.display()
-        ))
-    })
 }

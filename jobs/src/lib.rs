@@ -7,27 +7,39 @@
 //!
 //! A job lives in one directory. The *plan* ([`Plan`]) says which frames there are and under which
 //! settings; it is written once and again only when frames are added. The *ledger* ([`Ledger`])
-//! only grows: one line for each frame that was finished or failed. Outputs are published whole
+//! only grows: one line for each frame that was finished or failed, a file for each worker. Workers claim
+//! frames ([`Claims`]) before they do them. Outputs are published whole
 //! ([`Publisher`]) before their line is written, so a kill at any moment loses at most the frames
 //! in hand.
 #![deny(unsafe_code)]
 
+mod claims;
 mod error;
 mod fingerprint;
 mod interrupt;
 mod job;
 mod ledger;
 mod plan;
+mod planning;
+mod process;
 mod publish;
+mod queue;
 mod range;
+mod request;
 mod state;
+mod work;
 
+pub use claims::Claims;
 pub use error::{InputChange, JobError, SettingChange};
 pub use fingerprint::{Fingerprint, compare_settings, settings_hash};
 pub use interrupt::{Interrupt, InterruptLevel};
-pub use job::{DEFAULT_WORKER, Foreseen, FrameRequest, Job, JobRequest, Mode};
-pub use ledger::{Entry, Ledger, OutputFile, Status};
+pub use job::{Foreseen, Job};
+pub use ledger::{Details, Entry, Ledger, OutputFile, Status};
 pub use plan::{PLAN_FILE, Plan, PlannedFrame, PlannedInput};
-pub use publish::{Publisher, publish, publish_with};
+pub use process::{owner, work_on_behalf_of};
+pub use publish::{Publisher, discard_parts, publish, publish_with};
+pub use queue::{Queue, QueueNews};
 pub use range::{FrameRange, RangeError};
+pub use request::{DEFAULT_PATIENCE, FrameRequest, JobRequest, Mode};
 pub use state::{FrameState, JobState, Summary};
+pub use work::{Claim, Claimed, start_heart};

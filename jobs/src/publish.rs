@@ -1,15 +1,16 @@
 //! Files that appear at their name whole or not at all: written under a temporary name in the
 //! same directory, synced, renamed, and the directory synced too.
 //!
-//! A temporary is called `.NAME.PID.N.part` and stays locked while it is written, so that what a
-//! killed run left behind can be told from what a living one is writing, also across machines
-//! that share the file system (where it has locks).
+//! A temporary is called `.NAME.OWNER.N.part`, so that what a killed run left behind can be told from what
+//! a living one is writing, also across machines that share the file system.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+
+use crate::process::owner_token;
 
 /// A file being written. Dropped without [`Publisher::commit`], it leaves nothing behind.
 #[derive(Debug)]
@@ -32,7 +33,7 @@ impl Publisher {
         let mut part = OsString::from(".");
         part.push(name);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        part.push(format!(".{}.{count}.part", std::process::id()));
+        part.push(format!(".{}.{count}.part", owner_token()));
         let part = dst.with_file_name(part);
         let file = OpenOptions::new()
             .read(true)
@@ -40,8 +41,6 @@ impl Publisher {
             .create(true)
             .truncate(true)
             .open(&part)?;
-        // Where locks are unknown, leftovers are merely not cleaned.
-        let _ = file.try_lock();
         Ok(Self {
             dst: dst.to_owned(),
             part,
@@ -152,41 +151,41 @@ fn sync_directory(path: &Path) -> io::Result<()> {
     }
 }
 
-/// Removes the temporaries that dead runs left in `dir`; what is still being written stays.
-/// Returns how many were removed.
-pub(crate) fn remove_leftovers(dir: &Path) -> io::Result<usize> {
-    let mut removed = 0;
-    for entry in fs::read_dir(dir)? {
-        let entry = entry?;
-        let is_ours = entry.file_name().to_str().is_some_and(is_part_name);
-        if !is_ours || !entry.file_type()?.is_file() {
-            continue;
-        }
-        let Ok(file) = OpenOptions::new().write(true).open(entry.path()) else {
-            continue;
-        };
-        if file.try_lock().is_ok() && fs::remove_file(entry.path()).is_ok() {
-            removed += 1;
-        }
-    }
-    Ok(removed)
+/// Who writes, or wrote, the temporary file `name`: `.NAME.OWNER.N.part`. None for other files.
+pub(crate) fn part_owner(name: &str) -> Option<&str> {
+    let middle = name.strip_prefix('.')?.strip_suffix(".part")?;
+    let mut pieces = middle.rsplitn(3, '.');
+    let count = pieces.next()?;
+    let owner = pieces.next()?;
+    let is_number = !count.is_empty() && count.bytes().all(|b| b.is_ascii_digit());
+    let is_owner = owner.split('-').count() >= 3;
+    let is_named = pieces.next().is_some_and(|n| !n.is_empty());
+    (is_number && is_owner && is_named).then_some(owner)
 }
 
-/// `.NAME.PID.N.part`
-fn is_part_name(name: &str) -> bool {
-    let is_number = |s: &str| !s.is_empty() && s.bytes().all(|b| b.is_ascii_digit());
-    let Some(middle) = name.strip_prefix('.').and_then(|n| n.strip_suffix(".part")) else {
-        return false;
+/// Removes the temporary files for `dst` that the worker `owner` has left.
+///
+/// # Errors
+/// Trouble reading the directory.
+pub fn discard_parts(dst: &Path, owner: &str) -> io::Result<()> {
+    let (Some(dir), Some(name)) = (dst.parent(), dst.file_name().and_then(|n| n.to_str())) else {
+        return Ok(());
     };
-    let mut pieces = middle.rsplitn(3, '.');
-    pieces.next().is_some_and(is_number)
-        && pieces.next().is_some_and(is_number)
-        && pieces.next().is_some_and(|n| !n.is_empty())
+    let prefix = format!(".{name}.{owner}.");
+    for entry in fs::read_dir(dir)? {
+        let entry = entry?;
+        let is_left = |name: &str| name.starts_with(&prefix) && part_owner(name) == Some(owner);
+        if entry.file_name().to_str().is_some_and(is_left) {
+            let _ = fs::remove_file(entry.path());
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::work::sweep_parts;
 
     fn names(dir: &Path) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(dir)
@@ -236,25 +235,29 @@ mod tests {
     }
 
     #[test]
-    fn only_dead_leftovers_go() {
+    fn only_leftovers_of_the_dead_go() {
         let dir = tempfile::tempdir().unwrap();
         let keep = [
             "notes.part",
             ".a.exr.part",
-            ".a.exr.12.part",
-            ".a.exr.x.1.part",
-            "a.1.2.part",
+            ".a.exr.h-1-ff.part",
+            ".a.exr.12.1.part",
+            ".h-1-ff.1.part",
+            "a.h-1-ff.2.part",
+            ".a.exr.h-2-ff.7.part",
         ];
         for name in keep {
             fs::write(dir.path().join(name), b"mine").unwrap();
         }
-        fs::write(dir.path().join(".a.exr.123.0.part"), b"dead").unwrap();
-        let own = format!(".a.exr.{}.999.part", std::process::id());
-        fs::write(dir.path().join(own), b"dead, same process id").unwrap();
+        fs::write(dir.path().join(".a.exr.h-1-ff.0.part"), b"dead").unwrap();
         let mut living = Publisher::create(&dir.path().join("b.exr")).unwrap();
         living.write_all(b"x").unwrap();
-        assert_eq!(remove_leftovers(dir.path()).unwrap(), 2);
+        let at_work = [owner_token(), "h-2-ff"].map(str::to_owned).into();
+        assert_eq!(sweep_parts(dir.path(), &at_work).unwrap(), 1);
         living.commit().unwrap();
         assert_eq!(names(dir.path()).len(), keep.len() + 1);
+
+        discard_parts(&dir.path().join("a.exr"), "h-2-ff").unwrap();
+        assert_eq!(names(dir.path()).len(), keep.len());
     }
 }

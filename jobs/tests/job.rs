@@ -5,7 +5,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Value, json};
 use spherule_jobs::{
-    DEFAULT_WORKER, FrameRequest, FrameState, Job, JobError, JobRequest, Mode, PLAN_FILE, publish,
+    Claimed, DEFAULT_PATIENCE, FrameRequest, FrameState, Job, JobError, JobRequest, Mode,
+    PLAN_FILE, Status, publish,
 };
 use tempfile::TempDir;
 
@@ -42,13 +43,25 @@ impl Place {
         self.dir().join(format!("frame.{frame}.exr"))
     }
 
+    /// Those of all workers that have said something.
+    fn ledgers(&self) -> Vec<PathBuf> {
+        let paths = fs::read_dir(self.dir()).unwrap().map(|e| e.unwrap().path());
+        let mut ledgers: Vec<PathBuf> = paths
+            .filter(|p| p.extension().is_some_and(|e| e == "jsonl"))
+            .collect();
+        ledgers.sort();
+        ledgers
+    }
+
+    /// That of the only worker so far.
     fn ledger(&self) -> PathBuf {
-        self.dir().join("job.ledger.main.jsonl")
+        let ledgers = self.ledgers();
+        assert_eq!(ledgers.len(), 1, "{ledgers:?}");
+        ledgers[0].clone()
     }
 
     fn request(&self, frames: impl IntoIterator<Item = i64>) -> JobRequest {
         JobRequest {
-            worker: DEFAULT_WORKER.to_owned(),
             settings: settings(3),
             frames: frames
                 .into_iter()
@@ -60,6 +73,7 @@ impl Place {
                 .collect(),
             selection: None,
             mode: Mode::Resume,
+            patience: DEFAULT_PATIENCE,
         }
     }
 
@@ -162,10 +176,10 @@ fn killed_between_image_and_ledger() {
     let place = Place::new(0..2);
     place.started(0..2, &[]);
     publish(&place.image(0), b"an image").unwrap();
-    fs::write(place.dir().join(".frame.1.exr.7.0.part"), b"half").unwrap();
+    fs::write(place.dir().join(".frame.1.exr.host-7-ff.0.part"), b"half").unwrap();
     let job = place.open(place.request(0..2)).unwrap();
     assert_eq!(job.pending(), [0, 1]);
-    assert!(!place.dir().join(".frame.1.exr.7.0.part").exists());
+    assert!(!place.dir().join(".frame.1.exr.host-7-ff.0.part").exists());
 }
 
 #[test]
@@ -357,12 +371,103 @@ fn damage_is_an_error_and_never_a_fresh_start() {
 }
 
 #[test]
-fn one_process_at_a_time() {
+fn several_workers_share_the_frames() {
+    let place = Place::new(0..4);
+    let mut a = place.open(place.request(0..4)).unwrap();
+    let mut b = Job::open(&place.dir(), place.request(0..4), never).unwrap();
+    let take = |job: &Job, frame| job.claims().take(frame).unwrap();
+    let Claimed::Mine(zero) = take(&a, 0) else {
+        panic!("nobody else has it")
+    };
+    assert!(matches!(take(&b, 0), Claimed::Held(_)));
+    let Claimed::Mine(one) = take(&b, 1) else {
+        panic!("nobody else has it")
+    };
+    place.finish(&mut a, 0);
+    zero.end();
+    b.record_failed(1, "damaged", Value::Null).unwrap();
+    one.end();
+    assert!(matches!(take(&b, 0), Claimed::Ended(Status::Done)));
+    assert!(matches!(take(&a, 1), Claimed::Ended(Status::Failed)));
+    let Claimed::Mine(given_back) = take(&a, 2) else {
+        panic!("nobody has it")
+    };
+    drop(given_back);
+    assert!(matches!(take(&b, 2), Claimed::Mine(_)));
+    a.refresh().unwrap();
+    assert_eq!((a.summary().done, a.summary().failed), (1, vec![1]));
+    assert_eq!(place.ledgers().len(), 2);
+    drop((a, b));
+    assert!(!place.dir().join("job.work").exists());
+
+    // A new run tries again what failed.
+    let job = place.open(place.request(0..4)).unwrap();
+    assert_eq!(job.pending(), [1, 2, 3]);
+    assert!(matches!(take(&job, 1), Claimed::Mine(_)));
+}
+
+#[test]
+fn what_others_rely_on_does_not_change_under_them() {
     let place = Place::new(0..2);
-    let _job = place.open(place.request(0..2)).unwrap();
-    let error = place.open(place.request(0..2)).unwrap_err();
-    assert!(matches!(error, JobError::Busy { .. }), "{error}");
-    assert!(Job::read(&place.dir()).unwrap().is_some());
+    let at_work = place.open(place.request(0..2)).unwrap();
+    let with = |mode, depth| JobRequest {
+        mode,
+        settings: settings(depth),
+        ..place.request(0..2)
+    };
+    for (mode, depth) in [(Mode::Force, 3), (Mode::KeepDone, 5)] {
+        let error = place.open(with(mode, depth)).unwrap_err();
+        assert!(matches!(error, JobError::Busy { .. }), "{error}");
+    }
+    place.open(with(Mode::KeepDone, 3)).unwrap();
+    drop(at_work);
+    place.open(with(Mode::KeepDone, 5)).unwrap();
+    place.open(with(Mode::Force, 3)).unwrap();
+}
+
+#[test]
+fn workers_that_begin_at_once_make_one_plan() {
+    let place = Place::new(0..20);
+    let resolved: Vec<Value> = std::thread::scope(|scope| {
+        let workers: Vec<_> = (0..4)
+            .map(|worker| {
+                let place = &place;
+                scope.spawn(move || {
+                    let request = place.request(0..20);
+                    let resolve = |_: Option<&Value>| Ok::<_, String>(json!(worker));
+                    let mut job = Job::open(&place.dir(), request, resolve).unwrap();
+                    for frame in job.pending() {
+                        if let Claimed::Mine(claim) = job.claims().take(frame).unwrap() {
+                            place.finish(&mut job, frame);
+                            claim.end();
+                        }
+                    }
+                    job.resolved().clone()
+                })
+            })
+            .collect();
+        workers.into_iter().map(|w| w.join().unwrap()).collect()
+    });
+    assert!(resolved.iter().all(|r| *r == resolved[0]), "{resolved:?}");
+    let lines: usize = place
+        .ledgers()
+        .iter()
+        .map(|path| fs::read_to_string(path).unwrap().lines().count())
+        .sum();
+    assert_eq!(lines, 20, "each frame was done once");
+    assert!(!place.dir().join("job.work").exists());
+}
+
+#[test]
+fn many_ledgers_become_one() {
+    let place = Place::new(0..20);
+    for frame in 0..20 {
+        let mut job = place.open(place.request(0..20)).unwrap();
+        assert_eq!(job.pending().len(), usize::try_from(20 - frame).unwrap());
+        place.finish(&mut job, frame);
+    }
+    assert!(place.ledgers().len() < 11, "{:?}", place.ledgers());
+    assert_eq!(Job::read(&place.dir()).unwrap().unwrap().summary().done, 20);
 }
 
 #[test]
@@ -377,9 +482,6 @@ fn requests_that_contradict_themselves() {
     let mut request = place.request(0..2);
     request.frames[1].outputs = vec![place.image(0)];
     refused(request, "####");
-    let mut request = place.request(0..2);
-    request.worker = "a/b".to_owned();
-    refused(request, "worker `a/b`");
 }
 
 #[test]
@@ -391,7 +493,7 @@ fn records_need_a_planned_frame_and_its_output() {
         .unwrap_err();
     assert!(error.to_string().contains("frame.0.exr"), "{error}");
     assert!(job.record_failed(9, "why", Value::Null).is_err());
-    assert_eq!(fs::read(place.ledger()).unwrap(), b"");
+    assert!(place.ledgers().is_empty());
     assert_eq!(job.pending(), [0, 1]);
 }
 

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 use spherule_formats::SequenceInput;
 use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::sequence::Sequence;
-use spherule_jobs::{DEFAULT_WORKER, FrameRange, Job, JobRequest, Mode};
+use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
 use super::job::{absolute, apart};
 use super::numbers::{USUAL_BOUND, not_negative, positive};
@@ -111,6 +111,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         interrupt,
         &|event| show(&progress, &event),
     );
+    // Others may have done some of the frames.
+    let result = result.and(job.refresh());
     let finished = Finished {
         job: &job,
         tasks: tasks.len(),
@@ -136,6 +138,7 @@ fn show(progress: &Progress, event: &Event) {
             progress.done(task.frame, &task.output, &converted.to_string(), facts);
         }
         Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Others(news) => progress.others(*news),
         Event::Note(note) => progress.note(&format!("note: {note}")),
     }
 }
@@ -180,11 +183,11 @@ impl Plan<'_> {
         let mut settings = vec![(KIND.to_owned(), CONVERT.to_owned())];
         settings.extend(self.settings.settings());
         JobRequest {
-            worker: DEFAULT_WORKER.to_owned(),
             settings,
             frames: requests(&self.sequence, |frame| vec![self.output(frame)]),
             selection: self.args.frames.clone(),
             mode: self.mode(),
+            patience: DEFAULT_PATIENCE,
         }
     }
 

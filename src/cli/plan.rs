@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{DEFAULT_WORKER, Job, JobRequest, Mode, publish};
+use spherule_jobs::{DEFAULT_PATIENCE, Job, JobRequest, Mode, publish};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
@@ -130,11 +130,11 @@ impl Plan {
             image.chain(self.preview(frame)).collect()
         };
         JobRequest {
-            worker: DEFAULT_WORKER.to_owned(),
             settings: self.manifest.settings(),
             frames: requests(sequence, outputs),
             selection: self.manifest.input.frames.clone(),
             mode,
+            patience: DEFAULT_PATIENCE,
         }
     }
 

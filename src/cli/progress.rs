@@ -9,6 +9,7 @@ use std::time::Instant;
 use clap::ValueEnum;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
+use spherule_jobs::{QueueNews, Status};
 
 use super::put;
 
@@ -96,6 +97,26 @@ impl Progress {
         let json = json!({"frame": frame, "status": "failed", "reason": reason,
             "done": done, "total": self.total});
         self.line(done, "", &json);
+    }
+
+    /// What other workers do.
+    pub(super) fn others(&self, news: QueueNews) {
+        match news {
+            QueueNews::Waiting(frame, who) => {
+                self.note(&format!(
+                    "waiting for frame {frame}, which {who} has in hand"
+                ));
+            }
+            QueueNews::Elsewhere(frame, status) => {
+                let is_done = status == Status::Done;
+                let done = self.count((!is_done).then_some(frame));
+                let told = if is_done { "done" } else { "failed" };
+                let plain = format!("frame {frame}: {told} by another worker");
+                let json = json!({"frame": frame, "status": told, "elsewhere": true,
+                    "done": done, "total": self.total});
+                self.line(done, &plain, &json);
+            }
+        }
     }
 
     /// A line for people, whatever the mode.

@@ -59,12 +59,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         &setup, &sequence, &tasks, overlap, &mut job, interrupt, &watch,
     );
     let ended = progress.finish();
+    // Others may have done some of the frames.
+    let refreshed = job.refresh().map_err(CliError::from);
     let report = report::job::JobReport::new(job.state(), &plan.manifest);
     let reported = report.files().iter().try_for_each(|(name, text)| {
         report::job::write(&plan.dir, name, text).map_err(CliError::io(&plan.dir.join(name)))
     });
     // What ended the run explains why there is no report either.
-    let result = result.map_err(CliError::from).and(reported);
+    let result = result.map_err(CliError::from).and(refreshed).and(reported);
     let finished = Finished {
         job: &job,
         tasks: tasks.len(),
@@ -93,6 +95,7 @@ fn show(progress: &Progress, event: &Event) {
             progress.done(task.frame, &task.image, &told(report), facts);
         }
         Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Others(news) => progress.others(*news),
         Event::Note(note) => progress.note(&format!("note: {note}")),
     }
 }

@@ -45,6 +45,8 @@ pub(super) fn listen(words: Words) -> Result<Listener, CliError> {
         interrupt: interrupt.clone(),
         at_work: Arc::clone(&at_work),
     };
+    // Threads that begin after the survey find the memory that it has left, which is for the frames.
+    spherule_jobs::start_heart();
     thread::spawn(move || {
         for _ in signals.forever() {
             if interrupt.is_raised() || !at_work.load(Ordering::Acquire) {

@@ -7,7 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, Mode, PLAN_FILE};
+use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, JobError, Mode, PLAN_FILE};
 
 use super::progress::{Ended, duration};
 use super::{CliError, Outcome};
@@ -172,7 +172,11 @@ impl Finished<'_> {
         match result {
             Err(error) => {
                 say!("error: {error}");
-                Outcome::SomeFailed
+                match error {
+                    // The same command joins again.
+                    CliError::Job(JobError::TakenForDead { .. }) => Outcome::Interrupted,
+                    _ => Outcome::SomeFailed,
+                }
             }
             Ok(()) if self.interrupt.is_raised() && self.ended.count < self.tasks => {
                 Outcome::Interrupted

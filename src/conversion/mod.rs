@@ -10,8 +10,9 @@ use std::path::PathBuf;
 
 use serde_json::json;
 use spherule_formats::convert::{ConvertError, Phase, Progress};
+use spherule_formats::write::own_temporaries;
 use spherule_formats::{FrameError, Sequence};
-use spherule_jobs::{Interrupt, Job, JobError};
+use spherule_jobs::{Interrupt, Job, JobError, Queue, QueueNews};
 
 mod attributes;
 mod frame;
@@ -45,6 +46,8 @@ pub enum Event<'a> {
     Done(&'a ConvertTask, &'a ConvertedFrame),
     /// A frame could not be converted; it is recorded with this reason and the rest goes on.
     Failed(i64, &'a str),
+    /// Other workers are at frames of the run.
+    Others(QueueNews<'a>),
     /// Something the user should know.
     Note(&'a str),
 }
@@ -65,7 +68,8 @@ impl Progress for Watched<'_> {
     }
 }
 
-/// Converts `tasks` in order and records each in `job`. Ends early, with the frame in hand finished, once
+/// Converts those of `tasks` that no other worker does, in order, and records each in `job`; returns when all
+/// are ended, by whomever. Ends early, with the frame in hand finished, once
 /// `interrupt` is raised.
 ///
 /// # Errors
@@ -79,10 +83,13 @@ pub fn run(
     watch: Watch,
 ) -> Result<(), JobError> {
     let mut told = HashSet::new();
-    for task in tasks {
-        if interrupt.is_raised() {
-            return Ok(());
-        }
+    // So that the job knows what a killed run has left.
+    own_temporaries(spherule_jobs::owner());
+    let frames = tasks.iter().map(|task| task.frame);
+    let mut queue = Queue::new(job.claims(), frames, interrupt);
+    let mut heard = |news: QueueNews| watch(Event::Others(news));
+    while let Some((place, claim)) = queue.take(&mut heard)? {
+        let task = &tasks[place];
         watch(Event::Entered(task.frame));
         let watched = Watched {
             frame: task.frame,
@@ -109,6 +116,7 @@ pub fn run(
             Ok(Err(error)) => fail(job, watch, task, &reason(sequence, task, &error))?,
             Err(fault) => fail(job, watch, task, &fault)?,
         }
+        claim.end();
     }
     Ok(())
 }

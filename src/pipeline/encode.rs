@@ -10,7 +10,7 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 
 use super::setup::Setup;
 use super::trace::TracedFrame;
-use super::{Event, Passed, Stage, Watch};
+use super::{Event, InHand, Passed, Stage, Watch};
 use crate::mishap::is_disk_full;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
@@ -36,14 +36,14 @@ pub(super) enum WriteError {
 
 pub(super) fn write_stage(
     setup: &Setup,
-    traced: Receiver<Passed<TracedFrame>>,
+    traced: Receiver<InHand<TracedFrame>>,
     is_written: Option<SyncSender<()>>,
     job: &mut Job,
     watch: Watch,
 ) -> Result<(), JobError> {
     let mut peaks = MemoryPeaks::default();
     let mut image_before = Instant::now();
-    for passed in traced {
+    for InHand { claim, passed } in traced {
         match passed {
             Passed::Frame(frame) => {
                 watch(Event::Entered(frame.task.frame, Stage::Write));
@@ -75,6 +75,7 @@ pub(super) fn write_stage(
                 job.record_failed(task.frame, &reason, json!(null))?;
             }
         }
+        claim.end();
         if let Some(is_written) = &is_written {
             // Who reads may have ended by now.
             let _ = is_written.send(());

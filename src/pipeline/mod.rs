@@ -14,7 +14,7 @@ use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread;
 
 use spherule_formats::sequence::Sequence;
-use spherule_jobs::{Interrupt, Job, JobError};
+use spherule_jobs::{Claim, Interrupt, Job, JobError, Queue, QueueNews};
 
 mod decoded;
 mod encode;
@@ -76,6 +76,8 @@ pub enum Event<'a> {
     Done(&'a ImageTask, &'a FrameReport),
     /// A frame could not be made; it is recorded with this reason and the rest goes on.
     Failed(i64, &'a str),
+    /// Other workers are at frames of the run.
+    Others(QueueNews<'a>),
     /// Something the user should know.
     Note(&'a str),
 }
@@ -89,7 +91,14 @@ enum Passed<T> {
     Failed(ImageTask, String),
 }
 
-/// Renders `tasks` in order and records each in `job`. Ends early, with the frame in hand finished,
+/// A frame on its way that no other worker does meanwhile.
+struct InHand<T> {
+    claim: Claim,
+    passed: Passed<T>,
+}
+
+/// Renders those of `tasks` that no other worker does, in order, and records each in `job`; returns when all
+/// are ended, by whomever. Ends early, with the frame in hand finished,
 /// once `interrupt` is raised. Without `overlap` a frame is read only when the one before is written
 /// and nothing of it is left.
 ///
@@ -116,10 +125,12 @@ pub fn run(
             Overlap::None => (None, Some(go_on)),
         };
         let (begins, has_begun) = sync_channel(0);
-        scope.spawn(move || {
+        let frames = tasks.iter().map(|task| task.frame);
+        let queue = Queue::new(job.claims(), frames, interrupt);
+        let reader = scope.spawn(move || {
             let _ = begins.send(());
             let next = Next { to_trace, room };
-            read_stage(setup, sequence, tasks, interrupt, &next, watch);
+            read_stage(setup, sequence, tasks, queue, &next, watch)
         });
         // The first of the threads finds the memory that whoever looked at the frames has left.
         let _ = has_begun.recv();
@@ -136,25 +147,27 @@ pub fn run(
             watch,
         };
         stage.run(loaded, is_built, to_write);
-        writer
-            .join()
-            .unwrap_or_else(|fault| panic::resume_unwind(fault))
+        let read = joined(reader.join());
+        joined(writer.join()).and(read)
     })
+}
+
+fn joined<T>(result: thread::Result<T>) -> T {
+    result.unwrap_or_else(|fault| panic::resume_unwind(fault))
 }
 
 fn read_stage(
     setup: &Setup,
     sequence: &Sequence,
     tasks: &[ImageTask],
-    interrupt: &Interrupt,
+    mut queue: Queue,
     next: &Next,
     watch: Watch,
-) {
+) -> Result<(), JobError> {
     let mut told = HashSet::new();
-    for task in tasks {
-        if interrupt.is_raised() {
-            return;
-        }
+    let mut heard = |news: QueueNews| watch(Event::Others(news));
+    while let Some((place, claim)) = queue.take(&mut heard)? {
+        let task = &tasks[place];
         watch(Event::Entered(task.frame, Stage::Read));
         let loaded = match &task.refused {
             Some(reason) => Err(reason.clone()),
@@ -173,23 +186,24 @@ fn read_stage(
             }
             Err(reason) => Passed::Failed(task.clone(), reason),
         };
-        if !next.pass_on(passed) {
-            return;
+        if !next.pass_on(InHand { claim, passed }) {
+            break;
         }
     }
+    Ok(())
 }
 
 /// The way from reading to tracing.
 struct Next {
-    to_trace: SyncSender<Passed<LoadedFrame>>,
+    to_trace: SyncSender<InHand<LoadedFrame>>,
     /// Tells when there is memory for another frame.
     room: Receiver<()>,
 }
 
 impl Next {
     /// Hands over and waits until there is room again; false once a later stage has ended.
-    fn pass_on(&self, passed: Passed<LoadedFrame>) -> bool {
-        self.to_trace.send(passed).is_ok() && self.room.recv().is_ok()
+    fn pass_on(&self, frame: InHand<LoadedFrame>) -> bool {
+        self.to_trace.send(frame).is_ok() && self.room.recv().is_ok()
     }
 }
 
@@ -204,12 +218,12 @@ impl TraceStage<'_> {
     /// Its neighbours end when it does: it owns its ends of all channels.
     fn run(
         &self,
-        loaded: Receiver<Passed<LoadedFrame>>,
+        loaded: Receiver<InHand<LoadedFrame>>,
         is_built: Option<SyncSender<()>>,
-        next: SyncSender<Passed<TracedFrame>>,
+        next: SyncSender<InHand<TracedFrame>>,
     ) {
         let mut tracer = FrameTracer::new();
-        for passed in loaded {
+        for InHand { claim, passed } in loaded {
             // A frame that was only read when the interrupt came is dropped, not begun.
             if self.interrupt.is_raised() {
                 return;
@@ -243,7 +257,7 @@ impl TraceStage<'_> {
             if is_built.is_none() {
                 tracer = FrameTracer::new();
             }
-            if next.send(passed).is_err() {
+            if next.send(InHand { claim, passed }).is_err() {
                 return;
             }
         }

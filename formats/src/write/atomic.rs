@@ -1,11 +1,12 @@
 //! Files that appear whole or not at all.
 //!
-//! A temporary is called `.NAME.PID.N.part` and locked while it is written: by both, whoever resumes work in
-//! a directory knows what a killed process left there.
+//! A temporary is called `.NAME.OWNER.N.part`: by its owner, whoever resumes work in a directory knows what a
+//! killed process left there.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// A file under a temporary name beside its own. Dropped before it is published, it is removed.
@@ -29,8 +30,6 @@ impl Unpublished {
             .create(true)
             .truncate(true)
             .open(&part)?;
-        // Where locks are unknown, leftovers are merely not cleaned.
-        let _ = file.try_lock();
         Ok(Self {
             path: path.to_owned(),
             part,
@@ -97,6 +96,14 @@ pub(crate) fn publish<E: From<io::Error>>(
     Ok(file.publish()?)
 }
 
+static OWNER: OnceLock<String> = OnceLock::new();
+
+/// Names the owner of this process's temporary files, without dots; else it is the process's number. To be
+/// called once, before the first file.
+pub fn own_temporaries(owner: &str) {
+    let _ = OWNER.set(owner.to_owned());
+}
+
 /// Hidden and ending in `.part`, so that no listing takes it for a frame; distinct for each
 /// living process and call.
 fn temporary_name(path: &Path) -> io::Result<PathBuf> {
@@ -107,7 +114,8 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     let count = COUNT.fetch_add(1, Ordering::Relaxed);
     let mut part = std::ffi::OsString::from(".");
     part.push(name);
-    part.push(format!(".{}.{count}.part", std::process::id()));
+    let owner = OWNER.get_or_init(|| std::process::id().to_string());
+    part.push(format!(".{owner}.{count}.part"));
     Ok(path.with_file_name(part))
 }
 

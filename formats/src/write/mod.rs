@@ -3,6 +3,8 @@
 
 pub(crate) mod atomic;
 
+pub use atomic::own_temporaries;
+
 pub mod npy;
 pub mod vtk;
 

@@ -50,11 +50,12 @@ fn a_full_disk_is_told_and_nothing_is_half_written() {
     // Room for the plan only; for some of the first image; for some images.
     for (size, code) in [
         ("8k", 2),
-        ("16k", 1),
-        ("20k", 1),
+        ("16k", 2),
         ("24k", 1),
-        ("40k", 1),
-        ("60k", 1),
+        ("28k", 1),
+        ("32k", 1),
+        ("48k", 1),
+        ("68k", 1),
     ] {
         let place = Workshop::new();
         dam_break(&place.join("in"), 1..=FRAMES);

@@ -3,7 +3,7 @@
 use std::fs;
 
 use super::{convert, inspected};
-use crate::harness::{Workshop, dam_break, files, natives, npy};
+use crate::harness::{Workshop, dam_break, files, ledger_path, natives, npy};
 
 fn names(shop: &Workshop, file: &str) -> Vec<String> {
     let object = inspected(shop, file);
@@ -136,7 +136,7 @@ fn a_directory_of_something_else_is_refused() {
     // Frames are not converted onto themselves.
     let before = natives(&shop.join("native"));
     fs::remove_file(shop.join("native/job.plan.json")).expect("the plan");
-    fs::remove_file(shop.join("native/job.ledger.main.jsonl")).expect("the ledger");
+    fs::remove_file(ledger_path(&shop.join("native"))).expect("the ledger");
     shop.run(&["convert", "native", "-o", "native"])
         .expect(2)
         .tells("native/frame.0001.spf: would be overwritten by its own conversion");

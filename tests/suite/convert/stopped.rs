@@ -145,14 +145,19 @@ fn a_second_term_stops_at_once() {
 }
 
 #[test]
-fn a_second_process_is_told_that_one_is_at_work() {
+fn a_second_process_takes_over_from_one_that_dies() {
     let shop = large_frame();
     let mut running = shop.start(&Q10);
     assert!(running.wait_for_line("half the usual distance"));
-    shop.run(&Q10)
-        .expect(2)
-        .tells("job.ledger.main.jsonl: another process is at work here");
+    let mut second = shop.start(&Q10);
+    let waits = second.wait_for_line("which process");
     running.kill();
+    running.end();
+    let (told, status) = second.end();
+    assert_eq!(status.code(), Some(0), "{told}");
+    assert!(waits, "{told}");
+    assert_eq!(natives(&shop.join("out")).len(), 1);
+    no_leftovers(&shop.join("out"));
 }
 
 /// Files may not grow beyond some limit: the frame fails, and nothing of it is left.

@@ -10,7 +10,9 @@ mod outputs;
 mod running;
 
 pub(crate) use frames::{dam_break, npy};
-pub(crate) use outputs::{files, images, ledger, natives, no_leftovers, stamps};
+pub(crate) use outputs::{
+    files, images, ledger, ledger_path, ledger_paths, natives, no_leftovers, stamps,
+};
 pub(crate) use running::Running;
 
 /// Images that take a few milliseconds.

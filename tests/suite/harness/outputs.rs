@@ -2,7 +2,7 @@
 
 use std::collections::BTreeMap;
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::time::SystemTime;
 
 use serde_json::Value;
@@ -36,10 +36,11 @@ pub(crate) fn stamps(dir: &Path) -> BTreeMap<String, SystemTime> {
     entries(dir).into_iter().filter_map(stamp).collect()
 }
 
-/// Fails the test if `dir` has temporary files.
+/// Fails the test if `dir` has temporary files or claims.
 #[track_caller]
 pub(crate) fn no_leftovers(dir: &Path) {
-    let is_left = |name: &String| name.starts_with('.') || name.ends_with(".part");
+    let is_left =
+        |name: &String| name.starts_with('.') || name.ends_with(".part") || name == "job.work";
     let left: Vec<String> = entries(dir).iter().map(name).filter(is_left).collect();
     assert!(left.is_empty(), "{left:?}");
 }
@@ -48,7 +49,7 @@ pub(crate) fn no_leftovers(dir: &Path) {
 pub(crate) struct Ledger {
     /// The whole lines.
     pub(crate) lines: Vec<Value>,
-    /// Whether an unfinished line follows.
+    /// Whether an unfinished line follows somewhere.
     pub(crate) torn: bool,
 }
 
@@ -68,15 +69,36 @@ impl Ledger {
     }
 }
 
-/// The ledger in `dir`; empty if there is none.
+/// The ledgers in `dir`, one file a worker.
+pub(crate) fn ledger_paths(dir: &Path) -> Vec<PathBuf> {
+    let is_ledger = |name: &String| name.starts_with("job.ledger.") && name.ends_with(".jsonl");
+    let mut names: Vec<String> = entries(dir).iter().map(name).filter(is_ledger).collect();
+    names.sort();
+    names.into_iter().map(|name| dir.join(name)).collect()
+}
+
+/// The only ledger in `dir`.
+#[track_caller]
+pub(crate) fn ledger_path(dir: &Path) -> PathBuf {
+    let paths = ledger_paths(dir);
+    assert_eq!(paths.len(), 1, "{paths:?}");
+    paths[0].clone()
+}
+
+/// What all ledgers in `dir` say, one after the other.
 pub(crate) fn ledger(dir: &Path) -> Ledger {
-    let text = fs::read_to_string(dir.join("job.ledger.main.jsonl")).unwrap_or_default();
-    let whole = text.rfind('\n').map_or(0, |at| at + 1);
-    let parse = |line: &str| serde_json::from_str(line).expect("a whole line is JSON");
-    Ledger {
-        lines: text[..whole].lines().map(parse).collect(),
-        torn: whole < text.len(),
+    let mut ledger = Ledger {
+        lines: Vec::new(),
+        torn: false,
+    };
+    for path in ledger_paths(dir) {
+        let text = fs::read_to_string(path).unwrap_or_default();
+        let whole = text.rfind('\n').map_or(0, |at| at + 1);
+        let parse = |line: &str| serde_json::from_str(line).expect("a whole line is JSON");
+        ledger.lines.extend(text[..whole].lines().map(parse));
+        ledger.torn |= whole < text.len();
     }
+    ledger
 }
 
 fn entries(dir: &Path) -> Vec<fs::DirEntry> {

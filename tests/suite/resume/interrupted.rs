@@ -120,22 +120,18 @@ fn a_second_term_stops_at_once() {
 }
 
 #[test]
-fn a_second_process_is_told_that_one_is_at_work() {
+fn a_job_is_not_changed_under_those_at_work() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
     let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &LONG].concat();
     let mut running = workshop.start(&arguments);
     assert!(running.wait_for_line("colour by"));
-    workshop
-        .run(&arguments)
-        .expect(2)
-        .tells("job.ledger.main.jsonl: another process is at work here");
-    // Nor may it be started over under the first one's hands.
-    let force = [&arguments[..], &["--force"]].concat();
-    workshop
-        .run(&force)
-        .expect(2)
-        .tells("another process is at work here");
+    for options in [&["--force"][..], &["--keep-done", "--max-depth", "2"]] {
+        workshop
+            .run(&[&arguments[..], options].concat())
+            .expect(2)
+            .tells("is at work here; wait for it, or stop it first");
+    }
     running.kill();
     assert_eq!(running.end().1.code(), None);
     assert!(workshop.join("out/job.plan.json").exists());

@@ -1,54 +1,70 @@
-//! SIGKILL at any moment loses at most the frames in hand.
+//! SIGKILL at any moment loses at most the frames in hand, with one worker and with several.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
-use crate::harness::{Running, SMALL, Workshop, dam_break, files, images, ledger, no_leftovers};
+use crate::harness::{
+    Running, SMALL, Workshop, dam_break, files, images, ledger, ledger_paths, no_leftovers,
+};
 
 const FRAMES: usize = 60;
+const KILLS: usize = 50;
 
 /// When to kill.
 #[derive(Debug, Clone, Copy)]
 enum Moment {
-    /// As soon as it has started.
-    Start,
+    /// After so many thousandths of a second.
+    After(u64),
     /// Once this file is there.
     File(&'static str),
-    /// While a file is being written.
+    /// While an image is being written.
     Writing,
+    /// While a frame is claimed; somewhere in reading, tracing or writing.
+    Claimed,
+    /// Once a ledger has become longer; its line may not be whole.
+    Recorded,
     /// Once it has made so many images; the ledger may not know of the last.
     Images(usize),
     /// Once it has made so many previews; their image is on its way.
     Previews(usize),
-    /// Once it has told that a frame is done.
-    Told(&'static str),
 }
 
 /// In an order in which each can still come: what is there once stays.
-const MOMENTS: [Moment; 16] = [
-    Moment::Start,
-    Moment::File("job.ledger.main.jsonl"),
+const FIRST: [Moment; 6] = [
+    Moment::After(0),
+    Moment::File("job.work"),
     Moment::File("job.plan.json"),
     Moment::File("job.toml"),
     Moment::Previews(1),
     Moment::Images(1),
-    Moment::Start,
+];
+
+/// Again and again.
+const LATER: [Moment; 6] = [
     Moment::Writing,
-    Moment::Told("] frame "),
-    Moment::Images(2),
-    Moment::Writing,
-    Moment::Previews(2),
-    Moment::Images(3),
-    Moment::Told("are done already"),
-    Moment::Writing,
-    Moment::Images(1),
+    Moment::Claimed,
+    Moment::After(3),
+    Moment::Recorded,
+    Moment::Previews(1),
+    Moment::After(60),
 ];
 
 type Files = BTreeMap<String, Vec<u8>>;
 
 #[test]
 fn killed_again_and_again_the_result_is_that_of_an_unbroken_run() {
+    torture(1);
+}
+
+#[test]
+fn several_workers_killed_again_and_again_make_what_one_makes() {
+    torture(4);
+}
+
+/// Lets `workers` processes work in one directory, kills one after the other and starts another in its
+/// place.
+fn torture(workers: usize) {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=FRAMES);
     workshop.render_to("whole", &[]).expect(0);
@@ -57,9 +73,15 @@ fn killed_again_and_again_the_result_is_that_of_an_unbroken_run() {
 
     let out = workshop.join("out");
     let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL].concat();
+    let mut team: Vec<Running> = Vec::new();
     let mut kills = 0;
-    for moment in MOMENTS {
-        let mut running = workshop.start(&arguments);
+    let moments = FIRST.into_iter().chain(LATER.into_iter().cycle());
+    let mut done = 0;
+    for moment in moments {
+        while team.len() < workers {
+            team.push(workshop.start(&arguments));
+        }
+        let mut running = team.remove(0);
         wait(&mut running, moment, &out);
         running.kill();
         let (told, status) = running.end();
@@ -68,25 +90,57 @@ fn killed_again_and_again_the_result_is_that_of_an_unbroken_run() {
         } else {
             // It was faster; there is no other way to end.
             assert_eq!(status.code(), Some(0), "{moment:?}: {told}");
+            done += 1;
         }
         all_is_whole(&out, &whole, moment);
+        if kills >= KILLS {
+            break;
+        }
+        if images(&out).len() == whole.len() {
+            // Made too soon: some of them again, once nobody is at them.
+            finish(std::mem::take(&mut team));
+            lose_some(&out, kills);
+        }
     }
     assert!(
-        kills >= 10,
-        "only {kills} of {} kills came in time",
-        MOMENTS.len()
+        kills >= KILLS && done < 4 * KILLS,
+        "{kills} kills, {done} ends"
     );
-
+    finish(team);
     workshop.run(&arguments).expect(0);
+
     no_leftovers(&out);
     assert!(images(&out) == whole, "images differ from the unbroken run");
-    assert_eq!(ledger(&out).done().len(), 2 * FRAMES);
+    let mut reported: Vec<String> = ledger(&out).done().into_iter().map(|(n, _)| n).collect();
+    reported.sort();
+    reported.dedup();
+    assert_eq!(reported.len(), 2 * FRAMES);
+    assert!(
+        ledger_paths(&out).len() < 20,
+        "dead workers' ledgers are brought together"
+    );
     for name in ["job.toml", "job.plan.json"] {
         let read = |dir: &str| fs::read(workshop.join(dir).join(name)).expect(name);
         assert!(read("out") == read("whole"), "{name} differs");
     }
     let again = workshop.run(&arguments).expect(0);
     assert!(again.rendered().is_empty());
+}
+
+/// Workers that are not killed do all that is left.
+#[track_caller]
+fn finish(team: Vec<Running>) {
+    for running in team {
+        let (told, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{told}");
+    }
+}
+
+/// Removes every third image, so that there is something to do again.
+fn lose_some(out: &Path, from: usize) {
+    for frame in (1 + from % 3..=FRAMES).step_by(3) {
+        let _ = fs::remove_file(out.join(format!("f.{frame:04}.exr")));
+    }
 }
 
 fn wait(running: &mut Running, moment: Moment, out: &Path) {
@@ -96,23 +150,37 @@ fn wait(running: &mut Running, moment: Moment, out: &Path) {
         let new = |(name, _): &(String, Vec<u8>)| !before.contains_key(name);
         images(out).into_iter().filter(fits).filter(new).count()
     };
+    let lengths = || -> u64 {
+        let length = |path| fs::metadata(path).map_or(0, |m| m.len());
+        ledger_paths(out).iter().map(length).sum()
+    };
+    let recorded = lengths();
     match moment {
-        Moment::Start => true,
+        Moment::After(time) => {
+            std::thread::sleep(std::time::Duration::from_millis(time));
+            true
+        }
         Moment::File(name) => running.wait_until(|| out.join(name).exists()),
         Moment::Writing => running.wait_until(|| {
             files(out)
                 .keys()
                 .any(|name| name.starts_with(".f.") && name.ends_with(".part"))
         }),
+        Moment::Claimed => running.wait_until(|| {
+            let names = files(&out.join("job.work"));
+            names.keys().any(|name| name.starts_with("frame."))
+        }),
+        Moment::Recorded => running.wait_until(|| lengths() != recorded),
         Moment::Images(wanted) => running.wait_until(|| count(".exr") >= wanted),
         Moment::Previews(wanted) => running.wait_until(|| count(".png") >= wanted),
-        Moment::Told(text) => running.wait_for_line(text),
     };
 }
 
-/// Nothing under a final name is half written, and nothing is reported done that is not there.
+/// Nothing under a final name is half written, and nothing is reported done that is not there, unless it
+/// was lost on purpose.
 #[track_caller]
 fn all_is_whole(out: &Path, whole: &Files, moment: Moment) {
+    let reported = ledger(out).done();
     let made = images(out);
     for (name, bytes) in &made {
         assert!(
@@ -120,8 +188,10 @@ fn all_is_whole(out: &Path, whole: &Files, moment: Moment) {
             "{moment:?}: {name} is not whole"
         );
     }
-    for (name, length) in ledger(out).done() {
-        let bytes = made.get(&name).map(|b| b.len() as u64);
-        assert_eq!(bytes, Some(length), "{moment:?}: {name} is reported done");
+    for (name, length) in reported {
+        let bytes = made.get(&name).map_or(length, |b| b.len() as u64);
+        assert_eq!(bytes, length, "{moment:?}: {name} is reported done");
+        let wanted = whole.get(&name).map(|b| b.len() as u64);
+        assert_eq!(wanted, Some(length), "{moment:?}: {name} is reported done");
     }
 }

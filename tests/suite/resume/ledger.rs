@@ -2,9 +2,7 @@
 
 use std::fs;
 
-use crate::harness::{Workshop, dam_break, images, ledger, stamps};
-
-const LEDGER: &str = "out/job.ledger.main.jsonl";
+use crate::harness::{Workshop, dam_break, images, ledger, ledger_path, stamps};
 
 fn three_frames() -> Workshop {
     let workshop = Workshop::new();
@@ -17,28 +15,32 @@ fn three_frames() -> Workshop {
 fn a_torn_last_line_costs_its_frame() {
     let workshop = three_frames();
     let whole = images(&workshop.join("out"));
-    let text = fs::read_to_string(workshop.join(LEDGER)).expect("a ledger");
-    fs::write(workshop.join(LEDGER), &text[..text.len() - 40]).expect("a file");
+    let path = ledger_path(&workshop.join("out"));
+    let text = fs::read_to_string(&path).expect("a ledger");
+    fs::write(&path, &text[..text.len() - 40]).expect("a file");
     assert!(ledger(&workshop.join("out")).torn);
     let ran = workshop.render(&[]).expect(0);
     assert_eq!(ran.rendered(), [3]);
     let now = ledger(&workshop.join("out"));
-    assert!(!now.torn && now.lines.len() == 3);
+    // Nobody else writes the file of a worker that has ended.
+    assert!(now.torn && now.lines.len() == 3);
     assert!(images(&workshop.join("out")) == whole);
 }
 
 #[test]
 fn a_damaged_line_is_named_and_nothing_is_touched() {
     let workshop = three_frames();
-    let text = fs::read_to_string(workshop.join(LEDGER)).expect("a ledger");
+    let path = ledger_path(&workshop.join("out"));
+    let text = fs::read_to_string(&path).expect("a ledger");
     let damaged = text.replacen("\"frame\":2", "\"fr", 1);
     assert_ne!(damaged, text);
-    fs::write(workshop.join(LEDGER), &damaged).expect("a file");
+    fs::write(&path, &damaged).expect("a file");
     let before = stamps(&workshop.join("out"));
     let ran = workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.ledger.main.jsonl: line 2: not a ledger entry")
+        .tells("out/job.ledger.")
+        .tells(".jsonl: line 2: not a ledger entry")
         .tells("remove that line to do its frame again, or start over with --force");
     assert_eq!(ran.errors().matches("error:").count(), 1);
     assert_eq!(stamps(&workshop.join("out")), before);
@@ -46,7 +48,7 @@ fn a_damaged_line_is_named_and_nothing_is_touched() {
     // The remedy that the message names works.
     let mut lines: Vec<&str> = damaged.lines().collect();
     lines.remove(1);
-    fs::write(workshop.join(LEDGER), lines.join("\n") + "\n").expect("a file");
+    fs::write(&path, lines.join("\n") + "\n").expect("a file");
     let ran = workshop.render(&[]).expect(0);
     assert_eq!(ran.rendered(), [2]);
 }

@@ -1,0 +1,159 @@
+//! Plans as they come of requests: of nothing, or of the plan that is there.
+
+use std::collections::{HashMap, HashSet};
+use std::error::Error;
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+
+use crate::{
+    Fingerprint, FrameRequest, InputChange, JobError, JobRequest, JobState, Mode, Plan,
+    PlannedFrame, PlannedInput,
+};
+
+/// The plan of a job that begins.
+pub(crate) fn new_plan(
+    dir: &Path,
+    request: &JobRequest,
+    prints: &mut Prints,
+) -> Result<Plan, JobError> {
+    let mut frames = prints.plan(dir, &request.frames)?;
+    frames.sort_by_key(|f| f.number);
+    Ok(Plan::new(request.settings.clone(), Value::Null, frames))
+}
+
+/// The plan of a job that goes on.
+pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
+    state: &JobState,
+    request: &JobRequest,
+    selected: &[i64],
+    prints: &mut Prints,
+    resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
+) -> Result<Plan, JobError> {
+    let dir = state.dir.clone();
+    let changes = state.plan.changes_to(&request.settings);
+    if request.mode == Mode::Resume && !changes.is_empty() {
+        return Err(JobError::SettingsChanged { dir, changes });
+    }
+    let frames = prints.plan(&dir, wanted(request, selected, Some(&state.plan)))?;
+    if request.mode == Mode::Resume {
+        let changes = changed_inputs(state, &frames);
+        if !changes.is_empty() {
+            return Err(JobError::InputChanged { dir, changes });
+        }
+    }
+    let resolved = if changes.is_empty() {
+        state.plan.resolved().clone()
+    } else {
+        resolve(Some(state.plan.resolved())).map_err(|e| JobError::Resolve(e.into()))?
+    };
+    let settings = if changes.is_empty() {
+        state.plan.settings().to_vec()
+    } else {
+        request.settings.clone()
+    };
+    let mut plan = Plan::new(settings, resolved, state.plan.frames().to_vec());
+    plan.merge(frames);
+    Ok(plan)
+}
+
+/// Only finished frames can be stale; the others will be made from what is there now.
+fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange> {
+    let mut changes: Vec<InputChange> = frames
+        .iter()
+        .filter(|now| state.is_done(now.number))
+        .filter_map(|now| {
+            let (path, what) = state.plan.frame(now.number)?.changed_input(now)?;
+            Some(InputChange {
+                frame: now.number,
+                path,
+                what,
+            })
+        })
+        .collect();
+    changes.sort_by_key(|c| c.frame);
+    changes
+}
+
+/// Fingerprints that have been taken; a file that many frames share is read once.
+#[derive(Debug, Default)]
+pub(crate) struct Prints {
+    known: HashMap<PathBuf, Option<Fingerprint>>,
+}
+
+impl Prints {
+    /// Those of all inputs of `request` that a plan over `old` needs.
+    pub(crate) fn ahead(request: &JobRequest, selected: &[i64], old: Option<&Plan>) -> Self {
+        let mut prints = Self::default();
+        let needed = wanted(request, selected, old);
+        for path in needed.iter().flat_map(|frame| &frame.inputs) {
+            prints.of(path);
+        }
+        prints
+    }
+
+    fn of(&mut self, path: &Path) -> Option<Fingerprint> {
+        if let Some(known) = self.known.get(path) {
+            return known.clone();
+        }
+        let print = Fingerprint::of_file(path).ok();
+        self.known.insert(path.to_owned(), print.clone());
+        print
+    }
+
+    fn plan<'a>(
+        &mut self,
+        dir: &Path,
+        frames: impl IntoIterator<Item = &'a FrameRequest>,
+    ) -> Result<Vec<PlannedFrame>, JobError> {
+        let mut planned = Vec::new();
+        for frame in frames {
+            let mut inputs = Vec::with_capacity(frame.inputs.len());
+            for path in &frame.inputs {
+                inputs.push(PlannedInput {
+                    path: utf8(path)?,
+                    fingerprint: self.of(path),
+                });
+            }
+            let outputs = frame.outputs.iter().map(|path| stored_path(dir, path));
+            planned.push(PlannedFrame {
+                number: frame.number,
+                inputs,
+                outputs: outputs.collect::<Result<_, _>>()?,
+            });
+        }
+        Ok(planned)
+    }
+}
+
+/// The frames that are to be looked at. Those outside the selection that the plan knows are not, so that
+/// one of many runs over a long sequence reads only its own inputs.
+fn wanted<'a>(
+    request: &'a JobRequest,
+    selected: &[i64],
+    old: Option<&Plan>,
+) -> Vec<&'a FrameRequest> {
+    let selected: HashSet<i64> = selected.iter().copied().collect();
+    let is_known = |number| old.is_some_and(|plan| plan.frame(number).is_some());
+    let frames = request.frames.iter();
+    frames
+        .filter(|f| selected.contains(&f.number) || !is_known(f.number))
+        .collect()
+}
+
+/// Relative to `dir` where it can be, so that the directory may be moved.
+pub(crate) fn stored_path(dir: &Path, path: &Path) -> Result<String, JobError> {
+    let failed = |e| JobError::io(path, "finding its absolute path", e);
+    let path = std::path::absolute(path).map_err(failed)?;
+    let dir = std::path::absolute(dir).map_err(failed)?;
+    utf8(path.strip_prefix(dir).unwrap_or(&path))
+}
+
+fn utf8(path: &Path) -> Result<String, JobError> {
+    path.to_str().map(str::to_owned).ok_or_else(|| {
+        JobError::Request(format!(
+            "{}: the name is not UTF-8 and cannot go into a plan; rename it",
+            path.display()
+        ))
+    })
+}

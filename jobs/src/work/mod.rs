@@ -1,0 +1,132 @@
+//! Who is at work in a job's directory, and on what: the files in `job.work`.
+//!
+//! Every worker has a *card* there, `WORKER.worker`: who it is, and a point more every few seconds as a
+//! sign of life. What it has in hand it *claims*: `frame.12.0` appears only if it is not there, as
+//! another name (a hard link) of the card, so it says at once who holds it. All of this needs no more of
+//! a file system than that a name can be made by one alone: no locks, no clocks that agree, no appending
+//! by several.
+//!
+//! A claim is dead if its process has ended (seen on the same machine), if its card is gone, or if the
+//! card has not changed for a while by the clock of whoever looks. Nobody takes a dead claim away from
+//! under its name, since two might and the second would take what the first had just made: they claim
+//! the next generation, `frame.12.1`, which again one alone can make.
+//!
+//! Claims save work; they keep nothing safe. A worker that was taken for dead and comes back makes the
+//! same images under the same names, whole, and tells so in a ledger of its own.
+
+use std::collections::HashMap;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::sync::Mutex;
+use std::time::{Duration, Instant};
+
+use serde::{Deserialize, Serialize};
+
+use crate::process::Process;
+
+mod claim;
+mod desk;
+mod files;
+mod heart;
+#[cfg(test)]
+mod tests;
+
+pub use claim::{Claim, Claimed};
+pub(crate) use desk::Desk;
+pub(crate) use files::sweep_parts;
+pub use heart::start_heart;
+
+/// Name of the directory in the job's directory.
+const WORK_DIR: &str = "job.work";
+
+/// The end of a card's name.
+const CARD: &str = ".worker";
+
+/// What a worker says of itself, in the first line of its card.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub(crate) struct Card {
+    /// Its name, unique.
+    pub(crate) worker: String,
+    /// Who works.
+    pub(crate) process: Process,
+    /// When it began, milliseconds since 1970 by its own clock; for people.
+    pub(crate) since_ms: u64,
+}
+
+impl Card {
+    /// The card in the file at `path`; None if there is none in it.
+    fn read(path: &Path) -> io::Result<Option<Self>> {
+        let bytes = fs::read(path)?;
+        let line = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
+        Ok(serde_json::from_slice(line).ok())
+    }
+
+    /// The name of its file.
+    fn file_name(&self) -> String {
+        format!("{}{CARD}", self.worker)
+    }
+
+    /// Who it is, for people.
+    pub(crate) fn told(&self) -> String {
+        format!("process {} on {}", self.process.pid, self.process.host)
+    }
+}
+
+/// Whether whoever left a file still works.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Standing {
+    /// As far as can be known.
+    Alive,
+    /// It has ended.
+    Ended,
+    /// No sign of life for so long that it is taken for dead.
+    Silent,
+}
+
+/// Signs of life as they were seen.
+#[derive(Debug)]
+pub(crate) struct Watch {
+    patience: Duration,
+    /// Length of the file and when it was first seen so, by the file's path.
+    seen: Mutex<HashMap<PathBuf, (u64, Instant)>>,
+}
+
+impl Watch {
+    /// Takes a worker for dead after this long without a sign of life.
+    fn new(patience: Duration) -> Self {
+        Self {
+            patience,
+            seen: Mutex::default(),
+        }
+    }
+
+    /// How the owner of `card` stands.
+    fn standing(&self, work: &Path, card: &Card) -> Standing {
+        if card.process.has_ended() {
+            return Standing::Ended;
+        }
+        self.signs(&work.join(card.file_name()))
+    }
+
+    /// How whoever makes the file at `path` longer stands.
+    fn signs(&self, path: &Path) -> Standing {
+        // Network file systems look again at what is opened, not at what is asked about.
+        let length = match fs::File::open(path).and_then(|file| file.metadata()) {
+            Ok(metadata) => metadata.len(),
+            Err(e) if e.kind() == io::ErrorKind::NotFound => return Standing::Ended,
+            Err(_) => u64::MAX,
+        };
+        let mut seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());
+        let now = Instant::now();
+        let (before, since) = seen.entry(path.to_owned()).or_insert((length, now));
+        if *before != length {
+            (*before, *since) = (length, now);
+        }
+        if now.duration_since(*since) >= self.patience {
+            Standing::Silent
+        } else {
+            Standing::Alive
+        }
+    }
+}
