@@ -2,9 +2,9 @@
 //! `direction = d.x*u + d.y*v + w`, rays start at the eye.
 //!
 //! Set up in f64 world coordinates, used in f32 relative to the sequence's origin. Row 0 of the
-//! image is its top. Lens blur and motion are left to later.
+//! image is its top. How a camera moves is [`super::path`]'s business; lens blur is left to later.
 
-use glam::{DMat4, DVec3, DVec4, Vec2, Vec3};
+use glam::{DMat4, DVec2, DVec3, DVec4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -71,6 +71,9 @@ pub enum CameraError {
     /// A coordinate is NaN or infinite.
     #[error("a coordinate is not a finite number")]
     NotFinite,
+    /// The renderer works in f32.
+    #[error("eye or look_at is too far away for single precision, whose numbers end at 3e38")]
+    TooFar,
     /// There is no direction to look in.
     #[error("eye and look_at are the same point; move one of them")]
     NoDirection,
@@ -109,6 +112,10 @@ impl Camera {
         if !points.iter().all(|p| p.is_finite()) {
             return Err(CameraError::NotFinite);
         }
+        let is_near = |p: DVec3| (p - origin).as_vec3().is_finite();
+        if !is_near(view.eye) || !is_near(view.look_at) {
+            return Err(CameraError::TooFar);
+        }
         if !(view.fov > 0.0 && view.fov < 180.0) {
             return Err(CameraError::FieldOfView);
         }
@@ -132,7 +139,7 @@ impl Camera {
             right: right.as_vec3(),
             up: up.as_vec3(),
             forward: forward.as_vec3(),
-            half_extent: glam::DVec2::new(half_height * aspect, half_height).as_vec2(),
+            half_extent: DVec2::new(half_height * aspect, half_height).as_vec2(),
             camera_from_world: camera_from_world(view.eye, right, up, forward),
         })
     }
@@ -148,21 +155,13 @@ impl Camera {
         let direction = view_direction(up, framing.azimuth, framing.elevation);
         let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
         let screen_up = right.cross(direction);
-        let half_height = (0.5 * framing.fov.to_radians()).tan() * (1.0 - FRAMING_MARGIN);
-        let half_width = half_height * framing.aspect;
+        let half = half_extent(framing);
 
         let center = bounds.center();
         let relative = bounds.corners().map(|corner| corner - center);
-        let (x, distance_x) = fit(&relative, direction, right, half_width);
-        let (y, distance_y) = fit(&relative, direction, screen_up, half_height);
-        let diagonal = bounds.diagonal();
-        // A single point still needs some distance; the scale of its coordinates is all we have.
-        let least = if diagonal > 0.0 {
-            0.0
-        } else {
-            (1e-3 * center.length()).max(1.0)
-        };
-        let distance = distance_x.max(distance_y).max(least);
+        let (x, distance_x) = fit(&relative, direction, right, half.x);
+        let (y, distance_y) = fit(&relative, direction, screen_up, half.y);
+        let distance = distance_x.max(distance_y).max(least_distance(bounds));
         let look_at = center + x * right + y * screen_up;
         CameraView {
             eye: look_at - distance * direction,
@@ -214,8 +213,25 @@ fn camera_from_world(eye: DVec3, right: DVec3, up: DVec3, forward: DVec3) -> DMa
     )
 }
 
+/// What a framed box may fill of the picture, horizontally and vertically: its extent at distance 1 from
+/// the middle to the rim, without the margin.
+pub(super) fn half_extent(framing: &Framing) -> DVec2 {
+    let half_height = (0.5 * framing.fov.to_radians()).tan() * (1.0 - FRAMING_MARGIN);
+    DVec2::new(half_height * framing.aspect, half_height)
+}
+
+/// Distance without which nothing could be seen of `bounds`, although all of it would fit.
+pub(super) fn least_distance(bounds: &Bounds) -> f64 {
+    // A single point still needs some; the scale of its coordinates is all we have.
+    if bounds.diagonal() > 0.0 {
+        0.0
+    } else {
+        (1e-3 * bounds.center().length()).max(1.0)
+    }
+}
+
 /// The way a camera looks that stands at `azimuth` and `elevation` (degrees) around `up`.
-fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
+pub(super) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
     // Straight down would leave no up; a degree is not seen.
     let elevation = elevation.clamp(-89.0, 89.0).to_radians();
     let azimuth = azimuth.to_radians();

@@ -1,4 +1,4 @@
-use glam::{DVec2, Mat4};
+use glam::Mat4;
 
 use super::*;
 
@@ -85,6 +85,8 @@ fn impossible_views_are_refused() {
     assert_eq!(with(|v| v.fov = 180.0), CameraError::FieldOfView);
     assert_eq!(with(|v| v.fov = f64::NAN), CameraError::FieldOfView);
     assert_eq!(with(|v| v.eye.x = f64::NAN), CameraError::NotFinite);
+    assert_eq!(with(|v| v.eye.x = -1e308), CameraError::TooFar);
+    assert_eq!(with(|v| v.look_at.z = 1e39), CameraError::TooFar);
     let flat = Camera::new(&thesis_view(), 0.0, DVec3::ZERO).unwrap_err();
     assert_eq!(flat, CameraError::Aspect);
 }

@@ -124,7 +124,7 @@ impl Light {
 
 /// A key light from above the camera's left shoulder with shadows, and a soft fill from the right
 /// without. Both are directional, so they suit a scene of any size; they stay where they are when
-/// a camera moves, so pass a sequence's first view.
+/// a camera moves, so pass the view that its path starts with.
 pub fn default_lights(bounds: &Bounds, up: DVec3, view: &CameraView) -> Vec<Light> {
     let up = up.try_normalize().unwrap_or(DVec3::Z);
     let to_eye = view.eye - bounds.center();

@@ -13,6 +13,7 @@ pub mod colormap;
 pub mod ground;
 pub mod light;
 pub mod material;
+pub mod path;
 
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing};
@@ -20,6 +21,7 @@ pub use colormap::{ColorMap, UnknownColorMap};
 pub use ground::Ground;
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Material, MaterialError};
+pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 
 /// An axis-aligned box in world units, spheres included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
