@@ -1,5 +1,7 @@
 //! `[camera]`: where the picture is taken from. World coordinates.
 
+use std::collections::BTreeSet;
+
 use super::named;
 use super::reader::{Field, Section};
 use super::write::Entries;
@@ -12,12 +14,23 @@ named! {
         Auto = "auto",
         /// At `eye`, looking at `look_at`.
         Fixed = "fixed",
-        /// As auto, going around by `degrees_per_frame`.
+        /// Around the bounds of the whole sequence by `degrees_per_frame`.
         Turntable = "turntable",
-        /// Between the `[[camera.key]]` of the nearest frames.
+        /// Through each `[[camera.key]]` at its frame.
         Keys = "keys",
     }
 }
+
+/// What the commented file says of keys where there are none.
+pub(super) const NO_KEYS: &str = r#"
+# In mode "keys" the camera goes smoothly through these, and stands before the first and after the last.
+# [[camera.key]]
+# frame = 1                               # the camera is there at this frame
+# eye = [0.0, 0.0, 0.0]                   # where
+# look_at = [5.0, 5.0, 0.0]               # the middle of the picture
+# up = [0.0, 0.0, 1.0]                    # default: camera.up
+# fov = 45.0                              # default: camera.fov
+"#;
 
 /// `[camera]`.
 #[derive(Debug, Clone, PartialEq)]
@@ -52,6 +65,8 @@ pub struct CameraKey {
     pub eye: [f64; 3],
     /// What is in the middle of the picture.
     pub look_at: [f64; 3],
+    /// What is up in the picture; None is `camera.up`.
+    pub up: Option<[f64; 3]>,
     /// Vertical field of view, degrees; None is `camera.fov`.
     pub fov: Option<f64>,
 }
@@ -80,11 +95,16 @@ impl Camera {
     pub(super) fn read(mut section: Section<'_>) -> Self {
         let default = Self::default();
         let mode = section.optional("mode", |f| f.choice(CameraMode::ALL));
+        let (eye, look_at) = (
+            section.optional("eye", Field::point),
+            section.optional("look_at", Field::point),
+        );
+        let up = section.optional("up", Field::direction);
         let mut camera = Self {
             mode: CameraMode::Auto,
-            eye: section.optional("eye", Field::point),
-            look_at: section.optional("look_at", Field::point),
-            up: section.optional("up", Field::direction),
+            eye,
+            look_at,
+            up,
             fov: section.value("fov", default.fov, fov),
             azimuth: section.optional("azimuth", |f| f.number("degrees", |_| true)),
             elevation: section.optional("elevation", |f| {
@@ -93,13 +113,8 @@ impl Camera {
             degrees_per_frame: section.value("degrees_per_frame", default.degrees_per_frame, |f| {
                 f.number("degrees", |_| true)
             }),
-            keys: section
-                .sections("key")
-                .into_iter()
-                .filter_map(CameraKey::read)
-                .collect(),
+            keys: read_keys(&mut section, up),
         };
-        camera.keys.sort_by_key(|k| k.frame);
         camera.mode = mode.unwrap_or(if camera.eye.is_some() {
             CameraMode::Fixed
         } else if camera.keys.is_empty() {
@@ -113,14 +128,17 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
-        if self.mode == CameraMode::Auto {
-            for key in ["eye", "look_at"] {
-                if !section.lacks(key) {
-                    section.wrong(
-                        key,
-                        "is given, but the automatic camera finds its own; say mode = \"fixed\"",
-                    );
-                }
+        let own = match self.mode {
+            CameraMode::Auto => Some("the automatic camera finds its own; say mode = \"fixed\""),
+            CameraMode::Turntable => {
+                Some("a turntable finds its own; azimuth and elevation place it")
+            }
+            CameraMode::Keys => Some("each [[camera.key]] has its own"),
+            CameraMode::Fixed => None,
+        };
+        for key in ["eye", "look_at"] {
+            if let Some(own) = own.filter(|_| !section.lacks(key)) {
+                section.wrong(key, &format!("is given, but {own}"));
             }
         }
         if self.mode == CameraMode::Fixed {
@@ -140,10 +158,6 @@ impl Camera {
         if self.mode == CameraMode::Keys && section.lacks("key") {
             section.missing("key", "mode = \"keys\" needs at least one [[camera.key]]");
         }
-        if self.keys.is_sorted_by(|a, b| a.frame < b.frame) {
-            return;
-        }
-        section.wrong("key", "two keys have the same frame");
     }
 
     pub(super) fn entries(&self, out: &mut Entries) {
@@ -190,30 +204,72 @@ impl Camera {
             out.put("frame", &key.frame, "the camera is there at this frame");
             out.put("eye", &key.eye, "where");
             out.put("look_at", &key.look_at, "the middle of the picture");
+            out.maybe(
+                "up",
+                key.up.as_ref(),
+                "[0.0, 0.0, 1.0]",
+                "default: camera.up",
+            );
             out.maybe("fov", key.fov.as_ref(), "45.0", "default: camera.fov");
         }
     }
 }
 
+/// Every `[[camera.key]]`, ascending by frame; `camera_up` is for those without an up of their own.
+fn read_keys(section: &mut Section<'_>, camera_up: Option<[f64; 3]>) -> Vec<CameraKey> {
+    let mut taken = BTreeSet::new();
+    let mut read = |key| CameraKey::read(key, camera_up, &mut taken);
+    let mut keys: Vec<_> = section
+        .sections("key")
+        .into_iter()
+        .filter_map(&mut read)
+        .collect();
+    keys.sort_by_key(|key| key.frame);
+    keys
+}
+
 impl CameraKey {
-    fn read(mut section: Section<'_>) -> Option<Self> {
+    /// `taken` has the frames of the keys before it.
+    fn read(
+        mut section: Section<'_>,
+        camera_up: Option<[f64; 3]>,
+        taken: &mut BTreeSet<i64>,
+    ) -> Option<Self> {
         let frame = section.optional("frame", |f| f.or_wants(f.as_integer(), "a frame number"));
         let eye = section.optional("eye", Field::point);
         let look_at = section.optional("look_at", Field::point);
+        let up = section.optional("up", Field::direction);
         let fov = section.optional("fov", fov);
         for key in ["frame", "eye", "look_at"] {
             if section.lacks(key) {
                 section.missing(key, "each [[camera.key]] needs frame, eye and look_at");
             }
         }
-        if eye.is_some() && eye == look_at {
-            section.wrong("look_at", "is where the eye is; they must differ");
+        if let Some(frame) = frame.filter(|frame| !taken.insert(*frame)) {
+            section.wrong("frame", &format!("there is a key of frame {frame} already"));
+        }
+        if let (Some(eye), Some(look_at)) = (eye, look_at) {
+            if eye == look_at {
+                section.wrong("look_at", "is where the eye is; they must differ");
+            } else if up
+                .or(camera_up)
+                .is_some_and(|up| are_parallel(up, eye, look_at))
+            {
+                section.wrong(
+                    "up",
+                    match up {
+                        Some(_) => "points along the view; it must not",
+                        None => "is camera.up, which points along the view; give the key another",
+                    },
+                );
+            }
         }
         section.finish();
         Some(Self {
             frame: frame?,
             eye: eye?,
             look_at: look_at?,
+            up,
             fov,
         })
     }

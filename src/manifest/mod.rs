@@ -212,6 +212,9 @@ impl Manifest {
             "# A spherule job. Paths are relative to this file; lengths are those of the simulation.\n",
         );
         text.push_str(&self.entries().file());
+        if self.camera.keys.is_empty() {
+            text.push_str(camera::NO_KEYS);
+        }
         if self.lights.is_empty() {
             text.push_str(AUTO_LIGHTS);
         }

@@ -228,6 +228,10 @@ fn wrong_types_say_what_is_wanted() {
     refused("[camera]\nup = [0,0,0]", &["camera.up", "not all 0"]);
     refused("[camera]\nmode = \"keys\"", &["camera.key: is missing"]);
     refused(
+        "[camera]\nmode = \"turntable\"\neye = [1,2,3]",
+        &["line 4, column 1: camera.eye: is given, but a turntable finds its own"],
+    );
+    refused(
         "[light]\ntype = \"point\"",
         &["light: wants a list of tables, as [[light]]"],
     );
@@ -249,6 +253,81 @@ fn wrong_types_say_what_is_wanted() {
         &["one of none, rle, zip, zips, piz, not 3"],
     );
     refused("render = 3", &["render: wants a table, not 3"]);
+}
+
+#[test]
+fn keys_of_the_camera_are_checked() {
+    let key = |rest: &str| format!("[[camera.key]]\nframe = 4\neye = [0,0,9]\n{rest}\n");
+    for (rest, what) in [
+        (
+            "",
+            "line 2, column 1: camera.key.0.look_at: is missing; each",
+        ),
+        (
+            "look_at = [0,0,9]",
+            "line 5, column 1: camera.key.0.look_at: is where the eye is",
+        ),
+        (
+            "look_at = [0,1]",
+            "line 5, column 11: camera.key.0.look_at: wants three numbers",
+        ),
+        (
+            "look_at = [0,0,1]\nup = [0,0,-2]",
+            "line 6, column 1: camera.key.0.up: points along the view",
+        ),
+        (
+            "look_at = [0,0,1]\nup = [0,0,0]",
+            "line 6, column 6: camera.key.0.up: wants three numbers that are not all 0",
+        ),
+        (
+            "look_at = [0,0,1]\n[camera]\nup = [0,0,3]",
+            "line 2, column 1: camera.key.0.up: is camera.up, which points along the view",
+        ),
+        (
+            "look_at = [0,1,1]\nfov = 180",
+            "line 6, column 7: camera.key.0.fov: wants degrees",
+        ),
+        (
+            "look_at = [0,1,1]\nupp = [0,0,1]",
+            "did you mean `camera.key.0.up`?",
+        ),
+    ] {
+        refused(&key(rest), &[what]);
+    }
+    let good = key("look_at = [1,0,1]");
+    refused(
+        &[&good[..], &good].concat(),
+        &["line 7, column 1: camera.key.1.frame: there is a key of frame 4 already"],
+    );
+    refused(
+        &["[camera]\nmode = \"keys\"\nlook_at = [1,2,3]\n", &good].concat(),
+        &["line 4, column 1: camera.look_at: is given, but each [[camera.key]] has its own"],
+    );
+}
+
+#[test]
+fn images_depend_on_keys_and_not_on_their_order() {
+    let key = |frame: i64, rest: &str| {
+        format!("[[camera.key]]\nframe = {frame}\neye = [9,0,0]\nlook_at = [0,0,0]\n{rest}\n")
+    };
+    let settings = |keys: [String; 2]| {
+        let text = ["input.path = \"data\"\n", &keys.concat()].concat();
+        parse(&text).settings()
+    };
+    let base = settings([key(1, ""), key(5, "")]);
+    assert_eq!(settings([key(5, ""), key(1, "")]), base);
+    for (rest, shown) in [
+        (
+            "up = [0,1,0]",
+            "camera.key.1.up: (not set) -> [0.0, 1.0, 0.0]",
+        ),
+        ("fov = 30", "camera.key.1.fov: (not set) -> 30.0"),
+    ] {
+        let other = settings([key(1, ""), key(5, rest)]);
+        let changes = spherule_jobs::compare_settings(&base, &other);
+        assert_eq!(changes.len(), 1);
+        assert_eq!(changes[0].to_string(), shown);
+    }
 }
 
 #[test]
@@ -314,7 +393,7 @@ fn everything_wrong_is_told_at_once() {
 fn sets_lie_over_the_file() {
     let manifest = with_sets(&[
         "render.max_depth=5",
-        "camera.mode = turntable",
+        "output.compression = piz",
         "input.frames=1-3x2",
         "output.path=a=b.####.exr",
         "material.color={ attribute = \"velocity\", map = \"turbo\" }",
@@ -323,7 +402,7 @@ fn sets_lie_over_the_file() {
     ])
     .unwrap();
     assert_eq!(manifest.render.max_depth, 5);
-    assert_eq!(manifest.camera.mode, CameraMode::Turntable);
+    assert_eq!(manifest.output.compression, Compression::Piz);
     assert_eq!(manifest.input.frames, Some("1-3x2".parse().unwrap()));
     assert_eq!(manifest.output.path.as_str(), "a=b.####.exr");
     assert_eq!(
@@ -425,6 +504,8 @@ fn commented_file_reads_back_and_shows_every_key() {
     assert!(error.contains("camera.eye: is given"), "{error}");
     let all = parse(&uncommented.replace("mode = \"auto\"", "mode = \"fixed\""));
     assert_eq!(all.lights.len(), 1);
+    assert_eq!(all.camera.keys.len(), 1);
+    assert!(all.camera.keys[0].up.is_some() && all.camera.keys[0].fov.is_some());
     assert_eq!(all.output.fps, Some(24.0));
     assert_eq!(parse(&all.to_commented_toml()), all);
 }
@@ -433,7 +514,7 @@ fn commented_file_reads_back_and_shows_every_key() {
 fn lists_of_everything_read_back() {
     let text = r#"
 input = { path = ["a", "b"], radius = { attribute = "d", scale = 0.5 }, up = "-y" }
-camera.key = [{ frame = 9, eye = [1,2,3], look_at = [0,0,0], fov = 30 }, { frame = -1, eye = [1,1,1], look_at = [0,0,0] }]
+camera.key = [{ frame = 9, eye = [1,2,3], look_at = [0,0,0], fov = 30 }, { frame = -1, eye = [1,1,1], look_at = [0,0,0], up = [0,1,0] }]
 render = { background = { bottom = [0,0,0], top = [1,1,1] }, ground = true, ground_height = -2 }
 material.color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }
 light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", position = [1,1,1], falloff = "inverse-square" }]
@@ -441,6 +522,7 @@ light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", posit
     let manifest = parse(text);
     assert_eq!(manifest.camera.mode, CameraMode::Keys);
     assert_eq!(manifest.camera.keys[0].frame, -1);
+    assert_eq!(manifest.camera.keys[0].up, Some([0.0, 1.0, 0.0]));
     assert_eq!(manifest.render.ground_height, GroundHeight::At(-2.0));
     assert_eq!(parse(&manifest.to_commented_toml()), manifest);
 }
