@@ -5,19 +5,22 @@ use spherule_formats::native::Access;
 
 use crate::accel::BvhSettings;
 use crate::manifest::{
-    Background as BackgroundSetting, CameraMode, ColorSetting, Falloff as FalloffSetting,
-    GroundHeight, LightKind, Manifest, RadiusSetting,
+    Background as BackgroundSetting, ColorSetting, Falloff as FalloffSetting, GroundHeight,
+    LightKind, Manifest, RadiusSetting,
 };
 use crate::output::{Compression, ExrOptions, PreviewOptions};
 use crate::pipeline::{ColorRule, FrameSize, MemoryModel, RadiusRule, Setup, attribute_list};
 use crate::render::{Channels, RenderSettings};
 use crate::report::memory::available;
-use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
 use crate::scene::{
-    Background, Bounds, Camera, CameraError, CameraView, ColorMap, Falloff, Framing, Ground, Light,
-    Material, Scene, default_lights, material,
+    Background, Bounds, CameraError, ColorMap, Falloff, Ground, Light, Material, PathError, Scene,
+    default_lights, material,
 };
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
+
+mod camera;
+
+pub use camera::check_views;
 
 /// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -73,6 +76,17 @@ pub enum ResolveError {
     /// The camera sees nothing.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
+    /// The keys make no path.
+    #[error("camera.key: {0}")]
+    Path(#[from] PathError),
+    /// The camera sees nothing at some frame.
+    #[error("{place}: {source}")]
+    View {
+        /// The manifest's key and the frame.
+        place: String,
+        /// What is wrong with the view.
+        source: CameraError,
+    },
 }
 
 /// What the survey has to find out.
@@ -110,10 +124,10 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     };
     let image = &manifest.image;
     let aspect = f64::from(image.width) / f64::from(image.height);
-    let view = view(manifest, &bounds, up, aspect)?;
-    let camera = Camera::new(&view, aspect, survey.origin)?;
+    let path = camera::path(manifest, &bounds, up, aspect)?;
+    let camera = camera::at_start(&path, aspect, survey.origin)?;
     let lights = if manifest.lights.is_empty() {
-        default_lights(&bounds, up, &view)
+        default_lights(&bounds, up, &path.start())
     } else {
         lights(manifest, survey.origin)
     };
@@ -138,9 +152,6 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     render.max_depth = manifest.render.max_depth;
     render.channels = channels;
     render.transparent_background = output.transparent;
-    let backdrop = output
-        .transparent
-        .then(|| scene.background.color(scene.camera.forward()));
     let setup = Setup {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
@@ -155,7 +166,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         exr: ExrOptions {
             compression: compression(manifest),
             frames_per_second: output.fps.map(fps),
-            world_to_camera: Some(scene.camera.world_to_camera()),
+            world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
             custom: None,
             // The encoder's own threads are as many as the machine has; a run that was given fewer
@@ -164,7 +175,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         },
         preview: PreviewOptions {
             exposure: output.preview_exposure,
-            backdrop,
+            backdrop: None,
         },
         access: match manifest.input.mmap {
             true => Access::Map,
@@ -172,7 +183,8 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         },
         verify: manifest.input.verify,
         weight: survey.weight,
-        view,
+        path,
+        aspect,
         scene,
         render,
     };
@@ -301,44 +313,6 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
             require_attribute(survey, "material.color.attribute", attribute)?;
             mapped(attribute, map.name(), *range, true)
         }
-    }
-}
-
-fn view(
-    manifest: &Manifest,
-    bounds: &Bounds,
-    up: DVec3,
-    aspect: f64,
-) -> Result<CameraView, ResolveError> {
-    let camera = &manifest.camera;
-    let up = camera.up.map_or(up, DVec3::from_array);
-    match camera.mode {
-        CameraMode::Auto => Ok(Camera::framing(
-            bounds,
-            &Framing {
-                up,
-                azimuth: camera.azimuth.unwrap_or(DEFAULT_AZIMUTH),
-                elevation: camera.elevation.unwrap_or(DEFAULT_ELEVATION),
-                fov: camera.fov,
-                aspect,
-            },
-        )),
-        CameraMode::Fixed => {
-            let point = |p: Option<[f64; 3]>| DVec3::from_array(p.unwrap_or_default());
-            Ok(CameraView {
-                eye: point(camera.eye),
-                look_at: point(camera.look_at),
-                up,
-                fov: camera.fov,
-            })
-        }
-        CameraMode::Turntable | CameraMode::Keys => Err(ResolveError::Unsupported {
-            key: "camera.mode",
-            what: format!(
-                "{} is not in this version; auto and fixed are",
-                camera.mode.name()
-            ),
-        }),
     }
 }
 

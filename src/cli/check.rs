@@ -14,6 +14,7 @@ use crate::report::Bytes;
 use crate::report::memory::available;
 use crate::survey::Survey;
 
+mod camera;
 mod show;
 
 #[derive(Debug, Args)]
@@ -101,7 +102,7 @@ impl<'a> Check<'a> {
             self.foreseen = self.noted(foreseen);
         }
         let pictures = match self.foreseen.as_ref().and_then(|f| f.resolved.as_ref()) {
-            Some(resolved) => self.plan.settle(resolved),
+            Some(resolved) => self.plan.settle(resolved, self.sequence),
             None => self.plan.survey(self.sequence),
         };
         self.pictures = self.noted(pictures);

@@ -16,7 +16,7 @@ use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
 use crate::report::Bytes;
 use crate::report::memory::available;
-use crate::resolve::{self, question};
+use crate::resolve::{self, check_views, question};
 use crate::survey::Survey;
 
 /// The manifest that is written beside the images.
@@ -163,18 +163,26 @@ impl Plan {
     pub(super) fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), CliError> {
         say!("looking at the sequence");
         let survey = apart(|| Survey::of(sequence, question(&self.manifest)))?;
-        let setup = self.setup(&survey)?;
+        let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))
     }
 
-    fn setup(&self, survey: &Survey) -> Result<Setup, CliError> {
-        resolve::setup(&self.manifest, survey).map_err(|e| CliError::Other(e.to_string()))
+    /// The pictures, if there is one from everywhere the camera goes.
+    fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, CliError> {
+        let frames = sequence.frames().iter().map(|frame| frame.number);
+        let setup = resolve::setup(&self.manifest, survey);
+        let setup = setup.and_then(|setup| check_views(&setup, frames).map(|()| setup));
+        setup.map_err(|e| CliError::Other(e.to_string()))
     }
 
     /// The pictures, by what was found when the job began.
-    pub(super) fn settle(&self, resolved: &Value) -> Result<(Survey, Setup), CliError> {
+    pub(super) fn settle(
+        &self,
+        resolved: &Value,
+        sequence: &Sequence,
+    ) -> Result<(Survey, Setup), CliError> {
         let survey = saved_survey(resolved, &self.dir)?;
-        let setup = self.setup(&survey)?;
+        let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))
     }
 

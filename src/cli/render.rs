@@ -40,7 +40,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     plan.guard_directory(mode)?;
     plan.guard_manifest(run.work.force)?;
     let mut job = plan.open(&sequence, mode)?;
-    let (survey, setup) = plan.settle(job.resolved())?;
+    let (survey, setup) = plan.settle(job.resolved(), &sequence)?;
     let mut tasks = plan.tasks(&sequence, &job.pending());
     let schedule = plan.fit(&sequence, &setup, &mut tasks);
     one_fits(&tasks)?;

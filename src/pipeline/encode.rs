@@ -99,7 +99,7 @@ fn write_frame(
     };
     // The preview first: a ledger line vouches for both, and the EXR is what people wait for.
     if let Some(path) = &task.preview {
-        let png = encode_preview(&frame.film, &setup.preview)?;
+        let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
         publish(path, &png).map_err(at(path))?;
     }
     if report.bytes.file.total() > 0 {
@@ -182,6 +182,7 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
             name: "spherule".to_owned(),
             json: facts.to_string(),
         }),
+        world_to_camera: Some(frame.camera.world_to_camera()),
         ..setup.exr.clone()
     }
 }

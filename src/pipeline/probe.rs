@@ -69,7 +69,9 @@ pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Pro
         let exr = encode_exr(&film, &small.exr).map_err(|e| e.to_string())?;
         let mut bytes = exr.bytes.len();
         if task.preview.is_some() {
-            let png = encode_preview(&film, &small.preview).map_err(|e| e.to_string())?;
+            let camera = small.camera_at(task.frame).map_err(|e| e.to_string())?;
+            let options = small.preview_from(&camera);
+            let png = encode_preview(&film, &options).map_err(|e| e.to_string())?;
             bytes += png.len();
         }
         let encode = start.elapsed().as_secs_f64();

@@ -1,4 +1,4 @@
-//! Everything about a job's pictures that is the same for every frame.
+//! Everything about a job's pictures: what is the same for every frame, and where the camera is at each.
 
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
@@ -7,7 +7,7 @@ use super::rays::expected_rays;
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
-use crate::scene::{CameraView, ColorMap, Scene};
+use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
 use crate::survey::FrameWeight;
 
 /// Where radii come from.
@@ -54,9 +54,12 @@ pub struct Setup {
     pub radius: RadiusRule,
     /// Where colours come from.
     pub color: ColorRule,
-    /// Where the scene's camera stands, world units.
-    pub view: CameraView,
-    /// Camera, lights, material, background, ground.
+    /// Where the camera is at each frame, world units.
+    pub path: CameraPath,
+    /// Width over height of the images, also where fewer pixels are traced on trial.
+    pub aspect: f64,
+    /// Lights, material, background, ground; its camera is that of the path's start. What a frame is traced
+    /// in is [`Self::scene_at`].
     pub scene: Scene,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
@@ -66,9 +69,9 @@ pub struct Setup {
     pub bvh: BvhSettings,
     /// What `sbvh` is told.
     pub sbvh: SbvhSettings,
-    /// How the EXR is written.
+    /// How the EXR is written; the camera comes with the frame.
     pub exr: ExrOptions,
-    /// How the PNG is made.
+    /// How the PNG is made; [`Self::preview_from`] adds what lies behind.
     pub preview: PreviewOptions,
     /// How the bytes of native frames come into memory.
     pub access: Access,
@@ -80,6 +83,34 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// The camera of `frame`.
+    ///
+    /// # Errors
+    /// There is no picture from there; [`crate::resolve::check_views`] finds out before.
+    pub fn camera_at(&self, frame: i64) -> Result<Camera, CameraError> {
+        Camera::new(&self.path.view(frame), self.aspect, self.origin)
+    }
+
+    /// What `frame` is traced in: lights and everything else stay where they are when the camera moves.
+    ///
+    /// # Errors
+    /// As [`Self::camera_at`].
+    pub fn scene_at(&self, frame: i64) -> Result<Scene, CameraError> {
+        Ok(Scene {
+            camera: self.camera_at(frame)?,
+            ..self.scene.clone()
+        })
+    }
+
+    /// How the PNG of an image from `camera` is made: a film without background gets one behind it.
+    pub fn preview_from(&self, camera: &Camera) -> PreviewOptions {
+        let behind = || self.scene.background.color(camera.forward());
+        PreviewOptions {
+            backdrop: self.render.transparent_background.then(behind),
+            ..self.preview
+        }
+    }
+
     /// How the tree over a frame of so many particles is built, with or without values to colour
     /// them by.
     pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {

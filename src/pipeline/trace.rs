@@ -14,10 +14,13 @@ use super::setup::{ColorRule, Setup};
 use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, SphereRadius, Spheres, TreeBuilder};
-use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, ShadeSource, render};
+use crate::render::{
+    Colors, Film, ParticleShading, RayCounts, RenderError, RenderSettings, ShadeSource, render,
+};
 use crate::report::frame::FileBytes;
 use crate::report::{FrameReport, MemoryUse};
 use crate::scene::material::DEFAULT_COLOR;
+use crate::scene::{Camera, CameraError, Scene};
 use crate::surface::spheres::SphereSurface;
 
 /// Why there is no image of a frame that was read.
@@ -37,6 +40,9 @@ pub enum TraceError {
     /// A native frame changed while it was traced, or cannot be used on this machine.
     #[error(transparent)]
     File(#[from] FrameError),
+    /// There is no picture from where the camera is.
+    #[error("camera: {0}")]
+    Camera(#[from] CameraError),
 }
 
 /// An image in memory.
@@ -44,6 +50,8 @@ pub enum TraceError {
 pub struct TracedFrame {
     /// What it is.
     pub task: ImageTask,
+    /// Where it was taken from.
+    pub camera: Camera,
     /// The planes.
     pub film: Film,
     /// Simulation time, if known.
@@ -177,6 +185,7 @@ impl FrameTracer {
         report.seconds.trace = seconds(start.elapsed());
         report.rays = rays.into();
         Ok(TracedFrame {
+            camera: setup.camera_at(task.frame)?,
             task,
             film,
             time,
@@ -195,16 +204,18 @@ impl FrameTracer {
         frame: &BuiltFrame,
         stop: &AtomicBool,
     ) -> Result<(Film, RayCounts), TraceError> {
+        let scene = setup.scene_at(frame.task.frame)?;
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.color, shading);
                 let tree = self.builder.tree().view();
-                Ok(draw(setup, tree, &source, stop)?)
+                Ok(draw(tree, &scene, &source, &setup.render, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
                 let source = stored.shading(&setup.color, DEFAULT_COLOR);
-                let drawn = draw(setup, self.stored.view(&leaves), &source, stop)?;
+                let tree = self.stored.view(&leaves);
+                let drawn = draw(tree, &scene, &source, &setup.render, stop)?;
                 // Before anyone believes what was seen.
                 stored.check()?;
                 Ok(drawn)
@@ -214,13 +225,13 @@ impl FrameTracer {
 }
 
 fn draw<C: ShadeSource>(
-    setup: &Setup,
     tree: TreeView,
+    scene: &Scene,
     source: &C,
+    settings: &RenderSettings,
     stop: &AtomicBool,
 ) -> Result<(Film, RayCounts), RenderError> {
-    let surface = SphereSurface::new(tree);
-    render(&surface, &setup.scene, source, &setup.render, stop)
+    render(&SphereSurface::new(tree), scene, source, settings, stop)
 }
 
 fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> ParticleShading<'a> {

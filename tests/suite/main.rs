@@ -4,6 +4,7 @@ mod harness;
 mod picture;
 
 mod bad_input;
+mod camera;
 mod convert;
 mod damaged;
 mod golden;

@@ -4,7 +4,16 @@ use std::collections::BTreeMap;
 use std::io::Cursor;
 use std::path::Path;
 
+use exr::meta::MetaData;
 use exr::prelude::{AttributeValue, FlatSamples, ReadChannels, ReadLayers, read};
+
+/// `worldToCamera` of the image at `path`.
+#[track_caller]
+pub(crate) fn world_to_camera(path: &Path) -> [f32; 16] {
+    let meta = MetaData::read_from_file(path, false).expect("an EXR");
+    let matrix = meta.headers[0].own_attributes.world_to_camera;
+    matrix.expect("the attribute")
+}
 
 /// The values of one channel, row by row from the top.
 #[derive(Debug, Clone, PartialEq)]

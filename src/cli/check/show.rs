@@ -3,6 +3,7 @@
 use serde_json::{Map, Value, json};
 use spherule_jobs::FrameState;
 
+use super::camera::Seen;
 use super::{Check, whole};
 use crate::accel::Structure;
 use crate::cli::progress::duration;
@@ -47,7 +48,7 @@ impl Check<'_> {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
             put("radius", radius_json(setup, survey));
-            put("camera", camera_json(setup));
+            put("camera", self.camera(setup).to_json());
         }
         if let Some(schedule) = &self.schedule {
             let mut memory = json!(schedule.need);
@@ -95,15 +96,7 @@ impl Check<'_> {
                 survey.most_particles,
                 radius_text(setup, survey)
             ));
-            let view = &setup.view;
-            lines.push(format!(
-                "camera     {} from {:.4} to {:.4}, up {:.4}, {} degrees",
-                manifest.camera.mode.name(),
-                view.eye,
-                view.look_at,
-                view.up,
-                view.fov
-            ));
+            lines.push(self.camera(setup).to_text());
             lines.push(format!("structure  {}", structure(survey, setup)));
         }
         lines.extend(self.memory_line());
@@ -111,6 +104,11 @@ impl Check<'_> {
         lines.extend(self.time_line());
         lines.push(String::new());
         lines.join("\n")
+    }
+
+    fn camera<'a>(&self, setup: &'a Setup) -> Seen<'a> {
+        let mode = self.plan.manifest.camera.mode;
+        Seen::new(setup, mode, &self.plan.selected(self.sequence))
     }
 
     fn frames_line(&self) -> String {
@@ -182,14 +180,4 @@ fn radius_json(setup: &Setup, survey: &Survey) -> Value {
         RadiusRule::FileOr(radius) => json!(radius),
         RadiusRule::Attribute { name, scale } => json!({"attribute": name, "scale": scale}),
     }
-}
-
-fn camera_json(setup: &Setup) -> Value {
-    let view = &setup.view;
-    json!({
-        "eye": view.eye.to_array(),
-        "look_at": view.look_at.to_array(),
-        "up": view.up.to_array(),
-        "fov": view.fov,
-    })
 }

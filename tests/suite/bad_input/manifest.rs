@@ -91,10 +91,36 @@ fn what_is_no_toml_has_a_place() {
 }
 
 #[test]
-fn what_is_not_built_is_said() {
+fn keys_of_the_camera_have_line_and_column() {
+    let key = "[[camera.key]]\nframe = 3\neye = [9, 0, 0]\n";
+    let job = |keys: &str| format!("[input]\npath = \"in\"\n{keys}");
     wrong(
-        "[input]\npath = \"in\"\n[camera]\nmode = \"turntable\"\n",
-        &["camera.mode: turntable is not in this version"],
+        &job(&[key, "look_at = [9, 0, 0]\nfov = 0\n"].concat()),
+        &[
+            "my.toml: line 6, column 1: camera.key.0.look_at: is where the eye is; they must differ",
+            "my.toml: line 7, column 7: camera.key.0.fov: wants degrees between 0 and 180, not 0",
+        ],
+    );
+    wrong(
+        &job(&[key, "look_at = [0, 0, 0]\nup = [-1, 0, 0]\n"].concat()),
+        &["my.toml: line 7, column 1: camera.key.0.up: points along the view; it must not"],
+    );
+    wrong(
+        &job(&[key, "look_at = [0, 0, 0]\n", key, "look_at = [1, 0, 0]\n"].concat()),
+        &["my.toml: line 8, column 1: camera.key.1.frame: there is a key of frame 3 already"],
+    );
+    wrong(
+        &job("[camera]\nmode = \"keys\"\n"),
+        &["my.toml: line 3, column 1: camera.key: is missing; mode = \"keys\" needs at least one"],
+    );
+    wrong(
+        &job("[camera]\nmode = \"turntable\"\neye = [0, 0, 1]\n"),
+        &["my.toml: line 5, column 1: camera.eye: is given, but a turntable finds its own"],
+    );
+    // BGEO is y up, and that is along this view: known only once the frames are.
+    wrong(
+        &job("[[camera.key]]\nframe = 3\neye = [0, 9, 0]\nlook_at = [0, 0, 0]\n"),
+        &["error: camera.key: the key of frame 3: up is zero or points along the view"],
     );
 }
 

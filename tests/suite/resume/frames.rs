@@ -2,11 +2,11 @@
 
 use std::fs;
 
-use exr::meta::MetaData;
 use glam::Vec3;
 use serde_json::Value;
 
 use crate::harness::{Workshop, dam_break, images, ledger, npy, stamps};
+use crate::picture::world_to_camera;
 
 fn boxes(workshop: &Workshop, frames: impl IntoIterator<Item = u64>) {
     for frame in frames {
@@ -15,10 +15,8 @@ fn boxes(workshop: &Workshop, frames: impl IntoIterator<Item = u64>) {
     }
 }
 
-fn world_to_camera(workshop: &Workshop, image: &str) -> [f32; 16] {
-    let meta = MetaData::read_from_file(workshop.join(image), false).expect("an EXR");
-    let matrix = meta.headers[0].own_attributes.world_to_camera;
-    matrix.expect("the attribute")
+fn camera_of(workshop: &Workshop, image: &str) -> [f32; 16] {
+    world_to_camera(&workshop.join(image))
 }
 
 #[test]
@@ -51,12 +49,12 @@ fn appended_frames_are_seen_by_the_old_camera() {
         assert_eq!(after.get(name), Some(stamp), "{name}");
     }
     assert_eq!(resolved(), settled);
-    let camera = world_to_camera(&workshop, "out/f.0001.exr");
-    assert_eq!(world_to_camera(&workshop, "out/f.0004.exr"), camera);
+    let camera = camera_of(&workshop, "out/f.0001.exr");
+    assert_eq!(camera_of(&workshop, "out/f.0004.exr"), camera);
 
     // A job that knows all four from the start stands elsewhere.
     workshop.render_to("all", &[]).expect(0);
-    assert_ne!(world_to_camera(&workshop, "all/f.0001.exr"), camera);
+    assert_ne!(camera_of(&workshop, "all/f.0001.exr"), camera);
 }
 
 #[test]

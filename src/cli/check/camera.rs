@@ -1,0 +1,99 @@
+//! Where the camera is, and how it moves.
+
+use serde_json::{Value, json};
+
+use crate::manifest::CameraMode;
+use crate::pipeline::Setup;
+use crate::scene::{CameraPath, CameraView};
+
+/// The camera over some frames.
+pub(super) struct Seen<'a> {
+    path: &'a CameraPath,
+    mode: CameraMode,
+    /// Of these frames, ascending.
+    first: Option<i64>,
+    last: Option<i64>,
+}
+
+impl<'a> Seen<'a> {
+    pub(super) fn new(setup: &'a Setup, mode: CameraMode, frames: &[i64]) -> Self {
+        Self {
+            path: &setup.path,
+            mode,
+            first: frames.first().copied(),
+            last: frames.last().copied(),
+        }
+    }
+
+    fn view(&self, frame: Option<i64>) -> CameraView {
+        frame.map_or_else(|| self.path.start(), |frame| self.path.view(frame))
+    }
+
+    pub(super) fn to_text(&self) -> String {
+        let mut text = format!(
+            "camera     {} {}",
+            self.mode.name(),
+            told(&self.view(self.first))
+        );
+        let moving = self.path.moving();
+        if let (Some(first), Some(last), [_, ..]) = (self.first, self.last, &moving[..]) {
+            text += &format!(
+                " at frame {first}\n           {} at frame {last}\n           {}",
+                told(&self.view(Some(last))),
+                self.motion(&moving)
+            );
+        }
+        text
+    }
+
+    /// What moves, and how.
+    fn motion(&self, moving: &[&str]) -> String {
+        let verb = if moving.len() == 1 { "moves" } else { "move" };
+        let what = format!("{} {verb}", moving.join(", "));
+        match self.path {
+            CameraPath::Still(_) => what,
+            CameraPath::Turntable(turntable) => {
+                let degrees = turntable.degrees_per_frame();
+                format!("{what} around up, {degrees} degrees a frame")
+            }
+            CameraPath::Keys(path) => {
+                let keys = path.keys();
+                let frames = keys.first().zip(keys.last());
+                let [from, to] = frames.map_or([0; 2], |(a, b)| [a.frame, b.frame]);
+                format!("{what} through {} keys, frames {from} to {to}", keys.len())
+            }
+        }
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let moving = self.path.moving();
+        let mut all = placed(&self.view(self.first));
+        all["mode"] = json!(self.mode.name());
+        if !moving.is_empty() {
+            all["frame"] = json!(self.first);
+            all["last"] = placed(&self.view(self.last));
+            all["last"]["frame"] = json!(self.last);
+        }
+        all["moves"] = json!(moving);
+        all
+    }
+}
+
+fn told(view: &CameraView) -> String {
+    let CameraView {
+        eye,
+        look_at,
+        up,
+        fov,
+    } = view;
+    format!("from {eye:.4} to {look_at:.4}, up {up:.4}, {fov} degrees")
+}
+
+fn placed(view: &CameraView) -> Value {
+    json!({
+        "eye": view.eye.to_array(),
+        "look_at": view.look_at.to_array(),
+        "up": view.up.to_array(),
+        "fov": view.fov,
+    })
+}

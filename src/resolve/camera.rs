@@ -1,0 +1,113 @@
+//! Where the camera goes, and whether there is a picture from everywhere on its way.
+
+use glam::DVec3;
+
+use super::ResolveError;
+use crate::manifest::{self, CameraMode, Manifest};
+use crate::pipeline::Setup;
+use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
+use crate::scene::{Bounds, Camera, CameraKey, CameraPath, CameraView, Framing, KeyedPath};
+
+/// The way that is asked for; `up` is the scene's.
+pub(super) fn path(
+    manifest: &Manifest,
+    bounds: &Bounds,
+    up: DVec3,
+    aspect: f64,
+) -> Result<CameraPath, ResolveError> {
+    let camera = &manifest.camera;
+    let up = camera.up.map_or(up, DVec3::from_array);
+    let framing = Framing {
+        up,
+        azimuth: camera.azimuth.unwrap_or(DEFAULT_AZIMUTH),
+        elevation: camera.elevation.unwrap_or(DEFAULT_ELEVATION),
+        fov: camera.fov,
+        aspect,
+    };
+    Ok(match camera.mode {
+        CameraMode::Auto => CameraPath::Still(Camera::framing(bounds, &framing)),
+        CameraMode::Fixed => {
+            let point = |p: Option<[f64; 3]>| DVec3::from_array(p.unwrap_or_default());
+            CameraPath::Still(CameraView {
+                eye: point(camera.eye),
+                look_at: point(camera.look_at),
+                up,
+                fov: camera.fov,
+            })
+        }
+        CameraMode::Turntable => CameraPath::turntable(bounds, &framing, camera.degrees_per_frame),
+        CameraMode::Keys => {
+            let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
+            CameraPath::through(keys.collect())?
+        }
+    })
+}
+
+/// `key` with what it leaves to the camera.
+fn keyed(key: &manifest::CameraKey, up: DVec3, fov: f64) -> CameraKey {
+    CameraKey {
+        frame: key.frame,
+        view: CameraView {
+            eye: DVec3::from_array(key.eye),
+            look_at: DVec3::from_array(key.look_at),
+            up: key.up.map_or(up, DVec3::from_array),
+            fov: key.fov.unwrap_or(fov),
+        },
+    }
+}
+
+/// The camera at the start of `path`. Of a path through keys each key is tried.
+pub(super) fn at_start(
+    path: &CameraPath,
+    aspect: f64,
+    origin: DVec3,
+) -> Result<Camera, ResolveError> {
+    if let CameraPath::Keys(keys) = path {
+        for key in keys.keys() {
+            Camera::new(&key.view, aspect, origin).map_err(|source| ResolveError::View {
+                place: format!("camera.key: the key of frame {}", key.frame),
+                source,
+            })?;
+        }
+    }
+    Ok(Camera::new(&path.start(), aspect, origin)?)
+}
+
+/// Looks whether there is a picture from where the camera is at each of `frames`.
+///
+/// # Errors
+/// [`ResolveError::View`] for the first frame without, by its number and the keys around it.
+pub fn check_views(
+    setup: &Setup,
+    frames: impl IntoIterator<Item = i64>,
+) -> Result<(), ResolveError> {
+    if setup.path.moving().is_empty() {
+        return Ok(());
+    }
+    for frame in frames {
+        setup
+            .camera_at(frame)
+            .map_err(|source| ResolveError::View {
+                place: place(&setup.path, frame),
+                source,
+            })?;
+    }
+    Ok(())
+}
+
+fn place(path: &CameraPath, frame: i64) -> String {
+    let around = match path {
+        CameraPath::Keys(keys) => KeyedPath::around(keys, frame),
+        _ => None,
+    };
+    match around {
+        Some([from, to]) => {
+            format!("camera.key: frame {frame}, between the keys of frames {from} and {to}")
+        }
+        None => format!("camera: frame {frame}"),
+    }
+}
+
+#[cfg(test)]
+#[path = "camera_tests.rs"]
+mod tests;

@@ -1,0 +1,132 @@
+use super::*;
+use crate::manifest::{CameraKey as Key, RadiusSetting};
+use crate::pipeline::Setup;
+use crate::survey::Survey;
+
+fn survey() -> Survey {
+    Survey {
+        origin: DVec3::ZERO,
+        min: DVec3::splat(-1.0),
+        max: DVec3::splat(1.0),
+        radius: None,
+        has_radii: false,
+        reach: 0.0,
+        color: None,
+        up: DVec3::Z,
+        attributes: Vec::new(),
+        most_particles: 8,
+        frames: 1,
+        weight: None,
+    }
+}
+
+fn key(frame: i64, eye: [f64; 3]) -> Key {
+    Key {
+        frame,
+        eye,
+        look_at: [0.0; 3],
+        up: None,
+        fov: None,
+    }
+}
+
+fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveError> {
+    let mut manifest = Manifest::new("in");
+    manifest.input.radius = RadiusSetting::Length(0.1);
+    (manifest.image.width, manifest.image.height) = (64, 36);
+    manifest.output.transparent = true;
+    change(&mut manifest.camera);
+    super::super::setup(&manifest, &survey())
+}
+
+fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {
+    setup(|camera| {
+        camera.mode = CameraMode::Keys;
+        camera.keys = keys.into();
+    })
+}
+
+#[test]
+fn keys_take_from_the_camera_what_they_leave_out() {
+    let setup = setup(|camera| {
+        camera.mode = CameraMode::Keys;
+        camera.up = Some([0.0, 3.0, 0.0]);
+        camera.fov = 33.0;
+        camera.keys = vec![key(1, [5.0, 0.0, 0.0]), key(2, [6.0, 0.0, 0.0])];
+        camera.keys[1].up = Some([0.0, 0.0, 1.0]);
+        camera.keys[1].fov = Some(50.0);
+    });
+    let path = setup.unwrap().path;
+    assert_eq!((path.view(1).up, path.view(1).fov), (DVec3::Y, 33.0));
+    assert_eq!((path.view(2).up, path.view(2).fov), (DVec3::Z, 50.0));
+}
+
+#[test]
+fn each_frame_has_its_camera_and_all_have_the_same_light() {
+    let setup = setup(|camera| {
+        camera.mode = CameraMode::Turntable;
+        camera.degrees_per_frame = 120.0;
+    });
+    let setup = setup.unwrap();
+    check_views(&setup, [0, 1, 2, i64::MAX]).unwrap();
+    let scenes = [0, 1].map(|frame| setup.scene_at(frame).unwrap());
+    assert_eq!(scenes[0].camera, setup.scene.camera);
+    assert_ne!(scenes[1].camera, setup.scene.camera);
+    assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());
+    assert_eq!(scenes[0].lights, scenes[1].lights);
+    // The default lights come from where frame 0 is seen from.
+    let to_light = scenes[0].lights[0].at(glam::Vec3::ZERO).unwrap().to_light;
+    let away = |frame: usize| -scenes[frame].camera.forward().dot(to_light);
+    assert!(away(0) > 0.5 && away(1) < away(0));
+}
+
+#[test]
+fn what_lies_behind_a_preview_is_what_its_camera_looks_at() {
+    let keys = [key(1, [5.0, 0.0, -4.0]), key(2, [5.0, 0.0, 4.0])];
+    let setup = keyed_setup(keys).unwrap();
+    let behind = |frame| {
+        let camera = setup.camera_at(frame).unwrap();
+        let shown = setup.preview_from(&camera).backdrop;
+        assert_eq!(shown, Some(setup.scene.background.color(camera.forward())));
+        shown
+    };
+    assert_ne!(behind(1), behind(2));
+}
+
+#[test]
+fn a_key_without_a_picture_is_named() {
+    let told = |keys: [Key; 2]| keyed_setup(keys).unwrap_err().to_string();
+    assert_eq!(
+        told([key(1, [5.0, 0.0, 0.0]), key(-7, [0.0, 0.0, 5.0])]),
+        "camera.key: the key of frame -7: up is zero or points along the view; choose another camera.up"
+    );
+    assert_eq!(
+        told([key(1, [5.0, 0.0, 0.0]), key(1, [6.0, 0.0, 5.0])]),
+        "camera.key: two keys have frame 1; a frame has one view"
+    );
+    let mut over = [key(1, [5.0, 0.0, 0.0]), key(9, [5.0, 0.0, 0.0])];
+    over[1].up = Some([0.0, 0.0, -1.0]);
+    let error = told(over);
+    assert!(error.starts_with("camera.key: up turns upside down from frame 1 to frame 9"));
+}
+
+#[test]
+fn a_frame_without_a_picture_is_named() {
+    // Through what is looked at, and over its head.
+    for (eyes, what) in [
+        (
+            [[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0]],
+            "eye and look_at are the same point",
+        ),
+        (
+            [[5.0, 0.0, 5.0], [-5.0, 0.0, 5.0]],
+            "up is zero or points along the view",
+        ),
+    ] {
+        let setup = keyed_setup([key(10, eyes[0]), key(20, eyes[1])]).unwrap();
+        check_views(&setup, (0..15).chain(16..30)).unwrap();
+        let error = check_views(&setup, 0..30).unwrap_err().to_string();
+        let place = "camera.key: frame 15, between the keys of frames 10 and 20: ";
+        assert!(error.starts_with(&[place, what].concat()), "{error}");
+    }
+}

@@ -1,0 +1,260 @@
+//! Cameras that move over a sequence, as its images have them.
+
+use std::fs;
+
+use glam::{DVec3, Mat4, Vec3};
+use serde_json::{Value, json};
+
+use crate::harness::{SMALL, Workshop, images, npy};
+use crate::picture::{Picture, world_to_camera};
+
+/// Keys out of order, for frames 2 to 6: up by 8, with the sight narrowing.
+const KEYS: &str = r#"
+[[camera.key]]
+frame = 6
+eye = [5.0, 14.5, 30.0]
+look_at = [5.0, 14.5, 0.0]
+fov = 20.0
+
+[[camera.key]]
+frame = 2
+eye = [5.0, 6.5, 30.0]
+look_at = [5.0, 6.5, 0.0]
+"#;
+
+/// The same particles at frames 1 to 7, so that only the camera makes a difference, and a manifest.
+fn workshop(camera: &str) -> Workshop {
+    let workshop = Workshop::new();
+    for frame in 1..=7 {
+        let path = workshop.join(format!("in/f_{frame}.npy"));
+        npy(&path, 2000, 1, Vec3::ZERO);
+    }
+    let text = format!(
+        "[input]\npath = \"in\"\nup = \"y\"\n[image]\nwidth = 64\nheight = 36\nsamples = 1\n\
+         [output]\npath = \"out/f.####.exr\"\n{camera}"
+    );
+    fs::write(workshop.join("my.toml"), text).expect("a manifest");
+    workshop
+}
+
+fn image(frame: usize) -> String {
+    format!("f.{frame:04}.exr")
+}
+
+fn matrices(workshop: &Workshop) -> Vec<Mat4> {
+    let matrix = |frame| world_to_camera(&workshop.join("out").join(image(frame)));
+    (1..=7).map(|f| Mat4::from_cols_array(&matrix(f))).collect()
+}
+
+/// What right, up and forward make of a vector, with y up, at azimuth `a` from the z axis and elevation `e`.
+fn turned(a: f64, e: f64, vector: DVec3) -> DVec3 {
+    let right = DVec3::new(a.cos(), 0.0, -a.sin());
+    let up = DVec3::new(-e.sin() * a.sin(), e.cos(), -e.sin() * a.cos());
+    let forward = DVec3::new(-e.cos() * a.sin(), -e.sin(), -e.cos() * a.cos());
+    DVec3::new(right.dot(vector), up.dot(vector), forward.dot(vector))
+}
+
+#[test]
+fn a_turntable_goes_around_at_one_distance() {
+    let workshop = workshop(
+        "[camera]\nmode = \"turntable\"\ndegrees_per_frame = 52.0\nazimuth = 10.0\nelevation = 15.0\n",
+    );
+    workshop.run(&["render", "my.toml"]).expect(0);
+    let matrices = matrices(&workshop);
+    // On the axis of the thesis's box; there the nearer lower rim is as far from the middle of the picture as
+    // the farther upper one: a little lower than the middle of the box.
+    let told = &check(&workshop, &[])["camera"]["look_at"];
+    let look_at: [f64; 3] = std::array::from_fn(|i| told[i].as_f64().expect("a number"));
+    let look_at = DVec3::from_array(look_at);
+    assert!(
+        look_at.distance(DVec3::new(5.0, 5.88, 0.0)) < 0.05,
+        "{look_at}"
+    );
+    let mut distances = Vec::new();
+    for (frame, matrix) in (1..).zip(&matrices) {
+        let a = (10.0 + 52.0 * f64::from(frame)).to_radians();
+        let e = 15.0_f64.to_radians();
+        for axis in [DVec3::X, DVec3::Y, DVec3::Z] {
+            let found = matrix.transform_vector3(axis.as_vec3()).as_dvec3();
+            assert!(
+                found.distance(turned(a, e, axis)) < 1e-6,
+                "frame {frame}: {found}"
+            );
+        }
+        let at = matrix.transform_point3(look_at.as_vec3());
+        assert!(at.truncate().length() < 1e-5, "frame {frame}: {at}");
+        distances.push(at.z);
+    }
+    assert!(
+        distances.iter().all(|d| (d - distances[0]).abs() < 1e-5),
+        "{distances:?}"
+    );
+    let mut first = None;
+    for frame in 1..=7 {
+        let picture = Picture::open(&workshop.join("out").join(image(frame)));
+        let alpha = picture.floats("A");
+        let at = |x: usize, y: usize| alpha[y * picture.width + x];
+        let (right, bottom) = (picture.width - 1, picture.height - 1);
+        let rows = (0..=right).flat_map(|x| [at(x, 0), at(x, bottom)]);
+        let columns = (0..=bottom).flat_map(|y| [at(0, y), at(right, y)]);
+        assert!(
+            rows.chain(columns).all(|a| a == 0.0),
+            "frame {frame} is cut"
+        );
+        assert_eq!(at(right / 2, bottom / 2), 1.0, "frame {frame}");
+        let first = first.get_or_insert_with(|| picture.clone());
+        assert!(
+            frame == 1 || *first != picture,
+            "frame {frame} is as frame 1"
+        );
+    }
+}
+
+#[test]
+fn keys_are_passed_softly_and_met() {
+    let workshop = workshop(KEYS);
+    workshop.run(&["render", "my.toml"]).expect(0);
+    // 3t^2 - 2t^3 at quarters; beyond the keys the camera stands.
+    let heights = [0.0, 0.0, 0.15625, 0.5, 0.84375, 1.0, 1.0];
+    for (matrix, part) in matrices(&workshop).iter().zip(heights) {
+        // It looks along -z with y up and x to the right.
+        let wanted = Mat4::from_cols_array(&[
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            1.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            -1.0,
+            0.0,
+            -5.0,
+            -(6.5 + 8.0 * part),
+            30.0,
+            1.0,
+        ]);
+        assert_eq!(*matrix, wanted);
+    }
+    // At the end it looks over the box: 20 degrees are 5.3 units up and down at a distance of 30.
+    let covered = |frame| {
+        let picture = Picture::open(&workshop.join("out").join(image(frame)));
+        picture.floats("A").iter().filter(|a| **a > 0.0).count()
+    };
+    assert_eq!(covered(1), covered(2));
+    assert!(covered(2) > 0 && covered(6) == 0);
+}
+
+#[test]
+fn moving_cameras_are_resumed_and_determined() {
+    for camera in [KEYS, "[camera]\nmode = \"turntable\"\n"] {
+        let workshop = workshop(camera);
+        workshop
+            .run(&["render", "my.toml", "--threads", "1"])
+            .expect(0);
+        let out = workshop.join("out");
+        let whole = images(&out);
+        assert_eq!(whole.len(), 14);
+        for frame in [1, 4] {
+            fs::remove_file(out.join(image(frame))).expect("an image");
+        }
+        let again = workshop.run(&["render", "my.toml"]).expect(0);
+        assert_eq!(again.rendered(), [1, 4]);
+        assert!(images(&out) == whole, "{camera}");
+        // Some frames alone, from the manifest that lies beside the images, are seen as among all.
+        let arguments = [
+            "render",
+            "out/job.toml",
+            "--frames",
+            "3",
+            "-o",
+            "one/f.####.exr",
+        ];
+        workshop.run(&arguments).expect(0);
+        let one = fs::read(workshop.join("one/f.0003.exr")).expect("an image");
+        assert!(one == whole[&image(3)], "{camera}");
+    }
+}
+
+#[test]
+fn a_changed_key_is_refused_by_name() {
+    let workshop = workshop(KEYS);
+    workshop
+        .run(&["render", "my.toml", "--frames", "2"])
+        .expect(0);
+    workshop
+        .run(&["render", "my.toml", "--set", "camera.key.0.up=[1,0,0]"])
+        .expect(2)
+        .tells("camera.key.1.up: (not set) -> [1.0, 0.0, 0.0]");
+}
+
+fn check(workshop: &Workshop, options: &[&str]) -> Value {
+    let ran = workshop.run(&[&["check", "my.toml", "--json"], options].concat());
+    serde_json::from_str(&ran.expect(0).text()).expect("JSON")
+}
+
+#[test]
+fn check_tells_what_moves() {
+    let workshop = workshop(KEYS);
+    let camera = &check(&workshop, &["--frames", "3-9"])["camera"];
+    assert_eq!(camera["mode"], "keys");
+    assert_eq!(camera["moves"], json!(["eye", "look_at", "fov"]));
+    assert_eq!(
+        (&camera["frame"], &camera["eye"]),
+        (&json!(3), &json!([5.0, 7.75, 30.0]))
+    );
+    assert_eq!(
+        (&camera["last"]["frame"], &camera["last"]["fov"]),
+        (&json!(7), &json!(20.0))
+    );
+    let text = workshop.run(&["check", "my.toml"]).expect(0).text();
+    assert!(text.contains("at frame 7\n"), "{text}");
+    assert!(
+        text.contains("eye, look_at, fov move through 2 keys, frames 2 to 6"),
+        "{text}"
+    );
+
+    let camera = &check(&workshop, &["--set", "camera.mode=turntable"])["camera"];
+    assert_eq!(camera["moves"], json!(["eye"]));
+    assert_eq!(camera["look_at"], camera["last"]["look_at"]);
+    let still = &check(&workshop, &["--set", "camera.mode=auto"])["camera"];
+    assert_eq!(
+        (&still["moves"], &still["last"]),
+        (&json!([]), &Value::Null)
+    );
+}
+
+#[test]
+fn a_frame_without_a_picture_ends_the_job_before_it_begins() {
+    let over = r#"
+[[camera.key]]
+frame = 2
+eye = [25.0, 20.0, 0.0]
+look_at = [5.0, 6.5, 0.0]
+[[camera.key]]
+frame = 6
+eye = [-15.0, 20.0, 0.0]
+look_at = [5.0, 6.5, 0.0]
+"#;
+    let workshop = workshop(over);
+    let what = "error: camera.key: frame 4, between the keys of frames 2 and 6: up is zero or points \
+                along the view";
+    workshop.run(&["check", "my.toml"]).expect(2).tells(what);
+    // Whichever frames are wanted now.
+    let arguments = ["render", "my.toml", "--frames", "1-3"];
+    workshop.run(&arguments).expect(2).tells(what);
+    assert!(!workshop.join("out").exists());
+}
+
+#[test]
+fn init_shows_keys_and_keeps_them() {
+    let workshop = workshop(KEYS);
+    let text = workshop.run(&["init", "my.toml"]).expect(0).text();
+    assert_eq!(text.matches("\n[[camera.key]]\n").count(), 2, "{text}");
+    assert!(text.contains("# up = [0.0, 0.0, 1.0]"), "{text}");
+    let arguments = [&["init", "in"][..], &SMALL].concat();
+    let text = workshop.run(&arguments).expect(0).text();
+    assert!(text.contains("# [[camera.key]]\n# frame = 1 "), "{text}");
+}
