@@ -8,6 +8,7 @@ use spherule_formats::Sequence;
 use spherule_jobs::{Foreseen, FrameState, Job, Mode};
 
 use super::plan::{Plan, RunArgs, one_fits};
+use super::work::use_threads;
 use super::{CliError, Outcome, disk};
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
 use crate::report::Bytes;
@@ -27,8 +28,8 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
-    args.run.work.use_threads()?;
     let asked = args.run.manifest.manifest()?;
+    use_threads(asked.manifest.job.threads)?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
         say!("note: {note}");

@@ -12,14 +12,14 @@ use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
 use super::job::{absolute, apart};
 use super::numbers::{USUAL_BOUND, not_negative, positive};
-use super::progress::{Progress, ProgressMode};
+use super::progress::Progress;
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
-    tell_kept,
+    tell_kept, use_threads,
 };
 use super::{CliError, Outcome, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
-use crate::manifest::real_dir;
+use crate::manifest::{ProgressMode, real_dir};
 use crate::report::Bytes;
 use crate::survey::Survey;
 
@@ -68,6 +68,9 @@ pub(super) struct ConvertArgs {
     memory: Option<Bytes>,
     #[command(flatten)]
     work: WorkArgs,
+    /// Threads to use; default: all.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65_535))]
+    threads: Option<u32>,
     /// How progress is shown.
     #[arg(long, value_enum, default_value = "auto")]
     progress: ProgressMode,
@@ -80,7 +83,7 @@ const WORDS: signals::Words = signals::Words {
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
-    args.work.use_threads()?;
+    use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
     let sequence = apart(|| Sequence::open(&input))?;
     for note in sequence.notes() {

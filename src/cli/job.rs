@@ -10,6 +10,7 @@ use clap::Args;
 use spherule_formats::sequence::{Sequence, SequenceInput};
 
 use super::CliError;
+use super::job_args::JobArgs;
 use crate::manifest::{Manifest, Override};
 
 /// What can be said on the command line about the pictures. Every key of the manifest has
@@ -74,6 +75,8 @@ pub(super) struct ManifestArgs {
     /// Most memory to take: 4GiB, 512MiB. Frames that need more fail, the rest goes on.
     #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
     pub(super) memory_limit: Option<String>,
+    #[command(flatten)]
+    pub(super) job: JobArgs,
 }
 
 /// A manifest as asked for, and where its paths begin.
@@ -152,12 +155,7 @@ impl ManifestArgs {
 
     fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
         if let Some(output) = &self.output {
-            // As typed it is relative to here; in a manifest it would be relative to that.
-            let path = if from_file {
-                text(&absolute(Path::new(output))?)?
-            } else {
-                output.clone()
-            };
+            let path = path_as_typed(output, from_file)?;
             list.push(over("output.path", path, "--output")?);
         }
         if let Some(frames) = &self.frames {
@@ -212,6 +210,7 @@ impl ManifestArgs {
         if self.no_mmap {
             list.push(over("input.mmap", false, "--no-mmap")?);
         }
+        self.job.add_overrides(list, from_file)?;
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(CliError::Other)?);
         }
@@ -261,7 +260,20 @@ pub(super) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     })
 }
 
-fn over(key: &str, value: impl Into<toml::Value>, shown: &str) -> Result<Override, CliError> {
+/// As typed, `path` is relative to here; laid over a manifest from a file it would be relative to that.
+pub(super) fn path_as_typed(path: &str, from_file: bool) -> Result<String, CliError> {
+    if from_file {
+        text(&absolute(Path::new(path))?)
+    } else {
+        Ok(path.to_owned())
+    }
+}
+
+pub(super) fn over(
+    key: &str,
+    value: impl Into<toml::Value>,
+    shown: &str,
+) -> Result<Override, CliError> {
     Override::new(key, value, shown).map_err(CliError::Other)
 }
 

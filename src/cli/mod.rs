@@ -23,6 +23,7 @@ mod generate;
 mod init;
 mod inspect;
 mod job;
+mod job_args;
 mod numbers;
 mod plan;
 mod progress;

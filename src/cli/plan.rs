@@ -218,8 +218,11 @@ impl Plan {
         let path = self.job_file();
         let mut manifest = self.manifest.clone();
         if self.is_own_manifest() {
-            // Which frames to do now is no property of the job.
+            // Which frames to do now, and how, is no property of the job.
             manifest.input.frames = self.unchanged.as_ref().and_then(|m| m.input.frames.clone());
+            if let Some(unchanged) = &self.unchanged {
+                manifest.job = unchanged.job.clone();
+            }
             if !settled_anew || self.unchanged.as_ref() == Some(&manifest) {
                 return Ok(());
             }

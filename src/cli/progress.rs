@@ -7,25 +7,34 @@ use std::sync::Mutex;
 use std::time::Instant;
 
 use clap::ValueEnum;
+use clap::builder::PossibleValue;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use spherule_jobs::{QueueNews, Status};
 
 use super::put;
+use crate::manifest::ProgressMode;
 
-/// How progress is shown.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-pub(super) enum ProgressMode {
-    /// Bars on a terminal, plain lines elsewhere.
-    Auto,
-    /// One line a frame.
-    Plain,
-    /// One JSON object a frame.
-    Json,
-    /// The lines that Open Job Description engines read.
-    Openjd,
-    /// Nothing but warnings and errors.
-    None,
+impl ValueEnum for ProgressMode {
+    fn value_variants<'a>() -> &'a [Self] {
+        &[
+            Self::Auto,
+            Self::Plain,
+            Self::Json,
+            Self::Openjd,
+            Self::None,
+        ]
+    }
+
+    fn to_possible_value(&self) -> Option<PossibleValue> {
+        Some(PossibleValue::new(self.name()).help(match self {
+            Self::Auto => "Bars on a terminal, plain lines elsewhere",
+            Self::Plain => "One line a frame",
+            Self::Json => "One JSON object a frame",
+            Self::Openjd => "The lines that Open Job Description engines read",
+            Self::None => "Nothing but warnings and errors",
+        }))
+    }
 }
 
 /// Shows the frames of one run.

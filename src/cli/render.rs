@@ -5,8 +5,8 @@ use serde_json::json;
 use spherule_formats::Sequence;
 
 use super::plan::{Plan, RunArgs, one_fits};
-use super::progress::{Progress, ProgressMode};
-use super::work::{Finished, tell_kept};
+use super::progress::Progress;
+use super::work::{Finished, tell_kept, use_threads};
 use super::{CliError, Outcome, signals};
 use crate::pipeline::{self, Event, Overlap, RadiusRule, Setup, Stage};
 use crate::report::{self, FrameReport};
@@ -16,9 +16,6 @@ use crate::survey::Survey;
 pub(super) struct RenderArgs {
     #[command(flatten)]
     run: RunArgs,
-    /// How progress is shown.
-    #[arg(long, value_enum, default_value = "auto")]
-    progress: ProgressMode,
 }
 
 const WORDS: signals::Words = signals::Words {
@@ -28,10 +25,10 @@ const WORDS: signals::Words = signals::Words {
 
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
-    let RenderArgs { run, progress } = args;
-    run.work.use_threads()?;
+    let RenderArgs { run } = args;
     let mode = run.work.mode();
     let asked = run.manifest.manifest()?;
+    use_threads(asked.manifest.job.threads)?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
         say!("note: {note}");
@@ -50,7 +47,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
         say!("note: one frame at a time, to take less memory");
     }
     tell_kept(&job, tasks.len());
-    let progress = Progress::new(*progress, tasks.len());
+    let progress = Progress::new(plan.manifest.job.progress, tasks.len());
     let start = std::time::Instant::now();
     let interrupt = signals.at_work();
     let overlap = schedule.overlap;

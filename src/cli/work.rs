@@ -16,7 +16,8 @@ use crate::survey::Survey;
 /// The setting that says what a job makes; jobs that render have none.
 pub(super) const KIND: &str = "job";
 
-/// How a job is gone about; no property of what it makes.
+/// What one run does with what is there. No manifest says such things: one that always starts over would
+/// throw finished work away.
 #[derive(Debug, Args)]
 pub(super) struct WorkArgs {
     /// Start over, whatever was made here before.
@@ -25,9 +26,6 @@ pub(super) struct WorkArgs {
     /// Keep finished frames although settings or inputs have changed.
     #[arg(long, conflicts_with = "force")]
     pub(super) keep_done: bool,
-    /// Threads to use; default: all.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
 }
 
 impl WorkArgs {
@@ -39,17 +37,17 @@ impl WorkArgs {
             _ => Mode::Resume,
         }
     }
+}
 
-    /// Uses as many threads as asked for from now on.
-    pub(super) fn use_threads(&self) -> Result<(), CliError> {
-        let Some(threads) = self.threads else {
-            return Ok(());
-        };
-        rayon::ThreadPoolBuilder::new()
-            .num_threads(usize::from(threads))
-            .build_global()
-            .map_err(|e| CliError::other(format!("--threads {threads}: {e}")))
-    }
+/// Uses as many threads as asked for from now on; None leaves it to the machine.
+pub(super) fn use_threads(threads: Option<u32>) -> Result<(), CliError> {
+    let Some(count) = threads.and_then(|t| usize::try_from(t).ok()) else {
+        return Ok(());
+    };
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(count)
+        .build_global()
+        .map_err(|e| CliError::other(format!("{count} threads: {e}")))
 }
 
 /// The frames that `range` has of `sequence`, or all; `shown` is what the range was given by.

@@ -219,7 +219,7 @@ impl Render {
         out.put(
             "accelerator",
             &self.accelerator,
-            "auto | lbvh | bvh | sbvh; the picture is the same",
+            "auto | lbvh | kdtree | bvh | sbvh; the picture is the same",
         );
         out.depends_on(None);
         out.put(
@@ -278,7 +278,7 @@ impl Render {
 }
 
 /// A size as text or as a number of bytes, above 0.
-fn read_size(field: &Field<'_>) -> Option<Bytes> {
+pub(super) fn read_size(field: &Field<'_>) -> Option<Bytes> {
     let size = match (field.as_text(), field.as_integer()) {
         (Some(text), _) => text.parse().ok(),
         (None, Some(bytes)) => u64::try_from(bytes).ok().map(Bytes),

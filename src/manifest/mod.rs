@@ -23,6 +23,9 @@ mod rebase;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod work;
+#[cfg(test)]
+mod work_tests;
 mod write;
 
 pub use camera::{Camera, CameraKey, CameraMode};
@@ -35,6 +38,7 @@ pub use pattern::OutputPattern;
 pub(crate) use reader::nearest;
 pub use rebase::{named_place, real_dir};
 pub use tree::Override;
+pub use work::{ProgressMode, STOP_FILE, Seconds, Work};
 
 /// An enum whose variants have the names that users type.
 macro_rules! named {
@@ -83,6 +87,8 @@ pub struct Manifest {
     pub lights: Vec<Light>,
     /// Into which images.
     pub output: Output,
+    /// How the work is gone about; no image depends on it.
+    pub job: Work,
 }
 
 /// Everything that is wrong with a manifest, a line each.
@@ -117,6 +123,7 @@ impl Manifest {
             material: Material::default(),
             lights: Vec::new(),
             output: Output::default(),
+            job: Work::default(),
         }
     }
 
@@ -170,6 +177,7 @@ impl Manifest {
                 .filter_map(Light::read)
                 .collect(),
             output: Output::read(root.section("output")),
+            job: Work::read(root.section("job")),
         };
         let several = manifest
             .input
@@ -201,7 +209,7 @@ impl Manifest {
 
     /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
     /// order. Left out: `input.path` and frames, which are told by the files themselves, the
-    /// accelerator, and the directory of the images.
+    /// accelerator, the directory of the images, and all of `[job]`.
     pub fn settings(&self) -> Vec<(String, String)> {
         self.entries().settings()
     }
@@ -229,6 +237,7 @@ impl Manifest {
         self.render.entries(&mut out);
         self.material.entries(&mut out);
         self.output.entries(&mut out);
+        self.job.entries(&mut out);
         for (index, light) in self.lights.iter().enumerate() {
             light.entries(index, &mut out);
         }

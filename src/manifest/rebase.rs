@@ -24,6 +24,9 @@ impl Manifest {
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
         self.output.path = OutputPattern::parse(&output)?;
+        if let Some(path) = &mut self.job.stop_file {
+            *path = rebased(path, from, to)?;
+        }
         Ok(())
     }
 }
@@ -109,6 +112,7 @@ mod tests {
         let mut manifest = Manifest::new("data/dump.#.vtk");
         manifest.input.path.push("/abs/x.vtk".to_owned());
         manifest.input.path.push("../up/./x.vtk".to_owned());
+        manifest.job.stop_file = Some("control/stop".to_owned());
         let (here, there) = (Path::new("/home/me/sim"), Path::new("/home/me/sim/out"));
         let before = manifest.clone();
         manifest.rebase(here, there).unwrap();
@@ -117,6 +121,14 @@ mod tests {
             ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]
         );
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
+        assert_eq!(
+            manifest.job.stop_file_in(there),
+            Path::new("/home/me/sim/out/../control/stop")
+        );
+        assert_eq!(
+            Manifest::new("a").job.stop_file_in(there),
+            Path::new("/home/me/sim/out/job.stop")
+        );
         manifest.rebase(there, here).unwrap();
         assert_eq!(manifest.output.path, before.output.path);
         assert_eq!(manifest.input.path[0], before.input.path[0]);

@@ -502,7 +502,8 @@ fn commented_file_reads_back_and_shows_every_key() {
         .unwrap_err()
         .to_string();
     assert!(error.contains("camera.eye: is given"), "{error}");
-    let all = parse(&uncommented.replace("mode = \"auto\"", "mode = \"fixed\""));
+    let all = uncommented.replace("mode = \"auto\"", "mode = \"fixed\"");
+    let all = parse(&all.replace("isolate = false", "isolate = true"));
     assert_eq!(all.lights.len(), 1);
     assert_eq!(all.camera.keys.len(), 1);
     assert!(all.camera.keys[0].up.is_some() && all.camera.keys[0].fov.is_some());

@@ -156,6 +156,16 @@ impl Entries {
         self.list.iter().map(|e| e.key.clone()).collect()
     }
 
+    /// Every key with its value, or with an example where it is not set.
+    #[cfg(test)]
+    pub(super) fn samples(&self) -> Vec<(String, String)> {
+        let value = |e: &Entry| e.value.clone().unwrap_or_else(|| e.example.to_owned());
+        self.list
+            .iter()
+            .map(|e| (e.key.clone(), value(e)))
+            .collect()
+    }
+
     /// The keys that outputs depend on and that are set.
     pub(super) fn settings(&self) -> Vec<(String, String)> {
         let set = |e: &Entry| Some((e.key.clone(), e.setting.clone()?));

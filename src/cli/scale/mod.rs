@@ -8,9 +8,10 @@ use clap::Args;
 use serde_json::json;
 use spherule_jobs::Interrupt;
 
-use super::progress::{ProgressMode, duration, openjd};
+use super::progress::{duration, openjd};
 use super::{CliError, Outcome, signals};
 use crate::accel::Structure;
+use crate::manifest::ProgressMode;
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
 use crate::report::scale::{

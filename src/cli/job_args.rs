@@ -1,0 +1,95 @@
+//! Flags for `[job]`, how the work is gone about.
+
+use clap::Args;
+
+use super::CliError;
+use super::job::{over, path_as_typed};
+use crate::manifest::{Override, ProgressMode};
+
+/// Laid over the manifest's `[job]`.
+#[derive(Debug, Args)]
+pub(super) struct JobArgs {
+    /// Threads to use: all, or how many.
+    #[arg(long, value_name = "COUNT", allow_hyphen_values = true)]
+    threads: Option<String>,
+    /// How progress is shown.
+    #[arg(long, value_enum)]
+    progress: Option<ProgressMode>,
+    /// Make each frame in a process of its own.
+    #[arg(long)]
+    isolate: bool,
+    /// Most anonymous memory of such a process: 4GiB, 512MiB.
+    #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
+    memory_ceiling: Option<String>,
+    /// How often a frame whose process died is tried again in this run [default: 1].
+    #[arg(long, value_name = "COUNT", allow_negative_numbers = true)]
+    retries: Option<i64>,
+    /// Seconds without a sign of life after which the frames of a worker on another machine are taken
+    /// over [default: 60].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    takeover_after: Option<f64>,
+    /// Go on with frames that a running simulation writes.
+    #[arg(long)]
+    follow: bool,
+    /// Seconds without a new frame after which following ends [default: 600].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    idle: Option<f64>,
+    /// Seconds that a file must have stood unchanged to count as complete [default: 2].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    settle: Option<f64>,
+    /// Following ends when this file appears [default: job.stop beside the images].
+    #[arg(long, value_name = "FILE")]
+    stop_file: Option<String>,
+}
+
+impl JobArgs {
+    /// What was asked for; `from_file` if it goes over a manifest from a file.
+    pub(super) fn add_overrides(
+        &self,
+        list: &mut Vec<Override>,
+        from_file: bool,
+    ) -> Result<(), CliError> {
+        let number = |text: &String| {
+            let number = text.parse().map(|count: i64| toml::Value::from(count));
+            number.unwrap_or_else(|_| toml::Value::from(text.clone()))
+        };
+        let seconds = |value: Option<f64>| value.map(toml::Value::from);
+        let name = |mode: ProgressMode| toml::Value::from(mode.name());
+        let stop_file = self.stop_file.as_ref();
+        let stop_file = stop_file.map(|path| path_as_typed(path, from_file));
+        let asked = [
+            ("threads", self.threads.as_ref().map(number), "--threads"),
+            ("progress", self.progress.map(name), "--progress"),
+            ("isolate", self.isolate.then_some(true.into()), "--isolate"),
+            (
+                "memory_ceiling",
+                self.memory_ceiling.clone().map(toml::Value::from),
+                "--memory-ceiling",
+            ),
+            ("retries", self.retries.map(toml::Value::from), "--retries"),
+            (
+                "takeover_after",
+                seconds(self.takeover_after),
+                "--takeover-after",
+            ),
+            ("follow", self.follow.then_some(true.into()), "--follow"),
+            ("idle", seconds(self.idle), "--idle"),
+            ("settle", seconds(self.settle), "--settle"),
+            (
+                "stop_file",
+                stop_file.transpose()?.map(toml::Value::from),
+                "--stop-file",
+            ),
+        ];
+        for (key, value, shown) in asked {
+            if let Some(value) = value {
+                list.push(over(&format!("job.{key}"), value, shown)?);
+            }
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+#[path = "job_args_tests.rs"]
+mod tests;

@@ -1,0 +1,95 @@
+//! That every option of `render` is a key of the manifest, or says why it is none.
+
+use std::collections::BTreeSet;
+
+use clap::{Args as _, Command, FromArgMatches as _};
+
+use crate::cli::plan::RunArgs;
+use crate::manifest::Manifest;
+
+/// Options that are no property of a job: where it is, any key, and what one run does with what is there.
+const ACTIONS: [&str; 4] = ["input", "set", "force", "keep_done"];
+
+/// Every other option with a value that is not the default, and the key that it is laid over.
+const FLAGS: [(&str, &str); 27] = [
+    ("--output x.####.exr", "output.path = \"x.####.exr\""),
+    ("--frames 3-4", "input.frames = \"3-4\""),
+    ("--width 7", "image.width = 7"),
+    ("--height 7", "image.height = 7"),
+    ("--samples 7", "image.samples = 7"),
+    ("--radius 0.5", "input.radius = 0.5"),
+    ("--up -y", "input.up = \"-y\""),
+    (
+        "--color-by v --map turbo --range 0 2",
+        "material.color = { attribute = \"v\", map = \"turbo\", range = [0.0, 2.0] }",
+    ),
+    ("--map", ""),
+    ("--range", ""),
+    ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
+    ("--max-depth 7", "render.max_depth = 7"),
+    ("--ground", "render.ground = true"),
+    ("--no-mmap", "input.mmap = false"),
+    ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
+    ("--accelerator bvh", "render.accelerator = \"bvh\""),
+    ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),
+    ("--threads 7", "job.threads = 7"),
+    ("--progress json", "job.progress = \"json\""),
+    ("--isolate", "job.isolate = true"),
+    (
+        "--isolate --memory-ceiling 4GiB",
+        "job.memory_ceiling = \"4GiB\"",
+    ),
+    ("--retries 7", "job.retries = 7"),
+    ("--takeover-after 7", "job.takeover_after = 7.0"),
+    ("--follow", "job.follow = true"),
+    ("--idle 7", "job.idle = 7.0"),
+    ("--settle 7", "job.settle = 7.0"),
+    ("--stop-file stop", "job.stop_file = \"stop\""),
+];
+
+fn command() -> Command {
+    RunArgs::augment_args(Command::new("render"))
+}
+
+fn manifest(flags: &str) -> Manifest {
+    let arguments = format!("render data {flags}");
+    let matches = command().get_matches_from(arguments.split_whitespace());
+    let run = RunArgs::from_arg_matches(&matches).unwrap();
+    run.manifest.manifest().unwrap().manifest
+}
+
+#[test]
+fn every_option_is_a_key() {
+    for (flags, wanted) in FLAGS.iter().filter(|(_, wanted)| !wanted.is_empty()) {
+        let (key, value) = wanted.split_once(" = ").unwrap();
+        let mut plain = Manifest::new("data");
+        assert_ne!(manifest(flags), plain, "{flags}");
+        let mut sets = vec![format!("{key}={value}")];
+        if flags.contains("--isolate --") {
+            sets.push("job.isolate=true".to_owned());
+        }
+        let sets = sets
+            .iter()
+            .map(|set| format!(" --set {}", set.replace(' ', "")));
+        plain = manifest(&sets.collect::<String>());
+        assert_eq!(manifest(flags), plain, "{flags}");
+    }
+}
+
+#[test]
+fn no_option_is_forgotten() {
+    let known = FLAGS.iter().map(|(flags, _)| {
+        let flag = flags.split_whitespace().rfind(|w| w.starts_with("--"));
+        let first = flags.split_whitespace().next();
+        let flag = if flags.starts_with("--isolate") {
+            flag
+        } else {
+            first
+        };
+        flag.unwrap().trim_start_matches('-').replace('-', "_")
+    });
+    let known: BTreeSet<String> = known.chain(ACTIONS.map(str::to_owned)).collect();
+    let command = command();
+    let all = command.get_arguments().map(|a| a.get_id().to_string());
+    assert_eq!(all.collect::<BTreeSet<_>>(), known);
+}

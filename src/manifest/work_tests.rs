@@ -1,0 +1,134 @@
+//! `[job]`, and that every key can be given by `--set`.
+
+use std::path::Path;
+use std::time::Duration;
+
+use super::*;
+
+/// Every key of `[job]` with a value that is not the default, and what that needs.
+const OTHERS: [(&str, &str); 10] = [
+    ("threads=3", ""),
+    ("progress=json", ""),
+    ("isolate=true", ""),
+    ("memory_ceiling=4GiB", "isolate=true"),
+    ("retries=0", ""),
+    ("takeover_after=0.5", ""),
+    ("follow=true", ""),
+    ("idle=1e9", ""),
+    ("settle=0", ""),
+    ("stop_file=../stop", ""),
+];
+
+fn with(sets: &[&str]) -> Result<Manifest, ManifestError> {
+    let set = |set: &&str| Override::parse(set).unwrap();
+    let text = "[input]\npath = \"data\"\n";
+    Manifest::parse_with(text, Path::new("job.toml"), sets.iter().map(set).collect())
+}
+
+fn job(sets: [&str; 2]) -> Result<Manifest, ManifestError> {
+    let sets: Vec<String> = sets
+        .iter()
+        .filter(|set| !set.is_empty())
+        .map(|set| format!("job.{set}"))
+        .collect();
+    with(&sets.iter().map(String::as_str).collect::<Vec<_>>())
+}
+
+#[test]
+fn no_image_depends_on_how_the_work_is_gone_about() {
+    let plain = Manifest::new("data");
+    let keys: Vec<String> = known_keys()
+        .into_iter()
+        .filter_map(|key| key.strip_prefix("job.").map(str::to_owned))
+        .collect();
+    let tried: Vec<&str> = OTHERS
+        .iter()
+        .filter_map(|(set, _)| Some(set.split_once('=')?.0))
+        .collect();
+    assert_eq!(keys, tried);
+    for (set, needs) in OTHERS {
+        let manifest = job([needs, set]).unwrap();
+        assert_ne!(manifest.job, plain.job, "{set}");
+        assert_eq!(manifest.settings(), plain.settings(), "{set}");
+        let again = Manifest::parse(&manifest.to_commented_toml(), Path::new("job.toml"));
+        assert_eq!(again.unwrap(), manifest, "{set}");
+    }
+}
+
+#[test]
+fn values_that_will_not_do() {
+    #[track_caller]
+    fn refused(set: &str, what: &str) {
+        let error = job([set, ""]).unwrap_err();
+        assert_eq!(error.messages().len(), 1, "{error}");
+        let wanted = format!("--set job.{set}: job.{what}");
+        assert!(error.to_string().starts_with(&wanted), "{error}");
+    }
+    for wrong in ["0", "-1", "65536", "1.5", "many", "true"] {
+        let wanted = "threads: wants \"all\" or a whole number from 1 to 65535, not";
+        refused(&format!("threads={wrong}"), wanted);
+    }
+    refused(
+        "progress=jsno",
+        "progress: wants one of auto, plain, json, openjd, none, not the text \"jsno\"; did you mean json?",
+    );
+    refused("isolate=1", "isolate: wants true or false");
+    refused("memory_ceiling=0", "memory_ceiling: wants a size above 0");
+    refused(
+        "memory_ceiling=4GiB",
+        "memory_ceiling: is that of a frame's own process; say job.isolate = true (--isolate)",
+    );
+    refused("retries=-1", "retries: wants a whole number from 0 to 100");
+    refused("retries=101", "retries: wants a whole number from 0 to 100");
+    for wrong in ["0", "-1", "1.1e9", "inf", "nan", "soon"] {
+        for key in ["takeover_after", "idle"] {
+            refused(
+                &format!("{key}={wrong}"),
+                &format!("{key}: wants seconds above 0, at most 1e9, not"),
+            );
+        }
+    }
+    refused("settle=-0.1", "settle: wants seconds from 0 to 1e9");
+    refused("stop_file=\"\"", "stop_file: wants a name in quotes");
+    refused("idel=3", "idel: unknown key; did you mean `job.idle`?");
+    assert!(job(["threads=all", ""]).unwrap().job.threads.is_none());
+}
+
+#[test]
+fn any_time_is_a_duration() {
+    for (set, wanted) in [
+        ("settle=0", Duration::ZERO),
+        ("settle=1e-300", Duration::ZERO),
+        ("settle=0.25", Duration::from_millis(250)),
+        ("settle=1e9", Duration::from_secs(1_000_000_000)),
+    ] {
+        let work = job([set, ""]).unwrap().job;
+        assert_eq!(work.settle.duration(), wanted, "{set}");
+    }
+}
+
+/// The manifest that all keys are tried on: what some of them need is there.
+const NEEDS: [(&str, &[&str]); 3] = [
+    ("camera.eye", &["camera.look_at=[1,2,3]"]),
+    (
+        "camera.look_at",
+        &["camera.mode=fixed", "camera.eye=[1,2,3]"],
+    ),
+    ("job.memory_ceiling", &["job.isolate=true"]),
+];
+
+#[test]
+fn every_key_can_be_set() {
+    for (key, value) in Manifest::new("data").entries().samples() {
+        let needs = NEEDS.iter().find(|(of, _)| *of == key);
+        let mut sets = needs.map_or_else(Vec::new, |(_, needs)| needs.to_vec());
+        let set = format!("{key}={value}");
+        sets.push(&set);
+        let manifest = with(&sets).unwrap_or_else(|e| panic!("{e}"));
+        let samples = manifest.entries().samples();
+        assert!(samples.contains(&(key.clone(), value)), "{set}");
+        // What is set can be laid over by another value, so it did not pass unread.
+        let error = with(&[&format!("{key}={{ no_such = 1 }}")]).unwrap_err();
+        assert!(error.to_string().contains(&key), "{error}");
+    }
+}
