@@ -24,6 +24,10 @@ impl Claims {
         }
     }
 
+    pub(crate) const fn desk(&self) -> &Arc<Desk> {
+        &self.desk
+    }
+
     /// Claims `frame`, which was still to be done when this worker began.
     ///
     /// # Errors

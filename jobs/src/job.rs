@@ -5,6 +5,7 @@
 //! directory. They agree on who does what by claims ([`Claims`]), each writes a ledger of its own, and
 //! one at a time changes the plan.
 
+use std::collections::HashSet;
 use std::error::Error;
 use std::fs;
 use std::io;
@@ -172,6 +173,33 @@ impl Job {
             state,
             selected,
         })
+    }
+
+    /// Takes in the frames that a growing sequence has by now; those selected in `request` are added to those
+    /// of this run.
+    ///
+    /// # Errors
+    /// Those of [`Job::open`]; settings must be those that the job was opened with.
+    pub fn extend(&mut self, request: &JobRequest) -> Result<(), JobError> {
+        request.check()?;
+        let dir = self.state.dir.clone();
+        let new = request.selected();
+        let mut prints = Prints::ahead(request, &new, Some(&self.state.plan));
+        let locking = |e| JobError::io(&dir, "agreeing with other workers", e);
+        let lock = self.claims.desk().lock().map_err(locking)?;
+        self.refresh()?;
+        let never = |_: Option<&Value>| Ok::<_, JobError>(Value::Null);
+        let plan = merged_plan(&self.state, request, &new, &mut prints, never)?;
+        if plan != self.state.plan {
+            plan.store(&dir)?;
+            let ledger = std::mem::take(&mut self.state.ledger);
+            self.state = JobState::new(&dir, plan, ledger);
+        }
+        lock.end();
+        let known: HashSet<i64> = self.selected.iter().copied().collect();
+        let added = new.into_iter().filter(|frame| !known.contains(frame));
+        self.selected.extend(added);
+        Ok(())
     }
 
     /// What the frames of this job are claimed by, before they are worked on.

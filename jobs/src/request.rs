@@ -4,7 +4,7 @@ use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
 use std::time::Duration;
 
-use crate::{FrameRange, JobError};
+use crate::JobError;
 
 /// What to do with what an earlier run left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -25,8 +25,8 @@ pub struct JobRequest {
     pub settings: Vec<(String, String)>,
     /// All frames there are, each number and each output once.
     pub frames: Vec<FrameRequest>,
-    /// Which of them to do in this run, in this order; all if None. Not part of the job's identity.
-    pub selection: Option<FrameRange>,
+    /// Numbers of those to do in this run, in this order; all if None. Not part of the job's identity.
+    pub selection: Option<Vec<i64>>,
     /// What to do with what an earlier run left.
     pub mode: Mode,
     /// How long a worker on another machine may give no sign of life before its frames are taken over.
@@ -50,10 +50,9 @@ pub struct FrameRequest {
 impl JobRequest {
     /// The numbers of the frames to do in this run, in their order.
     pub(crate) fn selected(&self) -> Vec<i64> {
-        let all: Vec<i64> = self.frames.iter().map(|f| f.number).collect();
         match &self.selection {
-            Some(range) => range.select(&all),
-            None => all,
+            Some(numbers) => numbers.clone(),
+            None => self.frames.iter().map(|f| f.number).collect(),
         }
     }
 

@@ -160,7 +160,7 @@ fn runs_resumes_and_retries_what_failed() {
 fn selection_orders_and_limits_but_is_not_remembered() {
     let place = Place::new(1..=10);
     let mut request = place.request(1..=10);
-    request.selection = Some("10-1x-3,99".parse().unwrap());
+    request.selection = Some(vec![10, 7, 4, 1]);
     let mut job = place.open(request).unwrap();
     assert_eq!(job.pending(), [10, 7, 4, 1]);
     place.finish(&mut job, 7);
@@ -302,7 +302,7 @@ fn changed_input_of_a_finished_frame_is_refused_by_name() {
     }
     // A run that does not touch that frame need not care.
     let mut elsewhere = place.request(0..4);
-    elsewhere.selection = Some("2-3".parse().unwrap());
+    elsewhere.selection = Some(vec![2, 3]);
     assert_eq!(place.open(elsewhere).unwrap().pending(), [2, 3]);
     let mut keep = place.request(0..4);
     keep.mode = Mode::KeepDone;

@@ -34,7 +34,7 @@ pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     for note in sequence.notes() {
         say!("note: {note}");
     }
-    let plan = Plan::new(asked, &sequence)?;
+    let plan = Plan::new(asked, &sequence, args.run.work.shard)?;
     let mut check = Check::new(&plan, &sequence);
     check.look(&args.run);
     let text = if args.json {

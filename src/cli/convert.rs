@@ -15,7 +15,7 @@ use super::numbers::{USUAL_BOUND, not_negative, positive};
 use super::progress::Progress;
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
-    tell_kept, use_threads,
+    selection, tell_kept, use_threads,
 };
 use super::{CliError, Outcome, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
@@ -188,7 +188,11 @@ impl Plan<'_> {
         JobRequest {
             settings,
             frames: requests(&self.sequence, |frame| vec![self.output(frame)]),
-            selection: self.args.frames.clone(),
+            selection: Some(selection(
+                &self.sequence,
+                self.args.frames.as_ref(),
+                self.args.work.shard,
+            )),
             mode: self.mode(),
             patience: DEFAULT_PATIENCE,
         }

@@ -80,6 +80,7 @@ pub(super) struct ManifestArgs {
 }
 
 /// A manifest as asked for, and where its paths begin.
+#[derive(Clone)]
 pub(super) struct Asked {
     /// With all options laid over it.
     pub(super) manifest: Manifest,

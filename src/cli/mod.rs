@@ -16,6 +16,7 @@ macro_rules! say {
 }
 
 mod check;
+mod child;
 mod convert;
 mod disk;
 mod errors;
@@ -29,6 +30,7 @@ mod plan;
 mod progress;
 mod render;
 mod scale;
+mod shard;
 mod signals;
 mod work;
 
@@ -61,6 +63,9 @@ enum Command {
     /// Measure one cell for `scale`.
     #[command(hide = true)]
     ScaleCell,
+    /// Make one image for `render --isolate`.
+    #[command(hide = true)]
+    RenderFrame,
 }
 
 /// Writes a line, as one piece so that lines of several threads or processes do not mix.
@@ -80,6 +85,7 @@ pub fn main() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Scale(args) => scale::run(&args),
         Command::ScaleCell => scale::measure::run(),
+        Command::RenderFrame => render::isolate::run_child(),
     };
     match result {
         Ok(outcome) => outcome.into(),

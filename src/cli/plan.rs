@@ -6,11 +6,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{DEFAULT_PATIENCE, Job, JobRequest, Mode, publish};
+use spherule_jobs::{Job, JobRequest, Mode, publish};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
-use super::work::{WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey};
+use super::shard::Shard;
+use super::work::{
+    WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey, selection,
+};
 use crate::accel::Structure;
 use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
@@ -43,10 +46,16 @@ pub(super) struct Plan {
     unchanged: Option<Manifest>,
     /// The images as the user named them.
     pub(super) shown_output: PathBuf,
+    /// The part of the frames that this run is to do.
+    shard: Option<Shard>,
 }
 
 impl Plan {
-    pub(super) fn new(asked: Asked, sequence: &Sequence) -> Result<Self, CliError> {
+    pub(super) fn new(
+        asked: Asked,
+        sequence: &Sequence,
+        shard: Option<Shard>,
+    ) -> Result<Self, CliError> {
         let base = asked.absolute_base()?;
         let mut manifest = asked.manifest;
         let range = manifest.input.frames.as_ref();
@@ -71,6 +80,7 @@ impl Plan {
             file,
             unchanged,
             shown_output,
+            shard,
         })
     }
 
@@ -85,11 +95,7 @@ impl Plan {
 
     /// The frames asked for, done or not.
     pub(super) fn selected(&self, sequence: &Sequence) -> Vec<i64> {
-        let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
-        match &self.manifest.input.frames {
-            Some(range) => range.select(&numbers),
-            None => numbers,
-        }
+        selection(sequence, self.manifest.input.frames.as_ref(), self.shard)
     }
 
     /// Refuses a directory that cannot be, or that has a job of another kind.
@@ -132,9 +138,17 @@ impl Plan {
         JobRequest {
             settings: self.manifest.settings(),
             frames: requests(sequence, outputs),
-            selection: self.manifest.input.frames.clone(),
+            selection: Some(self.selected(sequence)),
             mode,
-            patience: DEFAULT_PATIENCE,
+            patience: self.manifest.job.takeover_after.duration(),
+        }
+    }
+
+    /// What is asked of a job that goes on with the frames `new`.
+    pub(super) fn request_for(&self, sequence: &Sequence, new: &[i64]) -> JobRequest {
+        JobRequest {
+            selection: Some(new.to_vec()),
+            ..self.request(sequence, Mode::Resume)
         }
     }
 
@@ -217,9 +231,11 @@ impl Plan {
     pub(super) fn write_manifest(&self, settled_anew: bool) -> Result<(), CliError> {
         let path = self.job_file();
         let mut manifest = self.manifest.clone();
+        if let Some(unchanged) = &self.unchanged {
+            // Which frames one of many workers does now, and how, is no property of the job.
+            manifest.input.frames = unchanged.input.frames.clone();
+        }
         if self.is_own_manifest() {
-            // Which frames to do now, and how, is no property of the job.
-            manifest.input.frames = self.unchanged.as_ref().and_then(|m| m.input.frames.clone());
             if let Some(unchanged) = &self.unchanged {
                 manifest.job = unchanged.job.clone();
             }

@@ -4,6 +4,7 @@
 use std::io::{IsTerminal, stderr, stdout};
 use std::path::Path;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicUsize, Ordering};
 use std::time::Instant;
 
 use clap::ValueEnum;
@@ -40,7 +41,7 @@ impl ValueEnum for ProgressMode {
 /// Shows the frames of one run.
 pub(super) struct Progress {
     show: Show,
-    total: usize,
+    total: AtomicUsize,
     start: Instant,
     ended: Mutex<Ended>,
 }
@@ -74,10 +75,22 @@ impl Progress {
         };
         Self {
             show,
-            total,
+            total: AtomicUsize::new(total),
             start: Instant::now(),
             ended: Mutex::default(),
         }
+    }
+
+    /// There are `count` frames more to do.
+    pub(super) fn more(&self, count: usize) {
+        self.total.fetch_add(count, Ordering::Relaxed);
+        if let Show::Bar(bar) = &self.show {
+            bar.inc_length(count as u64);
+        }
+    }
+
+    fn total(&self) -> usize {
+        self.total.load(Ordering::Relaxed)
     }
 
     /// A frame is in hand: `doing` says what is being done with it.
@@ -92,7 +105,8 @@ impl Progress {
         let done = self.count(None);
         let output = output.display().to_string();
         let plain = format!("frame {frame}: {output} ({told})");
-        let mut json = json!({"frame": frame, "status": "done", "done": done, "total": self.total});
+        let mut json =
+            json!({"frame": frame, "status": "done", "done": done, "total": self.total()});
         if let (Value::Object(json), Value::Object(facts)) = (&mut json, facts) {
             json.extend(facts);
         }
@@ -104,7 +118,7 @@ impl Progress {
         let done = self.count(Some(frame));
         self.note(&format!("error: frame {frame}: {reason}"));
         let json = json!({"frame": frame, "status": "failed", "reason": reason,
-            "done": done, "total": self.total});
+            "done": done, "total": self.total()});
         self.line(done, "", &json);
     }
 
@@ -122,7 +136,7 @@ impl Progress {
                 let told = if is_done { "done" } else { "failed" };
                 let plain = format!("frame {frame}: {told} by another worker");
                 let json = json!({"frame": frame, "status": told, "elsewhere": true,
-                    "done": done, "total": self.total});
+                    "done": done, "total": self.total()});
                 self.line(done, &plain, &json);
             }
         }
@@ -157,16 +171,20 @@ impl Progress {
         match &self.show {
             Show::Bar(bar) => bar.set_position(done as u64),
             Show::Plain if plain.is_empty() => {}
-            Show::Plain => say!("[{done}/{}] {plain}, {}", self.total, self.remaining(done)),
+            Show::Plain => say!(
+                "[{done}/{}] {plain}, {}",
+                self.total(),
+                self.remaining(done)
+            ),
             Show::Json => say!("{json}"),
-            Show::Openjd => openjd(done, self.total, plain),
+            Show::Openjd => openjd(done, self.total(), plain),
             Show::Nothing => {}
         }
     }
 
     fn remaining(&self, done: usize) -> String {
         let each = self.start.elapsed().as_secs_f64() / done.max(1) as f64;
-        let left = each * (self.total - done.min(self.total)) as f64;
+        let left = each * self.total().saturating_sub(done) as f64;
         format!("{} left", duration(left))
     }
 }

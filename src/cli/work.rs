@@ -10,6 +10,7 @@ use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, JobError, Mode, PLAN_FILE};
 
 use super::progress::{Ended, duration};
+use super::shard::Shard;
 use super::{CliError, Outcome};
 use crate::survey::Survey;
 
@@ -26,6 +27,10 @@ pub(super) struct WorkArgs {
     /// Keep finished frames although settings or inputs have changed.
     #[arg(long, conflicts_with = "force")]
     pub(super) keep_done: bool,
+    /// Do one part of the frames only: 2/4 is the second of four. Workers at the same job share its frames
+    /// without this, too.
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
+    pub(super) shard: Option<Shard>,
 }
 
 impl WorkArgs {
@@ -68,6 +73,17 @@ pub(super) fn chosen(
         )));
     }
     Ok(chosen)
+}
+
+/// The numbers of the frames to do: those of `range` and of the shard.
+pub(super) fn selection(
+    sequence: &Sequence,
+    range: Option<&FrameRange>,
+    shard: Option<Shard>,
+) -> Vec<i64> {
+    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    let chosen = range.map_or_else(|| numbers.clone(), |range| range.select(&numbers));
+    shard.map_or_else(|| chosen.clone(), |shard| shard.of(&chosen))
 }
 
 /// All frames of `sequence`, made into `outputs` of their number.

@@ -85,7 +85,7 @@ pub(super) fn write_stage(
 }
 
 /// Encodes and publishes the images of `frame`; the report is complete then.
-fn write_frame(
+pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
     peaks: &mut MemoryPeaks,

@@ -25,6 +25,7 @@ mod probe;
 mod rays;
 mod schedule;
 mod setup;
+mod single;
 mod trace;
 
 pub use decoded::{DecodedFrame, DecodedShading};
@@ -36,6 +37,7 @@ pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, probe};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, RadiusRule, Setup};
+pub use single::{SingleFault, make_image};
 pub use trace::{BuiltFrame, FrameTracer, TraceError, TracedFrame};
 
 use crate::mishap::guarded;

@@ -205,6 +205,11 @@ impl Sequence {
         Ok(())
     }
 
+    /// Keeps only the frames that are `wanted`.
+    pub fn keep_frames(&mut self, wanted: impl FnMut(&SequenceFrame) -> bool) {
+        self.frames.retain(wanted);
+    }
+
     /// What a user should know: gaps, files left out, missing parts.
     pub fn notes(&self) -> &[String] {
         &self.notes

@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 
 use spherule_jobs::Interrupt;
 
-use super::child::{self, Ended};
+use super::measure::COMMAND;
+use crate::cli::child::{self, Ended};
 use crate::report::scale::Conversion;
 use crate::scale::{CellRequest, Representation, Task};
 
@@ -50,6 +51,10 @@ impl Frames {
                 remove(&self.dir);
                 match self.make(request, interrupt) {
                     Ended::Told(made) => Now { key, made },
+                    Ended::Died(reason) => Now {
+                        key,
+                        made: Err(reason),
+                    },
                     Ended::Interrupted => return Ended::Interrupted,
                 }
             }
@@ -67,8 +72,10 @@ impl Frames {
             request: request.clone(),
             path: path.clone(),
         };
-        match child::run(&task, interrupt) {
+        let ended: Ended<Result<_, String>> = child::run(COMMAND, &task, || interrupt.is_raised());
+        match ended {
             Ended::Told(made) => Ended::Told(made.map(|conversion| (path, conversion))),
+            Ended::Died(reason) => Ended::Told(Err(reason)),
             Ended::Interrupted => Ended::Interrupted,
         }
     }

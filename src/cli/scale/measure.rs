@@ -1,11 +1,10 @@
 //! The hidden command that does one task of `spherule scale`: it measures a cell, or makes its particles.
 
-use std::io::{self, Read};
-use std::thread;
+use std::io;
 
 use serde_json::Value;
 
-use crate::cli::{CliError, INTERRUPTED, Outcome, put};
+use crate::cli::{CliError, Outcome, child, put};
 use crate::scale::{Task, cell, convert};
 
 /// Its name.
@@ -13,17 +12,7 @@ pub(super) const COMMAND: &str = "scale-cell";
 
 /// Reads the task, does it, prints what came of it or why nothing did.
 pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
-    let mut line = String::new();
-    let task: Task = io::stdin()
-        .read_line(&mut line)
-        .map_err(|e| e.to_string())
-        .and_then(|_| serde_json::from_str(&line).map_err(|e| e.to_string()))
-        .map_err(|e| {
-            CliError::other(format!(
-                "standard input: no request of `spherule scale`, whose own command this is: {e}"
-            ))
-        })?;
-    thread::spawn(end_with_parent);
+    let task: Task = child::task("scale")?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(task.threads())
         .build_global()
@@ -44,11 +33,4 @@ fn do_task(task: &Task) -> Result<Value, String> {
         }
     };
     told?.map_err(|e| e.to_string())
-}
-
-/// Whoever wanted the result is gone once our input ends.
-fn end_with_parent() {
-    let mut rest = [0; 64];
-    while io::stdin().read(&mut rest).is_ok_and(|n| n > 0) {}
-    std::process::exit(i32::from(INTERRUPTED));
 }

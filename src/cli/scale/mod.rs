@@ -11,6 +11,7 @@ use spherule_jobs::Interrupt;
 use super::progress::{duration, openjd};
 use super::{CliError, Outcome, signals};
 use crate::accel::Structure;
+use crate::cli::child::{self, Ended};
 use crate::manifest::ProgressMode;
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
@@ -19,13 +20,11 @@ use crate::report::scale::{
 };
 use crate::scale::{Budget, CellRequest, Motion, Representation, Task};
 
-mod child;
 mod experiment;
 mod frames;
 pub(super) mod measure;
 mod words;
 
-use child::Ended;
 use experiment::Experiment;
 use frames::Frames;
 
@@ -177,6 +176,7 @@ fn measure_one(
     if request.representation.encoding().is_some() {
         match frames.of(request, interrupt) {
             Ended::Interrupted => return Ended::Interrupted,
+            Ended::Died(reason) => return Ended::Told(CellOutcome::Failed { reason }),
             Ended::Told(Ok(frame)) => made = Some(frame),
             Ended::Told(Err(reason)) => {
                 let reason = format!("no native frame: {reason}");
@@ -188,9 +188,12 @@ fn measure_one(
         request: request.clone(),
         file: made.map(|(path, _)| path.clone()),
     };
-    let measured: Result<CellMeasurement, String> = match child::run(&task, interrupt) {
+    let stop = || interrupt.is_raised();
+    let measured: Result<CellMeasurement, String> = match child::run(measure::COMMAND, &task, stop)
+    {
         Ended::Interrupted => return Ended::Interrupted,
         Ended::Told(measured) => measured,
+        Ended::Died(reason) => Err(reason),
     };
     Ended::Told(match measured {
         Err(reason) => CellOutcome::Failed { reason },

@@ -1,9 +1,12 @@
 //! Jobs that are broken off, changed, damaged, and gone on with.
 
 mod changed;
+mod followed;
 mod frames;
 mod interrupted;
+mod isolated;
 mod killed;
 mod ledger;
 mod report;
+mod shared;
 mod threads;

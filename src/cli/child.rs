@@ -9,14 +9,13 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
+use serde::Serialize;
 use serde::de::DeserializeOwned;
-use spherule_jobs::Interrupt;
 
-use super::measure::COMMAND;
-use crate::scale::Task;
+use super::{CliError, INTERRUPTED};
 
-/// Between two looks at the child; short against any cell.
-const INTERVAL: Duration = Duration::from_millis(10);
+/// Between two looks at the child; short against what it does.
+const INTERVAL: Duration = Duration::from_millis(2);
 /// Characters of a reason; what a crash prints may be long.
 const REASON: usize = 400;
 
@@ -24,26 +23,28 @@ const REASON: usize = 400;
 pub(super) enum Ended<T> {
     /// With a result, failures included.
     Told(T),
+    /// Without one: why.
+    Died(String),
     /// We have ended it because we were asked to.
     Interrupted,
 }
 
-/// Has `task` done; whatever goes wrong is told as the reason.
+/// Has `task` done by the hidden command `command`, unless `stop` says to end it.
 pub(super) fn run<T: DeserializeOwned>(
-    task: &Task,
-    interrupt: &Interrupt,
-) -> Ended<Result<T, String>> {
-    if interrupt.is_raised() {
+    command: &str,
+    task: &impl Serialize,
+    stop: impl Fn() -> bool,
+) -> Ended<T> {
+    if stop() {
         return Ended::Interrupted;
     }
-    let failed = |reason: String| Ended::Told(Err(reason));
     let line = match serde_json::to_string(task) {
         Ok(line) => line,
-        Err(e) => return failed(format!("cannot be told to a process: {e}")),
+        Err(e) => return Ended::Died(format!("cannot be told to a process: {e}")),
     };
-    let mut child = match spawn() {
+    let mut child = match spawn(command) {
         Ok(child) => child,
-        Err(e) => return failed(format!("cannot start a process: {e}")),
+        Err(e) => return Ended::Died(format!("cannot start a process: {e}")),
     };
     let output = reader(child.stdout.take());
     let errors = reader(child.stderr.take());
@@ -56,9 +57,9 @@ pub(super) fn run<T: DeserializeOwned>(
         match child.try_wait() {
             Ok(Some(status)) => break status,
             Ok(None) => {}
-            Err(e) => return failed(format!("lost its process: {e}")),
+            Err(e) => return Ended::Died(format!("lost its process: {e}")),
         }
-        if interrupt.is_raised() {
+        if stop() {
             let _ = child.kill();
             let _ = child.wait();
             return Ended::Interrupted;
@@ -70,20 +71,47 @@ pub(super) fn run<T: DeserializeOwned>(
     let (output, errors) = (text(output), text(errors));
     match serde_json::from_str(&output) {
         Ok(told) if status.success() => Ended::Told(told),
-        _ => failed(reason(status, &errors)),
+        _ => Ended::Died(reason(status, &errors)),
     }
 }
 
-fn spawn() -> io::Result<Child> {
+fn spawn(name: &str) -> io::Result<Child> {
     let mut command = Command::new(own_program()?);
     command
-        .arg(COMMAND)
+        .arg(name)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped());
     #[cfg(unix)]
     std::os::unix::process::CommandExt::process_group(&mut command, 0);
     command.spawn()
+}
+
+/// The child's side: the task, after which the process ends with its parent; `whose` is the command that
+/// gives such tasks.
+///
+/// # Errors
+/// Standard input is no task.
+pub(super) fn task<T: DeserializeOwned>(whose: &str) -> Result<T, CliError> {
+    let mut line = String::new();
+    let task = io::stdin()
+        .read_line(&mut line)
+        .map_err(|e| e.to_string())
+        .and_then(|_| serde_json::from_str(&line).map_err(|e| e.to_string()))
+        .map_err(|e| {
+            CliError::other(format!(
+                "standard input: no request of `spherule {whose}`, whose own command this is: {e}"
+            ))
+        })?;
+    thread::spawn(end_with_parent);
+    Ok(task)
+}
+
+/// Whoever wanted the result is gone once our input ends.
+fn end_with_parent() {
+    let mut rest = [0; 64];
+    while io::stdin().read(&mut rest).is_ok_and(|n| n > 0) {}
+    std::process::exit(i32::from(INTERRUPTED));
 }
 
 /// The file that this process runs, even if another has taken its name since.

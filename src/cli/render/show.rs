@@ -1,0 +1,87 @@
+//! What a render tells of what it decides and does.
+
+use serde_json::json;
+use spherule_formats::Sequence;
+
+use crate::cli::progress::Progress;
+use crate::pipeline::{self, Event, RadiusRule, Setup, Stage};
+use crate::report::FrameReport;
+use crate::survey::Survey;
+
+/// Shows an event of the pipeline. Called from all its stages.
+pub(super) fn show(progress: &Progress, event: &Event) {
+    match event {
+        Event::Entered(frame, stage) => progress.entered(
+            *frame,
+            match stage {
+                Stage::Read => "reading",
+                Stage::Trace => "tracing",
+                Stage::Write => "writing",
+            },
+        ),
+        Event::Done(task, report) => {
+            let image = task.image.display().to_string();
+            let facts = json!({"image": image, "seconds": report.seconds});
+            progress.done(task.frame, &task.image, &told(report), facts);
+        }
+        Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Others(news) => progress.others(*news),
+        Event::Note(note) => progress.note(&format!("note: {note}")),
+    }
+}
+
+fn told(report: &FrameReport) -> String {
+    let s = &report.seconds;
+    format!(
+        "{} particles, {} built in {:.3} s, trace {:.2} s",
+        report.particles, report.build.structure, s.build, s.trace
+    )
+}
+
+/// What was decided for the user, so that nothing is a surprise.
+pub(super) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+    say!(
+        "{}, up to {}",
+        counted(sequence.frames().len(), "frame"),
+        counted(survey.most_particles, "particle")
+    );
+    if survey.most_particles == 0 {
+        return;
+    }
+    say!("{}", radius_text(setup, survey));
+    if let pipeline::ColorRule::Attribute { name, .. } = &setup.color
+        && let Some(color) = &survey.color
+    {
+        say!(
+            "colour by `{name}`, seen from {} to {}",
+            short(color.low),
+            short(color.high)
+        );
+    }
+    if survey.origin != glam::DVec3::ZERO {
+        say!("origin {}: the particles are far from zero", survey.origin);
+    }
+}
+
+/// The radius in words.
+pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
+    match &setup.radius {
+        RadiusRule::Common(radius) => format!("radius {radius}"),
+        RadiusRule::FileOr(_) if survey.has_radii => "radius from the files".to_owned(),
+        RadiusRule::FileOr(radius) => {
+            let radius = short(f64::from(*radius));
+            format!("radius {radius}, half the usual distance of neighbours (--radius sets it)")
+        }
+        RadiusRule::Attribute { name, scale } => format!("radius {scale} x attribute `{name}`"),
+    }
+}
+
+/// Four digits, as a person reads a number.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}

@@ -1,0 +1,117 @@
+//! `--follow`: a simulation that writes while we render.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+
+const QUICK: [&str; 3] = ["--follow", "--settle", "0.3"];
+
+fn arguments<'a>(options: &[&'a str]) -> Vec<&'a str> {
+    let render = ["render", "in", "-o", "out/f.####.exr"];
+    [&render[..], &SMALL, &QUICK, options].concat()
+}
+
+/// The bytes of a frame of the example.
+fn frame(workshop: &Workshop, number: usize) -> Vec<u8> {
+    dam_break(&workshop.join("elsewhere"), [number]);
+    fs::read(workshop.join(format!("elsewhere/f_{number}.bgeo"))).expect("a frame")
+}
+
+#[test]
+fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
+    let workshop = Workshop::new();
+    let mut running = workshop.start(&arguments(&[]));
+    // The simulation has not even made its directory.
+    assert!(running.wait_for_line("waiting: "));
+    let input = workshop.join("in");
+    fs::create_dir(&input).expect("a directory");
+    for number in 1..=3 {
+        let bytes = frame(&workshop, number);
+        let mut file = fs::File::create(input.join(format!("f_{number}.bgeo"))).expect("a file");
+        for piece in bytes.chunks(bytes.len() / 3 + 1) {
+            file.write_all(piece).expect("room");
+            std::thread::sleep(std::time::Duration::from_millis(50));
+        }
+        drop(file);
+        assert!(running.wait_for_line(&format!("] frame {number}:")));
+    }
+    fs::write(workshop.join("out/job.stop"), "").expect("a file");
+    let (told, status) = running.end();
+    assert_eq!(status.code(), Some(0), "{told}");
+    assert!(told.contains("job.stop is there"), "{told}");
+    assert!(
+        !told.contains("error"),
+        "a file was taken before it was complete: {told}"
+    );
+    assert_eq!(ledger(&workshop.join("out")).lines.len(), 3);
+    no_leftovers(&workshop.join("out"));
+
+    // The same as if everything had been there, but for what was settled by the first frame alone.
+    dam_break(&workshop.join("first"), 1..=1);
+    let render = ["render", "in", "-o", "whole/f.####.exr"];
+    fs::rename(&input, workshop.join("later")).expect("a directory");
+    fs::rename(workshop.join("first"), &input).expect("a directory");
+    let render = [&render[..], &SMALL].concat();
+    workshop.run(&render).expect(0);
+    fs::remove_dir_all(&input).expect("a directory");
+    fs::rename(workshop.join("later"), &input).expect("a directory");
+    workshop
+        .run(&[&render[..], &["--keep-done"]].concat())
+        .expect(0);
+    assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
+}
+
+#[test]
+fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    let ran = workshop
+        .run(&arguments(&["--idle", "1"]))
+        .expect(0)
+        .tells("nothing new for 1 s");
+    assert_eq!(ran.rendered(), [1, 2]);
+    dam_break(&workshop.join("in"), 3..=3);
+    let ran = workshop.run(&arguments(&["--idle", "1"])).expect(0);
+    assert_eq!(ran.rendered(), [3]);
+    // And what was never there is named.
+    fs::remove_dir_all(workshop.join("in")).expect("a directory");
+    let options = ["--idle", "0.5", "-o", "never/f.####.exr"];
+    let never = [&["render", "in"][..], &QUICK, &options].concat();
+    workshop
+        .run(&never)
+        .expect(2)
+        .tells("waiting: in: no such file or directory")
+        .tells("no complete frame has come: nothing new for 0.5 s");
+    assert!(!workshop.join("never").exists());
+}
+
+#[test]
+fn a_frame_that_was_not_complete_after_all_is_made_once_it_is() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    let whole = fs::read(workshop.join("in/f_2.bgeo")).expect("a frame");
+    let cut = |path: &Path| fs::write(path, &whole[..whole.len() / 2]).expect("a file");
+    cut(&workshop.join("in/f_2.bgeo"));
+    let mut running = workshop.start(&arguments(&[]));
+    assert!(running.wait_for_line("frame 2: "));
+    fs::write(workshop.join("in/f_2.bgeo"), &whole).expect("a file");
+    assert!(running.wait_for_line("] frame 2:"));
+    fs::write(workshop.join("out/job.stop"), "").expect("a file");
+    let (told, status) = running.end();
+    assert_eq!(status.code(), Some(0), "{told}");
+    assert_eq!(images(&workshop.join("out")).len(), 4);
+}
+
+#[test]
+fn a_signal_ends_it_with_75() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=1);
+    let mut running = workshop.start(&arguments(&[]));
+    assert!(running.wait_for_line("] frame 1:"));
+    running.signal("TERM");
+    let (told, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{told}");
+    no_leftovers(&workshop.join("out"));
+}

@@ -1,0 +1,149 @@
+//! `--isolate`: a process that dies costs one frame.
+
+use std::fs;
+use std::process::Command;
+
+use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers, npy};
+
+const FRAMES: usize = 5;
+
+/// Images that take a while.
+const LONG: [&str; 6] = ["--width", "320", "--height", "180", "--samples", "64"];
+
+fn long<'a>(options: &[&'a str]) -> Vec<&'a str> {
+    let render = ["render", "in", "-o", "out/f.####.exr", "--isolate"];
+    [&render[..], &LONG, options].concat()
+}
+
+fn arguments<'a>(options: &[&'a str]) -> Vec<&'a str> {
+    let render = ["render", "in", "-o", "out/f.####.exr", "--isolate"];
+    [&render[..], &SMALL, options].concat()
+}
+
+#[test]
+fn the_images_are_the_same() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=FRAMES);
+    workshop.render_to("whole", &["--frames", "1-3"]).expect(0);
+    workshop.render_to("whole", &[]).expect(0);
+    let ran = workshop.run(&arguments(&[])).expect(0);
+    assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
+    no_leftovers(&workshop.join("out"));
+    assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
+    // How the work is gone about is no property of the job.
+    workshop
+        .render(&[])
+        .expect(0)
+        .tells("5 of 5 frames are done already");
+}
+
+#[test]
+fn a_frame_beyond_the_ceiling_costs_one_frame() {
+    let workshop = Workshop::new();
+    for frame in 1..=3 {
+        npy(
+            &workshop.join(format!("in/f_{frame}.npy")),
+            2_000,
+            frame,
+            glam::Vec3::ZERO,
+        );
+    }
+    npy(&workshop.join("in/f_2.npy"), 6_000_000, 2, glam::Vec3::ZERO);
+    let options = [
+        "--memory-ceiling",
+        "64MiB",
+        "--radius",
+        "0.01",
+        "--threads",
+        "2",
+    ];
+    let ran = workshop
+        .run(&arguments(&options))
+        .expect(1)
+        .tells("frame 2: its process died (try 1 of 2): out of memory")
+        .tells("error: frame 2: its process died (try 2 of 2): out of memory")
+        .tells("failed: 2");
+    assert_eq!(ran.rendered(), [1, 3]);
+    no_leftovers(&workshop.join("out"));
+    let lines = ledger(&workshop.join("out")).lines;
+    assert_eq!(lines.iter().filter(|l| l["status"] == "failed").count(), 2);
+    // More room, and the same job goes on.
+    let ran = workshop.run(&arguments(&["--radius", "0.01"])).expect(0);
+    assert_eq!(ran.rendered(), [2]);
+    workshop
+        .run(&[
+            "render",
+            "in",
+            "-o",
+            "x/f.####.exr",
+            "--memory-ceiling",
+            "1GiB",
+        ])
+        .expect(2)
+        .tells("job.memory_ceiling");
+}
+
+/// The process that makes the frame, once there is one.
+#[cfg(target_os = "linux")]
+fn child_of(id: u32) -> Option<i64> {
+    let listed = fs::read_to_string(format!("/proc/{id}/task/{id}/children")).ok()?;
+    listed.split_ascii_whitespace().next()?.parse().ok()
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_killed_process_is_tried_again() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=3);
+    let whole = [&["render", "in", "-o", "whole/f.####.exr"][..], &LONG].concat();
+    workshop.run(&whole).expect(0);
+    let mut running = workshop.start(&long(&["--retries", "50"]));
+    let mut kills = 0;
+    while kills < 8 {
+        let parent = running.id();
+        if !running.wait_until(|| child_of(parent).is_some()) {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5 * kills));
+        if let Some(id) = child_of(parent) {
+            let killed = Command::new("kill").args(["-9", &id.to_string()]).output();
+            kills += u64::from(killed.expect("kill is there").status.success());
+        }
+    }
+    let (told, status) = running.end();
+    assert_eq!(status.code(), Some(0), "{told}");
+    assert!(told.contains("killed by the system"), "{told}");
+    no_leftovers(&workshop.join("out"));
+    assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
+}
+
+#[test]
+fn a_damaged_frame_is_told_by_its_own_reason_and_not_tried_again() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=3);
+    let path = workshop.join("in/f_2.bgeo");
+    let bytes = fs::read(&path).expect("a frame");
+    fs::write(&path, &bytes[..bytes.len() / 2]).expect("a file");
+    let ran = workshop.run(&arguments(&[])).expect(1);
+    assert_eq!(ran.rendered(), [1, 3]);
+    assert!(
+        !ran.errors().contains("its process died"),
+        "{}",
+        ran.errors()
+    );
+    assert_eq!(ledger(&workshop.join("out")).lines.len(), 3);
+}
+
+#[test]
+fn term_ends_after_the_frame_in_hand() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=FRAMES);
+    let mut running = workshop.start(&long(&[]));
+    assert!(running.wait_for_line("] frame 1:"));
+    running.signal("TERM");
+    let (told, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{told}");
+    let done = ledger(&workshop.join("out")).lines.len();
+    assert!((1..FRAMES).contains(&done), "{told}");
+    no_leftovers(&workshop.join("out"));
+}
