@@ -15,7 +15,7 @@ use serde_json::Value;
 
 use crate::ledger::{ENDED, LedgerFile, LedgerWriter, News, fold, ledger_files, remove};
 use crate::planning::{Prints, merged_plan, new_plan, stored_path};
-use crate::work::{Desk, sweep_parts};
+use crate::work::{Desk, WorkerView, sweep_parts, workers};
 use crate::{
     Claims, Entry, FrameState, JobError, JobRequest, JobState, Ledger, Mode, OutputFile, Plan,
     Status, Summary,
@@ -73,6 +73,15 @@ impl Job {
             Some(plan) => Ok(Some(JobState::new(dir, plan, Ledger::read(dir)?))),
             None => Ok(None),
         }
+    }
+
+    /// Who is at work in `dir`, also workers that died without a word. Touches nothing.
+    ///
+    /// # Errors
+    /// Trouble reading.
+    pub fn workers(dir: &Path) -> Result<Vec<WorkerView>, JobError> {
+        let dir = named(dir);
+        workers(dir).map_err(|e| JobError::io(dir, "looking for workers", e))
     }
 
     /// How the job in `dir` would stand after [`Job::open`]. Touches nothing, and may be asked while

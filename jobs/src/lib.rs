@@ -42,4 +42,4 @@ pub use queue::{Queue, QueueNews};
 pub use range::{FrameRange, RangeError};
 pub use request::{DEFAULT_PATIENCE, FrameRequest, JobRequest, Mode};
 pub use state::{FrameState, JobState, Summary};
-pub use work::{Claim, Claimed, start_heart};
+pub use work::{Claim, Claimed, WorkerView, start_heart};

@@ -127,11 +127,7 @@ impl ManifestArgs {
     }
 
     fn manifest_file(&self) -> Result<Option<PathBuf>, CliError> {
-        let is_toml = |p: &&PathBuf| {
-            p.extension()
-                .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-        };
-        match self.input.iter().find(is_toml) {
+        match self.input.iter().find(|path| is_manifest(path)) {
             None => Ok(None),
             Some(path) if self.input.len() == 1 => Ok(Some(path.clone())),
             Some(path) => Err(CliError::other(format!(
@@ -247,6 +243,12 @@ impl Asked {
     pub(super) fn absolute_base(&self) -> Result<PathBuf, CliError> {
         absolute(&self.base)
     }
+}
+
+/// Whether the name is that of a manifest.
+pub(super) fn is_manifest(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
 }
 
 /// Does `work` in a thread of its own. Allocators keep what a thread has freed for the next thread

@@ -32,6 +32,7 @@ mod render;
 mod scale;
 mod shard;
 mod signals;
+mod status;
 mod work;
 
 use errors::CliError;
@@ -50,6 +51,8 @@ enum Command {
     Render(Box<render::RenderArgs>),
     /// Tell what `render` would do, in what memory and time; touch nothing.
     Check(Box<check::CheckArgs>),
+    /// Tell how a job stands: frames done, failed, missing and running, rate and time left.
+    Status(status::StatusArgs),
     /// Print a complete, commented manifest for an input.
     Init(Box<init::InitArgs>),
     /// Print counts, bounds and attributes of particle files.
@@ -79,6 +82,7 @@ pub fn main() -> ExitCode {
     let result = match cli.command {
         Command::Render(args) => render::run(&args),
         Command::Check(args) => check::run(&args),
+        Command::Status(args) => status::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),

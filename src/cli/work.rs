@@ -9,9 +9,11 @@ use serde_json::Value;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, JobError, Mode, PLAN_FILE};
 
+use super::job::{absolute, is_manifest};
 use super::progress::{Ended, duration};
 use super::shard::Shard;
 use super::{CliError, Outcome};
+use crate::manifest::{Manifest, real_dir};
 use crate::survey::Survey;
 
 /// The setting that says what a job makes; jobs that render have none.
@@ -135,6 +137,17 @@ pub(super) fn guard_kind(dir: &Path, kind: Option<&str>, mode: Mode) -> Result<(
         what(found),
         what(kind)
     )))
+}
+
+/// The directory of the job that a user names by it or by a manifest.
+pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
+    if !is_manifest(job) || job.is_dir() {
+        return Ok(job.to_owned());
+    }
+    let text = std::fs::read_to_string(job).map_err(CliError::io(job))?;
+    let manifest = Manifest::parse(&text, job)?;
+    let base = absolute(job.parent().unwrap_or(Path::new("")))?;
+    Ok(real_dir(&base.join(manifest.output.path.dir())))
 }
 
 /// What was found when the job in `dir` began.

@@ -31,11 +31,14 @@ mod files;
 mod heart;
 #[cfg(test)]
 mod tests;
+mod view;
 
 pub use claim::{Claim, Claimed};
 pub(crate) use desk::Desk;
 pub(crate) use files::sweep_parts;
 pub use heart::start_heart;
+pub use view::WorkerView;
+pub(crate) use view::workers;
 
 /// Name of the directory in the job's directory.
 const WORK_DIR: &str = "job.work";

@@ -1,0 +1,109 @@
+//! How a job stands, for people and for scripts.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value, json};
+use spherule_jobs::{FrameState, WorkerView};
+
+use super::Standing;
+use crate::cli::progress::duration;
+use crate::cli::work::list;
+
+/// Failed frames that are told with their reasons.
+const MOST_REASONS: usize = 20;
+
+impl Standing {
+    pub(super) fn to_text(&self) -> String {
+        let mut text = String::new();
+        let mut line = |name: &str, what: &str| {
+            let _ = writeln!(text, "{name:<9} {what}");
+        };
+        line("job", &self.dir.display().to_string());
+        line("frames", &self.summary.total.to_string());
+        let mut frames = |name: &str, frames: &[i64]| {
+            if !frames.is_empty() {
+                line(name, &format!("{} ({})", frames.len(), list(frames)));
+            }
+        };
+        let running = self.running();
+        frames("done", &self.frames(FrameState::Done));
+        frames("running", &running);
+        frames("to do", &self.pending_but(&running));
+        frames("missing", &self.summary.lost);
+        frames("failed", &self.summary.failed);
+        for worker in &self.workers {
+            line("worker", &told(worker));
+        }
+        if let (Some(rate), Some(left)) = (self.rate(), self.seconds_left()) {
+            let each = format!("{rate:.2} frames a second");
+            line("rate", &format!("{each}, {} left", duration(left)));
+        }
+        for (frame, reason) in self.reasons().take(MOST_REASONS) {
+            line("failure", &format!("frame {frame}: {reason}"));
+        }
+        text
+    }
+
+    /// Frames not tried yet that nobody has in hand.
+    fn pending_but(&self, running: &[i64]) -> Vec<i64> {
+        let mut pending = self.frames(FrameState::Pending);
+        pending.retain(|frame| running.binary_search(frame).is_err());
+        pending
+    }
+
+    /// Failed frames and why.
+    fn reasons(&self) -> impl Iterator<Item = (i64, &str)> {
+        self.summary.failed.iter().filter_map(|frame| {
+            let entry = self.state.ledger().entry(*frame)?;
+            Some((*frame, entry.reason.as_deref().unwrap_or("not told")))
+        })
+    }
+
+    pub(super) fn to_json(&self) -> Value {
+        let failed: Vec<Value> = self
+            .reasons()
+            .map(|(frame, reason)| json!({"frame": frame, "reason": reason}))
+            .collect();
+        let workers: Vec<Value> = self.workers.iter().map(worker_json).collect();
+        let running = self.running();
+        json!({
+            "directory": self.dir,
+            "frames": self.summary.total,
+            "done": self.frames(FrameState::Done),
+            "running": running,
+            "pending": self.pending_but(&running),
+            "missing": self.summary.lost,
+            "failed": failed,
+            "workers": workers,
+            "frames_per_second": self.rate(),
+            "seconds_left": self.seconds_left(),
+        })
+    }
+}
+
+fn told(worker: &WorkerView) -> String {
+    let who = format!("process {} on {}", worker.pid, worker.host);
+    let hands = match worker.frames.as_slice() {
+        [] => "no frame in hand".to_owned(),
+        frames => format!("frame {} in hand", list(frames)),
+    };
+    let standing = if worker.has_ended {
+        "has died: whoever works next takes over".to_owned()
+    } else {
+        let silent = worker.silent_for.map_or(0.0, |time| time.as_secs_f64());
+        format!("last sign of life {} ago", duration(silent))
+    };
+    format!("{who}: {hands}, {standing}")
+}
+
+fn worker_json(worker: &WorkerView) -> Value {
+    json!({
+        "worker": worker.worker,
+        "host": worker.host,
+        "pid": worker.pid,
+        "since_ms": worker.since_ms,
+        "has_ended": worker.has_ended,
+        "silent_seconds": worker.silent_for.map(|time| time.as_secs_f64()),
+        "frames": worker.frames,
+    })
+}
