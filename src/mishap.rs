@@ -19,11 +19,17 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, 
     })
 }
 
-/// Whether all further files would fail for the same reason.
-pub(crate) fn is_disk_full(error: &io::Error) -> bool {
+/// Whether all further files would fail for the same reason: the disk is full, or the directory cannot be
+/// written any more, or is gone.
+pub(crate) fn is_place_at_fault(error: &io::Error) -> bool {
     matches!(
         error.kind(),
-        io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded
+        io::ErrorKind::StorageFull
+            | io::ErrorKind::QuotaExceeded
+            | io::ErrorKind::PermissionDenied
+            | io::ErrorKind::ReadOnlyFilesystem
+            | io::ErrorKind::NotFound
+            | io::ErrorKind::StaleNetworkFileHandle
     )
 }
 

@@ -1,6 +1,7 @@
 //! Sharing the frames of a job among workers.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
 use crate::ledger::News;
@@ -13,6 +14,8 @@ pub struct Claims {
     dir: PathBuf,
     desk: Arc<Desk>,
     news: Arc<Mutex<News>>,
+    /// Whether there were other workers when it was last looked.
+    has_company: Arc<AtomicBool>,
 }
 
 impl Claims {
@@ -21,6 +24,7 @@ impl Claims {
             dir: dir.to_owned(),
             desk,
             news: Arc::new(Mutex::new(news)),
+            has_company: Arc::new(AtomicBool::new(true)),
         }
     }
 
@@ -63,7 +67,13 @@ impl Claims {
         let workers = self.desk.names();
         let workers =
             workers.map_err(|e| JobError::io(&self.dir, "looking for other workers", e))?;
+        self.has_company.store(workers.len() > 1, Ordering::Relaxed);
         self.news().refresh(&workers)
+    }
+
+    /// Whether others may wait for what this worker says.
+    pub(crate) fn has_company(&self) -> bool {
+        self.has_company.load(Ordering::Relaxed)
     }
 
     /// A number for an entry that comes after all known ones.

@@ -143,6 +143,11 @@ pub enum JobError {
 }
 
 impl JobError {
+    /// That a file cannot be written, by what can be done about it.
+    pub fn writing(path: &Path, source: io::Error) -> Self {
+        Self::io(path, "writing", source)
+    }
+
     /// Sorts an error of the system by what can be done about it.
     pub(crate) fn io(path: &Path, doing: &'static str, source: io::Error) -> Self {
         let path = path.to_owned();

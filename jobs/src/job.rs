@@ -9,7 +9,9 @@ use std::collections::HashSet;
 use std::error::Error;
 use std::fs;
 use std::io;
+use std::panic;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use serde_json::Value;
 
@@ -69,10 +71,19 @@ impl Job {
     /// [`JobError::PlanDamaged`], [`JobError::LedgerDamaged`], or trouble reading.
     pub fn read(dir: &Path) -> Result<Option<JobState>, JobError> {
         let dir = named(dir);
-        match Plan::load(dir)? {
-            Some(plan) => Ok(Some(JobState::new(dir, plan, Ledger::read(dir)?))),
-            None => Ok(None),
+        if !Plan::path_in(dir).exists() {
+            return Ok(None);
         }
+        let (ledger, plan) = thread::scope(|scope| {
+            let plan = scope.spawn(|| Plan::load(dir));
+            let ledger = Ledger::read(dir);
+            (
+                ledger,
+                plan.join().unwrap_or_else(|e| panic::resume_unwind(e)),
+            )
+        });
+        let ledger = ledger?;
+        Ok(plan?.map(|plan| JobState::new(dir, plan, ledger)))
     }
 
     /// Who is at work in `dir`, also workers that died without a word. Touches nothing.
@@ -297,6 +308,15 @@ impl Job {
         self.record(entry, FrameState::Failed)
     }
 
+    /// Everything recorded so far is on the disk when this returns. Else that may be some tenths of a second
+    /// later, or at the end of the job.
+    ///
+    /// # Errors
+    /// The ledger cannot be written.
+    pub fn sync(&mut self) -> Result<(), JobError> {
+        self.writer.sync()
+    }
+
     fn record(&mut self, entry: Entry, state: FrameState) -> Result<(), JobError> {
         let frame = entry.frame;
         let Some(slot) = self.state.states.get_mut(&frame) else {
@@ -304,7 +324,7 @@ impl Job {
                 "frame {frame} is not in the plan"
             )));
         };
-        self.writer.append(&entry)?;
+        self.writer.append(&entry, self.claims.has_company())?;
         *slot = state;
         self.state.ledger.take_in(entry);
         Ok(())

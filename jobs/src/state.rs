@@ -2,7 +2,9 @@
 
 use std::collections::BTreeMap;
 use std::fs;
+use std::panic;
 use std::path::{Path, PathBuf};
+use std::thread;
 
 use crate::{Entry, Ledger, OutputFile, Plan, PlannedFrame, Status};
 
@@ -46,11 +48,7 @@ pub struct JobState {
 
 impl JobState {
     pub(crate) fn new(dir: &Path, plan: Plan, ledger: Ledger) -> Self {
-        let states = plan
-            .frames()
-            .iter()
-            .map(|f| (f.number, frame_state(dir, f, ledger.entry(f.number))))
-            .collect();
+        let states = look_at(dir, plan.frames(), &ledger);
         Self {
             dir: dir.to_owned(),
             plan,
@@ -110,6 +108,31 @@ impl JobState {
     pub(crate) fn is_done(&self, frame: i64) -> bool {
         self.frame_state(frame) == Some(FrameState::Done)
     }
+}
+
+/// Threads that look at outputs: asking a network file system means waiting.
+const LOOKERS: usize = 8;
+
+/// Frames that are looked at by one thread alone.
+const FEW: usize = 256;
+
+/// Looks for the outputs of all frames.
+fn look_at(dir: &Path, frames: &[PlannedFrame], ledger: &Ledger) -> BTreeMap<i64, FrameState> {
+    let look = |some: &[PlannedFrame]| -> Vec<(i64, FrameState)> {
+        let state = |f: &PlannedFrame| (f.number, frame_state(dir, f, ledger.entry(f.number)));
+        some.iter().map(state).collect()
+    };
+    let each = frames.len().div_ceil(LOOKERS).max(FEW);
+    thread::scope(|scope| {
+        let lookers: Vec<_> = frames
+            .chunks(each)
+            .map(|some| scope.spawn(move || look(some)))
+            .collect();
+        let looked = lookers
+            .into_iter()
+            .map(|looker| looker.join().unwrap_or_else(|e| panic::resume_unwind(e)));
+        looked.flatten().collect()
+    })
 }
 
 /// What was made counts by what is wanted now: under other names the images are still to be made.

@@ -22,7 +22,7 @@ pub use attributes::{AttributeChoices, Storage};
 pub use frame::{ConvertedFrame, convert_frame};
 pub use settings::{Conversion, ConvertSettings};
 
-use crate::mishap::{guarded, is_disk_full, may_be_unfinished};
+use crate::mishap::{guarded, is_place_at_fault, may_be_unfinished};
 
 /// One native frame to make.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -109,9 +109,10 @@ pub fn run(
             }
             // Not the frame's fault: it stays to be done.
             Ok(Err(ConvertError::Frame(FrameError::Io { path, source })))
-                if is_disk_full(&source) =>
+                if path.starts_with(task.output.parent().unwrap_or(&task.output))
+                    && is_place_at_fault(&source) =>
             {
-                return Err(JobError::DiskFull { path, source });
+                return Err(JobError::writing(&path, source));
             }
             Ok(Err(error)) => fail(job, watch, task, &reason(sequence, task, &error))?,
             Err(fault) => fail(job, watch, task, &fault)?,

@@ -11,7 +11,7 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 use super::setup::Setup;
 use super::trace::TracedFrame;
 use super::{Event, InHand, Passed, Stage, Watch};
-use crate::mishap::is_disk_full;
+use crate::mishap::is_place_at_fault;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
@@ -60,8 +60,8 @@ pub(super) fn write_stage(
                         watch(Event::Done(&task, &report));
                     }
                     // Not the frame's fault: it stays to be done.
-                    Err(WriteError::Io { path, source }) if is_disk_full(&source) => {
-                        return Err(JobError::DiskFull { path, source });
+                    Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
+                        return Err(JobError::writing(&path, source));
                     }
                     Err(error) => {
                         let reason = error.to_string();

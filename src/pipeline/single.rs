@@ -1,5 +1,6 @@
 //! One image by itself, in a process of its own: nothing of another frame is there.
 
+use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 
@@ -10,7 +11,7 @@ use super::encode::{WriteError, write_frame};
 use super::load::load_frame;
 use super::setup::Setup;
 use super::trace::FrameTracer;
-use crate::mishap::{guarded, is_disk_full};
+use crate::mishap::{guarded, is_place_at_fault};
 use crate::report::{FrameReport, MemoryPeaks};
 
 /// Why there is no image.
@@ -18,8 +19,8 @@ use crate::report::{FrameReport, MemoryPeaks};
 pub enum SingleFault {
     /// The frame is at fault; the reason.
     Frame(String),
-    /// The disk is full: the file that was being written.
-    DiskFull(PathBuf),
+    /// Further images would fail, too: the file that was being written, and what the system said.
+    Place(PathBuf, io::Error),
 }
 
 /// Makes the image of `task` with its preview; what the user should know goes to `note`.
@@ -47,8 +48,8 @@ pub fn make_image(
     let written = guarded(|| Ok(write_frame(setup, traced, &mut peaks)));
     match written.map_err(SingleFault::Frame)? {
         Ok(report) => Ok(report),
-        Err(WriteError::Io { path, source }) if is_disk_full(&source) => {
-            Err(SingleFault::DiskFull(path))
+        Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
+            Err(SingleFault::Place(path, source))
         }
         Err(error) => Err(SingleFault::Frame(error.to_string())),
     }

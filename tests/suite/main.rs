@@ -13,5 +13,6 @@ mod memory;
 mod resume;
 mod samples;
 mod scale;
+mod status;
 mod structures;
 mod thesis;

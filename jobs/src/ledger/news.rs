@@ -10,7 +10,7 @@ use super::files::{Mark, ledger_files, ledger_path, read_lines};
 use super::{Ledger, Status};
 use crate::JobError;
 
-/// How often the directory is looked through for ledgers of workers that have come and gone.
+/// How often a lone worker looks for ledgers of others that have come and gone.
 const LOOK: Duration = Duration::from_secs(2);
 
 /// As much of an entry as is asked for here.
@@ -34,6 +34,8 @@ pub(crate) struct News {
     old: HashMap<i64, Word>,
     next_seq: u64,
     looked: Instant,
+    /// Whether there were other workers the last time.
+    had_company: bool,
 }
 
 impl News {
@@ -59,6 +61,7 @@ impl News {
             words,
             next_seq: ledger.next_seq,
             looked: Instant::now(),
+            had_company: true,
         }
     }
 
@@ -80,7 +83,10 @@ impl News {
         for worker in workers {
             self.know(ledger_path(&self.dir, worker));
         }
-        let mut look = self.looked.elapsed() >= LOOK;
+        // Among others, one may have come and gone since; alone, only seldom.
+        let is_alone = workers.len() < 2 && !self.had_company;
+        self.had_company = workers.len() > 1;
+        let mut look = !is_alone || self.looked.elapsed() >= LOOK;
         loop {
             if look {
                 self.looked = Instant::now();

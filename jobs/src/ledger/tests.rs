@@ -12,7 +12,7 @@ fn append(dir: &Path, by: &str, worker: &str, frame: i64, status: Status) {
     let ledger = Ledger::read(dir).unwrap();
     let mut writer = LedgerWriter::new(dir, worker);
     let entry = Entry::new(ledger.next_seq, frame, status, &json!({ "by": by }));
-    writer.append(&entry).unwrap();
+    writer.append(&entry, true).unwrap();
 }
 
 fn text(dir: &Path, worker: &str) -> String {
@@ -25,7 +25,7 @@ fn ledger_of(dir: &Path, worker: &str, count: i64) {
     for frame in 1..=count {
         let seq = frame.unsigned_abs();
         let entry = Entry::new(seq, frame, Status::Done, &json!(null));
-        writer.append(&entry).unwrap();
+        writer.append(&entry, true).unwrap();
     }
 }
 
@@ -56,7 +56,7 @@ fn of_two_words_at_once_the_one_that_it_is_done_counts() {
         for (worker, status) in names.into_iter().zip([Status::Done, Status::Failed]) {
             let entry = Entry::new(5, 1, status, &json!(null));
             LedgerWriter::new(dir.path(), worker)
-                .append(&entry)
+                .append(&entry, true)
                 .unwrap();
         }
         let ledger = Ledger::read(dir.path()).unwrap();

@@ -3,6 +3,7 @@
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
 use super::files::{ENDED, LedgerFile, ledger_path};
 use super::{Entry, Ledger};
@@ -16,7 +17,14 @@ pub(crate) struct LedgerWriter {
     file: Option<File>,
     /// Length up to the last whole line.
     length: u64,
+    /// When the file was last synced, and whether nothing has been added since.
+    synced: Option<Instant>,
+    is_synced: bool,
 }
+
+/// Lines that come faster than this share a sync: a power cut then costs the frames of this long, which is
+/// less than most frames take.
+const SYNC: Duration = Duration::from_millis(100);
 
 impl LedgerWriter {
     /// For the ledger of `worker`, which is made with its first line.
@@ -25,11 +33,15 @@ impl LedgerWriter {
             path: ledger_path(dir, worker),
             file: None,
             length: 0,
+            synced: None,
+            is_synced: true,
         }
     }
 
-    /// The entry is on the disk when this returns. After an error the ledger is as before.
-    pub(crate) fn append(&mut self, entry: &Entry) -> Result<(), JobError> {
+    /// The entry is in the file when this returns: a killed process leaves it. It is on the disk, too, and
+    /// seen by other machines, if it `matters` at once, or if the last sync was a while ago. After an error
+    /// the ledger is as before.
+    pub(crate) fn append(&mut self, entry: &Entry, matters: bool) -> Result<(), JobError> {
         let line = line(entry)?;
         let failed = |e| JobError::io(&self.path, "writing the ledger", e);
         let file = match &mut self.file {
@@ -40,14 +52,36 @@ impl LedgerWriter {
         let written = file
             .set_len(self.length)
             .and_then(|()| file.seek(SeekFrom::Start(self.length)))
-            .and_then(|_| file.write_all(&line))
-            .and_then(|()| file.sync_data());
+            .and_then(|_| file.write_all(&line));
+        let is_due = matters || self.synced.is_none_or(|at| at.elapsed() >= SYNC);
+        self.is_synced = is_due;
+        let written = written.and_then(|()| if is_due { file.sync_data() } else { Ok(()) });
+        if is_due {
+            self.synced = Some(Instant::now());
+        }
         if let Err(error) = written {
             let _ = file.set_len(self.length);
             return Err(failed(error));
         }
         self.length += line.len() as u64;
         Ok(())
+    }
+
+    /// All entries are on the disk when this returns.
+    pub(crate) fn sync(&mut self) -> Result<(), JobError> {
+        if let (Some(file), false) = (&self.file, self.is_synced) {
+            let synced = file.sync_data();
+            synced.map_err(|e| JobError::io(&self.path, "writing the ledger", e))?;
+            self.is_synced = true;
+        }
+        Ok(())
+    }
+}
+
+impl Drop for LedgerWriter {
+    /// What cannot be synced now the system writes a little later.
+    fn drop(&mut self) {
+        let _ = self.sync();
     }
 }
 

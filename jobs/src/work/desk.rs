@@ -17,6 +17,9 @@ use crate::process::{Process, owner_token};
 /// Longest time between signs of life.
 const BEAT: Duration = Duration::from_secs(5);
 
+/// The same for the most impatient.
+const SHORTEST_BEAT: Duration = Duration::from_millis(10);
+
 /// See the module. Dropped, the worker has left.
 #[derive(Debug)]
 pub(crate) struct Desk {
@@ -35,17 +38,19 @@ impl Desk {
     /// sign of life.
     pub(crate) fn take(dir: &Path, patience: Duration) -> io::Result<Arc<Self>> {
         let work = dir.join(WORK_DIR);
+        let pause = BEAT.min(patience / 4).max(SHORTEST_BEAT);
         let card = Card {
             worker: worker_name(),
             process: Process::this().clone(),
             since_ms: milliseconds(),
+            pause_ms: u64::try_from(pause.as_millis()).unwrap_or(u64::MAX),
         };
         let mut text = serde_json::to_vec(&card)?;
         text.push(b'\n');
         let card_path = work.join(card.file_name());
         put_card(&work, &card_path, &text)?;
         let is_buried = Arc::new(AtomicBool::new(false));
-        heart::begin(&card_path, BEAT.min(patience / 4), &is_buried);
+        heart::begin(&card_path, pause, &is_buried);
         Ok(Arc::new(Self {
             work,
             card,

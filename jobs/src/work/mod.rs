@@ -55,7 +55,13 @@ pub(crate) struct Card {
     pub(crate) process: Process,
     /// When it began, milliseconds since 1970 by its own clock; for people.
     pub(crate) since_ms: u64,
+    /// Milliseconds between its signs of life.
+    #[serde(default)]
+    pause_ms: u64,
 }
+
+/// Signs of life that a worker must have missed, however impatient others are.
+const MISSED: u32 = 4;
 
 impl Card {
     /// The card in the file at `path`; None if there is none in it.
@@ -109,11 +115,16 @@ impl Watch {
         if card.process.has_ended() {
             return Standing::Ended;
         }
-        self.signs(&work.join(card.file_name()))
+        let least = Duration::from_millis(card.pause_ms).saturating_mul(MISSED);
+        self.signs_for(&work.join(card.file_name()), self.patience.max(least))
     }
 
     /// How whoever makes the file at `path` longer stands.
     fn signs(&self, path: &Path) -> Standing {
+        self.signs_for(path, self.patience)
+    }
+
+    fn signs_for(&self, path: &Path, patience: Duration) -> Standing {
         // Network file systems look again at what is opened, not at what is asked about.
         let length = match fs::File::open(path).and_then(|file| file.metadata()) {
             Ok(metadata) => metadata.len(),
@@ -126,7 +137,7 @@ impl Watch {
         if *before != length {
             (*before, *since) = (length, now);
         }
-        if now.duration_since(*since) >= self.patience {
+        if now.duration_since(*since) >= patience {
             Standing::Silent
         } else {
             Standing::Alive

@@ -45,6 +45,7 @@ fn stranger(dir: &Path, name: &str, frame: i64) -> PathBuf {
         worker: name.to_owned(),
         process: serde_json::from_value(process).unwrap(),
         since_ms: 0,
+        pause_ms: 0,
     };
     put(dir, &card, frame)
 }
@@ -57,6 +58,7 @@ fn ended(dir: &Path, name: &str, frame: i64) -> PathBuf {
         worker: name.to_owned(),
         process: serde_json::from_value(process).unwrap(),
         since_ms: 0,
+        pause_ms: 0,
     };
     put(dir, &card, frame)
 }

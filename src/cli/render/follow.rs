@@ -72,6 +72,7 @@ pub(super) fn run(args: &WorkArgs, asked: Asked, signals: &Listener) -> Result<O
         if let Err(error) = run.make_pending(follower.interrupt) {
             return Ok(run.end(Err(error), follower.interrupt));
         }
+        run.job.sync()?;
         follower.busy = Instant::now();
         match follower.next()? {
             Ok((sequence, new)) => run.extend(sequence, &new)?,

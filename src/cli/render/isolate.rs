@@ -50,7 +50,10 @@ enum Told {
         notes: Vec<String>,
     },
     Failed(String),
-    DiskFull(PathBuf),
+    /// The frame is not in the sequence any more.
+    Gone,
+    /// The file, and the number of the system's error.
+    Place(PathBuf, Option<i32>),
 }
 
 /// Frames to be made.
@@ -111,13 +114,18 @@ impl Work<'_> {
                     watch(Event::Done(task, &report));
                     return Ok(true);
                 }
+                Ended::Told(Told::Gone) => {
+                    fail(job, watch, task, &gone(job, task.frame))?;
+                    return Ok(true);
+                }
                 Ended::Told(Told::Failed(reason)) => {
                     fail(job, watch, task, &reason)?;
                     return Ok(true);
                 }
-                Ended::Told(Told::DiskFull(path)) => {
-                    let source = io::ErrorKind::StorageFull.into();
-                    return Err(JobError::DiskFull { path, source });
+                Ended::Told(Told::Place(path, number)) => {
+                    let unknown = || io::Error::other("the file cannot be written");
+                    let source = number.map_or_else(unknown, io::Error::from_raw_os_error);
+                    return Err(JobError::writing(&path, source));
                 }
                 Ended::Died(reason) => {
                     discard(task);
@@ -149,6 +157,14 @@ impl Work<'_> {
 fn fail(job: &mut Job, watch: Watch, task: &ImageTask, reason: &str) -> Result<(), JobError> {
     watch(Event::Failed(task.frame, reason));
     job.record_failed(task.frame, reason, json!(null))
+}
+
+/// That the files of `frame` are not there any more.
+fn gone(job: &Job, frame: i64) -> String {
+    let planned = job.state().plan().frame(frame);
+    let inputs = planned.map_or(&[][..], |planned| &planned.inputs);
+    let paths: Vec<&str> = inputs.iter().map(|input| input.path.as_str()).collect();
+    format!("{}: is gone since the job was planned", paths.join(", "))
 }
 
 fn outputs(task: &ImageTask) -> Vec<PathBuf> {
@@ -190,8 +206,7 @@ fn told(request: FrameRequest) -> Result<Told, CliError> {
     let (_, setup) = plan.settle(&request.resolved, &sequence)?;
     let tasks = plan.tasks(&sequence, &[request.frame]);
     let Some(task) = tasks.first() else {
-        let frame = request.frame;
-        return Ok(Told::Failed(format!("there is no frame {frame} any more")));
+        return Ok(Told::Gone);
     };
     let mut notes = Vec::new();
     let made = make_image(&setup, &sequence, task, |note| notes.push(note.to_owned()));
@@ -201,7 +216,7 @@ fn told(request: FrameRequest) -> Result<Told, CliError> {
             notes,
         },
         Err(SingleFault::Frame(reason)) => Told::Failed(reason),
-        Err(SingleFault::DiskFull(path)) => Told::DiskFull(path),
+        Err(SingleFault::Place(path, error)) => Told::Place(path, error.raw_os_error()),
     })
 }
 

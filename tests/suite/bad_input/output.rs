@@ -1,8 +1,12 @@
 //! Places where images cannot go.
 
 use std::fs;
+#[cfg(target_os = "linux")]
+use std::process::Command;
 
 use super::refused;
+#[cfg(target_os = "linux")]
+use crate::harness::{Running, images, no_leftovers};
 use crate::harness::{SMALL, Workshop, dam_break, files, sample};
 
 fn three_frames() -> Workshop {
@@ -87,6 +91,69 @@ fn a_directory_without_permission() {
             "out/f.####.exr",
             &["out/", "cannot be written", "check its permissions"],
         );
+    }
+}
+
+/// The user that runs the program: root may write anywhere, so then it is nobody.
+#[cfg(target_os = "linux")]
+fn as_plain_user(command: Command) -> Option<Command> {
+    let is_root =
+        fs::metadata("/proc/self").is_ok_and(|m| std::os::unix::fs::MetadataExt::uid(&m) == 0);
+    if !is_root {
+        return Some(command);
+    }
+    let ids = ["--reuid=65534", "--regid=65534", "--clear-groups"];
+    let can = Command::new("setpriv").args(ids).arg("true").status();
+    can.is_ok_and(|status| status.success()).then(|| {
+        let mut plain = Command::new("setpriv");
+        plain
+            .args(ids)
+            .arg(command.get_program())
+            .args(command.get_args());
+        plain.current_dir(command.get_current_dir().expect("it is set"));
+        plain
+    })
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+#[expect(clippy::print_stderr, reason = "a test that is left out says so")]
+fn a_directory_that_is_closed_while_a_job_runs() {
+    use std::os::unix::fs::PermissionsExt;
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=6);
+    let long = ["--width", "320", "--height", "180", "--samples", "32"];
+    let whole = [&["render", "in", "-o", "whole/f.####.exr"][..], &long].concat();
+    workshop.run(&whole).expect(0);
+    let out = workshop.join("out");
+    fs::create_dir(&out).expect("a directory");
+    let open = |mode| {
+        fs::set_permissions(&out, fs::Permissions::from_mode(mode)).expect("permissions");
+    };
+    for dir in [workshop.path(), &workshop.join("in")] {
+        fs::set_permissions(dir, fs::Permissions::from_mode(0o755)).expect("permissions");
+    }
+    for options in [&[][..], &["--isolate"]] {
+        open(0o777);
+        let render = ["render", "in", "-o", "out/f.####.exr"];
+        let arguments = [&render[..], &long, options].concat();
+        let Some(command) = as_plain_user(workshop.command(&arguments)) else {
+            eprintln!("left out: nobody but root is here");
+            return;
+        };
+        let mut running = Running::new(command);
+        assert!(running.wait_for_line("] frame 1:"));
+        open(0o555);
+        let (told, status) = running.end();
+        open(0o777);
+        assert_eq!(status.code(), Some(1), "{told}");
+        assert!(told.contains("cannot be written") && told.contains("check its permissions"));
+        assert!(!told.contains("failed:"), "no frame is at fault: {told}");
+        workshop.run(&arguments).expect(0);
+        assert!(images(&out) == images(&workshop.join("whole")));
+        no_leftovers(&out);
+        fs::remove_dir_all(&out).expect("a directory");
+        fs::create_dir(&out).expect("a directory");
     }
 }
 

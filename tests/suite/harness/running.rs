@@ -12,7 +12,7 @@ pub(crate) struct Running {
 }
 
 impl Running {
-    pub(super) fn new(mut command: Command) -> Self {
+    pub(crate) fn new(mut command: Command) -> Self {
         let mut child = command
             .stdin(Stdio::null())
             .stdout(Stdio::null())

@@ -3,6 +3,7 @@
 mod changed;
 mod followed;
 mod frames;
+mod inputs;
 mod interrupted;
 mod isolated;
 mod killed;

@@ -36,7 +36,8 @@ fn workers_started_at_once_make_each_frame_once() {
     let out = workshop.join("out");
     no_leftovers(&out);
     assert!(images(&out) == images(&workshop.join("whole")));
-    assert_eq!(ledger(&out).lines.len(), FRAMES);
+    let lines = ledger(&out).lines;
+    assert_eq!(lines.len(), FRAMES, "{lines:?}");
     let report = fs::read_to_string(out.join("report.json")).expect("a report");
     let report: serde_json::Value = serde_json::from_str(&report).expect("JSON");
     let frames = report["frames"].as_array().expect("frames");
