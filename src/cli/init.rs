@@ -1,12 +1,9 @@
 //! `spherule init`: a complete, commented manifest on standard output.
 
-use std::io::{self, Write};
-use std::path::Path;
-
 use clap::Args;
 
 use super::job::ManifestArgs;
-use super::{CliError, Outcome};
+use super::{CliError, Outcome, print};
 
 #[derive(Debug, Args)]
 pub(super) struct InitArgs {
@@ -20,11 +17,5 @@ pub(super) fn run(args: &InitArgs) -> Result<Outcome, CliError> {
     for note in sequence.notes() {
         say!("note: {note}");
     }
-    let text = asked.manifest.to_commented_toml();
-    match io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-            Err(CliError::io(Path::new("standard output"))(e))
-        }
-        _ => Ok(Outcome::Done),
-    }
+    print(&asked.manifest.to_commented_toml())
 }

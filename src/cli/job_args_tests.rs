@@ -8,7 +8,7 @@ use crate::cli::plan::RunArgs;
 use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, and what one run does with what is there.
-const ACTIONS: [&str; 4] = ["input", "set", "force", "keep_done"];
+const ACTIONS: [&str; 5] = ["input", "set", "force", "keep_done", "shard"];
 
 /// Every other option with a value that is not the default, and the key that it is laid over.
 const FLAGS: [(&str, &str); 27] = [

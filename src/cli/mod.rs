@@ -3,6 +3,7 @@
 //! Results go to standard output, everything else to standard error. Exit codes: 0 all done, 1 some
 //! frames or files failed, 2 could not start, 75 interrupted and to be resumed.
 use std::io::Write;
+use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
@@ -30,6 +31,7 @@ mod plan;
 mod progress;
 mod render;
 mod scale;
+mod schema;
 mod shard;
 mod signals;
 mod status;
@@ -55,6 +57,8 @@ enum Command {
     Status(status::StatusArgs),
     /// Print a complete, commented manifest for an input.
     Init(Box<init::InitArgs>),
+    /// Print the manifest's JSON schema, for editors.
+    Schema,
     /// Print counts, bounds and attributes of particle files.
     Inspect(inspect::InspectArgs),
     /// Convert particle files to compact native frames (.spf).
@@ -76,6 +80,16 @@ fn put(to: &mut impl Write, text: &str) {
     let _ = to.write_all(format!("{text}\n").as_bytes());
 }
 
+/// Puts a result on standard output. A reader that has seen enough is no fault.
+fn print(text: &str) -> Result<Outcome, CliError> {
+    match std::io::stdout().write_all(text.as_bytes()) {
+        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
+            Err(CliError::io(Path::new("standard output"))(e))
+        }
+        _ => Ok(Outcome::Done),
+    }
+}
+
 /// Parses the arguments of the process, runs the command, reports what went wrong.
 pub fn main() -> ExitCode {
     let cli = Cli::parse();
@@ -84,6 +98,7 @@ pub fn main() -> ExitCode {
         Command::Check(args) => check::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Init(args) => init::run(&args),
+        Command::Schema => schema::run(),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Generate(args) => generate::run(&args),

@@ -10,12 +10,13 @@ use spherule_jobs::{Job, JobRequest, Mode, publish};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
+use super::schema::schema_text;
 use super::shard::Shard;
 use super::work::{
     WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey, selection,
 };
 use crate::accel::Structure;
-use crate::manifest::{Manifest, OutputPattern, named_place, real_dir};
+use crate::manifest::{Manifest, OutputPattern, SCHEMA_FILE, named_place, real_dir};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
 use crate::report::Bytes;
 use crate::report::memory::available;
@@ -243,11 +244,12 @@ impl Plan {
                 return Ok(());
             }
         }
-        let text = manifest.to_commented_toml();
-        if fs::read_to_string(&path).is_ok_and(|old| old == text) {
-            return Ok(());
+        write_if_changed(&path, &manifest.to_commented_toml())?;
+        // Its first line refers to this, which is of use to editors alone.
+        if let Err(error) = write_if_changed(&self.dir.join(SCHEMA_FILE), &schema_text()) {
+            say!("note: {error}; editors do without it");
         }
-        publish(&path, text.as_bytes()).map_err(CliError::io(&path))
+        Ok(())
     }
 
     pub(super) fn tasks(&self, sequence: &Sequence, pending: &[i64]) -> Vec<ImageTask> {
@@ -264,6 +266,13 @@ impl Plan {
         };
         pending.iter().filter_map(task).collect()
     }
+}
+
+fn write_if_changed(path: &Path, text: &str) -> Result<(), CliError> {
+    if fs::read_to_string(path).is_ok_and(|old| old == text) {
+        return Ok(());
+    }
+    publish(path, text.as_bytes()).map_err(CliError::io(path))
 }
 
 fn to_value(survey: &Survey) -> Result<Value, CliError> {

@@ -2,7 +2,8 @@
 
 use super::named;
 use super::reader::{Field, Section, narrow};
-use super::write::Toml;
+use super::schema::{name_schema, rgb_schema, words};
+use super::write::{Toml, described};
 
 named! {
     /// Colour maps by name; the renderer knows what they look like.
@@ -120,6 +121,23 @@ impl Toml for ColorSetting {
     }
 }
 
+described!(ColorSetting, {
+    "anyOf": [
+        { "const": "auto" },
+        rgb_schema(),
+        {
+            "type": "object",
+            "properties": {
+                "attribute": name_schema(),
+                "map": { "enum": words(&[], ColorMap::ALL), "default": ColorMap::Viridis.name() },
+                "range": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
+            },
+            "required": ["attribute"],
+            "additionalProperties": false,
+        },
+    ],
+});
+
 impl Background {
     pub(super) fn read(field: &Field<'_>) -> Option<Self> {
         if field.as_text() == Some("auto") {
@@ -159,3 +177,16 @@ impl Toml for Background {
         }
     }
 }
+
+described!(Background, {
+    "anyOf": [
+        { "const": "auto" },
+        rgb_schema(),
+        {
+            "type": "object",
+            "properties": { "bottom": rgb_schema(), "top": rgb_schema() },
+            "required": ["bottom", "top"],
+            "additionalProperties": false,
+        },
+    ],
+});

@@ -4,7 +4,8 @@ use spherule_jobs::FrameRange;
 
 use super::named;
 use super::reader::{Field, Section};
-use super::write::{Entries, Toml};
+use super::schema::{name_schema, words};
+use super::write::{Entries, Toml, described};
 
 named! {
     /// Which axis of the simulation points up.
@@ -112,24 +113,16 @@ impl Input {
 
     pub(super) fn entries(&self, out: &mut Entries) {
         out.section("input");
-        let path = match self.path.as_slice() {
-            [one] => one.toml(),
-            many => many.toml(),
-        };
         out.put(
             "path",
-            &Raw(path),
+            &Paths(&self.path),
             "a directory, a pattern (#, %04d, *), or a list of files",
         );
         // The same files may be named in many ways; jobs know them by their fingerprints.
         out.depends_on(None);
-        let frames = self
-            .frames
-            .as_ref()
-            .map_or("all".to_owned(), ToString::to_string);
         out.put(
             "frames",
-            &frames,
+            &Frames(self.frames.as_ref()),
             "all, or a range: 7 | 1-10 | 1-10x2 | 1-5,8",
         );
         // More frames of the same job are not another job.
@@ -145,8 +138,7 @@ impl Input {
             &self.radius,
             "a length, auto, or { attribute = \"radius\", scale = 1.0 }",
         );
-        let up = self.up.map_or("auto", UpAxis::name);
-        out.put("up", up, "auto | x | y | z | -x | -y | -z");
+        out.put("up", &Up(self.up), "auto | x | y | z | -x | -y | -z");
         out.put(
             "mmap",
             &self.mmap,
@@ -154,10 +146,9 @@ impl Input {
         );
         // Neither changes the pictures.
         out.depends_on(None);
-        let verify = Raw(self.verify.map_or("auto".toml(), |all| all.toml()));
         out.put(
             "verify",
-            &verify,
+            &Verify(self.verify),
             "checksums of native frames: auto (up to 1 GiB) | true | false",
         );
         out.depends_on(None);
@@ -182,14 +173,84 @@ fn read_up(field: &Field<'_>) -> Option<Option<UpAxis>> {
     field.choice(UpAxis::ALL).map(Some)
 }
 
-/// TOML as it is.
-struct Raw(String);
+/// One path, or a list of them.
+struct Paths<'a>(&'a [String]);
 
-impl Toml for Raw {
+impl Toml for Paths<'_> {
     fn toml(&self) -> String {
-        self.0.clone()
+        match self.0 {
+            [one] => one.toml(),
+            many => many.toml(),
+        }
     }
 }
+
+described!(Paths<'_>, {
+    "anyOf": [name_schema(), { "type": "array", "items": name_schema(), "minItems": 1 }],
+});
+
+/// A range, or all.
+struct Frames<'a>(Option<&'a FrameRange>);
+
+impl Toml for Frames<'_> {
+    fn toml(&self) -> String {
+        self.0
+            .map_or_else(|| "all".toml(), |range| range.to_string().toml())
+    }
+}
+
+described!(Frames<'_>, {
+    "anyOf": [
+        { "const": "all" },
+        { "type": "integer" },
+        { "type": "string", "pattern": range_pattern() },
+    ],
+});
+
+/// Frame ranges as a regular expression; which numbers fit and which steps arrive is beyond it.
+fn range_pattern() -> String {
+    let number = r"\s*-?[0-9]+\s*";
+    let part = format!("{number}(-{number}([xy:]{number})?)?");
+    format!("^{part}(,{part})*$")
+}
+
+/// An axis, or auto.
+struct Up(Option<UpAxis>);
+
+impl Toml for Up {
+    fn toml(&self) -> String {
+        self.0.map_or("auto", UpAxis::name).toml()
+    }
+}
+
+described!(Up, { "enum": words(&["auto"], UpAxis::ALL) });
+
+/// Yes, no, or auto.
+struct Verify(Option<bool>);
+
+impl Toml for Verify {
+    fn toml(&self) -> String {
+        self.0.map_or_else(|| "auto".toml(), |all| all.toml())
+    }
+}
+
+described!(Verify, { "enum": ["auto", true, false] });
+
+described!(RadiusSetting, {
+    "anyOf": [
+        { "const": "auto" },
+        { "type": "number", "exclusiveMinimum": 0 },
+        {
+            "type": "object",
+            "properties": {
+                "attribute": name_schema(),
+                "scale": { "type": "number", "exclusiveMinimum": 0, "default": 1.0 },
+            },
+            "required": ["attribute"],
+            "additionalProperties": false,
+        },
+    ],
+});
 
 fn read_path(field: &Field<'_>) -> Option<Vec<String>> {
     if field.items().is_some() {

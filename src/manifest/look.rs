@@ -3,7 +3,7 @@
 use super::color::{Background, ColorSetting, rgb};
 use super::named;
 use super::reader::{Field, Section};
-use super::write::{Entries, Toml};
+use super::write::{Entries, Toml, described};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::Bytes;
@@ -306,6 +306,19 @@ impl Toml for Bytes {
     }
 }
 
+described!(Bytes, {
+    "anyOf": [
+        { "type": "integer", "minimum": 1 },
+        { "type": "string", "pattern": SIZE_PATTERN },
+    ],
+});
+
+/// Sizes as a regular expression; parts of a unit need one larger than a byte.
+const SIZE_PATTERN: &str = concat!(
+    r"^\s*([0-9]+\s*([bB]|[kKmMgGtT]([iI]?[bB])?)?",
+    r"|([0-9]+\.[0-9]*|\.[0-9]+)\s*[kKmMgGtT]([iI]?[bB])?)\s*$"
+);
+
 impl Toml for BvhPreset {
     fn toml(&self) -> String {
         self.name().toml()
@@ -317,6 +330,12 @@ impl Toml for BvhLeaves {
         self.name().toml()
     }
 }
+
+described!(BvhPreset, { "enum": BvhPreset::ALL.map(BvhPreset::name) });
+
+described!(BvhLeaves, { "enum": BvhLeaves::ALL.map(BvhLeaves::name) });
+
+described!(GroundHeight, { "anyOf": [{ "const": "auto" }, { "type": "number" }] });
 
 impl Toml for GroundHeight {
     fn toml(&self) -> String {

@@ -18,8 +18,11 @@ mod light;
 mod look;
 mod output;
 mod pattern;
+#[cfg(test)]
+mod places_tests;
 mod reader;
 mod rebase;
+mod schema;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -37,6 +40,7 @@ pub use output::{Channel, Compression, Output};
 pub use pattern::OutputPattern;
 pub(crate) use reader::nearest;
 pub use rebase::{named_place, real_dir};
+pub use schema::{SCHEMA_FILE, job_schema};
 pub use tree::Override;
 pub use work::{ProgressMode, STOP_FILE, Seconds, Work};
 
@@ -66,6 +70,10 @@ macro_rules! named {
                 $crate::manifest::write::Toml::toml(self.name())
             }
         }
+
+        $crate::manifest::write::described!($name, {
+            "enum": $crate::manifest::schema::words(&[], $name::ALL),
+        });
     };
 }
 use named;
@@ -216,9 +224,9 @@ impl Manifest {
 
     /// A complete manifest with every key, commented, that reads back equal.
     pub fn to_commented_toml(&self) -> String {
-        let mut text = String::from(
-            "# A spherule job. Paths are relative to this file; lengths are those of the simulation.\n",
-        );
+        // Editors that know the first line complete and check what is written below it, and pass over it where
+        // that file is missing.
+        let mut text = format!("#:schema ./{SCHEMA_FILE}\n# {ABOUT}\n");
         text.push_str(&self.entries().file());
         if self.camera.keys.is_empty() {
             text.push_str(camera::NO_KEYS);
@@ -244,6 +252,10 @@ impl Manifest {
         out
     }
 }
+
+/// What a manifest is.
+const ABOUT: &str =
+    "A spherule job. Paths are relative to this file; lengths are those of the simulation.";
 
 const NEEDS_NUMBER: &str =
     "several frames would get the same name; put #### into it, as in frame.####.exr";

@@ -7,23 +7,25 @@
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use schemars::JsonSchema;
+
 use super::look::read_size;
 use super::named;
 use super::reader::{Field, Section};
-use super::write::{Entries, Toml};
+use super::write::{Entries, Toml, described};
 use crate::report::Bytes;
 
 /// Name of the file that ends following if the manifest names none, beside the images.
 pub const STOP_FILE: &str = "job.stop";
 
 /// Threads beyond this are a slip of the hand.
-pub(super) const MAX_THREADS: u32 = 65_535;
+const MAX_THREADS: u32 = 65_535;
 
 /// Tries beyond this are a slip of the hand.
 pub(super) const MAX_RETRIES: u32 = 100;
 
 /// Longest time that can be asked for, seconds: some thirty years.
-pub(super) const MAX_SECONDS: f64 = 1e9;
+const MAX_SECONDS: f64 = 1e9;
 
 named! {
     /// How progress is shown.
@@ -205,7 +207,7 @@ impl Work {
 }
 
 /// A key that no image depends on.
-fn put(out: &mut Entries, key: &str, value: &impl Toml, comment: &'static str) {
+fn put(out: &mut Entries, key: &str, value: &(impl Toml + JsonSchema), comment: &'static str) {
     out.put(key, value, comment);
     out.depends_on(None);
 }
@@ -246,6 +248,15 @@ impl Toml for Threads {
         self.0.map_or_else(|| "all".toml(), |count| count.toml())
     }
 }
+
+described!(Threads, {
+    "anyOf": [
+        { "const": "all" },
+        { "type": "integer", "minimum": 1, "maximum": MAX_THREADS },
+    ],
+});
+
+described!(Seconds, { "type": "number", "minimum": 0, "maximum": MAX_SECONDS });
 
 impl Toml for Seconds {
     fn toml(&self) -> String {

@@ -1,7 +1,9 @@
-//! A manifest as one flat list of keys with values and comments, from which both the commented
-//! file of `init` and the list of settings for fingerprints are made.
+//! A manifest as one flat list of keys with values and comments, from which the commented file of
+//! `init`, the list of settings for fingerprints and the JSON schema are made.
 
 use std::fmt::Write as _;
+
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 
 /// Comments begin here where the value leaves room.
 const COMMENT_COLUMN: usize = 40;
@@ -78,16 +80,57 @@ impl<T: Toml> Toml for Vec<T> {
     }
 }
 
-struct Entry {
+/// Says in JSON schema what a value of a type looks like in a manifest.
+macro_rules! described {
+    ($type:ty, $schema:tt) => {
+        impl schemars::JsonSchema for $type {
+            fn inline_schema() -> bool {
+                true
+            }
+
+            fn schema_name() -> std::borrow::Cow<'static, str> {
+                stringify!($type).into()
+            }
+
+            fn json_schema(_: &mut schemars::SchemaGenerator) -> schemars::Schema {
+                schemars::json_schema!($schema)
+            }
+        }
+    };
+}
+pub(super) use described;
+
+/// One key.
+pub(super) struct Entry {
     header: String,
-    key: String,
+    /// Dotted.
+    pub(super) key: String,
     /// As TOML; None if it is not set.
-    value: Option<String>,
+    pub(super) value: Option<String>,
     /// What it might be set to.
-    example: &'static str,
-    comment: &'static str,
+    pub(super) example: &'static str,
+    pub(super) comment: &'static str,
+    /// What its values look like.
+    pub(super) schema: fn(&mut SchemaGenerator) -> Schema,
     /// What stands for the value among the settings; None if outputs do not depend on it.
     setting: Option<String>,
+}
+
+impl Entry {
+    /// The last part of the key.
+    pub(super) fn name(&self) -> &str {
+        self.key.rsplit('.').next().unwrap_or_default()
+    }
+
+    /// The rest of it.
+    pub(super) fn section(&self) -> &str {
+        self.key.rsplit_once('.').map_or("", |(section, _)| section)
+    }
+
+    /// The value, or an example where it is not set, as TOML.
+    pub(super) fn sample(&self) -> &str {
+        self.value.as_deref().unwrap_or(self.example)
+    }
 }
 
 /// All keys in the order in which they are written.
@@ -112,20 +155,24 @@ impl Entries {
     }
 
     /// A key with its value.
-    pub(super) fn put(&mut self, key: &str, value: &(impl Toml + ?Sized), comment: &'static str) {
-        let value = value.toml();
-        self.push(key, Some(value), "", comment);
+    pub(super) fn put<T: Toml + JsonSchema + ?Sized>(
+        &mut self,
+        key: &str,
+        value: &T,
+        comment: &'static str,
+    ) {
+        self.push::<T>(key, Some(value.toml()), "", comment);
     }
 
     /// A key with its value if it is set; else the `example` is shown as a comment.
-    pub(super) fn maybe(
+    pub(super) fn maybe<T: Toml + JsonSchema + ?Sized>(
         &mut self,
         key: &str,
-        value: Option<&(impl Toml + ?Sized)>,
+        value: Option<&T>,
         example: &'static str,
         comment: &'static str,
     ) {
-        self.push(key, value.map(Toml::toml), example, comment);
+        self.push::<T>(key, value.map(Toml::toml), example, comment);
     }
 
     /// Says that outputs depend on `setting` only, of the key last put, or not on it at all.
@@ -135,7 +182,7 @@ impl Entries {
         }
     }
 
-    fn push(
+    fn push<T: JsonSchema + ?Sized>(
         &mut self,
         key: &str,
         value: Option<String>,
@@ -149,21 +196,17 @@ impl Entries {
             value,
             example,
             comment,
+            schema: SchemaGenerator::subschema_for::<T>,
         });
+    }
+
+    /// All of them.
+    pub(super) fn list(&self) -> &[Entry] {
+        &self.list
     }
 
     pub(super) fn keys(&self) -> Vec<String> {
         self.list.iter().map(|e| e.key.clone()).collect()
-    }
-
-    /// Every key with its value, or with an example where it is not set.
-    #[cfg(test)]
-    pub(super) fn samples(&self) -> Vec<(String, String)> {
-        let value = |e: &Entry| e.value.clone().unwrap_or_else(|| e.example.to_owned());
-        self.list
-            .iter()
-            .map(|e| (e.key.clone(), value(e)))
-            .collect()
     }
 
     /// The keys that outputs depend on and that are set.
@@ -182,7 +225,7 @@ impl Entries {
                 let shown = header.split(" #").next().unwrap_or_default();
                 let _ = writeln!(text, "\n{shown}");
             }
-            let name = entry.key.rsplit('.').next().unwrap_or_default();
+            let name = entry.name();
             let line = match &entry.value {
                 Some(value) => format!("{name} = {value}"),
                 None => format!("# {name} = {}", entry.example),

@@ -14,5 +14,6 @@ mod resume;
 mod samples;
 mod scale;
 mod status;
+mod schema;
 mod structures;
 mod thesis;

@@ -25,8 +25,8 @@ fn the_same_command_again_does_nothing() {
     workshop.render(&[]).expect(0).tells("5 of 5 frames done");
     let out = workshop.join("out");
     let before = stamps(&out);
-    // Two images a frame; manifest, plan, ledger and two reports.
-    assert_eq!(before.len(), 2 * 5 + 5);
+    // Two images a frame; manifest and its schema, plan, ledger and two reports.
+    assert_eq!(before.len(), 2 * 5 + 6);
     let nothing = |ran: Ran| {
         let ran = ran.expect(0).tells("5 of 5 frames are done already");
         assert!(ran.rendered().is_empty());

@@ -1,0 +1,172 @@
+//! That whatever is wrong with a manifest is told with line, column and the nearest known key.
+
+use std::path::Path;
+
+use super::*;
+
+/// `text` must give exactly one message, which is `wanted` after the file's name.
+#[track_caller]
+fn told(text: &str, wanted: &str) {
+    let error = Manifest::parse(text, Path::new("job.toml")).unwrap_err();
+    assert_eq!(error.messages(), [format!("job.toml: {wanted}")]);
+}
+
+/// The same for what follows a good beginning of two lines.
+#[track_caller]
+fn told_below(text: &str, wanted: &str) {
+    told(&format!("[input]\npath = \"ä\"\n{text}"), wanted);
+}
+
+#[test]
+fn keys_in_tables() {
+    for (text, place, key, nearest) in [
+        ("[rendre]", "line 3, column 2", "rendre", "render"),
+        ("[[lights]]", "line 3, column 3", "lights", "light"),
+        ("[camra.key]", "line 3, column 2", "camra", "camera"),
+        (
+            "[image]\n\n  widht = 3",
+            "line 5, column 3",
+            "image.widht",
+            "image.width",
+        ),
+        (
+            "[camera]\nfvo = 3",
+            "line 4, column 1",
+            "camera.fvo",
+            "camera.fov",
+        ),
+        (
+            "[render]\nmax-depth = 3",
+            "line 4, column 1",
+            "render.max-depth",
+            "render.max_depth",
+        ),
+        (
+            "[material]\n\"iro\" = 3",
+            "line 4, column 1",
+            "material.iro",
+            "material.ior",
+        ),
+        (
+            "[output]\nchannel = 3",
+            "line 4, column 1",
+            "output.channel",
+            "output.channels",
+        ),
+        (
+            "[job]\ntheads = 3",
+            "line 4, column 1",
+            "job.theads",
+            "job.threads",
+        ),
+    ] {
+        told_below(
+            text,
+            &format!("{place}: {key}: unknown key; did you mean `{nearest}`?"),
+        );
+    }
+}
+
+#[test]
+fn keys_below_the_wrong_table() {
+    told_below(
+        "samples = 4",
+        "line 3, column 1: input.samples: unknown key here; did you mean `image.samples`?",
+    );
+    told_below(
+        "[output]\nthreads = 4",
+        "line 4, column 1: output.threads: unknown key here; did you mean `job.threads`?",
+    );
+}
+
+#[test]
+fn keys_in_items_of_lists() {
+    told_below(
+        "[[light]]\ntype = \"point\"\nposition = [0, 0, 1]\nintesity = 2",
+        "line 6, column 1: light.0.intesity: unknown key; did you mean `light.0.intensity`?",
+    );
+    told_below(
+        "[[light]]\ntype = \"point\"\nposition = [0, 0, 1]\n[[light]]\ntype = \"directional\"\ndirectoin = [0, 0, 1]\ndirection = [0, 0, 1]",
+        "line 8, column 1: light.1.directoin: unknown key; did you mean `light.1.direction`?",
+    );
+    told_below(
+        "[[camera.key]]\nframe = 1\neye = [1, 0, 0]\nlook_at = [0, 0, 0]\nfow = 30",
+        "line 7, column 1: camera.key.0.fow: unknown key; did you mean `camera.key.0.fov`?",
+    );
+    told_below(
+        "[[camera.key]]\nframe = 1\neye = [1, 0, 0]\nlookat = [0, 0, 0]\nlook_at = [0, 0, 0]",
+        "line 6, column 1: camera.key.0.lookat: unknown key; did you mean `camera.key.0.look_at`?",
+    );
+}
+
+#[test]
+fn keys_in_inline_tables() {
+    told(
+        "input = { path = \"ä\", raduis = 3 }",
+        "line 1, column 23: input.raduis: unknown key; did you mean `input.radius`?",
+    );
+    told(
+        "input = { path = \"ä\", radius = { attribute = \"h\", scael = 3 } }",
+        "line 1, column 51: input.radius.scael: unknown key; did you mean `input.radius.scale`?",
+    );
+    told_below(
+        "[render]\nbackground = { bottom = [0, 0, 0], top = [1, 1, 1], botom = 3 }",
+        "line 4, column 53: render.background.botom: unknown key; did you mean `render.background.bottom`?",
+    );
+    told_below(
+        "[material.color]\nattribute = \"v\"\nrnage = [0, 1]",
+        "line 5, column 1: material.color.rnage: unknown key; did you mean `material.color.range`?",
+    );
+    told(
+        "input.path = \"a\"\nlight = [{ type = \"point\", position = [0, 0, 1], colour = [1, 1, 1] }]",
+        "line 2, column 50: light.0.colour: unknown key; did you mean `light.0.color`?",
+    );
+    told(
+        "input.path = \"a\"\ncamera.key = [{ frame = 1, eye = [1, 0, 0], look_at = [0, 0, 0], fvo = 3 }]",
+        "line 2, column 66: camera.key.0.fvo: unknown key; did you mean `camera.key.0.fov`?",
+    );
+}
+
+#[test]
+fn values_in_every_kind_of_table() {
+    told_below(
+        "[job]\nsettle = \"soon\"",
+        "line 4, column 10: job.settle: wants seconds from 0 to 1e9, not the text \"soon\"",
+    );
+    told_below(
+        "[[light]]\ntype = \"spot\"",
+        "line 4, column 8: light.0.type: wants one of point, directional, not the text \"spot\"",
+    );
+    told(
+        "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",
+        "line 2, column 43: material.color.map: wants one of viridis, turbo, plasma, inferno, magma, \
+         cividis, red-blue, greys, not the text \"trubo\"; did you mean turbo?",
+    );
+}
+
+#[test]
+fn what_is_no_toml() {
+    for (text, place) in [
+        ("[job", "line 3, column 5"),
+        ("[job]\nthreads = ", "line 4, column 11"),
+        ("[job]\nthreads 3", "line 4, column 9"),
+        ("[job]\nstop_file = \"stop", "line 4, column 18"),
+        ("[camera]\neye = [1, 2", "line 4, column 12"),
+        ("[camera]\nfov = 1\nfov = 2", "line 5, column 1"),
+        ("[job]\n[job]", "line 4, column 2"),
+        (
+            "[material]\ncolor = { attribute = \"v\", attribute = \"w\" }",
+            "line 4, column 28",
+        ),
+        ("[job]\nidle = 1.2.3", "line 4, column 11"),
+    ] {
+        let text = format!("[input]\npath = \"ä\"\n{text}");
+        let error = Manifest::parse(&text, Path::new("job.toml")).unwrap_err();
+        assert_eq!(error.messages().len(), 1, "{error}");
+        let wanted = format!("job.toml: {place}: ");
+        assert!(
+            error.to_string().starts_with(&wanted),
+            "{error}, not {place}"
+        );
+    }
+}

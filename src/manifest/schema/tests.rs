@@ -1,0 +1,257 @@
+//! That schema and reader agree: on keys, defaults, words, and on which values will do.
+
+use std::collections::BTreeSet;
+
+use jsonschema::Validator;
+use toml::Table;
+
+use super::*;
+use crate::manifest::ManifestError;
+
+mod values;
+
+/// Something of everything, with what keys need of one another.
+const EVERYTHING: &str = r#"
+input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
+camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
+render = { background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
+material.color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }
+light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }]
+output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
+job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
+"#;
+
+fn validator() -> Validator {
+    jsonschema::draft202012::options()
+        .build(&job_schema())
+        .expect("a good schema")
+}
+
+fn read(text: &str) -> Result<Manifest, ManifestError> {
+    Manifest::parse(text, "job.toml".as_ref())
+}
+
+fn json(text: &str) -> Value {
+    let table: Table = text.parse().expect("TOML");
+    serde_json::to_value(table).expect("TOML has no values that JSON lacks, but for NaN")
+}
+
+#[track_caller]
+fn both_take(text: &str) {
+    read(text).unwrap();
+    let (json, validator) = (json(text), validator());
+    let errors: Vec<_> = validator
+        .iter_errors(&json)
+        .map(|e| e.to_string())
+        .collect();
+    assert!(errors.is_empty(), "{text}\n{errors:?}");
+}
+
+#[track_caller]
+fn both_refuse(text: &str) {
+    assert!(read(text).is_err(), "the reader takes {text}");
+    assert!(
+        !validator().is_valid(&json(text)),
+        "the schema takes {text}"
+    );
+}
+
+#[test]
+fn it_is_a_schema_of_draft_2020_12() {
+    let schema = job_schema();
+    assert_eq!(
+        schema["$schema"],
+        "https://json-schema.org/draft/2020-12/schema"
+    );
+    assert!(jsonschema::meta::is_valid(&schema));
+}
+
+#[test]
+fn what_the_program_writes_is_valid() {
+    let plain = Manifest::new("data");
+    both_take(&plain.to_commented_toml());
+    both_take(EVERYTHING);
+    both_take(&read(EVERYTHING).unwrap().to_commented_toml());
+    let mut fixed = plain;
+    fixed.camera.mode = crate::manifest::CameraMode::Fixed;
+    fixed.camera.eye = Some([1.0; 3]);
+    fixed.camera.look_at = Some([0.0; 3]);
+    both_take(&fixed.to_commented_toml());
+}
+
+/// Every table of the schema with a manifest that has it open at the end, so that a line goes into it.
+const TABLES: [(&str, &str); 14] = [
+    ("", ""),
+    ("/properties/input", "[input]\n"),
+    ("/properties/camera", "[camera]\n"),
+    (
+        "/properties/camera/properties/key/items",
+        "[[camera.key]]\n",
+    ),
+    ("/properties/image", "[image]\n"),
+    ("/properties/render", "[render]\n"),
+    ("/properties/material", "[material]\n"),
+    (
+        "/properties/light/items/oneOf/0",
+        "[[light]]\ntype = \"point\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/1",
+        "[[light]]\ntype = \"directional\"\n",
+    ),
+    ("/properties/output", "[output]\n"),
+    ("/properties/job", "[job]\n"),
+    (
+        "/properties/input/properties/radius/anyOf/2",
+        "[input.radius]\n",
+    ),
+    (
+        "/properties/material/properties/color/anyOf/2",
+        "[material.color]\n",
+    ),
+    (
+        "/properties/render/properties/background/anyOf/2",
+        "[render.background]\n",
+    ),
+];
+
+#[test]
+fn the_reader_knows_the_same_keys() {
+    let schema = job_schema();
+    for (pointer, text) in TABLES {
+        let error = read(&format!("{text}zzzzzzzzzzzzzzzz = 1\n")).unwrap_err();
+        let error = error.to_string();
+        let known = error.split("known here: ").nth(1);
+        let known = known.and_then(|rest| rest.lines().next());
+        let known: BTreeSet<&str> = known.expect(&error).split(", ").collect();
+        let table = schema.pointer(pointer).expect(pointer);
+        let properties = table["properties"].as_object().expect(pointer);
+        let described: BTreeSet<&str> = properties.keys().map(String::as_str).collect();
+        assert_eq!(described, known, "{pointer}");
+        assert_eq!(table["additionalProperties"], false, "{pointer}");
+    }
+    assert_eq!(count_tables(&schema), TABLES.len());
+}
+
+fn count_tables(schema: &Value) -> usize {
+    match schema {
+        Value::Object(map) => {
+            let is_table = map.get("type").is_some_and(|t| t == "object");
+            usize::from(is_table) + map.values().map(count_tables).sum::<usize>()
+        }
+        Value::Array(items) => items.iter().map(count_tables).sum(),
+        _ => 0,
+    }
+}
+
+#[test]
+fn comments_defaults_and_examples_are_those_of_init() {
+    let schema = job_schema();
+    for entry in Manifest::new("").entries().list() {
+        let at = format!(
+            "/properties/{}/properties/{}",
+            entry.section(),
+            entry.name()
+        );
+        let property = schema.pointer(&at).expect(&at);
+        assert_eq!(property["description"], entry.comment, "{at}");
+        let sample = json_of(entry.sample());
+        let wanted = match (&*entry.key, &entry.value) {
+            ("input.path", _) => (Value::Null, Value::Null),
+            (_, Some(_)) => (sample, Value::Null),
+            (_, None) => (Value::Null, json!([sample])),
+        };
+        let found = (&property["default"], &property["examples"]);
+        assert_eq!(found, (&wanted.0, &wanted.1), "{at}");
+    }
+    for (pointer, text) in TABLES {
+        let about = &schema.pointer(pointer).expect(pointer)["description"];
+        assert!(about != "", "{text}");
+    }
+}
+
+/// A table in which only the named keys are missing reads as if they had their defaults.
+#[test]
+fn defaults_of_items_are_the_readers() {
+    let schema = job_schema();
+    for (pointer, text) in [
+        (TABLES[7].0, "type = \"point\"\nposition = [1, 2, 3]\n"),
+        (
+            TABLES[8].0,
+            "type = \"directional\"\ndirection = [1, 2, 3]\n",
+        ),
+    ] {
+        let head = format!("input.path = \"data\"\n[[light]]\n{text}");
+        let plain = read(&head).unwrap();
+        for (name, property) in schema.pointer(pointer).unwrap()["properties"]
+            .as_object()
+            .unwrap()
+        {
+            if let Some(default) = property.get("default") {
+                let set = read(&format!("{head}{name} = {default}\n")).unwrap();
+                assert_eq!(set, plain, "{name}");
+            }
+        }
+    }
+}
+
+#[test]
+fn what_is_needed_is_needed_by_both() {
+    let path = "input.path = \"data\"\n";
+    both_refuse("");
+    both_refuse("[input]\nup = \"y\"");
+    for wrong in [
+        "[[camera.key]]\neye = [1, 0, 0]\nlook_at = [0, 0, 0]",
+        "[[camera.key]]\nframe = 1\nlook_at = [0, 0, 0]",
+        "[[camera.key]]\nframe = 1\neye = [1, 0, 0]",
+        "[[light]]",
+        "[[light]]\nposition = [0, 0, 1]",
+        "[[light]]\ntype = \"point\"",
+        "[[light]]\ntype = \"directional\"\nposition = [0, 0, 1]",
+        "[[light]]\ntype = \"point\"\nposition = [0, 0, 1]\ndirection = [0, 0, 1]",
+        "[[light]]\ntype = \"directional\"\ndirection = [0, 0, 1]\nfalloff = \"none\"",
+        "[light]\ntype = \"point\"\nposition = [0, 0, 1]",
+        "light = 3",
+        "camera.key = 3",
+        "camera.key = [3]",
+        "input = 3",
+        "image = [1]",
+        "samples = 3",
+        "[render]\nsamples = 3",
+    ] {
+        both_refuse(&if wrong.starts_with("input") {
+            wrong.to_owned()
+        } else {
+            format!("{path}{wrong}")
+        });
+    }
+}
+
+/// All ways to say where the camera is.
+#[test]
+fn keys_that_need_one_another() {
+    let modes = ["", "auto", "fixed", "turntable", "keys"];
+    let has = [false, true];
+    for mode in modes {
+        for (eye, look_at) in has.iter().flat_map(|a| has.iter().map(move |b| (*a, *b))) {
+            for key in has {
+                let mut text = String::from("input.path = \"data\"\n[camera]\n");
+                if !mode.is_empty() {
+                    text += &format!("mode = \"{mode}\"\n");
+                }
+                text += if eye { "eye = [1, 2, 3]\n" } else { "" };
+                text += if look_at { "look_at = [0, 0, 0]\n" } else { "" };
+                if key {
+                    text += "[[camera.key]]\nframe = 1\neye = [1, 2, 3]\nlook_at = [0, 0, 0]\n";
+                }
+                let valid = validator().is_valid(&json(&text));
+                assert_eq!(valid, read(&text).is_ok(), "{text}");
+            }
+        }
+    }
+    for isolate in ["", "isolate = true", "isolate = false"] {
+        let text = format!("input.path = \"a\"\n[job]\nmemory_ceiling = \"1G\"\n{isolate}\n");
+        let valid = validator().is_valid(&json(&text));
+        assert_eq!(valid, read(&text).is_ok(), "{text}");
+    }
+}

@@ -1,0 +1,222 @@
+//! Many values for every key: what the schema takes the reader takes, and the other way round.
+
+use super::*;
+
+/// Values of every kind, around every bound.
+const VALUES: [&str; 100] = [
+    "0",
+    "1",
+    "-1",
+    "2",
+    "7",
+    "8",
+    "8.5",
+    "9",
+    "0.0",
+    "0.5",
+    "-0.5",
+    "1.5",
+    "1e-3",
+    "45.25",
+    "-89.5",
+    "90",
+    "-90.5",
+    "91",
+    "100",
+    "101",
+    "-100",
+    "-100.5",
+    "179.5",
+    "180",
+    "180.5",
+    "64",
+    "65",
+    "4096",
+    "4097",
+    "65535",
+    "65536",
+    "65537",
+    "1e9",
+    "1.1e9",
+    "1e38",
+    "1e39",
+    "-1e39",
+    "1e300",
+    "9223372036854775807",
+    "-9223372036854775808",
+    "nan",
+    "inf",
+    "-inf",
+    "true",
+    "false",
+    "1979-05-27",
+    "\"\"",
+    "\" \"",
+    "\"auto\"",
+    "\"all\"",
+    "\"none\"",
+    "\"1-10\"",
+    "\" 1 - 10 x 2 \"",
+    "\"-5--2\"",
+    "\"1-5:2\"",
+    "\"1-9y3\"",
+    "\"1 , 2,3-4\"",
+    "\"1-z\"",
+    "\"10-\"",
+    "\"1-10x\"",
+    "\"1 2\"",
+    "\"1,\"",
+    "\"4GiB\"",
+    "\" 512 mib \"",
+    "\"1.5G\"",
+    "\".5k\"",
+    "\"1.5\"",
+    "\"1.5B\"",
+    "\"4XiB\"",
+    "\"4Gi\"",
+    "\"-1\"",
+    "\"x.exr\"",
+    "\"out/f.####.EXR\"",
+    "\"x.png\"",
+    "\"out/.exr\"",
+    "\".exr\"",
+    "[]",
+    "[1]",
+    "[1, 2]",
+    "[1, 2, 3]",
+    "[0, 0, 0]",
+    "[0, 1e100, 0]",
+    "[1, 2, 3, 4]",
+    "[-1, 0, 0]",
+    "[1, \"a\", 3]",
+    "[1, nan, 3]",
+    "[\"a\"]",
+    "[\"a\", \"\"]",
+    "[\"RGBA\"]",
+    "[\"Z\", \"id\"]",
+    "[\"Z\", \"Z\"]",
+    "[\"z\"]",
+    "{}",
+    "{ attribute = \"v\" }",
+    "{ attribute = \"v\", scale = 0.5 }",
+    "{ attribute = \"v\", scale = 0 }",
+    "{ attribute = \"\" }",
+    "{ bottom = [0, 0, 0], top = [1, 1, 1] }",
+    "{ bottom = [0, 0, 0] }",
+    "{ top = [0, 0, 0], bottom = [1, 1, 1], x = 1 }",
+];
+
+/// Values for colours by an attribute alone.
+const COLORS: [&str; 6] = [
+    "{ attribute = \"v\", map = \"turbo\", range = [0, 1] }",
+    "{ attribute = \"v\", map = \"trubo\" }",
+    "{ attribute = \"v\", range = [1] }",
+    "{ attribute = \"v\", range = [0, \"1\"] }",
+    "{ attribute = \"v\", scale = 1 }",
+    "{ map = \"turbo\" }",
+];
+
+/// What the schema takes and the reader does not.
+const BEYOND: [(&str, &str); 1] = [
+    // A size must be above 0.
+    ("render.memory_limit", "0B"),
+];
+
+/// A manifest with everything that keys need beside them.
+const BASE: &str = r#"
+input = { path = "data" }
+camera = { mode = "fixed", eye = [5, 6, 7.5], look_at = [9, 9, 9.25], key = [{ frame = 0, eye = [5, 6, 7.5], look_at = [9, 9, 9.25] }] }
+light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }]
+job = { isolate = true }
+"#;
+
+/// All keys: those of tables, and those of the items of lists.
+fn keys() -> Vec<String> {
+    let items = read(BASE).unwrap().entries();
+    items.list().iter().map(|e| e.key.clone()).collect()
+}
+
+/// `value` laid over BASE under the dotted `key`.
+fn with(key: &str, value: &toml::Value) -> Table {
+    let mut base: toml::Value = toml::Value::Table(BASE.parse().unwrap());
+    let mut node = &mut base;
+    for part in key.split('.') {
+        node = match node {
+            toml::Value::Array(items) => &mut items[part.parse::<usize>().unwrap()],
+            toml::Value::Table(table) => {
+                let empty = toml::Value::Table(Table::new());
+                table.entry(part).or_insert(empty)
+            }
+            other => panic!("{key}: {other}"),
+        };
+    }
+    *node = value.clone();
+    match base {
+        toml::Value::Table(table) => table,
+        other => panic!("{other}"),
+    }
+}
+
+/// Words that some key knows, and each with a slip.
+fn words_and_slips(schema: &Value, found: &mut BTreeSet<String>) {
+    match schema {
+        Value::Object(map) => {
+            let words = map.get("enum").and_then(Value::as_array);
+            for word in words.into_iter().flatten().chain(map.get("const")) {
+                if let Some(word) = word.as_str() {
+                    found.insert(format!("{word:?}"));
+                    found.insert(format!("{:?}", format!("{word}x")));
+                }
+            }
+            map.values().for_each(|v| words_and_slips(v, found));
+        }
+        Value::Array(items) => items.iter().for_each(|v| words_and_slips(v, found)),
+        _ => {}
+    }
+}
+
+/// A number without a fraction is whole to JSON, and none to TOML.
+fn is_whole_float(value: &toml::Value) -> bool {
+    matches!(value, toml::Value::Float(f) if f.fract() == 0.0)
+}
+
+#[test]
+fn both_take_and_refuse_the_same_values() {
+    let (schema, validator) = (job_schema(), validator());
+    let mut values: BTreeSet<String> = VALUES
+        .iter()
+        .chain(&COLORS)
+        .map(|v| (*v).to_owned())
+        .collect();
+    words_and_slips(&schema, &mut values);
+    let mut differ = Vec::new();
+    for key in keys() {
+        let mut taken = 0;
+        for text in &values {
+            let value = format!("v = {text}").parse::<Table>().unwrap()["v"].clone();
+            let table = with(&key, &value);
+            let read = read(&table.to_string());
+            let valid = validator.is_valid(&serde_json::to_value(&table).unwrap());
+            taken += usize::from(valid);
+            if valid != read.is_ok() && !(valid && is_whole_float(&value)) {
+                let told =
+                    read.map_or_else(|e| e.to_string(), |_| "the schema refuses it".to_owned());
+                differ.push(format!("{key} = {text}: {told}"));
+            }
+        }
+        if taken == 0 {
+            differ.push(format!("{key}: takes nothing"));
+        }
+    }
+    assert!(differ.is_empty(), "{}", differ.join("\n"));
+}
+
+/// Keeps the list of differences true.
+#[test]
+fn what_only_the_reader_knows() {
+    for (key, value) in BEYOND {
+        let table = with(key, &toml::Value::from(value));
+        assert!(validator().is_valid(&serde_json::to_value(&table).unwrap()));
+        assert!(read(&table.to_string()).is_err(), "{key}");
+    }
+}
