@@ -26,6 +26,7 @@ mod publish;
 mod queue;
 mod range;
 mod request;
+mod requeue;
 mod state;
 mod work;
 

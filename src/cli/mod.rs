@@ -35,6 +35,7 @@ mod schema;
 mod shard;
 mod signals;
 mod status;
+mod verify;
 mod work;
 
 use errors::CliError;
@@ -59,6 +60,8 @@ enum Command {
     Init(Box<init::InitArgs>),
     /// Print the manifest's JSON schema, for editors.
     Schema,
+    /// Open and decode every finished image of a job.
+    Verify(verify::VerifyArgs),
     /// Print counts, bounds and attributes of particle files.
     Inspect(inspect::InspectArgs),
     /// Convert particle files to compact native frames (.spf).
@@ -99,6 +102,7 @@ pub fn main() -> ExitCode {
         Command::Status(args) => status::run(&args),
         Command::Init(args) => init::run(&args),
         Command::Schema => schema::run(),
+        Command::Verify(args) => verify::run(&args),
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Generate(args) => generate::run(&args),

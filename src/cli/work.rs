@@ -150,6 +150,14 @@ pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
     Ok(real_dir(&base.join(manifest.output.path.dir())))
 }
 
+/// There is no job in `dir`.
+pub(super) fn no_job(dir: &Path) -> CliError {
+    CliError::other(format!(
+        "{}: no job here (no {PLAN_FILE}); name the directory of its images, or its job.toml",
+        dir.display()
+    ))
+}
+
 /// What was found when the job in `dir` began.
 pub(super) fn saved_survey(resolved: &Value, dir: &Path) -> Result<Survey, CliError> {
     serde_json::from_value(resolved.clone()).map_err(|e| {

@@ -6,6 +6,7 @@
 
 use std::io::{self, Cursor, Seek, Write};
 
+use exr::meta::attribute::SampleType;
 use exr::prelude::{
     AnyChannel, AnyChannels, AttributeValue, Blocks, Compression as Codec, Encoding, FlatSamples,
     Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, SmallVec, Text,
@@ -15,7 +16,7 @@ use glam::Vec3;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::render::Film;
+use crate::render::{Channels, Film};
 
 /// Largest finite half.
 const HALF_MAX: f32 = 65_504.0;
@@ -220,6 +221,24 @@ fn channels(film: Film) -> (AnyChannels<FlatSamples>, u64) {
         list.push(AnyChannel::new("id.I", FlatSamples::U32(id)));
     }
     (AnyChannels::sort(list), clamped)
+}
+
+/// Names and types of the planes in a file with `channels`.
+pub(super) fn planes(channels: Channels) -> Vec<(String, SampleType)> {
+    let vector = |has: bool, layer, axes: [&str; 3]| {
+        let names = axes.map(|axis| (format!("{layer}.{axis}"), SampleType::F32));
+        has.then_some(names).into_iter().flatten()
+    };
+    let mut all = ["R", "G", "B", "A"]
+        .map(|name| (name.to_owned(), SampleType::F16))
+        .to_vec();
+    all.extend(channels.depth.then(|| ("Z".to_owned(), SampleType::F32)));
+    all.extend(vector(channels.normal, "N", ["X", "Y", "Z"]));
+    all.extend(vector(channels.position, "P", ["X", "Y", "Z"]));
+    all.extend(vector(channels.velocity, "V", ["X", "Y", "Z"]));
+    all.extend(vector(channels.albedo, "albedo", ["R", "G", "B"]));
+    all.extend(channels.id.then(|| ("id.I".to_owned(), SampleType::U32)));
+    all
 }
 
 fn push_vectors(list: &mut ChannelList, names: [&str; 3], plane: Option<Vec<Vec3>>) {

@@ -1,11 +1,13 @@
 //! Films to bytes: OpenEXR for work, PNG to look at. Encodes into memory; putting a file in place
-//! whole is the caller's.
+//! whole is the caller's. And back: whether such a file is sound.
 
 mod exr;
 mod preview;
+mod verify;
 pub mod view;
 
 pub use exr::{
     Compression, CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, write_exr,
 };
 pub use preview::{PreviewOptions, encode_preview};
+pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

@@ -17,3 +17,4 @@ mod status;
 mod schema;
 mod structures;
 mod thesis;
+mod verify;

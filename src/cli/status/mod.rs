@@ -6,9 +6,9 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Args;
-use spherule_jobs::{FrameState, Job, JobState, PLAN_FILE, Status, Summary, WorkerView};
+use spherule_jobs::{FrameState, Job, JobState, Status, Summary, WorkerView};
 
-use super::work::job_directory;
+use super::work::{job_directory, no_job};
 use super::{CliError, Outcome};
 
 mod show;
@@ -68,10 +68,7 @@ impl Standing {
         // First: what a worker has in hand now may be done in a moment, but not the other way around.
         let workers = Job::workers(dir)?;
         let Some(state) = Job::read(dir)? else {
-            return Err(CliError::other(format!(
-                "{}: no job here (no {PLAN_FILE}); name the directory of its images, or its job.toml",
-                dir.display()
-            )));
+            return Err(no_job(dir));
         };
         Ok(Self {
             dir: dir.to_owned(),

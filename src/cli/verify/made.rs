@@ -1,0 +1,97 @@
+//! What a job makes, by the settings in its plan.
+
+use spherule_jobs::Plan;
+
+use crate::cli::work::KIND;
+use crate::output::ImageShape;
+use crate::render::Channels;
+
+/// What the files of a job must be.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Made {
+    /// Images, and previews of the same size.
+    Images(ImageShape),
+    /// Native frames.
+    Frames,
+}
+
+impl Made {
+    /// By the settings of `plan`.
+    ///
+    /// # Errors
+    /// They do not say it.
+    pub(super) fn of(plan: &Plan) -> Result<Self, String> {
+        Self::of_settings(plan.settings())
+    }
+
+    fn of_settings(settings: &[(String, String)]) -> Result<Self, String> {
+        let find = |wanted: &str| {
+            let found = settings.iter().find(|(key, _)| key == wanted);
+            found.map(|(_, value)| value.as_str())
+        };
+        if find(KIND).is_some() {
+            return Ok(Self::Frames);
+        }
+        let value = |key: &str| {
+            let table = format!("value = {}", find(key)?).parse::<toml::Table>();
+            table.ok()?.remove("value")
+        };
+        let wrong = |key: &str| format!("the plan's setting {key} says nothing of use");
+        let side = |key: &str| {
+            let side = value(key).and_then(|v| u32::try_from(v.as_integer()?).ok());
+            side.ok_or_else(|| wrong(key))
+        };
+        let channels = || {
+            let list = value("output.channels")?;
+            let names = list.as_array()?.iter().map(|name| name.as_str());
+            Channels::from_names(names.collect::<Option<Vec<_>>>()?).ok()
+        };
+        Ok(Self::Images(ImageShape {
+            width: side("image.width")?,
+            height: side("image.height")?,
+            channels: channels().ok_or_else(|| wrong("output.channels"))?,
+        }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::Manifest;
+
+    fn set(settings: &mut [(String, String)], key: &str, value: &str) {
+        let found = settings.iter_mut().find(|(k, _)| k == key);
+        found.unwrap().1 = value.to_owned();
+    }
+
+    #[test]
+    fn what_a_render_makes() {
+        let mut settings = Manifest::new("data").settings();
+        let wanted = ImageShape {
+            width: 1920,
+            height: 1080,
+            channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
+        };
+        assert_eq!(Made::of_settings(&settings), Ok(Made::Images(wanted)));
+        for (key, value) in [
+            ("image.width", "-3"),
+            ("image.height", "\"1080\""),
+            ("image.height", "]"),
+            ("output.channels", "[\"RGBA\", \"depth\"]"),
+            ("output.channels", "[3]"),
+        ] {
+            let mut wrong = settings.clone();
+            set(&mut wrong, key, value);
+            let error = Made::of_settings(&wrong).unwrap_err();
+            assert!(error.contains(key), "{error}");
+        }
+        settings.retain(|(key, _)| key != "image.width");
+        assert!(Made::of_settings(&settings).is_err());
+    }
+
+    #[test]
+    fn what_a_conversion_makes() {
+        let settings = [(KIND.to_owned(), "convert".to_owned())];
+        assert_eq!(Made::of_settings(&settings), Ok(Made::Frames));
+    }
+}

@@ -1,0 +1,175 @@
+use std::io::Cursor;
+
+use exr::block::chunk::CompressedBlock;
+
+use super::*;
+use crate::output::{Compression, ExrOptions, PreviewOptions, encode_exr, encode_preview};
+use crate::render::Film;
+
+/// Not even, and with few values, so that compression has something to do and every block is stored compressed.
+fn film(width: u32, height: u32, channels: Channels) -> Film {
+    let mut film = Film::new(width, height, channels);
+    for (at, color) in film.color.iter_mut().enumerate() {
+        let shade = ((at.wrapping_mul(0x9e37_79b9) >> 13) & 3) as f32 / 4.0;
+        *color = [shade, 0.5, 1.0 - shade, 1.0];
+    }
+    film
+}
+
+fn exr(film: &Film, compression: Compression) -> Vec<u8> {
+    let options = ExrOptions {
+        compression,
+        ..ExrOptions::default()
+    };
+    encode_exr(film, &options).unwrap().bytes
+}
+
+const fn shape(channels: Channels) -> ImageShape {
+    ImageShape {
+        width: 40,
+        height: 37,
+        channels,
+    }
+}
+
+fn verify(bytes: &[u8], wanted: &ImageShape) -> Result<(), String> {
+    verify_exr(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
+}
+
+/// Every choice of channels.
+fn choices() -> impl Iterator<Item = Channels> {
+    (0..64_u32).map(|bits| Channels {
+        depth: bits & 1 != 0,
+        normal: bits & 2 != 0,
+        position: bits & 4 != 0,
+        velocity: bits & 8 != 0,
+        albedo: bits & 16 != 0,
+        id: bits & 32 != 0,
+    })
+}
+
+#[test]
+fn what_is_written_is_sound() {
+    for channels in choices() {
+        let bytes = exr(&film(40, 37, channels), Compression::Zip);
+        assert_eq!(verify(&bytes, &shape(channels)), Ok(()), "{channels:?}");
+    }
+    for compression in [
+        Compression::None,
+        Compression::Rle,
+        Compression::Zips,
+        Compression::Piz,
+    ] {
+        let bytes = exr(&film(40, 37, Channels::ALL), compression);
+        let verdict = verify(&bytes, &shape(Channels::ALL));
+        assert_eq!(verdict, Ok(()), "{compression:?}");
+    }
+}
+
+#[test]
+fn another_picture_is_a_fault() {
+    let bytes = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
+    let mut wanted = shape(Channels::COLOR);
+    wanted.height = 38;
+    assert_eq!(
+        verify(&bytes, &wanted).unwrap_err(),
+        "is 40x37, 40x38 is wanted"
+    );
+    let wanted = shape(Channels {
+        id: true,
+        ..Channels::COLOR
+    });
+    assert_eq!(
+        verify(&bytes, &wanted).unwrap_err(),
+        "has the channels A (half), B (half), G (half), R (half), \
+         R (half), G (half), B (half), A (half), id.I (uint) are wanted"
+    );
+    let more = exr(&film(40, 37, Channels::ALL), Compression::Zip);
+    assert!(verify(&more, &shape(Channels::COLOR)).is_err());
+}
+
+/// All samples, block by block.
+fn samples(bytes: &[u8]) -> Vec<u8> {
+    let reader = exr::block::read(Cursor::new(bytes), true).unwrap();
+    let meta = reader.meta_data().clone();
+    let chunks = reader.filter_chunks(true, |_, _, _| true).unwrap();
+    chunks
+        .flat_map(|chunk| {
+            UncompressedBlock::decompress_chunk(chunk.unwrap(), &meta, true)
+                .unwrap()
+                .data
+        })
+        .collect()
+}
+
+/// Where the table of offsets begins: blocks follow it to the end of the file.
+fn end_of_header(bytes: &[u8]) -> usize {
+    let reader = exr::block::read(Cursor::new(bytes), true).unwrap();
+    let chunks = reader.all_chunks(true).unwrap().map(Result::unwrap);
+    let lengths = chunks.map(|chunk| match chunk.compressed_block {
+        // With its offset, its row and its length.
+        CompressedBlock::ScanLine(block) => block.compressed_pixels_le.len() + 8 + 4 + 4,
+        other => panic!("{other:?}"),
+    });
+    bytes.len() - lengths.sum::<usize>()
+}
+
+#[test]
+fn flipped_bits_that_change_a_pixel_are_found() {
+    let bytes = exr(&film(40, 37, Channels::ALL), Compression::Zip);
+    let good = samples(&bytes);
+    let start = end_of_header(&bytes);
+    let mut missed = 0;
+    for at in start..bytes.len() {
+        for bit in 0..8 {
+            let mut damaged = bytes.clone();
+            damaged[at] ^= 1 << bit;
+            // The last byte of a block has bits that mean nothing.
+            let is_sound = verify(&damaged, &shape(Channels::ALL)).is_ok();
+            missed += usize::from(is_sound && samples(&damaged) != good);
+        }
+    }
+    // Adler-32 is weak where there are few values: some ways of moving bytes about pass it.
+    let all = 8 * (bytes.len() - start);
+    assert!(missed * 100 < all, "{missed} of {all}");
+}
+
+#[test]
+fn a_file_cut_short_is_found_and_costs_no_memory() {
+    let bytes = exr(&film(40, 37, Channels::ALL), Compression::Piz);
+    for length in 0..bytes.len() {
+        assert!(verify(&bytes[..length], &shape(Channels::ALL)).is_err());
+    }
+    // A picture of absurd size is refused before anything is made for it.
+    let mut huge = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
+    let window = b"dataWindow\0box2i\0";
+    let at = huge
+        .windows(window.len())
+        .position(|w| w == window)
+        .unwrap();
+    let corner = at + window.len() + 4 + 8;
+    huge[corner..corner + 8].copy_from_slice(&[0xff, 0xff, 0xff, 0x0f, 0xff, 0xff, 0xff, 0x0f]);
+    assert!(verify(&huge, &shape(Channels::COLOR)).is_err());
+}
+
+#[test]
+fn previews_are_decoded_to_their_last_byte() {
+    let png = encode_preview(&film(40, 37, Channels::COLOR), &PreviewOptions::default()).unwrap();
+    let verify = |bytes: &[u8], wanted: &ImageShape| {
+        verify_preview(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
+    };
+    let wanted = shape(Channels::COLOR);
+    assert_eq!(verify(&png, &wanted), Ok(()));
+    for at in 0..png.len() {
+        let mut damaged = png.clone();
+        damaged[at] ^= 4;
+        assert!(verify(&damaged, &wanted).is_err(), "byte {at} flipped");
+        assert!(verify(&png[..at], &wanted).is_err(), "cut at byte {at}");
+    }
+    let mut other = wanted;
+    other.width = 41;
+    assert_eq!(
+        verify(&png, &other).unwrap_err(),
+        "is 40x37, 41x37 is wanted"
+    );
+}
