@@ -4,7 +4,7 @@
 //! clocks say of it may be wrong. A simulator that pauses for longer in the middle of a file gives a
 //! frame that cannot be read; once its file changes again, it is tried again.
 
-use std::collections::HashMap;
+use std::collections::{BTreeMap, HashMap};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant, SystemTime};
@@ -27,7 +27,7 @@ struct Seen {
 #[derive(Debug)]
 pub(super) struct Arrivals {
     settle: Duration,
-    seen: HashMap<i64, Seen>,
+    seen: BTreeMap<i64, Seen>,
     /// When something was last seen to change.
     pub(super) changed: Instant,
 }
@@ -37,7 +37,7 @@ impl Arrivals {
     pub(super) fn new(settle: Duration) -> Self {
         Self {
             settle,
-            seen: HashMap::new(),
+            seen: BTreeMap::new(),
             changed: Instant::now(),
         }
     }
@@ -88,7 +88,6 @@ impl Arrivals {
                 frames.push(*frame);
             }
         }
-        frames.sort_unstable();
         frames
     }
 }
