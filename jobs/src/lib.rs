@@ -15,6 +15,7 @@
 
 mod claims;
 mod error;
+pub mod export;
 mod fingerprint;
 mod interrupt;
 mod job;
