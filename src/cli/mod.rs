@@ -21,6 +21,7 @@ mod child;
 mod convert;
 mod disk;
 mod errors;
+mod export;
 mod generate;
 mod init;
 mod inspect;
@@ -68,6 +69,8 @@ enum Command {
     Convert(Box<convert::ConvertArgs>),
     /// Make particles to measure with.
     Generate(generate::GenerateArgs),
+    /// Write a job as work for a cluster (Slurm) or a render farm (Open Job Description).
+    Export(export::ExportArgs),
     /// Measure images per second, build time and memory over particle counts and structures.
     Scale(Box<scale::ScaleArgs>),
     /// Measure one cell for `scale`.
@@ -106,6 +109,7 @@ pub fn main() -> ExitCode {
         Command::Inspect(args) => inspect::run(&args),
         Command::Convert(args) => convert::run(&args),
         Command::Generate(args) => generate::run(&args),
+        Command::Export(args) => export::run(&args),
         Command::Scale(args) => scale::run(&args),
         Command::ScaleCell => scale::measure::run(),
         Command::RenderFrame => render::isolate::run_child(),

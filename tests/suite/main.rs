@@ -7,6 +7,7 @@ mod bad_input;
 mod camera;
 mod convert;
 mod damaged;
+mod export;
 mod golden;
 mod in_place;
 mod memory;
