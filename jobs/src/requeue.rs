@@ -30,7 +30,7 @@ impl Job {
             }
             let mut entry = Entry::new(news.take_seq(), *frame, Status::Failed, &Value::Null);
             entry.reason = Some(reason.clone());
-            writer.append(&entry)?;
+            writer.append(&entry, true)?;
             set_back.push(*frame);
         }
         lock.end();
