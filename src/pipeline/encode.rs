@@ -47,6 +47,10 @@ pub(super) fn write_stage(
         match passed {
             Passed::Frame(frame) => {
                 watch(Event::Entered(frame.task.frame, Stage::Write));
+                if !claim.is_valid() {
+                    let dir = job.state().dir().to_owned();
+                    return Err(JobError::TakenForDead { dir });
+                }
                 let task = frame.task.clone();
                 match write_frame(setup, frame, &mut peaks) {
                     Ok(mut report) => {

@@ -95,6 +95,12 @@ impl Claim {
         Ok(None)
     }
 
+    /// Whether this worker still counts as alive. To be asked before something is made visible: a worker that
+    /// slept while others took over, or began anew with other settings, must not put its image over theirs.
+    pub fn is_valid(&self) -> bool {
+        !self.desk.is_buried() && std::fs::File::open(&self.desk.card_path).is_ok()
+    }
+
     /// What was claimed is over for everybody: clears away the claims of the dead before this one, too.
     pub fn end(mut self) {
         self.is_over = true;

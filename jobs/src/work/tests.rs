@@ -155,10 +155,11 @@ fn what_another_machine_had_is_free_after_a_while_without_signs_of_life() {
 fn who_comes_back_from_the_dead_knows() {
     let dir = tempfile::tempdir().unwrap();
     let a = Desk::take(dir.path(), Duration::from_millis(40)).unwrap();
-    let _claim = mine(a.claim_frame(1).unwrap());
+    let claim = mine(a.claim_frame(1).unwrap());
     let b = desk(dir.path());
-    assert!(is_held(&b, 1));
+    assert!(is_held(&b, 1) && claim.is_valid());
     b.bury(&a.card).unwrap();
+    assert!(!claim.is_valid());
     let _mine = mine(b.claim_frame(1).unwrap());
     while !a.is_buried() {
         thread::yield_now();
