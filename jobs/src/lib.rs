@@ -10,7 +10,7 @@
 //! only grows: one line for each frame that was finished or failed, a file for each worker. Workers claim
 //! frames ([`Claims`]) before they do them. Outputs are published whole
 //! ([`Publisher`]) before their line is written, so a kill at any moment loses at most the frames
-//! in hand.
+//! in hand. [`export`] writes frames as work for other engines.
 #![deny(unsafe_code)]
 
 mod claims;

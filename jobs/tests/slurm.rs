@@ -1,5 +1,4 @@
-//! Scripts for Slurm: what is in them, and what they do under a shell with a Slurm that is played. In a program of
-//! its own: a process that is being started holds the locks of others for a moment.
+//! Scripts for Slurm: what is in them, and what they do under a shell with a Slurm that is played.
 
 use std::num::NonZeroUsize;
 
