@@ -235,14 +235,10 @@ impl Plan {
         if let Some(unchanged) = &self.unchanged {
             // Which frames one of many workers does now, and how, is no property of the job.
             manifest.input.frames = unchanged.input.frames.clone();
+            manifest.job = unchanged.job.clone();
         }
-        if self.is_own_manifest() {
-            if let Some(unchanged) = &self.unchanged {
-                manifest.job = unchanged.job.clone();
-            }
-            if !settled_anew || self.unchanged.as_ref() == Some(&manifest) {
-                return Ok(());
-            }
+        if self.is_own_manifest() && (!settled_anew || self.unchanged.as_ref() == Some(&manifest)) {
+            return Ok(());
         }
         write_if_changed(&path, &manifest.to_commented_toml())?;
         // Its first line refers to this, which is of use to editors alone.
