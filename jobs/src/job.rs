@@ -430,7 +430,7 @@ fn clean(dir: &Path, request: &JobRequest, desk: &Desk) -> Result<(), JobError> 
     dirs.push(dir);
     dirs.sort_unstable();
     dirs.dedup();
-    for dir in dirs {
+    for dir in &dirs {
         match sweep_parts(dir, &at_work) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => {
                 return Err(JobError::io(dir, "removing leftovers of a killed run", e));
@@ -438,6 +438,7 @@ fn clean(dir: &Path, request: &JobRequest, desk: &Desk) -> Result<(), JobError> 
             _ => {}
         }
     }
+    desk.writes_to(dirs.into_iter().map(Path::to_owned).collect());
     Ok(())
 }
 

@@ -236,6 +236,7 @@ impl Plan {
             // Which frames one of many workers does now, and how, is no property of the job.
             manifest.input.frames = unchanged.input.frames.clone();
             manifest.job = unchanged.job.clone();
+            manifest.render.memory_limit = unchanged.render.memory_limit;
         }
         if self.is_own_manifest() && (!settled_anew || self.unchanged.as_ref() == Some(&manifest)) {
             return Ok(());

@@ -4,13 +4,13 @@ use std::collections::HashSet;
 use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use super::claim::{Claim, Claimed};
-use super::files::{cards, list, remove};
+use super::files::{cards, list, remove, sweep_parts};
 use super::{Card, Standing, WORK_DIR, Watch, heart};
 use crate::process::{Process, owner_token};
 
@@ -31,6 +31,8 @@ pub(crate) struct Desk {
     pub(super) text: Vec<u8>,
     pub(super) watch: Watch,
     is_buried: Arc<AtomicBool>,
+    /// Directories in which temporary files are.
+    dirs: OnceLock<Vec<PathBuf>>,
 }
 
 impl Desk {
@@ -58,7 +60,14 @@ impl Desk {
             text,
             watch: Watch::new(patience),
             is_buried,
+            dirs: OnceLock::new(),
         }))
+    }
+
+    /// Tells in which directories workers of this job write, so that who leaves can clear them of what dead
+    /// ones have left.
+    pub(crate) fn writes_to(&self, dirs: Vec<PathBuf>) {
+        let _ = self.dirs.set(dirs);
     }
 
     /// This worker's name.
@@ -125,10 +134,16 @@ impl Drop for Desk {
     fn drop(&mut self) {
         heart::end(&self.card_path);
         let _ = remove(&self.card_path);
-        if let Ok(left) = sweep(&self.work, &self.watch, None)
-            && left.is_empty()
-        {
+        let Ok(mut left) = sweep(&self.work, &self.watch, None) else {
+            return;
+        };
+        if left.is_empty() {
             let _ = fs::remove_dir(&self.work);
+        }
+        // A process may have other jobs.
+        left.insert(owner_token().to_owned());
+        for dir in self.dirs.get().into_iter().flatten() {
+            let _ = sweep_parts(dir, &left);
         }
     }
 }

@@ -28,7 +28,7 @@ pub(super) fn link_alone(card: &Path, to: &Path, text: &[u8]) -> io::Result<bool
 }
 
 /// Makes a file; false if there is one of that name.
-fn create_alone(to: &Path, text: &[u8]) -> io::Result<bool> {
+pub(super) fn create_alone(to: &Path, text: &[u8]) -> io::Result<bool> {
     match OpenOptions::new().write(true).create_new(true).open(to) {
         Ok(mut file) => file.write_all(text).map(|()| true).inspect_err(|_| {
             let _ = fs::remove_file(to);

@@ -225,3 +225,16 @@ fn the_right_to_the_plan_goes_around() {
         }
     });
 }
+
+/// File systems without second names: the claim is a file of its own with the card's first line.
+#[test]
+fn a_claim_without_links_lives_as_long_as_its_worker() {
+    let dir = tempfile::tempdir().unwrap();
+    let (a, b) = (desk(dir.path()), desk(dir.path()));
+    let path = a.work.join("frame.1.0");
+    assert!(files::create_alone(&path, &a.text).unwrap());
+    assert!(!files::create_alone(&path, &b.text).unwrap());
+    assert!(is_held(&b, 1));
+    drop(a);
+    assert!(!is_held(&b, 1));
+}
