@@ -39,7 +39,7 @@ impl Claim {
             let path = desk.work.join(file_name(&name, generation));
             if link_alone(&desk.card_path, &path, &desk.text)? {
                 let claim = Self::of(desk, name, generation);
-                return Ok(match claim.rival()? {
+                return Ok(match claim.rival() {
                     None => Claimed::Mine(claim),
                     Some(rival) => Claimed::Held(rival.told()),
                 });
@@ -49,7 +49,8 @@ impl Claim {
                 Ok(None) => (desk.watch.signs(&path), None),
                 // Given back in between: once more.
                 Err(e) if e.kind() == io::ErrorKind::NotFound => continue,
-                Err(e) => return Err(e),
+                // Whatever it is, it is in the way like a claim that cannot be read.
+                Err(_) => (desk.watch.signs(&path), None),
             };
             match (standing, card) {
                 // A network may lose the answer to a request that was done, and ask again.
@@ -80,19 +81,18 @@ impl Claim {
     /// A living worker with a claim of another generation. There is one if a dead claim, which this one
     /// followed, was cleared away meanwhile and its name taken anew. Both make their claim first and
     /// look then, so at least one of them gives way.
-    fn rival(&self) -> io::Result<Option<Card>> {
+    fn rival(&self) -> Option<Card> {
         let below = (0..self.generation).chain(std::iter::once(self.generation + 1));
         for generation in below {
             let card = match Card::read(&self.path(generation)) {
                 Ok(Some(card)) if card.worker != self.desk.card.worker => card,
-                Err(e) if e.kind() != io::ErrorKind::NotFound => return Err(e),
                 _ => continue,
             };
             if self.desk.watch.standing(&self.desk.work, &card) == Standing::Alive {
-                return Ok(Some(card));
+                return Some(card);
             }
         }
-        Ok(None)
+        None
     }
 
     /// Whether this worker still counts as alive. To be asked before something is made visible: a worker that

@@ -11,11 +11,14 @@ use std::time::{Duration, SystemTime, UNIX_EPOCH};
 
 use super::claim::{Claim, Claimed};
 use super::files::{cards, list, remove, sweep_parts};
-use super::{Card, Standing, WORK_DIR, Watch, heart};
+use super::{CARD, Card, Standing, WORK_DIR, Watch, heart};
 use crate::process::{Process, owner_token};
 
 /// Longest time between signs of life.
 const BEAT: Duration = Duration::from_secs(5);
+
+/// The end of the name of a card that is being written.
+const DRAFT: &str = ".new";
 
 /// The same for the most impatient.
 const SHORTEST_BEAT: Duration = Duration::from_millis(10);
@@ -167,22 +170,32 @@ fn sweep(work: &Path, watch: &Watch, mine: Option<&Card>) -> io::Result<HashSet<
                 others += 1;
                 at_work.extend(card.map(|card| card.process.token));
             }
-            _ => remove(&path)?,
+            // What cannot be removed does no harm.
+            _ => drop(remove(&path)),
         }
     }
     if others == 0 {
-        for path in list(work)? {
+        for path in list(work)?.into_iter().filter(|path| is_ours(path)) {
             let owner = Card::read(&path).ok().flatten();
             if mine.is_none() || owner.as_ref() != mine {
                 // A newcomer's card is not there for long without being seen; its claims come later.
                 let is_new = owner.is_some_and(|c| watch.standing(work, &c) == Standing::Alive);
                 if !is_new {
-                    remove(&path)?;
+                    let _ = remove(&path);
                 }
             }
         }
     }
     Ok(at_work)
+}
+
+/// Whether a file is one that workers make.
+fn is_ours(path: &Path) -> bool {
+    let name = path.file_name().map(|name| name.to_string_lossy());
+    name.is_some_and(|name| {
+        let is_claim = name.starts_with("frame.") || name.starts_with("lock.");
+        is_claim || name.ends_with(CARD) || name.ends_with(DRAFT)
+    })
 }
 
 /// A process may have several jobs open.
@@ -197,7 +210,7 @@ fn worker_name() -> String {
 
 /// Puts the card into the directory, which is made if need be: the last one to leave removes it.
 fn put_card(work: &Path, card_path: &Path, text: &[u8]) -> io::Result<()> {
-    let draft = card_path.with_extension("new");
+    let draft = card_path.with_extension(&DRAFT[1..]);
     let put = || {
         fs::create_dir_all(work)?;
         let mut file = OpenOptions::new()

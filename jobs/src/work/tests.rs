@@ -188,10 +188,15 @@ fn damaged_and_foreign_files_do_no_harm() {
     fs::write(work.join("frame.1.0"), "").unwrap();
     fs::write(work.join("frame.2.0"), [0xff; 9]).unwrap();
     fs::write(work.join("notes.txt"), "mine").unwrap();
+    fs::create_dir(work.join("frame.4.0")).unwrap();
+    fs::create_dir(work.join("folder.worker")).unwrap();
     let a = Desk::take(dir.path(), Duration::from_millis(50)).unwrap();
-    assert!(is_held(&a, 1) && is_held(&a, 2));
+    a.sweep().unwrap();
+    assert!(is_held(&a, 1) && is_held(&a, 2) && is_held(&a, 4));
     thread::sleep(Duration::from_millis(100));
-    assert!(!is_held(&a, 1) && !is_held(&a, 2));
+    assert!(!is_held(&a, 1) && !is_held(&a, 2) && !is_held(&a, 4));
+    a.sweep().unwrap();
+    assert!(work.join("notes.txt").exists() && !work.join("torn.worker").exists());
     assert!(!is_held(&a, 3));
 }
 
