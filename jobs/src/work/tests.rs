@@ -38,22 +38,18 @@ fn names(dir: &Path) -> Vec<String> {
 
 /// A worker that left its card and a claim of `frame`, on another machine.
 fn stranger(dir: &Path, name: &str, frame: i64) -> PathBuf {
-    let mut process: serde_json::Value = serde_json::to_value(Process::this()).unwrap();
-    process["machine"] = "another".into();
-    process["host"] = "elsewhere".into();
-    let card = Card {
-        worker: name.to_owned(),
-        process: serde_json::from_value(process).unwrap(),
-        since_ms: 0,
-        pause_ms: 0,
-    };
-    put(dir, &card, frame)
+    left(dir, name, frame, "machine", "another".into())
 }
 
 /// The same of this machine, ended.
 fn ended(dir: &Path, name: &str, frame: i64) -> PathBuf {
+    left(dir, name, frame, "start", 1.into())
+}
+
+/// What a process would leave that is like this one but for a `field`.
+fn left(dir: &Path, name: &str, frame: i64, field: &str, value: serde_json::Value) -> PathBuf {
     let mut process: serde_json::Value = serde_json::to_value(Process::this()).unwrap();
-    process["start"] = 1.into();
+    process[field] = value;
     let card = Card {
         worker: name.to_owned(),
         process: serde_json::from_value(process).unwrap(),
