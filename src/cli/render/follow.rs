@@ -41,6 +41,12 @@ struct Follower<'a> {
 }
 
 pub(super) fn run(args: &WorkArgs, asked: Asked, signals: &Listener) -> Result<Outcome, CliError> {
+    if let Some(shard) = args.shard {
+        return Err(CliError::other(format!(
+            "--shard {shard} does not go with following: the place of a frame among all is not known before the \
+             last has come; workers share the frames without it"
+        )));
+    }
     let work = &asked.manifest.job;
     let base = asked.absolute_base()?;
     let stop_file = match &work.stop_file {

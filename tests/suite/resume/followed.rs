@@ -75,6 +75,10 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     dam_break(&workshop.join("in"), 3..=3);
     let ran = workshop.run(&arguments(&["--idle", "1"])).expect(0);
     assert_eq!(ran.rendered(), [3]);
+    workshop
+        .run(&arguments(&["--shard", "1/2"]))
+        .expect(2)
+        .tells("--shard 1/2 does not go with following");
     // And what was never there is named.
     fs::remove_dir_all(workshop.join("in")).expect("a directory");
     let options = ["--idle", "0.5", "-o", "never/f.####.exr"];
