@@ -4,6 +4,7 @@
 use std::fs;
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::OnceLock;
+use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
 
@@ -56,13 +57,6 @@ impl Process {
     }
 }
 
-/// What the name of a temporary file says of who writes it.
-pub(crate) fn owner_token() -> &'static str {
-    BEHALF
-        .get()
-        .map_or_else(|| Process::this().token.as_str(), String::as_str)
-}
-
 static BEHALF: OnceLock<String> = OnceLock::new();
 
 /// Temporary files of this process are from now on those of the worker whose [`owner`] this is, which
@@ -71,9 +65,17 @@ pub fn work_on_behalf_of(owner: &str) {
     let _ = BEHALF.set(owner.to_owned());
 }
 
-/// How temporary files of this process are told from those of others.
+/// What the name of a temporary file says of who writes it.
 pub fn owner() -> &'static str {
-    owner_token()
+    BEHALF
+        .get()
+        .map_or_else(|| Process::this().token.as_str(), String::as_str)
+}
+
+/// Milliseconds since 1970 by this machine's clock.
+pub(crate) fn now_ms() -> u64 {
+    let since = SystemTime::now().duration_since(UNIX_EPOCH);
+    since.map_or(0, |t| u64::try_from(t.as_millis()).unwrap_or(u64::MAX))
 }
 
 /// What the system says of a process.

@@ -10,7 +10,7 @@ use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use crate::process::owner_token;
+use crate::process::owner;
 
 /// A file being written. Dropped without [`Publisher::commit`], it leaves nothing behind.
 #[derive(Debug)]
@@ -33,7 +33,7 @@ impl Publisher {
         let mut part = OsString::from(".");
         part.push(name);
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
-        part.push(format!(".{}.{count}.part", owner_token()));
+        part.push(format!(".{}.{count}.part", owner()));
         let part = dst.with_file_name(part);
         let file = OpenOptions::new()
             .read(true)
@@ -252,7 +252,7 @@ mod tests {
         fs::write(dir.path().join(".a.exr.h-1-ff.0.part"), b"dead").unwrap();
         let mut living = Publisher::create(&dir.path().join("b.exr")).unwrap();
         living.write_all(b"x").unwrap();
-        let at_work = [owner_token(), "h-2-ff"].map(str::to_owned).into();
+        let at_work = [owner(), "h-2-ff"].map(str::to_owned).into();
         assert_eq!(sweep_parts(dir.path(), &at_work).unwrap(), 1);
         living.commit().unwrap();
         assert_eq!(names(dir.path()).len(), keep.len() + 1);

@@ -39,6 +39,7 @@ pub use look::{Accelerator, GroundHeight, Image, Material, Render};
 pub use output::{Channel, Compression, Output};
 pub use pattern::OutputPattern;
 pub(crate) use reader::nearest;
+pub(crate) use rebase::without_dots;
 pub use rebase::{named_place, real_dir};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use tree::Override;

@@ -89,7 +89,7 @@ pub fn named_place(path: &Path) -> PathBuf {
 }
 
 /// Without `.` and, where possible, `..`, by the text alone.
-fn without_dots(path: &Path) -> PathBuf {
+pub(crate) fn without_dots(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {
         match component {

@@ -1,10 +1,10 @@
 //! A line of a ledger.
 
-use std::time::{SystemTime, UNIX_EPOCH};
-
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use serde_json::value::RawValue;
+
+use crate::process::now_ms;
 
 /// How a frame ended.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -82,10 +82,9 @@ impl PartialEq for Details {
 impl Entry {
     /// An entry of this moment, to come after all before `seq`.
     pub(crate) fn new(seq: u64, frame: i64, status: Status, details: &Value) -> Self {
-        let since_1970 = SystemTime::now().duration_since(UNIX_EPOCH);
         Self {
             seq,
-            time_ms: since_1970.map_or(0, |t| u64::try_from(t.as_millis()).unwrap_or(u64::MAX)),
+            time_ms: now_ms(),
             frame,
             status,
             outputs: Vec::new(),

@@ -7,12 +7,12 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
-use std::time::{Duration, SystemTime, UNIX_EPOCH};
+use std::time::Duration;
 
 use super::claim::{Claim, Claimed};
 use super::files::{cards, list, remove, sweep_parts};
 use super::{CARD, Card, Standing, WORK_DIR, Watch, heart};
-use crate::process::{Process, owner_token};
+use crate::process::{Process, now_ms, owner};
 
 /// Longest time between signs of life.
 const BEAT: Duration = Duration::from_secs(5);
@@ -47,7 +47,7 @@ impl Desk {
         let card = Card {
             worker: worker_name(),
             process: Process::this().clone(),
-            since_ms: milliseconds(),
+            since_ms: now_ms(),
             pause_ms: u64::try_from(pause.as_millis()).unwrap_or(u64::MAX),
         };
         let mut text = serde_json::to_vec(&card)?;
@@ -144,7 +144,7 @@ impl Drop for Desk {
             let _ = fs::remove_dir(&self.work);
         }
         // A process may have other jobs.
-        left.insert(owner_token().to_owned());
+        left.insert(owner().to_owned());
         for dir in self.dirs.get().into_iter().flatten() {
             let _ = sweep_parts(dir, &left);
         }
@@ -159,7 +159,7 @@ fn sweep(work: &Path, watch: &Watch, mine: Option<&Card>) -> io::Result<HashSet<
     for (path, card) in cards(work)? {
         let standing = match &card {
             Some(card) if Some(card) == mine => {
-                at_work.insert(owner_token().to_owned());
+                at_work.insert(owner().to_owned());
                 continue;
             }
             Some(card) => watch.standing(work, card),
@@ -233,10 +233,4 @@ fn put_card(work: &Path, card_path: &Path, text: &[u8]) -> io::Result<()> {
         }
     }
     put()
-}
-
-/// Milliseconds since 1970.
-fn milliseconds() -> u64 {
-    let since = SystemTime::now().duration_since(UNIX_EPOCH);
-    since.map_or(0, |t| u64::try_from(t.as_millis()).unwrap_or(u64::MAX))
 }

@@ -1,23 +1,14 @@
 //! Paths as other hosts are to see them.
 
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
 use super::super::CliError;
-use crate::manifest::{named_place, real_dir};
+use crate::manifest::{named_place, real_dir, without_dots};
 
 /// The directory `path`, absolute, without `.` and `..`. Links stay: on a cluster a link's name often is what
 /// hosts have in common, and where it leads is not.
 pub(super) fn tidy(path: &Path) -> PathBuf {
-    let mut plain = PathBuf::new();
-    for component in path.components() {
-        match component {
-            Component::CurDir => {}
-            Component::ParentDir => {
-                plain.pop();
-            }
-            other => plain.push(other),
-        }
-    }
+    let plain = without_dots(path);
     // Unless `..` goes past a link.
     let real = real_dir(path);
     if real_dir(&plain) == real {
