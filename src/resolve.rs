@@ -16,6 +16,7 @@ use crate::scene::{
     Background, Bounds, CameraError, ColorMap, Falloff, Ground, Light, Material, PathError, Scene,
     default_lights, material,
 };
+use crate::surface::SurfaceSettings;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
@@ -157,6 +158,8 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
         color,
+        surface: SurfaceSettings::DEFAULT,
+        memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
         accelerator: manifest.render.accelerator.structure(),
         bvh: BvhSettings {
             preset: manifest.render.bvh_preset,

@@ -8,6 +8,7 @@ use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
 use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
+use crate::surface::SurfaceSettings;
 use crate::survey::FrameWeight;
 
 /// Where radii come from.
@@ -63,6 +64,10 @@ pub struct Setup {
     pub scene: Scene,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
+    /// What rays meet.
+    pub surface: SurfaceSettings,
+    /// Most memory that the job may take, bytes; None is what is free.
+    pub memory_limit: Option<u64>,
     /// Who builds the tree; None chooses by the frame.
     pub accelerator: Option<Structure>,
     /// What `bvh` is told.

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     ray::Ray,
-    surface::{Surface, SurfaceHit},
+    surface::{Substance, Surface, SurfaceHit},
 };
 
 /// Centre and radius.
@@ -58,6 +58,8 @@ impl Ball {
                 point: point.as_vec3(),
                 normal: normal.as_vec3(),
                 particle,
+                anchor: point.as_vec3(),
+                substance: Substance::Body,
                 offset: (1e-4 * self.radius).max(8.0 * f32::EPSILON * scale),
             }
         })

@@ -11,6 +11,17 @@ pub trait ShadeSource: Sync {
     /// Base colour, linear RGB.
     fn color(&self, index: u32) -> Vec3;
 
+    /// Base colour of a place between particles: of the weighted mean of what they are coloured by.
+    /// Weights are positive.
+    fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
+        let total: f32 = parts.iter().map(|(_, weight)| weight).sum();
+        let sum: Vec3 = parts
+            .iter()
+            .map(|(i, weight)| *weight * self.color(*i))
+            .sum();
+        sum / total
+    }
+
     /// The number in the `id` channel.
     fn id(&self, index: u32) -> u32;
 

@@ -7,9 +7,11 @@ use glam::Vec3;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod dimming;
+mod settings;
 pub mod spheres;
 
 pub(crate) use dimming::Dimming;
+pub use settings::{NormalKind, SurfaceKind, SurfaceSettings};
 
 /// One meeting of a ray with the surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -25,10 +27,68 @@ pub struct SurfaceHit {
     /// Length to step along the normal (either side) so that the next ray does not meet the same
     /// place again.
     pub offset: f32,
+    /// Where to step from: `point`, unless that lies on a finer surface than rays meet.
+    pub anchor: Vec3,
+    /// What is met.
+    pub substance: Substance,
+}
+
+/// What a surface is the surface of.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Substance {
+    /// What the scene's material says.
+    #[default]
+    Body,
+    /// Foam and spray beside a body: small, white, opaque.
+    Spray,
+}
+
+/// Where a ray is that meets one connected body.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Side {
+    /// In the open.
+    Outside,
+    /// In the body's medium.
+    Inside,
+}
+
+impl Side {
+    /// Where a ray is after it crossed the surface.
+    #[must_use]
+    pub const fn other(self) -> Self {
+        match self {
+            Self::Outside => Self::Inside,
+            Self::Inside => Self::Outside,
+        }
+    }
 }
 
 /// Anything a ray can meet. Answers do not depend on threads or on the accelerator.
 pub trait Surface: Sync {
+    /// Whether all of it bounds one body of one medium, so that rays are on one [`Side`] of it and ask for
+    /// [`Surface::crossing`]. Else each meeting tells by its normal where the ray goes.
+    const ONE_BODY: bool = false;
+
+    /// The first place where a ray that starts on `side` of one body comes to the other side, or meets
+    /// spray; [`Side::Outside`] is what [`Surface::nearest`] takes for granted. A ray that starts on the
+    /// wrong side by rounding crosses at once.
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<SurfaceHit> {
+        let _ = side;
+        self.nearest(ray)
+    }
+
+    /// Where `point` is of one body.
+    fn side_of(&self, point: Vec3) -> Side {
+        let _ = point;
+        Side::Outside
+    }
+
+    /// Gives `each` the particles whose attributes are those of a place on the surface, with positive
+    /// weights of any sum; at least one.
+    fn blend(&self, hit: &SurfaceHit, each: &mut dyn FnMut(u32, f32)) {
+        each(hit.particle, 1.0);
+    }
+
     /// The nearest meeting with distance in `ray.t_min..ray.t_max`; equal distances go to the
     /// lower particle index.
     fn nearest(&self, ray: &Ray) -> Option<SurfaceHit>;

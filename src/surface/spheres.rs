@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use glam::Vec3;
 
-use super::{Dimming, Surface, SurfaceHit};
+use super::{Dimming, Substance, Surface, SurfaceHit};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
@@ -41,6 +41,8 @@ impl<'a> SphereSurface<'a> {
             point,
             normal,
             particle: self.tree.particle(hit.slot),
+            anchor: point,
+            substance: Substance::Body,
             offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
         }
     }
