@@ -38,6 +38,7 @@ pub use builder::{BuildSettings, Structure, TreeBuilder};
 pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
 pub use choose::choose;
 pub use predict::{BuildBytes, predicted_bytes, predicted_stored_bytes};
+pub(crate) use report::PhaseClock;
 pub use report::{BuildReport, Phase};
 pub use sbvh::SbvhSettings;
 pub use spherule_formats::blocks::Aabb;

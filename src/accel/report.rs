@@ -51,20 +51,20 @@ pub struct BuildReport {
 }
 
 /// Wall-clock laps.
-pub(super) struct PhaseClock {
+pub(crate) struct PhaseClock {
     last: Instant,
     phases: Vec<Phase>,
 }
 
 impl PhaseClock {
-    pub(super) fn new() -> Self {
+    pub(crate) fn new() -> Self {
         Self {
             last: Instant::now(),
             phases: Vec::new(),
         }
     }
 
-    pub(super) fn lap(&mut self, name: &'static str) {
+    pub(crate) fn lap(&mut self, name: &'static str) {
         let now = Instant::now();
         self.phases.push(Phase {
             name,
@@ -73,7 +73,7 @@ impl PhaseClock {
         self.last = now;
     }
 
-    pub(super) fn finish(self) -> Vec<Phase> {
+    pub(crate) fn finish(self) -> Vec<Phase> {
         self.phases
     }
 }

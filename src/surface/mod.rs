@@ -7,7 +7,9 @@ use glam::Vec3;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod dimming;
+pub mod field;
 mod settings;
+pub mod smooth;
 pub mod spheres;
 
 pub(crate) use dimming::Dimming;

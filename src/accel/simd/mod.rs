@@ -234,3 +234,37 @@ impl Supported {
         }
     }
 }
+
+/// Arithmetic on plain arrays, which the compiler turns into the instructions of each level. `run` and
+/// all that it calls should be `inline(always)`. Nothing is contracted into fused operations unless it
+/// says so, so every level gives the same bits.
+pub(crate) trait ArrayTask {
+    /// What comes of it.
+    type Output;
+
+    /// Does it.
+    fn run(self) -> Self::Output;
+}
+
+struct OnArrays<T>(T);
+
+impl<T: ArrayTask> KernelTask for OnArrays<T> {
+    type Output = T::Output;
+
+    #[inline(always)]
+    fn run<K: PacketKernel>(self, _: K) -> T::Output {
+        self.0.run()
+    }
+}
+
+/// Compiles [`ArrayTask`]s for the best level of this machine.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct ArrayLanes(Supported);
+
+impl ArrayLanes {
+    /// Does `task`.
+    #[inline]
+    pub(crate) fn run<T: ArrayTask>(self, task: T) -> T::Output {
+        self.0.run(OnArrays(task))
+    }
+}

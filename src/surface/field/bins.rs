@@ -1,0 +1,395 @@
+//! Particles sorted into cubic bins of the kernel's support.
+//!
+//! Only bins that hold particles are kept: rows along x by (z, y), in each row the bins by x, in each bin
+//! the particles. So particles that escaped cost nothing, and the neighbours of a bin are nine runs.
+
+use std::ops::Range;
+
+use glam::Vec3;
+use rayon::prelude::*;
+use spherule_formats::order::partition::scatter;
+
+/// Bins lie within so many of the origin along each axis: three coordinates fit a key of 64 bits.
+const REACH: i32 = 1 << 20;
+/// Particles that a piece of the sort should have.
+const PIECE: usize = 512;
+/// Most pieces of the sort.
+const MAX_PIECES: usize = 1 << 14;
+
+/// A row of bins along x.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Row {
+    pub(crate) z: i32,
+    pub(crate) y: i32,
+    /// Number of its first bin.
+    first: u32,
+}
+
+/// A bin that holds particles.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Bin {
+    pub(crate) x: i32,
+    /// Number of its first particle.
+    pub(crate) start: u32,
+}
+
+/// See the module.
+#[derive(Debug, Default)]
+pub(crate) struct Bins {
+    size: f32,
+    inverse: f32,
+    /// One more than there are: the last one ends the one before.
+    rows: Vec<Row>,
+    /// One more than there are.
+    bins: Vec<Bin>,
+    points: Vec<Vec3>,
+    /// Index in the frame of each point; empty unless asked for.
+    indices: Vec<u32>,
+    lookup: RowLookup,
+    left_out: u64,
+}
+
+/// Where the row at (z, y) is.
+#[derive(Debug, Default)]
+enum RowLookup {
+    /// By binary search: rows lie far apart.
+    #[default]
+    Search,
+    /// In a table over the rectangle of all rows.
+    Table {
+        low: [i32; 2],
+        width: i32,
+        rows: Vec<u32>,
+    },
+}
+
+const NO_ROW: u32 = u32::MAX;
+
+/// The cell of `point` in a grid of cells of edge `1 / inverse`.
+#[inline(always)]
+pub(crate) fn cell_of(point: Vec3, inverse: f32) -> [i32; 3] {
+    [point.x, point.y, point.z].map(|x| floor(x * inverse))
+}
+
+/// The whole number at or below `x`, without the call that plain `floor` is on old processors.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "saturates")]
+pub(crate) fn floor(x: f32) -> i32 {
+    let cut = x as i32;
+    cut - i32::from((cut as f32) > x)
+}
+
+#[inline(always)]
+fn in_reach(cell: [i32; 3]) -> bool {
+    cell.iter().all(|c| (-REACH..REACH).contains(c))
+}
+
+/// Order of bins: by z, then y, then x.
+#[inline(always)]
+fn key(cell: [i32; 3]) -> u64 {
+    let part = |c: i32| u64::from((c + REACH).cast_unsigned());
+    part(cell[2]) << 42 | part(cell[1]) << 21 | part(cell[0])
+}
+
+impl Bins {
+    /// Sorts `centers` into bins of edge `size`. With `keep_indices` the way back is kept, and the order in
+    /// a bin depends on positions alone.
+    pub(crate) fn sort(centers: &[Vec3], size: f32, keep_indices: bool) -> Self {
+        let inverse = 1.0 / size;
+        let (low, high) = cell_bounds(centers, inverse);
+        let mut bins = Self {
+            size,
+            inverse,
+            points: vec![Vec3::ZERO; centers.len()],
+            indices: vec![0; if keep_indices { centers.len() } else { 0 }],
+            ..Self::default()
+        };
+        // The last piece takes what is out of reach.
+        let width = i64::from(high[1]) - i64::from(low[1]) + 1;
+        let rows = (width * (i64::from(high[2]) - i64::from(low[2]) + 1))
+            .max(1)
+            .cast_unsigned();
+        let most = (centers.len() / PIECE).clamp(1, MAX_PIECES) as u64;
+        let rows_each = rows.div_ceil(most);
+        #[expect(clippy::cast_possible_truncation, reason = "at most MAX_PIECES")]
+        let pieces = rows.div_ceil(rows_each) as usize;
+        #[expect(clippy::cast_possible_truncation, reason = "at most MAX_PIECES")]
+        let piece_of = |_: usize, center: Vec3| {
+            let cell = cell_of(center, inverse);
+            if !in_reach(cell) {
+                return pieces;
+            }
+            let (z, y) = (i64::from(cell[2] - low[2]), i64::from(cell[1] - low[1]));
+            ((z * width + y).cast_unsigned() / rows_each) as usize
+        };
+        let cells = scatter(
+            centers,
+            pieces + 1,
+            piece_of,
+            &mut bins.points,
+            &mut bins.indices,
+        );
+        let kept = cells.starts[pieces];
+        let mut slices = cells.slices_of(&mut bins.points, &mut bins.indices);
+        slices.truncate(pieces);
+        let found: Vec<Vec<(u64, u32)>> = slices
+            .into_par_iter()
+            .zip(&cells.starts[..pieces])
+            .map_init(Vec::new, |scratch, ((points, indices), first)| {
+                sort_piece(points, indices, inverse, scratch);
+                bins_of(points, inverse, *first)
+            })
+            .collect();
+        bins.left_out = (centers.len() - kept) as u64;
+        bins.points.truncate(kept);
+        bins.indices.truncate(kept);
+        bins.index(&found);
+        bins
+    }
+
+    /// Makes rows and bins of the keys of all bins with their first particles, in order.
+    fn index(&mut self, found: &[Vec<(u64, u32)>]) {
+        let count = found.iter().map(Vec::len).sum::<usize>();
+        self.bins = Vec::with_capacity(count + 1);
+        self.rows = Vec::new();
+        let part = |key: u64| (key & ((1 << 21) - 1)) as i32 - REACH;
+        let mut before = None;
+        for (key, start) in found.iter().flatten() {
+            if before != Some(key >> 21) {
+                before = Some(key >> 21);
+                let first = index_u32(self.bins.len());
+                self.rows.push(Row {
+                    z: part(key >> 42),
+                    y: part(key >> 21),
+                    first,
+                });
+            }
+            self.bins.push(Bin {
+                x: part(*key),
+                start: *start,
+            });
+        }
+        self.lookup = RowLookup::of(&self.rows);
+        self.rows.push(Row {
+            z: i32::MAX,
+            y: i32::MAX,
+            first: index_u32(self.bins.len()),
+        });
+        self.bins.push(Bin {
+            x: i32::MAX,
+            start: index_u32(self.points.len()),
+        });
+    }
+
+    /// Edge of a bin.
+    pub(crate) fn size(&self) -> f32 {
+        self.size
+    }
+
+    /// Particles too far away to be sorted in.
+    pub(crate) fn left_out(&self) -> u64 {
+        self.left_out
+    }
+
+    /// Particles in order.
+    pub(crate) fn points(&self) -> &[Vec3] {
+        &self.points
+    }
+
+    /// Their indices in the frame; empty unless kept.
+    pub(crate) fn indices(&self) -> &[u32] {
+        &self.indices
+    }
+
+    /// Rows.
+    pub(crate) fn row_count(&self) -> usize {
+        self.rows.len().saturating_sub(1)
+    }
+
+    /// Bins that hold particles.
+    pub(crate) fn bin_count(&self) -> usize {
+        self.bins.len().saturating_sub(1)
+    }
+
+    /// A row.
+    pub(crate) fn row(&self, row: usize) -> Row {
+        self.rows[row]
+    }
+
+    /// Numbers of the bins of a row.
+    #[inline]
+    pub(crate) fn bins_in(&self, row: usize) -> Range<usize> {
+        self.rows[row].first as usize..self.rows[row + 1].first as usize
+    }
+
+    /// A bin.
+    #[inline]
+    pub(crate) fn bin(&self, bin: usize) -> Bin {
+        self.bins[bin]
+    }
+
+    /// Numbers of the particles in a run of bins.
+    #[inline]
+    pub(crate) fn particles_in(&self, bins: Range<usize>) -> Range<usize> {
+        self.bins[bins.start].start as usize..self.bins[bins.end].start as usize
+    }
+
+    /// The cell of a point.
+    #[inline]
+    pub(crate) fn cell_of(&self, point: Vec3) -> [i32; 3] {
+        cell_of(point, self.inverse)
+    }
+
+    /// The number of the row at (z, y).
+    #[inline]
+    pub(crate) fn row_at(&self, z: i32, y: i32) -> Option<usize> {
+        match &self.lookup {
+            RowLookup::Search => {
+                let rows = &self.rows[..self.row_count()];
+                rows.binary_search_by_key(&(z, y), |row| (row.z, row.y))
+                    .ok()
+            }
+            RowLookup::Table { low, width, rows } => {
+                let (z, y) = (z.wrapping_sub(low[1]), y.wrapping_sub(low[0]));
+                if y < 0 || y >= *width || z < 0 {
+                    return None;
+                }
+                let place = z as usize * *width as usize + y as usize;
+                let row = *rows.get(place)?;
+                (row != NO_ROW).then_some(row as usize)
+            }
+        }
+    }
+
+    /// The bins of the row at (z, y) with x in `xs`.
+    #[inline]
+    pub(crate) fn run(&self, z: i32, y: i32, xs: Range<i32>) -> Range<usize> {
+        let Some(row) = self.row_at(z, y) else {
+            return 0..0;
+        };
+        let all = self.bins_in(row);
+        let bins = &self.bins[all.clone()];
+        let from = bins.partition_point(|bin| bin.x < xs.start);
+        let len = bins[from..].iter().take_while(|bin| bin.x < xs.end).count();
+        all.start + from..all.start + from + len
+    }
+
+    /// Bytes of all of it.
+    pub(crate) fn byte_len(&self) -> u64 {
+        let lookup = match &self.lookup {
+            RowLookup::Search => 0,
+            RowLookup::Table { rows, .. } => size_of_val(&rows[..]),
+        };
+        (size_of_val(&self.rows[..])
+            + size_of_val(&self.bins[..])
+            + size_of_val(&self.points[..])
+            + size_of_val(&self.indices[..])
+            + lookup) as u64
+    }
+}
+
+impl RowLookup {
+    fn of(rows: &[Row]) -> Self {
+        let bounds = |of: fn(&Row) -> i32| {
+            let all = || rows.iter().map(of);
+            (all().min().unwrap_or(0), all().max().unwrap_or(0))
+        };
+        let ((low_y, high_y), (low_z, high_z)) = (bounds(|r| r.y), bounds(|r| r.z));
+        let width = high_y - low_y + 1;
+        let area = i64::from(width) * i64::from(high_z - low_z + 1);
+        if area > 8 * rows.len() as i64 + 4096 {
+            return Self::Search;
+        }
+        let place =
+            |row: &Row| (row.z - low_z) as usize * width as usize + (row.y - low_y) as usize;
+        #[expect(
+            clippy::cast_possible_truncation,
+            reason = "compared with the rows above"
+        )]
+        let mut table = vec![NO_ROW; area as usize];
+        for (number, row) in (0..).zip(rows) {
+            table[place(row)] = number;
+        }
+        Self::Table {
+            low: [low_y, low_z],
+            width,
+            rows: table,
+        }
+    }
+}
+
+fn cell_bounds(centers: &[Vec3], inverse: f32) -> ([i32; 3], [i32; 3]) {
+    let join = |(a, b): ([i32; 3], [i32; 3]), (c, d): ([i32; 3], [i32; 3])| {
+        (
+            std::array::from_fn(|i| a[i].min(c[i])),
+            std::array::from_fn(|i| b[i].max(d[i])),
+        )
+    };
+    let none = ([i32::MAX; 3], [i32::MIN; 3]);
+    let (low, high) = centers
+        .par_chunks(1 << 16)
+        .map(|chunk| {
+            let cells = chunk.iter().map(|center| cell_of(*center, inverse));
+            cells
+                .filter(|cell| in_reach(*cell))
+                .fold(none, |all, cell| join(all, (cell, cell)))
+        })
+        .reduce(|| none, join);
+    if low[0] > high[0] {
+        ([0; 3], [0; 3])
+    } else {
+        (low, high)
+    }
+}
+
+/// What sorting a piece needs for each particle: bin, place before.
+type Keyed = (u64, u32, Vec3, u32);
+
+/// Sorts by bin. Where indices are kept, particles of a bin are sorted by position, so that sums over them
+/// do not depend on the order of the file.
+fn sort_piece(points: &mut [Vec3], indices: &mut [u32], inverse: f32, scratch: &mut Vec<Keyed>) {
+    scratch.clear();
+    scratch.extend((0..).zip(points.iter()).map(|(place, point)| {
+        let index = indices.get(place as usize).copied().unwrap_or(0);
+        (key(cell_of(*point, inverse)), place, *point, index)
+    }));
+    if indices.is_empty() {
+        scratch.sort_unstable_by_key(|(key, place, ..)| (*key, *place));
+    } else {
+        scratch.sort_unstable_by(|a, b| {
+            let by_position = || {
+                let pairs = a.2.to_array().into_iter().zip(b.2.to_array());
+                pairs.fold(std::cmp::Ordering::Equal, |order, (p, q)| {
+                    order.then(p.total_cmp(&q))
+                })
+            };
+            a.0.cmp(&b.0).then_with(by_position).then(a.3.cmp(&b.3))
+        });
+    }
+    for (point, sorted) in points.iter_mut().zip(scratch.iter()) {
+        *point = sorted.2;
+    }
+    for (index, sorted) in indices.iter_mut().zip(scratch.iter()) {
+        *index = sorted.3;
+    }
+}
+
+/// Key and first particle of each bin of a sorted piece that begins at particle `first`.
+fn bins_of(points: &[Vec3], inverse: f32, first: usize) -> Vec<(u64, u32)> {
+    let mut bins: Vec<(u64, u32)> = Vec::new();
+    for (number, point) in (first..).zip(points) {
+        let key = key(cell_of(*point, inverse));
+        if bins.last().is_none_or(|(last, _)| *last != key) {
+            bins.push((key, index_u32(number)));
+        }
+    }
+    bins
+}
+
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "frames have at most 2^32 - 1 particles"
+)]
+fn index_u32(index: usize) -> u32 {
+    index as u32
+}

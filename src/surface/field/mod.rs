@@ -1,0 +1,83 @@
+//! The SPH colour field of a frame: `phi(x) = sum_j V_j W(x - x_j)` with `V_j = 1 / sum_k W(x_j - x_k)`
+//! (Müller, Charypar and Gross 2003, eq. 12, with masses cancelled): about 1 inside, 0 outside, and 1 in the
+//! middle of a particle that is alone, so that no drop vanishes.
+//!
+//! Sums that decide bits elsewhere are exact: each term is rounded to a multiple of a power of two that is
+//! small, but large enough for the sum to fit f32. So they do not depend on the order of particles.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use glam::Vec3;
+
+pub(crate) mod bins;
+mod density;
+pub(crate) mod kernel;
+mod query;
+
+use bins::Bins;
+
+/// Terms of the field are multiples of 2^-20, exact for sums below 16.
+const FIELD_ROUNDING: f32 = 12.0;
+
+/// `term` as a multiple of 2^-20.
+#[inline(always)]
+pub(crate) fn rounded(term: f32) -> f32 {
+    (term + FIELD_ROUNDING) - FIELD_ROUNDING
+}
+
+/// The particles of a frame, sorted, with the volumes of those that the field was asked for.
+#[derive(Debug, Default)]
+pub struct FieldParticles {
+    bins: Bins,
+    /// Volume of each particle in units of the inverse of the kernel in the middle: at most 1, which is a
+    /// particle alone. 0 where it was not asked for.
+    volumes: Vec<f32>,
+}
+
+impl FieldParticles {
+    /// Sorts `centers` for a kernel of `support` and finds all volumes. Indices are kept for
+    /// [`Self::nearest`] and [`Self::neighbours`].
+    pub fn new(centers: &[Vec3], support: f32) -> Self {
+        let mut field = Self::sorted(centers, support, true);
+        field.find_volumes(None);
+        field
+    }
+
+    /// Sorts `centers`; no volumes yet.
+    pub(crate) fn sorted(centers: &[Vec3], support: f32, keep_indices: bool) -> Self {
+        Self {
+            bins: Bins::sort(centers, support, keep_indices),
+            volumes: Vec::new(),
+        }
+    }
+
+    /// Finds the volumes of the particles in the bins of `wanted`, or of all.
+    pub(crate) fn find_volumes(&mut self, wanted: Option<&[AtomicBool]>) {
+        let is_wanted =
+            |bin: usize| wanted.is_none_or(|wanted| wanted[bin].load(Ordering::Relaxed));
+        self.volumes = density::volumes(&self.bins, is_wanted);
+    }
+
+    /// Where the kernel ends.
+    pub fn support(&self) -> f32 {
+        self.bins.size()
+    }
+
+    /// The sorted particles.
+    pub(crate) fn bins(&self) -> &Bins {
+        &self.bins
+    }
+
+    /// Volume of each, in the order of the bins.
+    pub(crate) fn volumes(&self) -> &[f32] {
+        &self.volumes
+    }
+
+    /// Bytes of all of it.
+    pub fn byte_len(&self) -> u64 {
+        self.bins.byte_len() + size_of_val(&self.volumes[..]) as u64
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,208 @@
+//! The isosurface of the particles' SPH colour field, cast without a mesh.
+//!
+//! The field is sampled where the surface passes: in bricks of 8x8x8 voxels that lie at multiples of their edge,
+//! so that it does not swim from frame to frame. Particles in company are blurred on that grid, lonely ones are
+//! left as they are, so that bumps go and drops stay. Rays step through a sparse tree of bricks and solve
+//! for the crossing in the voxel. Exactly, crossing and normal are then taken from the particles.
+
+use glam::Vec3;
+
+use super::field::FieldParticles;
+use super::{Dimming, Side, Substance, Surface, SurfaceHit, SurfaceSettings};
+use crate::accel::simd::{ArrayLanes, ArrayTask};
+use crate::ray::Ray;
+
+mod blocks;
+mod blur;
+mod brick;
+mod build;
+mod exact;
+mod layout;
+mod raw;
+mod root;
+mod tree;
+
+use build::Built;
+pub use build::{SmoothError, SmoothReport};
+use tree::Meeting;
+
+/// Step off the surface in voxels: beyond the rounding of places in it.
+const OFFSET: f32 = 0.01;
+/// Step off the surface in units of the rounding of the largest coordinate involved.
+const OFFSET_OF_ROUNDING: f32 = 16.0 * f32::EPSILON;
+
+/// The surface of a frame. Its memory is let go for the next one.
+#[derive(Debug, Default)]
+pub struct SmoothGrid {
+    built: Built,
+    exact: bool,
+}
+
+impl SmoothGrid {
+    /// Builds the surface of particles with `centers` and one `radius`. With `keep_particles` it can tell which
+    /// particles are near a place. `memory_left` bytes may be taken.
+    ///
+    /// # Errors
+    /// [`SmoothError::TooLarge`] before anything large is made.
+    pub fn build(
+        &mut self,
+        centers: &[Vec3],
+        radius: f32,
+        settings: &SurfaceSettings,
+        keep_particles: bool,
+        memory_left: Option<u64>,
+    ) -> Result<SmoothReport, SmoothError> {
+        // Before the next one is made.
+        self.built = Built::default();
+        self.exact = settings.exact;
+        let (made, report) = build::build(centers, radius, settings, keep_particles, memory_left)?;
+        self.built = made;
+        Ok(report)
+    }
+
+    /// As rays see it.
+    pub fn surface(&self) -> SmoothSurface<'_> {
+        SmoothSurface {
+            built: &self.built,
+            exact: self.exact,
+            lanes: ArrayLanes::default(),
+        }
+    }
+
+    /// Box of the surface.
+    pub fn bounds(&self) -> [Vec3; 2] {
+        self.built.tree.bounds()
+    }
+}
+
+/// See the module.
+#[derive(Debug, Clone, Copy)]
+pub struct SmoothSurface<'a> {
+    built: &'a Built,
+    exact: bool,
+    lanes: ArrayLanes,
+}
+
+/// A crossing, compiled for the machine.
+struct Cross<'a> {
+    surface: &'a SmoothSurface<'a>,
+    ray: &'a Ray,
+    from: Side,
+}
+
+impl ArrayTask for Cross<'_> {
+    type Output = Option<SurfaceHit>;
+
+    #[inline(always)]
+    fn run(self) -> Option<SurfaceHit> {
+        let tree = &self.surface.built.tree;
+        let meeting = tree.first_crossing(self.ray, self.from)?;
+        Some(self.surface.hit(self.ray, &meeting, self.from))
+    }
+}
+
+/// Whether there is any crossing.
+struct Occlude<'a> {
+    surface: &'a SmoothSurface<'a>,
+    ray: &'a Ray,
+}
+
+impl ArrayTask for Occlude<'_> {
+    type Output = bool;
+
+    #[inline(always)]
+    fn run(self) -> bool {
+        let tree = &self.surface.built.tree;
+        tree.first_crossing(self.ray, Side::Outside).is_some()
+    }
+}
+
+impl SmoothSurface<'_> {
+    #[inline(always)]
+    fn hit(&self, ray: &Ray, meeting: &Meeting, from: Side) -> SurfaceHit {
+        let tree = &self.built.tree;
+        let point = ray.at(meeting.t);
+        let against = match from {
+            Side::Outside => -ray.direction,
+            Side::Inside => ray.direction,
+        };
+        let gradient = meeting
+            .brick
+            .map(|(brick, place)| tree.bricks[brick as usize].gradient(place));
+        let normal = gradient
+            .and_then(|gradient| (-gradient).try_normalize())
+            .unwrap_or(against);
+        let largest = point.abs().max(ray.origin.abs()).max_element();
+        let hit = SurfaceHit {
+            t: meeting.t,
+            point,
+            normal,
+            particle: 0,
+            offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
+            anchor: point,
+            substance: Substance::Body,
+        };
+        match (&self.built.field, &self.built.layout) {
+            (Some(field), Some(layout)) if self.exact => exact::refined(field, layout, ray, hit),
+            _ => hit,
+        }
+    }
+
+    fn field(&self) -> Option<&FieldParticles> {
+        self.built.field.as_ref()
+    }
+}
+
+impl Surface for SmoothSurface<'_> {
+    const ONE_BODY: bool = true;
+
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.crossing(ray, Side::Outside)
+    }
+
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<SurfaceHit> {
+        self.lanes.run(Cross {
+            surface: self,
+            ray,
+            from: side,
+        })
+    }
+
+    fn side_of(&self, point: Vec3) -> Side {
+        self.built.tree.side_of(point)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.lanes.run(Occlude { surface: self, ray })
+    }
+
+    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
+        let mut dimming = Dimming::default();
+        let mut side = self.side_of(ray.at(ray.t_min));
+        let mut rest = *ray;
+        while let Some(hit) = self.crossing(&rest, side) {
+            if !dimming.by(kept(hit.normal.dot(ray.direction).abs())) {
+                break;
+            }
+            rest.t_min = hit.t + hit.offset;
+            side = side.other();
+        }
+        dimming.product()
+    }
+
+    fn blend(&self, hit: &SurfaceHit, each: &mut dyn FnMut(u32, f32)) {
+        let mut found = false;
+        if let Some(field) = self.field() {
+            field.neighbours(hit.point, &mut |index, part| {
+                found = true;
+                each(index, part);
+            });
+        }
+        if !found {
+            each(hit.particle, 1.0);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
