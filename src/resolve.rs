@@ -5,26 +5,31 @@ use spherule_formats::native::Access;
 
 use crate::accel::BvhSettings;
 use crate::manifest::{
-    Background as BackgroundSetting, ColorSetting, Falloff as FalloffSetting, GroundHeight,
-    LightKind, Manifest, RadiusSetting,
+    AutoLength, Background as BackgroundSetting, ColorSetting, Falloff as FalloffSetting,
+    GroundHeight, GroundPattern, LightKind, Manifest, RadiusSetting,
 };
 use crate::output::{Compression, ExrOptions, PreviewOptions};
 use crate::pipeline::{ColorRule, FrameSize, MemoryModel, RadiusRule, Setup, attribute_list};
 use crate::render::{Channels, RenderSettings};
 use crate::report::memory::available;
 use crate::scene::{
-    Background, Bounds, CameraError, ColorMap, Falloff, Ground, Light, Material, PathError, Scene,
+    Background, Bounds, CameraError, Checker, ColorMap, Falloff, Ground, Light, PathError, Scene,
     default_lights, material,
 };
-use crate::surface::SurfaceSettings;
+use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
+mod surface;
 
 pub use camera::check_views;
 
 /// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
 const LEAST_RADIUS: f64 = 1e-6;
+
+/// About this part of the bounds' diagonal is the edge of a square on the floor: some can be counted
+/// through the particles, and none is a few pixels.
+const TILE: f64 = 1.0 / 16.0;
 
 /// Why there can be no pictures.
 #[derive(Debug, thiserror::Error)]
@@ -113,6 +118,7 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
 pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError> {
+    let surface = surface::settings(manifest)?;
     let radius = radius_rule(manifest, survey)?;
     check_radius(&radius)?;
     let color = color_rule(manifest, survey)?;
@@ -132,14 +138,23 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     } else {
         lights(manifest, survey.origin)
     };
+    let mut ground = ground(manifest, &bounds, up, survey.origin);
+    if surface.kind != SurfaceKind::Spheres
+        && manifest.render.ground_height == GroundHeight::Auto
+        && let Some(ground) = &mut ground
+    {
+        // Through the lowest centres: a body that only touched the floor would lie on a film of air, which
+        // mirrors all that comes from the side.
+        ground.raise(narrow(reach.x));
+    }
     let scene = Scene {
         origin: survey.origin,
         camera,
         lights,
         ambient_light: crate::scene::DEFAULT_AMBIENT_LIGHT,
-        material: surface_material(manifest),
+        material: surface::material(manifest, &bounds),
         background: background(manifest, up.as_vec3()),
-        ground: ground(manifest, &bounds, up, survey.origin),
+        ground,
     };
     let output = &manifest.output;
     let channels = Channels::from_names(output.channels.iter().map(|c| c.name())).map_err(|e| {
@@ -158,7 +173,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
         color,
-        surface: SurfaceSettings::DEFAULT,
+        surface,
         memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
         accelerator: manifest.render.accelerator.structure(),
         bvh: BvhSettings {
@@ -343,19 +358,6 @@ fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
         .collect()
 }
 
-fn surface_material(manifest: &Manifest) -> Material {
-    let m = &manifest.material;
-    Material {
-        ambient: m.ambient,
-        diffuse: m.diffuse,
-        specular: m.specular,
-        shininess: m.shininess,
-        ior: m.ior,
-        reflection: m.reflection,
-        transmission: m.transmission,
-    }
-}
-
 fn background(manifest: &Manifest, up: Vec3) -> Background {
     match &manifest.render.background {
         BackgroundSetting::Auto => Background::default_for(up),
@@ -380,6 +382,15 @@ fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Opt
         ground.height = relative;
     }
     ground.color = Vec3::from_array(render.ground_color);
+    ground.checker = match render.ground_pattern {
+        GroundPattern::Plain => None,
+        GroundPattern::Checker => Some(Checker {
+            tile: match render.ground_tile {
+                AutoLength::Length(tile) => narrow(tile),
+                AutoLength::Auto => surface::round(bounds.diagonal() * TILE),
+            },
+        }),
+    };
     Some(ground)
 }
 

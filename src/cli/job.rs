@@ -11,7 +11,7 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 
 use super::CliError;
 use super::job_args::JobArgs;
-use crate::manifest::{Manifest, Override};
+use crate::manifest::{Look, Manifest, Override};
 
 /// What can be said on the command line about the pictures. Every key of the manifest has
 /// `--set`; the usual ones have a flag.
@@ -62,6 +62,21 @@ pub(super) struct ManifestArgs {
     /// A ground plane under the particles.
     #[arg(long)]
     pub(super) ground: bool,
+    /// A look, for everything that is not said otherwise: water.
+    #[arg(long, value_name = "NAME")]
+    pub(super) look: Option<String>,
+    /// What rays meet: spheres, medium (overlapping spheres as one body) or smooth.
+    #[arg(long, value_name = "NAME")]
+    pub(super) surface: Option<String>,
+    /// How much a smooth surface is smoothed: 0 (every particle shows) to 1 (calm water).
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    pub(super) smoothing: Option<f64>,
+    /// The exact surface of the SPH field, without smoothing.
+    #[arg(long)]
+    pub(super) exact_surface: bool,
+    /// Particles with few neighbours are small white spheres beside the surface.
+    #[arg(long)]
+    pub(super) spray: bool,
     /// Read native frames instead of mapping them: where files may be cut short while they are used.
     #[arg(long)]
     pub(super) no_mmap: bool,
@@ -171,6 +186,7 @@ impl ManifestArgs {
         for (key, value, shown) in [
             ("input.up", &self.up, "--up"),
             ("render.accelerator", &self.accelerator, "--accelerator"),
+            ("render.surface", &self.surface, "--surface"),
         ] {
             if let Some(value) = value {
                 list.push(over(key, value.clone(), shown)?);
@@ -201,11 +217,21 @@ impl ManifestArgs {
                 list.push(over(key, value.clone(), shown)?);
             }
         }
-        if self.ground {
-            list.push(over("render.ground", true, "--ground")?);
+        if let Some(smoothing) = self.smoothing {
+            list.push(over("surface.smoothing", smoothing, "--smoothing")?);
         }
-        if self.no_mmap {
-            list.push(over("input.mmap", false, "--no-mmap")?);
+        for (asked, key, value, shown) in [
+            (self.ground, "render.ground", true, "--ground"),
+            (self.exact_surface, "surface.exact", true, "--exact-surface"),
+            (self.spray, "surface.spray", true, "--spray"),
+            (self.no_mmap, "input.mmap", false, "--no-mmap"),
+        ] {
+            if asked {
+                list.push(over(key, value, shown)?);
+            }
+        }
+        if let Some(look) = &self.look {
+            list.extend(Look::named(look).map_err(CliError::Other)?.settings());
         }
         self.job.add_overrides(list, from_file)?;
         for assignment in &self.set {

@@ -66,6 +66,12 @@ pub(super) fn rgb(field: &Field<'_>) -> Option<[f32; 3]> {
     field.or_wants(as_rgb(field), "three numbers from 0, as [0.6, 0.7, 0.9]")
 }
 
+/// The same, up to 1.
+pub(super) fn rgb_to_1(field: &Field<'_>) -> Option<[f32; 3]> {
+    let color = as_rgb(field).filter(|color| color.iter().all(|c| *c <= 1.0));
+    field.or_wants(color, "three numbers from 0 to 1, as [0.6, 0.9, 0.95]")
+}
+
 fn as_rgb(field: &Field<'_>) -> Option<[f32; 3]> {
     let color = field.as_numbers::<3>()?.map(narrow);
     let holds = |c: &f32| c.is_finite() && *c >= 0.0;

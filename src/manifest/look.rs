@@ -1,13 +1,15 @@
-//! `[image]`, `[render]` and `[material]`: how large, how traced, and made of what.
+//! `[image]` and `[render]`: how large, and how traced.
 
-use super::color::{Background, ColorSetting, rgb};
+use super::color::{Background, rgb};
+use super::length::AutoLength;
 use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml, described};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::Bytes;
-use crate::scene::{self, ground};
+use crate::scene::ground;
+use crate::surface::SurfaceKind;
 
 /// `[image]`.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -55,6 +57,16 @@ pub enum GroundHeight {
     At(f64),
 }
 
+named! {
+    /// What is painted on the ground.
+    GroundPattern {
+        /// Nothing.
+        Plain = "plain",
+        /// Squares, every other one darker.
+        Checker = "checker",
+    }
+}
+
 /// `[render]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Render {
@@ -76,29 +88,12 @@ pub struct Render {
     pub ground_height: GroundHeight,
     /// Linear RGB.
     pub ground_color: [f32; 3],
+    /// What is painted on it.
+    pub ground_pattern: GroundPattern,
+    /// Edge of the pattern's squares.
+    pub ground_tile: AutoLength,
     /// Most memory to take; None is what is free.
     pub memory_limit: Option<Bytes>,
-}
-
-/// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Material {
-    /// The particles' colour.
-    pub color: ColorSetting,
-    /// Weight of light from everywhere.
-    pub ambient: f32,
-    /// Weight of light that is scattered.
-    pub diffuse: f32,
-    /// Weight of highlights.
-    pub specular: f32,
-    /// Exponent of highlights.
-    pub shininess: f32,
-    /// Index of refraction.
-    pub ior: f32,
-    /// Weight of what is mirrored, 0 to 1, times what Fresnel says.
-    pub reflection: f32,
-    /// Weight of what shows through, 0 to 1; 0 is opaque.
-    pub transmission: f32,
 }
 
 impl Default for Image {
@@ -123,31 +118,9 @@ impl Default for Render {
             ground: false,
             ground_height: GroundHeight::Auto,
             ground_color: ground::DEFAULT_COLOR.to_array(),
+            ground_pattern: GroundPattern::Plain,
+            ground_tile: AutoLength::Auto,
             memory_limit: None,
-        }
-    }
-}
-
-impl Default for Material {
-    fn default() -> Self {
-        let scene::Material {
-            ambient,
-            diffuse,
-            specular,
-            shininess,
-            ior,
-            reflection,
-            transmission,
-        } = scene::Material::DEFAULT;
-        Self {
-            color: ColorSetting::Auto,
-            ambient,
-            diffuse,
-            specular,
-            shininess,
-            ior,
-            reflection,
-            transmission,
         }
     }
 }
@@ -173,6 +146,7 @@ impl Image {
 }
 
 impl Render {
+    /// Reads what is left of the section after the surface.
     pub(super) fn read(mut section: Section<'_>) -> Self {
         let default = Self::default();
         let render = Self {
@@ -208,14 +182,23 @@ impl Render {
                     .map(GroundHeight::At)
             }),
             ground_color: section.value("ground_color", default.ground_color, rgb),
+            ground_pattern: section.value("ground_pattern", default.ground_pattern, |f| {
+                f.choice(GroundPattern::ALL)
+            }),
+            ground_tile: section.value("ground_tile", default.ground_tile, AutoLength::read),
             memory_limit: section.optional("memory_limit", read_size),
         };
         section.finish();
         render
     }
 
-    pub(super) fn entries(&self, out: &mut Entries) {
+    pub(super) fn entries(&self, surface: SurfaceKind, out: &mut Entries) {
         out.section("render");
+        out.put(
+            "surface",
+            &surface,
+            "spheres | medium (one body of overlapping spheres) | smooth (of the SPH field)",
+        );
         out.put(
             "accelerator",
             &self.accelerator,
@@ -267,6 +250,16 @@ impl Render {
             "auto, or a height along input.up",
         );
         out.put("ground_color", &self.ground_color, "linear RGB");
+        out.put(
+            "ground_pattern",
+            &self.ground_pattern,
+            "plain | checker (every other square darker)",
+        );
+        out.put(
+            "ground_tile",
+            &self.ground_tile,
+            "edge of a square: auto, or a length",
+        );
         out.maybe(
             "memory_limit",
             self.memory_limit.as_ref(),
@@ -343,51 +336,5 @@ impl Toml for GroundHeight {
             Self::Auto => "auto".toml(),
             Self::At(height) => height.toml(),
         }
-    }
-}
-
-impl Material {
-    pub(super) fn read(mut section: Section<'_>) -> Self {
-        let default = Self::default();
-        let from_0 = |f: &Field<'_>| f.number32("a number from 0", |v| v >= 0.0);
-        let above_0 = |f: &Field<'_>| f.number32("a number above 0", |v| v > 0.0);
-        let weight =
-            |f: &Field<'_>| f.number32("a number from 0 to 1", |v| (0.0..=1.0).contains(&v));
-        let material = Self {
-            color: section.value("color", default.color, ColorSetting::read),
-            ambient: section.value("ambient", default.ambient, from_0),
-            diffuse: section.value("diffuse", default.diffuse, from_0),
-            specular: section.value("specular", default.specular, from_0),
-            shininess: section.value("shininess", default.shininess, above_0),
-            ior: section.value("ior", default.ior, above_0),
-            reflection: section.value("reflection", default.reflection, weight),
-            transmission: section.value("transmission", default.transmission, weight),
-        };
-        section.finish();
-        material
-    }
-
-    pub(super) fn entries(&self, out: &mut Entries) {
-        out.section("material");
-        out.put(
-            "color",
-            &self.color,
-            "auto (by speed), linear RGB, or { attribute = \"velocity\", map = \"viridis\", range = [0.0, 4.0] }",
-        );
-        out.put("ambient", &self.ambient, "light from everywhere");
-        out.put("diffuse", &self.diffuse, "scattered light");
-        out.put("specular", &self.specular, "highlights");
-        out.put("shininess", &self.shininess, "exponent of highlights");
-        out.put("ior", &self.ior, "index of refraction; water is 1.33");
-        out.put(
-            "reflection",
-            &self.reflection,
-            "0 to 1, times the Fresnel term",
-        );
-        out.put(
-            "transmission",
-            &self.transmission,
-            "0 (opaque) to 1, times the rest of the Fresnel term",
-        );
     }
 }

@@ -7,6 +7,8 @@
 use std::fmt;
 use std::path::Path;
 
+use crate::surface::SurfaceSettings;
+
 use reader::{Problem, Problems, Section};
 use tree::{Node, Place};
 use write::Entries;
@@ -14,15 +16,19 @@ use write::Entries;
 mod camera;
 mod color;
 mod input;
+mod length;
 mod light;
 mod look;
+mod material;
 mod output;
 mod pattern;
 #[cfg(test)]
 mod places_tests;
+mod preset;
 mod reader;
 mod rebase;
 mod schema;
+mod surface;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -34,10 +40,13 @@ mod write;
 pub use camera::{Camera, CameraKey, CameraMode};
 pub use color::{Background, ColorMap, ColorSetting};
 pub use input::{Input, RadiusSetting, UpAxis};
+pub use length::AutoLength;
 pub use light::{Falloff, Light, LightKind};
-pub use look::{Accelerator, GroundHeight, Image, Material, Render};
+pub use look::{Accelerator, GroundHeight, GroundPattern, Image, Render};
+pub use material::{Fresnel, Material};
 pub use output::{Channel, Compression, Output};
 pub use pattern::OutputPattern;
+pub use preset::Look;
 pub(crate) use reader::nearest;
 pub(crate) use rebase::without_dots;
 pub use rebase::{named_place, real_dir};
@@ -90,6 +99,8 @@ pub struct Manifest {
     pub image: Image,
     /// How traced.
     pub render: Render,
+    /// What rays meet: `render.surface` and `[surface]`.
+    pub surface: SurfaceSettings,
     /// Made of what.
     pub material: Material,
     /// In which light; with none, a key light and a soft fill are placed by the camera.
@@ -129,6 +140,7 @@ impl Manifest {
             camera: Camera::default(),
             image: Image::default(),
             render: Render::default(),
+            surface: SurfaceSettings::DEFAULT,
             material: Material::default(),
             lights: Vec::new(),
             output: Output::default(),
@@ -159,7 +171,9 @@ impl Manifest {
             let key = String::new();
             told(vec![Problem { place, key, what }], text, path)
         })?;
-        for overlay in overrides {
+        // What lies under everything fills the gaps that are left.
+        let (under, over): (Vec<_>, Vec<_>) = overrides.into_iter().partition(Override::is_under);
+        for overlay in over.into_iter().chain(under) {
             if let Err(problem) = tree.lay_over(overlay) {
                 problems.borrow_mut().push(problem);
             }
@@ -174,11 +188,14 @@ impl Manifest {
     }
 
     fn read(mut root: Section<'_>) -> Self {
+        let mut render = root.section("render");
+        let surface = surface::kind(&mut render);
         let manifest = Self {
             input: Input::read(root.section("input")),
             camera: Camera::read(root.section("camera")),
             image: Image::read(root.section("image")),
-            render: Render::read(root.section("render")),
+            surface: surface::read(root.section("surface"), surface),
+            render: Render::read(render),
             material: Material::read(root.section("material")),
             lights: root
                 .sections("light")
@@ -243,7 +260,8 @@ impl Manifest {
         self.input.entries(&mut out);
         self.camera.entries(&mut out);
         self.image.entries(&mut out);
-        self.render.entries(&mut out);
+        self.render.entries(self.surface.kind, &mut out);
+        surface::entries(&self.surface, &mut out);
         self.material.entries(&mut out);
         self.output.entries(&mut out);
         self.job.entries(&mut out);

@@ -38,11 +38,12 @@ pub(super) enum Kind {
     Other,
 }
 
-/// One value laid over the manifest, as by `--set render.max_depth=5`.
+/// One value laid over the manifest, as by `--set render.max_depth=5`, or under it.
 #[derive(Debug, Clone)]
 pub struct Override {
     keys: Vec<String>,
     node: Node,
+    is_under: bool,
 }
 
 impl Override {
@@ -72,6 +73,7 @@ impl Override {
         Ok(Self {
             keys,
             node: Node { kind, place },
+            is_under: false,
         })
     }
 
@@ -84,7 +86,21 @@ impl Override {
         Ok(Self {
             keys: split_key(key).map_err(|e| format!("{shown}: {e}"))?,
             node: Node::from_value(value.into(), &place),
+            is_under: false,
         })
+    }
+
+    /// The same as a default: anything that the manifest or another override says goes before it.
+    #[must_use]
+    pub fn under(self) -> Self {
+        Self {
+            is_under: true,
+            ..self
+        }
+    }
+
+    pub(super) fn is_under(&self) -> bool {
+        self.is_under
     }
 }
 
@@ -161,7 +177,7 @@ impl Node {
     }
 
     /// Lays `overlay` over this tree, making tables on the way; `light.0.intensity` reaches into
-    /// a list.
+    /// a list. What lies under changes nothing that is there.
     pub(super) fn lay_over(&mut self, overlay: Override) -> Result<(), Problem> {
         let problem = |at: usize, what: &str| Problem {
             place: overlay.node.place.clone(),
@@ -170,7 +186,11 @@ impl Node {
         };
         let mut node = self;
         for (at, key) in overlay.keys.iter().enumerate() {
+            let is_last = at + 1 == overlay.keys.len();
             node = match &mut node.kind {
+                Kind::Table(table) if is_last && overlay.is_under && table.contains_key(key) => {
+                    return Ok(());
+                }
                 Kind::Table(table) => {
                     let place = &overlay.node.place;
                     let empty = Self {
@@ -187,6 +207,8 @@ impl Node {
                     };
                     item
                 }
+                // Whoever reads it says what is wrong.
+                _ if overlay.is_under => return Ok(()),
                 _ => return Err(problem(at, "what is above it is a plain value")),
             };
         }

@@ -12,7 +12,7 @@ use spherule_formats::sequence::Sequence;
 use super::load::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
-use crate::render::{NO_ID, ShadeSource};
+use crate::render::{NO_ID, ShadeSource, mean};
 use crate::scene::ColorMap;
 use crate::survey::{Named, id_of, velocity_of};
 
@@ -286,6 +286,26 @@ impl ShadeSource for StoredShading<'_> {
             StoredColor::Constant(color) => *color,
             StoredColor::Mapped { values, map } => {
                 map.color(values.magnitude(index as usize) as f32)
+            }
+        }
+    }
+
+    fn constant_color(&self) -> Option<Vec3> {
+        match &self.color {
+            StoredColor::Constant(color) => Some(*color),
+            StoredColor::Mapped { .. } => None,
+        }
+    }
+
+    #[expect(
+        clippy::cast_possible_truncation,
+        reason = "colours need no more than f32"
+    )]
+    fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
+        match &self.color {
+            StoredColor::Constant(color) => *color,
+            StoredColor::Mapped { values, map } => {
+                map.color(mean(parts, |i| values.magnitude(i as usize) as f32))
             }
         }
     }

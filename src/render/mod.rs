@@ -16,26 +16,35 @@ use crate::{
 };
 
 mod aov;
+mod body;
 #[cfg(test)]
 pub(crate) mod brute;
 mod film;
+mod floor;
+mod lights;
 mod sampler;
 mod source;
 mod tile;
+mod tracer;
 mod whitted;
 
 #[cfg(test)]
+mod body_tests;
+#[cfg(test)]
 mod image_tests;
+#[cfg(test)]
+pub(crate) mod solid;
 #[cfg(test)]
 mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
 pub use sampler::PixelSampler;
+pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
 
 use tile::Tile;
-use whitted::Tracer;
+use tracer::Tracer;
 
 /// Most samples per pixel: more than any picture needs, and few enough to count in f32.
 pub const MAX_SAMPLES: u32 = 4096;

@@ -69,13 +69,22 @@ fn reorder(order: &mut [u32], random: &mut SplitMix64) {
 #[derive(Debug, Clone, Copy)]
 struct SplitMix64(u64);
 
+/// From state to state of [`SplitMix64`].
+const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
+
+/// What [`SplitMix64`] gives in `state`: bits that have nothing to do with those of other states.
+pub(super) const fn mix(state: u64) -> u64 {
+    let mut z = state.wrapping_add(STEP);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
 impl SplitMix64 {
     const fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
-        let mut z = self.0;
-        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-        z ^ (z >> 31)
+        let value = mix(self.0);
+        self.0 = self.0.wrapping_add(STEP);
+        value
     }
 
     /// 0..1 in steps of 2^-24.

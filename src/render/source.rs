@@ -1,5 +1,8 @@
 //! Where shading takes a particle's colour, id and velocity from.
 
+use std::iter::Sum;
+use std::ops::Mul;
+
 use glam::Vec3;
 
 use super::NO_ID;
@@ -11,15 +14,15 @@ pub trait ShadeSource: Sync {
     /// Base colour, linear RGB.
     fn color(&self, index: u32) -> Vec3;
 
+    /// The base colour of all particles, if they have the same.
+    fn constant_color(&self) -> Option<Vec3> {
+        None
+    }
+
     /// Base colour of a place between particles: of the weighted mean of what they are coloured by.
     /// Weights are positive.
     fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
-        let total: f32 = parts.iter().map(|(_, weight)| weight).sum();
-        let sum: Vec3 = parts
-            .iter()
-            .map(|(i, weight)| *weight * self.color(*i))
-            .sum();
-        sum / total
+        mean(parts, |i| self.color(i))
     }
 
     /// The number in the `id` channel.
@@ -27,6 +30,16 @@ pub trait ShadeSource: Sync {
 
     /// Velocity in world units per time, zero if not known.
     fn velocity(&self, index: u32) -> Vec3;
+}
+
+/// The weighted mean of what `of` says about `parts`, in their order.
+pub(crate) fn mean<T>(parts: &[(u32, f32)], of: impl Fn(u32) -> T) -> T
+where
+    T: Sum + Mul<f32, Output = T>,
+{
+    let total: f32 = parts.iter().map(|(_, weight)| weight).sum();
+    let sum: T = parts.iter().map(|(i, weight)| of(*i) * *weight).sum();
+    sum * (1.0 / total)
 }
 
 /// Base colours of a frame.
@@ -75,6 +88,23 @@ impl ShadeSource for ParticleShading<'_> {
             Colors::Constant(color) => color,
             Colors::PerParticle(colors) => colors.get(i).copied().unwrap_or_default(),
             Colors::Mapped { values, map } => map.color(values.get(i).copied().unwrap_or(f32::NAN)),
+        }
+    }
+
+    fn constant_color(&self) -> Option<Vec3> {
+        match self.colors {
+            Colors::Constant(color) => Some(color),
+            Colors::PerParticle(_) | Colors::Mapped { .. } => None,
+        }
+    }
+
+    fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
+        match self.colors {
+            Colors::Mapped { values, map } => {
+                let value = |i: u32| values.get(i as usize).copied().unwrap_or(f32::NAN);
+                map.color(mean(parts, value))
+            }
+            Colors::Constant(_) | Colors::PerParticle(_) => mean(parts, |i| self.color(i)),
         }
     }
 

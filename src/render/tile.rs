@@ -7,7 +7,7 @@ use super::{
     aov::DataSample,
     film::Band,
     sampler::PixelSampler,
-    whitted::{Scratch, Tracer},
+    tracer::{Scratch, Tracer},
 };
 use crate::ray::PACKET_SIZE;
 use crate::surface::Surface;

@@ -412,6 +412,7 @@ fn the_ground_takes_shadows_and_stops_light_from_below() {
         center: Vec3::new(0.0, 0.0, -1.0),
         fade_start: 100.0,
         fade_end: 200.0,
+        checker: None,
     });
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     // The ball hangs over the looked-at point, out of the picture.

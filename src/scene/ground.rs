@@ -19,6 +19,9 @@ pub const AMBIENT: f32 = 0.2;
 /// Part of the lights' radiance that the floor takes, as a default material's `diffuse`.
 pub const DIFFUSE: f32 = 0.7;
 
+/// What a darker square of a chequered floor has of the floor's colour.
+const DARKER: f32 = 0.35;
+
 /// The default floor begins to fade at this many bounds' diagonals from its middle.
 const FADE_START: f32 = 1.5;
 
@@ -40,6 +43,15 @@ pub struct Ground {
     pub fade_start: f32,
     /// Distance from which on there is only background.
     pub fade_end: f32,
+    /// Squares on it, if wanted.
+    pub checker: Option<Checker>,
+}
+
+/// Squares on a floor, every other one darker. Corners of four meet at the floor's middle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Checker {
+    /// Edge of a square; positive.
+    pub tile: f32,
 }
 
 impl Ground {
@@ -60,7 +72,45 @@ impl Ground {
             center: center + (height - center.dot(up)) * up,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,
+            checker: None,
         }
+    }
+
+    /// The colour at `point` of the floor.
+    #[inline]
+    pub fn color_at(&self, point: Vec3) -> Vec3 {
+        let Some(checker) = self.checker else {
+            return self.color;
+        };
+        let [across, along] = self.axes();
+        let from_middle = (point - self.center) / checker.tile;
+        // Parity by halves: counts beyond 2^24 are even numbers, and no harm done.
+        let square = from_middle.dot(across).floor() + from_middle.dot(along).floor();
+        if 0.5 * square == (0.5 * square).floor() {
+            self.color
+        } else {
+            DARKER * self.color
+        }
+    }
+
+    /// Two directions of the floor at a right angle, along the axes of space where `up` is one of them.
+    fn axes(&self) -> [Vec3; 2] {
+        let size = self.up.abs();
+        let aside = if size.x >= size.y && size.x >= size.z {
+            Vec3::Y
+        } else if size.y >= size.z {
+            Vec3::Z
+        } else {
+            Vec3::X
+        };
+        let across = (aside - aside.dot(self.up) * self.up).normalize();
+        [across, self.up.cross(across)]
+    }
+
+    /// Moves the floor along `up`.
+    pub fn raise(&mut self, by: f32) {
+        self.center += by * self.up;
+        self.height += by;
     }
 
     /// Distance at which `ray` comes down through the plane, if that lies in its range.
@@ -119,6 +169,28 @@ mod tests {
         assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
         assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::NEG_Z)), None);
         assert_eq!(floor.hit(&Ray::new(Vec3::splat(5.0), Vec3::X)), None);
+    }
+
+    #[test]
+    fn squares_alternate_around_the_middle() {
+        for up in [
+            Vec3::X,
+            Vec3::Y,
+            Vec3::Z,
+            Vec3::NEG_Z,
+            Vec3::ONE.normalize(),
+        ] {
+            let mut floor = Ground { up, ..floor() };
+            assert_eq!(floor.color_at(floor.center), floor.color);
+            floor.checker = Some(Checker { tile: 0.5 });
+            let [across, along] = floor.axes();
+            let at = |x: f32, y: f32| floor.color_at(floor.center + x * across + y * along);
+            let [light, dark] = [floor.color, DARKER * floor.color];
+            assert_eq!([at(0.1, 0.1), at(0.4, 0.3), at(-0.1, -0.4)], [light; 3]);
+            assert_eq!([at(0.6, 0.1), at(-0.1, 0.2), at(0.3, -0.3)], [dark; 3]);
+            assert_eq!(at(0.6, 0.7), light);
+            assert!(across.dot(along).abs() < 1e-6 && across.dot(up).abs() < 1e-6);
+        }
     }
 
     #[test]

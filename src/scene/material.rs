@@ -29,6 +29,22 @@ pub struct Material {
     pub reflection: f32,
     /// Weight of the refracted ray, 0 to 1; 0 is opaque.
     pub transmission: f32,
+    /// How `r` of eq. 4.1 comes of the angle.
+    pub fresnel: Fresnel,
+    /// What one body takes of light inside of it, per length: its colours fade by `exp(-extinction * length)`
+    /// (Beer-Lambert). Not negative. Separate spheres are clear.
+    pub extinction: Vec3,
+}
+
+/// How much a surface mirrors at which angle.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum Fresnel {
+    /// Schlick's approximation with the viewer's cosine (eq. 4.3). From inside it mirrors too little:
+    /// not nearly all where total reflection begins.
+    #[default]
+    Schlick,
+    /// Fresnel's equations for light without polarisation.
+    Exact,
 }
 
 impl Material {
@@ -42,6 +58,8 @@ impl Material {
         ior: 1.33,
         reflection: 1.0,
         transmission: 0.0,
+        fresnel: Fresnel::Schlick,
+        extinction: Vec3::ZERO,
     };
 
     /// Checks that the constants make sense; with reflection and transmission in 0 to 1 a ray's
@@ -63,6 +81,13 @@ impl Material {
                 return Err(MaterialError { name, value });
             }
         }
+        let extinction = self.extinction.to_array();
+        if let Some(value) = extinction.iter().find(|v| !(0.0..=f32::MAX).contains(*v)) {
+            return Err(MaterialError {
+                name: "extinction",
+                value: *value,
+            });
+        }
         if self.ior > 0.0 && self.ior.is_finite() {
             Ok(())
         } else {
@@ -78,6 +103,22 @@ impl Material {
         let root = (1.0 - self.ior) / (1.0 + self.ior);
         root * root
     }
+
+    /// The part mirrored by a surface that is met at the absolute `cosine` with the normal; `ratio` is the index
+    /// of refraction on the viewer's side over the one beyond. All of it where refraction ends.
+    pub fn mirrored(&self, cosine: f32, ratio: f32) -> f32 {
+        match self.fresnel {
+            Fresnel::Schlick => schlick(self.r0(), cosine),
+            Fresnel::Exact => dielectric(cosine, ratio),
+        }
+    }
+}
+
+/// The extinction of a medium that leaves `color` of white light after `length`. Of black, a millionth
+/// is left.
+pub fn extinction(color: Vec3, length: f32) -> Vec3 {
+    let loss = |part: f32| (-part.clamp(1e-6, 1.0).ln() / length).clamp(0.0, f32::MAX);
+    Vec3::from_array(color.to_array().map(loss))
 }
 
 impl Default for Material {
@@ -101,6 +142,20 @@ pub fn schlick(r0: f32, cosine: f32) -> f32 {
     let x = (1.0 - cosine).clamp(0.0, 1.0);
     let x2 = x * x;
     r0 + (1.0 - r0) * (x2 * x2 * x)
+}
+
+/// Reflected part by Fresnel's equations, the mean of both polarisations, from the absolute cosine between
+/// normal and ray and the `ratio` of the indices of refraction, on the ray's side over beyond. 1 under total reflection.
+pub fn dielectric(cosine: f32, ratio: f32) -> f32 {
+    let cos_in = cosine.clamp(0.0, 1.0);
+    let sin2_out = ratio * ratio * (1.0 - cos_in * cos_in);
+    if sin2_out >= 1.0 {
+        return 1.0;
+    }
+    let cos_out = (1.0 - sin2_out).sqrt();
+    let across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out);
+    let along = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out);
+    0.5 * (across * across + along * along)
 }
 
 /// Direction after passing a surface by Snell's law; `None` if all is reflected.
@@ -153,6 +208,39 @@ mod tests {
         }
         assert!((schlick(0.04, 0.0) - 1.0).abs() < 1e-6);
         assert_eq!(schlick(0.04, 1.000_001), 0.04);
+    }
+
+    #[test]
+    fn fresnel_at_known_angles() {
+        // By hand for 1.5: head on 0.04 from both sides; at Brewster's angle (tan a = 1.5) the part along is 0 and
+        // across ((1 - 1.5^2) / (1 + 1.5^2))^2 = 0.147929, the mean half of that. 60 degrees: cos_out = 0.816497,
+        // across (0.5 - 1.224745) / 1.724745 = -0.420204, along (0.75 - 0.816497) / 1.566497 = -0.042449.
+        let brewster = 1.5_f32.atan().cos();
+        for (cosine, ratio, wanted) in [
+            (1.0, 1.0 / 1.5, 0.04),
+            (1.0, 1.5, 0.04),
+            (brewster, 1.0 / 1.5, 0.073_964_5),
+            (0.5, 1.0 / 1.5, 0.089_186_7),
+            (0.0, 1.0 / 1.5, 1.0),
+            (0.7, 1.5, 1.0),
+            (0.3, 1.0, 0.0),
+        ] {
+            let r = dielectric(cosine, ratio);
+            assert!((r - wanted).abs() < 2e-6, "{cosine} {ratio}: {r} {wanted}");
+        }
+        // The same along the same way back.
+        let inside = (1.0 - 0.75_f32 / 2.25).sqrt();
+        assert!((dielectric(inside, 1.5) - dielectric(0.5, 1.0 / 1.5)).abs() < 1e-6);
+    }
+
+    #[test]
+    fn absorption_is_what_it_leaves_behind() {
+        let loss = extinction(Vec3::new(0.5, 1.0, 0.0), 2.0);
+        let left = (-3.0 * loss).exp();
+        assert!((left.x - 0.5_f32.powf(1.5)).abs() < 1e-6);
+        assert_eq!(left.y, 1.0);
+        assert!(left.z < 1e-6 && loss.z.is_finite());
+        assert!(extinction(Vec3::ZERO, f32::from_bits(1)).is_finite());
     }
 
     #[test]

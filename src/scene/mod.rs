@@ -18,9 +18,9 @@ pub mod path;
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing};
 pub use colormap::{ColorMap, UnknownColorMap};
-pub use ground::Ground;
+pub use ground::{Checker, Ground};
 pub use light::{Falloff, Light, LightKind, default_lights};
-pub use material::{Material, MaterialError};
+pub use material::{Fresnel, Material, MaterialError};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 
 /// An axis-aligned box in world units, spheres included.

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::{NAME_PATTERN, rgb_schema};
 use crate::accel::SbvhSettings;
+use crate::manifest::surface::{MAX_THRESHOLD, SMOOTHING_LENGTHS, VOXELS};
 use crate::manifest::work::MAX_RETRIES;
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 
@@ -38,6 +39,15 @@ pub(super) fn limits(key: &str) -> Value {
             from_to(*SbvhSettings::BUDGETS.start(), *SbvhSettings::BUDGETS.end())
         }
         "render.ground_color" | "light.color" => rgb_schema(),
+        "surface.smoothing" => from_to(0, 1),
+        "surface.voxel" => from_to(VOXELS[0], VOXELS[1]),
+        "surface.smoothing_length" => from_to(SMOOTHING_LENGTHS[0], SMOOTHING_LENGTHS[1]),
+        "surface.threshold" => json!({ "exclusiveMinimum": 0, "maximum": MAX_THRESHOLD }),
+        "material.absorption" => {
+            let mut rgb = rgb_schema();
+            rgb["items"]["maximum"] = json!(1);
+            rgb
+        }
         "material.ambient" | "material.diffuse" | "material.specular" | "light.intensity" => {
             from_to(0, f32::MAX)
         }
@@ -102,6 +112,7 @@ pub(super) fn about(section: &str) -> &'static str {
         "camera.key" => "Places that the camera passes through",
         "image" => "How large the picture is",
         "render" => "How it is traced",
+        "surface" => "What rays meet, beside its kind in render; lengths are in particle radii",
         "material" => "What particles are made of",
         "light" => "What shines; without any, a key light and a soft fill are placed by the camera",
         "output" => "Which images are written, with what in them",

@@ -14,8 +14,9 @@ mod values;
 const EVERYTHING: &str = r#"
 input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
-render = { background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
-material.color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }
+render = { surface = "smooth", ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
+surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true }
+material = { color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }]
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
 job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
@@ -80,7 +81,7 @@ fn what_the_program_writes_is_valid() {
 }
 
 /// Every table of the schema with a manifest that has it open at the end, so that a line goes into it.
-const TABLES: [(&str, &str); 14] = [
+const TABLES: [(&str, &str); 15] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -90,6 +91,7 @@ const TABLES: [(&str, &str); 14] = [
     ),
     ("/properties/image", "[image]\n"),
     ("/properties/render", "[render]\n"),
+    ("/properties/surface", "[surface]\n"),
     ("/properties/material", "[material]\n"),
     (
         "/properties/light/items/oneOf/0",
@@ -175,9 +177,9 @@ fn comments_defaults_and_examples_are_those_of_init() {
 fn defaults_of_items_are_the_readers() {
     let schema = job_schema();
     for (pointer, text) in [
-        (TABLES[7].0, "type = \"point\"\nposition = [1, 2, 3]\n"),
+        (TABLES[8].0, "type = \"point\"\nposition = [1, 2, 3]\n"),
         (
-            TABLES[8].0,
+            TABLES[9].0,
             "type = \"directional\"\ndirection = [1, 2, 3]\n",
         ),
     ] {

@@ -224,6 +224,7 @@ fn floor(height: f32) -> Ground {
         center: Vec3::Z * height,
         fade_start: 4.0,
         fade_end: 12.0,
+        checker: None,
     }
 }
 

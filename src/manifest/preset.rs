@@ -1,0 +1,75 @@
+//! Looks: many settings under one name, as defaults that anything said in a manifest or an option goes
+//! before.
+
+use toml::Value;
+
+use super::{Override, nearest};
+
+/// See the module.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Look {
+    /// Clear water on a chequered floor, under a sky.
+    Water,
+}
+
+/// Water: one body with a smooth surface. Nothing scatters in it, so its colour is what absorption
+/// leaves; the sky is what its walls mirror. Tuned by eye on dam breaks.
+const WATER: &str = r#"
+render.surface = "smooth"
+render.max_depth = 8
+render.background = { bottom = [0.62, 0.66, 0.70], top = [0.36, 0.58, 0.95] }
+render.ground = true
+render.ground_color = [0.52, 0.50, 0.47]
+render.ground_pattern = "checker"
+material.color = [0.6, 0.85, 0.9]
+material.ambient = 0.0
+material.diffuse = 0.0
+material.specular = 1.0
+material.shininess = 600.0
+material.ior = 1.333
+material.reflection = 1.0
+material.transmission = 1.0
+material.absorption = [0.55, 0.84, 0.90]
+"#;
+
+impl Look {
+    /// All, with the names that users type.
+    pub const ALL: &[(Self, &'static str)] = &[(Self::Water, "water")];
+
+    /// The look of a name.
+    ///
+    /// # Errors
+    /// There is none; names those that there are.
+    pub fn named(name: &str) -> Result<Self, String> {
+        let found = Self::ALL.iter().find(|(_, known)| *known == name);
+        found.map(|(look, _)| *look).ok_or_else(|| {
+            let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
+            let hint = nearest(name, &known).map(|n| format!("; did you mean {n}?"));
+            format!(
+                "--look {name}: there is no such look, known are: {}{}",
+                known.join(", "),
+                hint.unwrap_or_default()
+            )
+        })
+    }
+
+    /// What it sets.
+    pub fn settings(self) -> Vec<Override> {
+        let (text, shown) = match self {
+            Self::Water => (WATER, "--look water"),
+        };
+        let sections: toml::Table = text.parse().expect("a look of our own is TOML");
+        let key = |(section, keys): (String, Value)| match keys {
+            Value::Table(keys) => keys
+                .into_iter()
+                .map(|(key, value)| (format!("{section}.{key}"), value))
+                .collect(),
+            value => vec![(section, value)],
+        };
+        let set = |(key, value): (String, Value)| {
+            let set = Override::new(&key, value, shown);
+            set.expect("its keys have names").under()
+        };
+        sections.into_iter().flat_map(key).map(set).collect()
+    }
+}

@@ -1,0 +1,144 @@
+//! Test support: bodies of one medium, met in f64 by what is known of them.
+
+use glam::{DVec3, Vec3};
+
+use super::brute::{Ball, Balls};
+use crate::{
+    ray::Ray,
+    surface::{Side, Substance, Surface, SurfaceHit},
+};
+
+/// What a body fills.
+#[derive(Debug, Clone, Copy)]
+pub(crate) enum Shape {
+    Ball {
+        center: Vec3,
+        radius: f32,
+    },
+    /// Between two heights, without end.
+    Slab {
+        low: f32,
+        high: f32,
+    },
+}
+
+/// A body, and balls of spray.
+pub(crate) struct Solid {
+    pub(crate) shape: Shape,
+    pub(crate) spray: Vec<Ball>,
+}
+
+impl Solid {
+    pub(crate) const fn ball(radius: f32) -> Self {
+        Self::of(Shape::Ball {
+            center: Vec3::ZERO,
+            radius,
+        })
+    }
+
+    pub(crate) const fn slab(low: f32, high: f32) -> Self {
+        Self::of(Shape::Slab { low, high })
+    }
+
+    const fn of(shape: Shape) -> Self {
+        Self {
+            shape,
+            spray: Vec::new(),
+        }
+    }
+
+    /// Distances of entry and exit; empty if the ray misses.
+    fn inside(&self, ray: &Ray) -> [f64; 2] {
+        let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
+        match self.shape {
+            Shape::Ball { center, radius } => {
+                let center = center.as_dvec3() - origin;
+                let middle = center.dot(direction);
+                let across = (center - middle * direction).length_squared();
+                let half = (f64::from(radius).powi(2) - across).sqrt();
+                // No number, if the ray misses.
+                [middle - half, middle + half]
+            }
+            Shape::Slab { low, high } => {
+                let at = |height: f32| (f64::from(height) - origin.z) / direction.z;
+                let (a, b) = (at(low), at(high));
+                [a.min(b), a.max(b)]
+            }
+        }
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "surfaces answer in f32")]
+    fn hit(&self, ray: &Ray, t: f64) -> SurfaceHit {
+        let free: DVec3 = ray.origin.as_dvec3() + t * ray.direction.as_dvec3();
+        let (point, normal) = match self.shape {
+            Shape::Ball { center, radius } => {
+                let normal = (free - center.as_dvec3()).normalize();
+                (center.as_dvec3() + f64::from(radius) * normal, normal)
+            }
+            Shape::Slab { low, high } => {
+                let up = free.z > f64::from(0.5 * (low + high));
+                let z = f64::from(if up { high } else { low });
+                (free.with_z(z), if up { DVec3::Z } else { DVec3::NEG_Z })
+            }
+        };
+        let scale = point.abs().max_element().max(t) as f32;
+        SurfaceHit {
+            t: t as f32,
+            point: point.as_vec3(),
+            normal: normal.as_vec3(),
+            particle: 0,
+            offset: 1e-5 * scale.max(1.0),
+            anchor: point.as_vec3(),
+            substance: Substance::Body,
+        }
+    }
+
+    fn nearest_spray(&self, ray: &Ray) -> Option<SurfaceHit> {
+        let hit = Balls(self.spray.clone()).nearest(ray)?;
+        Some(SurfaceHit {
+            substance: Substance::Spray,
+            ..hit
+        })
+    }
+}
+
+impl Surface for Solid {
+    const ONE_BODY: bool = true;
+
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<SurfaceHit> {
+        let [enter, leave] = self.inside(ray);
+        let [low, high] = [f64::from(ray.t_min), f64::from(ray.t_max)];
+        let is_in = enter <= low && low < leave;
+        let t = match side {
+            Side::Outside if !is_in => enter,
+            Side::Inside if is_in => leave,
+            // Rounding put it on the wrong side.
+            Side::Outside | Side::Inside => low,
+        };
+        let body = (t >= low && t < high).then(|| self.hit(ray, t));
+        match (body, self.nearest_spray(ray)) {
+            (Some(body), Some(spray)) => Some(if spray.t < body.t { spray } else { body }),
+            (body, spray) => body.or(spray),
+        }
+    }
+
+    fn side_of(&self, point: Vec3) -> Side {
+        let is_in = match self.shape {
+            Shape::Ball { center, radius } => point.distance(center) < radius,
+            Shape::Slab { low, high } => point.z > low && point.z < high,
+        };
+        if is_in { Side::Inside } else { Side::Outside }
+    }
+
+    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+        self.crossing(ray, Side::Outside)
+    }
+
+    fn occluded(&self, ray: &Ray) -> bool {
+        self.nearest(ray).is_some()
+    }
+
+    fn transmittance(&self, _: &Ray, _: impl Fn(f32) -> f32) -> f32 {
+        unreachable!("shadow rays ask one body for crossings")
+    }
+}

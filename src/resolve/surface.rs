@@ -1,0 +1,103 @@
+//! What rays meet and what it is made of, and which settings make no sense together.
+
+use glam::Vec3;
+
+use super::{ResolveError, narrow};
+use crate::manifest::{AutoLength, Fresnel as FresnelSetting, Manifest};
+use crate::scene::{Bounds, Fresnel, Material, material};
+use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
+
+/// Part of the bounds' diagonal that light goes through a body to take the colour of its absorption:
+/// a pool seen from above has a tint, a drop has none. Tuned on dam breaks.
+const ABSORPTION: f64 = 0.25;
+
+/// The surface as asked for.
+///
+/// # Errors
+/// Settings that cannot be had together.
+pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveError> {
+    let surface = manifest.surface;
+    let unsupported = |key, what: &str| {
+        let what = what.to_owned();
+        Err(ResolveError::Unsupported { key, what })
+    };
+    match (surface.kind, surface.normals) {
+        (SurfaceKind::Spheres, NormalKind::Field) => {
+            return unsupported(
+                "surface.normals",
+                "\"field\" is for one body; for smooth normals of spheres take \"pca\", for one body set \
+                 render.surface to \"medium\" or \"smooth\"",
+            );
+        }
+        (SurfaceKind::Smooth, NormalKind::Sphere | NormalKind::Pca) => {
+            return unsupported(
+                "surface.normals",
+                "a smooth surface has the normals of its field; take \"auto\" or \"field\", or set render.surface \
+                 to \"spheres\" or \"medium\"",
+            );
+        }
+        _ => {}
+    }
+    if surface.exact && surface.kind != SurfaceKind::Smooth {
+        return unsupported(
+            "surface.exact",
+            "is for the smooth surface alone; set render.surface to \"smooth\", or leave it out (spheres are always \
+             exact)",
+        );
+    }
+    if surface.spray && surface.kind == SurfaceKind::Spheres {
+        return unsupported(
+            "surface.spray",
+            "lies beside one body; set render.surface to \"medium\" or \"smooth\", or leave it out",
+        );
+    }
+    if manifest.material.absorption != [1.0; 3] && surface.kind == SurfaceKind::Spheres {
+        return unsupported(
+            "material.absorption",
+            "is of one body; set render.surface to \"medium\" or \"smooth\", or leave it out",
+        );
+    }
+    Ok(surface)
+}
+
+/// What it is made of.
+pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
+    let m = &manifest.material;
+    let length = match m.absorption_length {
+        AutoLength::Length(length) => narrow(length),
+        AutoLength::Auto => narrow(bounds.diagonal() * ABSORPTION).max(f32::MIN_POSITIVE),
+    };
+    Material {
+        ambient: m.ambient,
+        diffuse: m.diffuse,
+        specular: m.specular,
+        shininess: m.shininess,
+        ior: m.ior,
+        reflection: m.reflection,
+        transmission: m.transmission,
+        fresnel: match (m.fresnel, manifest.surface.kind) {
+            (FresnelSetting::Schlick, _) | (FresnelSetting::Auto, SurfaceKind::Spheres) => {
+                Fresnel::Schlick
+            }
+            (FresnelSetting::Exact | FresnelSetting::Auto, _) => Fresnel::Exact,
+        },
+        extinction: material::extinction(Vec3::from_array(m.absorption), length),
+    }
+}
+
+/// About `length`: the nearest of 1, 2 and 5 times a power of ten; 1 of what has no extent.
+pub(super) fn round(length: f64) -> f32 {
+    let power = 10_f64.powf(length.log10().floor());
+    let nearest = [1.0, 2.0, 5.0, 10.0]
+        .map(|digit| digit * power)
+        .into_iter()
+        .min_by(|a, b| (a / length).ln().abs().total_cmp(&(b / length).ln().abs()));
+    match nearest.map(narrow) {
+        Some(length) if length > 0.0 && length.is_finite() => length,
+        _ => 1.0,
+    }
+}
+
+#[cfg(test)]
+#[path = "surface_tests.rs"]
+mod tests;

@@ -1,0 +1,93 @@
+use std::path::Path;
+
+use super::*;
+
+fn manifest(text: &str) -> Manifest {
+    let text = format!("input.path = \"data\"\n{text}");
+    Manifest::parse(&text, Path::new("job.toml")).unwrap()
+}
+
+#[track_caller]
+fn refused(text: &str, told: &str) {
+    let error = settings(&manifest(text)).unwrap_err().to_string();
+    assert!(error.contains(told), "{error}");
+}
+
+#[test]
+fn settings_come_from_the_manifest() {
+    assert_eq!(settings(&manifest("")).unwrap(), SurfaceSettings::DEFAULT);
+    let asked = settings(&manifest(
+        "render.surface = \"smooth\"\n[surface]\nsmoothing = 0.25\nvoxel = 0.5\nspray = true",
+    ));
+    let wanted = SurfaceSettings {
+        kind: SurfaceKind::Smooth,
+        smoothing: 0.25,
+        voxel: 0.5,
+        spray: true,
+        ..SurfaceSettings::DEFAULT
+    };
+    assert_eq!(asked.unwrap(), wanted);
+}
+
+#[test]
+fn what_makes_no_sense_together_is_refused() {
+    refused("surface.normals = \"field\"", "surface.normals: \"field\"");
+    refused("surface.exact = true", "surface.exact: is for the smooth");
+    refused(
+        "surface.spray = true",
+        "surface.spray: lies beside one body",
+    );
+    refused("material.absorption = [1, 1, 0.5]", "set render.surface");
+    for normals in ["pca", "sphere"] {
+        let smooth = format!("render.surface = \"smooth\"\nsurface.normals = \"{normals}\"");
+        refused(&smooth, "surface.normals: a smooth surface has");
+    }
+    refused(
+        "render.surface = \"medium\"\nsurface.exact = true",
+        "surface.exact",
+    );
+    for right in [
+        "surface.normals = \"pca\"",
+        "render.surface = \"medium\"\nsurface.normals = \"field\"\nsurface.spray = true",
+        "render.surface = \"smooth\"\nsurface.exact = true\nmaterial.absorption = [0, 1, 1]",
+    ] {
+        settings(&manifest(right)).unwrap();
+    }
+}
+
+#[test]
+fn one_body_has_exact_fresnel_and_absorption() {
+    let bounds = Bounds {
+        min: glam::DVec3::ZERO,
+        max: glam::DVec3::new(2.0, 3.0, 6.0),
+    };
+    let of = |text: &str| material(&manifest(text), &bounds);
+    assert_eq!(of(""), Material::DEFAULT);
+    let smooth = "render.surface = \"smooth\"\nmaterial.absorption = [0.5, 1, 1]\n";
+    assert_eq!(of(smooth).fresnel, Fresnel::Exact);
+    // A quarter of the diagonal of 7.
+    let loss = of(smooth).extinction;
+    assert!((loss.x - 2.0_f32.ln() / 1.75).abs() < 1e-5);
+    assert_eq!([loss.y, loss.z], [0.0; 2]);
+    let long = of(&format!("{smooth}material.absorption_length = 8"));
+    assert!((long.extinction.x - 2.0_f32.ln() / 8.0).abs() < 1e-6);
+    let named = of(&format!("{smooth}material.fresnel = \"schlick\""));
+    assert_eq!(named.fresnel, Fresnel::Schlick);
+    assert_eq!(of("material.fresnel = \"exact\"").fresnel, Fresnel::Exact);
+}
+
+#[test]
+fn lengths_are_rounded_to_what_people_count_by() {
+    for (length, wanted) in [
+        (0.9, 1.0),
+        (1.3, 1.0),
+        (0.017, 0.02),
+        (3.3, 5.0),
+        (80.0, 100.0),
+    ] {
+        assert_eq!(round(length), wanted, "{length}");
+    }
+    for nothing in [0.0, f64::NAN, f64::INFINITY, 1e-320] {
+        assert_eq!(round(nothing), 1.0, "{nothing}");
+    }
+}
