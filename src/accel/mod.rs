@@ -12,6 +12,7 @@ mod bvh;
 mod choose;
 mod collapse;
 mod coverage;
+pub mod intervals;
 mod kdtree;
 mod lbvh;
 mod leaves;

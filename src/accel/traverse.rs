@@ -40,7 +40,7 @@ impl TreeView<'_> {
     }
 
     /// Whether the ray comes near the box of all spheres; a superset of the rays that meet any.
-    fn may_be_met_by(&self, ray: &Ray) -> bool {
+    pub(super) fn may_be_met_by(&self, ray: &Ray) -> bool {
         let inverse = finite_inverse(ray.direction);
         let a = (self.bounds.min - ray.origin) * inverse;
         let b = (self.bounds.max - ray.origin) * inverse;

@@ -9,7 +9,7 @@ use super::view::Resolved;
 use spherule_formats::blocks::{Node, WIDTH};
 
 /// Every level can leave all children but one on the stack.
-const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
+pub(super) const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
 
 /// A node or block still to visit, as one word so that it is stored and loaded whole: the bits of
 /// the distance at which the ray enters its box (rounded down) above, and below them its code.
