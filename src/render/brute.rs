@@ -57,6 +57,8 @@ impl Ball {
                 t: t as f32,
                 point: point.as_vec3(),
                 normal: normal.as_vec3(),
+                shading: normal.as_vec3(),
+                lift: 0.0,
                 particle,
                 anchor: point.as_vec3(),
                 substance: Substance::Body,

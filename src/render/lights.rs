@@ -51,6 +51,20 @@ pub(super) struct Place {
     pub(super) side: Side,
 }
 
+impl Place {
+    /// The place of `hit` that a ray along `direction` sees: lit as the normal says that it is shaded by, from
+    /// off the surface.
+    pub(super) fn of(hit: &SurfaceHit, direction: Vec3, side: Side) -> Self {
+        let shading = facing(hit.shading, direction);
+        let off = hit.anchor + hit.offset * facing(hit.normal, direction);
+        Self {
+            start: off + hit.lift * shading,
+            normal: shading,
+            side,
+        }
+    }
+}
+
 /// The side of a surface that a ray sees.
 pub(super) struct Face {
     pub(super) place: Place,
@@ -78,12 +92,7 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
             *place = match seen.met(lane) {
                 Met::Ground(hit) => Some(hit.place(side)),
                 Met::Particle(hit) if is_opaque => {
-                    let normal = facing(hit.normal, seen.rays.ray(lane).direction);
-                    Some(Place {
-                        start: hit.anchor + hit.offset * normal,
-                        normal,
-                        side,
-                    })
+                    Some(Place::of(&hit, seen.rays.ray(lane).direction, side))
                 }
                 // What is seen through a surface is not known yet.
                 Met::Particle(_) | Met::Nothing => None,

@@ -86,6 +86,8 @@ impl Solid {
             t: t as f32,
             point: point.as_vec3(),
             normal: normal.as_vec3(),
+            shading: normal.as_vec3(),
+            lift: 0.0,
             particle: 0,
             offset: 1e-5 * scale.max(1.0),
             anchor: point.as_vec3(),

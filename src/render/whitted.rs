@@ -49,11 +49,7 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         let normal = facing(hit.normal, direction);
         let start = hit.anchor + hit.offset * normal;
         let face = Face {
-            place: Place {
-                start,
-                normal,
-                side: Side::Outside,
-            },
+            place: Place::of(hit, direction, Side::Outside),
             to_viewer: -direction,
             base: self.base(hit, scratch),
         };

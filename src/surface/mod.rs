@@ -8,11 +8,15 @@ use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod dimming;
 pub mod field;
+mod normals;
+mod pca;
 mod settings;
 pub mod smooth;
 pub mod spheres;
 
 pub(crate) use dimming::Dimming;
+pub use normals::ShadingNormals;
+pub use pca::PcaNormals;
 pub use settings::{NormalKind, SurfaceKind, SurfaceSettings};
 
 /// One meeting of a ray with the surface.
@@ -24,6 +28,11 @@ pub struct SurfaceHit {
     pub point: Vec3,
     /// Outward unit normal; the ray enters the body if it points against the ray.
     pub normal: Vec3,
+    /// Unit normal to shade by, seen from the same side as `normal`; `normal` where nothing smoother is known.
+    pub shading: Vec3,
+    /// Length along `shading` by which rays to lights start higher, so that what it smooths over casts no
+    /// shadow on itself; 0 where it smooths over nothing.
+    pub lift: f32,
     /// Index of the particle in the frame.
     pub particle: u32,
     /// Length to step along the normal (either side) so that the next ray does not meet the same

@@ -4,7 +4,7 @@ use std::cell::RefCell;
 
 use glam::Vec3;
 
-use super::{Dimming, Substance, Surface, SurfaceHit};
+use super::{Dimming, ShadingNormals, Substance, Surface, SurfaceHit};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
@@ -19,33 +19,57 @@ const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 #[derive(Debug, Clone, Copy)]
 pub struct SphereSurface<'a> {
     tree: TreeView<'a>,
+    normals: ShadingNormals,
 }
 
 impl<'a> SphereSurface<'a> {
     /// The spheres of `tree`.
     pub fn new(tree: TreeView<'a>) -> Self {
-        Self { tree }
+        Self {
+            tree,
+            normals: ShadingNormals::Sphere,
+        }
+    }
+
+    /// Shaded by these normals.
+    #[must_use]
+    pub fn shaded_by(self, normals: ShadingNormals) -> Self {
+        Self { normals, ..self }
     }
 
     #[inline]
     fn surface_hit(&self, ray: &Ray, hit: TreeHit) -> SurfaceHit {
-        let (center, radius) = self.tree.sphere(hit.slot);
-        let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
-        let point = center + normal * radius;
-        let largest = point
-            .abs()
-            .max_element()
-            .max(ray.origin.abs().max_element());
-        SurfaceHit {
-            t: hit.t,
-            point,
-            normal,
-            particle: self.tree.particle(hit.slot),
-            anchor: point,
-            substance: Substance::Body,
-            offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
-        }
+        sphere_hit(&self.tree, ray, hit, &self.normals)
     }
+}
+
+/// What a ray meets at `hit`, a sphere of `tree`.
+#[inline]
+pub(super) fn sphere_hit(
+    tree: &TreeView,
+    ray: &Ray,
+    hit: TreeHit,
+    normals: &ShadingNormals,
+) -> SurfaceHit {
+    let (center, radius) = tree.sphere(hit.slot);
+    let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
+    let point = center + normal * radius;
+    let largest = point
+        .abs()
+        .max_element()
+        .max(ray.origin.abs().max_element());
+    let met = SurfaceHit {
+        t: hit.t,
+        point,
+        normal,
+        shading: normal,
+        lift: 0.0,
+        particle: tree.particle(hit.slot),
+        anchor: point,
+        substance: Substance::Body,
+        offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
+    };
+    normals.shade(tree, ray, met, radius)
 }
 
 impl Surface for SphereSurface<'_> {

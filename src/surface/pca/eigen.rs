@@ -1,0 +1,74 @@
+//! The least of the principal components of three dimensions, in closed form: glam has no eigenvectors of
+//! symmetric matrices, and of a matrix this small iteration gains nothing.
+
+use std::ops::Sub;
+
+use glam::DVec3;
+
+/// xx, yy, zz, xy, xz, yz.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct SymmetricMatrix(pub(super) [f64; 6]);
+
+/// Second moments about zero, less the mean: those about the mean.
+impl Sub<DVec3> for SymmetricMatrix {
+    type Output = Self;
+
+    fn sub(self, DVec3 { x, y, z }: DVec3) -> Self {
+        let products = [x * x, y * y, z * z, x * y, x * z, y * z];
+        Self(std::array::from_fn(|i| self.0[i] - products[i]))
+    }
+}
+
+/// A direction in which a set spreads least.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Least {
+    /// Unit vector, either way.
+    pub(super) direction: DVec3,
+    /// How much less than the second it spreads, as a part of the second: 0 to 1.
+    pub(super) gap: f64,
+}
+
+/// More than what rounding to f32 leaves of no spread at all, in squared supports.
+const NOISE: f64 = 1e-6;
+
+/// The least component of `matrix`, whose eigenvalues are not negative; None where no direction is the least.
+/// Eigenvalues by the angle of the characteristic cubic (Smith 1961, "Eigenvalues of a symmetric 3 x 3
+/// matrix").
+pub(super) fn least_component(matrix: &SymmetricMatrix) -> Option<Least> {
+    let [xx, yy, zz, xy, xz, yz] = matrix.0;
+    let mean = (xx + yy + zz) / 3.0;
+    let [a, b, c] = [xx - mean, yy - mean, zz - mean];
+    let around = a * a + b * b + c * c + 2.0 * (xy * xy + xz * xz + yz * yz);
+    let scale = (around / 6.0).sqrt();
+    if scale.is_nan() || scale <= NOISE {
+        return None;
+    }
+    let determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
+    let cosine = (determinant / (2.0 * scale * scale * scale)).clamp(-1.0, 1.0);
+    let angle = cosine.acos() / 3.0;
+    let third = std::f64::consts::TAU / 3.0;
+    let most = mean + 2.0 * scale * angle.cos();
+    let least = mean + 2.0 * scale * (angle + third).cos();
+    let second = 3.0 * mean - most - least;
+    // What is across two rows of the matrix less the eigenvalue; the longest is the surest.
+    let rows = [
+        DVec3::new(xx - least, xy, xz),
+        DVec3::new(xy, yy - least, yz),
+        DVec3::new(xz, yz, zz - least),
+    ];
+    let across = [
+        rows[0].cross(rows[1]),
+        rows[1].cross(rows[2]),
+        rows[2].cross(rows[0]),
+    ];
+    let longest = across
+        .into_iter()
+        .max_by(|a, b| a.length_squared().total_cmp(&b.length_squared()))?;
+    if longest.length() <= 1e-9 * scale * scale {
+        return None;
+    }
+    Some(Least {
+        direction: longest.normalize(),
+        gap: ((second - least.max(0.0)) / second).clamp(0.0, 1.0),
+    })
+}
