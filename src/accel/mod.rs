@@ -18,6 +18,7 @@ mod lbvh;
 mod leaves;
 mod levels;
 mod linked;
+mod lonely;
 mod near;
 mod packet;
 mod ploc;

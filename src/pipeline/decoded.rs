@@ -3,6 +3,7 @@
 
 use glam::Vec3;
 use rayon::prelude::*;
+use spherule_formats::order::index_u32;
 use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius};
 
 use super::load::{LoadError, missing};
@@ -70,6 +71,48 @@ impl DecodedFrame {
         };
         Ok((decoded, clamped))
     }
+}
+
+impl DecodedFrame {
+    /// Moves the particles `chosen`, indices in order, behind all others; the order is the same otherwise.
+    /// Returns how many come before them. Who has no id keeps its place in the file as one if `ids` are asked
+    /// for.
+    pub(super) fn put_last(&mut self, chosen: &[u32], ids: bool) -> usize {
+        let count = self.centers.len();
+        let shading = &mut self.shading;
+        if ids && shading.ids.is_none() && !chosen.is_empty() {
+            shading.ids = Some((0..index_u32(count)).collect());
+        }
+        put_last(&mut self.centers, chosen);
+        if let Radius::PerParticle(radii) = &mut self.radius {
+            put_last(radii, chosen);
+        }
+        put_last(&mut shading.values, chosen);
+        if let Some(ids) = &mut shading.ids {
+            put_last(ids, chosen);
+        }
+        if let Some(velocities) = &mut shading.velocities {
+            put_last(velocities, chosen);
+        }
+        count - chosen.len()
+    }
+}
+
+/// Moves the items with the indices `chosen` behind all others, if there are any.
+fn put_last<T: Copy>(items: &mut [T], chosen: &[u32]) {
+    if items.is_empty() {
+        return;
+    }
+    let last: Vec<T> = chosen.iter().map(|i| items[*i as usize]).collect();
+    let mut chosen = chosen.iter().map(|i| *i as usize).peekable();
+    let mut kept = 0;
+    for i in 0..items.len() {
+        if chosen.next_if_eq(&i).is_none() {
+            items[kept] = items[i];
+            kept += 1;
+        }
+    }
+    items[kept..].copy_from_slice(&last);
 }
 
 impl DecodedShading {
@@ -165,4 +208,31 @@ fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
         Some(AttributeData::I8(v)) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
         _ => return frame.file_index.clone(),
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn chosen_particles_come_last_with_all_that_is_theirs() {
+        let mut frame = DecodedFrame {
+            centers: (0..6_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
+            radius: Radius::PerParticle((0..6_u16).map(f32::from).collect()),
+            shading: DecodedShading {
+                values: (0..6_u16).map(f32::from).collect(),
+                ids: None,
+                velocities: None,
+            },
+        };
+        assert_eq!(frame.put_last(&[], true), 6);
+        assert_eq!(frame.shading.ids, None);
+        assert_eq!(frame.put_last(&[0, 3, 5], true), 3);
+        let order = [1.0, 2.0, 4.0, 0.0, 3.0, 5.0];
+        assert_eq!(frame.centers, order.map(Vec3::splat));
+        assert_eq!(frame.radius, Radius::PerParticle(order.to_vec()));
+        assert_eq!(frame.shading.values, order);
+        assert_eq!(frame.shading.ids, Some(vec![1, 2, 4, 0, 3, 5]));
+        assert_eq!(frame.put_last(&[0, 1, 2, 3, 4, 5], false), 0);
+    }
 }

@@ -224,6 +224,9 @@ fn particles_in_place(
             "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
         ));
     }
+    if setup.surface.spray {
+        return Err("spray is parted from them, for 12 bytes a particle and more".to_owned());
+    }
     if DVec3::from_array(index.origin) != setup.origin {
         return Err(
             "they are relative to another origin than the sequence, for 12 bytes a particle \

@@ -26,6 +26,7 @@ mod rays;
 mod schedule;
 mod setup;
 mod single;
+mod surface;
 mod trace;
 
 pub use decoded::{DecodedFrame, DecodedShading};

@@ -15,7 +15,7 @@ use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
 use super::setup::{ColorRule, RadiusRule, Setup};
-use crate::accel::{BuildBytes, predicted_bytes, predicted_stored_bytes};
+use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::render::{Film, band_bytes};
 use crate::report::Bytes;
 use crate::survey::FrameWeight;
@@ -87,6 +87,8 @@ pub struct MemoryNeed {
     pub particles: u64,
     /// The tree, and what building it takes.
     pub tree: u64,
+    /// The surface, apart from the tree.
+    pub surface: u64,
     /// The planes of the images being traced and encoded.
     pub images: u64,
     /// What encoding takes beside the planes.
@@ -96,15 +98,22 @@ pub struct MemoryNeed {
 impl MemoryNeed {
     /// All together.
     pub const fn total(&self) -> u64 {
-        self.program + self.reading + self.particles + self.tree + self.images + self.encoding
+        self.program
+            + self.reading
+            + self.particles
+            + self.tree
+            + self.surface
+            + self.images
+            + self.encoding
     }
 
     /// The parts by name.
-    pub fn parts(&self) -> [(&'static str, u64); 6] {
+    pub fn parts(&self) -> [(&'static str, u64); 7] {
         [
             ("images", self.images),
             ("encoding", self.encoding),
             ("tree", self.tree),
+            ("surface", self.surface),
             ("particles", self.particles),
             ("reading the next frame", self.reading),
             ("program", self.program),
@@ -151,6 +160,9 @@ const THREAD: u64 = 256 << 10;
 /// Pieces from this size on go back to the system when they are freed: glibc's
 /// `DEFAULT_MMAP_THRESHOLD_MAX`. Other allocators keep less, as a rule.
 const RETURNED: u64 = 32 << 20;
+
+/// One particle of so many is taken to be spray.
+const SPRAY_PART: u64 = 10;
 
 impl<'a> MemoryModel<'a> {
     /// For the pictures of `setup`.
@@ -249,9 +261,11 @@ impl<'a> MemoryModel<'a> {
         }
         let channels = self.setup.render.channels;
         let values = matches!(self.setup.color, ColorRule::Attribute { .. });
+        // Particles that are put elsewhere need a number.
+        let ids = channels.id && (self.has_ids || self.setup.surface.spray);
         let each = [
             (values, 4),
-            (channels.id && self.has_ids, 4),
+            (ids, 4),
             (channels.velocity && self.has_velocities, 12),
         ];
         let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
@@ -265,7 +279,31 @@ impl<'a> MemoryModel<'a> {
         let values = matches!(self.setup.color, ColorRule::Attribute { .. });
         let count = usize::try_from(frame.particles).unwrap_or(usize::MAX);
         let settings = self.setup.build_settings(count, values);
-        predicted_bytes(&settings, frame.particles, self.own_radii)
+        let build = predicted_bytes(&settings, frame.particles, self.own_radii);
+        if !self.setup.surface.spray {
+            return build;
+        }
+        // Spray is looked for in a tree of its own, in the same memory.
+        let first = self.plain_tree(frame.particles);
+        BuildBytes {
+            tree: build.tree.max(first.tree),
+            scratch: build.scratch.max(first.scratch),
+        }
+    }
+
+    /// The tree that is soonest built.
+    fn plain_tree(&self, particles: u64) -> BuildBytes {
+        let settings = BuildSettings::new(Structure::Lbvh);
+        predicted_bytes(&settings, particles, self.own_radii)
+    }
+
+    /// The surface over a frame: normals are found hit by hit; spray has a tree.
+    fn surface(&self, frame: &FrameSize) -> u64 {
+        if self.setup.surface.spray {
+            self.plain_tree(frame.particles / SPRAY_PART).tree
+        } else {
+            0
+        }
     }
 
     fn tree(&self, frame: &FrameSize) -> u64 {
@@ -296,6 +334,7 @@ impl<'a> MemoryModel<'a> {
             ..MemoryNeed::default()
         };
         let kept = self.kept(frame);
+        let surface = self.surface(frame);
         let first_read = MemoryNeed {
             reading: self.reading(frame),
             ..idle
@@ -305,6 +344,7 @@ impl<'a> MemoryModel<'a> {
             // They lie in what the allocator keeps.
             reading: shared.max(self.retained(frame).saturating_sub(kept)),
             tree: tree + self.build(frame).scratch,
+            surface,
             images: film_before,
             encoding: encoding_before,
             ..idle
@@ -313,6 +353,7 @@ impl<'a> MemoryModel<'a> {
             reading: after.map_or(idle.reading, |after| self.reading(after).max(idle.reading)),
             particles: self.shading(frame),
             tree,
+            surface,
             images: film + film_before + band_bytes(render) * threads,
             encoding: encoding_before,
             ..idle

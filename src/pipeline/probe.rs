@@ -28,7 +28,7 @@ pub struct Probe {
     pub particles: u64,
     /// Reading it, measured.
     pub read: f64,
-    /// Building the tree, measured.
+    /// Building the tree and the surface, measured.
     pub build: f64,
     /// Tracing, estimated.
     pub trace: f64,
@@ -81,7 +81,7 @@ pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Pro
             frame: task.frame,
             particles: frame.report.particles,
             read,
-            build: frame.report.seconds.build,
+            build: frame.report.seconds.build + frame.report.seconds.surface,
             trace: trace * pixels * samples,
             encode: encode * pixels,
             image_bytes: bytes as f64 * pixels,

@@ -132,7 +132,8 @@ impl Setup {
     /// Whether native frames relative to [`Self::origin`] are traced where they lie.
     pub fn traces_in_place(&self) -> bool {
         let in_order = matches!(self.stored_structure(), Structure::Lbvh | Structure::Kdtree);
-        in_order && !matches!(self.radius, RadiusRule::Attribute { .. })
+        let is_whole = !self.surface.spray;
+        in_order && is_whole && !matches!(self.radius, RadiusRule::Attribute { .. })
     }
 
     /// Whose tree a native frame in place is said to be: its order is that of k-d cells.

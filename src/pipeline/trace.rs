@@ -4,24 +4,21 @@ use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
-use spherule_formats::{FrameError, Radius};
+use spherule_formats::FrameError;
 
 use super::ImageTask;
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
 use super::setup::{ColorRule, Setup};
+use super::surface::{SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
-use crate::accel::view::TreeView;
-use crate::accel::{BuildReport, SphereRadius, Spheres, TreeBuilder};
-use crate::render::{
-    Colors, Film, ParticleShading, RayCounts, RenderError, RenderSettings, ShadeSource, render,
-};
+use crate::accel::{BuildReport, TreeBuilder};
+use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError};
 use crate::report::frame::FileBytes;
 use crate::report::{FrameReport, MemoryUse};
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{Camera, CameraError, Scene};
-use crate::surface::spheres::SphereSurface;
+use crate::scene::{Camera, CameraError};
 
 /// Why there is no image of a frame that was read.
 #[derive(Debug, thiserror::Error)]
@@ -85,6 +82,7 @@ enum BuiltParticles {
 pub struct FrameTracer {
     builder: TreeBuilder,
     stored: StoredTree,
+    surface: SurfaceBuilder,
 }
 
 impl FrameTracer {
@@ -108,12 +106,15 @@ impl FrameTracer {
         };
         report.seconds.read = frame.read_time.as_secs_f64();
         let particles = match frame.particles {
-            LoadedParticles::Decoded(decoded) => {
+            LoadedParticles::Decoded(mut decoded) => {
+                self.surface
+                    .build(setup, &mut decoded, &mut self.builder, &mut report);
                 report.set_build(&self.build_copy(setup, &decoded));
                 report.bytes.attributes = decoded.shading.byte_len();
                 BuiltParticles::Decoded(decoded.shading)
             }
             LoadedParticles::Stored(stored) => {
+                self.surface.forget();
                 report.set_build(&self.build_above(setup, &stored)?);
                 report.bytes.attributes = stored.attribute_bytes();
                 report.bytes.file.attributes = stored.attribute_bytes();
@@ -132,17 +133,9 @@ impl FrameTracer {
     }
 
     fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame) -> BuildReport {
-        let radius = match &frame.radius {
-            Radius::Common(radius) => SphereRadius::Common(*radius),
-            Radius::PerParticle(radii) => SphereRadius::Each(radii),
-        };
         let has_values = !frame.shading.values.is_empty();
         let settings = setup.build_settings(frame.centers.len(), has_values);
-        let spheres = Spheres {
-            centers: &frame.centers,
-            radius,
-        };
-        self.builder.build(&spheres, &settings)
+        self.builder.build(&spheres(frame), &settings)
     }
 
     fn build_above(
@@ -205,33 +198,24 @@ impl FrameTracer {
         stop: &AtomicBool,
     ) -> Result<(Film, RayCounts), TraceError> {
         let scene = setup.scene_at(frame.task.frame)?;
+        let surface = &self.surface;
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.color, shading);
                 let tree = self.builder.tree().view();
-                Ok(draw(tree, &scene, &source, &setup.render, stop)?)
+                Ok(surface.draw(setup, tree, &scene, &source, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
                 let source = stored.shading(&setup.color, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
-                let drawn = draw(tree, &scene, &source, &setup.render, stop)?;
+                let drawn = surface.draw(setup, tree, &scene, &source, stop)?;
                 // Before anyone believes what was seen.
                 stored.check()?;
                 Ok(drawn)
             }
         }
     }
-}
-
-fn draw<C: ShadeSource>(
-    tree: TreeView,
-    scene: &Scene,
-    source: &C,
-    settings: &RenderSettings,
-    stop: &AtomicBool,
-) -> Result<(Film, RayCounts), RenderError> {
-    render(&SphereSurface::new(tree), scene, source, settings, stop)
 }
 
 fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> ParticleShading<'a> {

@@ -38,6 +38,8 @@ pub struct FrameReport {
 pub struct StageSeconds {
     pub read: f64,
     pub build: f64,
+    /// Making the surface, apart from the tree.
+    pub surface: f64,
     pub trace: f64,
     pub encode: f64,
     /// From the image before, or the beginning of the run, to this image: summed, the time that the
@@ -72,6 +74,8 @@ pub struct FrameBytes {
     pub structure: u64,
     /// Attributes that images are made of.
     pub attributes: u64,
+    /// The surface, apart from positions and structure.
+    pub surface: u64,
     /// Held while building and let go then, beside positions and structure.
     pub scratch: u64,
     /// Most held while building, the frame as read not counted unless it is traced where it lies.
@@ -158,7 +162,7 @@ impl FrameReport {
     /// Sum of the stages.
     pub fn total(&self) -> Duration {
         let s = &self.seconds;
-        Duration::from_secs_f64(s.read + s.build + s.trace + s.encode)
+        Duration::from_secs_f64(s.read + s.build + s.surface + s.trace + s.encode)
     }
 
     /// Bytes of positions, radii and tree for a particle; None without particles.
@@ -180,6 +184,7 @@ impl FrameReport {
         self.clamped_pixels += frame.clamped_pixels;
         self.seconds.read += frame.seconds.read;
         self.seconds.build += frame.seconds.build;
+        self.seconds.surface += frame.seconds.surface;
         self.seconds.trace += frame.seconds.trace;
         self.seconds.encode += frame.seconds.encode;
         self.seconds.wall += frame.seconds.wall;
@@ -206,9 +211,9 @@ impl FrameBytes {
         self.file.structure = report.file_bytes - self.file.positions;
     }
 
-    /// Held while tracing: positions, structure and attributes.
+    /// Held while tracing: positions, structure, surface and attributes.
     pub const fn held(&self) -> u64 {
-        self.positions + self.structure + self.attributes
+        self.positions + self.structure + self.surface + self.attributes
     }
 
     /// The part of [`Self::held`] that lies in anonymous memory.

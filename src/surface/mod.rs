@@ -8,11 +8,13 @@ use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod dimming;
 pub mod field;
+pub mod medium;
 mod normals;
 mod pca;
 mod settings;
 pub mod smooth;
 pub mod spheres;
+pub mod spray;
 
 pub(crate) use dimming::Dimming;
 pub use normals::ShadingNormals;

@@ -32,8 +32,12 @@ pub(super) fn show(progress: &Progress, event: &Event) {
 
 fn told(report: &FrameReport) -> String {
     let s = &report.seconds;
+    let surface = match s.surface {
+        none if none < 5e-4 => String::new(),
+        seconds => format!("surface {seconds:.3} s, "),
+    };
     format!(
-        "{} particles, {} built in {:.3} s, trace {:.2} s",
+        "{} particles, {} built in {:.3} s, {surface}trace {:.2} s",
         report.particles, report.build.structure, s.build, s.trace
     )
 }

@@ -10,12 +10,13 @@ const MOST_FAILURES: usize = 50;
 /// Characters of a message.
 const MOST_TEXT: usize = 500;
 
-const HEADS: [&str; 17] = [
+const HEADS: [&str; 18] = [
     "frame",
     "status",
     "particles",
     "read\ns",
     "build\ns",
+    "surface\ns",
     "trace\ns",
     "encode\ns",
     "all stages\ns",
@@ -65,9 +66,9 @@ impl JobReport {
         }
         page.section("slowest", "Slowest frames");
         // Up to the sum of the stages: the rest is further down.
-        let mut table = Table::new("slowest-frames", &HEADS[..8]);
+        let mut table = Table::new("slowest-frames", &HEADS[..9]);
         for (frame, _) in self.slowest() {
-            table.row(cells(frame).into_iter().take(8));
+            table.row(cells(frame).into_iter().take(9));
         }
         page.table(&table);
     }
@@ -128,6 +129,7 @@ fn cells(frame: &JobFrame) -> Vec<String> {
         count(report.particles),
         seconds(times.read),
         seconds(times.build),
+        seconds(times.surface),
         seconds(times.trace),
         seconds(times.encode),
         seconds(report.total().as_secs_f64()),

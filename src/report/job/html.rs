@@ -74,6 +74,7 @@ impl JobReport {
             ("Wall-clock time of the frames done", duration(seconds.wall)),
             ("Reading", duration(seconds.read)),
             ("Building", duration(seconds.build)),
+            ("Surface", duration(seconds.surface)),
             ("Tracing", duration(seconds.trace)),
             ("Encoding and writing", duration(seconds.encode)),
             ("Rays", count(rays.total())),
@@ -122,6 +123,7 @@ impl JobReport {
             ("SAH cost", short(build.sah_cost)),
             ("Positions", bytes(report.bytes.positions)),
             ("Nodes and indices", bytes(report.bytes.structure)),
+            ("Surface", bytes(report.bytes.surface)),
             ("Attributes", bytes(report.bytes.attributes)),
             (
                 "Of these in anonymous memory, in the mapped file",

@@ -20,6 +20,7 @@ impl JobReport {
         let stages = vec![
             curve("read", |r| r.seconds.read),
             curve("build", |r| r.seconds.build),
+            curve("surface", |r| r.seconds.surface),
             curve("trace", |r| r.seconds.trace),
             curve("encode", |r| r.seconds.encode),
         ];

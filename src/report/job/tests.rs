@@ -12,7 +12,8 @@ fn done(number: i64, particles: u64) -> JobFrame {
         particles,
         seconds: StageSeconds {
             read: 0.25,
-            build: 0.5,
+            build: 0.375,
+            surface: 0.125,
             trace: 1.0 + 0.25 * n,
             encode: 0.125,
             wall: 2.0,

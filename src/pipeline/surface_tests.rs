@@ -1,0 +1,161 @@
+//! Every kind of surface through all of the pipeline but the encoding.
+
+use std::path::{Path, PathBuf};
+
+use glam::{DVec3, Vec3};
+use spherule_formats::native::{Bound, Encoding, StoreSettings, store};
+use spherule_formats::{ParticleFrame, SequenceInput, sequence::Sequence};
+
+use super::*;
+use crate::manifest::{Manifest, RadiusSetting};
+use crate::pipeline::{FrameTracer, ImageTask, LoadedParticles, load_frame};
+use crate::render::Channels;
+
+/// A wavy block with drops above it.
+fn particles() -> Vec<Vec3> {
+    let wave = |i: u16| 0.05 * (f32::from(i) * 2.7).sin();
+    let place = |i: u16| {
+        let [x, y, z] = [i % 12, i / 12 % 12, i / 144].map(|c| 0.2 * f32::from(c));
+        Vec3::new(x + wave(i), y - wave(i), z + wave(i))
+    };
+    let mut centers: Vec<Vec3> = (0..1200).map(place).collect();
+    for drop in 0..8 {
+        let x = 0.3 * f32::from(drop % 4_u16);
+        centers.insert(usize::from(100 * drop), Vec3::new(x, 0.5, 2.5 + 2.0 * x));
+    }
+    centers
+}
+
+/// The setup and the frame of a file of [`particles`].
+fn opened(file: &Path) -> (Setup, Sequence) {
+    let mut manifest = Manifest::new("in");
+    manifest.input.radius = RadiusSetting::Length(0.12);
+    let sequence = Sequence::open(&SequenceInput::from_path(file)).expect("a frame");
+    let question = crate::resolve::question(&manifest);
+    let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
+    let mut setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
+    setup.render.width = 48;
+    setup.render.height = 27;
+    setup.render.samples = 1;
+    setup.render.max_depth = 4;
+    setup.render.channels = Channels::ALL;
+    setup.scene.material.transmission = 1.0;
+    setup.scene.material.reflection = 1.0;
+    (setup, sequence)
+}
+
+struct Drawn {
+    film: Film,
+    report: FrameReport,
+    in_place: bool,
+}
+
+fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut FrameTracer) -> Drawn {
+    let task = ImageTask {
+        frame: 0,
+        index: 0,
+        image: PathBuf::new(),
+        preview: None,
+        refused: None,
+    };
+    let loaded = load_frame(setup, sequence, &task).expect("readable");
+    let in_place = matches!(loaded.particles, LoadedParticles::Stored(_));
+    let built = tracer.build(setup, loaded).expect("a tree");
+    let report = built.report.clone();
+    let (film, _) = tracer
+        .image(setup, &built, &AtomicBool::new(false))
+        .expect("an image");
+    Drawn {
+        film,
+        report,
+        in_place,
+    }
+}
+
+/// Every surface there is.
+fn surfaces() -> Vec<SurfaceSettings> {
+    let mut all = Vec::new();
+    for kind in [SurfaceKind::Spheres, SurfaceKind::Medium] {
+        for (normals, spray) in [
+            (NormalKind::Auto, false),
+            (NormalKind::Pca, false),
+            (NormalKind::Auto, true),
+        ] {
+            all.push(SurfaceSettings {
+                kind,
+                normals,
+                spray,
+                ..SurfaceSettings::DEFAULT
+            });
+        }
+    }
+    all
+}
+
+#[test]
+fn every_structure_draws_every_surface_alike() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("f_1.npy");
+    spherule_formats::write::npy::write(&file, &particles()).expect("a file");
+    let (setup, sequence) = opened(&file);
+    let mut tracer = FrameTracer::new();
+    let mut films = Vec::new();
+    for surface in surfaces() {
+        let alike = Structure::ALL.map(|structure| {
+            let setup = Setup {
+                surface,
+                accelerator: Some(structure),
+                ..setup.clone()
+            };
+            let drawn = drawn(&setup, &sequence, &mut tracer);
+            assert_eq!(drawn.report.particles, 1208);
+            assert_eq!(drawn.report.bytes.surface > 0, surface.spray);
+            drawn.film
+        });
+        assert!(alike.iter().all(|film| *film == alike[0]), "{surface:?}");
+        films.push(alike[0].clone());
+    }
+    for (i, film) in films.iter().enumerate() {
+        assert!(
+            !films[..i].contains(film),
+            "{:?} changes nothing",
+            surfaces()[i]
+        );
+    }
+}
+
+#[test]
+fn compact_frames_in_place_have_every_surface() {
+    let directory = tempfile::tempdir().expect("a directory");
+    let file = directory.path().join("f_1.spf");
+    let frame = ParticleFrame {
+        positions: particles(),
+        origin: DVec3::ZERO,
+        radius: None,
+        attributes: Vec::new(),
+        time: None,
+        dropped: 0,
+        file_index: None,
+    };
+    let settings = StoreSettings {
+        encoding: Some(Encoding::Q16),
+        bound: Bound::None,
+        rounding: 0.0,
+    };
+    store(&file, &frame, None, &settings).expect("a frame");
+    let (setup, sequence) = opened(&file);
+    for surface in surfaces() {
+        // Who decodes has the same particles.
+        let [placed, decoded] = [Structure::Lbvh, Structure::Bvh].map(|structure| {
+            let setup = Setup {
+                surface,
+                accelerator: Some(structure),
+                ..setup.clone()
+            };
+            drawn(&setup, &sequence, &mut FrameTracer::new())
+        });
+        assert_eq!(placed.in_place, !surface.spray);
+        assert!(!decoded.in_place);
+        assert!(placed.film == decoded.film, "{surface:?}");
+    }
+}
