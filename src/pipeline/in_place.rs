@@ -14,6 +14,7 @@ use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};
 use crate::scene::ColorMap;
+use crate::surface::SurfaceKind;
 use crate::survey::{Named, id_of, velocity_of};
 
 /// Bytes of a frame up to which everything that is used is compared with its checksum before it is traced;
@@ -223,6 +224,11 @@ fn particles_in_place(
         return Err(format!(
             "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
         ));
+    }
+    if setup.surface.kind == SurfaceKind::Smooth {
+        return Err(
+            "a smooth surface sorts a copy of them, 12 bytes a particle and more".to_owned(),
+        );
     }
     if setup.surface.spray {
         return Err("spray is parted from them, for 12 bytes a particle and more".to_owned());

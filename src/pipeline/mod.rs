@@ -226,6 +226,7 @@ impl TraceStage<'_> {
         next: SyncSender<InHand<TracedFrame>>,
     ) {
         let mut tracer = FrameTracer::new();
+        let mut told = HashSet::new();
         for InHand { claim, passed } in loaded {
             // A frame that was only read when the interrupt came is dropped, not begun.
             if self.interrupt.is_raised() {
@@ -244,7 +245,13 @@ impl TraceStage<'_> {
                 // Who reads may have ended by now.
                 let _ = is_built.send(());
             }
-            let traced = built.and_then(|frame| {
+            let traced = built.and_then(|mut frame| {
+                for note in std::mem::take(&mut frame.notes) {
+                    if !told.contains(&note) {
+                        (self.watch)(Event::Note(&note));
+                        told.insert(note);
+                    }
+                }
                 let trace = || tracer.trace(self.setup, frame, self.stop);
                 guarded(|| trace().map_err(|e| e.to_string()))
             });

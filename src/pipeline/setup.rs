@@ -8,7 +8,7 @@ use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::RenderSettings;
 use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
-use crate::surface::SurfaceSettings;
+use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
 /// Where radii come from.
@@ -132,7 +132,7 @@ impl Setup {
     /// Whether native frames relative to [`Self::origin`] are traced where they lie.
     pub fn traces_in_place(&self) -> bool {
         let in_order = matches!(self.stored_structure(), Structure::Lbvh | Structure::Kdtree);
-        let is_whole = !self.surface.spray;
+        let is_whole = !self.surface.spray && self.surface.kind != SurfaceKind::Smooth;
         in_order && is_whole && !matches!(self.radius, RadiusRule::Attribute { .. })
     }
 

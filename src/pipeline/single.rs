@@ -39,7 +39,10 @@ pub fn make_image(
             .iter()
             .for_each(|n| note(n));
         let mut tracer = FrameTracer::new();
-        let built = tracer.build(setup, frame).map_err(|e| e.to_string())?;
+        let mut built = tracer.build(setup, frame).map_err(|e| e.to_string())?;
+        std::mem::take(&mut built.notes)
+            .iter()
+            .for_each(|n| note(n));
         let stop = AtomicBool::new(false);
         tracer.trace(setup, built, &stop).map_err(|e| e.to_string())
     });

@@ -7,18 +7,23 @@ use std::time::Instant;
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
-use super::setup::Setup;
+use super::setup::{ColorRule, Setup};
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, render};
-use crate::report::FrameReport;
+use crate::report::memory::available;
+use crate::report::{FrameReport, MemoryUse};
 use crate::scene::Scene;
 use crate::surface::medium::MediumSurface;
+use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, Drops, WithSpray, spray_of};
 use crate::surface::{
     NormalKind, PcaNormals, ShadingNormals, Surface, SurfaceKind, SurfaceSettings,
 };
+
+/// Radii that differ by no more than this part are the same.
+const SAME_RADIUS: f32 = 0.01;
 
 /// What a frame's surface has beside the tree over its body; its memory lives on from frame to frame.
 #[derive(Debug, Default)]
@@ -27,26 +32,73 @@ pub(super) struct SurfaceBuilder {
     spray: TreeBuilder,
     /// Particles of the body, which come before those of the spray.
     body: u32,
+    smooth: SmoothGrid,
 }
 
 impl SurfaceBuilder {
     /// Makes what `setup` asks for of a frame that a tree is to be built over, and says in `report` what that
     /// took. Spray is taken out of the body: its particles become the frame's last. `trees` is where the tree
-    /// will be.
+    /// will be. A smooth surface needs no tree: none of its particles are left for one.
+    ///
+    /// # Errors
+    /// [`SmoothError`] if a smooth surface does not fit.
     pub(super) fn build(
         &mut self,
         setup: &Setup,
         frame: &mut DecodedFrame,
         trees: &mut TreeBuilder,
         report: &mut FrameReport,
-    ) {
+    ) -> Result<Vec<String>, SmoothError> {
         let start = Instant::now();
         self.forget();
         if setup.surface.spray {
             let built = self.part_spray(setup, frame, trees);
             report.bytes.surface = built.position_bytes + built.structure_bytes;
         }
+        let mut notes = Vec::new();
+        if setup.surface.kind == SurfaceKind::Smooth {
+            let made = self.build_smooth(setup, frame, &mut notes)?;
+            report.bytes.surface += made.bytes;
+            report.bytes.surface_peak = report.bytes.surface + made.peak_bytes - made.bytes;
+            frame.centers = Vec::new();
+            frame.radius = Radius::Common(setup.least_radius);
+        }
         report.seconds.surface = start.elapsed().as_secs_f64();
+        Ok(notes)
+    }
+
+    fn build_smooth(
+        &mut self,
+        setup: &Setup,
+        frame: &DecodedFrame,
+        notes: &mut Vec<String>,
+    ) -> Result<SmoothReport, SmoothError> {
+        let radius = match &frame.radius {
+            Radius::Common(radius) => *radius,
+            Radius::PerParticle(radii) => usual_radius(radii, notes),
+        };
+        let channels = setup.render.channels;
+        let is_colored = matches!(setup.color, ColorRule::Attribute { .. });
+        // Whoever is asked for by a place on the surface.
+        let keep = channels.id || channels.velocity || is_colored;
+        let left = memory_left(setup.memory_limit);
+        let made = self
+            .smooth
+            .build(&frame.centers, radius, &setup.surface, keep, left)?;
+        if made.left_out > 0 {
+            notes.push(format!(
+                "{} particles are too far from all others for the smooth surface and left out",
+                made.left_out
+            ));
+        }
+        if made.is_empty {
+            notes.push(format!(
+                "the smooth surface is empty: with radius {radius} the field of the particles nowhere gets to \
+                 surface.threshold = {}",
+                setup.surface.threshold
+            ));
+        }
+        Ok(made)
     }
 
     /// Nothing is left of the last frame.
@@ -57,6 +109,7 @@ impl SurfaceBuilder {
         };
         self.spray.build(&nothing, &BuildSettings::default());
         self.body = u32::MAX;
+        self.smooth = SmoothGrid::default();
     }
 
     fn part_spray(
@@ -111,10 +164,12 @@ impl SurfaceBuilder {
                 let body = SphereSurface::new(tree).shaded_by(normals);
                 self.draw_body(body, setup, scene, source, stop)
             }
-            // Until there is an isosurface, the body that it lies in.
-            SurfaceKind::Medium | SurfaceKind::Smooth => {
+            SurfaceKind::Medium => {
                 let body = MediumSurface::new(tree).shaded_by(normals);
                 self.draw_body(body, setup, scene, source, stop)
+            }
+            SurfaceKind::Smooth => {
+                self.draw_body(self.smooth.surface(), setup, scene, source, stop)
             }
         }
     }
@@ -144,6 +199,36 @@ fn radius_of(radius: &Radius) -> SphereRadius<'_> {
     match radius {
         Radius::Common(radius) => SphereRadius::Common(*radius),
         Radius::PerParticle(radii) => SphereRadius::Each(radii),
+    }
+}
+
+/// The radius that half of `radii` are not above: the field has one for all.
+fn usual_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
+    let mut sorted = radii.to_vec();
+    let middle = sorted.len() / 2;
+    if sorted.is_empty() {
+        return 1.0;
+    }
+    let (_, median, _) = sorted.select_nth_unstable_by(middle, f32::total_cmp);
+    let median = *median;
+    if radii
+        .iter()
+        .any(|radius| (radius - median).abs() > SAME_RADIUS * median)
+    {
+        notes.push(format!(
+            "radii differ; a smooth surface has one for all, here their median {median} (--radius gives another)"
+        ));
+    }
+    median
+}
+
+/// Bytes that a surface may take: what is left of the job's limit, and free.
+fn memory_left(limit: Option<u64>) -> Option<u64> {
+    let used = MemoryUse::now().anonymous;
+    let of_limit = limit.map(|limit| limit.saturating_sub(used));
+    match (of_limit, available()) {
+        (Some(limit), Some(free)) => Some(limit.min(free)),
+        (limit, free) => limit.or(free),
     }
 }
 

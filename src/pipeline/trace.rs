@@ -19,6 +19,7 @@ use crate::report::frame::FileBytes;
 use crate::report::{FrameReport, MemoryUse};
 use crate::scene::material::DEFAULT_COLOR;
 use crate::scene::{Camera, CameraError};
+use crate::surface::smooth::SmoothError;
 
 /// Why there is no image of a frame that was read.
 #[derive(Debug, thiserror::Error)]
@@ -37,6 +38,9 @@ pub enum TraceError {
     /// A native frame changed while it was traced, or cannot be used on this machine.
     #[error(transparent)]
     File(#[from] FrameError),
+    /// The surface would not fit into memory.
+    #[error(transparent)]
+    Surface(#[from] SmoothError),
     /// There is no picture from where the camera is.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
@@ -66,6 +70,8 @@ pub struct BuiltFrame {
     particles: BuiltParticles,
     time: Option<f64>,
     pub(super) report: FrameReport,
+    /// What the user should know of it.
+    pub(super) notes: Vec<String>,
 }
 
 /// What is left of a frame's particles beside the tree.
@@ -105,10 +111,12 @@ impl FrameTracer {
             ..FrameReport::default()
         };
         report.seconds.read = frame.read_time.as_secs_f64();
+        let mut notes = Vec::new();
         let particles = match frame.particles {
             LoadedParticles::Decoded(mut decoded) => {
-                self.surface
-                    .build(setup, &mut decoded, &mut self.builder, &mut report);
+                notes = self
+                    .surface
+                    .build(setup, &mut decoded, &mut self.builder, &mut report)?;
                 report.set_build(&self.build_copy(setup, &decoded));
                 report.bytes.attributes = decoded.shading.byte_len();
                 BuiltParticles::Decoded(decoded.shading)
@@ -129,6 +137,7 @@ impl FrameTracer {
             particles,
             time: frame.time,
             report,
+            notes,
         })
     }
 

@@ -42,6 +42,8 @@ pub(super) struct Optics {
     /// Whether the surface scatters, so that its colour matters.
     scatters: bool,
     pub(super) wants_albedo: bool,
+    /// Whether it matters which particle is seen.
+    pub(super) wants_particle: bool,
 }
 
 /// The way that a ray came, as a number to draw from.
@@ -85,6 +87,7 @@ impl Optics {
             },
             scatters: material.ambient > 0.0 || material.diffuse > 0.0,
             wants_albedo: settings.channels.albedo,
+            wants_particle: settings.channels.id || settings.channels.velocity,
         }
     }
 

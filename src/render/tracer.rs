@@ -180,6 +180,11 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
         } else {
             self.shade(ray, hit, FIRST, lit, scratch)
         };
+        let particle = if self.optics.wants_particle {
+            self.surface.particle_at(hit)
+        } else {
+            hit.particle
+        };
         PixelSample {
             color,
             coverage: 1.0,
@@ -187,13 +192,13 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
                 z: self.scene.camera.depth(ray, hit.t),
                 normal: facing(hit.normal, ray.direction),
                 position: self.world(hit.point),
-                velocity: self.source.velocity(hit.particle),
+                velocity: self.source.velocity(particle),
                 albedo: if S::ONE_BODY && !self.optics.wants_albedo {
                     Vec3::ZERO
                 } else {
                     self.base(hit, scratch)
                 },
-                id: self.source.id(hit.particle),
+                id: self.source.id(particle),
             },
         }
     }

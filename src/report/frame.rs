@@ -76,6 +76,8 @@ pub struct FrameBytes {
     pub attributes: u64,
     /// The surface, apart from positions and structure.
     pub surface: u64,
+    /// Most held while making it.
+    pub surface_peak: u64,
     /// Held while building and let go then, beside positions and structure.
     pub scratch: u64,
     /// Most held while building, the frame as read not counted unless it is traced where it lies.

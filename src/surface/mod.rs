@@ -96,6 +96,11 @@ pub trait Surface: Sync {
         Side::Outside
     }
 
+    /// The particle that a hit belongs to, where finding it takes more than finding the hit.
+    fn particle_at(&self, hit: &SurfaceHit) -> u32 {
+        hit.particle
+    }
+
     /// Gives `each` the particles whose attributes are those of a place on the surface, with positive
     /// weights of any sum; at least one.
     fn blend(&self, hit: &SurfaceHit, each: &mut dyn FnMut(u32, f32)) {

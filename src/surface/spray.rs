@@ -85,6 +85,13 @@ impl<S: Surface> Surface for WithSpray<'_, S> {
         self.body.side_of(point)
     }
 
+    fn particle_at(&self, hit: &SurfaceHit) -> u32 {
+        match hit.substance {
+            Substance::Body => self.body.particle_at(hit),
+            Substance::Spray => hit.particle,
+        }
+    }
+
     fn blend(&self, hit: &SurfaceHit, each: &mut dyn FnMut(u32, f32)) {
         match hit.substance {
             Substance::Body => self.body.blend(hit, each),

@@ -42,10 +42,12 @@ pub(super) fn refined(
         }
     }
     let normal = gradient.and_then(|gradient| (-gradient).try_normalize());
+    let normal = normal.unwrap_or(hit.normal);
     SurfaceHit {
         t: hit.t + (point - hit.point).dot(ray.direction),
         point,
-        normal: normal.unwrap_or(hit.normal),
+        normal,
+        shading: normal,
         ..hit
     }
 }

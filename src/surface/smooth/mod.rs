@@ -137,6 +137,8 @@ impl SmoothSurface<'_> {
             t: meeting.t,
             point,
             normal,
+            shading: normal,
+            lift: 0.0,
             particle: 0,
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,
@@ -188,6 +190,11 @@ impl Surface for SmoothSurface<'_> {
             side = side.other();
         }
         dimming.product()
+    }
+
+    fn particle_at(&self, hit: &SurfaceHit) -> u32 {
+        let nearest = self.field().and_then(|field| field.nearest(hit.point));
+        nearest.unwrap_or(hit.particle)
     }
 
     fn blend(&self, hit: &SurfaceHit, each: &mut dyn FnMut(u32, f32)) {
