@@ -40,9 +40,9 @@ pub struct Material {
     pub transmission: f32,
     /// How much is mirrored at which angle.
     pub fresnel: Fresnel,
-    /// What is left of white light after [`Self::absorption_length`] inside of one body, linear RGB.
+    /// What is left of white light after [`Self::absorption_length`] inside, linear RGB.
     pub absorption: [f32; 3],
-    /// The way through the body for that.
+    /// The way inside for that.
     pub absorption_length: AutoLength,
 }
 
@@ -133,7 +133,7 @@ impl Material {
         out.put(
             "absorption",
             &self.absorption,
-            "linear RGB that white becomes on its way through one body; [1, 1, 1] is clear",
+            "linear RGB that white becomes on its way inside; [1, 1, 1] is clear",
         );
         out.put(
             "absorption_length",

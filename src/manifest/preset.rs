@@ -73,3 +73,71 @@ impl Look {
         sections.into_iter().flat_map(key).map(set).collect()
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+    use crate::manifest::{AutoLength, Background, GroundPattern, Manifest};
+    use crate::surface::SurfaceKind;
+
+    fn water(text: &str, sets: &[&str]) -> Manifest {
+        let sets = sets.iter().map(|set| Override::parse(set).unwrap());
+        let all = Look::Water.settings().into_iter().chain(sets).collect();
+        Manifest::parse_with(text, Path::new("job.toml"), all).unwrap()
+    }
+
+    #[test]
+    fn every_look_is_read() {
+        for (look, name) in Look::ALL {
+            assert_eq!(Look::named(name).unwrap(), *look);
+            let text = "input.path = \"data\"";
+            let manifest =
+                Manifest::parse_with(text, Path::new("job.toml"), look.settings()).unwrap();
+            let shown = manifest.to_commented_toml();
+            assert_eq!(Manifest::parse(&shown, Path::new("x")).unwrap(), manifest);
+        }
+    }
+
+    #[test]
+    fn water_is_one_clear_body_on_a_floor() {
+        let plain = water("input.path = \"data\"", &[]);
+        assert_eq!(plain.surface.kind, SurfaceKind::Smooth);
+        assert_eq!(plain.render.max_depth, 8);
+        assert_eq!(plain.render.ground_pattern, GroundPattern::Checker);
+        assert_eq!(plain.material.transmission, 1.0);
+        assert!(plain.render.ground && plain.material.absorption[0] < 1.0);
+    }
+
+    #[test]
+    fn what_is_said_goes_before_a_look() {
+        let text = "input.path = \"data\"\n[render]\nmax_depth = 5\nground_tile = 2\n[material]\nabsorption = [1, 1, 1]";
+        let mixed = water(
+            text,
+            &["render.surface=spheres", "render.background=[1,0,0]"],
+        );
+        assert_eq!(mixed.render.max_depth, 5);
+        assert_eq!(mixed.render.ground_tile, AutoLength::Length(2.0));
+        assert_eq!(mixed.material.absorption, [1.0; 3]);
+        assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
+        assert_eq!(mixed.render.background, Background::Plain([1.0, 0.0, 0.0]));
+        assert!(mixed.render.ground);
+        // What is wrong there is told once, by its own place.
+        let wrong = "input.path = \"data\"\nrender = 3";
+        let error = Manifest::parse_with(wrong, Path::new("job.toml"), Look::Water.settings());
+        let error = error.unwrap_err();
+        assert_eq!(error.messages().len(), 1, "{error}");
+        assert!(error.to_string().contains("line 2"), "{error}");
+    }
+
+    #[test]
+    fn an_unknown_look_names_the_known() {
+        let error = Look::named("watre").unwrap_err();
+        assert!(
+            error.contains("known are: water; did you mean water?"),
+            "{error}"
+        );
+        assert!(!Look::named("lava").unwrap_err().contains("did you mean"));
+    }
+}

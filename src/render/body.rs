@@ -304,7 +304,8 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
             let half = incident.to_light - leg.ray.direction;
             let cosine = place.normal.dot(half) / half.length();
             // Most are dark, and need no shadow ray.
-            if place.normal.dot(incident.to_light) <= 0.0 || !(cosine > optics.highlight) {
+            let is_bright = place.normal.dot(incident.to_light) > 0.0 && cosine > optics.highlight;
+            if !is_bright {
                 continue;
             }
             let highlight = material.specular * cosine.powf(material.shininess);

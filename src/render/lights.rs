@@ -229,6 +229,7 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
     fn kept_from(&self, ray: &Ray, mut side: Side, mut first: Option<SurfaceHit>) -> Vec3 {
         let mut kept = Vec3::ONE;
         let mut ahead = *ray;
+        let mut from = ray.t_min;
         for _ in 0..MAX_CROSSINGS {
             let hit = match first.take() {
                 Some(hit) => Some(hit),
@@ -237,7 +238,7 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
             // A way inside that has no end is a crack in the surface, and its length unknown.
             let end = hit.map_or(ray.t_max, |hit| hit.t);
             if side == Side::Inside && end.is_finite() {
-                kept *= self.optics.kept_after(end - ahead.t_min);
+                kept *= self.optics.kept_after(end - from);
             }
             let Some(hit) = hit else {
                 return kept;
@@ -249,6 +250,7 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
             if kept.max_element() < DARK {
                 return Vec3::ZERO;
             }
+            from = hit.t;
             ahead.t_min = hit.t + hit.offset;
             side = side.other();
         }

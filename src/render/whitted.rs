@@ -84,6 +84,10 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
             let traced = |counts: &mut RayCounts| counts.refraction += 1;
             intensity += passed * self.secondary(&next, level, scratch, traced);
         }
+        if !entering {
+            // The ray came through the sphere that it leaves here.
+            intensity *= self.optics.kept_after(hit.t);
+        }
         intensity
     }
 

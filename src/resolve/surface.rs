@@ -51,12 +51,6 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
             "lies beside one body; set render.surface to \"medium\" or \"smooth\", or leave it out",
         );
     }
-    if manifest.material.absorption != [1.0; 3] && surface.kind == SurfaceKind::Spheres {
-        return unsupported(
-            "material.absorption",
-            "is of one body; set render.surface to \"medium\" or \"smooth\", or leave it out",
-        );
-    }
     Ok(surface)
 }
 

@@ -37,7 +37,6 @@ fn what_makes_no_sense_together_is_refused() {
         "surface.spray = true",
         "surface.spray: lies beside one body",
     );
-    refused("material.absorption = [1, 1, 0.5]", "set render.surface");
     for normals in ["pca", "sphere"] {
         let smooth = format!("render.surface = \"smooth\"\nsurface.normals = \"{normals}\"");
         refused(&smooth, "surface.normals: a smooth surface has");

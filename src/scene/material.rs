@@ -31,8 +31,8 @@ pub struct Material {
     pub transmission: f32,
     /// How `r` of eq. 4.1 comes of the angle.
     pub fresnel: Fresnel,
-    /// What one body takes of light inside of it, per length: its colours fade by `exp(-extinction * length)`
-    /// (Beer-Lambert). Not negative. Separate spheres are clear.
+    /// What is taken of light inside, per length: its colours fade by `exp(-extinction * length)` (Beer-Lambert).
+    /// Not negative. Shadows of separate spheres are without it.
     pub extinction: Vec3,
 }
 

@@ -47,7 +47,41 @@ fn typing_errors_get_the_nearest_word() {
         &["--channels", "RGBA,z"],
         &["output.channels", "did you mean Z?"],
     );
+    not_rendered(
+        &workshop,
+        &["--surface", "smoth"],
+        &[
+            "--surface: render.surface: wants one of spheres, medium, smooth",
+            "did you mean smooth?",
+        ],
+    );
+    not_rendered(
+        &workshop,
+        &["--look", "watr"],
+        &["--look watr: there is no such look", "did you mean water?"],
+    );
     refused(&workshop, &["render"], &["<INPUT>"]);
+}
+
+#[test]
+fn surfaces_that_make_no_sense_are_refused() {
+    let workshop = one_frame();
+    for (options, wanted) in [
+        (
+            ["--exact-surface", "--surface=medium"],
+            "surface.exact: is for the smooth surface alone",
+        ),
+        (
+            ["--spray", "--surface=spheres"],
+            "surface.spray: lies beside one body; set render.surface",
+        ),
+        (
+            ["--smoothing", "1.5"],
+            "--smoothing: surface.smoothing: wants a number from 0 to 1",
+        ),
+    ] {
+        not_rendered(&workshop, &options, &[wanted]);
+    }
 }
 
 #[test]

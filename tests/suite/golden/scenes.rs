@@ -3,7 +3,8 @@
 use glam::{DVec3, Vec3};
 use spherule::render::{Channels, Colors, RenderSettings};
 use spherule::scene::{
-    Background, Bounds, Camera, CameraView, ColorMap, Falloff, Ground, Light, Material, Scene,
+    Background, Bounds, Camera, CameraView, ColorMap, Falloff, Fresnel, Ground, Light, Material,
+    Scene,
 };
 
 const WIDTH: u32 = 96;
@@ -31,6 +32,8 @@ const MATT: Material = Material {
     ior: 1.33,
     reflection: 0.0,
     transmission: 0.0,
+    fresnel: Fresnel::Schlick,
+    extinction: Vec3::ZERO,
 };
 
 /// Owned colours.
