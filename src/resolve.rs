@@ -29,7 +29,7 @@ const LEAST_RADIUS: f64 = 1e-6;
 
 /// About this part of the bounds' diagonal is the edge of a square on the floor: some can be counted
 /// through the particles, and none is a few pixels.
-const TILE: f64 = 1.0 / 16.0;
+const TILE: f64 = 1.0 / 8.0;
 
 /// Why there can be no pictures.
 #[derive(Debug, thiserror::Error)]

@@ -17,9 +17,9 @@ pub enum Look {
 const WATER: &str = r#"
 render.surface = "smooth"
 render.max_depth = 8
-render.background = { bottom = [0.62, 0.66, 0.70], top = [0.36, 0.58, 0.95] }
+render.background = { bottom = [0.75, 0.80, 0.86], top = [0.30, 0.52, 0.92] }
 render.ground = true
-render.ground_color = [0.52, 0.50, 0.47]
+render.ground_color = [0.46, 0.44, 0.41]
 render.ground_pattern = "checker"
 material.color = [0.6, 0.85, 0.9]
 material.ambient = 0.0
@@ -29,7 +29,7 @@ material.shininess = 600.0
 material.ior = 1.333
 material.reflection = 1.0
 material.transmission = 1.0
-material.absorption = [0.55, 0.84, 0.90]
+material.absorption = [0.42, 0.78, 0.86]
 "#;
 
 impl Look {
