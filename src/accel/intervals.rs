@@ -193,10 +193,19 @@ impl TreeTask for Contains<'_> {
     }
 }
 
-/// Nodes and blocks that begin beyond the end that is known, nearest first: bits of the distance above,
-/// which order like integers as they are not negative, and the code below.
+/// What begins beyond the end that is known, nearest first.
 #[derive(Debug)]
-struct Later(BinaryHeap<Reverse<u64>>);
+struct Later(BinaryHeap<Reverse<Begins>>);
+
+/// A block, or the rest of a node.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
+struct Begins {
+    /// Bits of the distance at which the next of it begins above, which order like integers as they are not
+    /// negative; the code below.
+    place: u64,
+    /// The children of a node that are done with.
+    done: u8,
+}
 
 impl Later {
     const fn new() -> Self {
@@ -208,21 +217,22 @@ impl Later {
     }
 
     #[inline(always)]
-    fn push(&mut self, distance: u32, code: u32) {
-        let entry = (u64::from(distance) << 32) | u64::from(code);
-        self.0.push(Reverse(entry));
+    fn push(&mut self, distance: u32, code: u32, done: u8) {
+        let place = (u64::from(distance) << 32) | u64::from(code);
+        self.0.push(Reverse(Begins { place, done }));
     }
 
-    /// The code of the nearest one, if it begins no later than `end`.
+    /// The nearest one, if it begins no later than `end`: its code and the children that are done with.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
-    fn pop_before(&mut self, end: f32) -> Option<u32> {
-        let Reverse(entry) = self.0.peek()?;
-        let begins = f32::from_bits((entry >> 32) as u32);
+    fn pop_before(&mut self, end: f32) -> Option<(u32, u8)> {
+        let Reverse(Begins { place, .. }) = self.0.peek()?;
+        let begins = f32::from_bits((place >> 32) as u32);
         if begins > end {
             return None;
         }
-        self.0.pop().map(|Reverse(entry)| entry as u32)
+        let Reverse(Begins { place, done }) = self.0.pop()?;
+        Some((place as u32, done))
     }
 }
 
@@ -296,7 +306,7 @@ impl TreeTask for Exit<'_> {
         // What begins before the end; no more of it than below one code at a time.
         let mut stack = [0_u32; STACK_SIZE];
         let mut depth = 0;
-        let mut code = T::ROOT;
+        let (mut code, mut done) = (T::ROOT, 0_u8);
         loop {
             match topology.place(code) {
                 Place::Block(block) => {
@@ -307,7 +317,7 @@ impl TreeTask for Exit<'_> {
                         return TreeExit::Beyond;
                     }
                     if next <= limit {
-                        later.push(next.to_bits(), code);
+                        later.push(next.to_bits(), code, 0);
                     }
                     if reach.end > before {
                         prepared = from(reach.end);
@@ -316,22 +326,31 @@ impl TreeTask for Exit<'_> {
                 Place::Node(node) => {
                     let (found, keys) = kernel.test_node(&prepared, node, limit);
                     let children = topology.children(code);
+                    let mut next = u32::MAX;
                     for key in &kernel.all_keys(keys)[..found] {
-                        let child = topology.child(children, key & 7);
-                        if f32::from_bits(key & !7) <= reach.end {
-                            stack[depth] = child;
+                        let (begins, slot) = (key & !7, key & 7);
+                        if done >> slot & 1 == 1 {
+                            continue;
+                        }
+                        if f32::from_bits(begins) <= reach.end {
+                            done |= 1 << slot;
+                            stack[depth] = topology.child(children, slot);
                             depth += 1;
                         } else {
-                            later.push(key & !7, child);
+                            next = next.min(begins);
                         }
+                    }
+                    // The rest is looked at again: by then some of it may end before the end.
+                    if next < u32::MAX {
+                        later.push(next, code, done);
                     }
                 }
             }
             if depth > 0 {
                 depth -= 1;
-                code = stack[depth];
+                (code, done) = (stack[depth], 0);
             } else if let Some(next) = later.pop_before(reach.end) {
-                code = next;
+                (code, done) = next;
             } else {
                 break;
             }
