@@ -54,6 +54,21 @@ fn pictures_are_those_of_decoded_particles() {
     }
 }
 
+#[test]
+fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
+    let shop = Workshop::new();
+    dam_break(&shop.join("in"), 1..=1);
+    let options = ["--encoding", "q16", "--max-error", "0.05"];
+    for (name, surface) in [
+        ("water", &["--look", "water", "--surface", "medium"][..]),
+        ("pca", &["--set", "surface.normals=\"pca\""]),
+    ] {
+        shop.run(&[&["convert", "in", "-o", name][..], &options].concat())
+            .expect(0);
+        same_as_decoded(&shop, name, surface);
+    }
+}
+
 /// Radii over a hundredfold, so that boxes hold spheres; ids that are not the places in the file.
 #[test]
 fn radii_and_ids_of_their_own() {

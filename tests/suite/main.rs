@@ -17,5 +17,6 @@ mod scale;
 mod schema;
 mod status;
 mod structures;
+mod surface;
 mod thesis;
 mod verify;

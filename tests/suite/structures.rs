@@ -137,3 +137,19 @@ fn radii_of_their_own() {
     let own = r#"input.radius={attribute="r"}"#;
     same_from_all(&workshop, "p.csv", &[GLASS, &["--set", own]].concat());
 }
+
+#[test]
+fn water_of_one_body() {
+    let water = ["--look", "water", "--surface", "medium"];
+    let file = "emitter_sph/ParticleData_Fluid_10.bgeo";
+    same_on_sample(file, &[&water[..], ALL_CHANNELS].concat());
+}
+
+#[test]
+fn normals_of_neighbours() {
+    let smooth = ["--set", r#"surface.normals="pca""#];
+    same_on_sample(
+        "emitter_sph/ParticleData_Fluid_10.bgeo",
+        &[&smooth[..], ALL_CHANNELS].concat(),
+    );
+}

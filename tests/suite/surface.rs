@@ -1,0 +1,51 @@
+//! Jobs of one body with spray: the same on any number of threads and when they are resumed, and what the
+//! surface took is told apart.
+
+use std::fs;
+
+use serde_json::Value;
+
+use crate::harness::{SMALL, Workshop, dam_break, images};
+
+const WATER: [&str; 8] = [
+    "--look",
+    "water",
+    "--surface",
+    "medium",
+    "--spray",
+    "--channels",
+    "RGBA,Z,N,P,V,id,albedo",
+    "--set=render.max_depth=5",
+];
+
+#[test]
+fn jobs_of_one_body_with_spray() {
+    let shop = Workshop::new();
+    // When it splashes.
+    dam_break(&shop.join("in"), 6..=8);
+    let render = |out: &str, options: &[&str]| {
+        let pattern = format!("{out}/f.####.exr");
+        let arguments = ["render", "in", "-o", &pattern];
+        shop.run(&[&arguments[..], &SMALL, &WATER, options].concat())
+            .expect(0)
+    };
+    render("one", &["--threads", "1"]);
+    render("many", &["--threads", "3"]);
+    let expected = images(&shop.join("one"));
+    assert!(expected == images(&shop.join("many")), "threads tell");
+
+    // What is lost is made again.
+    fs::remove_file(shop.join("many/f.0007.exr")).expect("an image");
+    render("many", &["--threads", "3"]);
+    assert!(expected == images(&shop.join("many")), "resuming tells");
+
+    let report = fs::read_to_string(shop.join("one/report.json")).expect("a report");
+    let report: Value = serde_json::from_str(&report).expect("JSON");
+    let frames = report["frames"].as_array().expect("frames");
+    assert_eq!(frames.len(), 3);
+    let seconds = |frame: &Value| frame["seconds"]["surface"].as_f64();
+    let bytes = |frame: &Value| frame["bytes"]["surface"].as_u64();
+    assert!(frames.iter().all(|frame| seconds(frame) > Some(0.0)));
+    assert!(frames.iter().all(|frame| bytes(frame).is_some()));
+    assert!(frames.iter().any(|frame| bytes(frame) > Some(0)));
+}
