@@ -19,7 +19,7 @@ use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, Drops, WithSpray, spray_of};
 use crate::surface::{
-    NormalKind, PcaNormals, ShadingNormals, Surface, SurfaceKind, SurfaceSettings,
+    GradientNormals, NormalKind, PcaNormals, ShadingNormals, Surface, SurfaceKind, SurfaceSettings,
 };
 
 /// Radii that differ by no more than this part are the same.
@@ -239,7 +239,8 @@ fn support(surface: &SurfaceSettings) -> f32 {
 
 fn shading_normals(surface: &SurfaceSettings) -> ShadingNormals {
     match surface.normals {
-        NormalKind::Auto | NormalKind::Sphere | NormalKind::Field => ShadingNormals::Sphere,
+        NormalKind::Auto | NormalKind::Sphere => ShadingNormals::Sphere,
+        NormalKind::Field => ShadingNormals::Gradient(GradientNormals::new(support(surface))),
         NormalKind::Pca => ShadingNormals::Pca(PcaNormals::new(support(surface))),
     }
 }

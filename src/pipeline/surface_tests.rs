@@ -79,6 +79,7 @@ fn surfaces() -> Vec<SurfaceSettings> {
         for (normals, spray) in [
             (NormalKind::Auto, false),
             (NormalKind::Pca, false),
+            (NormalKind::Field, false),
             (NormalKind::Auto, true),
         ] {
             all.push(SurfaceSettings {

@@ -256,11 +256,12 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
     fn cross(&self, leg: &Leg, hit: &SurfaceHit) -> Crossing {
         let material = &self.scene.material;
         let direction = leg.ray.direction;
-        let (outward, ratio) = match leg.side {
-            Side::Outside => (hit.normal, 1.0 / material.ior),
-            Side::Inside => (-hit.normal, material.ior),
+        // Light is bent by the normal to shade by, and goes on from off the surface that rays meet.
+        let (outward, shading, ratio) = match leg.side {
+            Side::Outside => (hit.normal, hit.shading, 1.0 / material.ior),
+            Side::Inside => (-hit.normal, -hit.shading, material.ior),
         };
-        let normal = against(outward, direction);
+        let normal = against(shading, direction);
         let cosine = -direction.dot(normal);
         let r = material.mirrored(cosine, ratio);
         let sin2_out = ratio * ratio * (1.0 - cosine * cosine).max(0.0);
@@ -368,13 +369,13 @@ impl Child {
 /// Where `leg` meets the surface, or spray, on its side of it.
 fn place(leg: &Leg, hit: &SurfaceHit) -> Place {
     // Spray has its own normals, the body those of its outside.
-    let outward = match (hit.substance, leg.side) {
-        (Substance::Body, Side::Inside) => -hit.normal,
-        _ => hit.normal,
+    let (outward, shading) = match (hit.substance, leg.side) {
+        (Substance::Body, Side::Inside) => (-hit.normal, -hit.shading),
+        _ => (hit.normal, hit.shading),
     };
     Place {
         start: hit.anchor + hit.offset * outward,
-        normal: against(outward, leg.ray.direction),
+        normal: against(shading, leg.ray.direction),
         side: leg.side,
     }
 }

@@ -8,7 +8,9 @@ use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod dimming;
 pub mod field;
+mod gradient;
 pub mod medium;
+mod neighbours;
 mod normals;
 mod pca;
 mod settings;
@@ -17,6 +19,7 @@ pub mod spheres;
 pub mod spray;
 
 pub(crate) use dimming::Dimming;
+pub use gradient::GradientNormals;
 pub use normals::ShadingNormals;
 pub use pca::PcaNormals;
 pub use settings::{NormalKind, SurfaceKind, SurfaceSettings};

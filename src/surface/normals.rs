@@ -1,6 +1,7 @@
 //! Which way spheres are said to face when they are shaded.
 
 use super::SurfaceHit;
+use super::gradient::GradientNormals;
 use super::pca::PcaNormals;
 use crate::accel::view::TreeView;
 use crate::ray::Ray;
@@ -12,8 +13,10 @@ pub enum ShadingNormals {
     /// The sphere's.
     #[default]
     Sphere,
-    /// Those of the particles about the place.
+    /// Across where the particles about the place lie flat.
     Pca(PcaNormals),
+    /// Against the gradient of their field.
+    Gradient(GradientNormals),
 }
 
 impl ShadingNormals {
@@ -29,6 +32,7 @@ impl ShadingNormals {
         match self {
             Self::Sphere => hit,
             Self::Pca(normals) => normals.shade(tree, ray, hit, radius),
+            Self::Gradient(normals) => normals.shade(tree, ray, hit, radius),
         }
     }
 }

@@ -1,0 +1,79 @@
+//! Normals of the SPH colour field, taken from the tree that rays use: against the gradient of
+//! `sum_j W(x - x_j)` with the cubic spline (Monaghan 1992) and all particles alike (Müller, Charypar and Gross
+//! 2003, eq. 16). For surfaces of spheres; the smooth surface has a field of its own.
+
+use super::SurfaceHit;
+use super::neighbours::{each_neighbour, fixed};
+use super::pca::towards_viewer;
+use crate::accel::view::TreeView;
+use crate::ray::Ray;
+
+/// Normals by the gradient of the field about the spheres of a tree.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct GradientNormals {
+    /// Reach of the kernel, in radii of the sphere that is hit.
+    support: f32,
+}
+
+impl GradientNormals {
+    /// Of a kernel that ends at `support` times the radius of the sphere that is hit.
+    #[must_use]
+    pub const fn new(support: f32) -> Self {
+        Self { support }
+    }
+
+    /// `hit`, which a `ray` found on a sphere of `radius` in `tree`, with the normal to shade it by.
+    pub(super) fn shade(
+        &self,
+        tree: &TreeView,
+        ray: &Ray,
+        hit: SurfaceHit,
+        radius: f32,
+    ) -> SurfaceHit {
+        let mut sum = [0_i64; 3];
+        let is_whole = each_neighbour(tree, hit.point, self.support * radius, |at| {
+            let pull = -at * steepness(2.0 * at.length());
+            for (sum, value) in sum.iter_mut().zip(pull.to_array()) {
+                *sum += fixed(value);
+            }
+        });
+        let outward = glam::DVec3::from_array(sum.map(|sum| sum as f64)).try_normalize();
+        match outward {
+            Some(outward) if is_whole => SurfaceHit {
+                shading: towards_viewer(outward.as_vec3(), hit.normal, ray.direction),
+                ..hit
+            },
+            _ => hit,
+        }
+    }
+}
+
+/// Minus the derivative of the cubic spline over the distance `q` in smoothing lengths, up to a factor.
+fn steepness(q: f32) -> f32 {
+    if q < 1.0 {
+        1.0 - 0.75 * q
+    } else {
+        0.25 * (2.0 - q).max(0.0).powi(2) / q
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steepness_is_that_of_the_spline() {
+        let spline = |q: f32| {
+            if q < 1.0 {
+                1.0 - 1.5 * q * q + 0.75 * q * q * q
+            } else {
+                0.25 * (2.0 - q).powi(3)
+            }
+        };
+        for q in [0.1, 0.5, 0.9, 1.1, 1.5, 1.9] {
+            let slope = (spline(q + 1e-2) - spline(q - 1e-2)) / 2e-2;
+            assert!((3.0 * q * steepness(q) + slope).abs() < 1e-3, "{q}");
+        }
+        assert!(steepness(2.0).abs() < 1e-6 && steepness(2.5).abs() < 1e-6);
+    }
+}
