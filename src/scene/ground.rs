@@ -84,9 +84,8 @@ impl Ground {
         };
         let [across, along] = self.axes();
         let from_middle = (point - self.center) / checker.tile;
-        // Parity by halves: counts beyond 2^24 are even numbers, and no harm done.
-        let square = from_middle.dot(across).floor() + from_middle.dot(along).floor();
-        if 0.5 * square == (0.5 * square).floor() {
+        let square = whole(from_middle.dot(across)) ^ whole(from_middle.dot(along));
+        if square & 1 == 0 {
             self.color
         } else {
             DARKER * self.color
@@ -137,6 +136,17 @@ impl Ground {
         let scale = point.abs().max_element().max(t).max(self.height.abs());
         (8.0 * f32::EPSILON * scale).max(f32::MIN_POSITIVE)
     }
+}
+
+/// The whole number at or under `value`; of the farthest squares only the last one's. Without the
+/// call that `floor` is where machines of any age must run the program.
+#[expect(
+    clippy::cast_possible_truncation,
+    reason = "saturates, where squares are far smaller than rounding"
+)]
+fn whole(value: f32) -> i32 {
+    let towards_zero = value as i32;
+    towards_zero.saturating_sub(i32::from(value < towards_zero as f32))
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! Only bins that hold particles are kept: rows along x by (z, y), in each row the bins by x, in each bin
 //! the particles. So particles that escaped cost nothing, and the neighbours of a bin are nine runs.
 
+use std::cmp::Ordering;
 use std::ops::Range;
 
 use glam::Vec3;
@@ -92,8 +93,8 @@ fn key(cell: [i32; 3]) -> u64 {
 }
 
 impl Bins {
-    /// Sorts `centers` into bins of edge `size`. With `keep_indices` the way back is kept, and the order in
-    /// a bin depends on positions alone.
+    /// Sorts `centers` into bins of edge `size`; in a bin they keep their order. With `keep_indices` the way back
+    /// is kept.
     pub(crate) fn sort(centers: &[Vec3], size: f32, keep_indices: bool) -> Self {
         let inverse = 1.0 / size;
         let (low, high) = cell_bounds(centers, inverse);
@@ -135,8 +136,8 @@ impl Bins {
         let found: Vec<Vec<(u64, u32)>> = slices
             .into_par_iter()
             .zip(&cells.starts[..pieces])
-            .map_init(Vec::new, |scratch, ((points, indices), first)| {
-                sort_piece(points, indices, inverse, scratch);
+            .map_init(Scratch::default, |scratch, ((points, indices), first)| {
+                scratch.sort(points, indices, inverse);
                 bins_of(points, inverse, *first)
             })
             .collect();
@@ -179,6 +180,60 @@ impl Bins {
             x: i32::MAX,
             start: index_u32(self.points.len()),
         });
+    }
+
+    /// Keeps the bins that are `wanted`, a flag each.
+    pub(crate) fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
+        let mut kept = 0;
+        let mut found = Vec::new();
+        for row in 0..self.row_count() {
+            let place = self.rows[row];
+            for bin in self.bins_in(row).filter(|bin| wanted(*bin)) {
+                let particles = self.particles_in(bin..bin + 1);
+                found.push((key([self.bins[bin].x, place.y, place.z]), index_u32(kept)));
+                self.points.copy_within(particles.clone(), kept);
+                if !self.indices.is_empty() {
+                    self.indices.copy_within(particles.clone(), kept);
+                }
+                kept += particles.len();
+            }
+        }
+        self.points.truncate(kept);
+        self.points.shrink_to_fit();
+        self.indices.truncate(kept);
+        self.indices.shrink_to_fit();
+        self.index(&[found]);
+    }
+
+    /// Brings the particles of each bin into an order that depends on their positions alone, so that sums over
+    /// them do not depend on the order of the file. Indices must be kept.
+    pub(crate) fn order_by_position(&mut self) {
+        let mut tasks = Vec::with_capacity(self.bin_count());
+        let (mut points, mut indices) = (&mut self.points[..], &mut self.indices[..]);
+        for bins in self.bins.windows(2) {
+            let count = (bins[1].start - bins[0].start) as usize;
+            let (its_points, others) = points.split_at_mut(count);
+            points = others;
+            let (its_indices, others) = indices.split_at_mut(count);
+            indices = others;
+            tasks.push((its_points, its_indices));
+        }
+        tasks.into_par_iter().with_min_len(64).for_each_init(
+            Vec::new,
+            |pairs, (points, indices)| {
+                pairs.clear();
+                pairs.extend(points.iter().copied().zip(indices.iter().copied()));
+                pairs.sort_unstable_by(|a: &(Vec3, u32), b| {
+                    let coordinates = a.0.to_array().into_iter().zip(b.0.to_array());
+                    let by_position = coordinates
+                        .fold(Ordering::Equal, |order, (p, q)| order.then(p.total_cmp(&q)));
+                    by_position.then(a.1.cmp(&b.1))
+                });
+                for ((point, index), sorted) in points.iter_mut().zip(indices).zip(pairs) {
+                    (*point, *index) = *sorted;
+                }
+            },
+        );
     }
 
     /// Edge of a bin.
@@ -342,35 +397,67 @@ fn cell_bounds(centers: &[Vec3], inverse: f32) -> ([i32; 3], [i32; 3]) {
     }
 }
 
-/// What sorting a piece needs for each particle: bin, place before.
-type Keyed = (u64, u32, Vec3, u32);
+/// The memory of sorting pieces.
+#[derive(Default)]
+struct Scratch {
+    /// Bin and place before.
+    keyed: Vec<(u64, u32)>,
+    /// Particles before each bin.
+    starts: Vec<u32>,
+    points: Vec<Vec3>,
+    indices: Vec<u32>,
+}
 
-/// Sorts by bin. Where indices are kept, particles of a bin are sorted by position, so that sums over them
-/// do not depend on the order of the file.
-fn sort_piece(points: &mut [Vec3], indices: &mut [u32], inverse: f32, scratch: &mut Vec<Keyed>) {
-    scratch.clear();
-    scratch.extend((0..).zip(points.iter()).map(|(place, point)| {
-        let index = indices.get(place as usize).copied().unwrap_or(0);
-        (key(cell_of(*point, inverse)), place, *point, index)
-    }));
-    if indices.is_empty() {
-        scratch.sort_unstable_by_key(|(key, place, ..)| (*key, *place));
-    } else {
-        scratch.sort_unstable_by(|a, b| {
-            let by_position = || {
-                let pairs = a.2.to_array().into_iter().zip(b.2.to_array());
-                pairs.fold(std::cmp::Ordering::Equal, |order, (p, q)| {
-                    order.then(p.total_cmp(&q))
-                })
-            };
-            a.0.cmp(&b.0).then_with(by_position).then(a.3.cmp(&b.3))
-        });
+impl Scratch {
+    /// Sorts a piece by bin, stably.
+    fn sort(&mut self, points: &mut [Vec3], indices: &mut [u32], inverse: f32) {
+        self.keyed.clear();
+        let keys = points.iter().map(|point| key(cell_of(*point, inverse)));
+        self.keyed.extend(keys.zip(0..));
+        self.points.clear();
+        self.points.extend_from_slice(points);
+        self.indices.clear();
+        self.indices.extend_from_slice(indices);
+        if !self.count_into_order() {
+            self.keyed.sort_unstable();
+        }
+        for (point, (_, place)) in points.iter_mut().zip(&self.keyed) {
+            *point = self.points[*place as usize];
+        }
+        for (index, (_, place)) in indices.iter_mut().zip(&self.keyed) {
+            *index = self.indices[*place as usize];
+        }
     }
-    for (point, sorted) in points.iter_mut().zip(scratch.iter()) {
-        *point = sorted.2;
-    }
-    for (index, sorted) in indices.iter_mut().zip(scratch.iter()) {
-        *index = sorted.3;
+
+    /// Sorts the keys by counting, if they are not too far apart; tells whether.
+    fn count_into_order(&mut self) -> bool {
+        let all = || self.keyed.iter().map(|(key, _)| *key);
+        let (Some(low), Some(high)) = (all().min(), all().max()) else {
+            return true;
+        };
+        // Keys of different rows are far apart.
+        let span = high - low;
+        if span > 4 * self.keyed.len() as u64 {
+            return false;
+        }
+        #[expect(clippy::cast_possible_truncation, reason = "compared above")]
+        let place = |key: u64| (key - low) as usize;
+        self.starts.clear();
+        self.starts.resize(place(high) + 2, 0);
+        for (key, _) in &self.keyed {
+            self.starts[place(*key) + 1] += 1;
+        }
+        for bin in 1..self.starts.len() {
+            self.starts[bin] += self.starts[bin - 1];
+        }
+        let mut sorted = vec![(0, 0); self.keyed.len()];
+        for entry in &self.keyed {
+            let next = &mut self.starts[place(entry.0)];
+            sorted[*next as usize] = *entry;
+            *next += 1;
+        }
+        self.keyed = sorted;
+        true
     }
 }
 

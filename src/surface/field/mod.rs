@@ -5,8 +5,6 @@
 //! Sums that decide bits elsewhere are exact: each term is rounded to a multiple of a power of two that is
 //! small, but large enough for the sum to fit f32. So they do not depend on the order of particles.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use glam::Vec3;
 
 pub(crate) mod bins;
@@ -39,7 +37,8 @@ impl FieldParticles {
     /// [`Self::nearest`] and [`Self::neighbours`].
     pub fn new(centers: &[Vec3], support: f32) -> Self {
         let mut field = Self::sorted(centers, support, true);
-        field.find_volumes(None);
+        field.bins.order_by_position();
+        field.find_volumes(|_| true);
         field
     }
 
@@ -51,11 +50,19 @@ impl FieldParticles {
         }
     }
 
-    /// Finds the volumes of the particles in the bins of `wanted`, or of all.
-    pub(crate) fn find_volumes(&mut self, wanted: Option<&[AtomicBool]>) {
-        let is_wanted =
-            |bin: usize| wanted.is_none_or(|wanted| wanted[bin].load(Ordering::Relaxed));
-        self.volumes = density::volumes(&self.bins, is_wanted);
+    /// Lets go of the particles in bins that are not `kept`, a flag each.
+    pub(crate) fn retain(&mut self, kept: &[bool]) {
+        self.bins.retain(|bin| kept[bin]);
+    }
+
+    /// See [`Bins::order_by_position`].
+    pub(crate) fn order_by_position(&mut self) {
+        self.bins.order_by_position();
+    }
+
+    /// Finds the volumes of the particles in the bins that are `wanted`.
+    pub(crate) fn find_volumes(&mut self, wanted: impl Fn(usize) -> bool + Sync) {
+        self.volumes = density::volumes(&self.bins, wanted);
     }
 
     /// Where the kernel ends.

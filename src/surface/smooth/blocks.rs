@@ -16,7 +16,7 @@ const BLOCKS: usize = 64;
 /// Rows of bins that a task looks at.
 const ROWS: usize = 128;
 /// Part of the particles that an even filling has, from which on a bin counts as filled.
-const FILLED: f32 = 0.375;
+const FILLED: f32 = 0.5;
 
 /// 4x4x4 bricks, a bit for each: x fastest, then y, then z.
 #[derive(Debug, Clone, Copy)]
@@ -152,24 +152,29 @@ pub(super) fn brick_at(place: [i32; 3], cell: u32) -> [i32; 3] {
     std::array::from_fn(|axis| EDGE * place[axis] + part(axis))
 }
 
-/// Marks the bins whose particles the field of the `blocks` is made of.
-pub(super) fn mark_needed(bins: &Bins, layout: &Layout, blocks: &[BlockPlan]) -> Vec<AtomicBool> {
-    let needed: Vec<AtomicBool> = (0..bins.bin_count())
+/// Flags for the bins within `reach` of the bricks where the field is needed.
+pub(super) fn bins_near(
+    bins: &Bins,
+    layout: &Layout,
+    blocks: &[BlockPlan],
+    reach: f32,
+) -> Vec<bool> {
+    let near: Vec<AtomicBool> = (0..bins.bin_count())
         .map(|_| AtomicBool::new(false))
         .collect();
     blocks.par_iter().for_each(|block| {
         for cell in cells(block.raw) {
-            let [xs, ys, zs] = cells_around(layout, brick_at(block.place, cell), layout.support);
+            let [xs, ys, zs] = cells_around(layout, brick_at(block.place, cell), reach);
             for z in zs {
                 for y in ys.clone() {
                     for bin in bins.run(z, y, xs.clone()) {
-                        needed[bin].store(true, Ordering::Relaxed);
+                        near[bin].store(true, Ordering::Relaxed);
                     }
                 }
             }
         }
     });
-    needed
+    near.into_iter().map(AtomicBool::into_inner).collect()
 }
 
 /// Keys and bits of blocks with bricks that particles are near enough to for a surface, in order.
@@ -192,7 +197,7 @@ fn occupied(bins: &Bins, layout: &Layout) -> Vec<(u64, u64)> {
 }
 
 /// One entry for each key, in order.
-fn merged(mut found: Vec<(u64, u64)>) -> Vec<(u64, u64)> {
+pub(super) fn merged(mut found: Vec<(u64, u64)>) -> Vec<(u64, u64)> {
     found.par_sort_unstable();
     found.dedup_by(|next, kept| {
         let same = next.0 == kept.0;
@@ -231,12 +236,12 @@ fn key_and_bit(brick: [i32; 3]) -> (u64, u64) {
     (key_of(brick.map(|c| c.div_euclid(EDGE))), 1 << cell)
 }
 
-fn key_of(block: [i32; 3]) -> u64 {
+pub(super) fn key_of(block: [i32; 3]) -> u64 {
     let part = |c: i32| u64::from((c + (1 << 20)).cast_unsigned());
     part(block[2]) << 42 | part(block[1]) << 21 | part(block[0])
 }
 
-fn place_of(key: u64) -> [i32; 3] {
+pub(super) fn place_of(key: u64) -> [i32; 3] {
     [0, 21, 42].map(|shift| (key >> shift & ((1 << 21) - 1)) as i32 - (1 << 20))
 }
 

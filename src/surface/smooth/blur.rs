@@ -36,63 +36,97 @@ pub(super) type Around<'a> = [Part<'a>; 27];
 /// The field at the samples of a brick, in rows of 16.
 pub(super) type BrickField = [[[f32; 16]; SAMPLES]; SAMPLES];
 
+/// Floats of a row of the window: those of three bricks, and room for groups that reach beyond.
+const STRIDE: usize = 32;
+/// Place of the first sample of a brick along an axis of the window.
+const FIRST: usize = VOXELS - 1;
+/// Rows of the window along an axis.
+const WIDE: usize = 3 * VOXELS;
+
 /// The memory of putting bricks together.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub(super) struct Blur {
-    /// The field around a brick.
-    window: Vec<f32>,
+    /// The field over a brick and its neighbours.
+    window: Vec<[f32; STRIDE]>,
     /// Blurred along z, and along z and y.
-    along_z: Vec<f32>,
-    along_y: Vec<f32>,
+    along_z: Vec<[f32; STRIDE]>,
+    along_y: Vec<[f32; STRIDE]>,
+}
+
+impl Default for Blur {
+    fn default() -> Self {
+        Self {
+            window: vec![[0.0; STRIDE]; WIDE * WIDE],
+            along_z: vec![[0.0; STRIDE]; SAMPLES * WIDE],
+            along_y: vec![[0.0; STRIDE]; SAMPLES * SAMPLES],
+        }
+    }
 }
 
 impl Blur {
     /// The sharp part.
     #[inline(always)]
     pub(super) fn copy_sharp(&mut self, around: &Around, field: &mut BrickField) {
-        let stride = self.fill(around, 1, SAMPLES);
+        if around.iter().all(|part| matches!(part, Part::Even(0.0))) {
+            *field = [[[0.0; 16]; SAMPLES]; SAMPLES];
+            return;
+        }
+        self.fill(around, 1);
         for (z, layer) in field.iter_mut().enumerate() {
             for (y, row) in layer.iter_mut().enumerate() {
-                let start = (z * SAMPLES + y) * stride;
-                row.copy_from_slice(&self.window[start..start + 16]);
+                let from = &self.window[(FIRST + z) * WIDE + FIRST + y];
+                row.copy_from_slice(&from[FIRST..FIRST + 16]);
             }
         }
     }
 
-    /// Adds the smoothed part: a Gaussian blur, one axis after the other. There are two taps at least.
+    /// Adds the smoothed part: a Gaussian blur, one axis after the other.
     #[inline(always)]
     pub(super) fn add_smooth(&mut self, around: &Around, taps: &[f32], field: &mut BrickField) {
-        let blur = taps.len() - 1;
-        let wide = SAMPLES + 2 * blur;
-        let stride = self.fill(around, blur + 1, wide);
-        let groups = wide.div_ceil(LANES);
-        self.along_z.resize(SAMPLES * wide * stride, 0.0);
-        self.along_y.resize(SAMPLES * SAMPLES * stride, 0.0);
-        let layer = wide * stride;
+        // The compiler unrolls what it knows the length of.
+        match taps {
+            [a, b] => self.add(around, &[*a, *b], field),
+            [a, b, c] => self.add(around, &[*a, *b, *c], field),
+            [a, b, c, d] => self.add(around, &[*a, *b, *c, *d], field),
+            [a, b, c, d, e] => self.add(around, &[*a, *b, *c, *d, *e], field),
+            [a, b, c, d, e, f] => self.add(around, &[*a, *b, *c, *d, *e, *f], field),
+            [a, b, c, d, e, f, g, ..] => self.add(around, &[*a, *b, *c, *d, *e, *f, *g], field),
+            [] | [_] => {}
+        }
+    }
+
+    #[inline(always)]
+    fn add<const TAPS: usize>(
+        &mut self,
+        around: &Around,
+        taps: &[f32; TAPS],
+        field: &mut BrickField,
+    ) {
+        let blur = TAPS - 1;
+        self.fill(around, blur + 1);
+        let rows = FIRST - blur..FIRST + SAMPLES + blur;
         for z in 0..SAMPLES {
-            for y in 0..wide {
-                let row = z * layer + y * stride;
-                for group in (0..groups * LANES).step_by(LANES) {
-                    let sums = weighted(&self.window, row + blur * layer + group, layer, taps);
-                    self.along_z[row + group..row + group + LANES].copy_from_slice(&sums);
-                }
+            for y in rows.clone() {
+                let row = |step: usize| &self.window[(FIRST + z + step - blur) * WIDE + y];
+                self.along_z[z * WIDE + y] = weighted_rows(row, taps);
             }
         }
         for z in 0..SAMPLES {
             for y in 0..SAMPLES {
-                let from = z * layer + (y + blur) * stride;
-                let to = (z * SAMPLES + y) * stride;
-                for group in (0..groups * LANES).step_by(LANES) {
-                    let sums = weighted(&self.along_z, from + group, stride, taps);
-                    self.along_y[to + group..to + group + LANES].copy_from_slice(&sums);
-                }
+                let row = |step: usize| &self.along_z[z * WIDE + FIRST + y + step - blur];
+                self.along_y[z * SAMPLES + y] = weighted_rows(row, taps);
             }
         }
         for (z, layer) in field.iter_mut().enumerate() {
             for (y, row) in layer.iter_mut().enumerate() {
-                let from = (z * SAMPLES + y) * stride + blur;
+                let from = &self.along_y[z * SAMPLES + y];
                 for (group, values) in row.chunks_exact_mut(LANES).enumerate() {
-                    let sums = weighted(&self.along_y, from + group * LANES, 1, taps);
+                    let first = FIRST + group * LANES;
+                    let part = |step: usize| -> &[f32; LANES] {
+                        let part = from[first + step - blur..].first_chunk();
+                        part.expect("rows have room for groups")
+                    };
+                    let sums = weighted(part, taps);
                     for (value, sum) in values.iter_mut().zip(sums) {
                         *value += sum;
                     }
@@ -101,62 +135,60 @@ impl Blur {
         }
     }
 
-    /// Brings `wide` samples along each axis into the window, the first `margin` before the brick. Returns the
-    /// floats from row to row, with room for groups that reach beyond its end.
+    /// Brings the samples of a brick, and `margin` voxels of its neighbours, into the window.
     #[inline(always)]
-    fn fill(&mut self, around: &Around, margin: usize, wide: usize) -> usize {
-        let stride = wide.next_multiple_of(LANES) + 2 * LANES;
-        self.window.resize(stride * wide * wide, 0.0);
-        for z in 0..wide {
-            let (brick_z, part_z) = place(z, margin);
-            for y in 0..wide {
-                let (brick_y, part_y) = place(y, margin);
-                let row = (z * wide + y) * stride;
-                let row = &mut self.window[row..row + wide];
-                let bricks = &around[9 * brick_z + 3 * brick_y..][..3];
-                let from = (part_z * VOXELS + part_y) * VOXELS;
-                let (before, rest) = row.split_at_mut(margin);
-                let (middle, after) = rest.split_at_mut(VOXELS);
-                copy(before, bricks[0], from + VOXELS - margin);
-                copy(middle, bricks[1], from);
-                copy(after, bricks[2], from);
-            }
-        }
-        stride
-    }
-}
-
-/// The brick (0 to 2) that sample `at` of a window lies in, and its place there.
-#[inline(always)]
-fn place(at: usize, margin: usize) -> (usize, usize) {
-    let from_first = at + VOXELS - margin;
-    (from_first / VOXELS, from_first % VOXELS)
-}
-
-#[inline(always)]
-fn copy(to: &mut [f32], part: Part, from: usize) {
-    match part {
-        Part::Even(value) => to.fill(value),
-        Part::Codes(codes) => {
-            for (to, code) in to.iter_mut().zip(&codes[from..]) {
-                *to = decode(*code);
+    fn fill(&mut self, around: &Around, margin: usize) {
+        // One more than a brick has: the first of the next.
+        let wanted = VOXELS - margin..2 * VOXELS + 1 + margin;
+        for z in wanted.clone() {
+            for y in wanted.clone() {
+                let bricks = &around[9 * (z / VOXELS) + 3 * (y / VOXELS)..][..3];
+                let from = (z % VOXELS * VOXELS + y % VOXELS) * VOXELS;
+                let row = &mut self.window[z * WIDE + y];
+                for (to, brick) in row.chunks_exact_mut(VOXELS).zip(bricks) {
+                    match brick {
+                        Part::Even(value) => to.fill(*value),
+                        Part::Codes(codes) => {
+                            for (to, code) in to.iter_mut().zip(&codes[from..from + VOXELS]) {
+                                *to = decode(*code);
+                            }
+                        }
+                    }
+                }
             }
         }
     }
 }
 
-/// The sum of groups of values at distances of `step` on both sides of `at`, each by its weight.
+/// The weighted sum of rows; `row` gives them from the farthest on one side to the farthest on the other.
 #[inline(always)]
-fn weighted(values: &[f32], at: usize, step: usize, taps: &[f32]) -> [f32; LANES] {
-    let group = |at: usize| -> [f32; LANES] {
-        let group = values.get(at..).and_then(|rest| rest.first_chunk());
-        *group.expect("windows have room beside the brick")
-    };
-    let mut sums = group(at).map(|value| taps[0] * value);
-    for (distance, tap) in taps.iter().enumerate().skip(1) {
-        let (before, after) = (group(at - distance * step), group(at + distance * step));
+fn weighted_rows<'a, const TAPS: usize>(
+    row: impl Fn(usize) -> &'a [f32; STRIDE],
+    taps: &[f32; TAPS],
+) -> [f32; STRIDE] {
+    let mut sums = [0.0; STRIDE];
+    for group in (0..WIDE).step_by(LANES) {
+        let part = |step: usize| -> &[f32; LANES] {
+            let part = row(step)[group..].first_chunk();
+            part.expect("rows have whole groups")
+        };
+        sums[group..group + LANES].copy_from_slice(&weighted(part, taps));
+    }
+    sums
+}
+
+/// The weighted sum of groups of values, given in the same way.
+#[inline(always)]
+fn weighted<'a, const TAPS: usize>(
+    group: impl Fn(usize) -> &'a [f32; LANES],
+    taps: &[f32; TAPS],
+) -> [f32; LANES] {
+    let blur = TAPS - 1;
+    let mut sums = group(blur).map(|value| taps[0] * value);
+    for distance in 1..TAPS {
+        let (before, after) = (group(blur - distance), group(blur + distance));
         for lane in 0..LANES {
-            sums[lane] += tap * (before[lane] + after[lane]);
+            sums[lane] += taps[distance] * (before[lane] + after[lane]);
         }
     }
     sums

@@ -1,6 +1,6 @@
 //! A cube of voxels with the field at their corners, quantised.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
 use crate::surface::Side;
 
@@ -8,8 +8,8 @@ use crate::surface::Side;
 pub(super) const VOXELS: usize = 8;
 /// The same to count with coordinates.
 pub(super) const VOXELS_I32: i32 = 8;
-/// The same to count with coordinates in a tree.
-pub(super) const VOXELS_U32: u32 = 8;
+/// Bits of a coordinate in voxels that tell the voxel in its brick.
+pub(super) const VOXEL_BITS: u32 = 3;
 /// Samples along an edge: the corners of the voxels, and one more on either side for gradients.
 pub(super) const SAMPLES: usize = VOXELS + 3;
 /// The largest value that is told from larger ones; the field in a body is about 1.
@@ -28,6 +28,9 @@ pub(super) struct Brick {
     any_inside: [u64; VOXELS],
     /// Some corner is outside.
     any_outside: [u64; VOXELS],
+    /// Boxes around the voxels of each, first and beyond the last along each axis.
+    inside_box: [[u8; 4]; 2],
+    outside_box: [[u8; 4]; 2],
     /// By z, y and x from one voxel before the brick on.
     samples: [u16; SAMPLES * LAYER],
 }
@@ -60,6 +63,8 @@ impl Brick {
         let mut brick = Self {
             any_inside: [0; VOXELS],
             any_outside: [0; VOXELS],
+            inside_box: [[0; 4]; 2],
+            outside_box: [[0; 4]; 2],
             samples: [0; SAMPLES * LAYER],
         };
         // A bit for each sample of a row, the one before the brick first.
@@ -96,7 +101,11 @@ impl Brick {
         match (any_inside, any_outside) {
             (0, _) => Made::Outside,
             (_, 0) => Made::Inside,
-            _ => Made::Brick(brick),
+            _ => {
+                brick.inside_box = box_around(&brick.any_inside);
+                brick.outside_box = box_around(&brick.any_outside);
+                Made::Brick(brick)
+            }
         }
     }
 
@@ -107,6 +116,16 @@ impl Brick {
             Side::Outside => &self.any_inside,
             Side::Inside => &self.any_outside,
         }
+    }
+
+    /// The box around those.
+    #[inline(always)]
+    pub(super) fn marked(&self, side: Side) -> [Vec3A; 2] {
+        let corners = match side {
+            Side::Outside => &self.inside_box,
+            Side::Inside => &self.outside_box,
+        };
+        corners.map(|[x, y, z, _]| Vec3A::new(f32::from(x), f32::from(y), f32::from(z)))
     }
 
     /// The field at the corners of a voxel, in codes: x fastest, then y, then z. Voxels beyond the brick by
@@ -135,7 +154,7 @@ impl Brick {
     pub(super) fn value(&self, place: Vec3) -> f32 {
         let voxel = voxel_of(place);
         let [x, y, z] = voxel;
-        trilinear(&self.corners(x, y, z), place - corner(voxel))
+        trilinear(&self.corners(x, y, z), place - Vec3::from(corner(voxel)))
     }
 
     /// The gradient at a place in voxels from the brick's corner: central differences at the corners,
@@ -144,7 +163,7 @@ impl Brick {
     pub(super) fn gradient(&self, place: Vec3) -> Vec3 {
         let voxel = voxel_of(place);
         let [x, y, z] = voxel;
-        let part = place - corner(voxel);
+        let part = place - Vec3::from(corner(voxel));
         let at = |dx: i32, dy: i32, dz: i32| trilinear(&self.corners(x + dx, y + dy, z + dz), part);
         0.5 * Vec3::new(
             at(1, 0, 0) - at(-1, 0, 0),
@@ -152,6 +171,24 @@ impl Brick {
             at(0, 0, 1) - at(0, 0, -1),
         )
     }
+}
+
+/// The box around the voxels whose bits are set; there are some.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "numbers from 0 to 8")]
+fn box_around(layers: &[u64; VOXELS]) -> [[u8; 4]; 2] {
+    let all = layers.iter().fold(0, |all, layer| all | layer);
+    let rows = (0..8).fold(0_u32, |rows, y| {
+        rows | u32::from(all >> (8 * y) & 0xff != 0) << y
+    });
+    let columns = (0..8).fold(0, |columns, y| columns | all >> (8 * y) & 0xff) as u32;
+    let deep = (0..8).fold(0_u32, |deep, z| deep | u32::from(layers[z] != 0) << z);
+    let first = |bits: u32| bits.trailing_zeros() as u8;
+    let beyond = |bits: u32| (u32::BITS - bits.leading_zeros()) as u8;
+    [
+        [first(columns), first(rows), first(deep), 0],
+        [beyond(columns), beyond(rows), beyond(deep), 0],
+    ]
 }
 
 #[inline(always)]
@@ -175,8 +212,8 @@ pub(super) fn voxel_of(place: Vec3) -> [i32; 3] {
 }
 
 #[inline(always)]
-pub(super) fn corner(voxel: [i32; 3]) -> Vec3 {
-    Vec3::new(voxel[0] as f32, voxel[1] as f32, voxel[2] as f32)
+pub(super) fn corner(voxel: [i32; 3]) -> Vec3A {
+    Vec3A::new(voxel[0] as f32, voxel[1] as f32, voxel[2] as f32)
 }
 
 /// Between the corners of a voxel, `part` of the way along each axis.

@@ -10,6 +10,7 @@ use super::blocks::{self, BlockPlan, Plan};
 use super::blur::{Around, Blur, BrickField, Part, taps};
 use super::brick::{Brick, CODES, Made, SAMPLES};
 use super::layout::Layout;
+use super::near::NearSpace;
 use super::raw::{Codes, Gather, RawBrick};
 use super::tree::{Block, BrickTree, Node};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
@@ -67,6 +68,7 @@ pub struct SmoothReport {
 #[derive(Debug, Default)]
 pub(super) struct Built {
     pub(super) tree: BrickTree,
+    pub(super) near: NearSpace,
     pub(super) field: Option<FieldParticles>,
     pub(super) layout: Option<Layout>,
 }
@@ -97,12 +99,20 @@ pub(super) fn build(
     let mut field = FieldParticles::sorted(centers, layout.support, keep);
     clock.lap("sort");
     let plan = Plan::of(field.bins(), &layout);
+    clock.lap("plan");
     let need = Need::of(&plan);
     refuse(field.byte_len() + 4 * count + need.total())?;
-    let needed = blocks::mark_needed(field.bins(), &layout, &plan.blocks);
-    clock.lap("plan");
-    field.find_volumes(if keep { None } else { Some(&needed) });
-    drop(needed);
+    let sorted_bytes = field.byte_len() + plan.byte_len();
+    if settings.exact {
+        field.order_by_position();
+        field.find_volumes(|_| true);
+    } else {
+        let needed = let_go(&mut field, &layout, &plan);
+        if keep {
+            field.order_by_position();
+        }
+        field.find_volumes(|bin| needed[bin]);
+    }
     clock.lap("volumes");
     let work = Work {
         field: &field,
@@ -115,24 +125,37 @@ pub(super) fn build(
     let (blocks, bricks) = work.bricks(&raw);
     let raw_bytes = raw.byte_len();
     drop(raw);
-    let tree = BrickTree::new(blocks, bricks, layout.voxel, layout.threshold * CODES);
+    let near = NearSpace::around(&blocks, layout.voxel);
+    let tree = BrickTree::new(&blocks, bricks, layout.voxel, layout.threshold * CODES);
     clock.lap("bricks");
     let phases = clock.finish();
     let report = SmoothReport {
         total: phases.iter().map(|phase| phase.time).sum(),
         phases,
         bricks: tree.bricks.len() as u64,
-        bytes: tree.byte_len() + if keep { field.byte_len() } else { 0 },
-        peak_bytes: field.byte_len() + plan.byte_len() + raw_bytes + tree.byte_len(),
+        bytes: tree.byte_len() + near.byte_len() + if keep { field.byte_len() } else { 0 },
+        peak_bytes: sorted_bytes
+            .max(field.byte_len() + plan.byte_len() + raw_bytes + tree.byte_len()),
         left_out: field.bins().left_out(),
         is_empty: count > 0 && tree.is_empty(),
     };
     let built = Built {
         tree,
+        near,
         field: keep.then_some(field),
         layout: Some(layout),
     };
     Ok((built, report))
+}
+
+/// Lets go of all particles that the surface does not depend on. Those whose volumes the field is made of are
+/// flagged, bin by bin; the others are their neighbours.
+fn let_go(field: &mut FieldParticles, layout: &Layout, plan: &Plan) -> Vec<bool> {
+    let near = |reach: f32| blocks::bins_near(field.bins(), layout, &plan.blocks, reach);
+    let (needed, kept) = (near(layout.support), near(2.0 * layout.support));
+    field.retain(&kept);
+    let still = needed.iter().zip(&kept).filter(|(_, kept)| **kept);
+    still.map(|(needed, _)| *needed).collect()
 }
 
 /// Bytes that bricks may take at most, before it is known which of them the surface passes.

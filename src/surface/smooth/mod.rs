@@ -10,7 +10,7 @@ use glam::Vec3;
 use super::field::FieldParticles;
 use super::{Dimming, Side, Substance, Surface, SurfaceHit, SurfaceSettings};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
-use crate::ray::Ray;
+use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod blocks;
 mod blur;
@@ -18,6 +18,7 @@ mod brick;
 mod build;
 mod exact;
 mod layout;
+mod near;
 mod raw;
 mod root;
 mod tree;
@@ -101,6 +102,50 @@ impl ArrayTask for Cross<'_> {
     }
 }
 
+/// The first crossing of each ray of a packet that is outside.
+struct CrossPacket<'a> {
+    surface: &'a SmoothSurface<'a>,
+    packet: &'a RayPacket,
+}
+
+impl ArrayTask for CrossPacket<'_> {
+    type Output = [Option<SurfaceHit>; PACKET_SIZE];
+
+    #[inline(always)]
+    fn run(self) -> Self::Output {
+        let built = self.surface.built;
+        let mut hits = [None; PACKET_SIZE];
+        let free = built.near.free_way(self.packet);
+        for (lane, ray) in near::rest_of(self.packet, free) {
+            if let Some(meeting) = built.tree.first_crossing(&ray, Side::Outside) {
+                hits[lane] = Some(self.surface.hit(&ray, &meeting, Side::Outside));
+            }
+        }
+        hits
+    }
+}
+
+/// Which rays of a packet meet anything.
+struct OccludePacket<'a> {
+    surface: &'a SmoothSurface<'a>,
+    packet: &'a RayPacket,
+}
+
+impl ArrayTask for OccludePacket<'_> {
+    type Output = u32;
+
+    #[inline(always)]
+    fn run(self) -> u32 {
+        let built = self.surface.built;
+        let free = built.near.free_way(self.packet);
+        let rays = near::rest_of(self.packet, free);
+        rays.fold(0, |occluded, (lane, ray)| {
+            let met = built.tree.first_crossing(&ray, Side::Outside);
+            occluded | u32::from(met.is_some()) << lane
+        })
+    }
+}
+
 /// Whether there is any crossing.
 struct Occlude<'a> {
     surface: &'a SmoothSurface<'a>,
@@ -176,6 +221,26 @@ impl Surface for SmoothSurface<'_> {
 
     fn occluded(&self, ray: &Ray) -> bool {
         self.lanes.run(Occlude { surface: self, ray })
+    }
+
+    fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {
+        if packet.is_empty() {
+            return [None; PACKET_SIZE];
+        }
+        self.lanes.run(CrossPacket {
+            surface: self,
+            packet,
+        })
+    }
+
+    fn occluded_packet(&self, packet: &RayPacket) -> u32 {
+        if packet.is_empty() {
+            return 0;
+        }
+        self.lanes.run(OccludePacket {
+            surface: self,
+            packet,
+        })
     }
 
     fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {

@@ -1,11 +1,8 @@
 //! Where a ray crosses the surface within one voxel.
 //!
-//! Along a ray a trilinear field is a cubic polynomial (Parker et al. 1998; Marmitt et al. 2004), known from
-//! four of its values.
+//! Along a ray a trilinear field is a cubic polynomial (Parker et al. 1998; Marmitt et al. 2004).
 
 use glam::Vec3;
-
-use super::brick::trilinear;
 
 /// Rounds of the search in a bracket; false position with Illinois steps gains more than a digit each.
 const ROUNDS: usize = 6;
@@ -23,13 +20,11 @@ pub(super) fn first_crossing(
     threshold: f32,
     sign: f32,
 ) -> Option<f32> {
-    let way = to - from;
-    let value = |part: f32| sign * (trilinear(corners, from + part * way) - threshold);
-    let g = [value(0.0), value(1.0 / 3.0), value(2.0 / 3.0), value(1.0)];
+    let cubic = Cubic::along(corners, from, to - from, threshold, sign);
+    let g = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| cubic.value(s));
     if g[0] >= 0.0 {
         return Some(0.0);
     }
-    let cubic = Cubic::through(g);
     let (low, high, at_low, at_high) = if g[1] >= 0.0 {
         (0.0, 1.0 / 3.0, g[0], g[1])
     } else if g[2] >= 0.0 {
@@ -52,14 +47,32 @@ pub(super) fn first_crossing(
 struct Cubic([f32; 4]);
 
 impl Cubic {
-    /// Through values at 0, 1/3, 2/3 and 1.
+    /// `sign` times the field over `threshold` along `from + s way`: the trilinear form multiplied out.
     #[inline(always)]
-    fn through(g: [f32; 4]) -> Self {
+    fn along(c: &[f32; 8], from: Vec3, way: Vec3, threshold: f32, sign: f32) -> Self {
+        // Of 1, x, y, z, xy, xz, yz and xyz.
+        let x = c[1] - c[0];
+        let (y, xy) = (c[2] - c[0], c[3] - c[2] - x);
+        let (z, xz) = (c[4] - c[0], c[5] - c[4] - x);
+        let yz = c[6] - c[4] - y;
+        let xyz = c[7] - c[6] - (c[5] - c[4]) - xy;
+        let (a, b) = (from, way);
+        // Each product of two or three coordinates, as a polynomial of s.
+        let of_xy = [a.x * a.y, a.x * b.y + b.x * a.y, b.x * b.y];
+        let of_xz = [a.x * a.z, a.x * b.z + b.x * a.z, b.x * b.z];
+        let of_yz = [a.y * a.z, a.y * b.z + b.y * a.z, b.y * b.z];
+        let of_xyz = [
+            of_xy[0] * a.z,
+            of_xy[1] * a.z + of_xy[0] * b.z,
+            of_xy[2] * a.z + of_xy[1] * b.z,
+            of_xy[2] * b.z,
+        ];
+        let even = |i: usize| xy * of_xy[i] + xz * of_xz[i] + yz * of_yz[i] + xyz * of_xyz[i];
         Self([
-            g[0],
-            -5.5 * g[0] + 9.0 * g[1] - 4.5 * g[2] + g[3],
-            9.0 * g[0] - 22.5 * g[1] + 18.0 * g[2] - 4.5 * g[3],
-            -4.5 * g[0] + 13.5 * g[1] - 13.5 * g[2] + 4.5 * g[3],
+            sign * (c[0] - threshold + x * a.x + y * a.y + z * a.z + even(0)),
+            sign * (x * b.x + y * b.y + z * b.z + even(1)),
+            sign * even(2),
+            sign * xyz * of_xyz[3],
         ])
     }
 

@@ -352,3 +352,36 @@ fn smoothing_takes_bumps_away() {
     let (raw, smooth) = (roughness(0.0), roughness(0.75));
     assert!(smooth < 0.6 * raw, "{raw} {smooth}");
 }
+
+#[test]
+fn packets_find_what_single_rays_find() {
+    let mut centers = filled(7, |p| p.length() < 6.0);
+    centers.extend(filled(9, |p| p.x > 8.5 && p.y > 8.5));
+    let grid = grid(&centers, &settings(0.75, false));
+    let surface = grid.surface();
+    let mut random = Random(8);
+    let mut met = 0;
+    for spread in [0.0, 0.003, 0.05, 0.5] {
+        for ray in rays(300, 21, 12.0) {
+            let mut packet = RayPacket::default();
+            for lane in 0..16 {
+                let far = Ray {
+                    t_max: if lane == 3 { 25.0 } else { ray.t_max },
+                    ..Ray::new(
+                        ray.origin + spread * random.in_cube(),
+                        (ray.direction + 0.1 * spread * random.in_cube()).normalize(),
+                    )
+                };
+                packet.push(&far);
+            }
+            let hits = surface.nearest_packet(&packet);
+            let occluded = surface.occluded_packet(&packet);
+            for (lane, ray) in packet.rays().enumerate() {
+                assert_eq!(hits[lane], surface.nearest(&ray), "{ray:?}");
+                assert_eq!(occluded >> lane & 1 == 1, surface.occluded(&ray));
+                met += usize::from(hits[lane].is_some());
+            }
+        }
+    }
+    assert!(met > 3000, "{met}");
+}

@@ -3,9 +3,9 @@
 //! A child is a brick (or a node of bricks) that the surface passes, or uniform: outside, or deep inside.
 //! Empty space costs a step for each of the largest uniform cells on the way, however far particles escaped.
 
-use glam::Vec3;
+use glam::{Vec3, Vec3A};
 
-use super::brick::{Brick, VOXELS, VOXELS_I32, VOXELS_U32, corner, voxel_of};
+use super::brick::{Brick, VOXEL_BITS, VOXELS, corner, voxel_of};
 use super::root::first_crossing;
 use crate::ray::Ray;
 use crate::surface::Side;
@@ -36,6 +36,35 @@ impl Node {
     }
 }
 
+/// A cell that is not outside.
+#[derive(Debug, Clone, Copy)]
+enum Cell {
+    /// All of it is inside.
+    Inside,
+    /// There is more to say of it.
+    Node(Node),
+}
+
+impl Cell {
+    fn of(node: Node) -> Self {
+        if node.inside == !0 {
+            Self::Inside
+        } else {
+            Self::Node(node)
+        }
+    }
+
+    fn node(self) -> Node {
+        match self {
+            Self::Inside => Node {
+                inside: !0,
+                ..Node::default()
+            },
+            Self::Node(node) => node,
+        }
+    }
+}
+
 /// A block of 4x4x4 bricks that are not all outside.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Block {
@@ -59,8 +88,8 @@ pub(super) struct BrickTree {
     /// The corner of the root.
     origin: Vec3,
     /// Box of all that is not outside, in voxels from there.
-    low: Vec3,
-    high: Vec3,
+    low: Vec3A,
+    high: Vec3A,
     /// The surface, in codes.
     threshold: f32,
 }
@@ -75,71 +104,89 @@ pub(super) struct Meeting {
 
 /// A ray in voxels from the root's corner; distances stay those of the ray.
 struct Line {
-    origin: Vec3,
-    direction: Vec3,
-    inverse: Vec3,
+    origin: Vec3A,
+    direction: Vec3A,
+    inverse: Vec3A,
+    /// 1 along axes that it goes up, else 0: where it leaves a cell.
+    ahead: Vec3A,
+    /// 1 along axes that it goes up, else -1.
+    step: Vec3A,
+    /// What stepping along some axes, a bit each, adds to the number of a voxel.
+    steps: [i32; 8],
 }
 
 impl BrickTree {
     /// Puts `blocks` and their `bricks` under one root. A block's children are numbered from its `first` on.
-    pub(super) fn new(
-        mut blocks: Vec<Block>,
-        bricks: Vec<Brick>,
-        voxel: f32,
-        threshold: f32,
-    ) -> Self {
+    pub(super) fn new(blocks: &[Block], bricks: Vec<Brick>, voxel: f32, threshold: f32) -> Self {
+        let mut tree = Self {
+            bricks,
+            voxel,
+            inverse: 1.0 / voxel,
+            low: Vec3A::INFINITY,
+            high: Vec3A::NEG_INFINITY,
+            threshold,
+            ..Self::default()
+        };
         let Some(first) = blocks.first() else {
-            return Self {
-                voxel,
-                inverse: 1.0 / voxel,
-                threshold,
-                ..Self::default()
-            };
+            return tree;
         };
         let (mut low, mut high) = (first.place, first.place);
-        for block in &blocks {
+        for block in blocks {
             for axis in 0..3 {
                 low[axis] = low[axis].min(block.place[axis]);
                 high[axis] = high[axis].max(block.place[axis]);
             }
         }
+        let edge = (4 * VOXELS) as f32;
+        tree.origin = Vec3::from(vector(low)) * edge * voxel;
+        for block in blocks {
+            tree.enclose(vector(block.place) - vector(low), &block.node);
+        }
         let extent = (0..3).map(|a| high[a].abs_diff(low[a])).max().unwrap_or(0);
         let bits = u32::BITS - extent.leading_zeros();
-        let levels = 1 + bits.div_ceil(LEVEL_BITS);
-        let key =
-            |block: &Block| order_key(std::array::from_fn(|a| block.place[a].abs_diff(low[a])));
-        blocks.sort_unstable_by_key(key);
-        let mut nodes: Vec<Node> = blocks.iter().map(|block| block.node).collect();
-        let mut keys: Vec<u128> = blocks.iter().map(key).collect();
-        let mut first_of_level = 0;
-        for _ in 1..levels {
-            let (parents, parent_keys) = parents(&keys, first_of_level);
-            first_of_level = nodes.len();
-            nodes.extend(parents);
-            keys = parent_keys;
+        let place = |block: &Block| std::array::from_fn(|a| block.place[a] - low[a]);
+        let mut cells: Vec<(u128, Cell)> = blocks
+            .iter()
+            .map(|block| (order_key(place(block)), Cell::of(block.node)))
+            .collect();
+        cells.sort_unstable_by_key(|(key, _)| *key);
+        // Of blocks, and of each level above.
+        tree.levels = 1 + bits.div_ceil(LEVEL_BITS);
+        for _ in 1..tree.levels {
+            cells = tree.level_above(&cells);
         }
-        let edge = (4 * VOXELS) as f32;
-        let place = |p: [i32; 3]| Vec3::from_array(p.map(|c| c as f32));
-        let mut tree = Self {
-            root: index_u32(first_of_level),
-            nodes,
-            levels,
-            bricks,
-            voxel,
-            inverse: 1.0 / voxel,
-            origin: place(low) * edge * voxel,
-            low: Vec3::INFINITY,
-            high: Vec3::NEG_INFINITY,
-            threshold,
-        };
-        for block in &blocks {
-            tree.enclose(place(block.place) - place(low), &block.node);
-        }
+        let root = cells.first().map(|(_, cell)| cell.node());
+        tree.root = index_u32(tree.nodes.len());
+        tree.nodes.extend(root);
         tree
     }
 
+    /// Puts the nodes of a level, in order, into the tree, and returns the cells of the level above.
+    fn level_above(&mut self, cells: &[(u128, Cell)]) -> Vec<(u128, Cell)> {
+        let brothers = cells.chunk_by(|(a, _), (b, _)| a >> 6 == b >> 6);
+        brothers
+            .map(|brothers| {
+                let mut parent = Node {
+                    first: index_u32(self.nodes.len()),
+                    ..Node::default()
+                };
+                for (key, cell) in brothers {
+                    let bit = 1 << (key & 63);
+                    match cell {
+                        Cell::Inside => parent.inside |= bit,
+                        Cell::Node(node) => {
+                            parent.children |= bit;
+                            self.nodes.push(*node);
+                        }
+                    }
+                }
+                (brothers[0].0 >> 6, Cell::of(parent))
+            })
+            .collect()
+    }
+
     /// Widens the box by the bricks of a node at a place in blocks.
-    fn enclose(&mut self, place: Vec3, node: &Node) {
+    fn enclose(&mut self, place: Vec3A, node: &Node) {
         let cells = node.children | node.inside;
         for cell in (0..64).filter(|cell| cells >> cell & 1 == 1) {
             let part = corner([cell & 3, cell >> 2 & 3, cell >> 4]);
@@ -164,12 +211,12 @@ impl BrickTree {
 
     /// Box of all that is not outside.
     pub(super) fn bounds(&self) -> [Vec3; 2] {
-        [self.low, self.high].map(|p| self.origin + p * self.voxel)
+        [self.low, self.high].map(|p| self.origin + Vec3::from(p) * self.voxel)
     }
 
     /// Where `point` is.
     pub(super) fn side_of(&self, point: Vec3) -> Side {
-        let place = (point - self.origin) * self.inverse;
+        let place = Vec3A::from(point - self.origin) * self.inverse;
         if !(place.cmpge(self.low).all() && place.cmplt(self.high).all()) {
             return Side::Outside;
         }
@@ -183,8 +230,8 @@ impl BrickTree {
             }
             node = n.child(bit);
             if level == 0 {
-                let base = Vec3::from_array(cell.map(|c| (c * VOXELS_U32) as f32));
-                let value = self.bricks[node as usize].value(place - base);
+                let base = vector(cell) * VOXELS as f32;
+                let value = self.bricks[node as usize].value(Vec3::from(place - base));
                 return side(value >= self.threshold);
             }
             level -= 1;
@@ -194,12 +241,15 @@ impl BrickTree {
     /// The first place where a ray on `from` comes to the other side.
     #[inline(always)]
     pub(super) fn first_crossing(&self, ray: &Ray, from: Side) -> Option<Meeting> {
+        if self.is_empty() {
+            return None;
+        }
         let line = Line::new(ray, self.origin, self.inverse);
         let near = (self.low - line.origin) * line.inverse;
         let far = (self.high - line.origin) * line.inverse;
         let t_in = near.min(far).max_element().max(ray.t_min);
         let t_out = near.max(far).min_element().min(ray.t_max);
-        // Also without bricks.
+        // Also where there are no numbers.
         if t_in.partial_cmp(&t_out).is_none_or(|order| order.is_ge()) {
             return None;
         }
@@ -215,46 +265,46 @@ impl BrickTree {
         loop {
             // Down to the largest uniform cell, or a brick.
             let mut brick = None;
-            let node = loop {
+            let (node, bit) = loop {
                 let node = &self.nodes[nodes[level as usize] as usize];
                 let bit = bit_of(cell, level);
                 if node.children >> bit & 1 == 0 {
-                    break node;
+                    break (node, bit);
                 }
                 let child = node.child(bit);
                 if level == 0 {
                     brick = Some(child);
-                    break node;
+                    break (node, bit);
                 }
                 level -= 1;
                 nodes[level as usize] = child;
             };
-            let size = 1_u32 << (LEVEL_BITS * level);
-            let corner = cell.map(|c| c & !(size - 1));
-            let (t_exit, axis) = line.exit(corner, size);
-            let until = t_exit.min(t_out);
+            let size = 1_i32 << (LEVEL_BITS * level);
+            let low = cell.map(|c| c & !(size - 1));
+            let corner = vector(low) * VOXELS as f32;
+            let (t_exit, axes) = line.exit(corner, (size << VOXEL_BITS) as f32);
             if let Some(brick) = brick {
-                let base = Vec3::from_array(corner.map(|c| (c * VOXELS_U32) as f32));
-                let local = line.origin - base;
-                let found =
-                    self.in_brick(&self.bricks[brick as usize], &line, local, t, until, from);
-                if let Some(t) = found {
-                    let place = local + line.direction * t;
+                let local = line.origin - corner;
+                let until = t_exit.min(t_out);
+                let bricks = &self.bricks[brick as usize];
+                if let Some(t) = self.in_brick(bricks, &line, local, t, until, from) {
+                    let place = Vec3::from(local + line.direction * t);
                     return Some(Meeting {
                         t,
                         brick: Some((brick, place)),
                     });
                 }
-            } else if side(node.inside >> bit_of(cell, level) & 1 == 1) != from {
+            } else if side(node.inside >> bit & 1 == 1) != from {
                 return Some(Meeting { t, brick: None });
             }
             if t_exit >= t_out {
                 return None;
             }
             t = t.max(t_exit);
-            let next = line.next_cell(t, axis, corner, size)?;
-            let changed = (0..3).fold(0, |bits, a| bits | (cell[a] ^ next[a]));
-            let up = (u32::BITS - 1 - changed.leading_zeros().min(u32::BITS - 1)) / LEVEL_BITS;
+            let next = line.next_cell(t, axes, low, size);
+            let changed = (0..3).fold(0, |bits, a| bits | (cell[a] ^ next[a]).cast_unsigned());
+            // Of places before the root's corner, too, the first bit is another.
+            let up = changed.max(1).ilog2() / LEVEL_BITS;
             if up > top {
                 return None;
             }
@@ -265,57 +315,107 @@ impl BrickTree {
 
     /// The distance in `t..until` where the ray first comes to the other side in `brick`; `local` is the
     /// ray's origin in voxels from the brick's corner.
+    ///
+    /// Steps from voxel to voxel (Amanatides and Woo 1987) without branches on axes. Where a ray passes an edge it
+    /// steps along two axes at once.
     #[inline(always)]
     fn in_brick(
         &self,
         brick: &Brick,
         line: &Line,
-        local: Vec3,
-        mut t: f32,
+        local: Vec3A,
+        t: f32,
         until: f32,
         from: Side,
     ) -> Option<f32> {
+        let [low, high] = brick.marked(from);
+        let near = (low - local) * line.inverse;
+        let far = (high - local) * line.inverse;
+        let mut t = t.max(near.min(far).max_element());
+        // Of planes of voxels, so that the last step ends there.
+        let until = until.min(near.max(far).min_element());
+        if t > until {
+            return None;
+        }
         let sign = match from {
             Side::Outside => 1.0,
             Side::Inside => -1.0,
         };
         let voxels = brick.voxels(from);
-        let mut voxel = voxel_of(local + line.direction * t);
-        let ahead = Vec3::select(line.direction.cmpge(Vec3::ZERO), Vec3::ONE, Vec3::ZERO);
-        let mut next = (corner(voxel) + ahead - local) * line.inverse;
+        let start = (local + line.direction * t).clamp(low, high - 1.0);
+        let first = voxel_of(Vec3::from(start));
+        let mut number = VoxelNumber::of(first);
+        let mut next = (corner(first) + line.ahead - local) * line.inverse;
         let step = line.inverse.abs();
         loop {
             let nearest = next.min_element();
-            let end = nearest.min(until);
-            #[expect(clippy::cast_sign_loss, reason = "voxels are from 0 to 7")]
-            let is_marked = voxels[voxel[2] as usize] >> (8 * voxel[1] + voxel[0]) & 1 == 1;
-            if is_marked {
-                let corners = brick.corners(voxel[0], voxel[1], voxel[2]);
-                let from = local + line.direction * t - corner(voxel);
-                let to = local + line.direction * end - corner(voxel);
-                let part = first_crossing(&corners, from, to, self.threshold, sign);
+            let [x, y, z] = number.voxel();
+            #[expect(clippy::cast_sign_loss, reason = "from 0 to 7")]
+            if voxels[z as usize] >> (8 * y + x) & 1 == 1 {
+                let end = nearest.min(until).max(t);
+                let corner = corner([x, y, z]);
+                let place = |t: f32| Vec3::from(local + line.direction * t - corner);
+                let corners = brick.corners(x, y, z);
+                let part = first_crossing(&corners, place(t), place(end), self.threshold, sign);
                 if let Some(part) = part {
-                    return Some(t + part * (end - t).max(0.0));
+                    return Some(t + part * (end - t));
                 }
             }
             if nearest >= until {
                 return None;
             }
             t = t.max(nearest);
-            let axis = line.axis_of(next, nearest);
-            voxel[axis] += if line.direction[axis] >= 0.0 { 1 } else { -1 };
-            if !(0..VOXELS_I32).contains(&voxel[axis]) {
+            let stepped = next.cmple(Vec3A::splat(nearest));
+            next += Vec3A::select(stepped, step, Vec3A::ZERO);
+            number.add(line.steps[stepped.bitmask() as usize & 7]);
+            if !number.is_in_brick() {
                 return None;
             }
-            next[axis] += step[axis];
         }
+    }
+}
+
+/// A voxel of a brick as one number: five bits an axis, its coordinate and 8. One beyond the brick shows by the
+/// upper two bits.
+#[derive(Clone, Copy)]
+struct VoxelNumber(i32);
+
+impl VoxelNumber {
+    const BITS: u32 = 5;
+    const BEYOND: i32 = 0b11000 * (1 + (1 << Self::BITS) + (1 << (2 * Self::BITS)));
+    const WITHIN: i32 = 0b01000 * (1 + (1 << Self::BITS) + (1 << (2 * Self::BITS)));
+
+    #[inline(always)]
+    fn of(voxel: [i32; 3]) -> Self {
+        Self(Self::WITHIN + Self::step(voxel))
+    }
+
+    /// What a step adds.
+    #[inline(always)]
+    const fn step([x, y, z]: [i32; 3]) -> i32 {
+        x + (y << Self::BITS) + (z << (2 * Self::BITS))
+    }
+
+    #[inline(always)]
+    fn voxel(self) -> [i32; 3] {
+        [0, Self::BITS, 2 * Self::BITS].map(|shift| self.0 >> shift & 7)
+    }
+
+    #[inline(always)]
+    fn add(&mut self, step: i32) {
+        self.0 += step;
+    }
+
+    #[inline(always)]
+    fn is_in_brick(self) -> bool {
+        self.0 & Self::BEYOND == Self::WITHIN
     }
 }
 
 impl Line {
     #[inline(always)]
     fn new(ray: &Ray, origin: Vec3, inverse_voxel: f32) -> Self {
-        let direction = ray.direction * inverse_voxel;
+        let direction = Vec3A::from(ray.direction) * inverse_voxel;
         let away = direction.map(|d| {
             if d.abs() < MIN_DIRECTION {
                 MIN_DIRECTION.copysign(d)
@@ -323,68 +423,72 @@ impl Line {
                 d
             }
         });
+        let up = away.cmpge(Vec3A::ZERO);
+        let step = Vec3A::select(up, Vec3A::ONE, Vec3A::NEG_ONE);
+        let bits = up.bitmask();
+        let along = |axis: u32, by: i32| if bits >> axis & 1 == 1 { by } else { -by };
+        let (x, y, z) = (
+            along(0, VoxelNumber::step([1, 0, 0])),
+            along(1, VoxelNumber::step([0, 1, 0])),
+            along(2, VoxelNumber::step([0, 0, 1])),
+        );
         Self {
-            origin: (ray.origin - origin) * inverse_voxel,
+            origin: Vec3A::from(ray.origin - origin) * inverse_voxel,
             direction,
             inverse: away.recip(),
+            ahead: Vec3A::select(up, Vec3A::ONE, Vec3A::ZERO),
+            step,
+            steps: [0, x, y, x + y, z, z + x, z + y, z + y + x],
         }
     }
 
-    /// Where the ray leaves a cell of `size` bricks, and along which axis.
+    /// Where the ray leaves a cell of `size` bricks at `corner`, and a bit for each axis that it does so along.
     #[inline(always)]
-    fn exit(&self, cell: [u32; 3], size: u32) -> (f32, usize) {
-        let bound = |axis: usize| {
-            let beyond = if self.direction[axis] >= 0.0 { size } else { 0 };
-            ((cell[axis] + beyond) * VOXELS_U32) as f32
-        };
-        let t = (Vec3::new(bound(0), bound(1), bound(2)) - self.origin) * self.inverse;
-        let nearest = t.min_element();
-        (nearest, self.axis_of(t, nearest))
+    fn exit(&self, corner: Vec3A, size: f32) -> (f32, u32) {
+        let next = (corner + size * self.ahead - self.origin) * self.inverse;
+        let nearest = next.min_element();
+        (nearest, next.cmple(Vec3A::splat(nearest)).bitmask())
     }
 
+    /// The brick beyond a cell that is left at `t` along `axes`: along the others it stays beside that cell, however
+    /// `t` is rounded.
     #[inline(always)]
-    fn axis_of(&self, t: Vec3, nearest: f32) -> usize {
-        if t.x == nearest {
-            0
-        } else if t.y == nearest {
-            1
-        } else {
-            2
-        }
-    }
-
-    /// The brick beyond a cell that is left at `t` along `axis`: along the other axes it stays beside that cell,
-    /// however `t` is rounded.
-    #[inline(always)]
-    fn next_cell(&self, t: f32, axis: usize, cell: [u32; 3], size: u32) -> Option<[u32; 3]> {
-        let mut next = brick_at(self.origin + self.direction * t);
-        for a in 0..3 {
-            next[a] = next[a].clamp(cell[a], cell[a] + size - 1);
-        }
-        next[axis] = if self.direction[axis] >= 0.0 {
-            cell[axis] + size
-        } else {
-            cell[axis].checked_sub(1)?
-        };
-        Some(next)
+    fn next_cell(&self, t: f32, axes: u32, cell: [i32; 3], size: i32) -> [i32; 3] {
+        let place = (self.origin + self.direction * t).to_array();
+        std::array::from_fn(|a| {
+            let beside = brick_of(place[a]).clamp(cell[a], cell[a] + size - 1);
+            let beyond = if self.step[a] > 0.0 {
+                cell[a] + size
+            } else {
+                cell[a] - 1
+            };
+            if axes >> a & 1 == 1 { beyond } else { beside }
+        })
     }
 }
 
 /// The brick at a place in voxels.
 #[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    clippy::cast_sign_loss,
-    reason = "saturates at 0, where the tree begins"
-)]
-fn brick_at(place: Vec3) -> [u32; 3] {
-    [place.x, place.y, place.z].map(|x| (x.max(0.0) as i32 as u32) / VOXELS_U32)
+fn brick_at(place: Vec3A) -> [i32; 3] {
+    place.to_array().map(brick_of)
+}
+
+/// The same along one axis; places are from 0 on, but for rounding.
+#[inline(always)]
+#[expect(clippy::cast_possible_truncation, reason = "saturates, and is clamped")]
+fn brick_of(place: f32) -> i32 {
+    place as i32 >> VOXEL_BITS
+}
+
+#[inline(always)]
+fn vector(cell: [i32; 3]) -> Vec3A {
+    Vec3A::new(cell[0] as f32, cell[1] as f32, cell[2] as f32)
 }
 
 /// The bit of a brick's cell in its node of `level`.
 #[inline(always)]
-fn bit_of(cell: [u32; 3], level: u32) -> u32 {
-    let part = |c: u32| c >> (LEVEL_BITS * level) & 3;
+fn bit_of(cell: [i32; 3], level: u32) -> u32 {
+    let part = |c: i32| c.cast_unsigned() >> (LEVEL_BITS * level) & 3;
     part(cell[0]) | part(cell[1]) << 2 | part(cell[2]) << 4
 }
 
@@ -394,29 +498,11 @@ fn side(inside: bool) -> Side {
 }
 
 /// Order in which the children of each node are neighbours: six bits a level.
-fn order_key(place: [u32; 3]) -> u128 {
+fn order_key(place: [i32; 3]) -> u128 {
     (0..MAX_LEVELS - 1).fold(0, |key, level| {
         let digit = u128::from(bit_of(place, level));
         key | digit << (3 * LEVEL_BITS * level)
     })
-}
-
-/// The nodes above those with these keys, of which the first has number `first`, and their keys.
-fn parents(keys: &[u128], first: usize) -> (Vec<Node>, Vec<u128>) {
-    let (mut nodes, mut parents): (Vec<Node>, Vec<u128>) = (Vec::new(), Vec::new());
-    for (number, key) in (first..).zip(keys) {
-        if parents.last() != Some(&(key >> 6)) {
-            parents.push(key >> 6);
-            nodes.push(Node {
-                first: index_u32(number),
-                ..Node::default()
-            });
-        }
-        if let Some(node) = nodes.last_mut() {
-            node.children |= 1 << (key & 63);
-        }
-    }
-    (nodes, parents)
 }
 
 #[expect(
