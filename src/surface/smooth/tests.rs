@@ -385,3 +385,64 @@ fn packets_find_what_single_rays_find() {
     }
     assert!(met > 3000, "{met}");
 }
+
+/// Where a ray goes that is bent by a ball of glass around the origin, in f64, by Snell's law twice.
+fn bent_by_ball(ray: &Ray, radius: f64, ior: f64) -> Option<DVec3> {
+    let bend = |direction: DVec3, normal: DVec3, ratio: f64| {
+        let cosine = -direction.dot(normal);
+        let rest = 1.0 - ratio * ratio * (1.0 - cosine * cosine);
+        (rest > 0.0)
+            .then(|| (ratio * direction + (ratio * cosine - rest.sqrt()) * normal).normalize())
+    };
+    let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
+    let middle = -origin.dot(direction);
+    let half2 = radius * radius - (origin + middle * direction).length_squared();
+    let entry = origin + (middle - (half2 > 0.0).then(|| half2.sqrt())?) * direction;
+    let inside = bend(direction, entry / radius, 1.0 / ior)?;
+    let exit = entry - 2.0 * entry.dot(inside) * inside;
+    bend(inside, -exit / radius, ior)
+}
+
+#[test]
+fn a_ball_of_particles_bends_light_as_a_ball_of_glass() {
+    let centers = filled(12, |p| p.length() < 10.5);
+    let grid = grid(&centers, &settings(1.0, false));
+    let surface = grid.surface();
+    // As large as its volume says, by rays through the middle.
+    let chords: Vec<f32> = rays(200, 40, 0.01)
+        .filter_map(|ray| {
+            let enters = surface.nearest(&ray)?;
+            let inside = Ray {
+                t_min: enters.t + enters.offset,
+                ..ray
+            };
+            Some(surface.crossing(&inside, Side::Inside)?.t - enters.t)
+        })
+        .collect();
+    assert_eq!(chords.len(), 200);
+    let radius = f64::from(0.5 * chords.iter().sum::<f32>() / 200.0);
+    let (mut degrees, mut straight) = (Vec::new(), Vec::new());
+    for ray in rays(400, 41, 4.0) {
+        let ior = 1.333;
+        let enters = surface.nearest(&ray).expect("towards the middle");
+        let inside = crate::scene::material::refract(ray.direction, enters.normal, 1.0 / ior);
+        let inside = Ray::new(
+            enters.anchor - enters.offset * enters.normal,
+            inside.expect("into glass"),
+        );
+        let leaves = surface.crossing(&inside, Side::Inside).expect("a way out");
+        let (Some(out), Some(wanted)) = (
+            crate::scene::material::refract(inside.direction, -leaves.normal, ior),
+            bent_by_ball(&ray, radius, f64::from(ior)),
+        ) else {
+            continue;
+        };
+        degrees.push(wanted.angle_between(out.as_dvec3()).to_degrees());
+        straight.push(wanted.angle_between(ray.direction.as_dvec3()).to_degrees());
+    }
+    let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+    assert!(degrees.len() > 380);
+    // The particles of a lattice make a ball with facets.
+    assert!(mean(&straight) > 5.0, "{}", mean(&straight));
+    assert!(mean(&degrees) < 2.5, "{}", mean(&degrees));
+}
