@@ -104,6 +104,9 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
             ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
         },
         radius: match &manifest.input.radius {
+            RadiusSetting::Auto if manifest.surface.kind != SurfaceKind::Spheres => {
+                RadiusQuestion::AutoOfBody
+            }
             RadiusSetting::Auto => RadiusQuestion::Auto,
             RadiusSetting::Length(_) => RadiusQuestion::None,
             RadiusSetting::Attribute { attribute, scale } => {
@@ -254,7 +257,7 @@ fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, Resol
                 scale: narrow(*scale),
             }
         }
-        RadiusSetting::Auto => match survey.radius {
+        RadiusSetting::Auto => match surface::radius(manifest.surface.kind, survey) {
             Some(radius) => RadiusRule::FileOr(radius),
             // Every frame brings its own, or there are no particles to need one.
             None if survey.has_radii || survey.most_particles == 0 => RadiusRule::FileOr(0.0),

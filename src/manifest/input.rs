@@ -136,7 +136,8 @@ impl Input {
         out.put(
             "radius",
             &self.radius,
-            "a length, auto, or { attribute = \"radius\", scale = 1.0 }",
+            "a length, auto (of the file, else by the neighbours; medium: 1.8 times as large), or \
+             { attribute = \"radius\", scale = 1.0 }",
         );
         out.put("up", &Up(self.up), "auto | x | y | z | -x | -y | -z");
         out.put(

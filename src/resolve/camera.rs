@@ -110,4 +110,4 @@ fn place(path: &CameraPath, frame: i64) -> String {
 
 #[cfg(test)]
 #[path = "camera_tests.rs"]
-mod tests;
+pub(super) mod tests;

@@ -3,12 +3,13 @@ use crate::manifest::{CameraKey as Key, RadiusSetting};
 use crate::pipeline::Setup;
 use crate::survey::Survey;
 
-fn survey() -> Survey {
+pub(in crate::resolve) fn survey() -> Survey {
     Survey {
         origin: DVec3::ZERO,
         min: DVec3::splat(-1.0),
         max: DVec3::splat(1.0),
         radius: None,
+        packed_radius: None,
         has_radii: false,
         reach: 0.0,
         color: None,

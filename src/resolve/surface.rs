@@ -6,10 +6,15 @@ use super::{ResolveError, narrow};
 use crate::manifest::{AutoLength, Fresnel as FresnelSetting, Manifest};
 use crate::scene::{Bounds, Fresnel, Material, material};
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
+use crate::survey::Survey;
 
 /// Part of the bounds' diagonal that light goes through a body to take the colour of its absorption:
 /// a pool seen from above has a tint, a drop has none. Tuned on dam breaks.
 const ABSORPTION: f64 = 0.25;
+
+/// Radii of particles that a sphere of one medium has. Spheres that only touch leave all the room between them
+/// empty, and light goes through a sponge of beads; these fill it with something to spare.
+const OVERLAP: f32 = 1.8;
 
 /// The surface as asked for.
 ///
@@ -52,6 +57,17 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
         );
     }
     Ok(surface)
+}
+
+/// The radius of particles that bring none. A job that was begun before there was one for bodies has that of
+/// spheres.
+pub(super) fn radius(kind: SurfaceKind, survey: &Survey) -> Option<f32> {
+    let packed = match kind {
+        SurfaceKind::Spheres => None,
+        SurfaceKind::Medium => survey.packed_radius.map(|radius| OVERLAP * radius),
+        SurfaceKind::Smooth => survey.packed_radius,
+    };
+    packed.or(survey.radius)
 }
 
 /// What it is made of.

@@ -30,6 +30,25 @@ fn settings_come_from_the_manifest() {
 }
 
 #[test]
+fn each_surface_has_a_radius_of_its_own() {
+    let found = Survey {
+        radius: Some(0.4),
+        packed_radius: Some(0.5),
+        ..super::super::camera::tests::survey()
+    };
+    assert_eq!(radius(SurfaceKind::Spheres, &found), Some(0.4));
+    assert_eq!(radius(SurfaceKind::Smooth, &found), Some(0.5));
+    assert_eq!(radius(SurfaceKind::Medium, &found), Some(0.9));
+    let older = Survey {
+        packed_radius: None,
+        ..found
+    };
+    for kind in [SurfaceKind::Smooth, SurfaceKind::Medium] {
+        assert_eq!(radius(kind, &older), Some(0.4));
+    }
+}
+
+#[test]
 fn what_makes_no_sense_together_is_refused() {
     refused("surface.normals = \"field\"", "surface.normals: \"field\"");
     refused("surface.exact = true", "surface.exact: is for the smooth");

@@ -4,13 +4,14 @@
 use glam::DVec3;
 use spherule_formats::convert::{SourceAttribute, open_source};
 use spherule_formats::native::layout::RadiusIndex;
-use spherule_formats::native::{Access, FrameIndex, NativeFile};
+use spherule_formats::native::{Access, FrameIndex, NativeFile, NativeFrame};
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParseError, RawParticles};
 
+use super::packing::{self, Spacing};
 use super::robust::{NEIGHBOUR_QUERIES, middle};
 use super::stream;
-use super::{FrameWeight, id_of, velocity_of};
+use super::{FrameWeight, RadiusQuestion, id_of, velocity_of};
 
 /// Particles that are looked at of a native frame; smaller ones are looked at as a whole.
 const MOST: usize = 1 << 17;
@@ -26,8 +27,8 @@ pub(super) struct Look {
     pub(super) count: usize,
     /// Outermost coordinates, if all are told.
     pub(super) extremes: Option<(DVec3, DVec3)>,
-    /// Half the usual distance of neighbours, where the particles that are seen do not tell it.
-    pub(super) spacing: Option<f32>,
+    /// What the distances of neighbours tell, where the particles that are seen do not tell it.
+    pub(super) spacing: Option<Spacing>,
     /// What the coordinates in a native frame are relative to.
     pub(super) origin: Option<DVec3>,
     pub(super) weight: FrameWeight,
@@ -35,20 +36,21 @@ pub(super) struct Look {
 
 impl Look {
     /// At frame `index` of `sequence`. The spacing of particles takes long to find, and is looked for only if
-    /// somebody `asks_spacing`.
+    /// it is `asked` for.
     pub(super) fn at(
         sequence: &Sequence,
         index: usize,
-        asks_spacing: bool,
+        asked: RadiusQuestion,
     ) -> Result<Self, FrameError> {
         match sequence.native_file(index) {
             Some(path) => {
                 let file = NativeFile::open(path, Access::Map)?;
-                let look = Self::at_native(&file).map_err(|e| e.in_file(path))?;
+                let look =
+                    Self::at_native(&file, asked.is_packed()).map_err(|e| e.in_file(path))?;
                 file.check()?;
                 Ok(look)
             }
-            None => match Self::at_large(sequence, index, asks_spacing)? {
+            None => match Self::at_large(sequence, index, asked)? {
                 Some(look) => Ok(look),
                 None => Self::at_files(sequence, index),
             },
@@ -59,7 +61,7 @@ impl Look {
     fn at_large(
         sequence: &Sequence,
         index: usize,
-        asks_spacing: bool,
+        asked: RadiusQuestion,
     ) -> Result<Option<Self>, FrameError> {
         let Some(path) = sequence.lone_file(index) else {
             return Ok(None);
@@ -70,8 +72,8 @@ impl Look {
         let particles = stream::sample(&*source, path, MOST)?;
         let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
         let has_radii = source.attributes().iter().any(is_radius);
-        let spacing = match asks_spacing && !has_radii {
-            true => stream::spacing(&*source, &particles.positions)?,
+        let spacing = match asked.is_auto() && !has_radii {
+            true => stream::spacing(&*source, &particles.positions, asked.is_packed())?,
             false => None,
         };
         let extremes = stream::extremes(&*source)?;
@@ -130,7 +132,7 @@ impl Look {
         })
     }
 
-    fn at_native(file: &NativeFile) -> Result<Self, ParseError> {
+    fn at_native(file: &NativeFile, how_packed: bool) -> Result<Self, ParseError> {
         let frame = file.frame_unchecked();
         let index = file.index();
         let too_many = |_| ParseError::unsupported("more particles than this machine can count");
@@ -143,9 +145,7 @@ impl Look {
         frame.verify_nodes()?;
         let particles = frame.sample(MOST)?;
         let spacing = match index.radius {
-            RadiusIndex::None if is_part => {
-                middle(frame.neighbour_distances(NEIGHBOUR_QUERIES)?).map(|d| 0.5 * d)
-            }
+            RadiusIndex::None if is_part => stored_spacing(&frame, how_packed)?,
             _ => None,
         };
         let origin = DVec3::from_array(index.origin);
@@ -159,6 +159,25 @@ impl Look {
             particles,
         })
     }
+}
+
+/// What neighbours in a native frame tell.
+fn stored_spacing(
+    frame: &NativeFrame<'_>,
+    how_packed: bool,
+) -> Result<Option<Spacing>, ParseError> {
+    let nearest = middle(frame.neighbour_distances(NEIGHBOUR_QUERIES)?);
+    let Some(touching) = nearest.map(|d| 0.5 * d) else {
+        return Ok(None);
+    };
+    let packed = match how_packed {
+        true => {
+            let counts = frame.neighbour_counts(NEIGHBOUR_QUERIES, packing::reach(touching))?;
+            packing::packed_radius(touching, counts)
+        }
+        false => None,
+    };
+    Ok(Some(Spacing { touching, packed }))
 }
 
 /// Of a native frame: as if it were read, for those who cannot trace it where it lies.

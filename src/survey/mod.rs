@@ -16,11 +16,15 @@ use spherule_formats::{Attribute, FrameError, ID_NAMES, ParticleFrame, Radius, c
 use crate::scene::Bounds;
 
 mod look;
+mod packing;
 mod robust;
 mod stream;
 
 use look::Look;
-use robust::{estimate_radius, narrow, robust_bounds, robust_largest, robust_range};
+use packing::Spacing;
+use robust::{
+    estimate_packed, estimate_radius, narrow, robust_bounds, robust_largest, robust_range,
+};
 
 /// Frames looked at; evenly spread, first and last among them. All of a shorter sequence.
 const FRAMES: usize = 24;
@@ -38,6 +42,10 @@ pub struct Survey {
     pub max: DVec3,
     /// Radius for frames that do not bring their own: half the usual distance of neighbours.
     pub radius: Option<f32>,
+    /// The same for the particles of one body: half the edge of the cube that each has for itself inside, and a
+    /// little more. Told if it was asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub packed_radius: Option<f32>,
     /// Whether the frames bring radii of their own.
     pub has_radii: bool,
     /// How far the spheres reach beyond their centres, as far as the frames tell: the 99th
@@ -112,8 +120,20 @@ pub enum RadiusQuestion<'a> {
     None,
     /// What the frames bring, or an estimate where they bring none.
     Auto,
+    /// As `Auto`, and an estimate for particles that are one body as well.
+    AutoOfBody,
     /// The largest values of an attribute times a factor.
     Attribute(&'a str, f64),
+}
+
+impl RadiusQuestion<'_> {
+    fn is_auto(&self) -> bool {
+        matches!(self, Self::Auto | Self::AutoOfBody)
+    }
+
+    fn is_packed(&self) -> bool {
+        *self == Self::AutoOfBody
+    }
 }
 
 /// What is asked about colours.
@@ -130,7 +150,7 @@ pub enum ColorQuestion<'a> {
 /// Running totals over the frames.
 struct Totals {
     bounds: Option<(DVec3, DVec3)>,
-    radius: Option<(usize, f32)>,
+    radius: Option<(usize, Spacing)>,
     has_radii: bool,
     reach: f32,
     range: Option<(f64, f64)>,
@@ -199,7 +219,7 @@ impl Survey {
         };
         let mut failure = None;
         for index in indices {
-            match Look::at(sequence, index, question.radius == RadiusQuestion::Auto) {
+            match Look::at(sequence, index, question.radius) {
                 Ok(look) => totals.take_in(look, question),
                 Err(error) => {
                     failure.get_or_insert(error);
@@ -276,6 +296,16 @@ pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
     })
 }
 
+/// What the neighbours in a frame tell.
+fn spacing_of(frame: &ParticleFrame, how_packed: bool) -> Option<Spacing> {
+    let touching = estimate_radius(&frame.positions)?;
+    let packed = || estimate_packed(&frame.positions, touching);
+    Some(Spacing {
+        touching,
+        packed: how_packed.then(packed).flatten(),
+    })
+}
+
 /// Up to [`FRAMES`] indices below `count`, evenly spread.
 fn spread(count: usize) -> Vec<usize> {
     if count <= FRAMES {
@@ -326,7 +356,11 @@ impl Totals {
         self.take_in_color(&frame, question.color);
         match question.radius {
             RadiusQuestion::None => {}
-            RadiusQuestion::Auto => self.take_in_radius(&frame, count, spacing),
+            RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
+                let estimate =
+                    || spacing.or_else(|| spacing_of(&frame, question.radius.is_packed()));
+                self.take_in_radius(&frame, count, estimate);
+            }
             RadiusQuestion::Attribute(name, scale) => {
                 if let Some(attribute) = frame.attribute(name) {
                     let radius = |i| narrow(attribute.magnitude(i) * scale);
@@ -352,7 +386,12 @@ impl Totals {
         self.color = Some(name);
     }
 
-    fn take_in_radius(&mut self, frame: &ParticleFrame, count: usize, spacing: Option<f32>) {
+    fn take_in_radius(
+        &mut self,
+        frame: &ParticleFrame,
+        count: usize,
+        estimate: impl Fn() -> Option<Spacing>,
+    ) {
         match &frame.radius {
             Some(Radius::Common(radius)) => {
                 self.has_radii = true;
@@ -365,9 +404,8 @@ impl Totals {
             None => {
                 // The fullest frame knows the spacing best.
                 let fuller = self.radius.is_none_or(|(known, _)| count > known);
-                let estimate = || spacing.or_else(|| estimate_radius(&frame.positions));
-                if fuller && let Some(radius) = estimate() {
-                    self.radius = Some((count, radius));
+                if fuller && let Some(spacing) = estimate() {
+                    self.radius = Some((count, spacing));
                 }
             }
         }
@@ -397,7 +435,8 @@ impl Totals {
             origin,
             min,
             max,
-            radius: self.radius.map(|(_, radius)| radius),
+            radius: self.radius.map(|(_, spacing)| spacing.touching),
+            packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
             has_radii: self.has_radii,
             reach: self.reach,
             color,

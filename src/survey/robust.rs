@@ -4,6 +4,8 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_formats::{Attribute, Positions};
 
+use super::packing;
+
 /// Particles of a frame that percentiles are taken from.
 const SAMPLE: usize = 20_000;
 /// Fewest particles of which one alone may count as escaped: of a handful each matters.
@@ -90,13 +92,32 @@ pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
     Some((if is_vector { 0.0 } else { low }, high))
 }
 
-/// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
-pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
+/// What is asked of some of the particles, evenly spread.
+fn asked(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
     let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
     let stride = positions.len().div_ceil(queries).max(1);
-    let distances: Vec<f32> = positions
-        .iter()
-        .step_by(stride)
+    positions.iter().step_by(stride)
+}
+
+/// The radius that `touching`, half the distance to the nearest neighbour, and the density tell.
+pub(super) fn estimate_packed(positions: &[Vec3], touching: f32) -> Option<f32> {
+    let square = packing::reach(touching).powi(2);
+    let count = |from: &Vec3| {
+        let chunks = positions.par_chunks(64 * 1024);
+        let near = |chunk: &[Vec3]| {
+            let near = chunk
+                .iter()
+                .filter(|to| from.distance_squared(**to) <= square);
+            near.map(|_| 1_u32).sum::<u32>()
+        };
+        chunks.map(near).sum()
+    };
+    packing::packed_radius(touching, asked(positions).map(count).collect())
+}
+
+/// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
+pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
+    let distances: Vec<f32> = asked(positions)
         .filter_map(|from| {
             let nearest = positions
                 .par_chunks(64 * 1024)

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use spherule_formats::convert::{ParticleSource, SourceAttribute};
 use spherule_formats::{Attribute, Endian, FrameError, ParseError, Positions, RawParticles};
 
+use super::packing::{self, Spacing};
 use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, middle};
 
 /// Particles that are read at a time.
@@ -79,19 +80,60 @@ fn decoded(attribute: &SourceAttribute, values: &[u8]) -> Result<Attribute, Pars
     })
 }
 
-/// Half the median distance to the nearest neighbour of some of the `sample`, among all particles.
-pub(super) fn spacing(
-    source: &dyn ParticleSource,
-    sample: &Positions,
-) -> Result<Option<f32>, FrameError> {
+/// Some of the `sample` whose neighbours among all particles are looked for.
+fn asked(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
     let count = usize::try_from(source.count()).unwrap_or(usize::MAX);
     let queries = (NEIGHBOUR_BUDGET / count.max(1)).clamp(LEAST_QUERIES, NEIGHBOUR_QUERIES);
     let stride = sample.len().div_ceil(queries).max(1);
-    let asked: Vec<DVec3> = (0..sample.len())
+    (0..sample.len())
         .step_by(stride)
         .map(|i| sample.get(i))
         .filter(|p| p.is_finite())
-        .collect();
+        .collect()
+}
+
+/// What the neighbours of some of the `sample` among all particles tell; `how_packed` asks for all of it.
+pub(super) fn spacing(
+    source: &dyn ParticleSource,
+    sample: &Positions,
+    how_packed: bool,
+) -> Result<Option<Spacing>, FrameError> {
+    let asked = asked(source, sample);
+    let Some(touching) = half_nearest(source, &asked)? else {
+        return Ok(None);
+    };
+    let packed = match how_packed {
+        true => packing::packed_radius(touching, around(source, &asked, touching)?),
+        false => None,
+    };
+    Ok(Some(Spacing { touching, packed }))
+}
+
+/// How many particles lie around each of those `asked`.
+fn around(
+    source: &dyn ParticleSource,
+    asked: &[DVec3],
+    touching: f32,
+) -> Result<Vec<u32>, FrameError> {
+    let square = f64::from(packing::reach(touching)).powi(2);
+    let of_run = |positions: &[DVec3]| {
+        let count = |from: &DVec3| {
+            let near = positions
+                .iter()
+                .filter(|to| from.distance_squared(**to) <= square);
+            near.map(|_| 1_u32).sum::<u32>()
+        };
+        asked.iter().map(count).collect::<Vec<u32>>()
+    };
+    let join = |mut a: Vec<u32>, b: Vec<u32>| {
+        a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
+        a
+    };
+    each_run(source, of_run, || vec![0; asked.len()], join)
+}
+
+/// Half the median distance from those `asked` to the nearest neighbour among all particles.
+fn half_nearest(source: &dyn ParticleSource, asked: &[DVec3]) -> Result<Option<f32>, FrameError> {
     let of_run = |positions: &[DVec3]| {
         let nearest = |from: &DVec3| {
             let squares = positions.iter().map(|to| from.distance_squared(*to));
@@ -140,7 +182,7 @@ mod tests {
     use spherule_formats::convert::{BoxSource, RawSource};
     use spherule_formats::generate::BoxSettings;
 
-    use super::super::robust::estimate_radius;
+    use super::super::robust::{estimate_packed, estimate_radius};
     use super::*;
 
     #[test]
@@ -154,12 +196,25 @@ mod tests {
         let some = sample(&source, Path::new("box"), 4096).expect("there");
         assert!((3000..=4096).contains(&some.positions.len()));
         assert!((0..some.positions.len()).all(|i| all.contains(&some.positions.get(i))));
-        let streamed = spacing(&source, &some.positions)
+        let streamed = spacing(&source, &some.positions, true)
             .expect("there")
             .expect("some");
         let single: Vec<Vec3> = all.iter().map(|p| p.as_vec3()).collect();
         let whole = estimate_radius(&single).expect("some");
-        assert!((streamed / whole - 1.0).abs() < 0.1, "{streamed} {whole}");
+        let near = |a: f32, b: f32| assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
+        near(streamed.touching, whole);
+        let packed = estimate_packed(&single, whole).expect("some");
+        near(streamed.packed.expect("asked for"), packed);
+        // Of particles at random the nearest neighbour is near: this tells one from the other.
+        assert!(packed > 1.5 * whole, "{packed} {whole}");
+        let asked_less = spacing(&source, &some.positions, false).expect("there");
+        assert_eq!(
+            asked_less,
+            Some(Spacing {
+                packed: None,
+                ..streamed
+            })
+        );
     }
 
     #[test]
@@ -172,6 +227,6 @@ mod tests {
         };
         let source = RawSource::new(Path::new("nan"), &raw).expect("whole");
         assert_eq!(extremes(&source).expect("there"), None);
-        assert_eq!(spacing(&source, &raw.positions).expect("there"), None);
+        assert_eq!(spacing(&source, &raw.positions, true).expect("there"), None);
     }
 }

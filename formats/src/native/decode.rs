@@ -76,22 +76,47 @@ impl NativeFrame<'_> {
     /// # Errors
     /// As [`Self::to_raw`].
     pub fn neighbour_distances(&self, queries: usize) -> Result<Vec<f32>, ParseError> {
+        let nearest = |squares: &mut dyn Iterator<Item = f32>| {
+            let nearest = squares.filter(|d| *d > 0.0).fold(f32::INFINITY, f32::min);
+            nearest.is_finite().then(|| nearest.sqrt())
+        };
+        let distances = self.around_some(queries, nearest)?;
+        Ok(distances.into_iter().flatten().collect())
+    }
+
+    /// How many particles lie within `reach` of `queries` particles, themselves included, among those around
+    /// them in the file: of some at the edge of a cell of the order too few, of others all.
+    ///
+    /// # Errors
+    /// As [`Self::to_raw`].
+    pub fn neighbour_counts(&self, queries: usize, reach: f32) -> Result<Vec<u32>, ParseError> {
+        let count = |squares: &mut dyn Iterator<Item = f32>| {
+            let near = squares.filter(|d| *d <= reach * reach);
+            near.map(|_| 1_u32).sum()
+        };
+        self.around_some(queries, count)
+    }
+
+    /// What `tell` says of the squares of the distances from some particles to those around them in the file.
+    fn around_some<T: Send>(
+        &self,
+        queries: usize,
+        tell: impl Fn(&mut dyn Iterator<Item = f32>) -> T + Sync,
+    ) -> Result<Vec<T>, ParseError> {
         /// Particles on either side of the one asked for: a cell of the order and half the next.
         const AROUND: usize = 1536;
         let leaves = self.leaves()?;
         let count = self.len()?;
         let stride = count.div_ceil(queries.max(1)).max(1);
-        let distance = |i: usize| {
+        let of = |i: usize| {
             let from = leaves.center(i);
             let blocks =
                 i.saturating_sub(AROUND) / BLOCK_SIZE..(i + AROUND).min(count).div_ceil(BLOCK_SIZE);
             let others = blocks.flat_map(|block| leaves.block(block).centers());
-            let distances = others.map(|to| from.distance_squared(to));
-            let nearest = distances.filter(|d| *d > 0.0).fold(f32::INFINITY, f32::min);
-            nearest.is_finite().then(|| nearest.sqrt())
+            tell(&mut others.map(|to| from.distance_squared(to)))
         };
         let asked: Vec<usize> = (0..count).step_by(stride).collect();
-        Ok(asked.into_par_iter().filter_map(distance).collect())
+        Ok(asked.into_par_iter().map(of).collect())
     }
 
     /// Particles, as many as fit the memory.

@@ -6,6 +6,7 @@ use spherule_formats::Sequence;
 use crate::cli::progress::Progress;
 use crate::pipeline::{self, Event, RadiusRule, Setup, Stage};
 use crate::report::FrameReport;
+use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
 /// Shows an event of the pipeline. Called from all its stages.
@@ -74,7 +75,14 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
         RadiusRule::FileOr(_) if survey.has_radii => "radius from the files".to_owned(),
         RadiusRule::FileOr(radius) => {
             let radius = short(f64::from(*radius));
-            format!("radius {radius}, half the usual distance of neighbours (--radius sets it)")
+            let why = match (setup.surface.kind, survey.packed_radius) {
+                (SurfaceKind::Spheres, _) | (_, None) => "half the usual distance of neighbours",
+                (SurfaceKind::Medium, _) => {
+                    "by how densely particles lie, enlarged so that spheres overlap"
+                }
+                (SurfaceKind::Smooth, _) => "by how densely particles lie",
+            };
+            format!("radius {radius}, {why} (--radius sets it)")
         }
         RadiusRule::Attribute { name, scale } => format!("radius {scale} x attribute `{name}`"),
     }
