@@ -28,7 +28,7 @@ const GRAZING: f32 = 1e-3;
 /// do not even out costs fewer rays than it is worth. Bounded by [`SPLIT_LEAST`] for few samples.
 const SPLIT: f32 = 1.0 / 80.0;
 
-/// A child that weighs this is seen in an image of one sample a pixel.
+/// A child that weighs this is seen in an image of one sample a pixel, and of any at the first crossing.
 const SPLIT_LEAST: f32 = 0.02;
 
 /// What is the same for all rays in a body.
@@ -220,7 +220,12 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
         }
         let is_mirror_lesser = mirrored.weight < passed.weight;
         let lesser = mirrored.weight.min(passed.weight);
-        let splits = lesser > 0.0 && seen * lesser >= self.optics.split;
+        // What the camera sees first is seen best, and cheap to follow: mostly sky.
+        let split = match leg.level.depth {
+            1 => self.optics.split.min(SPLIT_LEAST),
+            _ => self.optics.split,
+        };
+        let splits = lesser > 0.0 && seen * lesser >= split;
         let takes_mirror = if splits || lesser <= 0.0 {
             !is_mirror_lesser
         } else {

@@ -61,6 +61,7 @@ fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
     let options = ["--encoding", "q16", "--max-error", "0.05"];
     for (name, surface) in [
         ("water", &["--look", "water", "--surface", "medium"][..]),
+        ("smooth", &["--look", "water", "--color-by", "velocity"]),
         ("pca", &["--set", "surface.normals=\"pca\""]),
     ] {
         shop.run(&[&["convert", "in", "-o", name][..], &options].concat())

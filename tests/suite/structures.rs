@@ -140,9 +140,11 @@ fn radii_of_their_own() {
 
 #[test]
 fn water_of_one_body() {
-    let water = ["--look", "water", "--surface", "medium"];
-    let file = "emitter_sph/ParticleData_Fluid_10.bgeo";
-    same_on_sample(file, &[&water[..], ALL_CHANNELS].concat());
+    for surface in ["medium", "smooth"] {
+        let water = ["--look", "water", "--spray", "--surface", surface];
+        let file = "emitter_sph/ParticleData_Fluid_10.bgeo";
+        same_on_sample(file, &[&water[..], ALL_CHANNELS].concat());
+    }
 }
 
 #[test]

@@ -7,11 +7,9 @@ use serde_json::Value;
 
 use crate::harness::{SMALL, Workshop, dam_break, images};
 
-const WATER: [&str; 8] = [
+const WATER: [&str; 6] = [
     "--look",
     "water",
-    "--surface",
-    "medium",
     "--spray",
     "--channels",
     "RGBA,Z,N,P,V,id,albedo",
@@ -19,14 +17,24 @@ const WATER: [&str; 8] = [
 ];
 
 #[test]
-fn jobs_of_one_body_with_spray() {
+fn jobs_of_spheres_as_one_body_with_spray() {
+    jobs_with_spray("medium");
+}
+
+#[test]
+fn jobs_of_a_smooth_surface_with_spray() {
+    jobs_with_spray("smooth");
+}
+
+fn jobs_with_spray(surface: &str) {
     let shop = Workshop::new();
     // When it splashes.
     dam_break(&shop.join("in"), 6..=8);
     let render = |out: &str, options: &[&str]| {
         let pattern = format!("{out}/f.####.exr");
         let arguments = ["render", "in", "-o", &pattern];
-        shop.run(&[&arguments[..], &SMALL, &WATER, options].concat())
+        let surface = ["--surface", surface];
+        shop.run(&[&arguments[..], &SMALL, &WATER, &surface, options].concat())
             .expect(0)
     };
     render("one", &["--threads", "1"]);
