@@ -17,10 +17,11 @@ use super::work::{
 };
 use crate::accel::Structure;
 use crate::manifest::{Manifest, OutputPattern, SCHEMA_FILE, named_place, real_dir};
-use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
 use crate::report::Bytes;
 use crate::report::memory::available;
 use crate::resolve::{self, check_views, question};
+use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
 /// The manifest that is written beside the images.
@@ -218,8 +219,9 @@ impl Plan {
         if let Some(limit) = limit {
             for (place, need) in &schedule.too_large {
                 tasks[*place].refused = Some(format!(
-                    "it needs about {} ({need}), render.memory_limit is {limit}: {}",
+                    "it needs about {} ({need}){}, render.memory_limit is {limit}: {}",
                     Bytes(need.total()),
+                    surface_text(setup),
                     remedy(setup, &sizes[*place], limit)
                 ));
             }
@@ -287,6 +289,23 @@ pub(super) fn one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
     }
 }
 
+/// What the grid of a smooth surface depends on, the usual reason for its size being a wrong radius.
+fn surface_text(setup: &Setup) -> String {
+    if setup.surface.kind != SurfaceKind::Smooth {
+        return String::new();
+    }
+    let voxel = setup.surface.voxel;
+    match setup.radius {
+        RadiusRule::Common(radius) | RadiusRule::FileOr(radius) if radius > 0.0 => format!(
+            " for a smooth surface of particles of radius {radius} in voxels of {}",
+            voxel * radius
+        ),
+        _ => format!(
+            " for a smooth surface of particles of their own radius in voxels of {voxel} of it"
+        ),
+    }
+}
+
 /// What to do about a frame that needs more than `limit`.
 fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
     let mut ways = Vec::new();
@@ -298,9 +317,13 @@ fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
         MemoryModel::new(&setup).alone(frame).total() <= limit.0
     });
     ways.extend(others.map(|other| format!("choose --accelerator {other}")));
+    let alone = MemoryModel::new(setup).alone(frame);
     let empty = MemoryModel::new(setup).alone(&FrameSize::default());
     if 4 * (empty.images + empty.encoding) > limit.0 {
         ways.push("make the image smaller or ask for fewer channels".to_owned());
+    }
+    if setup.surface.kind == SurfaceKind::Smooth && 4 * alone.surface > limit.0 {
+        ways.push("give larger voxels (surface.voxel)".to_owned());
     }
     ways.push("raise the limit".to_owned());
     ways.join(", or ")

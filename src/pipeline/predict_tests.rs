@@ -47,6 +47,27 @@ fn more_of_anything_needs_more() {
 }
 
 #[test]
+fn a_smooth_surface_has_a_grid_and_no_tree() {
+    let mut smooth = setup();
+    smooth.surface.kind = SurfaceKind::Smooth;
+    let need = |setup: &Setup, particles| MemoryModel::new(setup).alone(&plain(particles));
+    let (some, more) = (need(&smooth, 1_000_000), need(&smooth, 8_000_000));
+    assert!(some.tree < 1 << 20, "{some}");
+    // Most of the particles lie inside.
+    assert!(more.surface > 4 * some.surface && more.surface < 8 * some.surface);
+    let mut finer = smooth.clone();
+    finer.surface.voxel = 0.5;
+    assert!(need(&finer, 1_000_000).surface > 2 * some.surface);
+    finer.surface.voxel = 0.25;
+    let few = need(&finer, 1).surface;
+    assert!((1 << 10..1 << 16).contains(&few), "{few}");
+    assert_eq!(need(&smooth, 0).surface, 0);
+    let mut medium = setup();
+    medium.surface.kind = SurfaceKind::Medium;
+    assert_eq!(need(&medium, 1_000_000), need(&setup(), 1_000_000));
+}
+
+#[test]
 fn limits_leave_out_what_does_not_fit_alone() {
     let setup = setup();
     let model = MemoryModel::new(&setup);

@@ -39,6 +39,7 @@ fn a_new_job_is_told_and_not_begun() {
         "reading",
         "particles",
         "tree",
+        "surface",
         "images",
         "encoding",
     ];

@@ -1,6 +1,6 @@
 //! `--memory-limit`: what does not fit is refused before it starts, and the rest goes on.
 
-use crate::harness::{Workshop, images, ledger};
+use crate::harness::{Workshop, dam_break, images, ledger};
 
 use super::{AWAY, vtk};
 
@@ -103,4 +103,31 @@ fn frames_go_one_at_a_time_where_that_fits() {
         images(&workshop.join("free")),
         images(&workshop.join("tight"))
     );
+}
+
+#[test]
+fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), [1]);
+    let smooth = ["--surface", "smooth", "--set=output.preview=false"];
+    // Of particles that do not meet each has a grid of its own. One can foresee what is usual, and no more.
+    let tiny = ["--radius", "0.0001", "--memory-limit", "40MiB"];
+    let ran = workshop.render(&[&smooth[..], &tiny].concat()).expect(1);
+    assert_eq!(ran.rendered(), [0_i64; 0]);
+    ran.tells(
+        "frame 1: the smooth surface of 10422 particles of radius 0.0001 in voxels of 0.0001 needs",
+    )
+    .tells("is the radius right? Else give larger voxels (surface.voxel) or more memory");
+    // What fits is rendered, on the same directory.
+    let right = ["--radius", "0.02", "--memory-limit", "40MiB", "--force"];
+    let ran = workshop.render(&[&smooth[..], &right].concat()).expect(0);
+    assert_eq!(ran.rendered(), [1]);
+    // What is foreseen not to fit says as much of the surface.
+    let tight = ["--radius", "0.02", "--memory-limit", "9MiB", "--force"];
+    workshop
+        .render(&[&smooth[..], &tight].concat())
+        .expect(2)
+        .tells("no frame fits into memory: frame 1: it needs about")
+        .tells(" for a smooth surface of particles of radius 0.02 in voxels of 0.02, render.memory_limit is")
+        .tells("give larger voxels (surface.voxel), or raise the limit");
 }
