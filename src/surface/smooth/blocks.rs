@@ -126,13 +126,15 @@ pub(super) fn cells(mut bits: u64) -> impl Iterator<Item = u32> {
 fn near_particles(bins: &Bins, layout: &Layout) -> Vec<(u64, BlockPlan)> {
     let occupied = occupied(bins, layout);
     let filled = filled_count(layout);
+    // Deep inside the field is taken to be 1: no inside for who asks for more.
+    let has_inside = layout.threshold < 1.0;
     occupied
         .into_par_iter()
         .map(|(key, near)| {
             let place = place_of(key);
             let is_deep = |cell: u32| {
                 let brick = brick_at(place, cell);
-                near >> cell & 1 == 1 && is_deep(bins, layout, brick, filled)
+                has_inside && near >> cell & 1 == 1 && is_deep(bins, layout, brick, filled)
             };
             let inside = (0..64).fold(0, |bits, cell| bits | u64::from(is_deep(cell)) << cell);
             let block = BlockPlan {

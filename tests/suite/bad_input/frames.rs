@@ -9,10 +9,10 @@ use spherule_formats::write;
 use super::not_rendered;
 use crate::harness::{Workshop, dam_break, images, npy};
 
-const BACKGROUND: [&str; 2] = ["--set", "render.background=[0.25,0.5,0.75]"];
+pub(super) const BACKGROUND: [&str; 2] = ["--set", "render.background=[0.25,0.5,0.75]"];
 
 /// The pixels of an image, row by row.
-fn pixels(workshop: &Workshop, name: &str) -> Vec<[f32; 4]> {
+pub(super) fn pixels(workshop: &Workshop, name: &str) -> Vec<[f32; 4]> {
     let image = read_first_rgba_layer_from_file(
         workshop.join(name),
         |size, _| (size.width(), vec![[0.0; 4]; size.area()]),
@@ -24,7 +24,7 @@ fn pixels(workshop: &Workshop, name: &str) -> Vec<[f32; 4]> {
     image.expect("an EXR").layer_data.channel_data.pixels.1
 }
 
-fn is_background(pixel: &[f32; 4]) -> bool {
+pub(super) fn is_background(pixel: &[f32; 4]) -> bool {
     pixel[..3] == [0.25, 0.5, 0.75]
 }
 

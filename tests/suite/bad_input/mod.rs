@@ -12,6 +12,7 @@ mod inputs;
 mod manifest;
 mod output;
 mod pipes;
+mod surface;
 
 /// Runs what cannot start; the messages must have these texts.
 #[track_caller]
