@@ -7,11 +7,12 @@ use clap::{Args as _, Command, FromArgMatches as _};
 use crate::cli::plan::RunArgs;
 use crate::manifest::Manifest;
 
-/// Options that are no property of a job: where it is, any key, and what one run does with what is there.
-const ACTIONS: [&str; 5] = ["input", "set", "force", "keep_done", "shard"];
+/// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
+/// there.
+const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard"];
 
 /// Every other option with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 27] = [
+const FLAGS: [(&str, &str); 31] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -28,6 +29,10 @@ const FLAGS: [(&str, &str); 27] = [
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
+    ("--surface medium", "render.surface = \"medium\""),
+    ("--smoothing 0.5", "surface.smoothing = 0.5"),
+    ("--exact-surface", "surface.exact = true"),
+    ("--spray", "surface.spray = true"),
     ("--no-mmap", "input.mmap = false"),
     ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
     ("--accelerator bvh", "render.accelerator = \"bvh\""),
