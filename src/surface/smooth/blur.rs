@@ -185,10 +185,10 @@ fn weighted<'a, const TAPS: usize>(
 ) -> [f32; LANES] {
     let blur = TAPS - 1;
     let mut sums = group(blur).map(|value| taps[0] * value);
-    for distance in 1..TAPS {
+    for (distance, tap) in taps.iter().enumerate().skip(1) {
         let (before, after) = (group(blur - distance), group(blur + distance));
         for lane in 0..LANES {
-            sums[lane] += taps[distance] * (before[lane] + after[lane]);
+            sums[lane] += tap * (before[lane] + after[lane]);
         }
     }
     sums

@@ -47,7 +47,6 @@ fn predicted_part(name: &str, make: impl Fn(&Path), options: &[&str]) -> f64 {
     let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64();
     let measured = measured.expect("bytes");
     let part = total / measured;
-    println!("{name} {options:?}: predicted {total}, measured {measured}, {part}: {predicted}");
     part
 }
 
