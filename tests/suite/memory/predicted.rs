@@ -46,8 +46,7 @@ fn predicted_part(name: &str, make: impl Fn(&Path), options: &[&str]) -> f64 {
     let total = predicted["total"].as_f64().expect("bytes");
     let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64();
     let measured = measured.expect("bytes");
-    let part = total / measured;
-    part
+    total / measured
 }
 
 /// A block of water of particles of radius 0.01.
