@@ -59,7 +59,8 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
     finer.surface.voxel = 0.5;
     assert!(need(&finer, 1_000_000).surface > 2 * some.surface);
     finer.surface.voxel = 0.25;
-    let few = need(&finer, 1).surface;
+    // Too little to be of the moment at which the job takes most.
+    let few = smooth_bytes(&finer, 1).building;
     assert!((1 << 10..1 << 16).contains(&few), "{few}");
     assert_eq!(need(&smooth, 0).surface, 0);
     let mut medium = setup();
