@@ -3,9 +3,9 @@
 //! way between them costs nothing, whatever particles lie there.
 //!
 //! Both children of a crossing are followed while the lesser weighs enough in its sample. Else one of them is, drawn
-//! by their weights (Russian roulette; Arvo and Kirk, "Particle transport and image synthesis", 1990): the
-//! mean stays what it was. The draw comes of the place on the film and the path since, so that it does not depend on
-//! threads.
+//! by their weights (Russian roulette; Arvo and Kirk, "Particle transport and image synthesis", 1990); at the first
+//! crossing the greater always is, and the draw is for the lesser alone. The mean stays what it was. Draws come of
+//! the place on the film and the path since, so that they do not depend on threads.
 
 use glam::{Vec2, Vec3};
 
@@ -28,7 +28,11 @@ const GRAZING: f32 = 1e-3;
 /// do not even out costs fewer rays than it is worth. Bounded by [`SPLIT_LEAST`] for few samples.
 const SPLIT: f32 = 1.0 / 80.0;
 
-/// A child that weighs this is seen in an image of one sample a pixel, and of any at the first crossing.
+/// At the first crossing the lesser child is followed with this chance where it weighs a split's weight, else in
+/// proportion.
+const FIRST_CHANCE: f32 = 2.0;
+
+/// A child that weighs this is seen in an image of one sample a pixel.
 const SPLIT_LEAST: f32 = 0.02;
 
 /// What is the same for all rays in a body.
@@ -220,13 +224,17 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
         }
         let is_mirror_lesser = mirrored.weight < passed.weight;
         let lesser = mirrored.weight.min(passed.weight);
-        // What the camera sees first is seen best, and cheap to follow: mostly sky.
-        let split = match leg.level.depth {
-            1 => self.optics.split.min(SPLIT_LEAST),
-            _ => self.optics.split,
+        let splits = lesser > 0.0 && seen * lesser >= self.optics.split;
+        // What the camera sees first is seen best: the greater child is followed always, the lesser now and then,
+        // with as much more weight.
+        let is_first = leg.level.depth == 1 && lesser > 0.0;
+        let chance = match (splits, is_first) {
+            (true, _) => 1.0,
+            (false, true) => (FIRST_CHANCE * seen * lesser / self.optics.split).min(1.0),
+            (false, false) => 0.0,
         };
-        let splits = lesser > 0.0 && seen * lesser >= split;
-        let takes_mirror = if splits || lesser <= 0.0 {
+        let follows_both = splits || is_first;
+        let takes_mirror = if follows_both || lesser <= 0.0 {
             !is_mirror_lesser
         } else {
             leg.path.draw() * both < mirrored.weight
@@ -236,16 +244,16 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
         } else {
             (passed, mirrored)
         };
-        if splits {
-            let part = *kept * other.weight;
+        if follows_both && leg.path.draw() < chance {
+            let part = other.weight / chance;
             let level = Level {
                 depth: leg.level.depth + 1,
-                weight: seen * other.weight,
+                weight: seen * part,
             };
             let other = other.leg(leg.path, level, scratch);
-            *sum += part * self.follow(other, None, scratch);
+            *sum += *kept * part * self.follow(other, None, scratch);
         }
-        let part = if splits { taken.weight } else { both };
+        let part = if follows_both { taken.weight } else { both };
         if part <= 0.0 {
             return None;
         }
