@@ -4,8 +4,8 @@
 //!
 //! Both children of a crossing are followed while the lesser weighs enough in its sample. Else one of them is, drawn
 //! by their weights (Russian roulette; Arvo and Kirk, "Particle transport and image synthesis", 1990); at the first
-//! crossing the greater always is, and the draw is for the lesser alone. The mean stays what it was. Draws come of
-//! the place on the film and the path since, so that they do not depend on threads.
+//! crossing the lesser more often, beside the greater. The mean stays what it was, and so does the sum of weights.
+//! Draws come of the place on the film and the path since, so that they do not depend on threads.
 
 use glam::{Vec2, Vec3};
 
@@ -28,7 +28,7 @@ const GRAZING: f32 = 1e-3;
 /// do not even out costs fewer rays than it is worth. Bounded by [`SPLIT_LEAST`] for few samples.
 const SPLIT: f32 = 1.0 / 80.0;
 
-/// At the first crossing the lesser child is followed with this chance where it weighs a split's weight, else in
+/// At the first crossing the lesser child is drawn with this chance where it weighs as much as is split, else in
 /// proportion.
 const FIRST_CHANCE: f32 = 2.0;
 
@@ -225,35 +225,38 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
         let is_mirror_lesser = mirrored.weight < passed.weight;
         let lesser = mirrored.weight.min(passed.weight);
         let splits = lesser > 0.0 && seen * lesser >= self.optics.split;
-        // What the camera sees first is seen best: the greater child is followed always, the lesser now and then,
-        // with as much more weight.
-        let is_first = leg.level.depth == 1 && lesser > 0.0;
+        // What the camera sees first is seen best, so the lesser child is drawn more often there, with less
+        // weight. Together the two always weigh the same.
+        let is_first = leg.level.depth == 1;
+        let share = lesser / both.max(f32::MIN_POSITIVE);
         let chance = match (splits, is_first) {
             (true, _) => 1.0,
-            (false, true) => (FIRST_CHANCE * seen * lesser / self.optics.split).min(1.0),
-            (false, false) => 0.0,
+            (false, true) => {
+                let often = FIRST_CHANCE * seen * lesser / self.optics.split;
+                often.min(1.0).max(share)
+            }
+            (false, false) => share,
         };
-        let follows_both = splits || is_first;
-        let takes_mirror = if follows_both || lesser <= 0.0 {
-            !is_mirror_lesser
-        } else {
-            leg.path.draw() * both < mirrored.weight
-        };
-        let (taken, other) = if takes_mirror {
-            (mirrored, passed)
-        } else {
+        let (greater, other) = if is_mirror_lesser {
             (passed, mirrored)
+        } else {
+            (mirrored, passed)
         };
-        if follows_both && leg.path.draw() < chance {
-            let part = other.weight / chance;
+        let is_drawn = lesser > 0.0 && leg.path.draw() < chance;
+        let (taken, part) = if !is_drawn {
+            (greater, both)
+        } else if splits || is_first {
+            let part = lesser / chance;
             let level = Level {
                 depth: leg.level.depth + 1,
                 weight: seen * part,
             };
             let other = other.leg(leg.path, level, scratch);
             *sum += *kept * part * self.follow(other, None, scratch);
-        }
-        let part = if follows_both { taken.weight } else { both };
+            (greater, both - part)
+        } else {
+            (other, both)
+        };
         if part <= 0.0 {
             return None;
         }
