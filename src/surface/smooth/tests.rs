@@ -202,7 +202,6 @@ fn rays_enter_and_leave_in_pairs() {
 }
 
 #[test]
-#[ignore = "a million rays; run with --release"]
 fn a_million_rays_enter_and_leave_in_pairs() {
     let (_, centers) = bodies().remove(3);
     for smoothing in [0.0, 0.75] {
