@@ -14,7 +14,6 @@ use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};
 use crate::scene::ColorMap;
-use crate::surface::SurfaceKind;
 use crate::survey::{Named, id_of, velocity_of};
 
 /// Bytes of a frame up to which everything that is used is compared with its checksum before it is traced;
@@ -60,7 +59,7 @@ impl StoredFrame {
         };
         let file = NativeFile::open(path, setup.access).map_err(LoadError::Frame)?;
         let structure = setup.stored_structure();
-        let radius = match particles_in_place(setup, file.index(), structure) {
+        let radius = match particles_in_place(setup, file.index()) {
             Ok(radius) => radius,
             Err(why) => {
                 let note = format!("native frames are decoded before they are traced: {why}");
@@ -215,23 +214,9 @@ struct PlacedRadius {
 }
 
 /// The radii of a frame, if it can be traced in place; else why not.
-fn particles_in_place(
-    setup: &Setup,
-    index: &FrameIndex,
-    structure: Structure,
-) -> Result<PlacedRadius, String> {
-    if matches!(structure, Structure::Bvh | Structure::Sbvh) {
-        return Err(format!(
-            "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
-        ));
-    }
-    if setup.surface.kind == SurfaceKind::Smooth {
-        return Err(
-            "a smooth surface sorts a copy of them, 12 bytes a particle and more".to_owned(),
-        );
-    }
-    if setup.surface.spray {
-        return Err("spray is parted from them, for 12 bytes a particle and more".to_owned());
+fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius, String> {
+    if let Some(why) = setup.needs_copy() {
+        return Err(why);
     }
     if DVec3::from_array(index.origin) != setup.origin {
         return Err(

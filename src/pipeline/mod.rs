@@ -167,7 +167,7 @@ fn read_stage(
     next: &Next,
     watch: Watch,
 ) -> Result<(), JobError> {
-    let mut told = HashSet::new();
+    let mut told = Told::default();
     let mut heard = |news: QueueNews| watch(Event::Others(news));
     while let Some((place, claim)) = queue.take(&mut heard)? {
         let task = &tasks[place];
@@ -178,13 +178,7 @@ fn read_stage(
         };
         let passed = match loaded {
             Ok(mut frame) => {
-                // What is so in every frame is said once.
-                for note in std::mem::take(&mut frame.notes) {
-                    if !told.contains(&note) {
-                        watch(Event::Note(&note));
-                        told.insert(note);
-                    }
-                }
+                told.tell(std::mem::take(&mut frame.notes), watch);
                 Passed::Frame(frame)
             }
             Err(reason) => Passed::Failed(task.clone(), reason),
@@ -194,6 +188,21 @@ fn read_stage(
         }
     }
     Ok(())
+}
+
+/// What a stage has told of its frames: what is so in every frame is said once.
+#[derive(Default)]
+struct Told(HashSet<String>);
+
+impl Told {
+    fn tell(&mut self, notes: Vec<String>, watch: Watch) {
+        for note in notes {
+            if !self.0.contains(&note) {
+                watch(Event::Note(&note));
+                self.0.insert(note);
+            }
+        }
+    }
 }
 
 /// The way from reading to tracing.
@@ -226,7 +235,7 @@ impl TraceStage<'_> {
         next: SyncSender<InHand<TracedFrame>>,
     ) {
         let mut tracer = FrameTracer::new();
-        let mut told = HashSet::new();
+        let mut told = Told::default();
         for InHand { claim, passed } in loaded {
             // A frame that was only read when the interrupt came is dropped, not begun.
             if self.interrupt.is_raised() {
@@ -246,12 +255,7 @@ impl TraceStage<'_> {
                 let _ = is_built.send(());
             }
             let traced = built.and_then(|mut frame| {
-                for note in std::mem::take(&mut frame.notes) {
-                    if !told.contains(&note) {
-                        (self.watch)(Event::Note(&note));
-                        told.insert(note);
-                    }
-                }
+                told.tell(std::mem::take(&mut frame.notes), self.watch);
                 let trace = || tracer.trace(self.setup, frame, self.stop);
                 guarded(|| trace().map_err(|e| e.to_string()))
             });

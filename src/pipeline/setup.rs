@@ -131,9 +131,27 @@ impl Setup {
 
     /// Whether native frames relative to [`Self::origin`] are traced where they lie.
     pub fn traces_in_place(&self) -> bool {
-        let in_order = matches!(self.stored_structure(), Structure::Lbvh | Structure::Kdtree);
-        let is_whole = !self.surface.spray && self.surface.kind != SurfaceKind::Smooth;
-        in_order && is_whole && !matches!(self.radius, RadiusRule::Attribute { .. })
+        self.needs_copy().is_none() && !matches!(self.radius, RadiusRule::Attribute { .. })
+    }
+
+    /// Why the particles of a native frame are copied whatever radii they have, if they are.
+    pub(super) fn needs_copy(&self) -> Option<String> {
+        let structure = self.stored_structure();
+        if matches!(structure, Structure::Bvh | Structure::Sbvh) {
+            return Some(format!(
+                "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
+            ));
+        }
+        let why = match self.surface {
+            SurfaceSettings { kind, .. } if kind == SurfaceKind::Smooth => {
+                "a smooth surface sorts a copy of them, 12 bytes a particle and more"
+            }
+            SurfaceSettings { spray: true, .. } => {
+                "spray is parted from them, for 12 bytes a particle and more"
+            }
+            _ => return None,
+        };
+        Some(why.to_owned())
     }
 
     /// Whose tree a native frame in place is said to be: its order is that of k-d cells.

@@ -139,8 +139,4 @@ impl Surface for Solid {
     fn occluded(&self, ray: &Ray) -> bool {
         self.nearest(ray).is_some()
     }
-
-    fn transmittance(&self, _: &Ray, _: impl Fn(f32) -> f32) -> f32 {
-        unreachable!("shadow rays ask one body for crossings")
-    }
 }

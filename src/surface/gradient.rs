@@ -3,10 +3,14 @@
 //! 2003, eq. 16). For surfaces of spheres; the smooth surface has a field of its own.
 
 use super::SurfaceHit;
+use super::field::kernel::slope;
 use super::neighbours::{each_neighbour, fixed};
 use super::pca::towards_viewer;
 use crate::accel::view::TreeView;
 use crate::ray::Ray;
+
+/// Distance in smoothing lengths under which a slope is mostly rounding.
+const NO_DISTANCE: f32 = 1e-4;
 
 /// Normals by the gradient of the field about the spheres of a tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -50,11 +54,11 @@ impl GradientNormals {
 
 /// Minus the derivative of the cubic spline over the distance `q` in smoothing lengths, up to a factor.
 fn steepness(q: f32) -> f32 {
-    if q < 1.0 {
-        1.0 - 0.75 * q
-    } else {
-        0.25 * (2.0 - q).max(0.0).powi(2) / q
+    // The limit in the middle, where both vanish.
+    if q < NO_DISTANCE {
+        return 1.0;
     }
+    -slope(0.5 * q) / (6.0 * q)
 }
 
 #[cfg(test)]

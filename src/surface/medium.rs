@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::spheres::{SphereSurface, sphere_hit};
-use super::{Dimming, ShadingNormals, Side, Surface, SurfaceHit};
+use super::{ShadingNormals, Side, Surface, SurfaceHit};
 use crate::accel::intervals::TreeExit;
 use crate::accel::traverse::TreeHit;
 use crate::accel::view::TreeView;
@@ -129,20 +129,6 @@ impl Surface for MediumSurface<'_> {
             }
         }
         hits
-    }
-
-    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
-        let mut dimming = Dimming::default();
-        let mut side = self.side_of(ray.at(ray.t_min));
-        let mut rest = *ray;
-        while let Some(hit) = self.crossing(&rest, side) {
-            if !dimming.by(kept(hit.normal.dot(ray.direction).abs())) {
-                break;
-            }
-            rest.t_min = hit.t;
-            side = side.other();
-        }
-        dimming.product()
     }
 }
 

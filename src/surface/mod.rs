@@ -120,7 +120,21 @@ pub trait Surface: Sync {
     /// How much of a light's radiance comes along `ray` through transmissive bodies: the product over
     /// all meetings in `ray.t_min..ray.t_max`, entering and leaving, of what `kept` makes of the
     /// absolute cosine between ray and normal.
-    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32;
+    ///
+    /// What is not one body must say itself where its meetings are; one body goes from side to side.
+    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
+        let mut dimming = Dimming::default();
+        let mut side = self.side_of(ray.at(ray.t_min));
+        let mut rest = *ray;
+        while let Some(hit) = self.crossing(&rest, side) {
+            if !dimming.by(kept(hit.normal.dot(ray.direction).abs())) {
+                break;
+            }
+            rest.t_min = hit.t + hit.offset;
+            side = side.other();
+        }
+        dimming.product()
+    }
 
     /// [`Surface::nearest`] of each ray, the same to the bit. For rays that are close together.
     fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {

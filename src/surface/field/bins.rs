@@ -8,6 +8,7 @@ use std::ops::Range;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use spherule_formats::order::index_u32;
 use spherule_formats::order::partition::scatter;
 
 /// Bins lie within so many of the origin along each axis: three coordinates fit a key of 64 bits.
@@ -471,12 +472,4 @@ fn bins_of(points: &[Vec3], inverse: f32, first: usize) -> Vec<(u64, u32)> {
         }
     }
     bins
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "frames have at most 2^32 - 1 particles"
-)]
-fn index_u32(index: usize) -> u32 {
-    index as u32
 }

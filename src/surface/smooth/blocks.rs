@@ -34,9 +34,8 @@ pub(super) struct BlockPlan {
 /// The blocks that hold anything, in the order of their places.
 #[derive(Debug)]
 pub(super) struct Plan {
+    /// By their keys.
     pub(super) blocks: Vec<BlockPlan>,
-    /// Of each.
-    keys: Vec<u64>,
 }
 
 impl Plan {
@@ -45,28 +44,19 @@ impl Plan {
         let beside: Vec<Vec<(u64, u64)>> = blocks.par_chunks(BLOCKS).map(beside_band).collect();
         let beside = merged(beside.concat());
         let mut near = blocks.into_iter().peekable();
-        let mut plan = Self {
-            blocks: Vec::new(),
-            keys: Vec::new(),
-        };
-        let mut push = |key: u64, block: BlockPlan| {
-            plan.keys.push(key);
-            plan.blocks.push(block);
-        };
+        let mut blocks = Vec::new();
         // Two lists by key become one.
         for (key, raw) in beside {
-            while let Some((earlier, block)) = near.next_if(|(other, _)| *other < key) {
-                push(earlier, block);
+            while let Some(earlier) = near.next_if(|block| block.key() < key) {
+                blocks.push(earlier);
             }
-            let block = near.next_if(|(other, _)| *other == key);
-            let block = block.map_or_else(|| BlockPlan::empty(key), |(_, block)| block);
+            let block = near.next_if(|block| block.key() == key);
+            let block = block.unwrap_or_else(|| BlockPlan::empty(key));
             let raw = raw & !block.inside;
-            push(key, BlockPlan { raw, ..block });
+            blocks.push(BlockPlan { raw, ..block });
         }
-        for (key, block) in near {
-            push(key, block);
-        }
-        plan
+        blocks.extend(near);
+        Self { blocks }
     }
 
     /// Numbers of the blocks around a block, by z, y and x.
@@ -76,17 +66,21 @@ impl Plan {
             let step = |i: usize| [-1, 0, 1][i % 3];
             let (x, y, z) = (step(i), step(i / 3), step(i / 9));
             let key = key_of([place[0] + x, place[1] + y, place[2] + z]);
-            self.keys.binary_search(&key).ok()
+            self.blocks.binary_search_by_key(&key, BlockPlan::key).ok()
         })
     }
 
     /// Bytes of all of it.
     pub(super) fn byte_len(&self) -> u64 {
-        (size_of_val(&self.blocks[..]) + size_of_val(&self.keys[..])) as u64
+        size_of_val(&self.blocks[..]) as u64
     }
 }
 
 impl BlockPlan {
+    fn key(&self) -> u64 {
+        key_of(self.place)
+    }
+
     fn empty(key: u64) -> Self {
         Self {
             place: place_of(key),
@@ -98,9 +92,9 @@ impl BlockPlan {
 }
 
 /// Keys and bits of the bricks of bands and of those around them.
-fn beside_band(blocks: &[(u64, BlockPlan)]) -> Vec<(u64, u64)> {
+fn beside_band(blocks: &[BlockPlan]) -> Vec<(u64, u64)> {
     let mut found = Vec::new();
-    for (_, block) in blocks {
+    for block in blocks {
         for cell in cells(block.band) {
             let [x, y, z] = brick_at(block.place, cell);
             for z in z - 1..=z + 1 {
@@ -122,8 +116,8 @@ pub(super) fn cells(mut bits: u64) -> impl Iterator<Item = u32> {
     })
 }
 
-/// Keys and bands of the blocks that particles are near enough to for a surface, in order.
-fn near_particles(bins: &Bins, layout: &Layout) -> Vec<(u64, BlockPlan)> {
+/// The bands of the blocks that particles are near enough to for a surface, by their keys.
+fn near_particles(bins: &Bins, layout: &Layout) -> Vec<BlockPlan> {
     let occupied = occupied(bins, layout);
     let filled = filled_count(layout);
     // Deep inside the field is taken to be 1: no inside for who asks for more.
@@ -137,13 +131,12 @@ fn near_particles(bins: &Bins, layout: &Layout) -> Vec<(u64, BlockPlan)> {
                 has_inside && near >> cell & 1 == 1 && is_deep(bins, layout, brick, filled)
             };
             let inside = (0..64).fold(0, |bits, cell| bits | u64::from(is_deep(cell)) << cell);
-            let block = BlockPlan {
+            BlockPlan {
                 place,
                 band: near & !inside,
                 inside,
                 raw: 0,
-            };
-            (key, block)
+            }
         })
         .collect()
 }

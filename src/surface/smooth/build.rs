@@ -4,6 +4,7 @@ use std::time::Duration;
 
 use glam::Vec3;
 use rayon::prelude::*;
+use spherule_formats::order::index_u32;
 use thiserror::Error;
 
 use super::blocks::{self, BlockPlan, Plan};
@@ -70,7 +71,8 @@ pub(super) struct Built {
     pub(super) tree: BrickTree,
     pub(super) near: NearSpace,
     pub(super) field: Option<FieldParticles>,
-    pub(super) layout: Option<Layout>,
+    /// Lengths, where places and normals are to be the field's.
+    pub(super) exact: Option<Layout>,
 }
 
 /// Builds the surface of `centers`; with `keep` the particles are kept. `left` is what memory there is.
@@ -143,7 +145,7 @@ pub(super) fn build(
         tree,
         near,
         field: keep.then_some(field),
-        layout: Some(layout),
+        exact: settings.exact.then_some(layout),
     };
     Ok((built, report))
 }
@@ -253,12 +255,7 @@ impl Work<'_> {
                 if block.node.children | block.node.inside == 0 {
                     continue;
                 }
-                #[expect(
-                    clippy::cast_possible_truncation,
-                    reason = "bricks are counted in 32 bits"
-                )]
-                let first = bricks.len() as u32;
-                block.node.first = first;
+                block.node.first = index_u32(bricks.len());
                 bricks.append(&mut its);
                 blocks.push(block);
             }

@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::field::FieldParticles;
-use super::{Dimming, Side, Substance, Surface, SurfaceHit, SurfaceSettings};
+use super::{Side, Substance, Surface, SurfaceHit, SurfaceSettings};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
@@ -36,7 +36,6 @@ const OFFSET_OF_ROUNDING: f32 = 16.0 * f32::EPSILON;
 #[derive(Debug, Default)]
 pub struct SmoothGrid {
     built: Built,
-    exact: bool,
 }
 
 impl SmoothGrid {
@@ -55,7 +54,6 @@ impl SmoothGrid {
     ) -> Result<SmoothReport, SmoothError> {
         // Before the next one is made.
         self.built = Built::default();
-        self.exact = settings.exact;
         let (made, report) = build::build(centers, radius, settings, keep_particles, memory_left)?;
         self.built = made;
         Ok(report)
@@ -65,14 +63,8 @@ impl SmoothGrid {
     pub fn surface(&self) -> SmoothSurface<'_> {
         SmoothSurface {
             built: &self.built,
-            exact: self.exact,
             lanes: ArrayLanes::default(),
         }
-    }
-
-    /// Box of the surface.
-    pub fn bounds(&self) -> [Vec3; 2] {
-        self.built.tree.bounds()
     }
 }
 
@@ -80,7 +72,6 @@ impl SmoothGrid {
 #[derive(Debug, Clone, Copy)]
 pub struct SmoothSurface<'a> {
     built: &'a Built,
-    exact: bool,
     lanes: ArrayLanes,
 }
 
@@ -189,8 +180,8 @@ impl SmoothSurface<'_> {
             anchor: point,
             substance: Substance::Body,
         };
-        match (&self.built.field, &self.built.layout) {
-            (Some(field), Some(layout)) if self.exact => exact::refined(field, layout, ray, hit),
+        match (&self.built.field, &self.built.exact) {
+            (Some(field), Some(layout)) => exact::refined(field, layout, ray, hit),
             _ => hit,
         }
     }
@@ -241,20 +232,6 @@ impl Surface for SmoothSurface<'_> {
             surface: self,
             packet,
         })
-    }
-
-    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
-        let mut dimming = Dimming::default();
-        let mut side = self.side_of(ray.at(ray.t_min));
-        let mut rest = *ray;
-        while let Some(hit) = self.crossing(&rest, side) {
-            if !dimming.by(kept(hit.normal.dot(ray.direction).abs())) {
-                break;
-            }
-            rest.t_min = hit.t + hit.offset;
-            side = side.other();
-        }
-        dimming.product()
     }
 
     fn particle_at(&self, hit: &SurfaceHit) -> u32 {

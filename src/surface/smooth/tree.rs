@@ -4,6 +4,7 @@
 //! Empty space costs a step for each of the largest uniform cells on the way, however far particles escaped.
 
 use glam::{Vec3, Vec3A};
+use spherule_formats::order::index_u32;
 
 use super::brick::{Brick, VOXEL_BITS, VOXELS, corner, voxel_of};
 use super::root::first_crossing;
@@ -207,11 +208,6 @@ impl BrickTree {
 
     pub(super) fn byte_len(&self) -> u64 {
         (size_of_val(&self.nodes[..]) + size_of_val(&self.bricks[..])) as u64
-    }
-
-    /// Box of all that is not outside.
-    pub(super) fn bounds(&self) -> [Vec3; 2] {
-        [self.low, self.high].map(|p| self.origin + Vec3::from(p) * self.voxel)
     }
 
     /// Where `point` is.
@@ -503,12 +499,4 @@ fn order_key(place: [i32; 3]) -> u128 {
         let digit = u128::from(bit_of(place, level));
         key | digit << (3 * LEVEL_BITS * level)
     })
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "bricks are counted in 32 bits"
-)]
-fn index_u32(index: usize) -> u32 {
-    index as u32
 }
