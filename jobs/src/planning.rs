@@ -54,7 +54,26 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     };
     let mut plan = Plan::new(settings, resolved, state.plan.frames().to_vec());
     plan.merge(frames);
+    refuse_shared_outputs(&dir, &plan)?;
     Ok(plan)
+}
+
+/// A request may have other frames than the plan, under a name that one of the plan's has.
+fn refuse_shared_outputs(dir: &Path, plan: &Plan) -> Result<(), JobError> {
+    let mut owners = HashMap::new();
+    for frame in plan.frames() {
+        for output in &frame.outputs {
+            if let Some(other) = owners.insert(output, frame.number) {
+                return Err(JobError::Request(format!(
+                    "{}: the job has frame {other} and would have frame {} under this name; put #### into \
+                     the name, choose another one, or start over with --force",
+                    dir.join(output).display(),
+                    frame.number
+                )));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// Only finished frames can be stale; the others will be made from what is there now.

@@ -1,5 +1,6 @@
 //! `spherule convert`: a sequence becomes native frames, in a directory that is a job.
 
+use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -7,7 +8,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use spherule_formats::SequenceInput;
 use spherule_formats::native::{Bound, Encoding};
-use spherule_formats::sequence::Sequence;
+use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
 use super::job::{absolute, apart};
@@ -31,8 +32,8 @@ pub(super) struct ConvertArgs {
     /// A directory, a pattern (dump.#.vtk), or files.
     #[arg(required = true)]
     input: Vec<PathBuf>,
-    /// Directory for the frames, which are called frame.NUMBER.spf; those that are there are replaced. The
-    /// same command goes on where it was stopped.
+    /// Directory for the frames, which are called frame.NUMBER.spf, or the name of a file (one.spf) for one
+    /// frame; those that are there are replaced. The same command goes on where it was stopped.
     #[arg(short, long)]
     output: PathBuf,
     /// How positions are stored: f32 (12 bytes a particle), q16 (6) or q10 (4). Without this, f32, or with
@@ -89,9 +90,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     for note in sequence.notes() {
         say!("note: {note}");
     }
+    let (dir, name) = args.place();
     let plan = Plan {
         args,
-        dir: real_dir(&absolute(&args.output)?),
+        dir: real_dir(&absolute(&dir)?),
+        name,
         settings: args.settings(),
         sequence,
     };
@@ -151,6 +154,8 @@ struct Plan<'a> {
     args: &'a ConvertArgs,
     /// Where the frames go, absolute.
     dir: PathBuf,
+    /// What the only frame is called, if the user gave it a name.
+    name: Option<OsString>,
     settings: ConvertSettings,
     sequence: Sequence,
 }
@@ -161,15 +166,28 @@ impl Plan<'_> {
     }
 
     fn output(&self, frame: i64) -> PathBuf {
-        self.dir.join(format!("frame.{frame:04}.spf"))
+        match &self.name {
+            Some(name) => self.dir.join(name),
+            None => self.dir.join(format!("frame.{frame:04}.spf")),
+        }
     }
 
     /// Refuses what cannot be before anything is written.
     fn guard(&self) -> Result<(), CliError> {
-        chosen(&self.sequence, self.args.frames.as_ref(), "--frames")?;
+        let frames = chosen(&self.sequence, self.args.frames.as_ref(), "--frames")?;
+        if self.name.is_some() && frames.len() > 1 {
+            return Err(CliError::other(format!(
+                "{}: is one name for {} frames; give a directory, or choose one frame with --frames",
+                self.args.output.display(),
+                frames.len()
+            )));
+        }
         guard_directory(&self.dir, "frames")?;
         guard_kind(&self.dir, Some(CONVERT), self.mode())?;
-        for (index, frame) in self.sequence.frames().iter().enumerate() {
+        let made = |(_, frame): &(usize, &SequenceFrame)| frames.contains(&frame.number);
+        let is_named = self.name.is_some();
+        let all = self.sequence.frames().iter().enumerate();
+        for (index, frame) in all.filter(|frame| !is_named || made(frame)) {
             let output = self.output(frame.number);
             let is_output = |path: &&Path| path.canonicalize().is_ok_and(|real| real == output);
             if let Some(input) = self.sequence.inputs(index).into_iter().find(is_output) {
@@ -185,9 +203,13 @@ impl Plan<'_> {
     fn request(&self) -> JobRequest {
         let mut settings = vec![(KIND.to_owned(), CONVERT.to_owned())];
         settings.extend(self.settings.settings());
+        let mut frames = requests(&self.sequence, |frame| vec![self.output(frame)]);
+        if let Some(range) = self.args.frames.as_ref().filter(|_| self.name.is_some()) {
+            frames.retain(|frame| range.contains(frame.number));
+        }
         JobRequest {
             settings,
-            frames: requests(&self.sequence, |frame| vec![self.output(frame)]),
+            frames,
             selection: Some(selection(
                 &self.sequence,
                 self.args.frames.as_ref(),
@@ -241,6 +263,16 @@ impl Plan<'_> {
 }
 
 impl ConvertArgs {
+    /// The directory for the frames, and what the only one is called if it was given a name.
+    fn place(&self) -> (PathBuf, Option<OsString>) {
+        let is_frame = |e: &OsStr| e.eq_ignore_ascii_case("spf");
+        let is_file = self.output.extension().is_some_and(is_frame) && !self.output.is_dir();
+        match (self.output.parent(), self.output.file_name()) {
+            (Some(dir), Some(name)) if is_file => (dir.to_owned(), Some(name.to_owned())),
+            _ => (self.output.clone(), None),
+        }
+    }
+
     fn settings(&self) -> ConvertSettings {
         let bound = match (self.max_error, self.max_error_length) {
             (Some(fraction), _) => Bound::OfRadius(fraction),

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{Job, JobRequest, Mode, publish};
+use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
@@ -139,11 +139,20 @@ impl Plan {
         };
         JobRequest {
             settings: self.manifest.settings(),
-            frames: requests(sequence, outputs),
+            frames: self.frames_of_job(requests(sequence, outputs)),
             selection: Some(self.selected(sequence)),
             mode,
             patience: self.manifest.job.takeover_after.duration(),
         }
+    }
+
+    /// The frames that the job has: all of the sequence, or the one that is asked for if there is but one name.
+    fn frames_of_job(&self, mut all: Vec<FrameRequest>) -> Vec<FrameRequest> {
+        let range = self.manifest.input.frames.as_ref();
+        if let Some(range) = range.filter(|_| !self.manifest.output.path.has_number()) {
+            all.retain(|frame| range.contains(frame.number));
+        }
+        all
     }
 
     /// What is asked of a job that goes on with the frames `new`.

@@ -220,17 +220,22 @@ impl Manifest {
     /// Whether each of `frame_count` frames gets an image of its own.
     ///
     /// # Errors
-    /// There are several frames, but the output's name has no number.
+    /// There are several frames, or more may come, but the output's name has no number.
     pub fn check_frame_count(&self, frame_count: usize) -> Result<(), ManifestError> {
-        if frame_count > 1 && !self.output.path.has_number() {
-            return Err(ManifestError {
-                lines: vec![format!(
-                    "output.path: {} for {frame_count} frames: {NEEDS_NUMBER}",
-                    self.output.path
-                )],
-            });
+        let more_may_come = self.job.follow && self.input.frames.is_none();
+        if self.output.path.has_number() || (frame_count <= 1 && !more_may_come) {
+            return Ok(());
         }
-        Ok(())
+        let count = match frame_count {
+            several @ 2.. => format!("{several} frames"),
+            _ => "all frames that come".to_owned(),
+        };
+        Err(ManifestError {
+            lines: vec![format!(
+                "output.path: {} for {count}: {NEEDS_NUMBER}, or choose one frame with --frames",
+                self.output.path
+            )],
+        })
     }
 
     /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
