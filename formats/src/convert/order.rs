@@ -40,36 +40,37 @@ impl Part {
         self.rows.clear();
     }
 
-    /// Takes in all of `other`.
-    pub(super) fn append(&mut self, other: &mut Self) {
+    /// Takes in all of `other`, before what is there: of coincident particles those that come from an earlier
+    /// part come first.
+    pub(super) fn prepend(&mut self, other: &mut Self) {
+        let (positions, rows) = (other.positions.len(), other.rows.len());
         self.positions.append(&mut other.positions);
         self.rows.append(&mut other.rows);
+        self.positions.rotate_right(positions);
+        self.rows.rotate_right(rows);
     }
 
-    /// Takes out the particles with these numbers, which increase; the last of those that stay come into their
-    /// places.
+    /// Takes out the particles with these numbers, which increase; those that stay keep their order.
     pub(super) fn take(&mut self, numbers: &[u32], width: usize) -> Self {
         let mut taken = Self::default();
-        for number in numbers {
+        let mut kept = 0;
+        for (nth, number) in numbers.iter().enumerate() {
             let number = *number as usize;
             taken.positions.push(self.positions[number]);
             taken
                 .rows
                 .extend_from_slice(&self.rows[number * width..][..width]);
+            let next = numbers.get(nth + 1).map_or(self.len(), |n| *n as usize);
+            if nth == 0 {
+                kept = number;
+            }
+            let staying = number + 1..next;
+            self.positions.copy_within(staying.clone(), kept);
+            self.rows
+                .copy_within(staying.start * width..staying.end * width, kept * width);
+            kept += staying.len();
         }
         let left = self.len() - numbers.len();
-        let holes = numbers.partition_point(|number| (*number as usize) < left);
-        let (holes, gone) = numbers.split_at(holes);
-        let mut gone = gone.iter().map(|number| *number as usize).peekable();
-        let staying = (left..self.len()).filter(|number| gone.next_if_eq(number).is_none());
-        let moves: Vec<(usize, usize)> = staying
-            .zip(holes.iter().map(|hole| *hole as usize))
-            .collect();
-        for (from, to) in moves {
-            self.positions[to] = self.positions[from];
-            self.rows
-                .copy_within(from * width..(from + 1) * width, to * width);
-        }
         self.positions.truncate(left);
         self.rows.truncate(left * width);
         taken

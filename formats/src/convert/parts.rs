@@ -104,7 +104,7 @@ fn order_all(
     };
     load(&mut pile, store, &mut part)?;
     loop {
-        part.append(&mut carried);
+        part.prepend(&mut carried);
         let next = waiting.next()?;
         if next.is_some() {
             carried = carry_last(&mut part, &pile.cuts.curve, width, unit);

@@ -1,5 +1,6 @@
 //! Every converted frame is compared with its source, particle by particle, whatever the memory was.
 
+use std::collections::HashMap;
 use std::fs;
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -122,9 +123,14 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
     let mut seen: Vec<bool> = (0..raw.positions.len()).map(|i| !kept(i)).collect();
     let dropped = seen.iter().filter(|s| **s).count();
     let mut largest = 0.0_f64;
+    let mut last_at = HashMap::new();
     for slot in 0..usize::try_from(index.count).expect("few") {
         let place = id.low_bits(slot).expect("an id") as usize;
         assert!(!std::mem::replace(&mut seen[place], true), "{place} twice");
+        // Of coincident particles the first in the source is the first here.
+        let point = (raw.positions.get(place) - settings.origin).as_vec3() + Vec3::ZERO;
+        let before = last_at.insert(point.to_array().map(f32::to_bits), place);
+        assert!(before < Some(place), "{before:?} after {place}");
         let found = leaves.center(slot).as_dvec3() + settings.origin;
         largest = largest.max(found.distance(raw.positions.get(place)));
         for attribute in &raw.attributes {
@@ -222,6 +228,29 @@ fn particles_in_one_place_are_cut_anywhere() {
     for limits in [whole(), tight(2048, 0)] {
         converted(&raw(all.clone()), &settings(), limits);
         converted(&raw(vec![Vec3::ONE; 9000]), &settings(), limits);
+    }
+}
+
+/// Few places for many particles, so that each is shared over blocks and parts; zeros of both signs.
+#[test]
+fn coincident_particles_keep_the_order_of_the_source() {
+    for places in [40, 700, 9000] {
+        let shared = clustered(places);
+        let place = |i: u32| {
+            let place = shared[(i.wrapping_mul(2_654_435_761) % places) as usize];
+            let zero = if i.is_multiple_of(3) { -0.0 } else { 0.0 };
+            place.with_x(if place.x < 0.4 { zero } else { place.x })
+        };
+        let all: Vec<Vec3> = (0..30_000).map(place).collect();
+        for limits in [whole(), tight(4096, 10_000), tight(2048, 0)] {
+            for encoding in Encoding::ALL {
+                let settings = ConvertSettings {
+                    encoding: Some(encoding),
+                    ..settings()
+                };
+                converted(&raw(all.clone()), &settings, limits);
+            }
+        }
     }
 }
 

@@ -328,32 +328,44 @@ fn block_of(positions: &[Vec3]) -> Block {
 
 /// Brings each block of `positions` into the arrangement that coded blocks need (z of the first particle
 /// not above that of the last), and `indices` likewise unless that is empty. Before attributes follow by the
-/// indices.
+/// indices. Coincident particles keep their order: it decides which of them a ray meets first.
 pub fn arrange(positions: &mut [Vec3], indices: &mut [u32]) {
-    let arrange_block = |positions: &mut [Vec3]| {
-        let last = positions.len() - 1;
-        let is_wrong = positions[0].z > positions[last].z;
-        if is_wrong {
-            positions.swap(0, last);
-        }
-        is_wrong
-    };
     if indices.is_empty() {
         positions
             .par_chunks_mut(BLOCK_SIZE)
             .with_min_len(1024)
-            .for_each(|block| {
-                arrange_block(block);
-            });
+            .for_each(|block| arrange_block(block, &mut []));
         return;
     }
     positions
         .par_chunks_mut(BLOCK_SIZE)
         .zip(indices.par_chunks_mut(BLOCK_SIZE))
         .with_min_len(1024)
-        .for_each(|(positions, indices)| {
-            if arrange_block(positions) {
-                indices.swap(0, positions.len() - 1);
-            }
-        });
+        .for_each(|(positions, indices)| arrange_block(positions, indices));
+}
+
+fn arrange_block(positions: &mut [Vec3], indices: &mut [u32]) {
+    let last = positions.len() - 1;
+    if positions[0].z <= positions[last].z {
+        return;
+    }
+    let mut swap = |positions: &mut [Vec3], a: usize, b: usize| {
+        positions.swap(a, b);
+        if !indices.is_empty() {
+            indices.swap(a, b);
+        }
+    };
+    swap(positions, 0, last);
+    // The particle that came from the front passes to the first place of those it coincides with
+    for slot in 1..last {
+        if positions[slot] == positions[last] {
+            swap(positions, slot, last);
+        }
+    }
+    // The one that came from the end passes to their last place
+    for slot in (1..last).rev() {
+        if positions[slot] == positions[0] {
+            swap(positions, slot, 0);
+        }
+    }
 }

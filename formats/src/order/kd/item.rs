@@ -47,10 +47,11 @@ pub(super) fn key(coordinate: f32, number: u32) -> i64 {
     (i64::from(order_bits(coordinate)) << 32) | i64::from(number)
 }
 
-/// An integer that orders as `f32::total_cmp` does.
+/// An integer that orders as `f32::total_cmp` does, with one zero: coincident particles are equal.
 #[inline(always)]
 fn order_bits(value: f32) -> i32 {
-    let bits = value.to_bits().cast_signed();
+    // The sum of -0 and 0 is 0.
+    let bits = (value + 0.0).to_bits().cast_signed();
     bits ^ ((bits >> 31) & i32::MAX)
 }
 
@@ -77,6 +78,9 @@ mod tests {
             .iter()
             .flat_map(|v| [0, 7, u32::MAX].map(|number| key(*v, number)))
             .collect();
-        assert!(keys.is_sorted_by(|a, b| a < b), "{keys:?}");
+        let (zeros, others): (Vec<i64>, Vec<i64>) =
+            keys.into_iter().partition(|key| *key >> 32 == 0);
+        assert!(others.is_sorted_by(|a, b| a < b), "{others:?}");
+        assert_eq!(zeros, [0, 7, u32::MAX, 0, 7, u32::MAX].map(i64::from));
     }
 }
