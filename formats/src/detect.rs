@@ -11,6 +11,8 @@ use crate::read::{self, Step};
 use crate::{ParseError, RawParticles, native};
 
 mod foreign;
+mod hdf5;
+mod molecules;
 
 /// The bytes that detection looks at; more may be given, less is fine for short files.
 pub const HEAD_LEN: usize = 4096;
@@ -122,6 +124,10 @@ impl Format {
         if let Some(format) = by_magic(head)? {
             return Ok(format);
         }
+        let foreign = hdf5::what(bytes).or_else(|| is_text(head).then(|| molecules::what(head))?);
+        if let Some(what) = foreign {
+            return Err(ParseError::unsupported(what));
+        }
         // Two or three bytes of raw floats may look like any short magic.
         let shortest = if named == Some(Self::Xyz) { 4 } else { 0 };
         foreign::refuse(head, path, shortest)?;
@@ -204,7 +210,10 @@ fn by_magic(head: &[u8]) -> Result<Option<Format>, ParseError> {
         _ if head.starts_with(b"BgeoV") => Format::Bgeo,
         _ if head.starts_with(b"ply\n") || head.starts_with(b"ply\r") => Format::Ply,
         _ if head.starts_with(b"\x93NUMPY") => Format::Npy,
-        _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => Format::Npz,
+        _ if head.starts_with(b"PK\x03\x04") || head.starts_with(b"PK\x05\x06") => {
+            foreign::refuse_usdz(head)?;
+            Format::Npz
+        }
         _ if text.trim_ascii_start().starts_with(b"ITEM:") => Format::Lammps,
         _ if text.trim_ascii_start().starts_with(b"<") => return vtk_xml_kind(text),
         _ => return Ok(None),
@@ -215,7 +224,12 @@ fn by_magic(head: &[u8]) -> Result<Option<Format>, ParseError> {
 fn vtk_xml_kind(head: &[u8]) -> Result<Option<Format>, ParseError> {
     let head = String::from_utf8_lossy(head);
     let Some((_, root)) = head.split_once("<VTKFile") else {
-        return Ok(None);
+        return match head.contains("<Xdmf") {
+            true => Err(ParseError::unsupported(
+                "an XDMF index, whose numbers lie in other files; save as .vtu with ParaView",
+            )),
+            false => Ok(None),
+        };
     };
     let root = root.split_once('>').map_or(root, |(root, _)| root);
     let kind = ["type=\"", "type='"].iter().find_map(|key| {
@@ -325,6 +339,15 @@ mod tests {
         assert!(error.to_string().contains(words), "{error}");
     }
 
+    /// The start of a ZIP whose first member is called `name`.
+    fn zip(name: &[u8]) -> Vec<u8> {
+        let length = u8::try_from(name.len()).expect("short");
+        let mut bytes = b"PK\x03\x04".to_vec();
+        bytes.resize(26, 0);
+        bytes.extend([length, 0, 0, 0]);
+        [&bytes, name].concat()
+    }
+
     #[test]
     fn content_goes_before_the_name() {
         assert_eq!(
@@ -387,6 +410,27 @@ mod tests {
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
         refused("a.vti", odd, r"type a\n\u{1b}[2J holds");
         refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
+        refused(
+            "a.csv",
+            b"a title\n\n2 atoms\n1 atom types\n",
+            "LAMMPS data file",
+        );
+        refused("a.usdz", &zip(b"scene.usdc"), "USD");
+        refused("a.usda", b"#usda 1.0\n", "USD");
+        refused("a.xtc", b"\0\0\x07\xcb\0\0\0\x03", "GROMACS");
+        refused("a.dcd", b"\x54\0\0\0CORD\0", "DCD");
+        refused("a.gsd", &[0xdf, 0x65].repeat(4), "GSD");
+        refused("Part_0001.bi4", &[1, 2, 3], "DualSPHysics");
+        refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");
+        let mut snapshot = vec![0; 400];
+        (snapshot[1], snapshot[261]) = (1, 1);
+        refused("snapshot_001", &snapshot, "Gadget");
+        let mut tar = vec![b'x'; 512];
+        tar[257..262].copy_from_slice(b"ustar");
+        refused("a.tar", &tar, "archive");
+        refused("a.7z", b"7z\xbc\xaf\x27\x1c", "archive");
+        refused("a.webp", b"RIFF\0\0\0\0WEBP", "image");
+        refused("a.xmf", b"<?xml version=\"1.0\"?>\n<Xdmf>", "XDMF");
         refused("a.abc", b"Ogawa\0", "Alembic");
         refused("a.bgeo", b"\x7fNSJ", "bhclassic");
         refused("a.bgeo", b"[\n\t\"fileversion\",\"19.5\"", "bhclassic");

@@ -7,10 +7,6 @@ use crate::ParseError;
 /// Magic bytes at the start, and the message.
 const MAGICS: &[(&[u8], &str)] = &[
     (
-        b"\x89HDF",
-        "an HDF5 file, which is not read; for PySPH: `pysph dump_vtk` writes .vtu from it",
-    ),
-    (
         b"Ogawa",
         "an Alembic file, which is not read; export the points as .ply or .bgeo",
     ),
@@ -76,15 +72,68 @@ const MAGICS: &[(&[u8], &str)] = &[
         b"CDF\x05",
         "a NetCDF file, which is not read; export as .vtu or .npy",
     ),
-    (b"\x76\x2f\x31\x01", "an image, no particle file"),
-    (b"\x89PNG", "an image, no particle file"),
-    (b"\xff\xd8\xff", "an image, no particle file"),
-    (b"II*\0", "an image, no particle file"),
-    (b"MM\0*", "an image, no particle file"),
+    (b"\x76\x2f\x31\x01", IMAGE),
+    (b"\x89PNG", IMAGE),
+    (b"\xff\xd8\xff", IMAGE),
+    (b"II*\0", IMAGE),
+    (b"MM\0*", IMAGE),
+    (b"GIF8", IMAGE),
+    (b"8BPS", IMAGE),
+    (b"DDS ", IMAGE),
+    (b"#?RADIANCE", IMAGE),
+    (b"\0\0\x07\xcb", TRAJECTORY),
+    (b"\0\0\x07\xc9\0\0\0\x0d", TRAJECTORY),
+    (b"\x54\0\0\0CORD", DCD),
+    (b"\0\0\0\x54CORD", DCD),
+    (
+        b"\xdf\x65\xdf\x65\xdf\x65\xdf\x65",
+        "a GSD file (HOOMD-blue), which is not read; write .npz with gsd and numpy, or a LAMMPS dump with OVITO",
+    ),
+    (
+        b"\x08\0\0\0HEAD",
+        "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody or yt",
+    ),
+    (b"#usda ", USD),
+    (b"PXR-USDC", USD),
+    (b"7z\xbc\xaf\x27\x1c", ARCHIVE),
+    (b"Rar!\x1a\x07", ARCHIVE),
+    (
+        b"MATLAB ",
+        "a MATLAB file, which is not read; write positions and attributes to .npz with SciPy and numpy",
+    ),
+    (
+        b"PAR1",
+        "a Parquet file, which is not read; write .csv or .npz with pandas",
+    ),
+    (
+        b"SQLite format 3",
+        "an SQLite database, which is not read; write the particles as .csv",
+    ),
+    (
+        b"BLENDER",
+        "a Blender file, which is not read; export the points as .ply",
+    ),
+    (
+        b"Kaydara FBX",
+        "an FBX file, which is not read; export the points as .ply",
+    ),
+    (
+        b"glTF",
+        "a glTF file, which is not read; export the points as .ply",
+    ),
     (b"\xff\xfe", UTF16),
     (b"\xfe\xff", UTF16),
 ];
 
+const IMAGE: &str = "an image, no particle file";
+const ARCHIVE: &str = "an archive, which is not read; unpack it and give its files";
+const TRAJECTORY: &str = "a GROMACS trajectory (.xtc, .trr), which is not read; write .xyz with MDAnalysis, VMD or OVITO";
+const DCD: &str = "a DCD trajectory, which is not read; write .xyz with MDAnalysis, VMD or OVITO";
+const USD: &str = "a USD file, which is not read; export the points as .ply or .bgeo";
+const DUALSPHYSICS: &str =
+    "a DualSPHysics binary part (.bi4), which is not read; `PartVTK` writes .vtk or .csv from it";
+const GADGET: &str = "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody \
+                      or yt";
 const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with partio";
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
 const LAMMPS_BINARY: &str =
@@ -98,9 +147,54 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
         .iter()
         .find(|(magic, _)| magic.len() >= shortest && head.starts_with(magic))
         .map(|(_, what)| *what)
+        .or_else(|| by_structure(head))
         .or_else(|| is_lammps_binary(head, path).then_some(LAMMPS_BINARY))
+        .or_else(|| is_dualsphysics(head, path).then_some(DUALSPHYSICS))
         .or_else(|| is_houdini_json(head).then_some(HOUDINI_JSON));
     what.map_or(Ok(()), |what| Err(ParseError::unsupported(what)))
+}
+
+/// A ZIP of USD files; other ones are taken for numpy's.
+pub(super) fn refuse_usdz(head: &[u8]) -> Result<(), ParseError> {
+    // Local file header: name at 30, its length at 26.
+    let length = head
+        .get(26..28)
+        .map_or(0, |len| usize::from(len[0]) | usize::from(len[1]) << 8);
+    let name = head.get(30..30 + length).unwrap_or_default();
+    let is_usd = [&b".usd"[..], b".usda", b".usdc"]
+        .iter()
+        .any(|end| name.to_ascii_lowercase().ends_with(end));
+    match head.starts_with(b"PK\x03\x04") && is_usd {
+        true => Err(ParseError::unsupported(USD)),
+        false => Ok(()),
+    }
+}
+
+/// What is known by bytes behind the first.
+fn by_structure(head: &[u8]) -> Option<&'static str> {
+    let at = |at: usize, bytes: &[u8]| head.get(at..).is_some_and(|b| b.starts_with(bytes));
+    // A header of 256 bytes between its lengths, as Fortran writes it
+    let is_gadget = [256_u32.to_le_bytes(), 256_u32.to_be_bytes()]
+        .iter()
+        .any(|length| at(0, length) && at(260, length));
+    [
+        (at(257, b"ustar"), ARCHIVE),
+        (at(0, b"RIFF") && at(8, b"WEBP"), IMAGE),
+        (at(4, b"ftyp"), "a video or image, no particle file"),
+        (is_gadget, GADGET),
+    ]
+    .into_iter()
+    .find_map(|(is_one, what)| is_one.then_some(what))
+}
+
+/// The text that begins them says what they hold; not all versions have it, so the name counts, too.
+fn is_dualsphysics(head: &[u8], path: &Path) -> bool {
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let name = name.to_ascii_lowercase();
+    let named = [".bi4", ".ibi4", ".obi4", ".bi2"]
+        .iter()
+        .any(|end| name.ends_with(end));
+    named || (head.starts_with(b"#File ") && head.contains(&0))
 }
 
 /// Newer versions open with minus the length of a name, then the name; older ones with a bare
