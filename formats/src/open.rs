@@ -11,8 +11,9 @@ use flate2::bufread::GzDecoder;
 use rkyv::util::AlignedVec;
 
 use crate::detect::{Format, HEAD_LEN};
+use crate::message::one_line;
 use crate::native;
-use crate::read::Step;
+use crate::read::{Step, remarks};
 use crate::{FrameError, ParseError, RawParticles};
 
 /// A file in memory, ready to give its steps.
@@ -165,6 +166,21 @@ pub fn is_native(path: &Path) -> Result<bool, FrameError> {
 pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
     let head = head(path)?;
     Format::detect(&head, path).map_err(|e| e.in_file(path))
+}
+
+/// What the head of the file at `path` says that is not in its particles: a cell and periodic boundaries, which are
+/// not used, and the names behind numbers. Nothing for a file that is not read.
+pub fn remarks(path: &Path) -> Vec<String> {
+    let Ok(head) = head(path) else {
+        return Vec::new();
+    };
+    let format = Format::detect(&head, path);
+    let remarks = format.map(|format| remarks::remarks(format, &head));
+    remarks
+        .unwrap_or_default()
+        .into_iter()
+        .map(one_line)
+        .collect()
 }
 
 /// The first bytes of the file at `path`, gzip taken off.

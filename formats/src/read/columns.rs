@@ -298,14 +298,16 @@ pub(super) fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
 }
 
 /// Collects scalars that are known to be the parts of a vector (`vx vy vz`, `nx ny nz`,
-/// `red green blue` with or without `alpha`) under the name of the vector. Parts that are missing or
+/// `red green blue` with or without `alpha`, `r g b`) under the name of the vector. Parts that are missing or
 /// of different types stay as they are.
 pub(super) fn group_vectors(mut columns: Vec<Column>) -> Vec<Column> {
-    const VECTORS: [(&str, &[&str]); 4] = [
+    const VECTORS: [(&str, &[&str]); 6] = [
         ("velocity", &["vx", "vy", "vz"]),
         ("normal", &["nx", "ny", "nz"]),
         ("color", &["red", "green", "blue", "alpha"]),
         ("color", &["red", "green", "blue"]),
+        ("color", &["diffuse_red", "diffuse_green", "diffuse_blue"]),
+        ("color", &["r", "g", "b"]),
     ];
     for (name, parts) in VECTORS {
         let places: Option<Vec<usize>> = parts

@@ -8,6 +8,7 @@
 use std::ops::Range;
 
 pub mod bgeo;
+mod category;
 pub(crate) mod columns;
 pub mod csv;
 #[cfg(test)]
@@ -15,6 +16,7 @@ mod damage;
 pub mod lammps;
 pub mod npy;
 pub mod ply;
+pub(crate) mod remarks;
 mod table;
 mod text;
 #[cfg(test)]

@@ -5,7 +5,7 @@
 //! may hold several steps. What a file holds is checked when its frame is loaded, so one damaged
 //! file costs one frame and not the sequence.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -181,23 +181,35 @@ impl Sequence {
         first.is_some_and(|part| y_is_up(&part.path))
     }
 
-    /// Keeps only the parts whose names are in `names`; frames without any of them are left out.
+    /// Names of the parts that the frames have, which are fewer after [`Self::keep_parts`].
+    pub fn kept_part_names(&self) -> Vec<&str> {
+        let files = self.frames.iter().flat_map(|frame| &frame.parts);
+        let kept: BTreeSet<u32> = files.map(|file| file.part).collect();
+        let names = (0..).zip(&self.parts);
+        names
+            .filter(|(part, _)| kept.contains(part))
+            .map(|(_, name)| name.as_str())
+            .collect()
+    }
+
+    /// Keeps only the parts that `names` mean: those of the name in whatever case, else all whose names contain it.
+    /// Frames without any of them are left out.
     ///
     /// # Errors
-    /// The first name that is not a part.
+    /// The first name that means no part.
     pub fn keep_parts(&mut self, names: &[String]) -> Result<(), SequenceError> {
-        if let Some(name) = names.iter().find(|n| !self.parts.contains(n)) {
-            return Err(SequenceError::NoSuchPart {
-                name: name.clone(),
-                known: self.parts.clone(),
-            });
+        let mut meant = BTreeSet::new();
+        for name in names {
+            let found = parts_meant(&self.parts, name);
+            if found.is_empty() {
+                return Err(SequenceError::NoSuchPart {
+                    name: name.clone(),
+                    known: self.parts.clone(),
+                });
+            }
+            meant.extend(found);
         }
-        let parts = &self.parts;
-        let kept = |part: &PartFile| {
-            parts
-                .get(part.part as usize)
-                .is_some_and(|p| names.contains(p))
-        };
+        let kept = |part: &PartFile| meant.contains(&part.part);
         for frame in &mut self.frames {
             frame.parts.retain(kept);
         }
@@ -213,6 +225,19 @@ impl Sequence {
     /// What a user should know: gaps, files left out, missing parts.
     pub fn notes(&self) -> &[String] {
         &self.notes
+    }
+
+    /// What the files of the first frame say that is not in their particles ([`crate::open::remarks`]), each once.
+    pub fn remarks(&self) -> Vec<String> {
+        let mut all: Vec<String> = Vec::new();
+        for path in self.inputs(0) {
+            for remark in crate::open::remarks(path) {
+                if !all.contains(&remark) {
+                    all.push(remark);
+                }
+            }
+        }
+        all
     }
 
     /// The files that frame `index` is read from.
@@ -325,6 +350,26 @@ impl Sequence {
             stamp,
         });
         Ok((file, step))
+    }
+}
+
+/// Indices of the `parts` that `name` means, see [`Sequence::keep_parts`].
+fn parts_meant(parts: &[String], name: &str) -> Vec<u32> {
+    let wanted = name.to_lowercase();
+    let matching = |fits: &dyn Fn(&str) -> bool| -> Vec<u32> {
+        let named = (0..).zip(parts);
+        let found = named.filter(|(_, part)| fits(&part.to_lowercase()));
+        found.map(|(index, _)| index).collect()
+    };
+    // Names that differ in case only are told apart where they are written as they are.
+    let as_written = (0..).zip(parts).filter(|(_, part)| *part == name);
+    let as_written: Vec<u32> = as_written.map(|(index, _)| index).collect();
+    let whole = matching(&|part| part == wanted);
+    match (as_written.is_empty(), whole.is_empty()) {
+        (false, _) => as_written,
+        (true, false) => whole,
+        (true, true) if parts.len() < 2 || wanted.is_empty() => Vec::new(),
+        (true, true) => matching(&|part| part.contains(&wanted)),
     }
 }
 

@@ -72,6 +72,24 @@ fn a_directory_of_frames() {
 }
 
 #[test]
+fn parts_are_named_in_any_case_and_in_part() {
+    let parts = ["Fluid", "Boundary_0", "Boundary_1", "Oil", "OilRig"].map(str::to_owned);
+    let meant = |name: &str| parts_meant(&parts, name);
+    assert_eq!(meant("fluid"), [0]);
+    assert_eq!(meant("BOUND"), [1, 2]);
+    // The whole name goes before a part of one.
+    assert_eq!(meant("oil"), [3]);
+    assert_eq!(meant("rig"), [4]);
+    assert!(meant("gas").is_empty() && meant("").is_empty());
+    assert_eq!(parts_meant(&["a".to_owned(), "A".to_owned()], "A"), [1]);
+    assert_eq!(
+        parts_meant(&["a".to_owned(), "A".to_owned(), "b".to_owned()], "B"),
+        [2]
+    );
+    assert!(parts_meant(&[String::new()], "a").is_empty());
+}
+
+#[test]
 fn patterns_choose() {
     let mut names = series(3, |i| format!("x_{i}.vtk"));
     names.extend(series(3, |i| format!("x_{i}.bgeo")));
@@ -155,7 +173,10 @@ fn what_is_not_there_is_told_with_a_remedy() {
     fs::create_dir(dir.path("vtk")).expect("writable");
     assert!(dir.error("").contains("`vtk`; give one of them"));
     fs::write(dir.path("a.hdf5"), b"\x89HDF\r\n\x1a\n").expect("writable");
-    assert!(dir.error("").contains("pysph dump_vtk"));
+    assert!(
+        dir.error("")
+            .contains("an HDF5 file, which is not read yet")
+    );
     let nothing = Sequence::open(&SequenceInput::Files(vec![]));
     assert!(matches!(nothing, Err(SequenceError::NoInput)));
 }

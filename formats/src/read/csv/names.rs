@@ -43,6 +43,9 @@ const SHORT: [(&str, &str); 12] = [
     ("force", ""),
 ];
 
+/// Names of columns that together are colours, in lower case.
+const COLORS: [[&str; 3]; 2] = [["red", "green", "blue"], ["r", "g", "b"]];
+
 /// Which number of a vector a column is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Part {
@@ -144,7 +147,24 @@ fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
             });
         }
     }
+    groups.extend(colors(names, axes));
     groups
+}
+
+/// The columns of red, green and blue.
+fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<Group> {
+    COLORS.iter().find_map(|parts| {
+        let column = |part: &&str| {
+            let found = names
+                .iter()
+                .position(|name| name.eq_ignore_ascii_case(part));
+            found.filter(|column| !axes.contains(&Some(*column)))
+        };
+        Some(Group {
+            name: "color".to_owned(),
+            columns: parts.iter().map(column).collect::<Option<_>>()?,
+        })
+    })
 }
 
 fn long_name(stem: &str) -> &str {

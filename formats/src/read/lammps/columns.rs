@@ -24,8 +24,8 @@ const VECTORS: [([&str; 3], &str); 2] = [
 /// Columns of integers that must stay exact.
 const WHOLE: [&str; 3] = ["id", "type", "mol"];
 
-/// Columns of text, even if all of it happens to look like numbers.
-const TEXT: [&str; 2] = ["element", "typelabel"];
+/// Columns of names, even if all of them happen to look like numbers.
+pub(super) const NAMES: [&str; 2] = ["element", "typelabel"];
 
 /// The plan for the rows of a step.
 #[derive(Debug)]
@@ -83,10 +83,15 @@ impl Columns {
         for (index, name) in header.names.iter().enumerate() {
             let name = String::from_utf8_lossy(name);
             let taken = self.fields.get(index).is_some_and(Option::is_some);
-            if taken || TEXT.contains(&&*name) || is_text(index) {
+            let target = self.targets.len();
+            if !taken && NAMES.contains(&&*name) {
+                self.targets.push(Target::category(name));
+                self.assign(Some(index), target, 0);
                 continue;
             }
-            let target = self.targets.len();
+            if taken || is_text(index) {
+                continue;
+            }
             let vector = VECTORS.iter().find(|(names, _)| names.contains(&&*name));
             let columns = vector.map(|(names, _)| names.map(&column));
             if let (Some((_, vector)), Some([Some(x), Some(y), Some(z)])) = (vector, columns)

@@ -16,9 +16,11 @@ use crate::{ParseError, Positions, RawParticles};
 mod bounds;
 mod columns;
 mod header;
+mod remarks;
 
 use columns::Columns;
 use header::{Header, Item};
+pub(super) use remarks::remarks;
 
 /// What every header line begins with.
 const ITEM: &[u8] = b"ITEM:";
@@ -69,7 +71,7 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 }
 
 /// Reads one of the [`steps`]: scaled positions are put into the box, `vx vy vz` become `velocity`,
-/// `fx fy fz` become `force`, and columns of text (`element`) are left out.
+/// `fx fy fz` become `force`, names (`element`, `typelabel`) become numbers, and other columns of text are left out.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if the step is cut short or breaks the format,

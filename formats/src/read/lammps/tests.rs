@@ -155,12 +155,62 @@ fn columns_of_every_sort() {
     assert!(real(&particles, "f_ave[1]")[1].is_nan());
     let names: Vec<_> = particles.attributes.iter().map(|a| &*a.name).collect();
     let expected = [
-        "id", "mol", "type", "force", "radius", "vx", "vy", "f_ave[1]", "ix", "v_name",
+        "element",
+        "id",
+        "mol",
+        "type",
+        "force",
+        "radius",
+        "vx",
+        "vy",
+        "f_ave[1]",
+        "ix",
+        "v_name",
+        "typelabel",
     ];
     assert_eq!(names, expected);
+    assert_eq!(whole(&particles, "element")[0], 6);
+    assert!(
+        whole(&particles, "typelabel")
+            .iter()
+            .all(|code| *code >= 1000)
+    );
     let twice = only(&dump(BOX, "x y z vx vy vz vx", &["0 0 0 1 2 3 4"])).unwrap();
     assert_eq!(real(&twice, "velocity"), [1., 2., 3.]);
     assert_eq!(real(&twice, "vx"), [4.]);
+}
+
+#[test]
+fn elements_are_the_same_numbers_in_every_frame() {
+    let code = |rows: &[&str]| {
+        let particles = only(&dump(BOX, "id element x y z", rows)).unwrap();
+        whole(&particles, "element").to_vec()
+    };
+    let first = code(&["1 O 0 0 0", "2 H 0 0 0", "3 wall 0 0 0"]);
+    assert_eq!(first[..2], [8, 1]);
+    let second = code(&["3 wall 0 0 0", "2 H 0 0 0"]);
+    assert_eq!(second, [first[2], 1]);
+}
+
+#[test]
+fn remarks_name_the_cell_and_the_elements() {
+    let text = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS xy xz yz pp pp ff\n0 1 0\n\
+        0 1 0\n0 1 0\nITEM: ATOMS id element x y z\n1 O 0 0 0\n2 H 0 0 0\nITEM: TIMESTEP\n1\n";
+    let remarks = remarks(text.as_bytes());
+    assert_eq!(remarks.len(), 2, "{remarks:?}");
+    assert!(remarks[0].contains("periodic boundaries (pp pp ff) is not used"));
+    assert!(remarks[1].ends_with("\"H\" = 1, \"O\" = 8"), "{remarks:?}");
+    for end in 0..text.len() {
+        super::remarks(&text.as_bytes()[..end]);
+    }
+    let shrink = text
+        .replace("xy xz yz pp pp ff", "ss ss ss")
+        .replace("element", "c");
+    let remarks = super::remarks(shrink.as_bytes());
+    assert!(
+        remarks.len() == 1 && !remarks[0].contains("periodic"),
+        "{remarks:?}"
+    );
 }
 
 #[test]

@@ -10,6 +10,7 @@ use std::ops::Range;
 use memchr::memchr;
 use rayon::prelude::*;
 
+use super::category;
 use super::text::{self, Line, Lines};
 use crate::{Attribute, ParseError, Positions};
 
@@ -88,6 +89,8 @@ pub(super) enum OnText {
     Fault,
     /// The column is text; leave it out.
     LeaveOut,
+    /// Every field is a name, whatever it looks like; its number is kept ([`super::category`]).
+    Category,
 }
 
 /// An array to fill: one or more numbers a row.
@@ -117,6 +120,11 @@ impl Target {
             numbers,
             on_text,
         }
+    }
+
+    /// An attribute for a column of names.
+    pub(super) fn category(name: impl Into<String>) -> Self {
+        Self::attribute(name, 1, Numbers::WholeIfAll, OnText::Category)
     }
 
     /// The positions: three f64 a row. Components that no field fills stay 0 (2D runs).
@@ -296,6 +304,10 @@ impl Table<'_> {
             ..
         } = self.targets[place.target];
         let from_end = components - place.component;
+        if on_text == OnText::Category {
+            values[place.target].set_whole(from_end, category::code(token));
+            return Ok(());
+        }
         if values[place.target].set(from_end, token, self.dialect.decimal) {
             return Ok(());
         }

@@ -55,6 +55,15 @@ impl Values {
         true
     }
 
+    /// Puts `value` `from_end` numbers before the end of integers.
+    #[inline]
+    pub(super) fn set_whole(&mut self, from_end: usize, value: i64) {
+        if let Self::Whole(v) = self {
+            let index = v.len() - from_end;
+            v[index] = value;
+        }
+    }
+
     fn len(&self) -> usize {
         match self {
             Self::Real(v) => v.len(),

@@ -113,6 +113,22 @@ impl Numbers {
         }
     }
 
+    /// Colours as bytes, which text has as numbers from 0 to 1: what VTK itself makes of them.
+    #[expect(
+        clippy::cast_possible_truncation,
+        clippy::cast_sign_loss,
+        reason = "clamped to bytes before"
+    )]
+    pub(super) fn into_color_codes(self) -> Self {
+        match self {
+            Self::Decoded(AttributeData::F32(values)) => {
+                let code = |v: f32| (v.clamp(0.0, 1.0) * 255.0).round() as u8;
+                Self::Decoded(AttributeData::U8(values.into_iter().map(code).collect()))
+            }
+            other => other,
+        }
+    }
+
     /// The numbers, `components` a particle, as a column; none for text and bits.
     pub(super) fn column(&self, name: String, components: usize) -> Option<Column> {
         let Self::Binary { at, scalar, .. } = *self else {

@@ -301,6 +301,10 @@ impl<'a> Walker<'a> {
             return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
         }
         let numbers = take_values(&mut self.cursor, self.encoding, stored, values, &what)?;
+        let numbers = match line.first_word().eq_ignore_ascii_case(b"COLOR_SCALARS") {
+            true => numbers.into_color_codes(),
+            false => numbers,
+        };
         if is_time {
             self.time = Some(numbers.decode(self.cursor.bytes())?.get_f64(0));
         } else {

@@ -12,6 +12,9 @@ use crate::{Endian, ParseError, RawParticles, ScalarType};
 
 mod comment;
 mod molecular;
+mod remarks;
+
+pub(super) use remarks::remarks;
 
 /// Which of the formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -61,7 +61,11 @@ pub(super) fn read(bytes: &[u8], span: Range<usize>) -> Result<RawParticles, Par
     }
     let rows = start..lines.at();
     let (fields, targets) = match comment::value(comment.text, "Properties") {
-        Some(properties) => extended_columns(properties, comment.at, rows.len())?,
+        Some(properties) => {
+            let first = Lines::new(bytes, rows.clone()).find(|line| !line.is_blank());
+            let first = first.map(|line| line.text);
+            extended_columns(properties, comment.at, rows.len(), first)?
+        }
         None => plain_columns(bytes, &rows)?,
     };
     let table = Table {
@@ -117,8 +121,31 @@ fn number(comment: Line<'_>) -> Option<i64> {
 
 type Columns = (Vec<Option<Place>>, Vec<Target>);
 
+/// The attribute for elements and species.
+pub(super) const NAME: &str = "element";
+
+/// Which column has the names of elements or species, if the first atom has one there that is no number.
+pub(super) fn name_column(comment: &[u8], first: &[u8]) -> Option<usize> {
+    let column = match comment::value(comment, "Properties") {
+        Some(properties) => {
+            let parts: Vec<&[u8]> = properties.split(|b| *b == b':').collect();
+            let (triples, _) = parts.as_chunks::<3>();
+            let place = triples.iter().position(|[name, kind, count]| {
+                is_species(name, kind) && text::integer(count) == Some(1)
+            })?;
+            let before = triples.iter().take(place);
+            let widths = before.map(|[_, _, count]| text::integer(count));
+            let widths = widths.map(|width| usize::try_from(width?).ok());
+            widths.sum::<Option<usize>>()?
+        }
+        None => 0,
+    };
+    let name = text::words(first).nth(column)?;
+    text::number(name).is_none().then_some(column)
+}
+
 /// The columns of plain text by the first atom: element (an attribute `type` if it is a number in
-/// every line), x, y, z, and `column_5`... for what follows.
+/// every line, numbers for the names if it is one there), x, y, z, and `column_5`... for what follows.
 fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseError> {
     let mut targets = vec![
         Target::positions(),
@@ -137,6 +164,9 @@ fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseErro
         );
         return Err(ParseError::malformed(first.at, what));
     }
+    if name_column(b"", first.text).is_some() {
+        targets[1] = Target::category(NAME);
+    }
     for column in 5..=columns {
         fields.push(place(targets.len(), 0));
         let name = format!("column_{column}");
@@ -150,8 +180,13 @@ fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseErro
     Ok((fields, targets))
 }
 
-/// The columns by `name:type:count` triples, for atoms in `size` bytes.
-fn extended_columns(properties: &[u8], at: usize, size: usize) -> Result<Columns, ParseError> {
+/// The columns by `name:type:count` triples, for atoms in `size` bytes that begin with the line `first`.
+fn extended_columns(
+    properties: &[u8],
+    at: usize,
+    size: usize,
+    first: Option<&[u8]>,
+) -> Result<Columns, ParseError> {
     let malformed = |what: String| ParseError::malformed(at, what);
     let mut targets = vec![Target::positions()];
     let mut fields = Vec::new();
@@ -183,7 +218,8 @@ fn extended_columns(properties: &[u8], at: usize, size: usize) -> Result<Columns
             positioned = true;
             Some(0)
         } else {
-            attribute(name, kind, components).map(|attribute| {
+            let cell = first.and_then(|first| text::words(first).nth(fields.len()));
+            attribute(name, kind, components, cell).map(|attribute| {
                 targets.push(attribute);
                 targets.len() - 1
             })
@@ -203,13 +239,23 @@ fn is_position(name: &[u8]) -> bool {
         .any(|known| name.eq_ignore_ascii_case(known.as_bytes()))
 }
 
-/// The array for a property. Text and truth values have none, save a species given as a number.
-fn attribute(name: &[u8], kind: &[u8], components: usize) -> Option<Target> {
+fn is_species(name: &[u8], kind: &[u8]) -> bool {
+    let is_named = |known: &str| name.eq_ignore_ascii_case(known.as_bytes());
+    kind.eq_ignore_ascii_case(b"S") && ["species", "element", "symbol"].into_iter().any(is_named)
+}
+
+/// The array for a property whose first field is `cell`. Text and truth values have none, save species: given as
+/// numbers, or by names.
+fn attribute(name: &[u8], kind: &[u8], components: usize, cell: Option<&[u8]>) -> Option<Target> {
+    let is_name = || cell.is_some_and(|cell| text::number(cell).is_none());
+    if components == 1 && is_species(name, kind) && is_name() {
+        return Some(Target::category(NAME));
+    }
     let shown = String::from_utf8_lossy(name);
     match kind {
         b"R" | b"r" => Some((shown, Numbers::Real, OnText::Fault)),
         b"I" | b"i" => Some((shown, Numbers::WholeIfAll, OnText::Fault)),
-        b"S" | b"s" if components == 1 && name.eq_ignore_ascii_case(b"species") => {
+        b"S" | b"s" if components == 1 && is_species(name, kind) => {
             Some(("type".into(), Numbers::WholeIfAll, OnText::LeaveOut))
         }
         _ => None,

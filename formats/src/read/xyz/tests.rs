@@ -91,7 +91,9 @@ fn raw_triples() {
 fn molecular_text_agrees_with_the_same_particles_raw() {
     let particles = only(&sample("single_frames/mol.xyz"));
     assert_agrees_with_raw(&particles);
-    assert!(particles.attributes.is_empty());
+    let elements = whole(&particles, "element");
+    assert!(elements.iter().all(|e| *e == elements[0]));
+    assert_eq!(particles.attributes.len(), 1);
 }
 
 #[test]
@@ -139,6 +141,28 @@ fn plain_columns_and_remarks() {
 }
 
 #[test]
+fn elements_and_species_are_numbers() {
+    let plain = only(b"3\n\nO 0 0 0\nH 1 0 0\nwall 0 0 1\n");
+    assert_eq!(whole(&plain, "element")[..2], [8, 1]);
+    let text = "3\nLattice=\"9 0 0 0 9 0 0 0 9\" pbc=\"T T F\" Properties=id:I:1:species:S:1:pos:R:3\n\
+        7 wall 0 0 0\n8 H 1 0 0\n9 7 0 0 1\n";
+    let extended = only(text.as_bytes());
+    assert_eq!(whole(&extended, "element")[0], whole(&plain, "element")[2]);
+    assert_eq!(whole(&extended, "element")[1], 1);
+    assert_eq!(whole(&extended, "id"), [7, 8, 9]);
+    let notes = remarks(text.as_bytes());
+    assert!(
+        notes[0].contains("periodic boundaries (T T F) is not used"),
+        "{notes:?}"
+    );
+    assert!(notes[1].contains("\"H\" = 1"), "{notes:?}");
+    for end in 0..text.len() {
+        remarks(&text.as_bytes()[..end]);
+    }
+    assert!(remarks(b"1\n\n1 0 0 0\n").is_empty());
+}
+
+#[test]
 fn frames_one_after_another() {
     let text = "1\nTime=0\nW 1 2 3\n0\n\n2\r\nTime=2\r\nW 4 5 6\r\nW 7 8 9\r\n\n1\nlast\nW 0 0 0";
     let bytes = text.as_bytes();
@@ -172,7 +196,7 @@ fn bare_points() {
     let particles = only(text.as_bytes());
     let expected = [DVec3::new(1., 2., 3.), DVec3::new(4., 5., 6.)];
     assert_eq!(f64_positions(&particles), expected);
-    assert_eq!(whole(&particles, "R"), [255, 0]);
+    assert_eq!(whole(&particles, "color"), [255, 0, 0, 0, 255, 0]);
     assert_eq!(real(&particles, "Scalar_h"), [0.5, 1.]);
     let particles = only(b"1 2 3 4\r\n5\t6  7 8\r\n");
     let expected = [DVec3::new(1., 2., 3.), DVec3::new(5., 6., 7.)];

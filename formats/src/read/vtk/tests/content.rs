@@ -166,7 +166,7 @@ fn ascii_is_free_form() {
     assert_eq!(attribute(&found, "n").data, expected);
     assert_eq!(
         attribute(&found, "c").data,
-        AttributeData::F32(vec![0.5, 1.0, 0.0, 0.25])
+        AttributeData::U8(vec![128, 255, 0, 64])
     );
     assert_eq!(attribute(&found, "u").data, AttributeData::U8(vec![255, 7]));
 }

@@ -1,0 +1,45 @@
+//! What a dump says that is not in the particles.
+
+use super::columns::NAMES;
+use super::header::{Header, Item};
+use super::{ITEM, Lines};
+use crate::read::remarks::unused_cell;
+use crate::read::{category, text};
+
+/// See [`crate::read::remarks`].
+pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
+    let mut remarks = Vec::new();
+    let mut items = Lines::new(head, 0..head.len());
+    let bounds = items.find(|line| {
+        line.text.starts_with(ITEM) && matches!(Item::of(line.text), Item::Bounds | Item::Atoms)
+    });
+    if let Some(bounds) = bounds.filter(|line| Item::of(line.text) == Item::Bounds) {
+        // `ITEM: BOX BOUNDS xy xz yz pp pp ff`
+        let flags = text::words(bounds.text)
+            .skip(3)
+            .filter(|word| word.len() == 2 && word.iter().all(|b| b"pfsm".contains(b)));
+        let flags: Vec<String> = flags.map(|f| String::from_utf8_lossy(f).into()).collect();
+        let is_periodic = flags.iter().any(|flag| flag.contains('p'));
+        remarks.push(unused_cell(is_periodic.then(|| flags.join(" ")).as_deref()));
+    }
+    let mut lines = Lines::new(head, 0..head.len());
+    let Ok(header) = Header::parse(&mut lines) else {
+        return remarks;
+    };
+    let start = lines.at();
+    // The last line may be cut off.
+    let end = head.iter().rposition(|b| *b == b'\n').unwrap_or(start);
+    for (column, name) in header.names.iter().enumerate() {
+        let name = String::from_utf8_lossy(name);
+        if !NAMES.contains(&&*name) {
+            continue;
+        }
+        let rows = Lines::new(head, start..end.max(start)).take(header.count);
+        let names = rows.map_while(|row| {
+            let is_row = !row.text.starts_with(ITEM);
+            is_row.then(|| text::words(row.text).nth(column)).flatten()
+        });
+        remarks.extend(category::note(&name, names));
+    }
+    remarks
+}
