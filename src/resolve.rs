@@ -301,6 +301,9 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
     })
 }
 
+/// The colour map where none is given.
+const DEFAULT_MAP: &str = "viridis";
+
 fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
     let mapped = |name: &str, map: &str, range: Option<[f64; 2]>, required: bool| {
         let found = survey
@@ -322,9 +325,13 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
     };
     match &manifest.material.color {
         ColorSetting::Rgb(rgb) => Ok(ColorRule::Constant(Vec3::from_array(*rgb))),
-        ColorSetting::Auto => match &survey.color {
-            Some(color) => mapped(&color.attribute, "viridis", None, false),
-            None => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
+        ColorSetting::Auto => match (&survey.color, &survey.rgb) {
+            (Some(color), _) => mapped(&color.attribute, DEFAULT_MAP, None, false),
+            (None, Some(rgb)) => Ok(ColorRule::Rgb {
+                name: rgb.attribute.clone(),
+                required: false,
+            }),
+            (None, None) => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
         },
         ColorSetting::Attribute {
             attribute,
@@ -332,7 +339,15 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
             range,
         } => {
             require_attribute(survey, "material.color.attribute", attribute)?;
-            mapped(attribute, map.name(), *range, true)
+            // Whoever names a map or a range means lengths.
+            if map.is_none() && range.is_none() && survey.rgb.is_some() {
+                return Ok(ColorRule::Rgb {
+                    name: attribute.clone(),
+                    required: true,
+                });
+            }
+            let map = map.map_or(DEFAULT_MAP, |map| map.name());
+            mapped(attribute, map, *range, true)
         }
     }
 }

@@ -44,7 +44,8 @@ pub(super) struct ManifestArgs {
     /// Axis that points up: x, y, z, -x, -y, -z, or "auto".
     #[arg(long, allow_hyphen_values = true)]
     pub(super) up: Option<String>,
-    /// Attribute to colour by.
+    /// Attribute to colour by. Colours (Cd, color, rgb, bytes) are taken as they are unless --map or --range is
+    /// given; vectors count by their length.
     #[arg(long, value_name = "ATTRIBUTE")]
     pub(super) color_by: Option<String>,
     /// Colour map of the attribute: viridis, turbo...
@@ -80,7 +81,7 @@ pub(super) struct ManifestArgs {
     /// Read native frames instead of mapping them: where files may be cut short while they are used.
     #[arg(long)]
     pub(super) no_mmap: bool,
-    /// Parts of a step to keep where it has several files: fluid,oil.
+    /// Parts of a step to keep where it has several files: fluid,oil. Case does not matter, and part of a name will do.
     #[arg(long, value_delimiter = ',', value_name = "LIST")]
     pub(super) parts: Option<Vec<String>>,
     /// Acceleration structure: auto, lbvh (fastest to build), kdtree (fastest to trace), bvh or sbvh. The

@@ -30,16 +30,17 @@ named! {
 /// Where a particle's colour comes from.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColorSetting {
-    /// By speed where the particles have velocities, else one colour.
+    /// By speed where the particles have velocities, else their own colours, else one colour.
     Auto,
     /// Linear RGB, the same for all.
     Rgb([f32; 3]),
-    /// An attribute through a map; vectors by their length.
+    /// An attribute: colours as they are unless a map or a range is given, anything else through a map,
+    /// vectors by their length.
     Attribute {
         /// Name of the attribute.
         attribute: String,
-        /// The map.
-        map: ColorMap,
+        /// The map; None is viridis.
+        map: Option<ColorMap>,
         /// Values at the two ends of the map; None is what the whole sequence has.
         range: Option<[f64; 2]>,
     },
@@ -92,7 +93,7 @@ impl ColorSetting {
         }
         let mut section = field.section()?;
         let attribute = section.optional("attribute", Field::name);
-        let map = section.value("map", ColorMap::Viridis, |f| f.choice(ColorMap::ALL));
+        let map = section.optional("map", |f| f.choice(ColorMap::ALL));
         let range = section.optional("range", |f| {
             let range = f.as_numbers::<2>().filter(|[low, high]| low < high);
             f.or_wants(range, "two rising numbers, as [0.0, 4.0]")
@@ -120,8 +121,8 @@ impl Toml for ColorSetting {
                 range,
             } => {
                 let range = range.map_or(String::new(), |r| format!(", range = {}", r.toml()));
-                let (attribute, map) = (attribute.toml(), map.toml());
-                format!("{{ attribute = {attribute}, map = {map}{range} }}")
+                let map = map.map_or(String::new(), |m| format!(", map = {}", m.toml()));
+                format!("{{ attribute = {}{map}{range} }}", attribute.toml())
             }
         }
     }
@@ -135,7 +136,7 @@ described!(ColorSetting, {
             "type": "object",
             "properties": {
                 "attribute": name_schema(),
-                "map": { "enum": words(&[], ColorMap::ALL), "default": ColorMap::Viridis.name() },
+                "map": { "enum": words(&[], ColorMap::ALL) },
                 "range": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
             },
             "required": ["attribute"],

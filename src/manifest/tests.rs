@@ -409,7 +409,7 @@ fn sets_lie_over_the_file() {
         manifest.material.color,
         ColorSetting::Attribute {
             attribute: "velocity".to_owned(),
-            map: ColorMap::Turbo,
+            map: Some(ColorMap::Turbo),
             range: None
         }
     );

@@ -8,6 +8,7 @@ use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius};
 
 use super::load::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
+use crate::scene::RgbEncoding;
 use crate::survey::{id_of, velocity_of};
 
 /// A frame in memory, ready for the tree.
@@ -27,6 +28,8 @@ pub struct DecodedShading {
     /// Numbers for the colour map, one a particle; empty with a constant colour, and in a frame
     /// that lacks an attribute which nobody asked for.
     pub values: Vec<f32>,
+    /// Colours that the particles bring, linear RGB; empty where they are not asked for.
+    pub colors: Vec<Vec3>,
     /// Numbers for the `id` channel; None if the particle's index serves.
     pub ids: Option<Vec<u32>>,
     /// Velocities for the `V` channel.
@@ -42,16 +45,19 @@ impl DecodedFrame {
         file: &str,
     ) -> Result<(Self, u64), LoadError> {
         let (radius, clamped) = radii(setup, &frame, file)?;
-        let values = match &setup.color {
-            ColorRule::Constant(_) => Vec::new(),
-            ColorRule::Attribute { name, required, .. } => {
-                let found = if *required {
-                    attribute(&frame, name, "colour", file)?
-                } else {
-                    frame.attribute(name)
-                };
-                found.map_or_else(Vec::new, |attribute| magnitudes(attribute, 1.0))
+        let colored_by = match &setup.color {
+            ColorRule::Constant(_) => None,
+            ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
+                match *required {
+                    true => attribute(&frame, name, "colour", file)?,
+                    false => frame.attribute(name),
+                }
             }
+        };
+        let (values, colors) = match (&setup.color, colored_by) {
+            (ColorRule::Attribute { .. }, Some(by)) => (magnitudes(by, 1.0), Vec::new()),
+            (ColorRule::Rgb { .. }, Some(by)) => (Vec::new(), colors(by)),
+            _ => (Vec::new(), Vec::new()),
         };
         let channels = setup.render.channels;
         let ids = if channels.id { ids(&frame) } else { None };
@@ -65,6 +71,7 @@ impl DecodedFrame {
             radius,
             shading: DecodedShading {
                 values,
+                colors,
                 ids,
                 velocities,
             },
@@ -88,6 +95,7 @@ impl DecodedFrame {
             put_last(radii, chosen);
         }
         put_last(&mut shading.values, chosen);
+        put_last(&mut shading.colors, chosen);
         if let Some(ids) = &mut shading.ids {
             put_last(ids, chosen);
         }
@@ -116,11 +124,17 @@ fn put_last<T: Copy>(items: &mut [T], chosen: &[u32]) {
 }
 
 impl DecodedShading {
+    /// Whether particles have colours of their own.
+    pub fn has_colors(&self) -> bool {
+        !self.values.is_empty() || !self.colors.is_empty()
+    }
+
     /// Bytes of all of it.
     pub fn byte_len(&self) -> u64 {
         let ids = self.ids.as_deref().unwrap_or_default();
         let velocities = self.velocities.as_deref().unwrap_or_default();
-        (size_of_val(&self.values[..]) + size_of_val(ids) + size_of_val(velocities)) as u64
+        let colors = size_of_val(&self.values[..]) + size_of_val(&self.colors[..]);
+        (colors + size_of_val(ids) + size_of_val(velocities)) as u64
     }
 }
 
@@ -181,6 +195,20 @@ fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
         .collect()
 }
 
+/// The colours in `attribute`; black where it has fewer than three numbers a particle.
+fn colors(attribute: &Attribute) -> Vec<Vec3> {
+    let encoding = RgbEncoding::of(attribute.data.scalar_type());
+    let components = attribute.components;
+    let value = |i: usize, c: usize| match c < components {
+        true => attribute.data.get_f64(i * components + c),
+        false => 0.0,
+    };
+    (0..attribute.count())
+        .into_par_iter()
+        .map(|i| encoding.color([value(i, 0), value(i, 1), value(i, 2)]))
+        .collect()
+}
+
 #[expect(clippy::cast_possible_truncation, reason = "the channel is f32")]
 fn vectors(attribute: &Attribute) -> Vec<Vec3> {
     let value = |i: usize| attribute.data.get_f64(i) as f32;
@@ -221,6 +249,7 @@ mod tests {
             radius: Radius::PerParticle((0..6_u16).map(f32::from).collect()),
             shading: DecodedShading {
                 values: (0..6_u16).map(f32::from).collect(),
+                colors: (0..6_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
                 ids: None,
                 velocities: None,
             },
@@ -232,6 +261,7 @@ mod tests {
         assert_eq!(frame.centers, order.map(Vec3::splat));
         assert_eq!(frame.radius, Radius::PerParticle(order.to_vec()));
         assert_eq!(frame.shading.values, order);
+        assert_eq!(frame.shading.colors, order.map(Vec3::splat));
         assert_eq!(frame.shading.ids, Some(vec![1, 2, 4, 0, 3, 5]));
         assert_eq!(frame.put_last(&[0, 1, 2, 3, 4, 5], false), 0);
     }

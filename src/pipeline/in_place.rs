@@ -3,17 +3,17 @@
 use std::path::Path;
 
 use glam::{DVec3, Vec3};
-use spherule_formats::FrameError;
 use spherule_formats::blocks::StoredLeaves;
 use spherule_formats::native::layout::RadiusIndex;
-use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFrame};
+use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFrame, StoredType};
 use spherule_formats::sequence::Sequence;
+use spherule_formats::{FrameError, ScalarType};
 
 use super::load::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};
-use crate::scene::ColorMap;
+use crate::scene::{ColorMap, RgbEncoding};
 use crate::survey::{Named, id_of, velocity_of};
 
 /// Bytes of a frame up to which everything that is used is compared with its checksum before it is traced;
@@ -123,7 +123,13 @@ impl StoredFrame {
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
         let color = match (color, view(&self.names.values)) {
             (ColorRule::Constant(color), _) => StoredColor::Constant(*color),
-            (ColorRule::Attribute { .. }, None) => StoredColor::Constant(default),
+            (ColorRule::Attribute { .. } | ColorRule::Rgb { .. }, None) => {
+                StoredColor::Constant(default)
+            }
+            (ColorRule::Rgb { .. }, Some(values)) => StoredColor::Rgb {
+                encoding: encoding(&values),
+                values,
+            },
             (ColorRule::Attribute { map, .. }, Some(values)) => StoredColor::Mapped { values, map },
         };
         StoredShading {
@@ -184,7 +190,7 @@ impl Names {
         let attributes = frame.attributes();
         let values = match &setup.color {
             ColorRule::Constant(_) => None,
-            ColorRule::Attribute { name, required, .. } => {
+            ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
                 let found = frame.attribute(name).map(|a| a.name().to_owned());
                 if found.is_none() && *required && file.index().count > 0 {
                     let path = file.path().display().to_string();
@@ -264,10 +270,26 @@ pub struct StoredShading<'a> {
 #[derive(Debug, Clone, Copy)]
 enum StoredColor<'a> {
     Constant(Vec3),
+    Rgb {
+        values: AttributeView<'a>,
+        encoding: RgbEncoding,
+    },
     Mapped {
         values: AttributeView<'a>,
         map: &'a ColorMap,
     },
+}
+
+/// As colours of decoded particles are understood: codes of fewer bits are decoded to floats.
+fn encoding(values: &AttributeView) -> RgbEncoding {
+    RgbEncoding::of(match values.stored() {
+        StoredType::Plain(kind) => kind,
+        StoredType::Half | StoredType::Ranged => ScalarType::F32,
+    })
+}
+
+fn stored_rgb(values: &AttributeView, encoding: RgbEncoding, index: u32) -> Vec3 {
+    encoding.color([0, 1, 2].map(|component| values.get(index as usize, component)))
 }
 
 impl ShadeSource for StoredShading<'_> {
@@ -278,6 +300,7 @@ impl ShadeSource for StoredShading<'_> {
     fn color(&self, index: u32) -> Vec3 {
         match &self.color {
             StoredColor::Constant(color) => *color,
+            StoredColor::Rgb { values, encoding } => stored_rgb(values, *encoding, index),
             StoredColor::Mapped { values, map } => {
                 map.color(values.magnitude(index as usize) as f32)
             }
@@ -287,7 +310,7 @@ impl ShadeSource for StoredShading<'_> {
     fn constant_color(&self) -> Option<Vec3> {
         match &self.color {
             StoredColor::Constant(color) => Some(*color),
-            StoredColor::Mapped { .. } => None,
+            StoredColor::Rgb { .. } | StoredColor::Mapped { .. } => None,
         }
     }
 
@@ -298,6 +321,9 @@ impl ShadeSource for StoredShading<'_> {
     fn blended_color(&self, parts: &[(u32, f32)]) -> Vec3 {
         match &self.color {
             StoredColor::Constant(color) => *color,
+            StoredColor::Rgb { values, encoding } => {
+                mean(parts, |i| stored_rgb(values, *encoding, i))
+            }
             StoredColor::Mapped { values, map } => {
                 map.color(mean(parts, |i| values.magnitude(i as usize) as f32))
             }

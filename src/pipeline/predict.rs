@@ -14,7 +14,7 @@ use spherule_formats::native::Access;
 use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
-use super::setup::{ColorRule, RadiusRule, Setup};
+use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::render::{Film, band_bytes};
 use crate::report::Bytes;
@@ -270,11 +270,11 @@ impl<'a> MemoryModel<'a> {
             return self.held_file(frame);
         }
         let channels = self.setup.render.channels;
-        let values = matches!(self.setup.color, ColorRule::Attribute { .. });
+        let color = self.setup.color.bytes();
         // Particles that are put elsewhere need a number.
         let ids = channels.id && (self.has_ids || self.setup.surface.spray);
         let each = [
-            (values, 4),
+            (true, color),
             (ids, 4),
             (channels.velocity && self.has_velocities, 12),
         ];
@@ -286,7 +286,7 @@ impl<'a> MemoryModel<'a> {
         if self.in_place {
             return predicted_stored_bytes(frame.particles);
         }
-        let values = matches!(self.setup.color, ColorRule::Attribute { .. });
+        let values = self.setup.color.is_by_particle();
         // A smooth surface has no tree over particles.
         let particles = match self.setup.surface.kind {
             SurfaceKind::Smooth => 0,
@@ -422,7 +422,7 @@ const MOST_GRID: f64 = 22_000.0;
 fn smooth_bytes(setup: &Setup, particles: u64) -> SurfaceBytes {
     let surface = &setup.surface;
     let channels = setup.render.channels;
-    let is_colored = matches!(setup.color, ColorRule::Attribute { .. });
+    let is_colored = setup.color.is_by_particle();
     let keeps = surface.exact || channels.id || channels.velocity || is_colored;
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]
     let count = particles as f64;

@@ -32,6 +32,13 @@ pub enum RadiusRule {
 pub enum ColorRule {
     /// One for all, linear RGB.
     Constant(Vec3),
+    /// An attribute whose values are colours.
+    Rgb {
+        /// Its name.
+        name: String,
+        /// As for [`Self::Attribute`].
+        required: bool,
+    },
     /// An attribute through a map; vectors by magnitude.
     Attribute {
         /// Its name.
@@ -42,6 +49,22 @@ pub enum ColorRule {
         /// a frame has the default colour.
         required: bool,
     },
+}
+
+impl ColorRule {
+    /// Whether particles have colours of their own, so that they must be told apart.
+    pub const fn is_by_particle(&self) -> bool {
+        !matches!(self, Self::Constant(_))
+    }
+
+    /// Bytes that a decoded particle has for its colour.
+    pub(super) const fn bytes(&self) -> u64 {
+        match self {
+            Self::Constant(_) => 0,
+            Self::Attribute { .. } => size_of::<f32>() as u64,
+            Self::Rgb { .. } => size_of::<Vec3>() as u64,
+        }
+    }
 }
 
 /// The pictures of a job.
@@ -143,9 +166,10 @@ impl Setup {
             ));
         }
         let why = match self.surface {
-            SurfaceSettings { kind, .. } if kind == SurfaceKind::Smooth => {
-                "a smooth surface sorts a copy of them, 12 bytes a particle and more"
-            }
+            SurfaceSettings {
+                kind: SurfaceKind::Smooth,
+                ..
+            } => "a smooth surface sorts a copy of them, 12 bytes a particle and more",
             SurfaceSettings { spray: true, .. } => {
                 "spray is parted from them, for 12 bytes a particle and more"
             }

@@ -7,7 +7,7 @@ use std::time::Instant;
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
-use super::setup::{ColorRule, Setup};
+use super::setup::Setup;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, render};
@@ -78,7 +78,7 @@ impl SurfaceBuilder {
             Radius::PerParticle(radii) => usual_radius(radii, notes),
         };
         let channels = setup.render.channels;
-        let is_colored = matches!(setup.color, ColorRule::Attribute { .. });
+        let is_colored = setup.color.is_by_particle();
         // Whoever is asked for by a place on the surface.
         let keep = channels.id || channels.velocity || is_colored;
         let left = memory_left(setup.memory_limit);

@@ -142,7 +142,7 @@ impl FrameTracer {
     }
 
     fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame) -> BuildReport {
-        let has_values = !frame.shading.values.is_empty();
+        let has_values = frame.shading.has_colors();
         let settings = setup.build_settings(frame.centers.len(), has_values);
         self.builder.build(&spheres(frame), &settings)
     }
@@ -231,6 +231,8 @@ fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> Pa
     let values = &shading.values;
     let colors = match color {
         ColorRule::Constant(color) => Colors::Constant(*color),
+        ColorRule::Rgb { .. } if shading.colors.is_empty() => Colors::Constant(DEFAULT_COLOR),
+        ColorRule::Rgb { .. } => Colors::PerParticle(&shading.colors),
         ColorRule::Attribute { .. } if values.is_empty() => Colors::Constant(DEFAULT_COLOR),
         ColorRule::Attribute { map, .. } => Colors::Mapped { values, map },
     };

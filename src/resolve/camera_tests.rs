@@ -13,6 +13,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         has_radii: false,
         reach: 0.0,
         color: None,
+        rgb: None,
         up: DVec3::Z,
         attributes: Vec::new(),
         most_particles: 8,

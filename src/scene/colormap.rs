@@ -218,7 +218,7 @@ fn nearest_name(name: &str) -> &'static str {
 }
 
 /// Inverse of the sRGB transfer function (IEC 61966-2-1).
-fn linear_from_srgb(v: f32) -> f32 {
+pub(super) fn linear_from_srgb(v: f32) -> f32 {
     if v <= 0.040_45 {
         v / 12.92
     } else {

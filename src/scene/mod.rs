@@ -14,6 +14,7 @@ pub mod ground;
 pub mod light;
 pub mod material;
 pub mod path;
+pub mod rgb;
 
 pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing};
@@ -22,6 +23,7 @@ pub use ground::{Checker, Ground};
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Fresnel, Material, MaterialError};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
+pub use rgb::{RgbEncoding, is_rgb};
 
 /// An axis-aligned box in world units, spheres included.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

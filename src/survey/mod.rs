@@ -13,7 +13,7 @@ use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError, ID_NAMES, ParticleFrame, Radius, choose_origin};
 
-use crate::scene::Bounds;
+use crate::scene::{Bounds, RgbEncoding, is_rgb};
 
 mod look;
 mod packing;
@@ -53,6 +53,10 @@ pub struct Survey {
     pub reach: f32,
     /// The attribute that colours were asked for by, if any, with its range.
     pub color: Option<ColorRange>,
+    /// The attribute whose values are the particles' colours, unless they are by speed. Jobs of earlier versions
+    /// lack it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rgb: Option<RgbAttribute>,
     /// Which way is up for users of this format, unit vector.
     pub up: DVec3,
     /// Names of all attributes seen.
@@ -104,6 +108,27 @@ pub struct ColorRange {
     pub high: f64,
 }
 
+/// An attribute whose values are colours.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct RgbAttribute {
+    /// Name of the attribute.
+    pub attribute: String,
+    /// What its numbers mean, in the first frame that has it.
+    pub encoding: RgbEncoding,
+}
+
+impl RgbAttribute {
+    /// The first of `attributes` that holds colours, or the one called `name`, if it does.
+    fn of(attributes: &[Attribute], name: Option<&str>) -> Option<Self> {
+        let is_wanted = |a: &&Attribute| name.is_none_or(|name| a.name.eq_ignore_ascii_case(name));
+        let found = attributes.iter().filter(is_wanted).find(|a| is_rgb(a))?;
+        Some(Self {
+            attribute: found.name.clone(),
+            encoding: RgbEncoding::of(found.data.scalar_type()),
+        })
+    }
+}
+
 /// What a job needs to know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Question<'a> {
@@ -141,7 +166,7 @@ impl RadiusQuestion<'_> {
 pub enum ColorQuestion<'a> {
     /// No attribute is needed.
     None,
-    /// The velocity, if there is one.
+    /// The velocity, if there is one, else colours, if there are any.
     Speed,
     /// This attribute.
     Attribute(&'a str),
@@ -156,6 +181,7 @@ struct Totals {
     range: Option<(f64, f64)>,
     color: Option<String>,
     velocity: Option<String>,
+    rgb: Option<RgbAttribute>,
     attributes: BTreeSet<String>,
     most_particles: usize,
     frames: usize,
@@ -211,6 +237,7 @@ impl Survey {
             range: None,
             color: None,
             velocity: None,
+            rgb: None,
             attributes: BTreeSet::new(),
             most_particles: 0,
             frames: 0,
@@ -339,6 +366,13 @@ impl Totals {
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
         }
+        if self.rgb.is_none() {
+            self.rgb = match question.color {
+                ColorQuestion::None => None,
+                ColorQuestion::Speed => RgbAttribute::of(&raw.attributes, None),
+                ColorQuestion::Attribute(name) => RgbAttribute::of(&raw.attributes, Some(name)),
+            };
+        }
         let origin = self
             .bounds
             .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
@@ -415,6 +449,11 @@ impl Totals {
         let (min, max) = self
             .bounds
             .unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
+        // Speed goes before colours.
+        let rgb = self.rgb.filter(|rgb| {
+            let is_asked = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
+            self.color.as_ref().is_none_or(is_asked)
+        });
         let color = self.color.map(|attribute| {
             let (low, high) = self.range.unwrap_or((0.0, 1.0));
             ColorRange {
@@ -440,6 +479,7 @@ impl Totals {
             has_radii: self.has_radii,
             reach: self.reach,
             color,
+            rgb,
             up,
             attributes: self.attributes.into_iter().collect(),
             most_particles: self.most_particles,

@@ -118,6 +118,40 @@ fn radii_and_ids_of_their_own() {
     }
 }
 
+/// Many particles in few places, each with an id of its own: which of them is seen goes by their order in the source,
+/// so all pictures are those of the source.
+#[test]
+fn coincident_particles_have_the_ids_of_the_source() {
+    let shop = Workshop::new();
+    let part = |i: u32, salt: u32| {
+        f64::from(((i % 150) * 7919 + salt).wrapping_mul(2_654_435_761) >> 8) / 2e7
+    };
+    let row = |i: u32| {
+        format!(
+            "{},{},{},{}\n",
+            part(i, 1),
+            part(i, 2),
+            part(i, 3),
+            5_000 + i
+        )
+    };
+    let rows: String = (0..3_000).map(row).collect();
+    fs::create_dir_all(shop.join("in")).expect("a directory");
+    fs::write(shop.join("in/p_1.csv"), format!("x,y,z,id\n{rows}")).expect("a file");
+    shop.run(&["convert", "in", "-o", "native"]).expect(0);
+    let mut first = None;
+    for input in ["in", "native"] {
+        for structure in ["lbvh", "kdtree", "bvh", "sbvh"] {
+            let out = format!("{input}-{structure}");
+            let how = ["--accelerator", structure, "--radius", "0.02"];
+            render(&shop, input, &out, &[&ALL[..], &how].concat()).expect(0);
+            let made: Vec<Vec<u8>> = images(&shop.join(&out)).into_values().collect();
+            let expected = first.get_or_insert_with(|| made.clone());
+            assert!(*expected == made, "{input}: {structure} differs");
+        }
+    }
+}
+
 #[test]
 fn damage_costs_the_frame_and_is_named() {
     let shop = Workshop::new();

@@ -5,6 +5,7 @@ mod picture;
 
 mod bad_input;
 mod camera;
+mod colors;
 mod convert;
 mod damaged;
 mod export;

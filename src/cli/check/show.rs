@@ -9,7 +9,7 @@ use crate::accel::Structure;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
 use crate::cli::work::list;
-use crate::pipeline::{ColorRule, Overlap, RadiusRule, Setup};
+use crate::pipeline::{Overlap, RadiusRule, Setup};
 use crate::report::Bytes;
 use crate::survey::Survey;
 
@@ -167,7 +167,7 @@ impl Check<'_> {
 
 /// For the largest frame that was looked at; the others may have another.
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
-    let has_values = matches!(setup.color, ColorRule::Attribute { .. });
+    let has_values = setup.color.is_by_particle();
     setup
         .build_settings(survey.most_particles, has_values)
         .structure

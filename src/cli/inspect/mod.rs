@@ -8,11 +8,12 @@ use clap::Args;
 use serde_json::json;
 use spherule_formats::detect::Format;
 use spherule_formats::native::{layout, verify};
-use spherule_formats::open::is_native;
+use spherule_formats::open::{is_native, remarks};
 use spherule_formats::sequence::lone_frame_number;
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
 
+use super::render::parts_text;
 use super::{CliError, Outcome};
 
 mod native;
@@ -46,6 +47,8 @@ struct Inspected<'a> {
     bytes_per_particle: Option<f64>,
     /// What a native frame says of itself.
     native: Option<NativeFacts>,
+    /// What the file says that is not in its particles.
+    notes: Vec<String>,
     /// Whether everything was checked because it was asked for.
     verified: bool,
 }
@@ -106,6 +109,9 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
             input => match Sequence::open(&input) {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
                 Ok(sequence) => {
+                    if let Some(parts) = parts_text(&sequence) {
+                        say!("{}: {parts}", argument.display());
+                    }
                     for frame in sequence.frames() {
                         // A file with many steps is in many frames.
                         for part in &frame.parts {
@@ -133,8 +139,11 @@ fn inspect(
         return Ok(inspected.write(args.json, out));
     }
     let file = FrameFile::open(path)?;
+    // Of many steps the first one says what holds for all.
+    let mut remarks = remarks(path);
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, number)?;
+        inspected.notes = std::mem::take(&mut remarks);
         if args.verify && inspected.native.is_some() {
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
@@ -179,6 +188,7 @@ fn read(file: &FrameFile, index: usize, number: Option<i64>) -> Result<Inspected
         stats,
         bytes_per_particle: (all > 0).then(|| stored / all as f64),
         native: native.map(|index| NativeFacts::new(index, file.bytes().len() as u64, None)),
+        notes: Vec::new(),
         verified: false,
     })
 }

@@ -43,6 +43,9 @@ impl Inspected<'_> {
         if let Some(native) = &self.native {
             object["native"] = native.to_json();
         }
+        if !self.notes.is_empty() {
+            object["notes"] = json!(self.notes);
+        }
         if self.verified {
             object["verified"] = json!(true);
         }
@@ -87,6 +90,9 @@ impl Inspected<'_> {
                 out,
                 "  values of attributes are from a sample of {sample} particles"
             )?;
+        }
+        for note in &self.notes {
+            writeln!(out, "  note: {note}")?;
         }
         if self.verified {
             let what = match self.native {

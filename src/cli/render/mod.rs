@@ -13,7 +13,7 @@ mod run;
 mod show;
 
 use run::Run;
-pub(super) use show::radius_text;
+pub(super) use show::{parts_text, radius_text};
 
 #[derive(Debug, Args)]
 pub(super) struct RenderArgs {

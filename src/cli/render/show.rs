@@ -50,6 +50,12 @@ pub(super) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
         counted(sequence.frames().len(), "frame"),
         counted(survey.most_particles, "particle")
     );
+    if let Some(parts) = parts_text(sequence) {
+        say!("{parts}");
+    }
+    for remark in sequence.remarks() {
+        say!("note: {remark}");
+    }
     if survey.most_particles == 0 {
         return;
     }
@@ -63,9 +69,28 @@ pub(super) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
             short(color.high)
         );
     }
+    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.color, &survey.rgb) {
+        say!(
+            "colour by the RGB attribute `{name}` ({})",
+            rgb.encoding.name()
+        );
+    }
     if survey.origin != glam::DVec3::ZERO {
         say!("origin {}: the particles are far from zero", survey.origin);
     }
+}
+
+/// The parts of a step, where there are several: all, and which of them are used.
+pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
+    let (all, kept) = (sequence.part_names(), sequence.kept_part_names());
+    if all.len() < 2 {
+        return None;
+    }
+    let used = match kept.len() == all.len() {
+        true => "; --parts keeps some of them".to_owned(),
+        false => format!("; used: {}", kept.join(", ")),
+    };
+    Some(format!("each step has the parts {}{used}", all.join(", ")))
 }
 
 /// The radius in words.

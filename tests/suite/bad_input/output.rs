@@ -60,6 +60,54 @@ fn names_that_will_not_do() {
 }
 
 #[test]
+fn one_frame_needs_no_number_in_its_name() {
+    let workshop = three_frames();
+    let one = ["render", "in", "-o", "one/f.exr", "--frames", "2"];
+    let arguments = [&one[..], &SMALL].concat();
+    let check = [&["check"], &arguments[1..]].concat();
+    workshop.run(&check).expect(0);
+    workshop.run(&arguments).expect(0).tells("1 of 1 frames");
+    // The picture is that of the whole sequence.
+    let all = [&["render", "in", "-o", "all/f.####.exr"][..], &SMALL].concat();
+    workshop.run(&all).expect(0);
+    let image = |name: &str| fs::read(workshop.join(name)).expect("an image");
+    let made = image("one/f.exr");
+    assert!(made == image("all/f.0002.exr"));
+    // The same command finds it done, and so does its manifest.
+    workshop
+        .run(&arguments)
+        .expect(0)
+        .tells("1 of 1 frames are done already");
+    workshop.run(&["render", "one/job.toml"]).expect(0);
+    // Another frame would take the place of the first.
+    let mut other = arguments.clone();
+    other[5] = "3";
+    refused(&workshop, &other, &["one/f.exr", "frame"]);
+    assert!(made == image("one/f.exr"));
+    for frames in ["1-2", "all"] {
+        let several = ["render", "in", "-o", "two/f.exr", "--frames", frames];
+        refused(&workshop, &several, &["put #### into it"]);
+    }
+    let follow = ["render", "in", "-o", "two/f.exr", "--follow"];
+    refused(&workshop, &follow, &["put #### into it"]);
+}
+
+#[test]
+fn one_converted_frame_has_the_name_it_was_given() {
+    let workshop = three_frames();
+    let one = ["convert", "in", "-o", "native/one.spf"];
+    workshop
+        .run(&[&one[..], &["--frames", "2"]].concat())
+        .expect(0);
+    assert!(workshop.join("native/one.spf").is_file());
+    refused(
+        &workshop,
+        &one,
+        &["one.spf: is one name for 3 frames", "--frames"],
+    );
+}
+
+#[test]
 fn a_file_in_the_place_of_the_directory() {
     let workshop = three_frames();
     fs::write(workshop.join("out"), "a file").expect("a file");

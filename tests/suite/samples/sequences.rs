@@ -1,5 +1,7 @@
 //! Sample sequences: found, ordered, gaps told, every frame read, and rendered.
 
+use std::fs;
+
 use glam::Vec3;
 use spherule_formats::sequence::{PART_ATTRIBUTE, SequenceError};
 use spherule_formats::{
@@ -158,6 +160,47 @@ fn a_part_can_be_picked_on_the_command_line() {
     workshop.run(&[&arguments[..], &size].concat()).expect(0);
     let facts = Picture::open(&workshop.join("f.exr")).facts.expect("facts");
     assert_eq!(facts["particles"], 36);
+    // Part of the name will do, and the parts are listed.
+    let arguments = ["render", &input, "-o", "g.exr", "--parts", "OBST"];
+    workshop
+        .run(&[&arguments[..], &size, &["--force"]].concat())
+        .expect(0)
+        .tells("each step has the parts fluid, obstacle; used: obstacle");
+    let arguments = ["render", &input, "-o", "g.exr", "--parts", "wall"];
+    workshop
+        .run(&arguments)
+        .expect(2)
+        .tells("no part is called `wall`; the parts are fluid, obstacle");
+    workshop
+        .run(&["inspect", &input])
+        .expect(0)
+        .tells("each step has the parts fluid, obstacle");
+}
+
+#[test]
+fn what_a_file_has_beside_its_particles_is_told() {
+    let workshop = Workshop::new();
+    let text = "2\nLattice=\"9 0 0 0 9 0 0 0 9\" pbc=\"T T T\" Properties=species:S:1:pos:R:3\nO 0 0 0\nH 1 0 0\n";
+    fs::write(workshop.join("water.xyz"), text).expect("a file");
+    let cell = "periodic boundaries (T T T) is not used";
+    let names = "\"H\" = 1, \"O\" = 8";
+    let told = workshop.run(&["inspect", "water.xyz"]).expect(0).text();
+    assert!(told.contains(cell) && told.contains(names), "{told}");
+    let size = ["--width", "48", "--height", "27", "--samples", "1"];
+    let arguments = [
+        "render",
+        "water.xyz",
+        "-o",
+        "f.exr",
+        "--color-by",
+        "element",
+    ];
+    workshop
+        .run(&[&arguments[..], &size].concat())
+        .expect(0)
+        .tells(cell)
+        .tells(names)
+        .tells("colour by `element`, seen from 1 to 8");
 }
 
 #[test]
