@@ -12,7 +12,7 @@ pub enum Endian {
 }
 
 /// The type of one stored number.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[expect(missing_docs, reason = "the names say all")]
 pub enum ScalarType {
     I8,

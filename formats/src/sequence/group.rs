@@ -172,22 +172,28 @@ fn candidates(names: Vec<Name>) -> Vec<Candidate> {
     let mut runs: Vec<Run> = by_text.into_values().flat_map(runs).collect();
     runs.sort_by_key(|run| std::cmp::Reverse(run.names.len()));
     let mut candidates: Vec<Candidate> = Vec::new();
+    // Candidates that have a frame number: only those can share it.
+    let mut homes = BTreeMap::<i64, BTreeSet<usize>>::new();
     for run in runs {
         let numbers = run.numbers();
-        let home = candidates.iter_mut().find(|c| {
-            let shared = c.numbers.intersection(&numbers).count();
-            shared > 0 && shared * 2 >= numbers.len().min(c.numbers.len())
-        });
-        match home {
-            Some(candidate) => {
-                candidate.numbers.extend(numbers);
-                candidate.runs.push(run);
-            }
-            None => candidates.push(Candidate {
-                runs: vec![run],
-                numbers,
-            }),
+        let mut shared = BTreeMap::<usize, usize>::new();
+        for home in numbers.iter().filter_map(|n| homes.get(n)).flatten() {
+            *shared.entry(*home).or_default() += 1;
         }
+        let home = shared.into_iter().find(|(home, shared)| {
+            let most = numbers.len().min(candidates[*home].numbers.len());
+            shared * 2 >= most
+        });
+        let home = home.map_or(candidates.len(), |(home, _)| home);
+        if home == candidates.len() {
+            candidates.push(Candidate::default());
+        }
+        for number in &numbers {
+            homes.entry(*number).or_default().insert(home);
+        }
+        let candidate = &mut candidates[home];
+        candidate.numbers.extend(numbers);
+        candidate.runs.push(run);
     }
     candidates
 }

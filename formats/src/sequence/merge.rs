@@ -1,5 +1,7 @@
 //! Several files of one step become one set of particles.
 
+use std::collections::{BTreeMap, VecDeque};
+
 use glam::DVec3;
 
 use crate::attribute::with_values;
@@ -69,17 +71,17 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
         let fullest = parts.iter_mut().max_by_key(|p| p.attributes.len());
         return fullest.map_or(Vec::new(), |p| std::mem::take(&mut p.attributes));
     };
+    // Each is looked up, never searched for: there may be very many.
+    let mut others: Vec<ByKind> = others.iter_mut().map(|other| by_kind(other)).collect();
     let mut merged = Vec::new();
     let mut lost: Vec<String> = Vec::new();
     for mut attribute in std::mem::take(&mut first.attributes) {
-        let mut same = Vec::new();
-        for other in others.iter_mut() {
-            let at = other
-                .attributes
-                .iter()
-                .position(|a| a.name == attribute.name && a.components == attribute.components);
-            same.extend(at.map(|at| other.attributes.swap_remove(at).data));
-        }
+        let kind = (attribute.name, attribute.components);
+        let same: Vec<AttributeData> = others
+            .iter_mut()
+            .filter_map(|other| other.get_mut(&kind)?.pop_front())
+            .collect();
+        attribute.name = kind.0;
         if same.len() == others.len() {
             attribute.data = join(attribute.data, same);
             merged.push(attribute);
@@ -87,11 +89,10 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
             lost.push(attribute.name);
         }
     }
-    lost.extend(
-        others
-            .iter()
-            .flat_map(|o| o.attributes.iter().map(|a| a.name.clone())),
-    );
+    for other in others {
+        let left = other.into_iter().filter(|(_, data)| !data.is_empty());
+        lost.extend(left.map(|((name, _), _)| name));
+    }
     lost.sort();
     lost.dedup();
     if !lost.is_empty() {
@@ -101,6 +102,22 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
         )));
     }
     merged
+}
+
+/// Attributes by name and components, those alike in their order.
+type ByKind = BTreeMap<(String, usize), VecDeque<AttributeData>>;
+
+/// Takes the attributes of a part.
+fn by_kind(part: &mut RawParticles) -> ByKind {
+    let mut attributes = ByKind::new();
+    for attribute in std::mem::take(&mut part.attributes) {
+        let kind = (attribute.name, attribute.components);
+        attributes
+            .entry(kind)
+            .or_default()
+            .push_back(attribute.data);
+    }
+    attributes
 }
 
 fn join(first: AttributeData, others: Vec<AttributeData>) -> AttributeData {

@@ -5,7 +5,7 @@
 //! may hold several steps. What a file holds is checked when its frame is loaded, so one damaged
 //! file costs one frame and not the sequence.
 
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -409,6 +409,7 @@ fn stamp(path: &Path) -> Option<(u64, SystemTime)> {
 /// The files of a list, its patterns and directories filled in; the same file twice is once.
 fn listed_names(paths: &[PathBuf]) -> Result<Vec<Name>, SequenceError> {
     let mut names: Vec<Name> = Vec::new();
+    let mut known = HashSet::new();
     for path in paths {
         let found = match SequenceInput::from_path(path) {
             SequenceInput::Directory(path) => scan::directory(&path)?,
@@ -422,7 +423,7 @@ fn listed_names(paths: &[PathBuf]) -> Result<Vec<Name>, SequenceError> {
             }
         };
         for name in found {
-            if !names.iter().any(|n| n.path == name.path) {
+            if known.insert(name.path.clone()) {
                 names.push(name);
             }
         }
@@ -464,20 +465,37 @@ fn note_gaps(frames: &[SequenceFrame], notes: &mut Vec<String>) {
 }
 
 fn note_missing_parts(frames: &[SequenceFrame], parts: &[String], notes: &mut Vec<String>) {
-    for (index, name) in (0u32..).zip(parts).filter(|_| parts.len() > 1) {
+    if parts.len() < 2 {
+        return;
+    }
+    // Frames that have a part, in their order; a frame may have several steps of one.
+    let mut present: Vec<Vec<usize>> = vec![Vec::new(); parts.len()];
+    for (place, frame) in frames.iter().enumerate() {
+        for part in &frame.parts {
+            if let Some(places) = present.get_mut(part.part as usize)
+                && places.last() != Some(&place)
+            {
+                places.push(place);
+            }
+        }
+    }
+    for (name, present) in parts.iter().zip(present) {
+        if present.len() == frames.len() {
+            continue;
+        }
+        let mut present = present.into_iter().peekable();
         let missing: Vec<i64> = frames
             .iter()
-            .filter(|f| f.parts.iter().all(|p| p.part != index))
-            .map(|f| f.number)
+            .enumerate()
+            .filter(|(place, _)| present.next_if_eq(place).is_none())
+            .map(|(_, frame)| frame.number)
             .collect();
-        if !missing.is_empty() {
-            notes.push(format!(
-                "part `{name}` is missing in {} of {} frames: {}",
-                missing.len(),
-                frames.len(),
-                ranges(&missing)
-            ));
-        }
+        notes.push(format!(
+            "part `{name}` is missing in {} of {} frames: {}",
+            missing.len(),
+            frames.len(),
+            ranges(&missing)
+        ));
     }
 }
 

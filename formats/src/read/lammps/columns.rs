@@ -80,6 +80,8 @@ impl Columns {
             let cell = first_row.get(index);
             cell.is_some_and(|cell| text::number(cell).is_none())
         };
+        // Found once: a header may repeat a name as often as it has room for.
+        let vectors = VECTORS.map(|(names, vector)| (names, vector, names.map(&column)));
         for (index, name) in header.names.iter().enumerate() {
             let name = String::from_utf8_lossy(name);
             let taken = self.fields.get(index).is_some_and(Option::is_some);
@@ -92,9 +94,8 @@ impl Columns {
             if taken || is_text(index) {
                 continue;
             }
-            let vector = VECTORS.iter().find(|(names, _)| names.contains(&&*name));
-            let columns = vector.map(|(names, _)| names.map(&column));
-            if let (Some((_, vector)), Some([Some(x), Some(y), Some(z)])) = (vector, columns)
+            let vector = vectors.iter().find(|(names, ..)| names.contains(&&*name));
+            if let Some((_, vector, [Some(x), Some(y), Some(z)])) = vector.copied()
                 && [x, y, z].contains(&index)
                 && ![x, y, z].into_iter().any(is_text)
             {

@@ -29,7 +29,7 @@ pub(super) enum Item {
 impl Item {
     /// What `line` announces; it begins with `ITEM:`.
     pub(super) fn of(line: &[u8]) -> Self {
-        let rest = line.strip_prefix(ITEM).unwrap_or(line).trim_ascii();
+        let rest = line.strip_prefix(ITEM).unwrap_or(line).trim_ascii_start();
         let begins = |name: &str| {
             rest.strip_prefix(name.as_bytes())
                 .is_some_and(|tail| tail.first().is_none_or(u8::is_ascii_whitespace))

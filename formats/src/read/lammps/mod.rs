@@ -34,12 +34,13 @@ const ITEM: &[u8] = b"ITEM:";
 pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
     let mut steps: Vec<Step> = Vec::new();
     let mut seen = Seen::default();
+    let mut pair = LinePair::default();
     for at in memmem::find_iter(bytes, ITEM) {
         if steps.is_empty() {
             check_start(bytes, at)?;
         }
-        let mut lines = Lines::new(bytes, at..bytes.len());
-        let item = lines.next().map_or(Item::Other, |line| Item::of(line.text));
+        pair.go_to(bytes, at);
+        let item = Item::of(bytes.get(at..pair.end).unwrap_or_default());
         if steps.is_empty() || seen.ends_before(item) {
             if let Some(last) = steps.last_mut() {
                 last.span.end = at;
@@ -53,12 +54,10 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
             seen = Seen::default();
         }
         seen.note(item);
-        // A value without a newline may lack digits.
-        let value = lines.next().filter(|v| v.at + v.text.len() < bytes.len());
-        if let (Some(step), Some(value)) = (steps.last_mut(), value) {
+        if let (Some(step), Some(value)) = (steps.last_mut(), pair.value()) {
             match item {
-                Item::TimeStep => step.number = text::integer(value.text.trim_ascii()),
-                Item::Time => step.time = text::number(value.text.trim_ascii()),
+                Item::TimeStep => step.number = value.integer,
+                Item::Time => step.time = value.number,
                 _ => {}
             }
         }
@@ -127,6 +126,48 @@ const DIALECT: Dialect = Dialect {
     comments: Comments::None,
     surplus: Surplus::Empty,
 };
+
+/// A line with one `ITEM:` or many, and the next line, which is looked at once for all of them.
+#[derive(Debug, Default)]
+struct LinePair<'a> {
+    /// Where the line ends.
+    end: usize,
+    next: Option<&'a [u8]>,
+    value: Option<Value>,
+}
+
+/// What the line after an item says.
+#[derive(Debug, Clone, Copy)]
+struct Value {
+    integer: Option<i64>,
+    number: Option<f64>,
+}
+
+impl<'a> LinePair<'a> {
+    /// Goes to the line that has byte `at`, which is not before that of the last call.
+    fn go_to(&mut self, bytes: &'a [u8], at: usize) {
+        if at < self.end {
+            return;
+        }
+        let mut lines = Lines::new(bytes, at..bytes.len());
+        self.end = lines
+            .next()
+            .map_or(bytes.len(), |line| line.at + line.text.len());
+        // A value without a newline may lack digits.
+        let next = lines.next().filter(|v| v.at + v.text.len() < bytes.len());
+        self.next = next.map(|line| line.text.trim_ascii());
+        self.value = None;
+    }
+
+    fn value(&mut self) -> Option<Value> {
+        let next = self.next?;
+        let value = || Value {
+            integer: text::integer(next),
+            number: text::number(next),
+        };
+        Some(*self.value.get_or_insert_with(value))
+    }
+}
 
 /// Which header lines of a step have passed.
 #[derive(Debug, Default)]

@@ -1,9 +1,15 @@
 //! The `<AppendedData>` element: found in the bytes, not by an XML parser, because raw data make
 //! the file invalid XML.
 
+use std::cell::Cell;
+
 use memchr::memmem;
 
 use crate::ParseError;
+
+/// How often all appended bytes may be read. Writers give each array bytes of its own; a file whose arrays
+/// share them could ask for work that grows with the square of its length.
+const MOST_READS: usize = 4;
 
 /// The blob behind the underscore.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,6 +18,8 @@ pub(super) struct Appended<'a> {
     pub(super) at: usize,
     pub(super) blob: &'a [u8],
     pub(super) is_base64: bool,
+    /// Bytes that arrays were read from so far.
+    pub(super) spent: &'a Cell<usize>,
 }
 
 /// Where the XML in front of the appended data ends; `None` if there are no appended data.
@@ -24,7 +32,11 @@ impl<'a> Appended<'a> {
     ///
     /// # Errors
     /// Malformed if the tag or the underscore is missing, or the encoding is neither.
-    pub(super) fn parse(bytes: &'a [u8], tag: usize) -> Result<Self, ParseError> {
+    pub(super) fn parse(
+        bytes: &'a [u8],
+        tag: usize,
+        spent: &'a Cell<usize>,
+    ) -> Result<Self, ParseError> {
         let from_tag = bytes.get(tag..).unwrap_or_default();
         let ended = || ParseError::malformed(bytes.len(), "the file ends inside <AppendedData>");
         let open = memchr::memchr(b'>', from_tag).ok_or_else(ended)?;
@@ -46,6 +58,7 @@ impl<'a> Appended<'a> {
                 at: tag,
                 blob: &[],
                 is_base64,
+                spent,
             });
         }
         let at = tag + open + 1 + (rest.len() - trimmed.len());
@@ -69,7 +82,15 @@ impl<'a> Appended<'a> {
             at: at + 1,
             blob: blob.get(..end.unwrap_or(blob.len())).unwrap_or_default(),
             is_base64,
+            spent,
         })
+    }
+
+    /// Counts `used` bytes as read; false if that makes too many.
+    pub(super) fn spend(&self, used: usize) -> bool {
+        let spent = self.spent.get().saturating_add(used);
+        self.spent.set(spent);
+        spent <= self.blob.len().saturating_mul(MOST_READS)
     }
 }
 
@@ -90,7 +111,8 @@ mod tests {
     #[track_caller]
     fn check(file: &[u8], blob: Option<(&[u8], bool)>) {
         let tag = find(file).expect("the test has the tag");
-        let found = Appended::parse(file, tag).ok();
+        let spent = Cell::new(0);
+        let found = Appended::parse(file, tag, &spent).ok();
         assert_eq!(found.map(|a| (a.blob, a.is_base64)), blob);
         if let Some(a) = found {
             assert_eq!(file.get(a.at..a.at + a.blob.len()), Some(a.blob));

@@ -55,6 +55,13 @@ pub(super) enum Source<'a> {
 }
 
 impl<'a> Source<'a> {
+    /// Bytes or characters that are left.
+    const fn len(self) -> usize {
+        match self {
+            Self::Raw(bytes) | Self::Base64(bytes) => bytes.len(),
+        }
+    }
+
     /// The next `count` bytes, encoded as one run, and the source behind them.
     fn run(self, count: usize) -> Result<(Cow<'a, [u8]>, Self), String> {
         match self {
@@ -138,7 +145,8 @@ fn take_chars(chars: &[u8], count: usize) -> (Cow<'_, [u8]>, &[u8]) {
     (Cow::Owned(taken), chars.get(used..).unwrap_or_default())
 }
 
-/// The `need` bytes of an array, borrowed if the file holds them as they are.
+/// The `need` bytes of an array, borrowed if the file holds them as they are, and how many bytes of `source`
+/// they were read from.
 ///
 /// # Errors
 /// What is wrong: the header states another length, the source is too short, or a block is damaged.
@@ -147,14 +155,18 @@ pub(super) fn payload<'a>(
     source: Source<'a>,
     encoding: Encoding,
     need: usize,
-) -> Result<Cow<'a, [u8]>, String> {
-    match encoding.compressor {
+) -> Result<(Cow<'a, [u8]>, usize), String> {
+    let (bytes, rest) = match encoding.compressor {
         None => plain(source, encoding, need),
         Some(compressor) => compressed(source, encoding, compressor, need),
-    }
+    }?;
+    Ok((bytes, source.len() - rest.len()))
 }
 
-fn plain<'a>(source: Source<'a>, encoding: Encoding, need: usize) -> Result<Cow<'a, [u8]>, String> {
+/// The bytes of an array, and what is behind them.
+type Payload<'a> = (Cow<'a, [u8]>, Source<'a>);
+
+fn plain<'a>(source: Source<'a>, encoding: Encoding, need: usize) -> Result<Payload<'a>, String> {
     let header = encoding.header.size();
     let (length, data) = source.length_and_data(header)?;
     let stated = integers(&length, encoding).next().unwrap_or(0);
@@ -162,13 +174,14 @@ fn plain<'a>(source: Source<'a>, encoding: Encoding, need: usize) -> Result<Cow<
         return Err(format!("{need} bytes needed, the header says {stated}"));
     }
     match data {
-        DataRun::New(source) => Ok(source.run(need)?.0),
+        DataRun::New(source) => source.run(need),
         DataRun::Same(source) => {
             let whole = need.checked_add(header);
             let whole = whole.ok_or_else(|| format!("{need} bytes are too many"))?;
-            let mut bytes = source.run(whole)?.0.into_owned();
+            let (bytes, rest) = source.run(whole)?;
+            let mut bytes = bytes.into_owned();
             bytes.drain(..header);
-            Ok(Cow::Owned(bytes))
+            Ok((Cow::Owned(bytes), rest))
         }
     }
 }
@@ -178,14 +191,14 @@ fn compressed<'a>(
     encoding: Encoding,
     compressor: Compressor,
     need: usize,
-) -> Result<Cow<'a, [u8]>, String> {
+) -> Result<Payload<'a>, String> {
     let size = encoding.header.size();
-    let (first, _) = source.run(size)?;
+    let (first, rest) = source.run(size)?;
     let blocks = integers(&first, encoding).next().unwrap_or(0);
     if blocks == 0 {
         // Some writers leave out the other two integers then.
         return match need {
-            0 => Ok(Cow::Borrowed(&[])),
+            0 => Ok((Cow::Borrowed(&[]), rest)),
             _ => Err(format!("{need} bytes needed, there are no blocks")),
         };
     }
@@ -204,7 +217,7 @@ fn inflate<'a>(
     encoding: Encoding,
     compressor: Compressor,
     need: usize,
-) -> Result<Cow<'a, [u8]>, String> {
+) -> Result<Payload<'a>, String> {
     let mut header = integers(header, encoding);
     let (_, block_size, last) = (header.next(), header.next(), header.next());
     let block_size = block_size.unwrap_or(0);
@@ -228,7 +241,7 @@ fn inflate<'a>(
         .iter()
         .try_fold(0_usize, |sum, n| sum.checked_add(*n));
     let compressed_total = compressed_total.ok_or("the block sizes overflow")?;
-    let (data, _) = data.run(compressed_total)?;
+    let (data, behind_data) = data.run(compressed_total)?;
     let mut blocks = Vec::with_capacity(compressed_sizes.len());
     let mut rest: &[u8] = &data;
     let mut left = need;
@@ -247,7 +260,7 @@ fn inflate<'a>(
         .par_chunks_mut(block_size)
         .zip(blocks)
         .try_for_each(|(chunk, block)| compressor.decompress(block, chunk))?;
-    Ok(Cow::Owned(output))
+    Ok((Cow::Owned(output), behind_data))
 }
 
 /// The integers of a header.

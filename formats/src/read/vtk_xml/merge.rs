@@ -1,10 +1,12 @@
 //! Several pieces become one set of particles: arrays are joined in the order of the pieces.
 
+use std::collections::{HashMap, HashSet};
+
 use super::appended::Appended;
 use super::document::{Array, Document, Piece};
 use super::{scalar_type, value_count, values};
 use crate::read::vtk;
-use crate::{Attribute, AttributeData, ParseError, Positions};
+use crate::{Attribute, AttributeData, ParseError, Positions, ScalarType};
 
 /// The positions of all pieces; double precision if any piece has it.
 pub(super) fn positions(
@@ -69,28 +71,38 @@ pub(super) fn attributes(
     let Some((first, others)) = pieces.split_first() else {
         return Ok(Vec::new());
     };
+    // A file may list as many arrays as it has room for: each is looked up, never searched for.
+    let others: Vec<(&Piece<'_>, ByKind<'_, '_>)> =
+        others.iter().map(|p| (*p, by_kind(p))).collect();
+    let mut tried = HashSet::new();
+    let mut names = HashSet::new();
     let mut joined: Vec<Attribute> = Vec::new();
     for array in &first.point_data {
         let components = array.components.unwrap_or(1);
-        let is_twice = joined.iter().any(|a| a.name == array.name);
+        // What was left out once is left out again.
+        let kind = kind(array);
+        if components == 0 || !tried.insert(kind) || names.contains(array.name.as_str()) {
+            continue;
+        }
         let everywhere: Option<Vec<&Array<'_>>> = others
             .iter()
-            .map(|piece| same_array(piece, array))
+            .map(|(_, arrays)| arrays.get(&kind).copied())
             .collect();
-        let Some(parts) = everywhere.filter(|_| components > 0 && !is_twice) else {
+        let Some(parts) = everywhere else {
             continue;
         };
         let count = value_count(array, first.points, components)?;
         let Some(mut data) = values(array, document.encoding, appended, count)? else {
             continue;
         };
-        for (piece, part) in others.iter().zip(parts) {
+        for ((piece, _), part) in others.iter().zip(parts) {
             let count = value_count(part, piece.points, components)?;
             match values(part, document.encoding, appended, count)? {
                 Some(more) => extend(&mut data, more),
                 None => return Err(not_numeric(part)),
             }
         }
+        names.insert(array.name.as_str());
         joined.push(Attribute {
             name: array.name.clone(),
             components,
@@ -105,15 +117,29 @@ fn filled<'d, 'a>(document: &'d Document<'a>) -> impl Iterator<Item = &'d Piece<
     document.pieces.iter().filter(|piece| piece.points > 0)
 }
 
-fn same_array<'p, 'a>(piece: &'p Piece<'a>, like: &Array<'_>) -> Option<&'p Array<'a>> {
-    piece.point_data.iter().find(|array| {
-        array.name == like.name
-            && array.components.unwrap_or(1) == like.components.unwrap_or(1)
-            && scalar_type(&array.type_name) == scalar_type(&like.type_name)
-    })
+/// What arrays of two pieces must share to be joined: name, components and type.
+type Kind<'p> = (&'p str, usize, Option<ScalarType>);
+
+/// The first array of each kind in a piece.
+type ByKind<'p, 'a> = HashMap<Kind<'p>, &'p Array<'a>>;
+
+fn kind<'p>(array: &'p Array<'_>) -> Kind<'p> {
+    (
+        &array.name,
+        array.components.unwrap_or(1),
+        scalar_type(&array.type_name),
+    )
 }
 
-/// Appends `more`, which has the same type: [`same_array`] saw to that.
+fn by_kind<'p, 'a>(piece: &'p Piece<'a>) -> ByKind<'p, 'a> {
+    let mut arrays = HashMap::with_capacity(piece.point_data.len());
+    for array in &piece.point_data {
+        arrays.entry(kind(array)).or_insert(array);
+    }
+    arrays
+}
+
+/// Appends `more`, which has the same type: it is of the same [`Kind`].
 fn extend(data: &mut AttributeData, more: AttributeData) {
     use AttributeData::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
     match (data, more) {

@@ -14,6 +14,8 @@ mod merge;
 #[cfg(test)]
 mod tests;
 
+use std::cell::Cell;
+
 use super::Step;
 use super::text::same_length;
 use super::vtk::{MOST_COMPONENTS, parse_values};
@@ -66,7 +68,9 @@ fn parse<T>(
     let head = same_length(head);
     let document = Document::parse(&head, cut.is_some(), until)?;
     check_total(&document, bytes.len())?;
-    let appended = cut.map(|tag| Appended::parse(bytes, tag)).transpose()?;
+    let spent = Cell::new(0);
+    let appended = cut.map(|tag| Appended::parse(bytes, tag, &spent));
+    let appended = appended.transpose()?;
     then(document, appended)
 }
 
@@ -220,7 +224,12 @@ fn values(
             (appended.at + offset, source)
         }
     };
-    let bytes = payload(source, encoding, need).map_err(|what| fault(at, what))?;
+    let (bytes, used) = payload(source, encoding, need).map_err(|what| fault(at, what))?;
+    let is_appended = matches!(array.place, Place::Appended(_));
+    if is_appended && !appended.is_none_or(|appended| appended.spend(used)) {
+        let what = "it shares its bytes with too many others; each array needs bytes of its own";
+        return Err(fault(at, what.to_owned()));
+    }
     let data = scalar.decode(encoding.endian, &bytes);
     data.map(Some).map_err(|error| fault(at, error.to_string()))
 }

@@ -5,17 +5,18 @@
 /// braces and have blanks then.
 pub(super) fn value<'a>(comment: &'a [u8], key: &str) -> Option<&'a [u8]> {
     let mut rest = comment;
+    let mut open = Unclosed::default();
     loop {
         rest = rest.trim_ascii_start();
         if rest.is_empty() {
             return None;
         }
-        let (name, after) = item(rest, b"=");
+        let (name, after) = item(rest, b"=", &mut open);
         let Some(after) = after.trim_ascii_start().strip_prefix(b"=") else {
             rest = after; // a word without a value
             continue;
         };
-        let (found, after) = item(after.trim_ascii_start(), b"");
+        let (found, after) = item(after.trim_ascii_start(), b"", &mut open);
         if name.eq_ignore_ascii_case(key.as_bytes()) {
             return Some(found);
         }
@@ -23,9 +24,28 @@ pub(super) fn value<'a>(comment: &'a [u8], key: &str) -> Option<&'a [u8]> {
     }
 }
 
+/// Closing characters that were looked for in vain. They are not looked for again, since a line may have as
+/// many openings as it has room for.
+#[derive(Default)]
+struct Unclosed(Vec<u8>);
+
+impl Unclosed {
+    /// Where the item that `text` begins with ends, see [`closed_at`].
+    fn end(&mut self, text: &[u8], closing: u8) -> Option<usize> {
+        if self.0.contains(&closing) {
+            return None;
+        }
+        let end = closed_at(text, closing);
+        if end.is_none() {
+            self.0.push(closing);
+        }
+        end
+    }
+}
+
 /// The quoted or bare item that `text` begins with, and what follows. A bare one ends at a blank
 /// or at one of `ends`, and takes at least one byte.
-fn item<'a>(text: &'a [u8], ends: &[u8]) -> (&'a [u8], &'a [u8]) {
+fn item<'a>(text: &'a [u8], ends: &[u8], open: &mut Unclosed) -> (&'a [u8], &'a [u8]) {
     let closing = match text.first() {
         Some(b'"') => Some(b'"'),
         Some(b'\'') => Some(b'\''),
@@ -34,7 +54,7 @@ fn item<'a>(text: &'a [u8], ends: &[u8]) -> (&'a [u8], &'a [u8]) {
         _ => None,
     };
     if let Some(closing) = closing
-        && let Some(end) = closed_at(text, closing)
+        && let Some(end) = open.end(text, closing)
     {
         return (&text[1..end], &text[end + 1..]);
     }
@@ -90,6 +110,15 @@ mod tests {
             "", "=", "= =", "a=", "\"", "a=\"b", "==a=1", "{", "a = ", "'", "\\",
         ] {
             assert_eq!(value(comment.as_bytes(), "nothing"), None, "{comment}");
+        }
+    }
+
+    #[test]
+    fn a_comment_of_openings_is_walked_once() {
+        // Looked through from each of them, these would take hours.
+        for openings in ["{ ", "\" ", "a={ ", "[ ' "] {
+            let comment = openings.repeat(1 << 20);
+            assert_eq!(value(comment.as_bytes(), "nothing"), None);
         }
     }
 

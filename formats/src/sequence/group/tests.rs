@@ -182,3 +182,21 @@ fn listed_files_are_all_used() {
     assert_eq!(list(&["fluid_3.vtk", "wall_3.ply"]), (vec![3, 3], 2, 0));
     assert_eq!(list(&["alone.vtk"]), (vec![], 1, 0));
 }
+
+#[test]
+fn very_many_names_without_anything_in_common_are_grouped() {
+    // Compared each with each, these would take minutes.
+    let letters = |mut i: usize| {
+        let mut text = String::new();
+        for _ in 0..4 {
+            text.push(char::from(b'a' + u8::try_from(i % 26).expect("a letter")));
+            i /= 26;
+        }
+        text
+    };
+    let files: Vec<String> = (0..100_000)
+        .map(|i| format!("{}.vtk", letters(i)))
+        .collect();
+    let found = candidates(names(&files));
+    assert_eq!(found.len(), files.len());
+}

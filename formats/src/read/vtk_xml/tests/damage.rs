@@ -138,7 +138,9 @@ fn places_are_those_of_the_file_whatever_its_names() {
 /// The first byte of the appended data.
 fn blob_at(file: &[u8]) -> usize {
     let tag = appended::find(file).unwrap();
-    Appended::parse(file, tag).unwrap().at
+    Appended::parse(file, tag, &std::cell::Cell::new(0))
+        .unwrap()
+        .at
 }
 
 #[track_caller]
