@@ -30,6 +30,7 @@ mod mishap;
 pub mod output;
 pub mod pipeline;
 pub mod ray;
+pub mod reading;
 pub mod render;
 pub mod report;
 pub mod resolve;

@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use crate::read::{self, Step};
-use crate::{ParseError, RawParticles, native};
+use crate::{MemoryBudget, ParseError, RawParticles, native};
 
 mod foreign;
 mod hdf5;
@@ -160,6 +160,15 @@ impl Format {
     /// # Errors
     /// What the reader of the format says.
     pub fn steps(self, bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+        self.steps_within(bytes, MemoryBudget::UNLIMITED)
+    }
+
+    /// [`Self::steps`] within a budget.
+    pub(crate) fn steps_within(
+        self,
+        bytes: &[u8],
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
         match self {
             Self::Spf => native::steps(bytes),
             Self::VtkLegacy => read::vtk::steps(bytes),
@@ -168,7 +177,7 @@ impl Format {
             Self::Ply => read::ply::steps(bytes),
             Self::Xyz => read::xyz::steps(bytes),
             Self::Lammps => read::lammps::steps(bytes),
-            Self::Npy | Self::Npz => read::npy::steps(bytes),
+            Self::Npy | Self::Npz => read::npy::steps_within(bytes, budget),
             Self::Csv => read::csv::steps(bytes),
         }
     }
@@ -178,16 +187,29 @@ impl Format {
     /// # Errors
     /// What the reader of the format says.
     pub fn read(self, bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+        self.read_within(bytes, step, MemoryBudget::UNLIMITED)
+    }
+
+    /// [`Self::read`] if the numbers fit into a budget, apart from `bytes`.
+    ///
+    /// # Errors
+    /// As [`Self::read`], and [`ParseError::TooLarge`].
+    pub fn read_within(
+        self,
+        bytes: &[u8],
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
         match self {
             Self::Spf => native::read(bytes, step),
             Self::VtkLegacy => read::vtk::read(bytes, step),
-            Self::VtkXml => read::vtk_xml::read(bytes, step),
+            Self::VtkXml => read::vtk_xml::read_within(bytes, step, budget),
             Self::Bgeo => read::bgeo::read(bytes, step),
             Self::Ply => read::ply::read(bytes, step),
-            Self::Xyz => read::xyz::read(bytes, step),
-            Self::Lammps => read::lammps::read(bytes, step),
-            Self::Npy | Self::Npz => read::npy::read(bytes, step),
-            Self::Csv => read::csv::read(bytes, step),
+            Self::Xyz => read::xyz::read_within(bytes, step, budget),
+            Self::Lammps => read::lammps::read_within(bytes, step, budget),
+            Self::Npy | Self::Npz => read::npy::read_within(bytes, step, budget),
+            Self::Csv => read::csv::read_within(bytes, step, budget),
         }
     }
 }

@@ -28,6 +28,12 @@ pub enum ParseError {
         /// What it is and what to do instead.
         what: String,
     },
+    /// Reading it takes more memory than is allowed.
+    #[error("{what}")]
+    TooLarge {
+        /// How much is allowed and what to do about it.
+        what: String,
+    },
 }
 
 impl ParseError {
@@ -46,6 +52,25 @@ impl ParseError {
         }
     }
 
+    /// A [`ParseError::TooLarge`].
+    pub fn too_large(what: impl Into<String>) -> Self {
+        Self::TooLarge {
+            what: one_line(what.into()),
+        }
+    }
+
+    /// The same fault in a file of which `start` bytes come before those that were looked at.
+    #[must_use]
+    pub(crate) fn behind(self, start: usize) -> Self {
+        match self {
+            Self::Malformed { at, what } => Self::Malformed {
+                at: at.saturating_add(start as u64),
+                what,
+            },
+            other => other,
+        }
+    }
+
     /// The same fault at the same place, told as `tell` has it.
     #[must_use]
     pub fn retold(self, tell: impl FnOnce(&str) -> String) -> Self {
@@ -55,6 +80,7 @@ impl ParseError {
                 what: one_line(tell(&what)),
             },
             Self::Unsupported { what } => Self::unsupported(tell(&what)),
+            Self::TooLarge { what } => Self::too_large(tell(&what)),
         }
     }
 
@@ -64,6 +90,7 @@ impl ParseError {
         match self {
             Self::Malformed { at, what } => FrameError::Malformed { path, at, what },
             Self::Unsupported { what } => FrameError::Unsupported { path, what },
+            Self::TooLarge { what } => FrameError::TooLarge { path, what },
         }
     }
 }
@@ -87,6 +114,14 @@ pub enum FrameError {
         /// The file.
         path: PathBuf,
         /// What it is and what to do instead.
+        what: String,
+    },
+    /// Reading it takes more memory than is allowed; worth a retry with more.
+    #[error("{}: {what}", path.display())]
+    TooLarge {
+        /// The file.
+        path: PathBuf,
+        /// How much is allowed and what to do about it.
         what: String,
     },
     /// The operating system refused; perhaps worth a retry.

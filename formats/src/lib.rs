@@ -7,11 +7,13 @@
 #![deny(unsafe_code)]
 
 mod attribute;
+mod budget;
 mod error;
 mod frame;
 mod message;
 mod origin;
 mod scalar;
+mod unpack;
 
 pub mod blocks;
 pub mod convert;
@@ -26,6 +28,7 @@ pub mod stats;
 pub mod write;
 
 pub use attribute::{Attribute, AttributeData, ID_NAMES};
+pub use budget::MemoryBudget;
 pub use error::{FrameError, ParseError};
 pub use frame::{ParticleFrame, Positions, Radius, RawParticles};
 pub use open::FrameFile;

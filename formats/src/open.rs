@@ -1,11 +1,14 @@
 //! Opens one file of particles: reads it, takes gzip off, finds the format and the steps inside.
 //!
-//! The only place that reads foreign files; the readers see bytes. A file that changes while it is
+//! The only place that reads foreign files; the readers see bytes. Tables are read in pieces from the disk,
+//! other files as a whole, and both within a [`MemoryBudget`]. A file that changes while it is
 //! read is told as such, because a simulation that is still running is the usual cause.
 
 use std::fs::{self, File};
-use std::io::{self, Read, Seek};
+use std::io::{self, BufReader, Read, Seek};
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+use std::time::SystemTime;
 
 use flate2::bufread::GzDecoder;
 use rkyv::util::AlignedVec;
@@ -13,10 +16,15 @@ use rkyv::util::AlignedVec;
 use crate::detect::{Format, HEAD_LEN};
 use crate::message::one_line;
 use crate::native;
-use crate::read::{Step, remarks};
-use crate::{FrameError, ParseError, RawParticles};
+use crate::read::{Step, csv, remarks, stream_bytes, xyz};
+use crate::unpack::{ByteSource, SourceError, Unpacker};
+use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
-/// A file in memory, ready to give its steps.
+/// Files up to this length, unpacked, are always read as a whole; of longer ones so much decides whether that
+/// is needed. More than the reader of tables looks at to find columns.
+const HEAD: usize = 2 << 20;
+
+/// A file ready to give its steps.
 #[derive(Debug)]
 pub struct FrameFile {
     path: PathBuf,
@@ -25,6 +33,7 @@ pub struct FrameFile {
     steps: Vec<Step>,
     stored_len: u64,
     notes: Vec<String>,
+    budget: MemoryBudget,
 }
 
 /// Where the bytes of a file are.
@@ -33,6 +42,26 @@ enum Content {
     Plain(Vec<u8>),
     /// Native frames: their sections are used as they lie.
     Aligned(AlignedVec<64>),
+    /// On the disk: they are read whenever they are wanted.
+    Streamed(Streamed),
+}
+
+/// A table that is not in memory.
+#[derive(Debug)]
+struct Streamed {
+    /// Its beginning, unpacked.
+    head: Vec<u8>,
+    /// What the file was when it was opened.
+    stamp: Stamp,
+    /// Found when it was first read: bytes once unpacked, and oddities.
+    end: OnceLock<(u64, Vec<String>)>,
+}
+
+/// What tells a file from one that was written to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+struct Stamp {
+    len: u64,
+    modified: Option<SystemTime>,
 }
 
 impl Content {
@@ -40,24 +69,72 @@ impl Content {
         match self {
             Self::Plain(bytes) => bytes,
             Self::Aligned(bytes) => bytes,
+            Self::Streamed(streamed) => &streamed.head,
         }
     }
 }
 
 impl FrameFile {
+    /// [`Self::open_within`] all memory that there is.
+    ///
+    /// # Errors
+    /// As [`Self::open_within`].
+    pub fn open(path: &Path) -> Result<Self, FrameError> {
+        Self::open_within(path, MemoryBudget::UNLIMITED)
+    }
+
     /// Reads and understands the file at `path`, whatever its name.
     ///
     /// # Errors
     /// [`FrameError::Io`] if it cannot be read or changed size meanwhile,
-    /// [`FrameError::Unsupported`] for a known format that is not read (or no regular file), and
+    /// [`FrameError::Unsupported`] for a known format that is not read (or no regular file),
+    /// [`FrameError::TooLarge`] if it needs more memory than `budget` allows, and
     /// [`FrameError::Malformed`] for everything that breaks its own format.
-    pub fn open(path: &Path) -> Result<Self, FrameError> {
+    pub fn open_within(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
         if is_native(path)? {
+            let len = regular_len(path)?;
+            let fits = budget.for_content().check(len, "the file is");
+            fits.map_err(|e| e.in_file(path))?;
             let bytes = native::read_aligned(path)?;
             let stored_len = bytes.len() as u64;
-            return Self::new(path, Content::Aligned(bytes), stored_len, Vec::new());
+            let content = Content::Aligned(bytes);
+            return Self::new(path, content, stored_len, Vec::new(), budget);
         }
-        Self::from_bytes(path, read_stable(path)?)
+        let in_file = |e: SourceError| e.in_file(path);
+        let stamp = Stamp::of(path)?;
+        let mut source = unpacker(path)?;
+        let mut bytes = Vec::new();
+        if !source.is_packed() {
+            bytes.reserve_exact(usize::try_from(stamp.len).map_or(HEAD, |len| len.min(HEAD)));
+        }
+        let is_whole = source.fill(&mut bytes, HEAD).map_err(in_file)? < HEAD;
+        // Before more is unpacked than is of use.
+        Format::detect(&bytes, path).map_err(|e| e.in_file(path))?;
+        if !is_whole && is_streamed(&bytes, path) {
+            let streamed = Streamed {
+                head: bytes,
+                stamp,
+                end: OnceLock::new(),
+            };
+            let content = Content::Streamed(streamed);
+            return Self::new(path, content, stamp.len, Vec::new(), budget);
+        }
+        let notes = if is_whole {
+            source.into_notes()
+        } else {
+            let room = budget.for_content();
+            if !source.is_packed() {
+                let fits = room.check(stamp.len, "the file is");
+                fits.map_err(|e| e.in_file(path))?;
+            }
+            // A guess for packed files; more is no harm, since pages that are not used cost nothing.
+            let len = unpacked_len(path).unwrap_or(stamp.len).min(room.bytes());
+            let more = usize::try_from(len).unwrap_or(usize::MAX);
+            let _ = bytes.try_reserve_exact(more.saturating_sub(bytes.len()).saturating_add(1));
+            source.finish(&mut bytes, room).map_err(in_file)?
+        };
+        stamp.check(path)?;
+        Self::new(path, Content::Plain(bytes), stamp.len, notes, budget)
     }
 
     /// Understands `bytes` as the content of a file at `path`, which is not touched.
@@ -65,15 +142,32 @@ impl FrameFile {
     /// # Errors
     /// As [`Self::open`], less the reading.
     pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, FrameError> {
+        Self::from_bytes_within(path, bytes, MemoryBudget::UNLIMITED)
+    }
+
+    /// [`Self::from_bytes`] if it can be unpacked and read within `budget`.
+    ///
+    /// # Errors
+    /// As [`Self::open_within`], less the reading.
+    pub fn from_bytes_within(
+        path: &Path,
+        bytes: Vec<u8>,
+        budget: MemoryBudget,
+    ) -> Result<Self, FrameError> {
         let stored_len = bytes.len() as u64;
-        let in_file = |e: ParseError| e.in_file(path);
+        let in_file = |e: SourceError| e.in_file(path);
         let mut notes = Vec::new();
         let bytes = if is_gzip(&bytes) {
-            gunzip(&bytes, &mut notes).map_err(in_file)?
+            let mut unpacked = Vec::new();
+            let source = Unpacker::new(bytes.as_slice()).map_err(SourceError::Io);
+            let source = source.map_err(in_file)?;
+            let left = source.finish(&mut unpacked, budget.for_content());
+            notes.extend(left.map_err(in_file)?);
+            unpacked
         } else {
             bytes
         };
-        Self::new(path, Content::Plain(bytes), stored_len, notes)
+        Self::new(path, Content::Plain(bytes), stored_len, notes, budget)
     }
 
     fn new(
@@ -81,17 +175,20 @@ impl FrameFile {
         content: Content,
         stored_len: u64,
         notes: Vec<String>,
+        budget: MemoryBudget,
     ) -> Result<Self, FrameError> {
         let in_file = |e: ParseError| e.in_file(path);
         let format = Format::detect(content.bytes(), path).map_err(in_file)?;
-        let steps = format.steps(content.bytes()).map_err(in_file)?;
+        let left = budget.less(content.bytes().len() as u64);
+        let steps = format.steps_within(content.bytes(), left);
         Ok(Self {
             path: path.to_owned(),
-            content,
             format,
-            steps,
+            steps: steps.map_err(in_file)?,
+            content,
             stored_len,
             notes,
+            budget,
         })
     }
 
@@ -110,7 +207,7 @@ impl FrameFile {
         &self.steps
     }
 
-    /// The uncompressed content.
+    /// The uncompressed content; of a large table its beginning.
     pub fn bytes(&self) -> &[u8] {
         self.content.bytes()
     }
@@ -120,16 +217,41 @@ impl FrameFile {
         self.stored_len
     }
 
-    /// Oddities that did not stop the file from being understood.
+    /// Bytes of the uncompressed content. Of a packed table a guess until it was read.
+    pub fn unpacked_len(&self) -> u64 {
+        match &self.content {
+            Content::Streamed(streamed) => match streamed.end.get() {
+                Some((len, _)) => *len,
+                None => unpacked_len(&self.path).unwrap_or(self.stored_len),
+            },
+            held => held.bytes().len() as u64,
+        }
+    }
+
+    /// Bytes that are held beside the numbers while these are read.
+    pub fn held_len(&self) -> u64 {
+        let held = self.bytes().len() as u64;
+        match &self.content {
+            Content::Streamed(_) => held + stream_bytes(),
+            Content::Plain(_) | Content::Aligned(_) => held,
+        }
+    }
+
+    /// Oddities that did not stop the file from being understood; those at the end of a large table once it
+    /// was read.
     pub fn notes(&self) -> &[String] {
-        &self.notes
+        match &self.content {
+            Content::Streamed(streamed) => streamed.end.get().map_or(&[], |(_, notes)| notes),
+            Content::Plain(_) | Content::Aligned(_) => &self.notes,
+        }
     }
 
     /// Reads step `index` of [`Self::steps`].
     ///
     /// # Errors
     /// [`FrameError::Malformed`] if there is no such step or its bytes are damaged,
-    /// [`FrameError::Unsupported`] for a variant of the format that is not read.
+    /// [`FrameError::Unsupported`] for a variant of the format that is not read,
+    /// [`FrameError::TooLarge`] if its numbers need more memory than is allowed.
     pub fn read(&self, index: usize) -> Result<RawParticles, FrameError> {
         let step = self.steps.get(index).ok_or_else(|| {
             let what = format!(
@@ -138,9 +260,81 @@ impl FrameFile {
             );
             ParseError::malformed(self.bytes().len(), what).in_file(&self.path)
         })?;
-        self.format
-            .read(self.bytes(), step)
-            .map_err(|e| e.in_file(&self.path))
+        let left = self.budget.less(self.held_len());
+        if let Content::Streamed(streamed) = &self.content {
+            return streamed.read(&self.path, left);
+        }
+        let particles = self.format.read_within(self.bytes(), step, left);
+        let fits = particles.and_then(|particles| {
+            left.check(particles.byte_len(), "in memory its numbers are")?;
+            Ok(particles)
+        });
+        fits.map_err(|e| e.in_file(&self.path))
+    }
+}
+
+impl Streamed {
+    /// Reads the particles of the file at `path`.
+    fn read(&self, path: &Path, budget: MemoryBudget) -> Result<RawParticles, FrameError> {
+        self.stamp.check(path)?;
+        let mut source = unpacker(path)?;
+        let len = unpacked_len(path).unwrap_or(self.stamp.len);
+        let read = csv::read_stream(&self.head, &mut source, len, budget);
+        let particles = read.map_err(|e| e.in_file(path));
+        // What changed meanwhile explains any other fault.
+        self.stamp.check(path)?;
+        let end = (source.len() as u64, source.into_notes());
+        let _ = self.end.set(end);
+        particles
+    }
+}
+
+/// Whether the file at `path`, which begins with `head` and goes on, is a table that can be read in pieces.
+fn is_streamed(head: &[u8], path: &Path) -> bool {
+    let is_table = match Format::detect(head, path) {
+        Ok(Format::Csv) => true,
+        Ok(Format::Xyz) => xyz::kind(head) == Ok(xyz::Kind::Bare),
+        _ => false,
+    };
+    is_table && csv::is_told_by(head)
+}
+
+fn unpacker(path: &Path) -> Result<Unpacker<BufReader<File>>, FrameError> {
+    let file = File::open(path).map(|file| BufReader::with_capacity(1 << 16, file));
+    let source = file.and_then(Unpacker::new);
+    source.map_err(|e| FrameError::io(path, e))
+}
+
+impl Stamp {
+    /// Of the regular file at `path`.
+    fn of(path: &Path) -> Result<Self, FrameError> {
+        let len = regular_len(path)?;
+        let meta = fs::metadata(path).map_err(|e| FrameError::io(path, e))?;
+        Ok(Self {
+            len,
+            modified: meta.modified().ok(),
+        })
+    }
+
+    /// That the file is still what it was.
+    fn check(self, path: &Path) -> Result<(), FrameError> {
+        self.check_same(Self::of(path)?)
+            .map_err(|e| FrameError::io(path, e))
+    }
+
+    fn check_same(self, now: Self) -> io::Result<()> {
+        if self == now {
+            return Ok(());
+        }
+        let what = if self.len == now.len {
+            "the file was written to while it was read".to_owned()
+        } else {
+            let (before, after) = (self.len, now.len);
+            format!("the size went from {before} to {after} bytes while it was read")
+        };
+        Err(io::Error::other(format!(
+            "{what}; it is still being written, try again later"
+        )))
     }
 }
 
@@ -202,25 +396,6 @@ pub(crate) fn head(path: &Path) -> Result<Vec<u8>, FrameError> {
     Ok(head)
 }
 
-/// The whole file, if it did not change size while it was read.
-fn read_stable(path: &Path) -> Result<Vec<u8>, FrameError> {
-    let before = regular_len(path)?;
-    let bytes = fs::read(path).map_err(|e| FrameError::io(path, e))?;
-    let after = regular_len(path)?;
-    check_stable(before, bytes.len() as u64, after).map_err(|e| FrameError::io(path, e))?;
-    Ok(bytes)
-}
-
-fn check_stable(before: u64, read: u64, after: u64) -> io::Result<()> {
-    if before == read && read == after {
-        return Ok(());
-    }
-    Err(io::Error::other(format!(
-        "the size went from {before} to {after} bytes while {read} were read; \
-         it is still being written, try again later"
-    )))
-}
-
 /// Length of a regular file: reading a pipe or a device could take forever.
 pub(crate) fn regular_len(path: &Path) -> Result<u64, FrameError> {
     let meta = fs::metadata(path).map_err(|e| FrameError::io(path, e))?;
@@ -260,40 +435,6 @@ pub fn unpacked_len(path: &Path) -> io::Result<u64> {
 /// Magic, deflate, no reserved flags: four bytes, so that raw floats do not look like it.
 pub(crate) fn is_gzip(bytes: &[u8]) -> bool {
     bytes.starts_with(&[0x1f, 0x8b, 8]) && bytes.get(3).is_none_or(|flags| flags & 0xe0 == 0)
-}
-
-/// Unpacks all members of a gzip file. Zeros after the last one are padding; anything else there
-/// is ignored with a note, as `gzip -d` does.
-fn gunzip(mut packed: &[u8], notes: &mut Vec<String>) -> Result<Vec<u8>, ParseError> {
-    let mut bytes = Vec::new();
-    loop {
-        let mut decoder = GzDecoder::new(packed);
-        decoder.read_to_end(&mut bytes).map_err(|e| {
-            let at = bytes.len();
-            match e.kind() {
-                io::ErrorKind::UnexpectedEof => ParseError::malformed(
-                    at,
-                    "the gzip stream breaks off here; perhaps it is still being written",
-                ),
-                io::ErrorKind::OutOfMemory => {
-                    ParseError::malformed(at, "no memory left to unpack the gzip stream")
-                }
-                _ => ParseError::malformed(at, format!("the gzip stream is damaged: {e}")),
-            }
-        })?;
-        let rest = decoder.into_inner();
-        if rest.iter().all(|b| *b == 0) {
-            return Ok(bytes);
-        }
-        if rest[0] != 0x1f || rest.get(1).is_some_and(|b| *b != 0x8b) {
-            notes.push(format!(
-                "{} bytes after the gzip stream are ignored",
-                rest.len()
-            ));
-            return Ok(bytes);
-        }
-        packed = rest;
-    }
 }
 
 #[cfg(test)]
@@ -382,9 +523,13 @@ mod tests {
 
     #[test]
     fn a_growing_file_is_noticed() {
-        assert!(check_stable(7, 7, 7).is_ok());
-        for (before, read, after) in [(7, 8, 8), (7, 7, 8), (8, 7, 7)] {
-            let error = check_stable(before, read, after).expect_err("changed");
+        let stamp = |len, seconds| Stamp {
+            len,
+            modified: Some(SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(seconds)),
+        };
+        assert!(stamp(7, 1).check_same(stamp(7, 1)).is_ok());
+        for now in [stamp(8, 1), stamp(6, 2), stamp(7, 2)] {
+            let error = stamp(7, 1).check_same(now).expect_err("changed");
             assert!(error.to_string().contains("still being written"));
         }
     }

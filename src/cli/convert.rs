@@ -21,6 +21,7 @@ use super::work::{
 use super::{CliError, Outcome, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
 use crate::manifest::{ProgressMode, real_dir};
+use crate::reading::read_budget;
 use crate::report::Bytes;
 use crate::survey::Survey;
 
@@ -86,7 +87,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
-    let sequence = apart(|| Sequence::open(&input))?;
+    let sequence = apart(|| Sequence::open_within(&input, read_budget(None, None)))?;
     for note in sequence.notes() {
         say!("note: {note}");
     }

@@ -12,6 +12,8 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 use super::CliError;
 use super::job_args::JobArgs;
 use crate::manifest::{Look, Manifest, Override};
+use crate::reading::read_budget;
+use crate::report::Bytes;
 
 /// What can be said on the command line about the pictures. Every key of the manifest has
 /// `--set`; the usual ones have a flag.
@@ -259,7 +261,14 @@ impl Asked {
     pub(super) fn sequence(&self) -> Result<Sequence, CliError> {
         let input = &self.manifest.input;
         let paths = input.path.iter().map(|p| self.base.join(p)).collect();
-        let mut sequence = apart(|| Sequence::open(&SequenceInput::from_paths(paths)))?;
+        let limit = |size: &Option<Bytes>| size.as_ref().map(|size| size.0);
+        let limits = &self.manifest;
+        let budget = read_budget(
+            limit(&limits.render.memory_limit),
+            limit(&limits.job.memory_ceiling),
+        );
+        let paths = SequenceInput::from_paths(paths);
+        let mut sequence = apart(|| Sequence::open_within(&paths, budget))?;
         if let Some(parts) = &input.parts {
             sequence.keep_parts(parts)?;
         }

@@ -11,7 +11,7 @@ use super::in_place::{Opened, StoredFrame};
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::mishap::may_be_unfinished;
-use crate::report::memory::available;
+use crate::report::memory::{available, process_room};
 
 /// Why a frame cannot be drawn.
 #[derive(Debug, thiserror::Error)]
@@ -179,7 +179,7 @@ fn first_file(sequence: &Sequence, task: &ImageTask) -> String {
 fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
     let size = FrameSize::of(sequence, task.index, setup.weight.as_ref());
     let need = MemoryModel::new(setup).decoding(&size);
-    match available() {
+    match available().into_iter().chain(process_room()).min() {
         Some(available) if need > available => Err(LoadError::TooLarge {
             file: first_file(sequence, task),
             need: need >> 20,

@@ -27,6 +27,26 @@ pub fn available() -> Option<u64> {
     value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable")
 }
 
+/// Bytes that this process may still take before a limit of its own (`ulimit -d`, `ulimit -v`) refuses more;
+/// None without one.
+#[cfg(unix)]
+pub fn process_room() -> Option<u64> {
+    use rustix::process::{Resource, getrlimit};
+    let status = fs::read_to_string("/proc/self/status").unwrap_or_default();
+    let limits = [(Resource::Data, "VmData"), (Resource::As, "VmSize")];
+    let rooms = limits.into_iter().filter_map(|(limit, taken)| {
+        let most = getrlimit(limit).current?;
+        Some(most.saturating_sub(value_of(&status, taken).unwrap_or(0)))
+    });
+    rooms.min()
+}
+
+/// Bytes that this process may still take; not known on this system.
+#[cfg(not(unix))]
+pub fn process_room() -> Option<u64> {
+    None
+}
+
 /// Bytes of memory that the machine has (`MemTotal`); None where the system does not tell.
 pub fn installed() -> Option<u64> {
     value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemTotal")

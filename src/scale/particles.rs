@@ -7,6 +7,7 @@ use spherule_formats::{ParticleFrame, Radius};
 
 use super::{CellRequest, FrameSource, Source, Stage};
 use crate::accel::{SphereRadius, Spheres};
+use crate::reading::read_budget;
 use crate::report::memory;
 use crate::scene::Bounds;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
@@ -64,7 +65,8 @@ impl Particles {
 
     fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, String> {
         let input = SequenceInput::from_path(&source.path);
-        let sequence = Sequence::open(&input).map_err(|e| e.to_string())?;
+        let sequence =
+            Sequence::open_within(&input, read_budget(None, None)).map_err(|e| e.to_string())?;
         let index = sequence
             .frames()
             .iter()

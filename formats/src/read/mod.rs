@@ -25,6 +25,8 @@ pub mod vtk;
 pub mod vtk_xml;
 pub mod xyz;
 
+pub(crate) use table::stream_bytes;
+
 /// One time step inside a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Step {

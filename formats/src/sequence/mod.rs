@@ -17,7 +17,7 @@ use crate::detect::Format;
 use crate::native::layout::UP_Y;
 use crate::native::{Access, NativeFile};
 use crate::open::FrameFile;
-use crate::{FrameError, ParseError, ParticleFrame, RawParticles};
+use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles};
 
 mod error;
 mod group;
@@ -97,6 +97,7 @@ pub struct Sequence {
     parts: Vec<String>,
     notes: Vec<String>,
     cache: Mutex<Option<Cached>>,
+    budget: MemoryBudget,
 }
 
 /// A frame as it is in its files, and what was in memory for it.
@@ -108,7 +109,7 @@ pub struct Loaded {
     pub notes: Vec<String>,
     /// Bytes of all its files, uncompressed.
     pub all_bytes: u64,
-    /// Bytes of the largest of its files, uncompressed: one is in memory at a time.
+    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time.
     pub content_bytes: u64,
 }
 
@@ -120,11 +121,19 @@ struct Cached {
 }
 
 impl Sequence {
-    /// Finds the frames of `input`.
+    /// [`Self::open_within`] all memory that there is.
+    ///
+    /// # Errors
+    /// As [`Self::open_within`].
+    pub fn open(input: &SequenceInput) -> Result<Self, SequenceError> {
+        Self::open_within(input, MemoryBudget::UNLIMITED)
+    }
+
+    /// Finds the frames of `input`, of which each file is read within `budget`.
     ///
     /// # Errors
     /// [`SequenceError`] if there is nothing, or no way to tell which files belong together.
-    pub fn open(input: &SequenceInput) -> Result<Self, SequenceError> {
+    pub fn open_within(input: &SequenceInput, budget: MemoryBudget) -> Result<Self, SequenceError> {
         let mut notes = Vec::new();
         let group = match input {
             SequenceInput::Directory(path) => {
@@ -137,11 +146,11 @@ impl Sequence {
             }
             SequenceInput::Files(paths) => group::listed(listed_names(paths)?, &mut notes)?,
         };
-        Ok(Self::from_group(group, notes))
+        Ok(Self::from_group(group, notes, budget))
     }
 
-    fn from_group(group: Group, mut notes: Vec<String>) -> Self {
-        let (numbered, last) = scan::number_steps(group.files, &mut notes);
+    fn from_group(group: Group, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
+        let (numbered, last) = scan::number_steps(group.files, budget, &mut notes);
         let mut by_number = BTreeMap::<i64, Vec<PartFile>>::new();
         for entry in numbered {
             by_number.entry(entry.number).or_default().push(entry.file);
@@ -161,6 +170,7 @@ impl Sequence {
             parts: group.parts,
             notes,
             cache: Mutex::new(cache),
+            budget,
         }
     }
 
@@ -301,9 +311,8 @@ impl Sequence {
             let (file, step) = self.file_of(part)?;
             parts.push((part.part, file.read(step)?));
             notes.extend_from_slice(file.notes());
-            let bytes = file.bytes().len() as u64;
-            all_bytes += bytes;
-            content_bytes = content_bytes.max(bytes);
+            all_bytes += file.unpacked_len();
+            content_bytes = content_bytes.max(file.held_len());
         }
         let only = if self.parts.len() < 2 {
             parts.pop().map(|(_, only)| only)
@@ -322,7 +331,7 @@ impl Sequence {
     /// The opened file of `part` and the step in it.
     fn file_of(&self, part: &PartFile) -> Result<(Arc<FrameFile>, usize), FrameError> {
         let Some(step) = part.step else {
-            let file = FrameFile::open(&part.path)?;
+            let file = FrameFile::open_within(&part.path, self.budget)?;
             return match file.steps() {
                 [_, second, ..] => {
                     let what = format!(
@@ -344,7 +353,7 @@ impl Sequence {
         }
         // Let go of the old one first: two large files need not be in memory at once.
         *lock() = None;
-        let file = Arc::new(FrameFile::open(&part.path)?);
+        let file = Arc::new(FrameFile::open_within(&part.path, self.budget)?);
         *lock() = Some(Cached {
             file: Arc::clone(&file),
             stamp,

@@ -8,6 +8,7 @@ use super::group::GroupFile;
 use super::name::Name;
 use super::pattern::Pattern;
 use super::{PartFile, SequenceError};
+use crate::MemoryBudget;
 use crate::detect::Format;
 use crate::open::{FrameFile, detect_file};
 use crate::read::Step;
@@ -176,10 +177,14 @@ pub(super) struct Numbered {
 /// again as any seen to hold one step. Loading checks the rest.
 pub(super) fn number_steps(
     files: Vec<GroupFile>,
+    budget: MemoryBudget,
     notes: &mut Vec<String>,
 ) -> (Vec<Numbered>, Option<FrameFile>) {
     let lone = files.len() == 1;
-    let mut scan = Scan::default();
+    let mut scan = Scan {
+        budget,
+        ..Scan::default()
+    };
     let several = files.iter().enumerate().any(|(i, f)| {
         may_hold_many(&f.path) && scan.is_suspect(&files, i) && scan.steps(i, &f.path).len() > 1
     });
@@ -251,6 +256,7 @@ struct Scan {
     single: u64,
     /// The file opened last: the caller may want it next.
     last: Option<FrameFile>,
+    budget: MemoryBudget,
 }
 
 impl Scan {
@@ -265,7 +271,7 @@ impl Scan {
             let mut steps = Vec::new();
             // Before the next is opened, so that only one is in memory.
             self.last = None;
-            if let Ok(file) = FrameFile::open(path) {
+            if let Ok(file) = FrameFile::open_within(path, self.budget) {
                 steps = file.steps().to_vec();
                 if steps.len() == 1 {
                     self.single = self.single.max(file.stored_len());

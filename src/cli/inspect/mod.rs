@@ -15,6 +15,7 @@ use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput
 
 use super::render::parts_text;
 use super::{CliError, Outcome};
+use crate::reading::read_budget;
 
 mod native;
 mod show;
@@ -106,7 +107,7 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
                     all.push(Meant::File(file, number));
                 }
             }
-            input => match Sequence::open(&input) {
+            input => match Sequence::open_within(&input, read_budget(None, None)) {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
                 Ok(sequence) => {
                     if let Some(parts) = parts_text(&sequence) {
@@ -138,7 +139,7 @@ fn inspect(
         let inspected = native::inspect(path, number, args.verify)?;
         return Ok(inspected.write(args.json, out));
     }
-    let file = FrameFile::open(path)?;
+    let file = FrameFile::open_within(path, read_budget(None, None))?;
     // Of many steps the first one says what holds for all.
     let mut remarks = remarks(path);
     for index in 0..file.steps().len() {

@@ -5,8 +5,9 @@
 //! names; `read::table` parses the rows.
 
 use super::Step;
-use super::table::{CUT_SHORT, Numbers, OnText, Place, Table, Target};
-use crate::{ParseError, RawParticles};
+use super::table::{CUT_SHORT, Numbers, OnText, Place, Table, TableStream, Target};
+use crate::unpack::{ByteSource, SourceError};
+use crate::{MemoryBudget, ParseError, RawParticles};
 
 mod layout;
 mod names;
@@ -41,15 +42,21 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// [`ParseError::Malformed`] if there are no positions among the columns, a row has another
 /// number of cells, or a position is no number; [`ParseError::Unsupported`] for UTF-16.
 pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    read_within(bytes, step, MemoryBudget::UNLIMITED)
+}
+
+/// [`read`] within a budget.
+pub(crate) fn read_within(
+    bytes: &[u8],
+    step: &Step,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
     if bytes.len() < step.span.end {
         let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
         return Err(ParseError::malformed(bytes.len(), what));
     }
     let layout = Layout::find(bytes)?;
-    let (fields, targets) = match &layout.names {
-        Some(names) => named_columns(names).ok_or_else(|| layout.no_positions(names))?,
-        None => numbered_columns(layout.columns),
-    };
+    let (fields, targets) = layout_columns(&layout)?;
     let table = Table {
         bytes,
         span: layout.rows,
@@ -57,13 +64,64 @@ pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
         fields,
         targets,
     };
-    let (positions, attributes) = table.particles()?;
+    let (positions, attributes) = table.particles(budget)?;
     Ok(RawParticles {
         positions,
         attributes,
         time: layout.time,
         step: None,
     })
+}
+
+/// Lines that decide what a table is like: more than are looked at from the first row on, and for separators.
+const TELLING_LINES: usize = 300;
+
+/// True if `head`, the beginning of a file, tells all about the table but its rows: then [`read_stream`] finds
+/// what [`read`] would.
+pub(crate) fn is_told_by(head: &[u8]) -> bool {
+    let Ok(layout) = Layout::find(head) else {
+        return false;
+    };
+    let rows = head.get(layout.rows).unwrap_or_default();
+    let lines = memchr::memchr_iter(b'\n', rows).take(TELLING_LINES);
+    lines.count() == TELLING_LINES
+}
+
+/// [`read`] of a table that begins with `head` and is told by it. `source` gives all of it from the beginning,
+/// about `len` bytes.
+pub(crate) fn read_stream(
+    head: &[u8],
+    source: &mut dyn ByteSource,
+    len: u64,
+    budget: MemoryBudget,
+) -> Result<RawParticles, SourceError> {
+    let layout = Layout::find(head)?;
+    let (fields, targets) = layout_columns(&layout)?;
+    let rows = head.get(layout.rows.clone()).unwrap_or_default();
+    let lines = memchr::memchr_iter(b'\n', rows).count() as u64;
+    // A little more than in proportion: rows may become shorter.
+    let guess = len.saturating_mul(lines) / rows.len().max(1) as u64 / 16 * 17;
+    let table = TableStream {
+        start: layout.rows.start,
+        dialect: layout.dialect,
+        fields,
+        targets,
+        rows: usize::try_from(guess).unwrap_or(usize::MAX),
+    };
+    let (positions, attributes) = table.particles(source, budget)?;
+    Ok(RawParticles {
+        positions,
+        attributes,
+        time: layout.time,
+        step: None,
+    })
+}
+
+fn layout_columns(layout: &Layout) -> Result<Columns, ParseError> {
+    match &layout.names {
+        Some(names) => named_columns(names).ok_or_else(|| layout.no_positions(names)),
+        None => Ok(numbered_columns(layout.columns)),
+    }
 }
 
 /// True if a line of `bytes` names positions.

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::Step;
 use super::table::{CUT_SHORT, Comments, Decimal, Dialect, Separator, Surplus, Table};
 use super::text::{self, Lines};
-use crate::{ParseError, Positions, RawParticles};
+use crate::{MemoryBudget, ParseError, Positions, RawParticles};
 
 mod bounds;
 mod columns;
@@ -76,6 +76,15 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// [`ParseError::Malformed`] if the step is cut short or breaks the format,
 /// [`ParseError::Unsupported`] for dumps of other things than atoms.
 pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    read_within(bytes, step, MemoryBudget::UNLIMITED)
+}
+
+/// [`read`] within a budget.
+pub(crate) fn read_within(
+    bytes: &[u8],
+    step: &Step,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
     if bytes.len() < step.span.end || step.span.end < step.span.start {
         let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
         return Err(ParseError::malformed(bytes.len(), what));
@@ -100,7 +109,7 @@ pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
         fields: columns.fields,
         targets: columns.targets,
     };
-    let (mut positions, attributes) = table.particles()?;
+    let (mut positions, attributes) = table.particles(budget)?;
     if positions.len() != header.count {
         let what = format!(
             "{} atoms announced, {} found: blank lines between them",

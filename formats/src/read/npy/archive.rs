@@ -14,7 +14,7 @@ use super::member::{self, Member, in_member, zip_error};
 use super::{check_frame, layout_steps, read_array};
 use crate::read::Step;
 use crate::read::columns::{self, Column};
-use crate::{Attribute, AttributeData, ParseError, RawParticles};
+use crate::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles};
 
 /// Whether `bytes` begin like a zip archive, an empty one included.
 pub(super) fn is_zip(bytes: &[u8]) -> bool {
@@ -61,10 +61,10 @@ impl<'a> Archive<'a> {
     }
 
     /// See [`super::steps`].
-    pub(super) fn steps(mut self) -> Result<Vec<Step>, ParseError> {
+    pub(super) fn steps(mut self, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
         let (_, layout) = self.source()?;
         let mut steps = layout_steps(&layout, self.bytes.len());
-        let times = self.times(&layout)?;
+        let times = self.times(&layout, budget)?;
         for step in &mut steps {
             step.time = time_of(times.as_ref(), step.index);
         }
@@ -72,20 +72,27 @@ impl<'a> Archive<'a> {
     }
 
     /// See [`super::read`].
-    pub(super) fn read(mut self, frame: usize) -> Result<RawParticles, ParseError> {
+    pub(super) fn read(
+        mut self,
+        frame: usize,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
         let (source, layout) = self.source()?;
         check_frame(&layout, frame)?;
         let (mut particles, used) = match source {
-            Source::Array(member) => (self.read_positions(member, frame)?, vec![member]),
-            Source::Axes(members) => (self.read_axes(&members, &layout)?, members),
+            Source::Array(member) => (self.read_positions(member, frame, budget)?, vec![member]),
+            Source::Axes(members) => (self.read_axes(&members, &layout, budget)?, members),
         };
+        let mut held = particles.byte_len();
         for member in 0..self.members.len() {
             if !used.contains(&member) && !self.is_time(member, &layout) {
-                let attribute = self.attribute(member, &layout, frame)?;
+                let left = budget.less(held);
+                let attribute = self.attribute(member, &layout, frame, left)?;
+                held += attribute.as_ref().map_or(0, |a| a.data.byte_len());
                 particles.attributes.extend(attribute);
             }
         }
-        particles.time = time_of(self.times(&layout)?.as_ref(), frame);
+        particles.time = time_of(self.times(&layout, budget)?.as_ref(), frame);
         Ok(particles)
     }
 
@@ -170,11 +177,16 @@ impl<'a> Archive<'a> {
         ))
     }
 
-    fn read_positions(&mut self, member: usize, frame: usize) -> Result<RawParticles, ParseError> {
+    fn read_positions(
+        &mut self,
+        member: usize,
+        frame: usize,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
         let Some(found) = self.members.get(member) else {
             return Err(self.no_positions());
         };
-        let contents = member::contents(self.bytes, &mut self.zip, found)?;
+        let contents = member::contents(self.bytes, &mut self.zip, found, budget)?;
         read_array(&contents, &found.header, frame).map_err(|e| in_member(e, &found.name))
     }
 
@@ -182,10 +194,13 @@ impl<'a> Archive<'a> {
         &mut self,
         members: &[usize],
         layout: &Layout,
+        budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
         let mut parts: Vec<AttributeData> = Vec::with_capacity(members.len());
+        let mut held = 0;
         for member in members {
-            let axis = self.attribute(*member, layout, 0)?;
+            let axis = self.attribute(*member, layout, 0, budget.less(held))?;
+            held += axis.as_ref().map_or(0, |a| a.data.byte_len());
             parts.push(axis.ok_or_else(|| self.no_positions())?.data);
         }
         Ok(RawParticles {
@@ -202,6 +217,7 @@ impl<'a> Archive<'a> {
         member: usize,
         layout: &Layout,
         frame: usize,
+        budget: MemoryBudget,
     ) -> Result<Option<Attribute>, ParseError> {
         let Some(found) = self.members.get(member) else {
             return Ok(None);
@@ -209,7 +225,7 @@ impl<'a> Archive<'a> {
         let Some(column) = layout.attribute(&found.name, &found.header, frame) else {
             return Ok(None);
         };
-        let contents = member::contents(self.bytes, &mut self.zip, found)?;
+        let contents = member::contents(self.bytes, &mut self.zip, found, budget)?;
         let decoded = decode(&contents, layout.count, column);
         decoded.map_err(|e| in_member(e, &found.name))
     }
@@ -228,7 +244,11 @@ impl<'a> Archive<'a> {
     }
 
     /// The member that tells the time.
-    fn times(&mut self, layout: &Layout) -> Result<Option<Attribute>, ParseError> {
+    fn times(
+        &mut self,
+        layout: &Layout,
+        budget: MemoryBudget,
+    ) -> Result<Option<Attribute>, ParseError> {
         let times = (0..self.members.len()).find(|m| self.is_time(*m, layout));
         let Some(member) = times else {
             return Ok(None);
@@ -250,7 +270,7 @@ impl<'a> Archive<'a> {
         let Some(column) = list.attribute(&found.name, &flat, 0) else {
             return Ok(None);
         };
-        let contents = member::contents(self.bytes, &mut self.zip, found)?;
+        let contents = member::contents(self.bytes, &mut self.zip, found, budget)?;
         let decoded = decode(&contents, count, column);
         decoded.map_err(|e| in_member(e, &found.name))
     }

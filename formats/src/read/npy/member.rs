@@ -10,7 +10,7 @@ use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
 use super::header::{self, Header};
-use crate::ParseError;
+use crate::{MemoryBudget, ParseError};
 
 /// Deflate cannot do better: 258 bytes for two bits.
 const MAX_DEFLATE_RATIO: u64 = 1032;
@@ -81,11 +81,13 @@ pub(super) fn open(
     }))
 }
 
-/// All bytes of a member: a slice of the archive if it is stored, else inflated.
+/// All bytes of a member: a slice of the archive if it is stored, else inflated, if `budget` allows that and
+/// as much again for its numbers.
 pub(super) fn contents<'a>(
     bytes: &'a [u8],
     zip: &mut ZipArchive<Cursor<&'a [u8]>>,
     member: &Member,
+    budget: MemoryBudget,
 ) -> Result<Cow<'a, [u8]>, ParseError> {
     let mut file = zip
         .by_index(member.index)
@@ -105,6 +107,11 @@ pub(super) fn contents<'a>(
         }
         return Ok(Cow::Borrowed(stored));
     }
+    let too_large = |e| in_member(e, &member.name);
+    let need = file.size().saturating_mul(2);
+    budget
+        .check(need, "decompressed it is")
+        .map_err(too_large)?;
     let mut inflated = Vec::with_capacity(size.min(MAX_RESERVE));
     // One byte more than stated tells a member that goes on.
     let bound = file.size().saturating_add(1);
@@ -127,7 +134,7 @@ fn place(offset: u64) -> usize {
 pub(super) fn in_member(error: ParseError, name: &str) -> ParseError {
     let begin = match error {
         ParseError::Malformed { .. } => "of member",
-        ParseError::Unsupported { .. } => "npz member",
+        ParseError::Unsupported { .. } | ParseError::TooLarge { .. } => "npz member",
     };
     error.retold(|what| format!("{begin} {name}: {what}"))
 }

@@ -18,7 +18,7 @@ use self::header::Header;
 use self::layout::Layout;
 use super::Step;
 use super::columns::ParticleLayout;
-use crate::{ParseError, RawParticles};
+use crate::{MemoryBudget, ParseError, RawParticles};
 
 /// The time steps that `bytes` hold: as many as the first dimension of (frames, N, 3), else one.
 ///
@@ -26,8 +26,13 @@ use crate::{ParseError, RawParticles};
 /// [`ParseError::Malformed`] for damaged files; [`ParseError::Unsupported`] for pickled objects and
 /// for arrays that are no positions, saying what to save instead.
 pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    steps_within(bytes, MemoryBudget::UNLIMITED)
+}
+
+/// [`steps`] within a budget: the times are a member of an archive.
+pub(crate) fn steps_within(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     if archive::is_zip(bytes) {
-        return archive::Archive::open(bytes)?.steps();
+        return archive::Archive::open(bytes)?.steps(budget);
     }
     let header = Header::parse(bytes)?;
     header.check_items(bytes.len())?;
@@ -42,8 +47,17 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// # Errors
 /// As [`steps`]; [`ParseError::Malformed`] if there is no such step.
 pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    read_within(bytes, step, MemoryBudget::UNLIMITED)
+}
+
+/// [`read`] within a budget.
+pub(crate) fn read_within(
+    bytes: &[u8],
+    step: &Step,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
     if archive::is_zip(bytes) {
-        return archive::Archive::open(bytes)?.read(step.index);
+        return archive::Archive::open(bytes)?.read(step.index, budget);
     }
     let header = Header::parse(bytes)?;
     read_array(bytes, &header, step.index)

@@ -12,13 +12,18 @@ use rayon::prelude::*;
 
 use super::category;
 use super::text::{self, Line, Lines};
-use crate::{Attribute, ParseError, Positions};
+use crate::{Attribute, MemoryBudget, ParseError, Positions};
 
 mod cells;
+mod grow;
+mod stream;
 mod values;
 
 pub(super) use cells::cells;
 use cells::is_blank;
+use grow::Growing;
+pub(super) use stream::TableStream;
+pub(crate) use stream::stream_bytes;
 pub(super) use values::Values;
 
 /// What to say of a line that ends where the file does.
@@ -165,57 +170,118 @@ pub(super) struct Table<'a> {
 /// Bytes that one thread parses in one go; large enough to hide the cost of a task.
 const PIECE: usize = 1 << 20;
 
+/// How the rows of a table are parsed, wherever they are.
+#[derive(Debug, Clone, Copy)]
+struct RowFormat<'t> {
+    dialect: Dialect,
+    fields: &'t [Option<Place>],
+    targets: &'t [Target],
+}
+
+/// Rows in memory.
+struct Rows<'t> {
+    bytes: &'t [u8],
+    dialect: Dialect,
+    fields: &'t [Option<Place>],
+    targets: &'t [Target],
+}
+
+/// Positions and attributes.
+pub(super) type Particles = (Positions, Vec<Attribute>);
+
 impl Table<'_> {
     /// Parses all rows; the values are in the order of the targets, each `components` times the
-    /// number of rows long.
+    /// number of rows long. Some pieces are parsed at a time, so that little is held but the values.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] at the first field (in file order) that has no place or does not
-    /// fit, whatever the number of threads.
-    pub(super) fn parse(&self) -> Result<Vec<Values>, ParseError> {
-        let pieces: Vec<Result<Vec<Values>, ParseError>> = pieces(self.bytes, self.span.clone())
-            .into_par_iter()
-            .map(|piece| self.parse_piece(piece))
-            .collect();
-        let mut by_target: Vec<Vec<Values>> = self.targets.iter().map(|_| Vec::new()).collect();
-        for piece in pieces {
-            for (target, values) in by_target.iter_mut().zip(piece?) {
-                target.push(values);
+    /// fit, whatever the number of threads; [`ParseError::TooLarge`] if the values need more memory than
+    /// `budget` allows.
+    pub(super) fn parse(&self, budget: MemoryBudget) -> Result<Vec<Values>, ParseError> {
+        let format = self.format();
+        let rows = format.in_bytes(self.bytes);
+        let span = self.bytes.get(self.span.clone()).unwrap_or_default();
+        let mut values = Growing::new(format.targets, rows.most_rows(span), budget);
+        for some in pieces(self.bytes, self.span.clone()).chunks(pieces_at_once()) {
+            let parsed: Vec<Result<Vec<Values>, ParseError>> = some
+                .into_par_iter()
+                .map(|piece| rows.parse_piece(piece.clone()))
+                .collect();
+            for piece in parsed {
+                values.append(piece?)?;
             }
         }
-        let joined = self.targets.iter().zip(by_target);
-        Ok(joined
-            .map(|(target, pieces)| values::merge(target.numbers, pieces))
-            .collect())
+        Ok(values.into_values())
     }
 
     /// [`Self::parse`] with target 0 taken for the positions and the rest for attributes.
     ///
     /// # Errors
     /// As [`Self::parse`].
-    pub(super) fn particles(self) -> Result<(Positions, Vec<Attribute>), ParseError> {
-        let mut values = self.parse()?.into_iter();
-        let positions = values
-            .next()
-            .map_or(Positions::F64(Vec::new()), Values::into_positions);
-        let attributes = self.targets.into_iter().skip(1).zip(values);
-        let attributes = attributes
-            .filter_map(|(target, values)| {
-                Some(Attribute {
-                    name: target.name,
-                    components: target.components,
-                    data: values.into_data()?,
-                })
+    pub(super) fn particles(self, budget: MemoryBudget) -> Result<Particles, ParseError> {
+        let values = self.parse(budget)?;
+        Ok(particles(self.targets, values))
+    }
+
+    fn format(&self) -> RowFormat<'_> {
+        RowFormat {
+            dialect: self.dialect,
+            fields: &self.fields,
+            targets: &self.targets,
+        }
+    }
+}
+
+/// Pieces that are parsed before their values are put together.
+fn pieces_at_once() -> usize {
+    2 * rayon::current_num_threads()
+}
+
+fn particles(targets: Vec<Target>, values: Vec<Values>) -> Particles {
+    let mut values = values.into_iter();
+    let positions = values
+        .next()
+        .map_or(Positions::F64(Vec::new()), Values::into_positions);
+    let attributes = targets.into_iter().skip(1).zip(values);
+    let attributes = attributes
+        .filter_map(|(target, values)| {
+            Some(Attribute {
+                name: target.name,
+                components: target.components,
+                data: values.into_data()?,
             })
-            .collect();
-        Ok((positions, attributes))
+        })
+        .collect();
+    (positions, attributes)
+}
+
+impl<'t> RowFormat<'t> {
+    fn in_bytes(self, bytes: &'t [u8]) -> Rows<'t> {
+        let Self {
+            dialect,
+            fields,
+            targets,
+        } = self;
+        Rows {
+            bytes,
+            dialect,
+            fields,
+            targets,
+        }
+    }
+}
+
+impl Rows<'_> {
+    /// The most rows that `bytes` can have.
+    fn most_rows(&self, bytes: &[u8]) -> usize {
+        let newlines = memchr::memchr_iter(b'\n', bytes).count();
+        // A field takes two bytes with what follows it, save empty ones.
+        newlines.min(bytes.len() / (2 * self.fields.len()).max(1)) + 1
     }
 
     fn parse_piece(&self, piece: Range<usize>) -> Result<Vec<Values>, ParseError> {
         let bytes = self.bytes.get(piece.clone()).unwrap_or_default();
-        let newlines = memchr::memchr_iter(b'\n', bytes).count();
-        // A field takes two bytes with what follows it, save empty ones.
-        let rows = newlines.min(bytes.len() / (2 * self.fields.len()).max(1)) + 1;
+        let rows = self.most_rows(bytes);
         let mut values: Vec<Values> = self
             .targets
             .iter()

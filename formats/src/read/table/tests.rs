@@ -1,5 +1,5 @@
 use super::*;
-use crate::AttributeData;
+use crate::{AttributeData, MemoryBudget};
 use glam::DVec3;
 
 const WORDS: Dialect = Dialect {
@@ -44,7 +44,7 @@ fn fields_go_where_they_belong() {
             scalar(Numbers::WholeIfAll, OnText::Fault),
         ],
     };
-    let mut values = table.parse().unwrap();
+    let mut values = table.parse(MemoryBudget::UNLIMITED).unwrap();
     assert_eq!(values.pop(), Some(Values::Whole(vec![7, 8])));
     assert_eq!(
         values.pop().unwrap().into_positions(),
@@ -57,7 +57,7 @@ fn whole_numbers_give_way_to_fractions_and_text() {
     let whole = || scalar(Numbers::WholeIfAll, OnText::LeaveOut);
     let parse = |text: &str| {
         let mut values = columns(text.as_bytes(), WORDS, vec![whole()])
-            .parse()
+            .parse(MemoryBudget::UNLIMITED)
             .unwrap();
         values.pop().unwrap()
     };
@@ -81,7 +81,9 @@ fn many_pieces_are_joined_in_order() {
         scalar(Numbers::WholeIfAll, OnText::Fault),
         scalar(Numbers::WholeIfAll, OnText::Fault),
     ];
-    let values = columns(text.as_bytes(), WORDS, targets).parse().unwrap();
+    let values = columns(text.as_bytes(), WORDS, targets)
+        .parse(MemoryBudget::UNLIMITED)
+        .unwrap();
     let ids = (0..rows).map(i64::from).collect();
     let halves = (0..rows).map(|i| f64::from(i) * 0.5).collect();
     assert_eq!(values, [Values::Whole(ids), Values::Real(halves)]);
@@ -97,7 +99,10 @@ fn the_first_fault_is_reported() {
         WORDS,
         vec![scalar(Numbers::Real, OnText::Fault)],
     );
-    let error = table.parse().unwrap_err().to_string();
+    let error = table
+        .parse(MemoryBudget::UNLIMITED)
+        .unwrap_err()
+        .to_string();
     assert_eq!(error, "byte 10: column 1 has \"x\", not a number");
 }
 
@@ -111,7 +116,10 @@ fn an_unfinished_last_line_is_called_so() {
     };
     let error = |text: &str| {
         let table = columns(text.as_bytes(), WORDS, two());
-        table.parse().unwrap_err().to_string()
+        table
+            .parse(MemoryBudget::UNLIMITED)
+            .unwrap_err()
+            .to_string()
     };
     let cut = "the file is cut short, perhaps still being written";
     assert_eq!(
@@ -161,7 +169,9 @@ fn empty_cells_are_nan_and_commas_may_be_points() {
         scalar(Numbers::WholeIfAll, OnText::LeaveOut),
     ];
     let text = b"# 1;2\n1,5;2;\n // 3\n;3;;\n";
-    let values = columns(text, dialect, targets).parse().unwrap();
+    let values = columns(text, dialect, targets)
+        .parse(MemoryBudget::UNLIMITED)
+        .unwrap();
     let [Values::Real(a), b] = &values[..] else {
         panic!("{values:?}")
     };

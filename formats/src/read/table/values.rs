@@ -1,8 +1,9 @@
 //! The typed arrays that rows of text are parsed into.
 
+use bytemuck::allocation::try_cast_vec;
 use glam::DVec3;
 
-use super::{Decimal, Numbers};
+use super::Decimal;
 use crate::read::text;
 use crate::{AttributeData, Positions};
 
@@ -64,7 +65,8 @@ impl Values {
         }
     }
 
-    fn len(&self) -> usize {
+    /// How many numbers there are.
+    pub(super) fn len(&self) -> usize {
         match self {
             Self::Real(v) => v.len(),
             Self::Whole(v) => v.len(),
@@ -83,42 +85,23 @@ impl Values {
 
     /// The numbers of [`super::Target::positions`].
     pub(in crate::read) fn into_positions(self) -> Positions {
-        let Self::Real(v) = self else {
+        let Self::Real(mut v) = self else {
             return Positions::F64(Vec::new());
         };
-        let (triples, _) = v.as_chunks::<3>();
-        Positions::F64(triples.iter().copied().map(DVec3::from_array).collect())
+        v.truncate(v.len() / 3 * 3);
+        let triples = try_cast_vec(v).or_else(|(_, mut v)| {
+            // The room behind them is no whole number of triples.
+            v.shrink_to_fit();
+            try_cast_vec(v)
+        });
+        Positions::F64(triples.unwrap_or_else(|(_, v)| {
+            let (triples, _) = v.as_chunks::<3>();
+            triples.iter().copied().map(DVec3::from_array).collect()
+        }))
     }
 }
 
 /// Ids beyond 2^53 are rounded; it takes a fraction in the same column to get here.
 fn real(whole: &[i64]) -> Vec<f64> {
     whole.iter().map(|v| *v as f64).collect()
-}
-
-/// Joins the pieces of one target in their order.
-pub(super) fn merge(numbers: Numbers, pieces: Vec<Values>) -> Values {
-    let len = pieces.iter().map(Values::len).sum();
-    let whole = numbers == Numbers::WholeIfAll;
-    if pieces.contains(&Values::Text) {
-        Values::Text
-    } else if whole && pieces.iter().all(|p| matches!(p, Values::Whole(_))) {
-        let mut joined = Vec::with_capacity(len);
-        for piece in pieces {
-            if let Values::Whole(v) = piece {
-                joined.extend_from_slice(&v);
-            }
-        }
-        Values::Whole(joined)
-    } else {
-        let mut joined = Vec::with_capacity(len);
-        for piece in pieces {
-            match piece {
-                Values::Real(v) => joined.extend_from_slice(&v),
-                Values::Whole(v) => joined.extend(v.iter().map(|v| *v as f64)),
-                Values::Text => {}
-            }
-        }
-        Values::Real(joined)
-    }
 }

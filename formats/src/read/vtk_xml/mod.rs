@@ -19,7 +19,7 @@ use std::cell::Cell;
 use super::Step;
 use super::text::same_length;
 use super::vtk::{MOST_COMPONENTS, parse_values};
-use crate::{AttributeData, Endian, ParseError, RawParticles, ScalarType};
+use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
 use blocks::{Encoding, Source, payload};
 use document::{Array, Document, Place, Until, short};
@@ -44,9 +44,19 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// # Errors
 /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
 /// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
-pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
+pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    read_within(bytes, step, MemoryBudget::UNLIMITED)
+}
+
+/// [`read`] within a budget.
+pub(crate) fn read_within(
+    bytes: &[u8],
+    _step: &Step,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
     parse(bytes, Until::End, |document, appended| {
         check_shares(&document, appended)?;
+        check_memory(&document, budget)?;
         Ok(RawParticles {
             positions: merge::positions(&document, appended)?,
             attributes: merge::attributes(&document, appended)?,
@@ -107,30 +117,47 @@ fn check_shares(document: &Document<'_>, appended: Option<Appended<'_>>) -> Resu
         None => len,
     };
     let mut need = 0_usize;
-    for piece in &document.pieces {
-        let coordinates = piece.coordinates.iter().map(|array| (array, 3));
-        let data = piece.point_data.iter();
-        let data = data.map(|array| (array, array.components.unwrap_or(1)));
-        for (array, components) in coordinates.chain(data) {
-            let is_appended = matches!(array.place, Place::Appended(_));
-            let Some(scalar) = scalar_type(&array.type_name).filter(|_| is_appended) else {
-                continue;
-            };
-            let values = piece.points.saturating_mul(components);
-            need = need.saturating_add(values.saturating_mul(scalar.size()));
-            if need > most {
-                return Err(ParseError::malformed(
-                    array.at,
-                    format!(
-                        "array `{}` and those before it need {need} bytes, more than the {len} bytes \
-                         appended can hold; each array needs bytes of its own",
-                        short(&array.name)
-                    ),
-                ));
-            }
+    for (array, bytes) in array_sizes(document) {
+        if !matches!(array.place, Place::Appended(_)) {
+            continue;
+        }
+        need = need.saturating_add(bytes);
+        if need > most {
+            return Err(ParseError::malformed(
+                array.at,
+                format!(
+                    "array `{}` and those before it need {need} bytes, more than the {len} bytes \
+                     appended can hold; each array needs bytes of its own",
+                    short(&array.name)
+                ),
+            ));
         }
     }
     Ok(())
+}
+
+/// Refuses arrays that together take more memory than is allowed, before any is unpacked.
+fn check_memory(document: &Document<'_>, budget: MemoryBudget) -> Result<(), ParseError> {
+    let sizes = array_sizes(document).map(|(_, bytes)| bytes as u64);
+    let need = sizes.fold(0, u64::saturating_add);
+    // The largest is there twice: as bytes, and as numbers.
+    let largest = array_sizes(document).map(|(_, bytes)| bytes as u64).max();
+    let need = need.saturating_add(largest.unwrap_or(0));
+    budget.check(need, "decompressed its arrays are")
+}
+
+/// The numeric arrays and the bytes that their numbers take.
+fn array_sizes<'d, 'a>(document: &'d Document<'a>) -> impl Iterator<Item = (&'d Array<'a>, usize)> {
+    document.pieces.iter().flat_map(|piece| {
+        let coordinates = piece.coordinates.iter().map(|array| (array, 3));
+        let data = piece.point_data.iter();
+        let data = data.map(|array| (array, array.components.unwrap_or(1)));
+        coordinates.chain(data).filter_map(|(array, components)| {
+            let scalar = scalar_type(&array.type_name)?;
+            let values = piece.points.saturating_mul(components);
+            Some((array, values.saturating_mul(scalar.size())))
+        })
+    })
 }
 
 /// The simulation time, if a field tells one. It is extra: a damaged field costs only the time.
@@ -196,7 +223,7 @@ fn values(
                         text.at.saturating_add(usize::try_from(at).unwrap_or(0)),
                         what,
                     ),
-                    other @ ParseError::Unsupported { .. } => other,
+                    other => other,
                 })?;
             let rest = bytes.get(end..).unwrap_or_default();
             if !rest.trim_ascii().is_empty() {

@@ -8,7 +8,7 @@ use super::columns::{Column, Lane, ParticleLayout};
 use super::table::CUT_SHORT;
 use super::text::{self, Lines};
 use super::{Step, csv};
-use crate::{Endian, ParseError, RawParticles, ScalarType};
+use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 
 mod comment;
 mod molecular;
@@ -95,14 +95,23 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// # Errors
 /// [`ParseError::Malformed`] if the step is cut short or breaks its format.
 pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    read_within(bytes, step, MemoryBudget::UNLIMITED)
+}
+
+/// [`read`] within a budget.
+pub(crate) fn read_within(
+    bytes: &[u8],
+    step: &Step,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
     if bytes.len() < step.span.end {
         let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
         return Err(ParseError::malformed(bytes.len(), what));
     }
     match kind(bytes)? {
         Kind::Raw => raw_layout(bytes).particles(bytes),
-        Kind::Molecular => molecular::read(bytes, step.span.clone()),
-        Kind::Bare => csv::read(bytes, step),
+        Kind::Molecular => molecular::read(bytes, step.span.clone(), budget),
+        Kind::Bare => csv::read_within(bytes, step, budget),
     }
 }
 

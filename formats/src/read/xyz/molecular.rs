@@ -9,7 +9,7 @@ use crate::read::table::{
     Target,
 };
 use crate::read::text::{self, Line, Lines};
-use crate::{ParseError, RawParticles};
+use crate::{MemoryBudget, ParseError, RawParticles};
 
 /// The frames from byte `start` on. Where a count should be and is not, the rest of the file is
 /// one last step, so that reading it can say so.
@@ -43,7 +43,11 @@ pub(super) fn steps(bytes: &[u8], start: usize) -> Vec<Step> {
 }
 
 /// Reads the frame in `span`.
-pub(super) fn read(bytes: &[u8], span: Range<usize>) -> Result<RawParticles, ParseError> {
+pub(super) fn read(
+    bytes: &[u8],
+    span: Range<usize>,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
     let mut lines = Lines::new(bytes, span);
     let too_short = |at, what: String| ParseError::malformed(at, format!("{what}: {CUT_SHORT}"));
     let Some(first) = lines.find(|line| !line.is_blank()) else {
@@ -75,7 +79,7 @@ pub(super) fn read(bytes: &[u8], span: Range<usize>) -> Result<RawParticles, Par
         fields,
         targets,
     };
-    let (positions, attributes) = table.particles()?;
+    let (positions, attributes) = table.particles(budget)?;
     if positions.len() != count {
         let what = format!(
             "{count} particles announced, {} found: blank lines between them",

@@ -1,0 +1,103 @@
+//! How much memory reading one file may take.
+//!
+//! A file of a few hundred kilobytes can ask for gigabytes: as gzip, as a member of an archive, as a block of
+//! VTK XML, or as text of short numbers. The caller says how much there is; a file that needs more fails by
+//! name before the memory is taken.
+
+use crate::ParseError;
+
+/// The memory that one file may take while it is read: what is held of it, and the numbers made of it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MemoryBudget {
+    bytes: u64,
+    remedy: &'static str,
+}
+
+impl MemoryBudget {
+    /// No limit but that of the machine.
+    pub const UNLIMITED: Self = Self::new(u64::MAX, "free some memory");
+
+    /// So many bytes. `remedy` says in a message what to do about it: `raise the limit`.
+    pub const fn new(bytes: u64, remedy: &'static str) -> Self {
+        Self { bytes, remedy }
+    }
+
+    /// The bytes.
+    pub const fn bytes(self) -> u64 {
+        self.bytes
+    }
+
+    /// The same, but `bytes` if it is less.
+    #[must_use]
+    pub fn at_least(self, bytes: u64) -> Self {
+        Self {
+            bytes: self.bytes.max(bytes),
+            ..self
+        }
+    }
+
+    /// What is left beside `held` bytes.
+    pub(crate) const fn less(self, held: u64) -> Self {
+        Self {
+            bytes: self.bytes.saturating_sub(held),
+            ..self
+        }
+    }
+
+    /// The part of it that the bytes of a file may take which has to be in memory as a whole: the rest is for
+    /// the numbers.
+    pub(crate) const fn for_content(self) -> Self {
+        Self {
+            bytes: self.bytes / 2,
+            ..self
+        }
+    }
+
+    /// That `need` bytes are allowed; `what` begins the message, as in `decompressed it is`.
+    ///
+    /// # Errors
+    /// [`ParseError::TooLarge`].
+    pub(crate) fn check(self, need: u64, what: &str) -> Result<(), ParseError> {
+        if need <= self.bytes {
+            Ok(())
+        } else {
+            Err(self.exceeded(what))
+        }
+    }
+
+    /// The error of a file that needs more.
+    pub(crate) fn exceeded(self, what: &str) -> ParseError {
+        let limit = match self.bytes >> 20 {
+            0 => format!("{} bytes", self.bytes),
+            mebibytes => format!("{mebibytes} MiB"),
+        };
+        ParseError::too_large(format!("{what} larger than {limit}; {}", self.remedy))
+    }
+}
+
+impl Default for MemoryBudget {
+    fn default() -> Self {
+        Self::UNLIMITED
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_left_is_told_in_plain_units() {
+        let budget = MemoryBudget::new(64 << 20, "raise the limit");
+        assert_eq!(budget.check(64 << 20, "it is"), Ok(()));
+        let error = |budget: MemoryBudget| budget.check(u64::MAX, "it is").unwrap_err().to_string();
+        assert_eq!(error(budget), "it is larger than 64 MiB; raise the limit");
+        assert_eq!(
+            error(budget.for_content()),
+            "it is larger than 32 MiB; raise the limit"
+        );
+        let little = budget.less((64 << 20) - 5);
+        assert_eq!(error(little), "it is larger than 5 bytes; raise the limit");
+        assert_eq!(budget.less(u64::MAX).bytes(), 0);
+        assert_eq!(MemoryBudget::default().check(u64::MAX, ""), Ok(()));
+    }
+}

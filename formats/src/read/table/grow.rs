@@ -1,0 +1,90 @@
+//! Columns that grow piece by piece, within a budget.
+
+use super::{Numbers, Target, Values};
+use crate::{MemoryBudget, ParseError};
+
+/// What the message about too many numbers begins with.
+const TOO_LARGE: &str = "in memory its numbers are";
+
+/// The values of all targets so far.
+pub(super) struct Growing {
+    values: Vec<Values>,
+    bytes: u64,
+    budget: MemoryBudget,
+}
+
+impl Growing {
+    /// Nothing yet; there is room for `rows`, which are no more than a guess, if `budget` allows as many.
+    pub(super) fn new(targets: &[Target], rows: usize, budget: MemoryBudget) -> Self {
+        let numbers = |target: &Target| rows.saturating_mul(target.components);
+        let all = targets.iter().map(numbers).fold(0, usize::saturating_add);
+        let fits = (all as u64).saturating_mul(size_of::<f64>() as u64) <= budget.bytes();
+        let empty = |target: &Target| {
+            let room = if fits { numbers(target) } else { 0 };
+            match target.numbers {
+                Numbers::Real => Values::Real(with_room(room)),
+                Numbers::WholeIfAll => Values::Whole(with_room(room)),
+            }
+        };
+        Self {
+            values: targets.iter().map(empty).collect(),
+            bytes: 0,
+            budget,
+        }
+    }
+
+    /// Puts the values of the next piece behind those that are there.
+    ///
+    /// # Errors
+    /// [`ParseError::TooLarge`].
+    pub(super) fn append(&mut self, piece: Vec<Values>) -> Result<(), ParseError> {
+        let more: usize = piece.iter().map(Values::len).sum();
+        self.bytes += (more * size_of::<f64>()) as u64;
+        self.budget.check(self.bytes, TOO_LARGE)?;
+        for (all, more) in self.values.iter_mut().zip(piece) {
+            if append(all, more).is_none() {
+                let there = MemoryBudget::UNLIMITED.less(u64::MAX - self.bytes);
+                return Err(there.exceeded(TOO_LARGE));
+            }
+        }
+        Ok(())
+    }
+
+    pub(super) fn into_values(self) -> Vec<Values> {
+        self.values
+    }
+}
+
+/// A vector with room for `len` items if they can be had: pages that are not used cost nothing.
+fn with_room<T>(len: usize) -> Vec<T> {
+    let mut room = Vec::new();
+    let _ = room.try_reserve_exact(len);
+    room
+}
+
+/// `None` if there is no memory.
+fn append(all: &mut Values, more: Values) -> Option<()> {
+    match (&mut *all, more) {
+        (Values::Text, _) => {}
+        (_, Values::Text) => *all = Values::Text,
+        (Values::Whole(all), Values::Whole(more)) => {
+            all.try_reserve(more.len()).ok()?;
+            all.extend_from_slice(&more);
+        }
+        (Values::Real(all), Values::Real(more)) => {
+            all.try_reserve(more.len()).ok()?;
+            all.extend_from_slice(&more);
+        }
+        (Values::Real(all), Values::Whole(more)) => {
+            all.try_reserve(more.len()).ok()?;
+            all.extend(more.iter().map(|v| *v as f64));
+        }
+        (Values::Whole(whole), more @ Values::Real(_)) => {
+            let whole = std::mem::take(whole);
+            // In the same memory: both have eight bytes.
+            *all = Values::Real(whole.into_iter().map(|v| v as f64).collect());
+            return append(all, more);
+        }
+    }
+    Some(())
+}

@@ -1,0 +1,199 @@
+//! The bytes of a file from front to back, gzip taken off on the way.
+
+use std::io::{self, BufRead, Read};
+
+use flate2::bufread::GzDecoder;
+
+use crate::budget::MemoryBudget;
+use crate::open::is_gzip;
+use crate::{FrameError, ParseError};
+
+/// Bytes that are unpacked before it is looked again whether they are too many.
+const STEP: usize = 1 << 20;
+
+/// Why the next bytes cannot be had.
+#[derive(Debug)]
+pub(crate) enum SourceError {
+    /// The system says so.
+    Io(io::Error),
+    /// They are damaged, or too many.
+    Bytes(ParseError),
+}
+
+impl From<ParseError> for SourceError {
+    fn from(error: ParseError) -> Self {
+        Self::Bytes(error)
+    }
+}
+
+impl SourceError {
+    /// Adds the path of the file.
+    pub(crate) fn in_file(self, path: &std::path::Path) -> FrameError {
+        match self {
+            Self::Io(source) => FrameError::io(path, source),
+            Self::Bytes(error) => error.in_file(path),
+        }
+    }
+}
+
+/// Uncompressed bytes that come in their order, a bounded number at a time.
+pub(crate) trait ByteSource {
+    /// Appends up to `most` bytes to `to`; fewer only at the end.
+    ///
+    /// # Errors
+    /// [`SourceError`].
+    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError>;
+}
+
+/// The content of a file, compressed by gzip or not.
+pub(crate) struct Unpacker<R> {
+    state: State<R>,
+    is_packed: bool,
+    /// Uncompressed bytes so far.
+    at: usize,
+    notes: Vec<String>,
+}
+
+enum State<R> {
+    Plain(R),
+    Packed(GzDecoder<R>),
+    Ended,
+}
+
+impl<R: BufRead> Unpacker<R> {
+    /// What `reader` gives, from its beginning.
+    ///
+    /// # Errors
+    /// It cannot be read.
+    pub(crate) fn new(mut reader: R) -> io::Result<Self> {
+        let is_packed = is_gzip(reader.fill_buf()?);
+        let state = if is_packed {
+            State::Packed(GzDecoder::new(reader))
+        } else {
+            State::Plain(reader)
+        };
+        Ok(Self {
+            state,
+            is_packed,
+            at: 0,
+            notes: Vec::new(),
+        })
+    }
+
+    /// Appends all that is left to `bytes`, which begin the content, and returns the notes.
+    ///
+    /// # Errors
+    /// [`SourceError`]; [`ParseError::TooLarge`] if the content is more than `budget` allows.
+    pub(crate) fn finish(
+        mut self,
+        bytes: &mut Vec<u8>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<String>, SourceError> {
+        loop {
+            budget.check(bytes.len() as u64, TOO_LARGE)?;
+            // What was reserved is used up first.
+            let step = match bytes.capacity() - bytes.len() {
+                0 => STEP,
+                room => room.min(STEP),
+            };
+            if bytes.try_reserve(step).is_err() {
+                let there = MemoryBudget::UNLIMITED.less(u64::MAX - bytes.len() as u64);
+                return Err(there.exceeded(TOO_LARGE).into());
+            }
+            if self.fill(bytes, step)? < step {
+                budget.check(bytes.len() as u64, TOO_LARGE)?;
+                return Ok(self.notes);
+            }
+        }
+    }
+
+    /// Whether gzip was found.
+    pub(crate) const fn is_packed(&self) -> bool {
+        self.is_packed
+    }
+
+    /// Uncompressed bytes so far.
+    pub(crate) const fn len(&self) -> usize {
+        self.at
+    }
+
+    /// Oddities so far.
+    pub(crate) fn into_notes(self) -> Vec<String> {
+        self.notes
+    }
+
+    /// What follows a stream of gzip: another one, or the end. Zeros are padding; anything else is ignored
+    /// with a note, as `gzip -d` does.
+    fn after_member(&mut self, mut reader: R) -> io::Result<State<R>> {
+        let next = reader.fill_buf()?;
+        if next.first() == Some(&0x1f) && next.get(1).is_none_or(|b| *b == 0x8b) {
+            return Ok(State::Packed(GzDecoder::new(reader)));
+        }
+        let (mut count, mut is_padding) = (0, true);
+        loop {
+            let rest = reader.fill_buf()?;
+            if rest.is_empty() {
+                break;
+            }
+            is_padding &= rest.iter().all(|b| *b == 0);
+            let len = rest.len();
+            count += len;
+            reader.consume(len);
+        }
+        if !is_padding {
+            self.notes
+                .push(format!("{count} bytes after the gzip stream are ignored"));
+        }
+        Ok(State::Ended)
+    }
+}
+
+/// What the message about too large a content begins with.
+const TOO_LARGE: &str = "decompressed it is";
+
+impl<R: BufRead> ByteSource for Unpacker<R> {
+    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError> {
+        let start = to.len();
+        while to.len() - start < most {
+            let left = (most - (to.len() - start)) as u64;
+            let before = to.len();
+            match std::mem::replace(&mut self.state, State::Ended) {
+                State::Plain(mut reader) => {
+                    let read = reader.by_ref().take(left).read_to_end(to);
+                    if read.map_err(SourceError::Io)? as u64 == left {
+                        self.state = State::Plain(reader);
+                    }
+                }
+                State::Packed(mut decoder) => {
+                    let read = decoder.by_ref().take(left).read_to_end(to);
+                    let at = self.at + (to.len() - before);
+                    let read = read.map_err(|e| damaged(at, e))?;
+                    self.state = if read as u64 == left {
+                        State::Packed(decoder)
+                    } else {
+                        let reader = decoder.into_inner();
+                        self.after_member(reader).map_err(SourceError::Io)?
+                    };
+                }
+                State::Ended => break,
+            }
+            self.at += to.len() - before;
+        }
+        Ok(to.len() - start)
+    }
+}
+
+/// What is wrong with a stream of gzip after `at` good bytes.
+fn damaged(at: usize, error: io::Error) -> SourceError {
+    if error.raw_os_error().is_some() {
+        return SourceError::Io(error);
+    }
+    let what = match error.kind() {
+        io::ErrorKind::UnexpectedEof => {
+            "the gzip stream breaks off here; perhaps it is still being written".to_owned()
+        }
+        io::ErrorKind::OutOfMemory => "no memory left to unpack the gzip stream".to_owned(),
+        _ => format!("the gzip stream is damaged: {error}"),
+    };
+    SourceError::Bytes(ParseError::malformed(at, what))
+}

@@ -1,0 +1,51 @@
+//! How much memory reading a file may take: what a limit of the job, a limit of the process and the machine
+//! leave.
+
+use spherule_formats::MemoryBudget;
+
+use crate::report::memory::{available, process_room};
+
+/// Files that take no more are always read: a job with a tiny limit is refused for what its frames need and
+/// not for what a look at them takes.
+const LEAST: u64 = 8 << 20;
+
+/// What reading one file may take in a job with `limit` on its memory whose frames are made in processes with
+/// a `ceiling`.
+pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
+    // Something is left for the tree and the image.
+    let part = |free: u64| free / 4 * 3;
+    let of_job = limit.map(|bytes| {
+        let remedy = "raise render.memory_limit (--memory-limit) if there is more memory";
+        MemoryBudget::new(bytes, remedy)
+    });
+    let of_frame = ceiling.map(|bytes| {
+        let remedy = "raise job.memory_ceiling (--memory-ceiling) if there is more memory";
+        MemoryBudget::new(part(bytes), remedy)
+    });
+    let of_process = process_room().map(|bytes| {
+        let remedy = "raise the memory limit of the process (ulimit, --memory-ceiling)";
+        MemoryBudget::new(part(bytes), remedy)
+    });
+    let of_machine = available().map(|bytes| {
+        let remedy = "that is what free memory allows: free some, or use a machine with more";
+        MemoryBudget::new(part(bytes), remedy)
+    });
+    let all = [of_job, of_frame, of_process, of_machine];
+    let least = all
+        .into_iter()
+        .flatten()
+        .min_by_key(|budget| budget.bytes());
+    least.map_or(MemoryBudget::UNLIMITED, |budget| budget.at_least(LEAST))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_least_of_all_limits_counts() {
+        assert_eq!(read_budget(Some(20 << 20), Some(1 << 40)).bytes(), 20 << 20);
+        assert_eq!(read_budget(Some(1 << 40), Some(40 << 20)).bytes(), 30 << 20);
+        assert_eq!(read_budget(Some(1), None).bytes(), LEAST);
+    }
+}
