@@ -416,6 +416,10 @@ pub(crate) fn regular_len(path: &Path) -> Result<u64, FrameError> {
 /// # Errors
 /// The file cannot be read.
 pub fn unpacked_len(path: &Path) -> io::Result<u64> {
+    // Opening a pipe would wait for a writer.
+    if !fs::metadata(path)?.is_file() {
+        return Err(io::ErrorKind::InvalidInput.into());
+    }
     let mut file = File::open(path)?;
     let len = file.metadata()?.len();
     let mut start = [0; 4];

@@ -18,6 +18,7 @@ use rkyv::util::AlignedVec;
 
 use super::NativeFrame;
 use super::layout::{FrameIndex, parse};
+use crate::open::regular_len;
 use crate::{FrameError, ParseError};
 
 /// How the bytes of a native frame come into memory.
@@ -48,6 +49,8 @@ impl MappedFile {
     /// [`FrameError`] if it cannot be opened or is no regular file.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
         let io = |e| FrameError::io(path, e);
+        // Opening a pipe would wait for a writer.
+        regular_len(path)?;
         let file = File::open(path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
         if !meta.is_file() {
@@ -199,6 +202,7 @@ impl Bytes {
 /// [`FrameError`] if it cannot be read or is no regular file.
 pub(crate) fn read(path: &Path) -> Result<AlignedVec<64>, FrameError> {
     let io = |e| FrameError::io(path, e);
+    regular_len(path)?;
     let mut file = File::open(path).map_err(io)?;
     let meta = file.metadata().map_err(io)?;
     if !meta.is_file() {
