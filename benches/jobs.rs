@@ -94,7 +94,8 @@ fn render(place: &Path, options: &[&str]) {
 fn enlarge(place: &Path) {
     let (from, to) = (place.join("out"), place.join("large"));
     fs::create_dir(&to).expect("a directory");
-    let mut plan: Value = json(&fs::read_to_string(from.join("job.plan.json")).expect("a plan"));
+    let sealed = json(&fs::read_to_string(from.join("job.plan.json")).expect("a plan"));
+    let mut plan = sealed["plan"].clone();
     let planned = plan["frames"].as_array().expect("frames").clone();
     let ledger = fs::read_dir(&from)
         .expect("a directory")
@@ -124,7 +125,12 @@ fn enlarge(place: &Path) {
         }
     }
     plan["frames"] = frames.into();
-    fs::write(to.join("job.plan.json"), plan.to_string()).expect("a file");
+    let text = plan.to_string();
+    let seal = serde_json::json!({"version": sealed["version"], "blake3": spherule_jobs::text_hash(&text)});
+    let sealed = seal
+        .to_string()
+        .replacen('}', &format!(",\"plan\":{text}}}"), 1);
+    fs::write(to.join("job.plan.json"), sealed).expect("a file");
     fs::write(to.join("job.ledger.ended.jsonl"), lines).expect("a file");
 }
 

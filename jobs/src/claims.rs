@@ -6,7 +6,7 @@ use std::sync::{Arc, Mutex};
 
 use crate::ledger::News;
 use crate::work::{Claimed, Desk};
-use crate::{JobError, Status};
+use crate::{Entry, JobError, Status};
 
 /// What a worker claims frames by; clones are the same worker's.
 #[derive(Debug, Clone)]
@@ -63,7 +63,8 @@ impl Claims {
         self.news().ended(frame)
     }
 
-    fn refresh(&self) -> Result<(), JobError> {
+    /// Takes in what others have said.
+    pub(crate) fn refresh(&self) -> Result<(), JobError> {
         let workers = self.desk.names();
         let workers =
             workers.map_err(|e| JobError::io(&self.dir, "looking for other workers", e))?;
@@ -79,6 +80,11 @@ impl Claims {
     /// A number for an entry that comes after all known ones.
     pub(crate) fn take_seq(&self) -> u64 {
         self.news().take_seq()
+    }
+
+    /// Takes in that this worker has set a frame back.
+    pub(crate) fn set_back(&self, entry: &Entry) {
+        self.news().set_back(entry);
     }
 
     fn news(&self) -> std::sync::MutexGuard<'_, News> {

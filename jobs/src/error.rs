@@ -70,6 +70,28 @@ pub enum JobError {
         /// Which, by frame.
         changes: Vec<InputChange>,
     },
+    /// The job was begun with another input: none of its files is among those given, and the same frames
+    /// have other contents.
+    #[error("{}: this job was made from other files ({}, now {}); choose another output{}, or start over with --force", dir.display(), planned.display(), given.display(), if *is_same_dir { ", keep what is there with --keep-done" } else { "" })]
+    OtherInput {
+        /// The job's directory.
+        dir: PathBuf,
+        /// A file that it was made from.
+        planned: PathBuf,
+        /// A file given now.
+        given: PathBuf,
+        /// Whether they are in the same directory.
+        is_same_dir: bool,
+    },
+    /// Files have the names of outputs, and no worker of the job has made them.
+    #[error(
+        "{}: there already, and not made by this job; choose another output, move what is there, or replace it with --force",
+        existing(paths)
+    )]
+    OutputsExist {
+        /// Which; at least one.
+        paths: Vec<PathBuf>,
+    },
     /// The plan is there but cannot be understood.
     #[error("{}: {what}; restore it, or start over with --force", path.display())]
     PlanDamaged {
@@ -164,6 +186,17 @@ impl JobError {
                 source,
             },
         }
+    }
+}
+
+/// The first of `paths`, and how many more there are.
+fn existing(paths: &[PathBuf]) -> String {
+    let first = paths.first().map(|path| path.display().to_string());
+    let first = first.unwrap_or_default();
+    match paths.len() {
+        0 | 1 => first,
+        2 => format!("{first} and 1 more file"),
+        count => format!("{first} and {} more files", count - 1),
     }
 }
 

@@ -3,14 +3,13 @@
 //! A file is told by length, time of modification, and a BLAKE3 of its length, first and last
 //! 64 KiB: cheap for files of gigabytes, and a rewritten file changes at least one of the three.
 
-use std::fs::File;
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
 use std::time::UNIX_EPOCH;
 
 use serde::{Deserialize, Serialize};
 
-use crate::SettingChange;
+use crate::{SettingChange, open_regular};
 
 const SAMPLE_BYTES: u64 = 64 * 1024;
 
@@ -31,8 +30,7 @@ impl Fingerprint {
     /// # Errors
     /// Whatever opening or reading it says.
     pub fn of_file(path: &Path) -> io::Result<Self> {
-        let mut file = File::open(path)?;
-        let metadata = file.metadata()?;
+        let (mut file, metadata) = open_regular(path)?;
         let length = metadata.len();
         let mut hasher = blake3::Hasher::new();
         hasher.update(&length.to_le_bytes());
@@ -51,6 +49,11 @@ impl Fingerprint {
             modified_ns: modified_ns(&metadata),
             blake3: hasher.finalize().to_hex().to_string(),
         })
+    }
+
+    /// Whether the contents are the same, whenever they were written: a copy is as good.
+    pub(crate) fn has_contents_of(&self, other: &Self) -> bool {
+        (self.length, &self.blake3) == (other.length, &other.blake3)
     }
 
     /// How `self`, taken earlier, differs from `now`; None if it does not.
@@ -76,6 +79,11 @@ fn modified_ns(metadata: &std::fs::Metadata) -> i64 {
         Ok(after) => i64::try_from(after.as_nanos()).unwrap_or(i64::MAX),
         Err(before) => i64::try_from(before.duration().as_nanos()).map_or(i64::MIN, |ns| -ns),
     }
+}
+
+/// BLAKE3 of a text, in hex.
+pub fn text_hash(text: &str) -> String {
+    blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
 /// BLAKE3 of ordered settings, in hex. Lengths go in too, so that no two lists run together.
@@ -108,7 +116,7 @@ pub fn compare_settings(old: &[(String, String)], new: &[(String, String)]) -> V
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::fs;
+    use std::fs::{self, File};
     use std::time::{Duration, SystemTime};
 
     fn pairs(list: &[(&str, &str)]) -> Vec<(String, String)> {

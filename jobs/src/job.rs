@@ -5,7 +5,6 @@
 //! directory. They agree on who does what by claims ([`Claims`]), each writes a ledger of its own, and
 //! one at a time changes the plan.
 
-use std::collections::HashSet;
 use std::error::Error;
 use std::fs;
 use std::io;
@@ -20,7 +19,7 @@ use crate::planning::{Prints, merged_plan, new_plan, stored_path};
 use crate::work::{Desk, WorkerView, sweep_parts, workers};
 use crate::{
     Claims, Entry, FrameState, JobError, JobRequest, JobState, Ledger, Mode, OutputFile, Plan,
-    Status, Summary,
+    Status, Summary, foreign,
 };
 
 /// So many ledgers of workers that have ended may lie about before they are brought together in one.
@@ -40,10 +39,10 @@ pub struct Foreseen {
 /// A job opened for work.
 #[derive(Debug)]
 pub struct Job {
-    state: JobState,
+    pub(crate) state: JobState,
     writer: LedgerWriter,
-    claims: Claims,
-    selected: Vec<i64>,
+    pub(crate) claims: Claims,
+    pub(crate) selected: Vec<i64>,
 }
 
 impl Job {
@@ -116,6 +115,9 @@ impl Job {
                 if !forgotten {
                     refuse_ledgers(dir)?;
                 }
+                if request.mode != Mode::Force {
+                    foreign::refuse_at_begin(request)?;
+                }
                 (new_plan(dir, request, &mut prints)?, ledger, true)
             }
             Some(old) => {
@@ -125,6 +127,7 @@ impl Job {
                     anew = true;
                     Ok::<_, JobError>(Value::Null)
                 })?;
+                foreign::refuse_new(&state, &plan)?;
                 (plan, state.ledger, anew)
             }
         };
@@ -170,7 +173,10 @@ impl Job {
             alone(dir, &desk)?;
             start_over(dir)?;
         }
-        let old = Plan::load(dir)?;
+        let old = match request.mode {
+            Mode::Force => None,
+            Mode::Resume | Mode::KeepDone => Plan::load(dir)?,
+        };
         let ledger = Ledger::read(dir)?;
         let state = match old {
             None => begin(dir, &request, ledger, &mut prints, resolve)?,
@@ -193,33 +199,6 @@ impl Job {
             state,
             selected,
         })
-    }
-
-    /// Takes in the frames that a growing sequence has by now; those selected in `request` are added to those
-    /// of this run.
-    ///
-    /// # Errors
-    /// Those of [`Job::open`]; settings must be those that the job was opened with.
-    pub fn extend(&mut self, request: &JobRequest) -> Result<(), JobError> {
-        request.check()?;
-        let dir = self.state.dir.clone();
-        let new = request.selected();
-        let mut prints = Prints::ahead(request, &new, Some(&self.state.plan));
-        let locking = |e| JobError::io(&dir, "agreeing with other workers", e);
-        let lock = self.claims.desk().lock().map_err(locking)?;
-        self.refresh()?;
-        let never = |_: Option<&Value>| Ok::<_, JobError>(Value::Null);
-        let plan = merged_plan(&self.state, request, &new, &mut prints, never)?;
-        if plan != self.state.plan {
-            plan.store(&dir)?;
-            let ledger = std::mem::take(&mut self.state.ledger);
-            self.state = JobState::new(&dir, plan, ledger);
-        }
-        lock.end();
-        let known: HashSet<i64> = self.selected.iter().copied().collect();
-        let added = new.into_iter().filter(|frame| !known.contains(frame));
-        self.selected.extend(added);
-        Ok(())
     }
 
     /// What the frames of this job are claimed by, before they are worked on.
@@ -317,7 +296,7 @@ impl Job {
         self.writer.sync()
     }
 
-    fn record(&mut self, entry: Entry, state: FrameState) -> Result<(), JobError> {
+    pub(crate) fn record(&mut self, entry: Entry, state: FrameState) -> Result<(), JobError> {
         let frame = entry.frame;
         let Some(slot) = self.state.states.get_mut(&frame) else {
             return Err(JobError::Request(format!(
@@ -352,6 +331,9 @@ fn begin<E: Into<Box<dyn Error + Send + Sync>>>(
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<JobState, JobError> {
     refuse_ledgers(dir)?;
+    if request.mode != Mode::Force {
+        foreign::refuse_at_begin(request)?;
+    }
     let mut plan = new_plan(dir, request, prints)?;
     plan.resolve(resolve(None).map_err(|e| JobError::Resolve(e.into()))?);
     plan.store(dir)?;
@@ -375,6 +357,7 @@ fn go_on(old: JobState, plan: Plan, desk: &Desk) -> Result<JobState, JobError> {
         // The others make their images with what they began with.
         alone(&old.dir, desk)?;
     }
+    foreign::refuse_new(&old, &plan)?;
     plan.store(&old.dir)?;
     Ok(JobState::new(&old.dir, plan, old.ledger))
 }
@@ -392,19 +375,10 @@ fn alone(dir: &Path, desk: &Desk) -> Result<(), JobError> {
     }
 }
 
-/// Ledgers go first: a plan without them means nothing is done, they without it could be taken
-/// for words on the next plan.
+/// A plan without ledgers means nothing is done. It stays until the next one replaces it, so that a kill in
+/// between does not leave images that no plan knows.
 fn start_over(dir: &Path) -> Result<(), JobError> {
-    for file in ledger_files(dir)? {
-        remove(&file)?;
-    }
-    let path = Plan::path_in(dir);
-    match fs::remove_file(&path) {
-        Err(e) if e.kind() != io::ErrorKind::NotFound => {
-            Err(JobError::io(&path, "removing the plan", e))
-        }
-        _ => Ok(()),
-    }
+    ledger_files(dir)?.iter().try_for_each(remove)
 }
 
 /// Brings ledgers of ended workers together if there are many; whether it did.

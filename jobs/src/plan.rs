@@ -1,29 +1,42 @@
 //! The plan: which frames a job has, from which inputs to which outputs, under which settings,
-//! and what "auto" turned into. One JSON file in the job's directory, replaced only as a whole.
+//! and what "auto" turned into. One JSON file in the job's directory, replaced only as a whole, with a
+//! checksum of all of it: a plan with one wrong digit would give the remaining frames another camera.
 
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
+use serde_json::value::RawValue;
 
-use crate::{Fingerprint, JobError, SettingChange, compare_settings, publish, settings_hash};
+use crate::{
+    Fingerprint, JobError, SettingChange, compare_settings, publish, read_regular, settings_hash,
+    text_hash,
+};
 
 /// Name of the plan in the job's directory.
 pub const PLAN_FILE: &str = "job.plan.json";
 
-const VERSION: u32 = 1;
+/// The version that is written. Version 1, of spherule 0.1.0, has a checksum of the settings alone and no
+/// `input_dirs`; it is read, and replaced when the job goes on.
+const VERSION: u32 = 2;
+
+/// More than a plan of two million frames needs.
+const MAX_BYTES: u64 = 1 << 30;
 
 /// See the module.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
+    /// That of the file it was read from.
+    #[serde(skip, default = "current_version")]
     version: u32,
     /// What outputs depend on, besides the inputs: dotted key and value, in the caller's order.
     settings: Vec<(String, String)>,
-    settings_blake3: String,
     /// What "auto" turned into; means something to the caller only.
     resolved: Value,
+    /// The directories that inputs were found in, absolute and without links, the latest last.
+    #[serde(default)]
+    input_dirs: Vec<String>,
     /// By number, ascending.
     frames: Vec<PlannedFrame>,
 }
@@ -48,17 +61,32 @@ pub struct PlannedInput {
     pub fingerprint: Option<Fingerprint>,
 }
 
+/// The file of a plan.
+#[derive(Serialize, Deserialize)]
+struct SealedPlan<'a> {
+    version: u32,
+    /// BLAKE3 of the text of `plan` as it stands in the file, in hex.
+    blake3: String,
+    #[serde(borrow)]
+    plan: &'a RawValue,
+}
+
+const fn current_version() -> u32 {
+    VERSION
+}
+
 impl Plan {
     pub(crate) fn new(
         settings: Vec<(String, String)>,
         resolved: Value,
+        input_dirs: Vec<String>,
         frames: Vec<PlannedFrame>,
     ) -> Self {
         Self {
             version: VERSION,
-            settings_blake3: settings_hash(&settings),
             settings,
             resolved,
+            input_dirs,
             frames,
         }
     }
@@ -83,6 +111,11 @@ impl Plan {
         &self.resolved
     }
 
+    /// The directories that inputs were found in; empty in plans of version 1.
+    pub(crate) fn input_dirs(&self) -> &[String] {
+        &self.input_dirs
+    }
+
     /// All frames, ascending by number.
     pub fn frames(&self) -> &[PlannedFrame] {
         &self.frames
@@ -101,7 +134,7 @@ impl Plan {
     /// The plan in `dir`, or None if there is none.
     pub(crate) fn load(dir: &Path) -> Result<Option<Self>, JobError> {
         let path = Self::path_in(dir);
-        let bytes = match fs::read(&path) {
+        let bytes = match read_regular(&path, MAX_BYTES) {
             Ok(bytes) => bytes,
             Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(None),
             Err(e) => return Err(JobError::io(&path, "reading the plan", e)),
@@ -111,36 +144,75 @@ impl Plan {
             .map_err(|what| JobError::PlanDamaged { path, what })
     }
 
-    fn parse(bytes: &[u8]) -> Result<Self, String> {
+    /// Reads the bytes of a plan's file. What is wrong with them is said without the file's name.
+    ///
+    /// # Errors
+    /// They are no plan, are damaged, or are of a version that is not known.
+    #[doc(hidden)]
+    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
         #[derive(Deserialize)]
         struct Versioned {
             version: u32,
         }
-        let damaged = |e: serde_json::Error| format!("this is no readable plan ({e})");
         let version = serde_json::from_slice::<Versioned>(bytes)
             .map_err(damaged)?
             .version;
-        if version != VERSION {
-            return Err(format!(
-                "the plan has version {version}, this program knows version {VERSION}"
-            ));
-        }
-        let plan: Self = serde_json::from_slice(bytes).map_err(damaged)?;
-        if settings_hash(&plan.settings) != plan.settings_blake3 {
-            return Err("the settings in the plan do not match their fingerprint".to_owned());
-        }
+        let plan = match version {
+            VERSION => Self::unsealed(bytes)?,
+            1 => Self::parse_version_1(bytes)?,
+            _ => {
+                return Err(format!(
+                    "the plan has version {version}, this program knows versions 1 to {VERSION}"
+                ));
+            }
+        };
         if !plan.frames.is_sorted_by(|a, b| a.number < b.number) {
             return Err("the frames in the plan are not in ascending order".to_owned());
         }
         Ok(plan)
     }
 
+    fn unsealed(bytes: &[u8]) -> Result<Self, String> {
+        let sealed: SealedPlan = serde_json::from_slice(bytes).map_err(damaged)?;
+        let text = sealed.plan.get();
+        if text_hash(text) != sealed.blake3 {
+            return Err("the plan does not match its checksum: it is damaged or edited".to_owned());
+        }
+        serde_json::from_str(text).map_err(damaged)
+    }
+
+    fn parse_version_1(bytes: &[u8]) -> Result<Self, String> {
+        #[derive(Deserialize)]
+        struct Hashed {
+            settings_blake3: String,
+        }
+        let hash: Hashed = serde_json::from_slice(bytes).map_err(damaged)?;
+        let mut plan: Self = serde_json::from_slice(bytes).map_err(damaged)?;
+        if settings_hash(&plan.settings) != hash.settings_blake3 {
+            return Err("the settings in the plan do not match their fingerprint".to_owned());
+        }
+        plan.version = 1;
+        Ok(plan)
+    }
+
     pub(crate) fn store(&self, dir: &Path) -> Result<(), JobError> {
         let path = Self::path_in(dir);
-        let mut bytes = serde_json::to_vec_pretty(self)
+        let bytes = self
+            .to_bytes()
             .map_err(|e| JobError::Request(format!("the plan cannot be written as JSON: {e}")))?;
-        bytes.push(b'\n');
         publish(&path, &bytes).map_err(|e| JobError::io(&path, "writing the plan", e))
+    }
+
+    fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
+        let text = RawValue::from_string(serde_json::to_string_pretty(self)?)?;
+        let sealed = SealedPlan {
+            version: VERSION,
+            blake3: text_hash(text.get()),
+            plan: &text,
+        };
+        let mut bytes = serde_json::to_vec_pretty(&sealed)?;
+        bytes.push(b'\n');
+        Ok(bytes)
     }
 
     /// Takes in `frames`, replacing those of the same number.
@@ -155,6 +227,10 @@ impl Plan {
             }
         }
     }
+}
+
+fn damaged(error: serde_json::Error) -> String {
+    format!("this is no readable plan ({error})")
 }
 
 impl PlannedFrame {
@@ -178,66 +254,4 @@ impl PlannedFrame {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn plan() -> Plan {
-        let frame = |number| PlannedFrame {
-            number,
-            inputs: Vec::new(),
-            outputs: vec![format!("f.{number}.exr")],
-        };
-        Plan::new(
-            vec![("a".into(), "1".into())],
-            serde_json::json!({ "radius": 0.1_f32, "eye": [1.0e-300, 0.1 + 0.2] }),
-            vec![frame(-1), frame(4)],
-        )
-    }
-
-    #[test]
-    fn comes_back_to_the_bit() {
-        let dir = tempfile::tempdir().unwrap();
-        assert_eq!(Plan::load(dir.path()).unwrap(), None);
-        plan().store(dir.path()).unwrap();
-        let again = Plan::load(dir.path()).unwrap().unwrap();
-        assert_eq!(again, plan());
-        assert_eq!(again.frame(4).unwrap().outputs, ["f.4.exr"]);
-        assert_eq!(again.frame(3), None);
-    }
-
-    #[track_caller]
-    fn refused(text: &str, what: &str) {
-        let dir = tempfile::tempdir().unwrap();
-        fs::write(dir.path().join(PLAN_FILE), text).unwrap();
-        let error = Plan::load(dir.path()).unwrap_err().to_string();
-        assert!(error.contains(what) && error.contains("--force"), "{error}");
-    }
-
-    #[test]
-    fn damage_is_an_error() {
-        let text = serde_json::to_string(&plan()).unwrap();
-        refused("", "no readable plan");
-        refused("[]", "no readable plan");
-        refused(&text[..text.len() - 9], "no readable plan");
-        refused(&text.replace("\"version\":1", "\"version\":9"), "version 9");
-        refused(
-            &text.replace("[\"a\",\"1\"]", "[\"a\",\"2\"]"),
-            "fingerprint",
-        );
-        refused(&text.replace("\"number\":-1", "\"number\":5"), "ascending");
-    }
-
-    #[test]
-    fn merge_keeps_order() {
-        let mut plan = plan();
-        let frame = |number, output: &str| PlannedFrame {
-            number,
-            inputs: Vec::new(),
-            outputs: vec![output.to_owned()],
-        };
-        plan.merge(vec![frame(9, "new"), frame(4, "other"), frame(0, "new")]);
-        let numbers: Vec<i64> = plan.frames().iter().map(|f| f.number).collect();
-        assert_eq!(numbers, [-1, 0, 4, 9]);
-        assert_eq!(plan.frame(4).unwrap().outputs, ["other"]);
-    }
-}
+mod tests;

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
+use crate::input::{check_input, input_dirs};
 use crate::{
     Fingerprint, FrameRequest, InputChange, JobError, JobRequest, JobState, Mode, Plan,
     PlannedFrame, PlannedInput,
@@ -19,7 +20,9 @@ pub(crate) fn new_plan(
 ) -> Result<Plan, JobError> {
     let mut frames = prints.plan(dir, &request.frames)?;
     frames.sort_by_key(|f| f.number);
-    Ok(Plan::new(request.settings.clone(), Value::Null, frames))
+    let dirs = input_dirs(&[], request);
+    let settings = request.settings.clone();
+    Ok(Plan::new(settings, Value::Null, dirs, frames))
 }
 
 /// The plan of a job that goes on.
@@ -30,6 +33,7 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     prints: &mut Prints,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<Plan, JobError> {
+    check_input(state, request, prints)?;
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
     if request.mode == Mode::Resume && !changes.is_empty() {
@@ -52,7 +56,8 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     } else {
         request.settings.clone()
     };
-    let mut plan = Plan::new(settings, resolved, state.plan.frames().to_vec());
+    let dirs = input_dirs(state.plan.input_dirs(), request);
+    let mut plan = Plan::new(settings, resolved, dirs, state.plan.frames().to_vec());
     plan.merge(frames);
     refuse_shared_outputs(&dir, &plan)?;
     Ok(plan)
@@ -74,6 +79,35 @@ fn refuse_shared_outputs(dir: &Path, plan: &Plan) -> Result<(), JobError> {
         }
     }
     Ok(())
+}
+
+/// What comes of a sequence that has grown.
+pub(crate) struct Extension {
+    pub(crate) plan: Plan,
+    /// Finished frames that are to be made anew.
+    pub(crate) changes: Vec<InputChange>,
+}
+
+/// The plan of a job that takes in the frames `new` while it is open.
+pub(crate) fn extended_plan(
+    state: &JobState,
+    request: &JobRequest,
+    new: &[i64],
+    prints: &mut Prints,
+) -> Result<Extension, JobError> {
+    let dir = state.dir.clone();
+    let changes = state.plan.changes_to(&request.settings);
+    if !changes.is_empty() {
+        return Err(JobError::SettingsChanged { dir, changes });
+    }
+    let mut frames = prints.plan(&dir, wanted(request, new, Some(&state.plan)))?;
+    // An image is not stale because its input has been cleared away since.
+    let is_readable = |f: &PlannedFrame| f.inputs.iter().all(|i| i.fingerprint.is_some());
+    frames.retain(|now| is_readable(now) || !state.is_done(now.number));
+    let changes = changed_inputs(state, &frames);
+    let mut plan = state.plan.clone();
+    plan.merge(frames);
+    Ok(Extension { plan, changes })
 }
 
 /// Only finished frames can be stale; the others will be made from what is there now.
@@ -111,7 +145,8 @@ impl Prints {
         prints
     }
 
-    fn of(&mut self, path: &Path) -> Option<Fingerprint> {
+    /// That of the file at `path`; None if it cannot be read.
+    pub(crate) fn of(&mut self, path: &Path) -> Option<Fingerprint> {
         if let Some(known) = self.known.get(path) {
             return known.clone();
         }

@@ -9,10 +9,11 @@ use crate::JobError;
 /// What to do with what an earlier run left.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Mode {
-    /// Go on with it; refuse if settings, or inputs of finished frames, have changed.
+    /// Go on with it; refuse if settings, or inputs of finished frames, have changed, or if a new job's
+    /// outputs are there already.
     #[default]
     Resume,
-    /// Forget plan and ledgers. Images stay until they are replaced.
+    /// Forget plan and ledgers, and replace whatever has the names of outputs. Images stay until then.
     Force,
     /// Finished frames stay finished whatever has changed; the rest is done as asked now.
     KeepDone,
@@ -25,6 +26,8 @@ pub struct JobRequest {
     pub settings: Vec<(String, String)>,
     /// All frames there are, each number and each output once.
     pub frames: Vec<FrameRequest>,
+    /// Files that the caller writes for the job as a whole: a new job does not replace them either.
+    pub extra_outputs: Vec<PathBuf>,
     /// Numbers of those to do in this run, in this order; all if None. Not part of the job's identity.
     pub selection: Option<Vec<i64>>,
     /// What to do with what an earlier run left.

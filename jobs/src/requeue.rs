@@ -1,7 +1,5 @@
 //! Setting finished frames back, when what was made of them is no good.
 
-use serde_json::Value;
-
 use crate::ledger::{LedgerWriter, News};
 use crate::work::Desk;
 use crate::{DEFAULT_PATIENCE, Entry, Job, JobError, JobState, Ledger, Status};
@@ -28,8 +26,7 @@ impl Job {
             if now.is_none() || now != then.map(|seq| (seq, Status::Done)) {
                 continue;
             }
-            let mut entry = Entry::new(news.take_seq(), *frame, Status::Failed, &Value::Null);
-            entry.reason = Some(reason.clone());
+            let entry = Entry::set_back(news.take_seq(), *frame, reason.clone());
             writer.append(&entry, true)?;
             set_back.push(*frame);
         }
@@ -57,6 +54,7 @@ mod tests {
         let request = JobRequest {
             settings: Vec::new(),
             frames: (1..=3).map(frame).collect(),
+            extra_outputs: Vec::new(),
             selection: None,
             mode: Mode::Resume,
             patience: DEFAULT_PATIENCE,

@@ -71,6 +71,7 @@ impl Place {
                     outputs: vec![self.image(number)],
                 })
                 .collect(),
+            extra_outputs: vec![self.dir().join("report.html")],
             selection: None,
             mode: Mode::Resume,
             patience: DEFAULT_PATIENCE,

@@ -34,7 +34,8 @@ pub(super) struct ConvertArgs {
     #[arg(required = true)]
     input: Vec<PathBuf>,
     /// Directory for the frames, which are called frame.NUMBER.spf, or the name of a file (one.spf) for one
-    /// frame; those that are there are replaced. The same command goes on where it was stopped.
+    /// frame; files that another command made are replaced only with --force. The same command goes on where it
+    /// was stopped.
     #[arg(short, long)]
     output: PathBuf,
     /// How positions are stored: f32 (12 bytes a particle), q16 (6) or q10 (4). Without this, f32, or with
@@ -211,6 +212,7 @@ impl Plan<'_> {
         JobRequest {
             settings,
             frames,
+            extra_outputs: Vec::new(),
             selection: Some(selection(
                 &self.sequence,
                 self.args.frames.as_ref(),

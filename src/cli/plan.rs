@@ -19,6 +19,7 @@ use crate::accel::Structure;
 use crate::manifest::{Manifest, OutputPattern, SCHEMA_FILE, named_place, real_dir};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
 use crate::report::Bytes;
+use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::report::memory::available;
 use crate::resolve::{self, check_views, question};
 use crate::surface::SurfaceKind;
@@ -140,6 +141,9 @@ impl Plan {
         JobRequest {
             settings: self.manifest.settings(),
             frames: self.frames_of_job(requests(sequence, outputs)),
+            extra_outputs: [JSON_FILE, HTML_FILE]
+                .map(|name| self.dir.join(name))
+                .into(),
             selection: Some(self.selected(sequence)),
             mode,
             patience: self.manifest.job.takeover_after.duration(),

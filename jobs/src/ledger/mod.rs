@@ -17,8 +17,8 @@ mod tests;
 mod writer;
 
 pub use entry::{Details, Entry, OutputFile, Status};
-pub(crate) use files::{ENDED, LedgerFile, ledger_files};
-use files::{Mark, read_lines};
+pub(crate) use files::{ENDED, LedgerFile, ledger_files, outputs_of, parse_lines};
+use files::{Mark, read_entries};
 pub(crate) use news::News;
 pub(crate) use writer::{LedgerWriter, fold, remove};
 
@@ -58,10 +58,9 @@ impl Ledger {
         let mut ledger = Self::default();
         for LedgerFile { path, .. } in ledger_files(dir)? {
             let mut mark = Mark::default();
-            let Some(entries) = read_lines(&path, &mut mark)? else {
+            if !read_entries(&path, &mut mark, |entry| ledger.take_in(entry))? {
                 return Ok(None);
-            };
-            entries.into_iter().for_each(|entry| ledger.take_in(entry));
+            }
             ledger.read.insert(path, mark);
         }
         Ok(Some(ledger))

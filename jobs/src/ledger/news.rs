@@ -4,22 +4,33 @@ use std::collections::{BTreeMap, HashMap};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use serde::Deserialize;
-
-use super::files::{Mark, ledger_files, ledger_path, read_lines};
-use super::{Ledger, Status};
+use super::files::{Mark, ledger_files, ledger_path, read_entries};
+use super::{Entry, Ledger, Status};
 use crate::JobError;
 
 /// How often a lone worker looks for ledgers of others that have come and gone.
 const LOOK: Duration = Duration::from_secs(2);
 
 /// As much of an entry as is asked for here.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Deserialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
 struct Word {
     seq: u64,
     time_ms: u64,
     frame: i64,
     status: Status,
+    set_back: bool,
+}
+
+impl From<&Entry> for Word {
+    fn from(entry: &Entry) -> Self {
+        Self {
+            seq: entry.seq,
+            time_ms: entry.time_ms,
+            frame: entry.frame,
+            status: entry.status,
+            set_back: entry.set_back,
+        }
+    }
 }
 
 /// The last word on each frame, kept up to date.
@@ -30,7 +41,7 @@ pub(crate) struct News {
     own: PathBuf,
     read: BTreeMap<PathBuf, Mark>,
     words: HashMap<i64, Word>,
-    /// What had been said when this worker began.
+    /// What had been said when this worker began, or when the frame was set back.
     old: HashMap<i64, Word>,
     next_seq: u64,
     looked: Instant,
@@ -43,15 +54,7 @@ impl News {
     pub(crate) fn new(dir: &Path, worker: &str, ledger: &Ledger) -> Self {
         let words: HashMap<i64, Word> = ledger
             .entries()
-            .map(|entry| {
-                let word = Word {
-                    seq: entry.seq,
-                    time_ms: entry.time_ms,
-                    frame: entry.frame,
-                    status: entry.status,
-                };
-                (entry.frame, word)
-            })
+            .map(|entry| (entry.frame, entry.into()))
             .collect();
         Self {
             dir: dir.to_owned(),
@@ -103,6 +106,11 @@ impl News {
         }
     }
 
+    /// Takes in that this worker has set a frame back: how others ended it before is over.
+    pub(crate) fn set_back(&mut self, entry: &Entry) {
+        self.take_in(entry.into());
+    }
+
     fn know(&mut self, path: PathBuf) {
         if path != self.own {
             self.read.entry(path).or_default();
@@ -114,19 +122,18 @@ impl News {
         let mut is_gone = false;
         let mut read = std::mem::take(&mut self.read);
         let mut fault = None;
-        read.retain(|path, mark| match read_lines::<Word>(path, mark) {
-            Ok(Some(words)) => {
-                words.into_iter().for_each(|word| self.take_in(word));
-                true
-            }
-            // Not written yet, or gone.
-            Ok(None) => {
-                is_gone |= *mark != Mark::default();
-                false
-            }
-            Err(error) => {
-                fault = Some(error);
-                true
+        read.retain(|path, mark| {
+            match read_entries(path, mark, |entry| self.take_in((&entry).into())) {
+                Ok(true) => true,
+                // Not written yet, or gone.
+                Ok(false) => {
+                    is_gone |= *mark != Mark::default();
+                    false
+                }
+                Err(error) => {
+                    fault = Some(error);
+                    true
+                }
             }
         });
         self.read = read;
@@ -139,6 +146,9 @@ impl News {
         if known.is_none_or(|known| supersedes((word.seq, word.status), (known.seq, known.status)))
         {
             self.words.insert(word.frame, word);
+            if word.set_back {
+                self.old.insert(word.frame, word);
+            }
         }
     }
 }

@@ -94,12 +94,23 @@ fn damage_in_the_middle_is_an_error_and_nothing_is_touched() {
     let dir = tempfile::tempdir().unwrap();
     ledger_of(dir.path(), "w", 2);
     let good = text(dir.path(), "w");
+    let with_details = |value: &str| {
+        let damaged = good.replacen("\"details\":null", &format!("\"details\":{value}"), 1);
+        assert_ne!(damaged, good);
+        damaged
+    };
     let cases = [
         (good.replacen("\"frame\":1", "\"frame\":?", 1), 1),
         (good.replacen("done", "dome", 1), 1),
         (format!("{good}\n{good}"), 3),
         (format!("{good}\0\0\n"), 3),
         (format!("{good}[]\n"), 3),
+        // What the parser passes over in text that is kept for later.
+        (with_details("203E616"), 1),
+        (with_details("[1e999]"), 1),
+        (with_details("{\"a\":\"\\ud800\"}"), 1),
+        (with_details("{\"\\ud800\":1}"), 1),
+        (with_details(&("[".repeat(300) + &"]".repeat(300))), 1),
     ];
     for (damaged, wanted) in cases {
         fs::write(ledger_path(dir.path(), "w"), &damaged).unwrap();
@@ -108,7 +119,10 @@ fn damage_in_the_middle_is_an_error_and_nothing_is_touched() {
             matches!(&error, JobError::LedgerDamaged { line, .. } if *line == wanted),
             "{error}"
         );
-        assert!(error.to_string().contains("job.ledger.w.jsonl"));
+        let text_of = error.to_string();
+        assert!(text_of.contains("job.ledger.w.jsonl") && text_of.contains("not a ledger entry"));
+        let mut news = News::new(dir.path(), "me", &Ledger::default());
+        assert!(news.refresh(&["w".to_owned()]).is_err());
         assert_eq!(text(dir.path(), "w"), damaged);
     }
 }
@@ -154,4 +168,36 @@ fn what_ended_workers_said_is_brought_together_and_still_found() {
         news.refresh(&[]).unwrap();
         assert_eq!(news.ended(2), Some(Status::Done));
     }
+}
+
+#[test]
+fn a_line_without_an_end_is_damage_beyond_a_limit() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = ledger_path(dir.path(), "w");
+    let file = fs::File::create(&path).unwrap();
+    file.set_len(1 << 36).unwrap();
+    let error = Ledger::read(dir.path()).unwrap_err().to_string();
+    assert!(
+        error.contains("line 1: not a ledger entry (longer"),
+        "{error}"
+    );
+}
+
+#[test]
+fn a_frame_that_is_set_back_is_open_to_all() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut news = News::new(dir.path(), "me", &Ledger::default());
+    append(dir.path(), "1", "a", 1, Status::Done);
+    news.refresh(&["a".to_owned()]).unwrap();
+    assert_eq!(news.ended(1), Some(Status::Done));
+    let entry = Entry::set_back(news.take_seq(), 1, "f.vtk: grown".to_owned());
+    let mut writer = LedgerWriter::new(dir.path(), "b");
+    writer.append(&entry, true).unwrap();
+    news.refresh(&["b".to_owned()]).unwrap();
+    assert_eq!(news.ended(1), None);
+    let ledger = Ledger::read(dir.path()).unwrap();
+    assert!(ledger.entry(1).unwrap().set_back);
+    append(dir.path(), "3", "c", 1, Status::Done);
+    news.refresh(&["c".to_owned()]).unwrap();
+    assert_eq!(news.ended(1), Some(Status::Done));
 }

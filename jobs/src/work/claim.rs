@@ -6,7 +6,7 @@ use std::sync::Arc;
 
 use super::files::{link_alone, remove};
 use super::{Card, Desk, Standing};
-use crate::Status;
+use crate::{Status, open_regular};
 
 /// What came of asking for a claim.
 #[derive(Debug)]
@@ -49,7 +49,8 @@ impl Claim {
                 Ok(None) => (desk.watch.signs(&path), None),
                 // Given back in between: once more.
                 Err(e) if e.kind() == io::ErrorKind::NotFound => continue,
-                // Whatever it is, it is in the way like a claim that cannot be read.
+                // Whatever it is, it is in the way like a claim that cannot be read. No worker makes
+                // anything but files, so nobody else is behind a pipe or a directory.
                 Err(_) => (desk.watch.signs(&path), None),
             };
             match (standing, card) {
@@ -98,7 +99,7 @@ impl Claim {
     /// Whether this worker still counts as alive. To be asked before something is made visible: a worker that
     /// slept while others took over, or began anew with other settings, must not put its image over theirs.
     pub fn is_valid(&self) -> bool {
-        !self.desk.is_buried() && std::fs::File::open(&self.desk.card_path).is_ok()
+        !self.desk.is_buried() && open_regular(&self.desk.card_path).is_ok()
     }
 
     /// What was claimed is over for everybody: clears away the claims of the dead before this one, too.

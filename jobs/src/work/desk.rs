@@ -9,6 +9,7 @@ use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Duration;
 
+use super::card::is_worker_name;
 use super::claim::{Claim, Claimed};
 use super::files::{cards, list, remove, sweep_parts};
 use super::{CARD, Card, Standing, WORK_DIR, Watch, heart};
@@ -50,8 +51,7 @@ impl Desk {
             since_ms: now_ms(),
             pause_ms: u64::try_from(pause.as_millis()).unwrap_or(u64::MAX),
         };
-        let mut text = serde_json::to_vec(&card)?;
-        text.push(b'\n');
+        let text = card.line()?;
         let card_path = work.join(card.file_name());
         put_card(&work, &card_path, &text)?;
         let is_buried = Arc::new(AtomicBool::new(false));
@@ -109,13 +109,14 @@ impl Desk {
         Ok(all.into_iter().filter_map(alive).collect())
     }
 
-    /// The names of all workers here, dead or alive.
+    /// The names of all workers here, dead or alive, also of those whose cards are damaged.
     pub(crate) fn names(&self) -> io::Result<Vec<String>> {
         let all = cards(&self.work)?;
-        Ok(all
-            .into_iter()
-            .filter_map(|(_, c)| Some(c?.worker))
-            .collect())
+        let name = |(path, _): (PathBuf, Option<Card>)| {
+            let name = path.file_name()?.to_str()?.strip_suffix(CARD)?;
+            is_worker_name(name).then(|| name.to_owned())
+        };
+        Ok(all.into_iter().filter_map(name).collect())
     }
 
     /// Declares a worker dead: from now on all agree that its claims are free, and should it come back it

@@ -65,7 +65,10 @@ pub(super) fn cards(work: &Path) -> io::Result<Vec<(PathBuf, Option<Card>)>> {
     let mut cards = Vec::new();
     for path in paths {
         match Card::read(&path) {
-            Ok(card) => cards.push((path, card)),
+            Ok(card) => {
+                let card = card.filter(|card| card.is_at(&path));
+                cards.push((path, card));
+            }
             // It has just ended.
             Err(e) if e.kind() == io::ErrorKind::NotFound => {}
             Err(_) => cards.push((path, None)),

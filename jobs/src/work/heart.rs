@@ -1,6 +1,6 @@
 //! Signs of life: one thread a process makes the cards of its workers longer.
 
-use std::fs::OpenOptions;
+use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -69,12 +69,20 @@ impl Beat {
     /// Whether there is a card still. A full disk is no death.
     fn give(&mut self, now: Instant) -> bool {
         self.next = now + self.pause;
-        let card = OpenOptions::new().append(true).open(&self.card);
-        let given = card.and_then(|mut file| file.write_all(b"."));
+        let given = self.append();
         let is_gone = given.is_err_and(|e| e.kind() == io::ErrorKind::NotFound);
         if is_gone {
             self.is_buried.store(true, Ordering::Relaxed);
         }
         !is_gone
+    }
+
+    fn append(&self) -> io::Result<()> {
+        // Opening a pipe in the card's place would wait for a reader.
+        if !fs::metadata(&self.card)?.is_file() {
+            return Err(io::ErrorKind::NotFound.into());
+        }
+        let mut file = OpenOptions::new().append(true).open(&self.card)?;
+        file.write_all(b".")
     }
 }

@@ -15,16 +15,14 @@
 //! same images under the same names, whole, and tells so in a ledger of its own.
 
 use std::collections::HashMap;
-use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
-use serde::{Deserialize, Serialize};
+use crate::open_regular;
 
-use crate::process::Process;
-
+mod card;
 mod claim;
 mod desk;
 mod files;
@@ -33,6 +31,7 @@ mod heart;
 mod tests;
 mod view;
 
+pub(crate) use card::Card;
 pub use claim::{Claim, Claimed};
 pub(crate) use desk::Desk;
 pub(crate) use files::sweep_parts;
@@ -46,40 +45,16 @@ const WORK_DIR: &str = "job.work";
 /// The end of a card's name.
 const CARD: &str = ".worker";
 
-/// What a worker says of itself, in the first line of its card.
-#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
-pub(crate) struct Card {
-    /// Its name, unique.
-    pub(crate) worker: String,
-    /// Who works.
-    pub(crate) process: Process,
-    /// When it began, milliseconds since 1970 by its own clock; for people.
-    pub(crate) since_ms: u64,
-    /// Milliseconds between its signs of life.
-    #[serde(default)]
-    pause_ms: u64,
-}
-
 /// Signs of life that a worker must have missed, however impatient others are.
 const MISSED: u32 = 4;
 
-impl Card {
-    /// The card in the file at `path`; None if there is none in it.
-    fn read(path: &Path) -> io::Result<Option<Self>> {
-        let bytes = fs::read(path)?;
-        let line = bytes.split(|b| *b == b'\n').next().unwrap_or_default();
-        Ok(serde_json::from_slice(line).ok())
-    }
-
-    /// The name of its file.
-    fn file_name(&self) -> String {
-        format!("{}{CARD}", self.worker)
-    }
-
-    /// Who it is, for people.
-    pub(crate) fn told(&self) -> String {
-        format!("process {} on {}", self.process.pid, self.process.host)
-    }
+/// Whether what is at a path was made by no living worker: nothing, or no regular file.
+fn is_none_of_ours(error: &io::Error) -> bool {
+    use io::ErrorKind as Kind;
+    matches!(
+        error.kind(),
+        Kind::NotFound | Kind::IsADirectory | Kind::InvalidInput
+    )
 }
 
 /// Whether whoever left a file still works.
@@ -115,7 +90,7 @@ impl Watch {
         if card.process.has_ended() {
             return Standing::Ended;
         }
-        let least = Duration::from_millis(card.pause_ms).saturating_mul(MISSED);
+        let least = card.pause().saturating_mul(MISSED);
         self.signs_for(&work.join(card.file_name()), self.patience.max(least))
     }
 
@@ -126,9 +101,9 @@ impl Watch {
 
     fn signs_for(&self, path: &Path, patience: Duration) -> Standing {
         // Network file systems look again at what is opened, not at what is asked about.
-        let length = match fs::File::open(path).and_then(|file| file.metadata()) {
-            Ok(metadata) => metadata.len(),
-            Err(e) if e.kind() == io::ErrorKind::NotFound => return Standing::Ended,
+        let length = match open_regular(path) {
+            Ok((_, metadata)) => metadata.len(),
+            Err(e) if is_none_of_ours(&e) => return Standing::Ended,
             Err(_) => u64::MAX,
         };
         let mut seen = self.seen.lock().unwrap_or_else(|e| e.into_inner());

@@ -6,6 +6,8 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
+use crate::process::Process;
+
 use super::*;
 
 const PATIENT: Duration = Duration::from_secs(3600);
@@ -188,12 +190,72 @@ fn damaged_and_foreign_files_do_no_harm() {
     fs::create_dir(work.join("folder.worker")).unwrap();
     let a = Desk::take(dir.path(), Duration::from_millis(50)).unwrap();
     a.sweep().unwrap();
-    assert!(is_held(&a, 1) && is_held(&a, 2) && is_held(&a, 4));
+    assert!(!is_held(&a, 4), "no worker makes directories");
+    assert!(is_held(&a, 1) && is_held(&a, 2));
     thread::sleep(Duration::from_millis(100));
-    assert!(!is_held(&a, 1) && !is_held(&a, 2) && !is_held(&a, 4));
+    assert!(!is_held(&a, 1) && !is_held(&a, 2));
     a.sweep().unwrap();
     assert!(work.join("notes.txt").exists() && !work.join("torn.worker").exists());
     assert!(!is_held(&a, 3));
+}
+
+/// A claim that names a worker by a path must not lead out of the directory.
+#[test]
+fn a_forged_claim_deletes_nothing_elsewhere() {
+    let dir = tempfile::tempdir().unwrap();
+    let (work, victim) = (dir.path().join(WORK_DIR), dir.path().join("victim.worker"));
+    fs::write(&victim, "mine").unwrap();
+    let stranger = stranger(dir.path(), "far", 3);
+    let forged = |worker: &str| {
+        let text = fs::read_to_string(&stranger).unwrap();
+        text.replace("\"far\"", &format!("\"{worker}\""))
+    };
+    fs::write(work.join("frame.1.0"), forged("../victim")).unwrap();
+    fs::write(work.join("forged.worker"), forged("../victim")).unwrap();
+    // Nor may one card speak for another worker.
+    let other = desk(dir.path());
+    fs::write(work.join("liar.worker"), forged(other.worker())).unwrap();
+    let a = Desk::take(dir.path(), Duration::from_millis(40)).unwrap();
+    while is_held(&a, 1) {
+        thread::sleep(Duration::from_millis(10));
+    }
+    while work.join("forged.worker").exists() {
+        a.sweep().unwrap();
+    }
+    assert_eq!(fs::read_to_string(&victim).unwrap(), "mine");
+    assert!(other.card_path.exists());
+    drop((a, other));
+    assert_eq!(fs::read_to_string(&victim).unwrap(), "mine");
+}
+
+/// Its ledger must not be taken for that of a worker that has ended.
+#[test]
+fn a_worker_with_a_damaged_card_keeps_its_name() {
+    let dir = tempfile::tempdir().unwrap();
+    let (a, b) = (desk(dir.path()), desk(dir.path()));
+    let text = fs::read_to_string(&a.card_path).unwrap();
+    fs::write(&a.card_path, text.replace("since_ms", "since_mx")).unwrap();
+    assert!(b.names().unwrap().contains(&a.worker().to_owned()));
+}
+
+#[cfg(unix)]
+#[test]
+fn pipes_among_cards_and_claims_are_passed_by() {
+    let dir = tempfile::tempdir().unwrap();
+    let work = dir.path().join(WORK_DIR);
+    fs::create_dir(&work).unwrap();
+    for name in ["frame.1.0", "lock.0", "pipe.worker"] {
+        let made = std::process::Command::new("mkfifo")
+            .arg(work.join(name))
+            .status();
+        assert!(made.unwrap().success());
+    }
+    let a = desk(dir.path());
+    a.lock().unwrap().end();
+    a.sweep().unwrap();
+    assert!(!is_held(&a, 1));
+    assert!(a.others().unwrap().is_empty());
+    assert_eq!(workers(dir.path()).unwrap().len(), 1);
 }
 
 #[test]

@@ -74,27 +74,34 @@ pub(super) fn run(args: &WorkArgs, asked: Asked, signals: &Listener) -> Result<O
     };
     let mut run = Run::begin(args, asked, sequence)?;
     run.tell_kept();
-    loop {
-        if let Err(error) = run.make_pending(follower.interrupt) {
-            return Ok(run.end(Err(error), follower.interrupt));
-        }
-        run.job.sync()?;
-        follower.busy = Instant::now();
-        match follower.next()? {
-            Ok((sequence, new)) => run.extend(sequence, &new)?,
-            Err(end) => {
-                say!("{}", follower.told(&end));
-                let outcome = run.end(Ok(()), follower.interrupt);
-                return Ok(match (end, outcome) {
-                    (End::Interrupted, Outcome::Done) => Outcome::Interrupted,
-                    (_, outcome) => outcome,
-                });
+    Ok(match follower.follow(&mut run) {
+        Ok(end) => {
+            say!("{}", follower.told(&end));
+            let outcome = run.end(Ok(()), follower.interrupt);
+            match (end, outcome) {
+                (End::Interrupted, Outcome::Done) => Outcome::Interrupted,
+                (_, outcome) => outcome,
             }
         }
-    }
+        // Frames have been made by now, so there is a report.
+        Err(error) => run.end(Err(error), follower.interrupt),
+    })
 }
 
 impl Follower<'_> {
+    /// Makes frames as they come, until there will be no more.
+    fn follow(&mut self, run: &mut Run) -> Result<End, CliError> {
+        loop {
+            run.make_pending(self.interrupt)?;
+            run.job.sync()?;
+            self.busy = Instant::now();
+            match self.next()? {
+                Ok((sequence, new)) => run.extend(sequence, &new)?,
+                Err(end) => return Ok(end),
+            }
+        }
+    }
+
     /// Waits for complete frames: the sequence of all complete ones, and the numbers of the new ones.
     fn next(&mut self) -> Result<Result<(Sequence, Vec<i64>), End>, CliError> {
         loop {

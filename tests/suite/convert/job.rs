@@ -127,7 +127,7 @@ fn appended_frames_are_converted_as_the_first_ones_were() {
     let resolved = || {
         let text = fs::read(shop.join("out/job.plan.json")).expect("the plan");
         let plan: Value = serde_json::from_slice(&text).expect("JSON");
-        plan["resolved"].clone()
+        plan["plan"]["resolved"].clone()
     };
     let settled = resolved();
     // Alone it would have another origin and another radius.

@@ -119,3 +119,44 @@ fn a_signal_ends_it_with_75() {
     assert_eq!(status.code(), Some(75), "{told}");
     no_leftovers(&workshop.join("out"));
 }
+
+/// A simulator may pause inside a file for longer than `--settle`.
+#[test]
+fn a_finished_frame_whose_file_grows_is_rendered_again() {
+    let workshop = Workshop::new();
+    let input = workshop.join("in");
+    fs::create_dir(&input).expect("a directory");
+    let file = |number: usize| input.join(format!("f_{number}.xyz"));
+    let lines = |count: usize| -> String {
+        let line = |i: usize| format!("{} {} {}\n", i % 7, i / 7 % 7, i / 49);
+        (0..count).map(line).collect()
+    };
+    fs::write(file(1), lines(300)).expect("a file");
+    fs::write(file(2), lines(100)).expect("a file");
+    for options in [&[][..], &["--isolate"]] {
+        fs::write(file(2), lines(100)).expect("a file");
+        let mut running = workshop.start(&arguments(options));
+        assert!(running.wait_for_line("] frame 2:"));
+        let half = fs::read(workshop.join("out/f.0002.exr")).expect("an image");
+        fs::write(file(2), lines(300)).expect("a file");
+        assert!(running.wait_for_line("note: frame 2: in/f_2.xyz: length "));
+        assert!(running.wait_for_line("] frame 2:"));
+        fs::write(file(3), lines(300)).expect("a file");
+        assert!(running.wait_for_line("] frame 3:"));
+        fs::write(workshop.join("out/job.stop"), "").expect("a file");
+        let (told, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{told}");
+        assert!(told.contains("since it was rendered; it is rendered again"));
+        assert!(fs::read(workshop.join("out/f.0002.exr")).expect("an image") != half);
+        let report = fs::read_to_string(workshop.join("out/report.json")).expect("a report");
+        assert_eq!(
+            report.matches("\"status\": \"done\"").count(),
+            3,
+            "{report}"
+        );
+        let again = workshop.run(&arguments(&["--idle", "0.5"])).expect(0);
+        assert!(again.rendered().is_empty());
+        fs::remove_dir_all(workshop.join("out")).expect("a directory");
+        fs::remove_file(file(3)).expect("a file");
+    }
+}

@@ -27,7 +27,7 @@ fn appended_frames_are_seen_by_the_old_camera() {
     let resolved = || {
         let text = fs::read(workshop.join("out/job.plan.json")).expect("the plan");
         let plan: Value = serde_json::from_slice(&text).expect("JSON");
-        plan["resolved"].clone()
+        plan["plan"]["resolved"].clone()
     };
     let settled = resolved();
     let before = stamps(&workshop.join("out"));

@@ -8,6 +8,7 @@ mod interrupted;
 mod isolated;
 mod killed;
 mod ledger;
+mod mixed;
 mod report;
 mod shared;
 mod threads;
