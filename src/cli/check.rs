@@ -129,7 +129,7 @@ impl<'a> Check<'a> {
         if self.noted(self.plan.guard_directory(mode)).is_none() {
             return false;
         }
-        self.noted(self.plan.guard_manifest(mode == Mode::Force));
+        self.noted(self.plan.guard_manifest());
         let there = disk::existing(&self.plan.dir);
         self.free_disk = disk::free(&there);
         if let Err(error) = disk::writable(&there) {

@@ -1,7 +1,6 @@
 //! From arguments to a manifest and its sequence: what `render` and `init` share.
 
 use std::env;
-use std::fs;
 use std::panic;
 use std::path::{Path, PathBuf};
 use std::thread;
@@ -11,7 +10,7 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 
 use super::CliError;
 use super::job_args::JobArgs;
-use crate::manifest::{Look, Manifest, Override};
+use crate::manifest::{Look, Manifest, Override, read_manifest};
 use crate::reading::read_budget;
 use crate::report::Bytes;
 
@@ -117,7 +116,7 @@ impl ManifestArgs {
         let file = self.manifest_file()?;
         let (text, base) = match &file {
             Some(path) => {
-                let text = fs::read_to_string(path).map_err(CliError::io(path))?;
+                let text = read_manifest(path).map_err(CliError::io(path))?;
                 (
                     text,
                     path.parent().map_or_else(PathBuf::new, Path::to_owned),

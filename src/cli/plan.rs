@@ -1,22 +1,23 @@
 //! A job as it is asked for, before anything is written: what `render` and `check` share.
 
-use std::fs;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish};
+use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish, read_regular_text};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, absolute, apart};
-use super::schema::schema_text;
+use super::schema::{is_schema, schema_text};
 use super::shard::Shard;
 use super::work::{
     WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey, selection,
 };
 use crate::accel::Structure;
-use crate::manifest::{Manifest, OutputPattern, SCHEMA_FILE, named_place, real_dir};
+use crate::manifest::{
+    Manifest, OutputPattern, SCHEMA_FILE, is_marked, marked, named_place, read_manifest, real_dir,
+};
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
 use crate::report::Bytes;
 use crate::report::job::{HTML_FILE, JSON_FILE};
@@ -107,15 +108,17 @@ impl Plan {
         guard_kind(&self.dir, None, mode)
     }
 
-    /// Refuses to overwrite a `job.toml` that belongs to no job of ours.
-    pub(super) fn guard_manifest(&self, force: bool) -> Result<(), CliError> {
+    /// Refuses to begin a job beside a `job.toml` that a user wrote for something else: no option makes
+    /// that file's place free.
+    pub(super) fn guard_manifest(&self) -> Result<(), CliError> {
         let path = self.job_file();
-        if force || self.is_own_manifest() || !path.exists() || Job::has_begun(&self.dir)? {
+        let is_free = || !path.exists() || read_manifest(&path).is_ok_and(|text| is_marked(&text));
+        if self.is_own_manifest() || is_free() || Job::has_begun(&self.dir)? {
             return Ok(());
         }
         Err(CliError::other(format!(
             "{}: is in the way of this job's own manifest; render that file, choose another \
-             output directory, or overwrite it with --force",
+             output directory, or move it away",
             path.display()
         )))
     }
@@ -243,7 +246,8 @@ impl Plan {
     }
 
     /// Writes the manifest beside the images, unless it is what was given or stands there already.
-    /// If it is what was given, options become part of it where the job was `settled_anew` by them.
+    /// If it is what was given, options become part of it where the job was `settled_anew` by them. A file
+    /// that a user wrote or edited stays as it is.
     pub(super) fn write_manifest(&self, settled_anew: bool) -> Result<(), CliError> {
         let path = self.job_file();
         let mut manifest = self.manifest.clone();
@@ -256,12 +260,33 @@ impl Plan {
         if self.is_own_manifest() && (!settled_anew || self.unchanged.as_ref() == Some(&manifest)) {
             return Ok(());
         }
-        write_if_changed(&path, &manifest.to_commented_toml())?;
-        // Its first line refers to this, which is of use to editors alone.
-        if let Err(error) = write_if_changed(&self.dir.join(SCHEMA_FILE), &schema_text()) {
+        if path.exists() {
+            let text = read_manifest(&path).unwrap_or_default();
+            if !is_marked(&text) {
+                if Manifest::parse(&text, &path).ok().as_ref() != Some(&manifest) {
+                    say!(
+                        "note: {}: not written by spherule, or edited since, so it stays as it is; this job was made \
+                         with other settings than it has: give the same options again, or put them into it",
+                        path.display()
+                    );
+                }
+                return Ok(());
+            }
+        }
+        write_if_changed(&path, &marked(&manifest.to_commented_toml()))?;
+        self.write_schema();
+        Ok(())
+    }
+
+    /// The manifest's first line refers to the schema, which is of use to editors alone.
+    fn write_schema(&self) {
+        let path = self.dir.join(SCHEMA_FILE);
+        if path.exists() && !is_schema(&path) {
+            return;
+        }
+        if let Err(error) = write_if_changed(&path, &schema_text()) {
             say!("note: {error}; editors do without it");
         }
-        Ok(())
     }
 
     pub(super) fn tasks(&self, sequence: &Sequence, pending: &[i64]) -> Vec<ImageTask> {
@@ -281,7 +306,7 @@ impl Plan {
 }
 
 fn write_if_changed(path: &Path, text: &str) -> Result<(), CliError> {
-    if fs::read_to_string(path).is_ok_and(|old| old == text) {
+    if read_regular_text(path, text.len() as u64).is_ok_and(|old| old == text) {
         return Ok(());
     }
     publish(path, text.as_bytes()).map_err(CliError::io(path))

@@ -1,5 +1,10 @@
 //! `spherule schema`: the manifest's JSON schema on standard output.
 
+use std::path::Path;
+
+use serde_json::Value;
+use spherule_jobs::read_regular_text;
+
 use super::{CliError, Outcome, print};
 use crate::manifest::job_schema;
 
@@ -12,10 +17,22 @@ pub(super) fn schema_text() -> String {
     format!("{:#}\n", job_schema())
 }
 
+/// Whether the file at `path` is such a schema, of this version or another.
+pub(super) fn is_schema(path: &Path) -> bool {
+    let text = read_regular_text(path, MAX_BYTES).unwrap_or_default();
+    let title = |text: &str| -> Option<Value> {
+        let schema: Value = serde_json::from_str(text).ok()?;
+        schema.get("title").cloned()
+    };
+    title(&text).is_some_and(|found| job_schema().get("title") == Some(&found))
+}
+
+/// Many times what a schema has.
+const MAX_BYTES: u64 = 16 << 20;
+
 #[cfg(test)]
 mod tests {
     use std::fs;
-    use std::path::Path;
 
     use super::*;
 

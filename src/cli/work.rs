@@ -13,7 +13,7 @@ use super::job::{absolute, is_manifest};
 use super::progress::{Ended, duration};
 use super::shard::Shard;
 use super::{CliError, Outcome};
-use crate::manifest::{Manifest, real_dir};
+use crate::manifest::{Manifest, read_manifest, real_dir};
 use crate::survey::Survey;
 
 /// The setting that says what a job makes; jobs that render have none.
@@ -144,7 +144,7 @@ pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
     if !is_manifest(job) || job.is_dir() {
         return Ok(job.to_owned());
     }
-    let text = std::fs::read_to_string(job).map_err(CliError::io(job))?;
+    let text = read_manifest(job).map_err(CliError::io(job))?;
     let manifest = Manifest::parse(&text, job)?;
     let base = absolute(job.parent().unwrap_or(Path::new("")))?;
     Ok(real_dir(&base.join(manifest.output.path.dir())))

@@ -15,6 +15,7 @@ use write::Entries;
 
 mod camera;
 mod color;
+mod file;
 mod input;
 mod length;
 mod light;
@@ -39,6 +40,7 @@ mod write;
 
 pub use camera::{Camera, CameraKey, CameraMode};
 pub use color::{Background, ColorMap, ColorSetting};
+pub use file::{is_marked, marked, read_manifest};
 pub use input::{Input, RadiusSetting, UpAxis};
 pub use length::AutoLength;
 pub use light::{Falloff, Light, LightKind};

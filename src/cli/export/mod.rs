@@ -1,7 +1,6 @@
 //! `spherule export`: a job as work for a cluster or a render farm, whose tasks only ever call
 //! `spherule render job.toml --frames RANGE`.
 
-use std::fs;
 use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -10,10 +9,10 @@ use clap::{Args, Subcommand};
 use spherule_jobs::export::{Chunks, ExportError};
 use spherule_jobs::{Mode, publish};
 
-use super::job::{Asked, absolute};
+use super::job::{Asked, absolute, is_manifest};
 use super::plan::Plan;
 use super::{CliError, Outcome};
-use crate::manifest::{Manifest, Override, named_place};
+use crate::manifest::{Manifest, Override, named_place, read_manifest};
 use crate::report::Bytes;
 
 mod openjd;
@@ -112,7 +111,7 @@ impl Work {
             .join(asked.manifest.output.path.dir());
         let plan = Plan::new(asked, &sequence, None)?;
         plan.guard_directory(Mode::Resume)?;
-        plan.guard_manifest(false)?;
+        plan.guard_manifest()?;
         let frames = plan.selected(&sequence);
         let chunks = Chunks::of(&frames, args.chunk, most_tasks)?;
         let manifest_file = absolute(&args.manifest)?;
@@ -148,17 +147,14 @@ impl Work {
 /// The manifest with its frames: all else is read by each task from the file itself.
 fn asked(args: &CommonArgs) -> Result<Asked, CliError> {
     let path = &args.manifest;
-    let is_toml = path
-        .extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("toml"));
-    if !is_toml {
+    if !is_manifest(path) {
         return Err(CliError::other(format!(
             "{}: is no manifest (.toml), which each task is to read; `spherule init {0} > job.toml` \
              writes one",
             path.display()
         )));
     }
-    let content = fs::read_to_string(path).map_err(CliError::io(path))?;
+    let content = read_manifest(path).map_err(CliError::io(path))?;
     let frames = args.frames.as_ref().map(|range| {
         Override::new("input.frames", range.clone(), "--frames").map_err(CliError::Other)
     });
@@ -187,6 +183,12 @@ fn deliver(args: &CommonArgs, content: &str) -> Result<(), CliError> {
     if same(path, &args.manifest)? {
         return Err(CliError::other(format!(
             "{}: is the manifest itself; choose another --output",
+            path.display()
+        )));
+    }
+    if is_manifest(path) && path.exists() {
+        return Err(CliError::other(format!(
+            "{}: is a manifest already; choose another --output",
             path.display()
         )));
     }

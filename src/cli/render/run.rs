@@ -40,7 +40,7 @@ impl Run {
         let mode = args.mode();
         let plan = Plan::new(asked, &sequence, args.shard)?;
         plan.guard_directory(mode)?;
-        plan.guard_manifest(args.force)?;
+        plan.guard_manifest()?;
         let job = plan.open(&sequence, mode)?;
         let (survey, setup) = plan.settle(job.resolved(), &sequence)?;
         let mut tasks = plan.tasks(&sequence, &job.pending());

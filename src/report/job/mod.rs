@@ -10,12 +10,11 @@ mod plots;
 mod tests;
 
 use std::cmp::Reverse;
-use std::fs;
 use std::io;
 use std::path::Path;
 
 use serde_json::Value;
-use spherule_jobs::{Entry, FrameState, JobState, PlannedFrame, publish};
+use spherule_jobs::{Entry, FrameState, JobState, PlannedFrame, publish, read_regular_text};
 
 use super::frame::FrameReport;
 use crate::accel::simd::SimdLevel;
@@ -171,7 +170,7 @@ impl JobFrame {
 /// It cannot be written.
 pub fn write(dir: &Path, name: &str, text: &str) -> io::Result<()> {
     let path = dir.join(name);
-    if fs::read_to_string(&path).is_ok_and(|old| old == text) {
+    if read_regular_text(&path, text.len() as u64).is_ok_and(|old| old == text) {
         return Ok(());
     }
     publish(&path, text.as_bytes())

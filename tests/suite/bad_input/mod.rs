@@ -12,6 +12,8 @@ mod inputs;
 mod manifest;
 mod output;
 mod pipes;
+#[cfg(unix)]
+mod special;
 mod surface;
 
 /// Runs what cannot start; the messages must have these texts.

@@ -178,7 +178,14 @@ fn options_on_the_job_s_own_manifest_become_part_of_it() {
     let workshop = five_frames();
     workshop.render(&[]).expect(0);
     let own = |options: &[&str]| workshop.run(&[&["render", "out/job.toml"], options].concat());
-    let manifest = || fs::read_to_string(workshop.join("out/job.toml")).expect("the manifest");
+    let file = || fs::read_to_string(workshop.join("out/job.toml")).expect("the manifest");
+    // Without the mark at the end, which has a checksum.
+    let manifest = || {
+        let text = file();
+        let (text, mark) = text.trim_end().rsplit_once('\n').expect("lines");
+        assert!(mark.starts_with("# Written by spherule"), "{mark}");
+        text.to_owned()
+    };
     let first = manifest();
 
     let ran = own(&["--width", "80", "--frames", "2", "--force"]).expect(0);
@@ -192,12 +199,44 @@ fn options_on_the_job_s_own_manifest_become_part_of_it() {
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
     assert!(manifest().contains("path = \"g.####.exr\""));
     own(&[]).expect(0).tells("5 of 5 frames are done already");
-    // Without either, and without a change, the file is as the user wrote it.
-    let mine = format!("# mine\n{}", manifest());
-    fs::write(workshop.join("out/job.toml"), &mine).expect("a file");
+}
+
+/// No command changes what a user has written, or written into.
+#[test]
+fn a_manifest_that_a_user_wrote_stays_as_it_is() {
+    let workshop = five_frames();
+    workshop.render(&["--frames", "1"]).expect(0);
+    let path = workshop.join("out/job.toml");
+    let mine = format!(
+        "# mine\n{}",
+        fs::read_to_string(&path).expect("the manifest")
+    );
+    fs::write(&path, &mine).expect("a file");
+    let own = |options: &[&str]| workshop.run(&[&["render", "out/job.toml"], options].concat());
+    let stays = || fs::read_to_string(&path).expect("the manifest") == mine;
     own(&["--frames", "1", "--keep-done"]).expect(0);
     own(&["--width", "90"]).expect(2);
-    assert_eq!(manifest(), mine);
+    for option in ["--force", "--keep-done"] {
+        let width = if option == "--force" { "80" } else { "90" };
+        let told = "out/job.toml: not written by spherule, or edited since, so it stays as it is";
+        own(&["--frames", "2", "--width", width, option])
+            .expect(0)
+            .tells(told);
+        assert!(stays(), "{option}");
+    }
+    // Nor from elsewhere.
+    let ran = workshop.render(&["--frames", "1", "--force"]).expect(0);
+    assert!(stays() && !ran.errors().contains("stays as it is"));
+    workshop.render(&["--max-depth", "1", "--force"]).expect(0);
+    workshop.render(&["--max-depth", "1"]).expect(0);
+    assert!(stays());
+    let export = ["export", "slurm", "mine.toml", "-o", "out/job.toml"];
+    fs::write(workshop.join("mine.toml"), "[input]\npath = \"in\"\n").expect("a file");
+    workshop
+        .run(&export)
+        .expect(2)
+        .tells("out/job.toml: is a manifest already");
+    assert!(stays());
 }
 
 #[test]
