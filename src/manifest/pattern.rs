@@ -3,6 +3,9 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+/// Digits that a frame number can be padded to: none has more than 19.
+const MAX_DIGITS: usize = 32;
+
 /// An output path with room for the frame's number. Its length in `#` (or `%0Nd`) is the least
 /// number of digits; larger numbers take more.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -20,7 +23,7 @@ impl OutputPattern {
     ///
     /// # Errors
     /// It does not end in `.exr`, names no file, has a number in a directory's name or several
-    /// numbers, or an unknown `%`.
+    /// numbers, an unknown `%`, or a number of too many digits.
     pub fn parse(text: &str) -> Result<Self, String> {
         let is_exr = Path::new(text)
             .extension()
@@ -110,7 +113,7 @@ fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
     let rest = &text[start..];
     if rest.starts_with('#') {
         let digits = rest.bytes().take_while(|b| *b == b'#').count();
-        return Ok(Some((start, start + digits, digits)));
+        return Ok(Some((start, start + digits, at_most(digits)?)));
     }
     let unknown = || format!("`{rest}` is no frame number; use #### or %04d");
     let width = rest[1..].find('d').ok_or_else(unknown)?;
@@ -118,11 +121,21 @@ fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
         "" => 1,
         padded => padded
             .strip_prefix('0')
-            .filter(|n| n.len() <= 2 && n.bytes().all(|b| b.is_ascii_digit()))
-            .and_then(|n| n.parse().ok())
+            .filter(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
+            // More digits than any number here has.
+            .map(|n| n.parse().unwrap_or(usize::MAX))
             .ok_or_else(unknown)?,
     };
-    Ok(Some((start, start + width + 2, digits)))
+    Ok(Some((start, start + width + 2, at_most(digits)?)))
+}
+
+fn at_most(digits: usize) -> Result<usize, String> {
+    if digits > MAX_DIGITS {
+        return Err(format!(
+            "more than {MAX_DIGITS} digits for the frame number; write ####, larger numbers take more"
+        ));
+    }
+    Ok(digits)
 }
 
 #[cfg(test)]
@@ -150,6 +163,13 @@ mod tests {
         path("a.%d.b.EXR", 12, "a.12.b.EXR");
         path("/x/ä_%012d.exr", 12, "/x/ä_000000000012.exr");
         path("still.exr", 12, "still.exr");
+        let zeros = "0".repeat(30);
+        path(
+            &format!("{}.exr", "#".repeat(32)),
+            12,
+            &format!("{zeros}12.exr"),
+        );
+        path("%032d.exr", 12, &format!("{zeros}12.exr"));
     }
 
     #[test]
@@ -182,6 +202,27 @@ mod tests {
         refused("a.%s.exr", "%04d");
         refused("a.%4d.exr", "%04d");
         refused("a.%0-4d.exr", "%04d");
-        refused("a.%099999d.exr", "%04d");
+        refused("a.%0d.exr", "%04d");
+        for digits in [33, 65_535, 65_536, 70_000] {
+            refused(
+                &format!("{}.exr", "#".repeat(digits)),
+                "more than 32 digits",
+            );
+        }
+        for width in [
+            "033",
+            "099999",
+            "0999999d0999999",
+            "099999999999999999999999",
+        ] {
+            refused(
+                &format!("a.%{width}d.exr"),
+                if width.contains('d') {
+                    "digits"
+                } else {
+                    "more than 32"
+                },
+            );
+        }
     }
 }

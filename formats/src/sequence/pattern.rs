@@ -4,6 +4,7 @@
 //! padding differs between tools, and between frame 9999 and 10000 of the same tool. `*` is any
 //! text, `?` any one character. Wildcards work in the file name only, not in directories.
 
+use std::collections::HashSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -62,8 +63,12 @@ impl Pattern {
 
     /// Fits the pattern to a whole file name.
     pub(super) fn fit(&self, name: &str) -> Option<Fit> {
-        let mut fit = Fit { number: None };
-        fits(&self.tokens, name, 0, &mut fit).then_some(fit)
+        let mut search = Search {
+            name,
+            fit: Fit { number: None },
+            dead_ends: HashSet::new(),
+        };
+        search.fits(&self.tokens, 0).then_some(search.fit)
     }
 }
 
@@ -109,34 +114,49 @@ fn printf_len(text: &str) -> Option<usize> {
     rest[width..].starts_with('d').then_some(width + 2)
 }
 
-/// Backtracking match: `*` takes as little as it can, a number as much as it can.
-fn fits(tokens: &[Token], name: &str, at: usize, fit: &mut Fit) -> bool {
-    let rest = &name[at..];
-    let Some((token, tokens)) = tokens.split_first() else {
-        return rest.is_empty();
-    };
-    let next = rest.chars().next();
-    match token {
-        Token::Char(c) => next == Some(*c) && fits(tokens, name, at + c.len_utf8(), fit),
-        Token::AnyChar => next.is_some_and(|c| fits(tokens, name, at + c.len_utf8(), fit)),
-        Token::AnyText if tokens.is_empty() => true,
-        Token::AnyText => rest
-            .char_indices()
-            .map(|(i, _)| i)
-            .chain([rest.len()])
-            .any(|skipped| fits(tokens, name, at + skipped, fit)),
-        Token::Number => {
-            let unsigned = match rest.strip_prefix('-') {
-                Some(unsigned) if sign_may_follow(&name[..at]) => unsigned,
-                _ => rest,
-            };
-            let digits = unsigned.bytes().take_while(u8::is_ascii_digit).count();
-            let end = at + rest.len() - unsigned.len() + digits;
-            if digits == 0 || !fits(tokens, name, end, fit) {
-                return false;
+/// A name under way to its fit.
+struct Search<'a> {
+    name: &'a str,
+    fit: Fit,
+    /// Tokens left and place in the name of what does not fit. Each is tried once: without that, a pattern with
+    /// many `*` would take time that grows exponentially.
+    dead_ends: HashSet<(usize, usize)>,
+}
+
+impl Search<'_> {
+    /// Backtracking match: `*` takes as little as it can, a number as much as it can.
+    fn fits(&mut self, tokens: &[Token], at: usize) -> bool {
+        let rest = &self.name[at..];
+        let Some((token, left)) = tokens.split_first() else {
+            return rest.is_empty();
+        };
+        let next = rest.chars().next();
+        match token {
+            Token::Char(c) => next == Some(*c) && self.fits(left, at + c.len_utf8()),
+            Token::AnyChar => next.is_some_and(|c| self.fits(left, at + c.len_utf8())),
+            Token::AnyText if left.is_empty() => true,
+            Token::AnyText => {
+                if !self.dead_ends.insert((tokens.len(), at)) {
+                    return false;
+                }
+                let places = rest.char_indices().map(|(i, _)| i).chain([rest.len()]);
+                places
+                    .into_iter()
+                    .any(|skipped| self.fits(left, at + skipped))
             }
-            fit.number = Some(at..end);
-            true
+            Token::Number => {
+                let unsigned = match rest.strip_prefix('-') {
+                    Some(unsigned) if sign_may_follow(&self.name[..at]) => unsigned,
+                    _ => rest,
+                };
+                let digits = unsigned.bytes().take_while(u8::is_ascii_digit).count();
+                let end = at + rest.len() - unsigned.len() + digits;
+                if digits == 0 || !self.fits(left, end) {
+                    return false;
+                }
+                self.fit.number = Some(at..end);
+                true
+            }
         }
     }
 }
@@ -188,6 +208,19 @@ mod tests {
             Some(Some("23".into()))
         );
         assert_eq!(number("100%.vtk", "100%.vtk"), Some(None));
+    }
+
+    #[test]
+    fn many_wildcards_take_no_longer() {
+        let name = "a".repeat(250);
+        let pattern = "*a?".repeat(80);
+        assert_eq!(number(&(pattern.clone() + "b"), &name), None);
+        assert_eq!(number(&(pattern + "*"), &name), Some(None));
+        let digits = "7".repeat(250);
+        assert_eq!(number(&("*7".repeat(80) + "#.vtk"), &digits), None);
+        // Longer than any name, and than a stack of calls.
+        assert_eq!(number(&"?".repeat(200_000), &name), None);
+        assert_eq!(number(&"*?".repeat(200_000), &name), None);
     }
 
     #[test]
