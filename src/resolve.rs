@@ -99,7 +99,7 @@ pub enum ResolveError {
 pub fn question(manifest: &Manifest) -> Question<'_> {
     Question {
         color: match &manifest.material.color {
-            ColorSetting::Auto => ColorQuestion::Speed,
+            ColorSetting::Auto | ColorSetting::AutoWith { .. } => ColorQuestion::Speed,
             ColorSetting::Rgb(_) => ColorQuestion::None,
             ColorSetting::Attribute { attribute, .. } => ColorQuestion::Attribute(attribute),
         },
@@ -332,6 +332,16 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
                 required: false,
             }),
             (None, None) => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
+        },
+        ColorSetting::AutoWith { map, range } => match &survey.color {
+            Some(color) => {
+                let map = map.map_or(DEFAULT_MAP, |map| map.name());
+                mapped(&color.attribute, map, *range, false)
+            }
+            None => {
+                require_attribute(survey, "material.color", "velocity")?;
+                Ok(ColorRule::Constant(material::DEFAULT_COLOR))
+            }
         },
         ColorSetting::Attribute {
             attribute,

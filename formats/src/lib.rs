@@ -31,6 +31,7 @@ pub use attribute::{Attribute, AttributeData, ID_NAMES};
 pub use budget::MemoryBudget;
 pub use error::{FrameError, ParseError};
 pub use frame::{ParticleFrame, Positions, Radius, RawParticles};
+pub use message::{escape_controls, is_control};
 pub use open::FrameFile;
 pub use origin::choose_origin;
 pub use scalar::{Endian, ScalarType};

@@ -1,5 +1,7 @@
 //! Text from files, made fit for a line of a message.
 
+use std::borrow::Cow;
+
 /// Characters that are kept of the start of a long message.
 const START: usize = 560;
 /// Characters that are kept of its end, where the remedy is.
@@ -10,24 +12,38 @@ const MOST: usize = START + END + 60;
 /// `text` as one line of bounded length that a terminal shows as it is: characters that control it,
 /// break the line or turn its direction are written as escapes.
 pub(crate) fn one_line(text: String) -> String {
-    if !text.contains(is_unfit) {
-        return shortened(text);
+    match escape_controls(&text) {
+        Cow::Borrowed(_) => shortened(text),
+        Cow::Owned(line) => shortened(line),
+    }
+}
+
+/// `text` with every character that [controls](is_control) a terminal written as an escape: one line, shown as
+/// it is. Escaping twice changes nothing.
+///
+/// ```
+/// assert_eq!(spherule_formats::escape_controls("a\u{1b}[2J\n"), "a\\u{1b}[2J\\n");
+/// ```
+pub fn escape_controls(text: &str) -> Cow<'_, str> {
+    if !text.contains(is_control) {
+        return Cow::Borrowed(text);
     }
     let mut line = String::with_capacity(text.len());
     for c in text.chars() {
-        if is_unfit(c) {
+        if is_control(c) {
             line.extend(c.escape_default());
         } else {
             line.push(c);
         }
     }
-    shortened(line)
+    Cow::Owned(line)
 }
 
-/// Control characters, line and paragraph separators, and those that reorder text.
-fn is_unfit(c: char) -> bool {
+/// Whether `c` does something to a terminal or to the text around it: control characters (C0, DEL, C1), line and
+/// paragraph separators, and those that reorder text.
+pub fn is_control(c: char) -> bool {
     c.is_control()
-        || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+        || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
 }
 
 fn shortened(text: String) -> String {
@@ -65,6 +81,7 @@ mod tests {
             "\\u{1b}[2Jx\\u{0}\\u{7f}\\u{9b}",
         );
         shown("a\u{202e}b\u{2028}c", "a\\u{202e}b\\u{2028}c");
+        shown("a\u{61c}b", "a\\u{61c}b");
     }
 
     #[test]

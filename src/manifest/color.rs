@@ -32,6 +32,13 @@ named! {
 pub enum ColorSetting {
     /// By speed where the particles have velocities, else their own colours, else one colour.
     Auto,
+    /// By speed, through a map that is not the usual one.
+    AutoWith {
+        /// The map; None is the usual one.
+        map: Option<ColorMap>,
+        /// Values at the two ends of the map; None is what the whole sequence has.
+        range: Option<[f64; 2]>,
+    },
     /// Linear RGB, the same for all.
     Rgb([f32; 3]),
     /// An attribute: colours as they are unless a map or a range is given, anything else through a map,
@@ -92,16 +99,21 @@ impl ColorSetting {
             );
         }
         let mut section = field.section()?;
+        let is_auto =
+            section.lacks("attribute") && !(section.lacks("map") && section.lacks("range"));
         let attribute = section.optional("attribute", Field::name);
-        let map = section.optional("map", |f| f.choice(ColorMap::ALL));
+        let map = section.optional("map", |f| f.choice_of("colour map", ColorMap::ALL));
         let range = section.optional("range", |f| {
             let range = f.as_numbers::<2>().filter(|[low, high]| low < high);
             f.or_wants(range, "two rising numbers, as [0.0, 4.0]")
         });
-        if section.lacks("attribute") {
+        if section.lacks("attribute") && !is_auto {
             section.missing("attribute", "the name of an attribute, as \"velocity\"");
         }
         section.finish();
+        if is_auto {
+            return Some(Self::AutoWith { map, range });
+        }
         Some(Self::Attribute {
             attribute: attribute?,
             map,
@@ -115,17 +127,25 @@ impl Toml for ColorSetting {
         match self {
             Self::Auto => "auto".toml(),
             Self::Rgb(rgb) => rgb.toml(),
+            Self::AutoWith { map, range } => {
+                format!("{{ {} }}", mapping(*map, *range).trim_start_matches(", "))
+            }
             Self::Attribute {
                 attribute,
                 map,
                 range,
             } => {
-                let range = range.map_or(String::new(), |r| format!(", range = {}", r.toml()));
-                let map = map.map_or(String::new(), |m| format!(", map = {}", m.toml()));
-                format!("{{ attribute = {}{map}{range} }}", attribute.toml())
+                format!("{{ attribute = {}{} }}", attribute.toml(), mapping(*map, *range))
             }
         }
     }
+}
+
+/// The keys of a map, each after a comma.
+fn mapping(map: Option<ColorMap>, range: Option<[f64; 2]>) -> String {
+    let map = map.map_or(String::new(), |m| format!(", map = {}", m.toml()));
+    let range = range.map_or(String::new(), |r| format!(", range = {}", r.toml()));
+    map + &range
 }
 
 described!(ColorSetting, {
@@ -139,7 +159,7 @@ described!(ColorSetting, {
                 "map": { "enum": words(&[], ColorMap::ALL) },
                 "range": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
             },
-            "required": ["attribute"],
+            "minProperties": 1,
             "additionalProperties": false,
         },
     ],

@@ -54,7 +54,7 @@ pub(crate) use rebase::without_dots;
 pub use rebase::{named_place, real_dir};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use tree::Override;
-pub use work::{ProgressMode, STOP_FILE, Seconds, Work};
+pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Seconds, Work};
 
 /// An enum whose variants have the names that users type.
 macro_rules! named {

@@ -293,6 +293,22 @@ impl<'a> Field<'a> {
         )
     }
 
+    /// One of `names`, each of which is a `what`.
+    pub(super) fn choice_of<T: Copy>(&self, what: &str, names: &[(T, &'static str)]) -> Option<T> {
+        let is_known = |text: &str| names.iter().any(|(_, name)| *name == text);
+        let Some(unknown) = self.as_text().filter(|text| !is_known(text)) else {
+            return self.choice(names);
+        };
+        let known: Vec<&'static str> = names.iter().map(|(_, name)| *name).collect();
+        let hint = nearest(unknown, &known).map(|n| format!("; did you mean {n}?"));
+        self.fail(&format!(
+            "unknown {what} `{unknown}`; choose one of {}{}",
+            known.join(", "),
+            hint.unwrap_or_default()
+        ));
+        None
+    }
+
     /// One of `names`.
     pub(super) fn choice<T: Copy>(&self, names: &[(T, &'static str)]) -> Option<T> {
         let known: Vec<&'static str> = names.iter().map(|(_, name)| *name).collect();

@@ -176,8 +176,8 @@ impl Node {
         }
     }
 
-    /// Lays `overlay` over this tree, making tables on the way; `light.0.intensity` reaches into
-    /// a list. What lies under changes nothing that is there.
+    /// Lays `overlay` over this tree, making tables on the way, also in the place of an `"auto"`, which says as much
+    /// as nothing; `light.0.intensity` reaches into a list. What lies under changes nothing that is there.
     pub(super) fn lay_over(&mut self, overlay: Override) -> Result<(), Problem> {
         let problem = |at: usize, what: &str| Problem {
             place: overlay.node.place.clone(),
@@ -187,6 +187,11 @@ impl Node {
         let mut node = self;
         for (at, key) in overlay.keys.iter().enumerate() {
             let is_last = at + 1 == overlay.keys.len();
+            let is_auto = matches!(&node.kind, Kind::Text(text) if text == "auto");
+            if is_auto && !overlay.is_under {
+                node.kind = Kind::Table(BTreeMap::new());
+            }
+            let found = node.describe();
             node = match &mut node.kind {
                 Kind::Table(table) if is_last && overlay.is_under && table.contains_key(key) => {
                     return Ok(());
@@ -200,7 +205,7 @@ impl Node {
                     let entry = table.entry(key.clone()).or_insert((place.clone(), empty));
                     &mut entry.1
                 }
-                Kind::Array(items) => {
+                Kind::Array(items) if key.bytes().all(|b| b.is_ascii_digit()) => {
                     let index = key.parse::<usize>().ok();
                     let Some(item) = index.and_then(|i| items.get_mut(i)) else {
                         return Err(problem(at, "the list has no such item; they count from 0"));
@@ -209,7 +214,11 @@ impl Node {
                 }
                 // Whoever reads it says what is wrong.
                 _ if overlay.is_under => return Ok(()),
-                _ => return Err(problem(at, "what is above it is a plain value")),
+                _ => {
+                    let above = overlay.keys[..at].join(".");
+                    let what = format!("{above} is {found}, which has no keys; set {above} itself");
+                    return Err(problem(at, &what));
+                }
             };
         }
         *node = overlay.node;

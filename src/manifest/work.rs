@@ -18,8 +18,8 @@ use crate::report::Bytes;
 /// Name of the file that ends following if the manifest names none, beside the images.
 pub const STOP_FILE: &str = "job.stop";
 
-/// Threads beyond this are a slip of the hand.
-const MAX_THREADS: u32 = 65_535;
+/// Threads beyond this are a slip of the hand. Fewer are used where the machine has few processors.
+pub const MAX_THREADS: u32 = 1024;
 
 /// Tries beyond this are a slip of the hand.
 pub(super) const MAX_RETRIES: u32 = 100;
@@ -143,7 +143,12 @@ impl Work {
 
     fn run_entries(&self, out: &mut Entries) {
         let threads = Threads(self.threads);
-        put(out, "threads", &threads, "all, or how many");
+        put(
+            out,
+            "threads",
+            &threads,
+            "all, or how many; at most 4 for each processor are used",
+        );
         put(
             out,
             "progress",

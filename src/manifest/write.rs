@@ -4,6 +4,7 @@
 use std::fmt::Write as _;
 
 use schemars::{JsonSchema, Schema, SchemaGenerator};
+use spherule_formats::is_control;
 
 /// Comments begin here where the value leaves room.
 const COMMENT_COLUMN: usize = 40;
@@ -45,8 +46,25 @@ impl Toml for bool {
 
 impl Toml for str {
     fn toml(&self) -> String {
+        if self.contains(is_control) {
+            return basic_string(self);
+        }
         toml::Value::from(self).to_string()
     }
+}
+
+/// `text` as a string on one line. What controls a terminal is an escape in it: manifests are printed.
+fn basic_string(text: &str) -> String {
+    let mut quoted = String::from('"');
+    for c in text.chars() {
+        // Writing to a string cannot fail.
+        let _ = match c {
+            '"' | '\\' => write!(quoted, "\\{c}"),
+            c if is_control(c) => write!(quoted, "\\U{:08X}", u32::from(c)),
+            c => write!(quoted, "{c}"),
+        };
+    }
+    quoted + "\""
 }
 
 impl Toml for String {

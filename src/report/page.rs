@@ -4,15 +4,14 @@
 use std::borrow::Cow;
 use std::fmt::Write as _;
 
+use spherule_formats::is_control;
+
 use super::plots::{self, Plot};
 
 /// Text as it stands in HTML, in elements and in quoted attributes. Control characters, which HTML
 /// forbids, and those that turn the direction of what follows are spelt out.
 pub fn escaped(text: &str) -> Cow<'_, str> {
-    let is_odd = |c: char| {
-        (c.is_control() && c != '\n' && c != '\t')
-            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{202a}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
-    };
+    let is_odd = |c: char| is_control(c) && c != '\n' && c != '\t';
     if !text
         .chars()
         .any(|c| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_odd(c))

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Why no sequence could be made of an input. None of these is about the content of a frame:
 /// damaged files are told when they are loaded.
@@ -81,6 +81,16 @@ pub enum SequenceError {
         /// The operating system's reason.
         source: io::Error,
     },
+}
+
+impl SequenceError {
+    /// That the file `path` is not there, with names in its directory that come close.
+    pub fn missing(path: &Path) -> Self {
+        Self::Missing {
+            path: path.to_owned(),
+            hint: super::scan::hint_for(path),
+        }
+    }
 }
 
 /// One of several sequences in a directory.

@@ -425,10 +425,7 @@ fn listed_names(paths: &[PathBuf]) -> Result<Vec<Name>, SequenceError> {
             SequenceInput::Pattern(path) => scan::fitting(&Pattern::parse(&path)?, &path)?,
             SequenceInput::Files(_) if path.exists() => vec![Name::parse(path, None)],
             SequenceInput::Files(_) => {
-                return Err(SequenceError::Missing {
-                    path: path.clone(),
-                    hint: scan::hint_for(path),
-                });
+                return Err(SequenceError::missing(path));
             }
         };
         for name in found {

@@ -3,6 +3,8 @@
 
 use std::fmt::Write as _;
 
+use spherule_formats::escape_controls;
+
 use super::{CellMeasurement, CellReport, Column, ScaleReport, Spread, parts};
 use crate::scale::{Budget, Motion};
 
@@ -41,6 +43,7 @@ pub fn text(report: &ScaleReport) -> String {
     });
     put_parts(&mut text, report);
     for (cell, reason) in report.failed() {
+        let reason = escape_controls(reason);
         let _ = write!(text, "\nfailed: {}: {reason}", cell_name(cell));
     }
     if report.failed().next().is_some() {
@@ -62,7 +65,10 @@ pub fn subject(report: &ScaleReport) -> String {
     let s = &report.settings;
     let what = s.input.as_ref().map_or_else(
         || "the thesis's box".to_owned(),
-        |i| format!("{}, frame {} ({} particles)", i.path, i.frame, i.particles),
+        |i| {
+            let path = escape_controls(&i.path);
+            format!("{path}, frame {} ({} particles)", i.frame, i.particles)
+        },
     );
     let budget = match s.budget {
         Budget::Seconds(seconds) => format!("{seconds} s"),
