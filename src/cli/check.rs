@@ -1,15 +1,12 @@
 //! `spherule check`: what `render` would do with the same arguments. Writes nothing but its answer.
 
-use std::io::{self, Write};
-use std::path::Path;
-
 use clap::Args;
 use spherule_formats::Sequence;
 use spherule_jobs::{Foreseen, FrameState, Job, Mode};
 
 use super::plan::{Plan, RunArgs, one_fits};
 use super::work::use_threads;
-use super::{CliError, Outcome, disk};
+use super::{CliError, Outcome, disk, print};
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
 use crate::report::Bytes;
 use crate::report::memory::available;
@@ -18,7 +15,17 @@ use crate::survey::Survey;
 mod camera;
 mod show;
 
+const EXAMPLES: &str = "\
+Examples:
+  spherule check run1 -o out/frame.####.exr
+      What the same render would do, need and take
+  spherule check run1 --memory-limit 2GiB
+      Which frames fit into a limit
+  spherule check out/job.toml --json
+      How a job stands and what is left of it, for scripts";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct CheckArgs {
     #[command(flatten)]
     run: RunArgs,
@@ -32,21 +39,15 @@ pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     use_threads(asked.manifest.job.threads)?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
-        say!("note: {note}");
+        note!("{note}");
     }
     let plan = Plan::new(asked, &sequence, args.run.work.shard)?;
     let mut check = Check::new(&plan, &sequence);
     check.look(&args.run);
-    let text = if args.json {
-        format!("{:#}\n", check.to_json())
+    if args.json {
+        print::pretty_json(&check.to_json())?;
     } else {
-        check.to_text()
-    };
-    match io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-            return Err(CliError::io(Path::new("standard output"))(e));
-        }
-        _ => {}
+        print::lines(check.to_lines())?;
     }
     for problem in &check.problems {
         say!("error: {problem}");
@@ -92,7 +93,7 @@ impl<'a> Check<'a> {
     /// Keeps what went well; what did not is a problem.
     fn noted<T>(&mut self, result: Result<T, CliError>) -> Option<T> {
         result
-            .map_err(|error| self.problems.push(error.to_string()))
+            .map_err(|error| self.problems.extend(error.messages()))
             .ok()
     }
 
@@ -166,7 +167,7 @@ impl<'a> Check<'a> {
         match probe(setup, self.sequence, heaviest) {
             Ok(probe) => self.probe = Some(probe),
             // Costs that frame alone when its turn comes.
-            Err(reason) => say!("note: frame {}: {reason}", heaviest.frame),
+            Err(reason) => note!("frame {}: {reason}", heaviest.frame),
         }
         let needed = self.disk_bytes().unwrap_or(0.0);
         if let Some(free) = self.free_disk.filter(|free| needed > *free as f64) {

@@ -7,6 +7,7 @@ use std::time::Instant;
 use clap::Args;
 use serde_json::{Value, json};
 use spherule_formats::SequenceInput;
+use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
@@ -18,9 +19,9 @@ use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
     selection, tell_kept, use_threads,
 };
-use super::{CliError, Outcome, signals};
+use super::{CliError, Outcome, events, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
-use crate::manifest::{ProgressMode, real_dir};
+use crate::manifest::{MAX_THREADS, ProgressMode, real_dir};
 use crate::reading::read_budget;
 use crate::report::Bytes;
 use crate::survey::Survey;
@@ -28,54 +29,75 @@ use crate::survey::Survey;
 /// What the job of a conversion is called in its plan.
 const CONVERT: &str = "convert";
 
+const EXAMPLES: &str = "\
+Examples:
+  spherule convert run1 -o run1-native
+      Every frame as it is, 12 bytes for each position
+  spherule convert run1 -o run1-native --max-error 0.02
+      As small as positions within 2 % of the radius can be
+  spherule convert run1 -o run1-native --attributes velocity:f16,*:off
+      With one attribute, in half precision";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct ConvertArgs {
     /// A directory, a pattern (dump.#.vtk), or files.
     #[arg(required = true)]
     input: Vec<PathBuf>,
-    /// Directory for the frames, which are called frame.NUMBER.spf, or the name of a file (one.spf) for one
-    /// frame; files that another command made are replaced only with --force. The same command goes on where it
-    /// was stopped.
-    #[arg(short, long)]
+    /// Frames to convert: 7 | 1-10 | 1-10x2 | 1-5,8 [default: all]
+    #[arg(
+        long,
+        value_name = "RANGE",
+        allow_hyphen_values = true,
+        help_heading = "Input"
+    )]
+    frames: Option<FrameRange>,
+    /// Radius of all particles [default: of the files, else half the usual distance of neighbours]
+    #[arg(long, value_parser = positive, help_heading = "Input")]
+    radius: Option<f32>,
+    /// Directory for the frames, which are called frame.NUMBER.spf, or the name of a file (one.spf) for one frame.
+    ///
+    /// Files that another command made are replaced only with --force. The same command goes on where it was stopped.
+    #[arg(short, long, help_heading = "Output")]
     output: PathBuf,
-    /// How positions are stored: f32 (12 bytes a particle), q16 (6) or q10 (4). Without this, f32, or with
-    /// a largest error what needs the fewest bytes.
-    #[arg(long)]
+    /// How positions are stored: f32 (12 bytes a particle), q16 (6) or q10 (4) [default: f32]
+    ///
+    /// With a largest error, the default is what needs the fewest bytes.
+    #[arg(long, help_heading = "Output")]
     encoding: Option<Encoding>,
-    /// Largest error of a position as a fraction of the radius [default: 0.02 for q16 and q10].
-    #[arg(long, value_name = "FRACTION", value_parser = not_negative)]
+    /// Largest error of a position as a fraction of the radius [default: 0.02 for q16 and q10]
+    #[arg(long, value_name = "FRACTION", value_parser = not_negative, help_heading = "Output")]
     max_error: Option<f64>,
     /// Largest error of a position as a length.
-    #[arg(long, value_name = "LENGTH", value_parser = not_negative, conflicts_with = "max_error")]
+    #[arg(long, value_name = "LENGTH", value_parser = not_negative, conflicts_with = "max_error",
+        help_heading = "Output")]
     max_error_length: Option<f64>,
-    /// Radius of all particles. Without this, that of the files, or half the usual distance of neighbours.
-    #[arg(long, value_parser = positive)]
-    radius: Option<f32>,
-    /// How attributes are stored: velocity:f16,density:u8,id:keep,*:off. Ways are keep (as they are), f32,
-    /// f16, u8 (8 bits over the range) and off; * are all that are not named, kept if nothing is said.
-    #[arg(long, value_name = "NAME:HOW,...")]
+    /// How attributes are stored: velocity:f16,density:u8,id:keep,*:off [default: *:keep]
+    ///
+    /// Ways are keep (as they are), f32, f16, u8 (8 bits over the range) and off; * are all that are not named.
+    #[arg(long, value_name = "NAME:HOW,...", help_heading = "Output")]
     attributes: Option<AttributeChoices>,
     /// Store no attributes: positions and radii only.
-    #[arg(long, conflicts_with = "attributes")]
+    #[arg(long, conflicts_with = "attributes", help_heading = "Output")]
     no_attributes: bool,
-    /// Keep each particle's place in its file as an attribute `id`, where there is none: native frames are in
-    /// another order.
-    #[arg(long)]
+    /// Keep each particle's place in its file as an attribute `id`, where there is none.
+    ///
+    /// Native frames are in another order.
+    #[arg(long, help_heading = "Output")]
     ids: bool,
-    /// Frames to convert: 7 | 1-10 | 1-10x2 | 1-5,8.
-    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
-    frames: Option<FrameRange>,
-    /// Memory that the conversion may hold: 4GiB, 512MiB [default: 2GiB]. A frame that does not fit is ordered
-    /// in parts, which lie on the disk of the output meanwhile. Text and packed files are read whole.
-    #[arg(long, value_name = "SIZE")]
+    /// Memory that the conversion may hold: 4GiB, 512MiB [default: 2GiB]
+    ///
+    /// A frame that does not fit is ordered in parts, which lie on the disk of the output meanwhile. Text and packed
+    /// files are read whole.
+    #[arg(long, value_name = "SIZE", help_heading = "Job")]
     memory: Option<Bytes>,
     #[command(flatten)]
     work: WorkArgs,
-    /// Threads to use; default: all.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65_535))]
+    /// Threads to use [default: all]; at most 4 for each processor are used.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
     threads: Option<u32>,
     /// How progress is shown.
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Job")]
     progress: ProgressMode,
 }
 
@@ -86,11 +108,15 @@ const WORDS: signals::Words = signals::Words {
 
 pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
+    if args.progress == ProgressMode::Json {
+        events::begin();
+    }
+    guard_name(&args.output)?;
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
     let sequence = apart(|| Sequence::open_within(&input, read_budget(None, None)))?;
     for note in sequence.notes() {
-        say!("note: {note}");
+        note!("{note}");
     }
     let (dir, name) = args.place();
     let plan = Plan {
@@ -108,7 +134,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
         say!("radius {radius}, half the usual distance of neighbours; --radius sets another");
     }
     tell_kept(&job, tasks.len());
-    let progress = Progress::new(args.progress, tasks.len());
+    let progress = Progress::new(args.progress, CONVERT, tasks.len(), &args.output);
     let start = Instant::now();
     let interrupt = signals.at_work();
     let result = conversion::run(
@@ -132,6 +158,22 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     Ok(finished.tell(result.map_err(CliError::from)))
 }
 
+/// Refuses a file's name where a directory is wanted.
+fn guard_name(output: &Path) -> Result<(), CliError> {
+    let why = match Format::by_name(output) {
+        None => return Ok(()),
+        Some(_) if output.is_dir() => return Ok(()),
+        Some(Format::Spf) => "the frames of a sequence go into a directory, as frame.NUMBER.spf",
+        Some(_) => "convert writes native frames (.spf) alone, and a directory of them",
+    };
+    let dir = output.with_extension("");
+    Err(CliError::other(format!(
+        "{}: is a file's name: {why}; name a directory, as in -o {}",
+        output.display(),
+        dir.display()
+    )))
+}
+
 fn show(progress: &Progress, event: &Event) {
     match event {
         Event::Entered(frame) => progress.entered(*frame, "converting"),
@@ -147,7 +189,7 @@ fn show(progress: &Progress, event: &Event) {
         }
         Event::Failed(frame, reason) => progress.failed(*frame, reason),
         Event::Others(news) => progress.others(*news),
-        Event::Note(note) => progress.note(&format!("note: {note}")),
+        Event::Note(note) => progress.note(note),
     }
 }
 

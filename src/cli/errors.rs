@@ -42,6 +42,14 @@ impl CliError {
         move |source| Self::Io { path, source }
     }
 
+    /// What is wrong, each on a line of its own.
+    pub(super) fn messages(&self) -> Vec<String> {
+        match self {
+            Self::Manifest(error) => error.messages().to_vec(),
+            other => vec![other.to_string()],
+        }
+    }
+
     pub(super) fn other(what: impl Into<String>) -> Self {
         Self::Other(what.into())
     }

@@ -22,7 +22,17 @@ const WORDS: signals::Words = signals::Words {
     at_once: "stopped",
 };
 
+const EXAMPLES: &str = "\
+Examples:
+  spherule generate box --particles 1e6 -o box.npy
+      The thesis's box
+  spherule generate block --particles 1e7 --velocity -o water.spf
+      A block of water as a native frame
+  spherule generate box --particles 1e8 --radius 0.01 --encoding q16 -o box.spf
+      Positions of 6 bytes each";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct GenerateArgs {
     #[command(subcommand)]
     what: What,
@@ -68,16 +78,19 @@ struct CommonArgs {
     /// File to write: .spf, .npy or .vtk.
     #[arg(short, long)]
     output: PathBuf,
-    /// How native frames store positions: f32 (12 bytes a particle), q16 (6) or q10 (4). Without this, f32, or
-    /// with a largest error what needs the fewest bytes.
+    /// How native frames store positions: f32 (12 bytes a particle), q16 (6) or q10 (4) [default: f32]
+    ///
+    /// With a largest error, the default is what needs the fewest bytes.
     #[arg(long)]
     encoding: Option<Encoding>,
-    /// Largest error of a stored position as a fraction of the radius [default: 0.02 for q16 and q10 where
-    /// there is a radius].
+    /// Largest error of a stored position as a fraction of the radius [default: 0.02 for q16 and q10]
+    ///
+    /// The default holds where there is a radius.
     #[arg(long, value_name = "FRACTION", value_parser = not_negative)]
     max_error: Option<f64>,
-    /// Memory that making a native frame may take, beside what the program itself needs; what does not fit
-    /// lies beside the file meanwhile.
+    /// Memory that making a native frame may take, beside what the program itself needs.
+    ///
+    /// What does not fit lies beside the file meanwhile.
     #[arg(long, value_name = "SIZE", default_value = "2GiB")]
     memory: Bytes,
 }

@@ -15,7 +15,8 @@ pub(super) fn run(args: &InitArgs) -> Result<Outcome, CliError> {
     let asked = args.manifest.manifest()?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
-        say!("note: {note}");
+        note!("{note}");
     }
-    print(&asked.manifest.to_commented_toml())
+    print::file(&asked.manifest.to_commented_toml())?;
+    Ok(Outcome::Done)
 }

@@ -1,16 +1,18 @@
 //! From arguments to a manifest and its sequence: what `render` and `init` share.
 
 use std::env;
+use std::io;
 use std::panic;
 use std::path::{Path, PathBuf};
 use std::thread;
 
 use clap::Args;
-use spherule_formats::sequence::{Sequence, SequenceInput};
+use spherule_formats::sequence::{Sequence, SequenceError, SequenceInput};
 
 use super::CliError;
 use super::job_args::JobArgs;
-use crate::manifest::{Look, Manifest, Override, read_manifest};
+use super::numbers::{number, pixels, whole};
+use crate::manifest::{self, Look, Manifest, Override};
 use crate::reading::read_budget;
 use crate::report::Bytes;
 
@@ -21,76 +23,128 @@ pub(super) struct ManifestArgs {
     /// A directory, a pattern (dump.#.vtk, frame_%04d.bgeo, *), files, or a manifest (.toml).
     #[arg(required = true)]
     pub(super) input: Vec<PathBuf>,
-    /// Images to write: out/frame.####.exr.
-    #[arg(short, long, value_name = "PATTERN")]
-    pub(super) output: Option<String>,
-    /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8.
-    #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
+
+    /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8 [default: all]
+    #[arg(
+        long,
+        value_name = "RANGE",
+        allow_hyphen_values = true,
+        help_heading = "Input"
+    )]
     pub(super) frames: Option<String>,
-    /// Any key of the manifest: --set render.max_depth=5. May be repeated.
-    #[arg(long, value_name = "KEY=VALUE")]
-    pub(super) set: Vec<String>,
-    /// Image width in pixels.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(super) width: Option<i64>,
-    /// Image height in pixels.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(super) height: Option<i64>,
-    /// Samples per pixel.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(super) samples: Option<i64>,
-    /// Particle radius: a length, or "auto".
-    #[arg(long, allow_negative_numbers = true)]
+    /// Particle radius: a length, or auto [default: auto]
+    ///
+    /// `auto` takes the radius of the files, else half the usual distance of neighbours.
+    #[arg(long, allow_negative_numbers = true, help_heading = "Input")]
     pub(super) radius: Option<String>,
-    /// Axis that points up: x, y, z, -x, -y, -z, or "auto".
-    #[arg(long, allow_hyphen_values = true)]
+    /// Parts of a step to keep where it has several files: fluid,oil.
+    ///
+    /// Case does not matter, and part of a name will do.
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "LIST",
+        help_heading = "Input"
+    )]
+    pub(super) parts: Option<Vec<String>>,
+    /// Read native frames instead of mapping them.
+    ///
+    /// For places where files may be cut short while they are used.
+    #[arg(long, help_heading = "Input")]
+    pub(super) no_mmap: bool,
+
+    /// Axis that points up: x, y, z, -x, -y, -z, or auto [default: auto]
+    ///
+    /// `auto` is y for BGEO files and those of SPlisHSPlasH, else z. Everything else about the camera is set by
+    /// --set: camera.eye, camera.look_at, camera.fov, camera.mode.
+    #[arg(long, allow_hyphen_values = true, help_heading = "Camera")]
     pub(super) up: Option<String>,
-    /// Attribute to colour by. Colours (Cd, color, rgb, bytes) are taken as they are unless --map or --range is
-    /// given; vectors count by their length.
-    #[arg(long, value_name = "ATTRIBUTE")]
-    pub(super) color_by: Option<String>,
-    /// Colour map of the attribute: viridis, turbo...
-    #[arg(long, value_name = "NAME", requires = "color_by")]
-    pub(super) map: Option<String>,
-    /// Values at the ends of the colour map; default: what the sequence has.
-    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], requires = "color_by", allow_negative_numbers = true)]
-    pub(super) range: Option<Vec<f64>>,
-    /// Channels of the images: RGBA,Z,N,id,P,V,albedo.
-    #[arg(long, value_delimiter = ',', value_name = "LIST")]
-    pub(super) channels: Option<Vec<String>>,
-    /// Reflections and refractions followed; 1 is direct light only.
-    #[arg(long, allow_negative_numbers = true)]
-    pub(super) max_depth: Option<i64>,
-    /// A ground plane under the particles.
-    #[arg(long)]
-    pub(super) ground: bool,
-    /// A look, for everything that is not said otherwise: water.
-    #[arg(long, value_name = "NAME")]
+
+    /// Image width in pixels [default: 1920]
+    #[arg(long, allow_negative_numbers = true, value_parser = pixels, help_heading = "Image")]
+    pub(super) width: Option<i64>,
+    /// Image height in pixels [default: 1080]
+    #[arg(long, allow_negative_numbers = true, value_parser = pixels, help_heading = "Image")]
+    pub(super) height: Option<i64>,
+    /// Samples per pixel [default: 16]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole, help_heading = "Image")]
+    pub(super) samples: Option<i64>,
+
+    /// A look, for everything that is not set otherwise: water.
+    #[arg(long, value_name = "NAME", help_heading = "Look")]
     pub(super) look: Option<String>,
-    /// What rays meet: spheres, medium (overlapping spheres as one body) or smooth.
-    #[arg(long, value_name = "NAME")]
+    /// Attribute to colour by [default: velocity, else the particles' own colours]
+    ///
+    /// Colours (Cd, color, rgb, bytes) are taken as they are unless --map or --range is given; vectors count by
+    /// their length.
+    #[arg(long, value_name = "ATTRIBUTE", help_heading = "Look")]
+    pub(super) color_by: Option<String>,
+    /// Colour map of the attribute [default: viridis]
+    ///
+    /// viridis, turbo, plasma, inferno, magma, cividis, red-blue or greys.
+    #[arg(long, value_name = "NAME", help_heading = "Look")]
+    pub(super) map: Option<String>,
+    /// Values at the ends of the colour map [default: what the sequence has]
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
+        help_heading = "Look")]
+    pub(super) range: Option<Vec<f64>>,
+    /// What rays meet: spheres, medium or smooth [default: spheres]
+    ///
+    /// medium: overlapping spheres as one body; smooth: the surface of the SPH field.
+    #[arg(long, value_name = "NAME", help_heading = "Look")]
     pub(super) surface: Option<String>,
-    /// How much a smooth surface is smoothed: 0 (every particle shows) to 1 (calm water).
-    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    /// How much a smooth surface is smoothed, 0 to 1 [default: 0.75]
+    ///
+    /// 0: every particle shows; 1: calm water.
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true, value_parser = number, help_heading = "Look")]
     pub(super) smoothing: Option<f64>,
     /// The exact surface of the SPH field, without smoothing.
-    #[arg(long)]
+    #[arg(long, help_heading = "Look")]
     pub(super) exact_surface: bool,
     /// Particles with few neighbours are small white spheres beside the surface.
-    #[arg(long)]
+    #[arg(long, help_heading = "Look")]
     pub(super) spray: bool,
-    /// Read native frames instead of mapping them: where files may be cut short while they are used.
-    #[arg(long)]
-    pub(super) no_mmap: bool,
-    /// Parts of a step to keep where it has several files: fluid,oil. Case does not matter, and part of a name will do.
-    #[arg(long, value_delimiter = ',', value_name = "LIST")]
-    pub(super) parts: Option<Vec<String>>,
-    /// Acceleration structure: auto, lbvh (fastest to build), kdtree (fastest to trace), bvh or sbvh. The
-    /// picture is the same; auto goes by the rays for each particle.
-    #[arg(long, value_name = "NAME")]
+    /// A ground plane under the particles.
+    #[arg(long, help_heading = "Look")]
+    pub(super) ground: bool,
+    /// Reflections and refractions followed; 1 is direct light only [default: 3]
+    #[arg(long, allow_negative_numbers = true, value_parser = whole, help_heading = "Look")]
+    pub(super) max_depth: Option<i64>,
+
+    /// Images to write [default: out/frame.####.exr]
+    ///
+    /// #### or %04d is the frame number, with as many digits at least.
+    #[arg(short, long, value_name = "PATTERN", help_heading = "Output")]
+    pub(super) output: Option<String>,
+    /// Channels of the images: RGBA,Z,N,id,P,V,albedo [default: RGBA,Z,N,id]
+    #[arg(
+        long,
+        value_delimiter = ',',
+        value_name = "LIST",
+        help_heading = "Output"
+    )]
+    pub(super) channels: Option<Vec<String>>,
+
+    /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
+    ///
+    /// `spherule init` prints all keys with what they mean.
+    #[arg(long, value_name = "KEY=VALUE", help_heading = "Job")]
+    pub(super) set: Vec<String>,
+    /// Acceleration structure: auto, lbvh, kdtree, bvh or sbvh [default: auto]
+    ///
+    /// lbvh is the fastest to build, kdtree the fastest to trace. The picture is the same; auto goes by the rays for
+    /// each particle.
+    #[arg(long, value_name = "NAME", help_heading = "Job")]
     pub(super) accelerator: Option<String>,
-    /// Most memory to take: 4GiB, 512MiB. Frames that need more fail, the rest goes on.
-    #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
+    /// Most memory to take: 4GiB, 512MiB [default: what is free]
+    ///
+    /// Frames that need more fail, the rest goes on.
+    #[arg(
+        long,
+        value_name = "SIZE",
+        allow_hyphen_values = true,
+        help_heading = "Job"
+    )]
     pub(super) memory_limit: Option<String>,
     #[command(flatten)]
     pub(super) job: JobArgs,
@@ -116,7 +170,7 @@ impl ManifestArgs {
         let file = self.manifest_file()?;
         let (text, base) = match &file {
             Some(path) => {
-                let text = read_manifest(path).map_err(CliError::io(path))?;
+                let text = read_manifest(path)?;
                 (
                     text,
                     path.parent().map_or_else(PathBuf::new, Path::to_owned),
@@ -208,8 +262,16 @@ impl ManifestArgs {
             );
             list.push(over("input.radius", value, "--radius")?);
         }
-        if let Some(value) = self.color() {
-            list.push(over("material.color", value, "--color-by")?);
+        if let Some(attribute) = &self.color_by {
+            let mut table = toml::Table::new();
+            table.insert("attribute".to_owned(), attribute.clone().into());
+            list.push(over("material.color", table, "--color-by")?);
+        }
+        if let Some(map) = &self.map {
+            list.push(over("material.color.map", map.clone(), "--map")?);
+        }
+        if let Some(range) = &self.range {
+            list.push(over("material.color.range", range.clone(), "--range")?);
         }
         for (key, value, shown) in [
             ("output.channels", &self.channels, "--channels"),
@@ -241,18 +303,6 @@ impl ManifestArgs {
         }
         Ok(())
     }
-
-    fn color(&self) -> Option<toml::Value> {
-        let mut table = toml::Table::new();
-        table.insert("attribute".to_owned(), self.color_by.clone()?.into());
-        if let Some(map) = &self.map {
-            table.insert("map".to_owned(), map.clone().into());
-        }
-        if let Some(range) = &self.range {
-            table.insert("range".to_owned(), range.clone().into());
-        }
-        Some(table.into())
-    }
 }
 
 impl Asked {
@@ -278,6 +328,14 @@ impl Asked {
     pub(super) fn absolute_base(&self) -> Result<PathBuf, CliError> {
         absolute(&self.base)
     }
+}
+
+/// The text of the manifest `path`.
+pub(super) fn read_manifest(path: &Path) -> Result<String, CliError> {
+    manifest::read_manifest(path).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => SequenceError::missing(path).into(),
+        _ => CliError::io(path)(error),
+    })
 }
 
 /// Whether the name is that of a manifest.

@@ -4,40 +4,43 @@ use clap::Args;
 
 use super::CliError;
 use super::job::{over, path_as_typed};
+use super::numbers::{seconds, whole};
 use crate::manifest::{Override, ProgressMode};
 
 /// Laid over the manifest's `[job]`.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Job")]
 pub(super) struct JobArgs {
-    /// Threads to use: all, or how many.
+    /// Threads to use: all, or how many up to 1024 [default: all]
+    ///
+    /// At most 4 for each processor are used: more only keep one another from working.
     #[arg(long, value_name = "COUNT", allow_hyphen_values = true)]
     threads: Option<String>,
-    /// How progress is shown.
+    /// How progress is shown [default: auto]
     #[arg(long, value_enum)]
     progress: Option<ProgressMode>,
     /// Make each frame in a process of its own.
     #[arg(long)]
     isolate: bool,
-    /// Most anonymous memory of such a process: 4GiB, 512MiB.
+    /// Most anonymous memory of such a process: 4GiB, 512MiB [default: no limit]
     #[arg(long, value_name = "SIZE", allow_hyphen_values = true)]
     memory_ceiling: Option<String>,
-    /// How often a frame whose process died is tried again in this run [default: 1].
-    #[arg(long, value_name = "COUNT", allow_negative_numbers = true)]
+    /// How often a frame whose process died is tried again in this run [default: 1]
+    #[arg(long, value_name = "COUNT", allow_negative_numbers = true, value_parser = whole)]
     retries: Option<i64>,
-    /// Seconds without a sign of life after which the frames of a worker on another machine are taken
-    /// over [default: 60].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Seconds without a sign of life after which another machine's frames are taken over [default: 60]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     takeover_after: Option<f64>,
     /// Go on with frames that a running simulation writes.
     #[arg(long)]
     follow: bool,
-    /// Seconds without a new frame after which following ends [default: 600].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Seconds without a new frame after which following ends [default: 600]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     idle: Option<f64>,
-    /// Seconds that a file must have stood unchanged to count as complete [default: 2].
-    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    /// Seconds that a file must have stood unchanged to count as complete [default: 2]
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     settle: Option<f64>,
-    /// Following ends when this file appears [default: job.stop beside the images].
+    /// Following ends when this file appears [default: job.stop beside the images]
     #[arg(long, value_name = "FILE")]
     stop_file: Option<String>,
 }

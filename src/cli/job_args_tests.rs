@@ -24,8 +24,8 @@ const FLAGS: [(&str, &str); 31] = [
         "--color-by v --map turbo --range 0 2",
         "material.color = { attribute = \"v\", map = \"turbo\", range = [0.0, 2.0] }",
     ),
-    ("--map", ""),
-    ("--range", ""),
+    ("--map turbo", "material.color.map = \"turbo\""),
+    ("--range 0 2", "material.color.range = [0.0, 2.0]"),
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
@@ -65,7 +65,7 @@ fn manifest(flags: &str) -> Manifest {
 
 #[test]
 fn every_option_is_a_key() {
-    for (flags, wanted) in FLAGS.iter().filter(|(_, wanted)| !wanted.is_empty()) {
+    for (flags, wanted) in FLAGS.iter() {
         let (key, value) = wanted.split_once(" = ").unwrap();
         let mut plain = Manifest::new("data");
         assert_ne!(manifest(flags), plain, "{flags}");
@@ -79,6 +79,41 @@ fn every_option_is_a_key() {
         plain = manifest(&sets.collect::<String>());
         assert_eq!(manifest(flags), plain, "{flags}");
     }
+}
+
+/// Options whose `[default: ...]` is no value that could be given.
+const WORDS: [&str; 5] = [
+    "memory_limit",
+    "memory_ceiling",
+    "color_by",
+    "range",
+    "stop_file",
+];
+
+#[test]
+fn defaults_in_the_help_are_those_of_the_manifest() {
+    let mut checked = 0;
+    for argument in command().get_arguments() {
+        let help = argument.get_help().map(ToString::to_string);
+        let help = help.unwrap_or_default();
+        let Some((_, rest)) = help.split_once("[default: ") else {
+            continue;
+        };
+        if WORDS.contains(&argument.get_id().as_str()) {
+            continue;
+        }
+        let default = rest.trim_end_matches(']');
+        let flag = argument.get_long().unwrap();
+        let given = manifest(&format!("--{flag} {default}"));
+        // A map of its own is another setting, though it is the same one.
+        if flag == "map" {
+            assert_eq!(given, manifest("--set material.color.map=viridis"));
+        } else {
+            assert_eq!(given, Manifest::new("data"), "--{flag} {default}");
+        }
+        checked += 1;
+    }
+    assert!(checked >= 15, "{checked}");
 }
 
 #[test]

@@ -2,17 +2,25 @@
 //!
 //! Results go to standard output, everything else to standard error. Exit codes: 0 all done, 1 some
 //! frames or files failed, 2 could not start, 75 interrupted and to be resumed.
+use std::env;
+use std::ffi::OsString;
 use std::io::Write;
-use std::path::Path;
 use std::process::ExitCode;
 
 use clap::{Parser, Subcommand};
+use spherule_formats::escape_controls;
 
-/// A line on standard error. A reader that has gone away, or a log on a full disk, is no reason to
-/// stop work.
+/// A line on standard error.
 macro_rules! say {
     ($($text:tt)*) => {
-        $crate::cli::put(&mut std::io::stderr(), &format!($($text)*))
+        $crate::cli::print::message(&format!($($text)*))
+    };
+}
+
+/// What a user should know of, on standard error; also an event for programs.
+macro_rules! note {
+    ($($text:tt)*) => {
+        $crate::cli::events::note(&format!($($text)*))
     };
 }
 
@@ -21,6 +29,7 @@ mod child;
 mod convert;
 mod disk;
 mod errors;
+mod events;
 mod export;
 mod generate;
 mod init;
@@ -29,6 +38,7 @@ mod job;
 mod job_args;
 mod numbers;
 mod plan;
+mod print;
 mod progress;
 mod render;
 mod scale;
@@ -73,33 +83,72 @@ enum Command {
     Export(export::ExportArgs),
     /// Measure images per second, build time and memory over particle counts and structures.
     Scale(Box<scale::ScaleArgs>),
-    /// Measure one cell for `scale`.
-    #[command(hide = true)]
-    ScaleCell,
-    /// Make one image for `render --isolate`.
-    #[command(hide = true)]
-    RenderFrame,
-}
-
-/// Writes a line, as one piece so that lines of several threads or processes do not mix.
-fn put(to: &mut impl Write, text: &str) {
-    let _ = to.write_all(format!("{text}\n").as_bytes());
-}
-
-/// Puts a result on standard output. A reader that has seen enough is no fault.
-fn print(text: &str) -> Result<Outcome, CliError> {
-    match std::io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != std::io::ErrorKind::BrokenPipe => {
-            Err(CliError::io(Path::new("standard output"))(e))
-        }
-        _ => Ok(Outcome::Done),
-    }
 }
 
 /// Parses the arguments of the process, runs the command, reports what went wrong.
 pub fn main() -> ExitCode {
-    let cli = Cli::parse();
-    let result = match cli.command {
+    let arguments: Vec<OsString> = env::args_os().collect();
+    let result = match own_command(&arguments) {
+        Some(command) => command(),
+        None => match parse(&arguments) {
+            Ok(command) => run(command),
+            Err(code) => return ExitCode::from(code),
+        },
+    };
+    let (code, errors) = match result {
+        Ok(outcome) => (outcome.code(), Vec::new()),
+        Err(error) => (Outcome::Refused.code(), error.messages()),
+    };
+    for error in &errors {
+        say!("error: {error}");
+    }
+    events::end(code, &errors);
+    ExitCode::from(code)
+}
+
+/// The commands that this program gives to processes of its own. clap does not know them, so it neither lists nor
+/// suggests them.
+fn own_command(arguments: &[OsString]) -> Option<fn() -> Result<Outcome, CliError>> {
+    let [_, name] = arguments else {
+        return None;
+    };
+    match name.to_str()? {
+        scale::measure::COMMAND => Some(scale::measure::run),
+        render::isolate::COMMAND => Some(render::isolate::run_child),
+        _ => None,
+    }
+}
+
+/// The command of the process; without one, help or a message has been printed, and this is the exit code.
+fn parse(arguments: &[OsString]) -> Result<Command, u8> {
+    let error = match Cli::try_parse_from(arguments) {
+        Ok(cli) => return Ok(cli.command),
+        Err(error) => error,
+    };
+    if !error.use_stderr() {
+        let printed = error.print().and_then(|()| std::io::stdout().flush());
+        return Err(match print::written_to_stdout(printed) {
+            Ok(_) => Outcome::Done.code(),
+            Err(error) => {
+                say!("error: {error}");
+                Outcome::Refused.code()
+            }
+        });
+    }
+    // clap's message has several lines, and quotes the arguments as they are: so it is made again of escaped ones.
+    let escaped = arguments.iter().map(|argument| {
+        let text = argument.to_string_lossy();
+        escape_controls(&text).into_owned()
+    });
+    let error = Cli::try_parse_from(escaped).err().unwrap_or(error);
+    for line in error.render().to_string().lines() {
+        say!("{line}");
+    }
+    Err(Outcome::Refused.code())
+}
+
+fn run(command: Command) -> Result<Outcome, CliError> {
+    match command {
         Command::Render(args) => render::run(&args),
         Command::Check(args) => check::run(&args),
         Command::Status(args) => status::run(&args),
@@ -111,17 +160,6 @@ pub fn main() -> ExitCode {
         Command::Generate(args) => generate::run(&args),
         Command::Export(args) => export::run(&args),
         Command::Scale(args) => scale::run(&args),
-        Command::ScaleCell => scale::measure::run(),
-        Command::RenderFrame => render::isolate::run_child(),
-    };
-    match result {
-        Ok(outcome) => outcome.into(),
-        Err(error) => {
-            for line in error.to_string().lines() {
-                say!("error: {line}");
-            }
-            ExitCode::from(2)
-        }
     }
 }
 
@@ -138,14 +176,15 @@ enum Outcome {
     Interrupted,
 }
 
-impl From<Outcome> for ExitCode {
-    fn from(outcome: Outcome) -> Self {
-        Self::from(match outcome {
-            Outcome::Done => 0,
-            Outcome::SomeFailed => 1,
-            Outcome::Refused => 2,
-            Outcome::Interrupted => INTERRUPTED,
-        })
+impl Outcome {
+    /// The exit code.
+    const fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::SomeFailed => 1,
+            Self::Refused => 2,
+            Self::Interrupted => INTERRUPTED,
+        }
     }
 }
 

@@ -3,6 +3,39 @@
 /// The bound that coded positions keep if none is given: a fraction of the radius.
 pub(super) const USUAL_BOUND: f64 = 0.02;
 
+/// A side of an image. How many pixels there may be, the manifest says.
+pub(super) fn pixels(text: &str) -> Result<i64, String> {
+    text.parse()
+        .map_err(|_| "wants a number of pixels, as in --width 3840 --height 2160".to_owned())
+}
+
+/// A whole number, whatever its range.
+pub(super) fn whole(text: &str) -> Result<i64, String> {
+    text.parse()
+        .map_err(|_| "wants a whole number, as in 16".to_owned())
+}
+
+/// A number with or without a fraction, whatever its range.
+pub(super) fn number(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| "wants a number, as in 0.5".to_owned())
+}
+
+/// A number of seconds, whatever its range.
+pub(super) fn seconds(text: &str) -> Result<f64, String> {
+    text.parse()
+        .map_err(|_| "wants seconds as a number, as in 90 for a minute and a half".to_owned())
+}
+
+/// A side of an image, from 1 to `most` pixels.
+pub(super) fn pixels_to(most: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync {
+    move |text| {
+        let count = pixels(text)?;
+        let fitting = u32::try_from(count).ok().filter(|c| (1..=most).contains(c));
+        fitting.ok_or_else(|| format!("{count} is not in 1..={most}"))
+    }
+}
+
 /// A largest error: 0 or more.
 pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;

@@ -264,8 +264,8 @@ impl Plan {
             let text = read_manifest(&path).unwrap_or_default();
             if !is_marked(&text) {
                 if Manifest::parse(&text, &path).ok().as_ref() != Some(&manifest) {
-                    say!(
-                        "note: {}: not written by spherule, or edited since, so it stays as it is; this job was made \
+                    note!(
+                        "{}: not written by spherule, or edited since, so it stays as it is; this job was made \
                          with other settings than it has: give the same options again, or put them into it",
                         path.display()
                     );
@@ -285,7 +285,7 @@ impl Plan {
             return;
         }
         if let Err(error) = write_if_changed(&path, &schema_text()) {
-            say!("note: {error}; editors do without it");
+            note!("{error}; editors do without it");
         }
     }
 

@@ -1,7 +1,7 @@
 //! What a running job shows: bars on a terminal, one plain line a frame elsewhere, or lines for
 //! programs.
 
-use std::io::{IsTerminal, stderr, stdout};
+use std::io::{IsTerminal, stderr};
 use std::path::Path;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -13,7 +13,7 @@ use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
 use spherule_jobs::{QueueNews, Status};
 
-use super::put;
+use super::{events, print};
 use crate::manifest::ProgressMode;
 
 impl ValueEnum for ProgressMode {
@@ -31,7 +31,7 @@ impl ValueEnum for ProgressMode {
         Some(PossibleValue::new(self.name()).help(match self {
             Self::Auto => "Bars on a terminal, plain lines elsewhere",
             Self::Plain => "One line a frame",
-            Self::Json => "One JSON object a frame",
+            Self::Json => "Events as JSON, one a line, on standard output",
             Self::Openjd => "The lines that Open Job Description engines read",
             Self::None => "Nothing but warnings and errors",
         }))
@@ -58,20 +58,24 @@ pub(super) struct Ended {
 enum Show {
     Bar(ProgressBar),
     Plain,
-    Json,
     Openjd,
+    /// For people, that is: events are sent whatever is shown.
     Nothing,
 }
 
 impl Progress {
-    /// For a run of `total` frames.
-    pub(super) fn new(mode: ProgressMode, total: usize) -> Self {
+    /// For a run of `command` that makes `total` frames, in `output` as the user named it.
+    pub(super) fn new(mode: ProgressMode, command: &str, total: usize, output: &Path) -> Self {
+        let output = output.display().to_string();
+        events::send(
+            "start",
+            json!({"command": command, "total": total, "output": output}),
+        );
         let show = match mode {
             ProgressMode::Auto if stderr().is_terminal() => Show::Bar(bar(total)),
             ProgressMode::Auto | ProgressMode::Plain => Show::Plain,
-            ProgressMode::Json => Show::Json,
             ProgressMode::Openjd => Show::Openjd,
-            ProgressMode::None => Show::Nothing,
+            ProgressMode::Json | ProgressMode::None => Show::Nothing,
         };
         Self {
             show,
@@ -83,7 +87,8 @@ impl Progress {
 
     /// There are `count` frames more to do.
     pub(super) fn more(&self, count: usize) {
-        self.total.fetch_add(count, Ordering::Relaxed);
+        let total = count + self.total.fetch_add(count, Ordering::Relaxed);
+        events::send("frames_added", json!({"added": count, "total": total}));
         if let Show::Bar(bar) = &self.show {
             bar.inc_length(count as u64);
         }
@@ -105,45 +110,59 @@ impl Progress {
         let done = self.count(None);
         let output = output.display().to_string();
         let plain = format!("frame {frame}: {output} ({told})");
-        let mut json =
-            json!({"frame": frame, "status": "done", "done": done, "total": self.total()});
-        if let (Value::Object(json), Value::Object(facts)) = (&mut json, facts) {
-            json.extend(facts);
+        let mut event = json!({"frame": frame, "done": done, "total": self.total()});
+        if let (Value::Object(event), Value::Object(facts)) = (&mut event, facts) {
+            event.extend(facts);
         }
-        self.line(done, &plain, &json);
+        events::send("frame_done", event);
+        self.line(done, &plain);
     }
 
     /// `frame` could not be made.
     pub(super) fn failed(&self, frame: i64, reason: &str) {
         let done = self.count(Some(frame));
-        self.note(&format!("error: frame {frame}: {reason}"));
-        let json = json!({"frame": frame, "status": "failed", "reason": reason,
-            "done": done, "total": self.total()});
-        self.line(done, "", &json);
+        self.message(&format!("error: frame {frame}: {reason}"));
+        let facts = json!({"frame": frame, "reason": reason, "done": done, "total": self.total()});
+        events::send("frame_failed", facts);
+        self.line(done, "");
     }
 
     /// What other workers do.
     pub(super) fn others(&self, news: QueueNews) {
         match news {
             QueueNews::Waiting(frame, who) => {
-                self.note(&format!(
-                    "waiting for frame {frame}, which {who} has in hand"
-                ));
+                let text = format!("waiting for frame {frame}, which {who} has in hand");
+                self.message(&text);
+                events::send("note", json!({"text": text}));
             }
             QueueNews::Elsewhere(frame, status) => {
                 let is_done = status == Status::Done;
                 let done = self.count((!is_done).then_some(frame));
                 let told = if is_done { "done" } else { "failed" };
                 let plain = format!("frame {frame}: {told} by another worker");
-                let json = json!({"frame": frame, "status": told, "elsewhere": true,
+                let facts = json!({"frame": frame, "elsewhere": true,
                     "done": done, "total": self.total()});
-                self.line(done, &plain, &json);
+                let event = if is_done {
+                    "frame_done"
+                } else {
+                    "frame_failed"
+                };
+                events::send(event, facts);
+                self.line(done, &plain);
             }
         }
     }
 
-    /// A line for people, whatever the mode.
+    /// What a user should know of, whatever the mode.
     pub(super) fn note(&self, text: &str) {
+        match &self.show {
+            Show::Bar(bar) => bar.suspend(|| note!("{text}")),
+            _ => note!("{text}"),
+        }
+    }
+
+    /// A line for people, whatever the mode.
+    fn message(&self, text: &str) {
         match &self.show {
             Show::Bar(bar) => bar.suspend(|| say!("{text}")),
             _ => say!("{text}"),
@@ -167,7 +186,7 @@ impl Progress {
     }
 
     /// One frame has ended, well or badly.
-    fn line(&self, done: usize, plain: &str, json: &serde_json::Value) {
+    fn line(&self, done: usize, plain: &str) {
         match &self.show {
             Show::Bar(bar) => bar.set_position(done as u64),
             Show::Plain if plain.is_empty() => {}
@@ -176,7 +195,6 @@ impl Progress {
                 self.total(),
                 self.remaining(done)
             ),
-            Show::Json => say!("{json}"),
             Show::Openjd => openjd(done, self.total(), plain),
             Show::Nothing => {}
         }
@@ -192,10 +210,12 @@ impl Progress {
 /// Engines read these on standard output.
 pub(super) fn openjd(done: usize, total: usize, plain: &str) {
     let percent = 100.0 * done as f64 / total.max(1) as f64;
-    put(&mut stdout(), &format!("openjd_progress: {percent:.1}"));
+    let mut lines = vec![format!("openjd_progress: {percent:.1}")];
     if !plain.is_empty() {
-        put(&mut stdout(), &format!("openjd_status: {plain}"));
+        lines.push(format!("openjd_status: {plain}"));
     }
+    // An engine that does not listen any more is no reason to stop work.
+    let _ = print::lines(lines);
 }
 
 fn bar(total: usize) -> ProgressBar {

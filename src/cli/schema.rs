@@ -9,7 +9,8 @@ use super::{CliError, Outcome, print};
 use crate::manifest::job_schema;
 
 pub(super) fn run() -> Result<Outcome, CliError> {
-    print(&schema_text())
+    print::file(&schema_text())?;
+    Ok(Outcome::Done)
 }
 
 /// The schema as a file.

@@ -9,7 +9,7 @@ use signal_hook::consts::{SIGINT, SIGTERM};
 use signal_hook::iterator::Signals;
 use spherule_jobs::Interrupt;
 
-use super::{CliError, INTERRUPTED};
+use super::{CliError, INTERRUPTED, events};
 
 /// What is said to whoever sent a signal.
 #[derive(Debug, Clone, Copy)]
@@ -53,6 +53,7 @@ pub(super) fn listen(words: Words) -> Result<Listener, CliError> {
                 // Nothing is lost: images appear whole or not at all, and what was being written
                 // is cleared away by the next run.
                 say!("{}", words.at_once);
+                events::end_at_once(INTERRUPTED);
                 std::process::exit(i32::from(INTERRUPTED));
             }
             interrupt.raise();

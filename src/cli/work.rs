@@ -1,19 +1,20 @@
 //! What the commands that work as jobs have in common: how an earlier run is gone on with, where the
 //! files go, and how the end is told.
 
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::Value;
+use serde_json::{Value, json};
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, JobError, Mode, PLAN_FILE};
 
-use super::job::{absolute, is_manifest};
+use super::job::{absolute, is_manifest, read_manifest};
 use super::progress::{Ended, duration};
 use super::shard::Shard;
-use super::{CliError, Outcome};
-use crate::manifest::{Manifest, read_manifest, real_dir};
+use super::{CliError, Outcome, events};
+use crate::manifest::{Manifest, real_dir};
 use crate::survey::Survey;
 
 /// The setting that says what a job makes; jobs that render have none.
@@ -22,6 +23,7 @@ pub(super) const KIND: &str = "job";
 /// What one run does with what is there. No manifest says such things: one that always starts over would
 /// throw finished work away.
 #[derive(Debug, Args)]
+#[command(next_help_heading = "Job")]
 pub(super) struct WorkArgs {
     /// Start over, whatever was made here before.
     #[arg(long)]
@@ -29,8 +31,9 @@ pub(super) struct WorkArgs {
     /// Keep finished frames although settings or inputs have changed.
     #[arg(long, conflicts_with = "force")]
     pub(super) keep_done: bool,
-    /// Do one part of the frames only: 2/4 is the second of four. Workers at the same job share its frames
-    /// without this, too.
+    /// Do one part of the frames only: 2/4 is the second of four.
+    ///
+    /// Workers at the same job share its frames without this, too.
     #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
     pub(super) shard: Option<Shard>,
 }
@@ -46,15 +49,32 @@ impl WorkArgs {
     }
 }
 
+/// Threads for each processor that are of any use. With far more, they keep one another from working: 2000 on two
+/// processors need minutes for what two do in milliseconds.
+const THREADS_PER_PROCESSOR: usize = 4;
+
 /// Uses as many threads as asked for from now on; None leaves it to the machine.
 pub(super) fn use_threads(threads: Option<u32>) -> Result<(), CliError> {
     let Some(count) = threads.and_then(|t| usize::try_from(t).ok()) else {
         return Ok(());
     };
+    let count = useful_threads(count);
     rayon::ThreadPoolBuilder::new()
         .num_threads(count)
         .build_global()
         .map_err(|e| CliError::other(format!("{count} threads: {e}")))
+}
+
+/// `asked` threads, or as many as this machine has any use for.
+pub(super) fn useful_threads(asked: usize) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let most = processors.saturating_mul(THREADS_PER_PROCESSOR);
+    if asked > most {
+        note!(
+            "--threads {asked}: {most} are used, {THREADS_PER_PROCESSOR} for each of {processors} processors"
+        );
+    }
+    asked.min(most)
 }
 
 /// The frames that `range` has of `sequence`, or all; `shown` is what the range was given by.
@@ -144,7 +164,7 @@ pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
     if !is_manifest(job) || job.is_dir() {
         return Ok(job.to_owned());
     }
-    let text = read_manifest(job).map_err(CliError::io(job))?;
+    let text = read_manifest(job)?;
     let manifest = Manifest::parse(&text, job)?;
     let base = absolute(job.parent().unwrap_or(Path::new("")))?;
     Ok(real_dir(&base.join(manifest.output.path.dir())))
@@ -204,9 +224,15 @@ impl Finished<'_> {
         if !self.ended.failed.is_empty() {
             say!("failed: {}", list(&self.ended.failed));
         }
+        events::at_end(json!({
+            "done": summary.done,
+            "total": summary.total,
+            "failed": self.ended.failed,
+        }));
         match result {
             Err(error) => {
                 say!("error: {error}");
+                events::at_end(json!({"errors": [error.to_string()]}));
                 match error {
                     // The same command joins again.
                     CliError::Job(JobError::TakenForDead { .. }) => Outcome::Interrupted,

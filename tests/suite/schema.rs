@@ -59,7 +59,7 @@ fn how_the_work_is_gone_about_is_kept_and_may_change() {
         "json",
     ];
     let ran = workshop.run(&again).expect(0);
-    assert!(ran.errors().contains("{\"done\":1,"), "{}", ran.errors());
+    assert!(ran.text().contains("{\"done\":1,"), "{}", ran.text());
     assert_eq!(kept(), first);
     workshop
         .render(&["--progress", "sideways"])

@@ -29,21 +29,17 @@ impl<'a> Seen<'a> {
         frame.map_or_else(|| self.path.start(), |frame| self.path.view(frame))
     }
 
-    pub(super) fn to_text(&self) -> String {
-        let mut text = format!(
-            "camera     {} {}",
-            self.mode.name(),
-            told(&self.view(self.first))
-        );
+    pub(super) fn to_lines(&self) -> Vec<String> {
+        let first_view = told(&self.view(self.first));
+        let mut lines = vec![format!("camera     {} {first_view}", self.mode.name())];
         let moving = self.path.moving();
         if let (Some(first), Some(last), [_, ..]) = (self.first, self.last, &moving[..]) {
-            text += &format!(
-                " at frame {first}\n           {} at frame {last}\n           {}",
-                told(&self.view(Some(last))),
-                self.motion(&moving)
-            );
+            lines[0] += &format!(" at frame {first}");
+            let last_view = told(&self.view(Some(last)));
+            lines.push(format!("           {last_view} at frame {last}"));
+            lines.push(format!("           {}", self.motion(&moving)));
         }
-        text
+        lines
     }
 
     /// What moves, and how.

@@ -73,7 +73,7 @@ impl Check<'_> {
         Value::Object(all)
     }
 
-    pub(super) fn to_text(&self) -> String {
+    pub(super) fn to_lines(&self) -> Vec<String> {
         let mut lines = vec![self.frames_line()];
         let manifest = &self.plan.manifest;
         let names: Vec<&str> = manifest.output.channels.iter().map(|c| c.name()).collect();
@@ -96,14 +96,13 @@ impl Check<'_> {
                 survey.most_particles,
                 radius_text(setup, survey)
             ));
-            lines.push(self.camera(setup).to_text());
+            lines.extend(self.camera(setup).to_lines());
             lines.push(format!("structure  {}", structure(survey, setup)));
         }
-        lines.extend(self.memory_line());
+        lines.extend(self.memory_lines());
         lines.extend(self.disk_line());
         lines.extend(self.time_line());
-        lines.push(String::new());
-        lines.join("\n")
+        lines
     }
 
     fn camera<'a>(&self, setup: &'a Setup) -> Seen<'a> {
@@ -128,8 +127,10 @@ impl Check<'_> {
         line
     }
 
-    fn memory_line(&self) -> Option<String> {
-        let schedule = self.schedule.as_ref()?;
+    fn memory_lines(&self) -> Vec<String> {
+        let Some(schedule) = &self.schedule else {
+            return Vec::new();
+        };
         let mut line = format!("memory     about {}", Bytes(schedule.need.total()));
         if let Some(limit) = self.plan.manifest.render.memory_limit {
             line += &format!(", the limit is {limit}");
@@ -140,7 +141,7 @@ impl Check<'_> {
         if schedule.overlap == Overlap::None {
             line += "; one frame at a time";
         }
-        Some(line + &format!("\n           {}", schedule.need))
+        vec![line, format!("           {}", schedule.need)]
     }
 
     fn disk_line(&self) -> Option<String> {

@@ -1,7 +1,6 @@
 //! `spherule export`: a job as work for a cluster or a render farm, whose tasks only ever call
 //! `spherule render job.toml --frames RANGE`.
 
-use std::io::{self, Write};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -9,10 +8,10 @@ use clap::{Args, Subcommand};
 use spherule_jobs::export::{Chunks, ExportError};
 use spherule_jobs::{Mode, publish};
 
-use super::job::{Asked, absolute, is_manifest};
+use super::job::{Asked, absolute, is_manifest, read_manifest};
 use super::plan::Plan;
-use super::{CliError, Outcome};
-use crate::manifest::{Manifest, Override, named_place, read_manifest};
+use super::{CliError, Outcome, print};
+use crate::manifest::{Manifest, Override, named_place};
 use crate::report::Bytes;
 
 mod openjd;
@@ -21,7 +20,17 @@ mod slurm;
 
 use place::{common_dir, text, tidy};
 
+const EXAMPLES: &str = "\
+Examples:
+  spherule export slurm job.toml -o job.sh --cpus 16 --time 02:00:00
+      A script for sbatch
+  spherule export slurm job.toml --chunk 10 --concurrent 20
+      The script on standard output: ten frames a task, twenty tasks at once
+  spherule export openjd job.toml -o job.template.yaml
+      A job template for a render farm";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct ExportArgs {
     #[command(subcommand)]
     engine: Engine,
@@ -48,14 +57,15 @@ struct CommonArgs {
     /// A manifest: your own, or the job.toml beside the images.
     #[arg(value_name = "JOB.TOML")]
     manifest: PathBuf,
-    /// Where the text goes; standard output without it.
+    /// Where the text goes [default: standard output]
     #[arg(short, long, value_name = "FILE")]
     output: Option<PathBuf>,
-    /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8; otherwise those of the manifest.
+    /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8 [default: those of the manifest]
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     frames: Option<String>,
-    /// Frames a task does; otherwise as many as make about a hundred tasks. Five to thirty minutes a task suit
-    /// most clusters.
+    /// Frames a task does [default: as many as make about a hundred tasks]
+    ///
+    /// Five to thirty minutes a task suit most clusters.
     #[arg(long, value_name = "N")]
     chunk: Option<NonZeroUsize>,
     /// Memory for a task: 4GiB, 512MiB.
@@ -102,7 +112,7 @@ impl Work {
         let asked = asked(args)?;
         let sequence = asked.sequence()?;
         for note in sequence.notes() {
-            say!("note: {note}");
+            note!("{note}");
         }
         let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
         let inputs: Vec<PathBuf> = inputs.map(absolute).collect::<Result<_, _>>()?;
@@ -154,7 +164,7 @@ fn asked(args: &CommonArgs) -> Result<Asked, CliError> {
             path.display()
         )));
     }
-    let content = read_manifest(path).map_err(CliError::io(path))?;
+    let content = read_manifest(path)?;
     let frames = args.frames.as_ref().map(|range| {
         Override::new("input.frames", range.clone(), "--frames").map_err(CliError::Other)
     });
@@ -170,12 +180,8 @@ fn asked(args: &CommonArgs) -> Result<Asked, CliError> {
 /// Writes `text` where it was asked for.
 fn deliver(args: &CommonArgs, content: &str) -> Result<(), CliError> {
     let Some(path) = &args.output else {
-        return match io::stdout().write_all(content.as_bytes()) {
-            Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-                Err(CliError::io(Path::new("standard output"))(e))
-            }
-            _ => Ok(()),
-        };
+        print::file(content)?;
+        return Ok(());
     };
     let same = |a: &Path, b: &Path| -> Result<bool, CliError> {
         Ok(named_place(&absolute(a)?) == named_place(&absolute(b)?))

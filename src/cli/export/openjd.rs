@@ -44,15 +44,15 @@ pub(super) fn run(args: &OpenjdArgs) -> Result<Outcome, CliError> {
 fn tell(args: &OpenjdArgs, work: &Work, home: &Path, places: &[Place]) {
     say!("{}", work.chunks);
     if work.input_dir.is_none() {
-        say!("note: the particles have no directory in common, so none is declared as input");
+        note!("the particles have no directory in common, so none is declared as input");
     }
     let given: Vec<String> = places.iter().filter_map(Place::option).collect();
     if !given.is_empty() {
-        say!("note: engines take no default for what is not below the template's directory");
+        note!("engines take no default for what is not below the template's directory");
     }
     let file = args.common.output.as_deref();
     if file.is_none() {
-        say!("note: relative paths in it begin at {}", home.display());
+        note!("relative paths in it begin at {}", home.display());
     }
     let file = file.unwrap_or(Path::new("FILE"));
     say!(

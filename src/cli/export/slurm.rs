@@ -11,6 +11,7 @@ use spherule_jobs::export::slurm::{ArrayScript, FrameCommand, MOST_TASKS, Resour
 use super::super::job::absolute;
 use super::super::{CliError, Outcome};
 use super::{CommonArgs, Work, deliver, text, tidy};
+use crate::manifest::MAX_THREADS;
 use crate::report::Bytes;
 
 #[derive(Debug, Args)]
@@ -18,9 +19,9 @@ pub(super) struct SlurmArgs {
     #[command(flatten)]
     common: CommonArgs,
     /// Processors for a task, and threads of it.
-    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..))]
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=i64::from(MAX_THREADS)))]
     cpus: u16,
-    /// Time for a task: 02:00:00, 1-12:00:00, or minutes; otherwise the partition's.
+    /// Time for a task: 02:00:00, 1-12:00:00, or minutes [default: the partition's]
     #[arg(long, value_name = "TIME")]
     time: Option<TimeLimit>,
     /// Tasks that may run at once.
@@ -32,13 +33,17 @@ pub(super) struct SlurmArgs {
     /// Account to charge.
     #[arg(long, value_name = "NAME")]
     account: Option<String>,
-    /// How long before the time limit a task is told to finish its frame: longer than a frame takes.
+    /// Seconds before the time limit at which a task is told to finish its frame.
+    ///
+    /// Longer than a frame takes.
     #[arg(long, value_name = "SECONDS", default_value_t = 120)]
     signal_ahead: u32,
-    /// Directory for the tasks' logs; default: slurm-logs beside the manifest.
+    /// Directory for the tasks' logs [default: slurm-logs beside the manifest]
     #[arg(long, value_name = "DIR")]
     logs: Option<PathBuf>,
-    /// Tasks that an array may have at this cluster (its MaxArraySize less 1); with more, tasks get more frames.
+    /// Tasks that an array may have at this cluster: its MaxArraySize less 1.
+    ///
+    /// With more, tasks get more frames.
     #[arg(long, value_name = "N", default_value_t = usual_most())]
     max_tasks: NonZeroUsize,
 }

@@ -1,7 +1,6 @@
 //! `spherule inspect`: what is in particle files, for people and (`--json`) for scripts.
 
 use std::collections::HashSet;
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -13,6 +12,7 @@ use spherule_formats::sequence::lone_frame_number;
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, FrameFile, Positions, Sequence, SequenceInput};
 
+use super::print::{self, Reader};
 use super::render::parts_text;
 use super::{CliError, Outcome};
 use crate::reading::read_budget;
@@ -22,7 +22,17 @@ mod show;
 
 use native::NativeFacts;
 
+const EXAMPLES: &str = "\
+Examples:
+  spherule inspect run1/frame_0001.vtk
+      Counts, bounds and attributes of one file
+  spherule inspect --json run1
+      The same of all frames of a directory, for scripts
+  spherule inspect --verify run1-native
+      Whether all of them are sound";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct InspectArgs {
     /// Files, directories or patterns.
     #[arg(required = true)]
@@ -55,32 +65,29 @@ struct Inspected<'a> {
 }
 
 pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
-    let mut out = io::BufWriter::new(io::stdout().lock());
     let mut outcome = Outcome::Done;
     for meant in expand(&args.files) {
         let inspected = match meant {
             Meant::File(file, number) => {
-                inspect(&file, number, args, &mut out).map_err(|e| (file, e.to_string()))
+                inspect(&file, number, args).map_err(|e| (file, e.to_string()))
             }
             Meant::Nothing(argument, why) => Err((argument, why)),
         };
-        let written = match inspected {
-            Ok(written) => written,
+        let printed = match inspected {
+            Ok(printed) => printed,
             Err((file, error)) => {
                 outcome = Outcome::SomeFailed;
                 if args.json {
                     let shown = file.display().to_string();
-                    writeln!(out, "{}", json!({"file": shown, "error": error}))
+                    print::json(&json!({"file": shown, "error": error}))
                 } else {
                     say!("error: {error}");
-                    Ok(())
+                    Ok(Reader::Listening)
                 }
             }
         };
-        match written.and_then(|()| out.flush()) {
-            // Whoever reads has seen enough.
-            Err(e) if e.kind() == io::ErrorKind::BrokenPipe => return Ok(outcome),
-            other => other.map_err(CliError::io(Path::new("standard output")))?,
+        if printed? == Reader::Gone {
+            return Ok(outcome);
         }
     }
     Ok(outcome)
@@ -133,11 +140,10 @@ fn inspect(
     path: &Path,
     number: Option<i64>,
     args: &InspectArgs,
-    out: &mut impl Write,
-) -> Result<io::Result<()>, FrameError> {
+) -> Result<Result<Reader, CliError>, FrameError> {
     if is_native(path)? {
         let inspected = native::inspect(path, number, args.verify)?;
-        return Ok(inspected.write(args.json, out));
+        return Ok(inspected.print(args.json));
     }
     let file = FrameFile::open_within(path, read_budget(None, None))?;
     // Of many steps the first one says what holds for all.
@@ -149,12 +155,12 @@ fn inspect(
             verify(file.bytes()).map_err(|e| e.in_file(path))?;
         }
         inspected.verified = args.verify;
-        let written = inspected.write(args.json, out);
-        if written.is_err() {
-            return Ok(written);
+        match inspected.print(args.json) {
+            Ok(Reader::Listening) => {}
+            ended => return Ok(ended),
         }
     }
-    Ok(Ok(()))
+    Ok(Ok(Reader::Listening))
 }
 
 /// Reads step `index` of `file`.

@@ -1,7 +1,6 @@
 //! What a native frame says of itself: index, sections, bytes for each particle. Large frames are not read
 //! for that.
 
-use std::io::{self, Write};
 use std::path::Path;
 
 use serde_json::{Value, json};
@@ -219,49 +218,48 @@ impl NativeFacts {
     }
 
     /// Lines for people.
-    pub(super) fn print(&self, out: &mut impl Write) -> io::Result<()> {
+    pub(super) fn to_lines(&self) -> Vec<String> {
         let index = &self.index;
         let [blocks, wide, nodes] = self.blocks();
-        writeln!(
-            out,
-            "  version {VERSION}, k-d order, {blocks} blocks of {BLOCK_SIZE} ({wide} kept as f32), {nodes} nodes"
-        )?;
-        writeln!(
-            out,
-            "  largest error {:e}, origin {:?}",
-            index.max_error, index.origin
-        )?;
-        if let Some(step) = index.step {
-            writeln!(out, "  step {step}")?;
-        }
-        self.print_bytes(out)?;
+        let mut lines = vec![
+            format!(
+                "  version {VERSION}, k-d order, {blocks} blocks of {BLOCK_SIZE} ({wide} kept as f32), {nodes} nodes"
+            ),
+            format!(
+                "  largest error {:e}, origin {:?}",
+                index.max_error, index.origin
+            ),
+        ];
+        lines.extend(index.step.map(|step| format!("  step {step}")));
+        lines.extend(self.bytes_lines());
         for (what, section) in index.sections() {
             let name = what.strip_prefix("the ").unwrap_or(&what);
-            writeln!(out, "  {name}: {} bytes at {}", section.len, section.offset)?;
+            let (bytes, place) = (section.len, section.offset);
+            lines.push(format!("  {name}: {bytes} bytes at {place}"));
         }
         if let RadiusIndex::PerParticle(radii) = &index.radius {
-            writeln!(
-                out,
-                "  radii stored as {}, largest error {:e}",
-                radius_name(radii.code),
-                radii.max_error
-            )?;
+            let (stored, error) = (radius_name(radii.code), radii.max_error);
+            lines.push(format!(
+                "  radii stored as {stored}, largest error {error:e}"
+            ));
         }
         for attribute in &index.attributes {
             let (name, stored) = (&attribute.name, stored_name(attribute.stored));
             let error = attribute.max_error;
-            writeln!(out, "  {name} stored as {stored}, largest error {error:e}")?;
+            lines.push(format!(
+                "  {name} stored as {stored}, largest error {error:e}"
+            ));
         }
-        Ok(())
+        lines
     }
 
-    fn print_bytes(&self, out: &mut impl Write) -> io::Result<()> {
+    fn bytes_lines(&self) -> Vec<String> {
         let parts = self.parts();
         let Some(all) = self.each(parts.all) else {
-            return Ok(());
+            return Vec::new();
         };
         let each = |bytes| self.each(bytes).unwrap_or(0.0);
-        write!(out, "  bytes per particle:")?;
+        let mut line = "  bytes per particle:".to_owned();
         for (bytes, what) in [
             (parts.positions, "positions"),
             (parts.radii, "radii"),
@@ -269,15 +267,16 @@ impl NativeFacts {
             (parts.nodes, "nodes"),
             (parts.rest, "header, index and padding"),
         ] {
-            write!(out, " {:.2} {what},", each(bytes))?;
+            line += &format!(" {:.2} {what},", each(bytes));
         }
-        writeln!(out, " {all:.2} in all")?;
-        writeln!(
-            out,
-            "  positions and nodes: {:.2} bytes per particle (thesis: {} bytes per particle)",
-            each(parts.positions + parts.nodes),
-            thesis::BYTES
-        )
+        vec![
+            line + &format!(" {all:.2} in all"),
+            format!(
+                "  positions and nodes: {:.2} bytes per particle (thesis: {} bytes per particle)",
+                each(parts.positions + parts.nodes),
+                thesis::BYTES
+            ),
+        ]
     }
 }
 

@@ -1,19 +1,19 @@
 //! What `inspect` prints of a frame.
 
-use std::io::{self, Write};
-
 use serde_json::{Value, json};
 use spherule_formats::stats::{AttributeStats, Number};
 
 use super::Inspected;
+use crate::cli::CliError;
+use crate::cli::print::{self, Reader};
 
 impl Inspected<'_> {
-    /// One line of JSON, or several for people.
-    pub(super) fn write(&self, as_json: bool, out: &mut impl Write) -> io::Result<()> {
+    /// Prints one line of JSON, or several for people.
+    pub(super) fn print(&self, as_json: bool) -> Result<Reader, CliError> {
         if as_json {
-            writeln!(out, "{}", self.to_json())
+            print::json(&self.to_json())
         } else {
-            self.print(out)
+            print::lines(self.to_lines())
         }
     }
 
@@ -52,44 +52,33 @@ impl Inspected<'_> {
         object
     }
 
-    fn print(&self, out: &mut impl Write) -> io::Result<()> {
+    fn to_lines(&self) -> Vec<String> {
         let stats = &self.stats;
-        write!(out, "{}", self.file.display())?;
-        if let Some(frame) = self.frame {
-            write!(out, "  frame {frame}")?;
-        }
-        if let Some(time) = self.time {
-            write!(out, "  time {time}")?;
-        }
-        writeln!(out)?;
+        let mut lines = vec![self.heading()];
         let dropped = match stats.dropped {
             0 => String::new(),
             n => format!(", {n} dropped (not finite)"),
         };
-        writeln!(
-            out,
+        lines.push(format!(
             "  {}, {} positions: {} particles{dropped}",
             self.format, self.encoding, stats.count
-        )?;
+        ));
         if let Some(native) = &self.native {
-            native.print(out)?;
+            lines.extend(native.to_lines());
         }
         if let Some((min, max)) = stats.bounds {
-            writeln!(out, "  bounds {min} to {max}")?;
+            lines.push(format!("  bounds {min} to {max}"));
         }
-        match stats.radius {
-            None => writeln!(out, "  radius not in the file")?,
-            Some((low, high)) if low == high => writeln!(out, "  radius {low}")?,
-            Some((low, high)) => writeln!(out, "  radius {low} to {high}")?,
-        }
-        for attribute in &stats.attributes {
-            print_attribute(attribute, out)?;
-        }
+        lines.push(match stats.radius {
+            None => "  radius not in the file".to_owned(),
+            Some((low, high)) if low == high => format!("  radius {low}"),
+            Some((low, high)) => format!("  radius {low} to {high}"),
+        });
+        lines.extend(stats.attributes.iter().map(attribute_line));
         if let Some(sample) = self.native.as_ref().and_then(|native| native.sample) {
-            writeln!(
-                out,
+            lines.push(format!(
                 "  values of attributes are from a sample of {sample} particles"
-            )?;
+            ));
         }
         for note in &self.notes {
             writeln!(out, "  note: {note}")?;
@@ -99,9 +88,21 @@ impl Inspected<'_> {
                 Some(_) => "checksums, nodes, positions, radii and padding are sound",
                 None => "every number could be read",
             };
-            writeln!(out, "  verified: {what}")?;
+            lines.push(format!("  verified: {what}"));
         }
-        Ok(())
+        lines
+    }
+
+    /// Which frame of which file.
+    fn heading(&self) -> String {
+        let mut line = self.file.display().to_string();
+        if let Some(frame) = self.frame {
+            line += &format!("  frame {frame}");
+        }
+        if let Some(time) = self.time {
+            line += &format!("  time {time}");
+        }
+        line
     }
 
     /// One value a component.
@@ -115,21 +116,20 @@ impl Inspected<'_> {
     }
 }
 
-fn print_attribute(attribute: &AttributeStats, out: &mut impl Write) -> io::Result<()> {
-    write!(
-        out,
+fn attribute_line(attribute: &AttributeStats) -> String {
+    let mut line = format!(
         "  {} ({} x {}):",
         attribute.name,
         attribute.scalar_type.name(),
         attribute.components.len()
-    )?;
+    );
     for component in &attribute.components {
-        match (component.min, component.max) {
-            (Some(min), Some(max)) => write!(out, " [{min} .. {max}]")?,
-            _ => write!(out, " [no values]")?,
-        }
+        line += &match (component.min, component.max) {
+            (Some(min), Some(max)) => format!(" [{min} .. {max}]"),
+            _ => " [no values]".to_owned(),
+        };
     }
-    writeln!(out)
+    line
 }
 
 fn attribute_json(attribute: &AttributeStats) -> Value {

@@ -170,7 +170,7 @@ impl Follower<'_> {
     fn told(&self, end: &End) -> String {
         match end {
             End::Idle => format!("nothing new for {} s (--idle)", self.idle.as_secs_f64()),
-            End::StopFile => format!("{} is there: following ends", shown(&self.stop_file)),
+            End::StopFile => format!("following ends: {} is there", shown(&self.stop_file)),
             End::Interrupted => "following was interrupted; the same command goes on".to_owned(),
         }
     }

@@ -18,13 +18,13 @@ use crate::cli::child::{self, Ended};
 use crate::cli::job::Asked;
 use crate::cli::plan::Plan;
 use crate::cli::work::use_threads;
-use crate::cli::{CliError, Outcome, put};
+use crate::cli::{CliError, Outcome, print};
 use crate::manifest::Manifest;
 use crate::pipeline::{Event, ImageTask, SingleFault, Stage, Watch, make_image};
 use crate::report::FrameReport;
 
-/// The hidden command.
-const COMMAND: &str = "render-frame";
+/// The command of the process, which users are not told of.
+pub(in crate::cli) const COMMAND: &str = "render-frame";
 
 /// What a process is to do.
 #[derive(Debug, Serialize, Deserialize)]
@@ -188,7 +188,7 @@ pub(in crate::cli) fn run_child() -> Result<Outcome, CliError> {
     }
     let told = told(request)?;
     let text = serde_json::to_string(&told).map_err(|e| CliError::Other(e.to_string()))?;
-    put(&mut io::stdout(), &text);
+    print::file(&(text + "\n"))?;
     Ok(Outcome::Done)
 }
 

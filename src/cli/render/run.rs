@@ -49,9 +49,14 @@ impl Run {
         plan.write_manifest(args.force || args.keep_done)?;
         tell(&sequence, &survey, &setup);
         if schedule.overlap == Overlap::None && tasks.len() > 1 {
-            say!("note: one frame at a time, to take less memory");
+            note!("one frame at a time, to take less memory");
         }
-        let progress = Progress::new(plan.manifest.job.progress, tasks.len());
+        let progress = Progress::new(
+            plan.manifest.job.progress,
+            "render",
+            tasks.len(),
+            &plan.shown_output,
+        );
         Ok(Self {
             plan,
             sequence,

@@ -27,7 +27,7 @@ pub(super) fn show(progress: &Progress, event: &Event) {
         }
         Event::Failed(frame, reason) => progress.failed(*frame, reason),
         Event::Others(news) => progress.others(*news),
-        Event::Note(note) => progress.note(&format!("note: {note}")),
+        Event::Note(note) => progress.note(note),
     }
 }
 
@@ -54,7 +54,7 @@ pub(super) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
         say!("{parts}");
     }
     for remark in sequence.remarks() {
-        say!("note: {remark}");
+        note!("{remark}");
     }
     if survey.most_particles == 0 {
         return;

@@ -10,6 +10,7 @@ use super::ScaleArgs;
 use crate::accel::Structure;
 use crate::cli::CliError;
 use crate::cli::job::absolute;
+use crate::cli::work::useful_threads;
 use crate::report::scale::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 
@@ -44,9 +45,10 @@ impl Experiment {
             samples: args.samples,
             max_depth: args.max_depth,
             seed: args.seed,
-            threads: args
-                .threads
-                .map_or_else(rayon::current_num_threads, usize::from),
+            threads: match args.threads.and_then(|count| usize::try_from(count).ok()) {
+                Some(count) => useful_threads(count),
+                None => rayon::current_num_threads(),
+            },
         };
         check_pairs(&structures, &settings.representations)?;
         let mut source = Source::Box;
@@ -123,9 +125,7 @@ fn check_pairs(
              add kdtree to --structures, or measure these structures in memory"
         )));
     }
-    say!(
-        "note: native frames ({names}) are traced where they lie, in k-d order: with kdtree alone"
-    );
+    note!("native frames ({names}) are traced where they lie, in k-d order: with kdtree alone");
     Ok(())
 }
 
@@ -141,7 +141,7 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
     let path = absolute(path)?;
     let sequence = Sequence::open(&SequenceInput::from_path(&path))?;
     for note in sequence.notes() {
-        say!("note: {note}");
+        note!("{note}");
     }
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
     let index = match args.frame {
@@ -156,8 +156,8 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
         })?,
     };
     if args.frame.is_none() && numbers.len() > 1 {
-        say!(
-            "note: {} has {} frames; frame {} is measured, --frame chooses another",
+        note!(
+            "{} has {} frames; frame {} is measured, --frame chooses another",
             path.display(),
             numbers.len(),
             numbers[index]
@@ -172,8 +172,8 @@ fn at_most(there: usize, asked: &[usize]) -> Vec<usize> {
     let (mut fit, above): (Vec<_>, Vec<_>) = asked.iter().partition(|count| **count <= there);
     if !above.is_empty() {
         let above: Vec<String> = above.iter().map(usize::to_string).collect();
-        say!(
-            "note: the input has {there} particles; all of them are measured, once, instead of {}",
+        note!(
+            "the input has {there} particles; all of them are measured, once, instead of {}",
             above.join(", ")
         );
         if !fit.contains(&there) {

@@ -91,7 +91,7 @@ impl Drop for Frames {
 fn remove(dir: &Path) {
     match fs::remove_dir_all(dir) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => {
-            say!("note: {}: cannot be removed: {e}", dir.display());
+            note!("{}: cannot be removed: {e}", dir.display());
         }
         _ => {}
     }

@@ -1,14 +1,12 @@
 //! The hidden command that does one task of `spherule scale`: it measures a cell, or makes its particles.
 
-use std::io;
-
 use serde_json::Value;
 
-use crate::cli::{CliError, Outcome, child, put};
+use crate::cli::{CliError, Outcome, child, print};
 use crate::scale::{Task, cell, convert};
 
 /// Its name.
-pub(super) const COMMAND: &str = "scale-cell";
+pub(in crate::cli) const COMMAND: &str = "scale-cell";
 
 /// Reads the task, does it, prints what came of it or why nothing did.
 pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
@@ -19,7 +17,7 @@ pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
         .map_err(|e| CliError::other(format!("{} threads: {e}", task.threads())))?;
     let told = do_task(&task);
     let text = serde_json::to_string(&told).map_err(|e| CliError::Other(e.to_string()))?;
-    put(&mut io::stdout(), &text);
+    print::file(&(text + "\n"))?;
     Ok(Outcome::Done)
 }
 

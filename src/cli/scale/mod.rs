@@ -1,6 +1,6 @@
 //! `spherule scale`: the thesis's experiment on this machine, each cell in a process of its own.
 
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
@@ -8,11 +8,12 @@ use clap::Args;
 use serde_json::json;
 use spherule_jobs::Interrupt;
 
+use super::numbers::pixels_to;
 use super::progress::{duration, openjd};
-use super::{CliError, Outcome, signals};
+use super::{CliError, Outcome, events, print, signals};
 use crate::accel::Structure;
 use crate::cli::child::{self, Ended};
-use crate::manifest::ProgressMode;
+use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
 use crate::report::scale::{
@@ -28,66 +29,84 @@ mod words;
 use experiment::Experiment;
 use frames::Frames;
 
+const EXAMPLES: &str = "\
+Examples:
+  spherule scale -o scale
+      The whole experiment: 36 cells of a minute each
+  spherule scale --particles 1e5,1e6 --structures lbvh,kdtree --seconds 10
+      Two structures, quickly
+  spherule scale --input run1 --frame 100 --images 20
+      Particles of your own";
+
 #[derive(Debug, Args)]
+#[command(after_help = EXAMPLES)]
 pub(super) struct ScaleArgs {
     /// Particle counts; 1e6 is understood.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1e5,1e6,1e7",
-        value_parser = words::particles, allow_hyphen_values = true)]
+        value_parser = words::particles, allow_hyphen_values = true, help_heading = "Experiment")]
     particles: Vec<usize>,
-    /// Acceleration structures; default: all.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::structure)]
+    /// Acceleration structures: lbvh, kdtree, bvh, sbvh [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::structure, help_heading = "Experiment")]
     structures: Vec<Structure>,
-    /// Camera motions: rotation, translation, both; default: all.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::motion)]
+    /// Camera motions: rotation, translation, both [default: all]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::motion, help_heading = "Experiment")]
     motions: Vec<Motion>,
-    /// Where positions are: memory, or f32, q16, q10 for a mapped native frame of that encoding, traced
-    /// where it lies (kdtree alone); default: memory.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::representation)]
+    /// Where positions are: memory, f32, q16, q10 [default: memory]
+    ///
+    /// All but memory are a mapped native frame of that encoding, traced where it lies (kdtree alone).
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::representation, help_heading = "Experiment")]
     representations: Vec<Representation>,
-    /// Seconds that the images of a cell are traced for; default: 60.
-    #[arg(long, value_parser = words::seconds, conflicts_with = "images", allow_hyphen_values = true)]
+    /// Seconds that the images of a cell are traced for [default: 60]
+    #[arg(long, value_parser = words::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
     seconds: Option<f64>,
     /// Images of a cell, instead of a time.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_hyphen_values = true)]
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_hyphen_values = true, help_heading = "Experiment")]
     images: Option<u32>,
     /// Image width in pixels.
     #[arg(long, default_value_t = 1920, allow_hyphen_values = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIDE)))]
+        value_parser = pixels_to(MAX_SIDE), help_heading = "Image")]
     width: u32,
     /// Image height in pixels.
     #[arg(long, default_value_t = 1080, allow_hyphen_values = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SIDE)))]
+        value_parser = pixels_to(MAX_SIDE), help_heading = "Image")]
     height: u32,
     /// Reflections and refractions followed; 1 is direct light only.
     #[arg(long, visible_alias = "depth", default_value_t = 3, allow_hyphen_values = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_DEPTH)))]
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_DEPTH)), help_heading = "Image")]
     max_depth: u32,
     /// Samples per pixel.
     #[arg(long, default_value_t = 1, allow_hyphen_values = true,
-        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)))]
+        value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)), help_heading = "Image")]
     samples: u32,
     /// Seed of the box, or of the choice among the input's particles.
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, help_heading = "Input")]
     seed: u64,
-    /// Threads to use; default: all.
-    #[arg(long, value_parser = clap::value_parser!(u16).range(1..))]
-    threads: Option<u16>,
     /// Particles of your own instead of the box: a file, a pattern or a directory.
-    #[arg(long, value_name = "PATH")]
+    #[arg(long, value_name = "PATH", help_heading = "Input")]
     input: Option<PathBuf>,
-    /// Which frame of the input; default: the first.
+    /// Which frame of the input [default: the first]
     #[arg(
         long,
         value_name = "NUMBER",
         requires = "input",
-        allow_hyphen_values = true
+        allow_hyphen_values = true,
+        help_heading = "Input"
     )]
     frame: Option<i64>,
     /// Directory for scale.json, scale.csv and scale.html.
-    #[arg(short, long, value_name = "DIR", default_value = "scale")]
+    #[arg(
+        short,
+        long,
+        value_name = "DIR",
+        default_value = "scale",
+        help_heading = "Output"
+    )]
     output: PathBuf,
+    /// Threads to use [default: all]; at most 4 for each processor are used.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
+    threads: Option<u32>,
     /// How progress is shown.
-    #[arg(long, value_enum, default_value = "auto")]
+    #[arg(long, value_enum, default_value = "auto", help_heading = "Job")]
     progress: ProgressMode,
 }
 
@@ -98,6 +117,9 @@ const WORDS: signals::Words = signals::Words {
 
 pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(WORDS)?;
+    if args.progress == ProgressMode::Json {
+        events::begin();
+    }
     let experiment = Experiment::settle(args)?;
     prepare(&args.output)?;
     let cells = experiment.cells();
@@ -109,13 +131,29 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         cells: Vec::with_capacity(cells.len()),
     };
     say!("{}", table::subject(&report));
+    let output = args.output.display().to_string();
+    events::send(
+        "start",
+        json!({"command": "scale", "total": cells.len(), "output": output}),
+    );
     let ended = measure_all(&cells, &mut report, args, signals.at_work());
     if report.cells.is_empty() {
         return Ok(Outcome::Interrupted);
     }
-    print(&table::text(&report))?;
+    let failed: Vec<String> = report
+        .failed()
+        .map(|(cell, _)| table::cell_name(cell))
+        .collect();
+    events::at_end(json!({
+        "done": report.cells.len() - failed.len(),
+        "total": report.planned,
+        "failed": failed,
+    }));
+    show_tables(&report, args.progress)?;
     if let Some((path, source)) = ended.unwritten {
-        say!("error: {}", CliError::Io { path, source });
+        let error = CliError::Io { path, source };
+        say!("error: {error}");
+        events::at_end(json!({"errors": [error.to_string()]}));
         return Ok(Outcome::SomeFailed);
     }
     let [json, csv, html] = [files::JSON, files::CSV, files::HTML];
@@ -236,14 +274,15 @@ fn prepare(dir: &Path) -> Result<(), CliError> {
     })
 }
 
-/// The result: a full disk is told, a reader that has seen enough is not.
-fn print(text: &str) -> Result<(), CliError> {
-    match io::stdout().write_all(text.as_bytes()) {
-        Err(e) if e.kind() != io::ErrorKind::BrokenPipe => {
-            Err(CliError::io(Path::new("standard output"))(e))
-        }
-        _ => Ok(()),
+/// Prints the result, beside the events if standard output is theirs.
+fn show_tables(report: &ScaleReport, mode: ProgressMode) -> Result<(), CliError> {
+    let text = table::text(report);
+    if mode == ProgressMode::Json {
+        text.lines().for_each(print::message);
+    } else {
+        print::lines(text.lines())?;
     }
+    Ok(())
 }
 
 /// Tells one cell after the other.
@@ -262,6 +301,14 @@ impl Progress {
         };
         let done = report.cells.len();
         let name = table::cell_name(cell);
+        let event = match &cell.outcome {
+            CellOutcome::Done(_) => "cell_done",
+            CellOutcome::Failed { .. } => "cell_failed",
+        };
+        events::send(
+            event,
+            json!({"cell": cell, "done": done, "total": self.total}),
+        );
         let told = match &cell.outcome {
             CellOutcome::Done(measured) => table::line(measured),
             CellOutcome::Failed { reason } => {
@@ -275,14 +322,8 @@ impl Progress {
                 self.total,
                 self.remaining(done)
             ),
-            ProgressMode::Json => {
-                say!(
-                    "{}",
-                    json!({"cell": cell, "done": done, "total": self.total})
-                );
-            }
             ProgressMode::Openjd => openjd(done, self.total, &format!("{name}: {told}")),
-            ProgressMode::None => {}
+            ProgressMode::Json | ProgressMode::None => {}
         }
     }
 

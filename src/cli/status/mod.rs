@@ -1,6 +1,6 @@
 //! `spherule status`: how a job stands, and who is at it.
 
-use std::io::{self, IsTerminal, Write};
+use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
 use std::thread;
 use std::time::Duration;
@@ -8,6 +8,7 @@ use std::time::Duration;
 use clap::Args;
 use spherule_jobs::{FrameState, Job, JobState, Status, Summary, WorkerView};
 
+use super::print::{self, Reader};
 use super::work::{job_directory, no_job};
 use super::{CliError, Outcome};
 
@@ -44,19 +45,16 @@ pub(super) fn run(args: &StatusArgs) -> Result<Outcome, CliError> {
     let clears = args.watch && !args.json && io::stdout().is_terminal();
     loop {
         let standing = Standing::now(&dir)?;
-        let mut text = if args.json {
-            standing.to_json().to_string() + "\n"
+        let reader = if args.json {
+            print::json(&standing.to_json())?
+        } else if clears {
+            print::lines_afresh(standing.to_lines())?
         } else {
-            standing.to_text()
+            print::lines(standing.to_lines())?
         };
-        if clears {
-            // To the first line and column, with everything below cleared away.
-            text.insert_str(0, "\x1b[H\x1b[J");
-        }
-        let written = io::stdout().write_all(text.as_bytes());
         let is_over =
             !args.watch || standing.summary.pending == 0 || standing.living().next().is_none();
-        if is_over || written.is_err() {
+        if is_over || reader == Reader::Gone {
             return Ok(standing.outcome());
         }
         thread::sleep(PAUSE);

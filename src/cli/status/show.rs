@@ -1,7 +1,5 @@
 //! How a job stands, for people and for scripts.
 
-use std::fmt::Write as _;
-
 use serde_json::{Value, json};
 use spherule_jobs::{FrameState, WorkerView};
 
@@ -13,11 +11,9 @@ use crate::cli::work::list;
 const MOST_REASONS: usize = 20;
 
 impl Standing {
-    pub(super) fn to_text(&self) -> String {
-        let mut text = String::new();
-        let mut line = |name: &str, what: &str| {
-            let _ = writeln!(text, "{name:<9} {what}");
-        };
+    pub(super) fn to_lines(&self) -> Vec<String> {
+        let mut lines = Vec::new();
+        let mut line = |name: &str, what: &str| lines.push(format!("{name:<9} {what}"));
         line("job", &self.dir.display().to_string());
         line("frames", &self.summary.total.to_string());
         let mut frames = |name: &str, frames: &[i64]| {
@@ -41,7 +37,7 @@ impl Standing {
         for (frame, reason) in self.reasons().take(MOST_REASONS) {
             line("failure", &format!("frame {frame}: {reason}"));
         }
-        text
+        lines
     }
 
     /// Frames not tried yet that nobody has in hand.

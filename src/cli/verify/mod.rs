@@ -1,7 +1,7 @@
 //! `spherule verify`: opens and decodes everything that a job has finished.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, Write};
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,8 +9,10 @@ use rayon::prelude::*;
 use spherule_formats::native::{Access, NativeFile};
 use spherule_jobs::{Entry, FrameRange, Job, JobState, PLAN_FILE, PlannedFrame, Status};
 
+use super::print::{self, Reader};
 use super::work::{job_directory, list, no_job, use_threads};
 use super::{CliError, Outcome};
+use crate::manifest::MAX_THREADS;
 use crate::mishap::guarded;
 use crate::output::{verify_exr, verify_preview};
 use made::Made;
@@ -32,8 +34,8 @@ pub(super) struct VerifyArgs {
     /// missing or of another length is made anew in any case.
     #[arg(long)]
     requeue_bad: bool,
-    /// Threads to use; default: all.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=65_535))]
+    /// Threads to use [default: all]; at most 4 for each processor are used.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
     threads: Option<u32>,
 }
 
@@ -93,22 +95,20 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     let made = Made::of(state.plan())
         .map_err(|what| CliError::other(format!("{}: {what}", dir.join(PLAN_FILE).display())))?;
     let frames = chosen(&state, args.frames.as_ref())?;
-    let mut out = io::stdout().lock();
     let mut verdicts = Vec::with_capacity(frames.len());
     let mut damaged = Vec::new();
     for some in frames.chunks(AT_ONCE * rayon::current_num_threads()) {
         let looked = some.par_iter().map(|frame| look(&state, frame, made));
         let looked: Vec<FrameVerdict> = looked.collect();
-        let text: String = looked.iter().map(|f| f.text(args.json)).collect();
+        let reader = print::lines(looked.iter().flat_map(|f| f.lines(args.json)))?;
         damaged.extend(looked.iter().filter_map(FrameVerdict::damage));
         verdicts.extend(looked.iter().map(|f| (f.frame, f.verdict)));
-        if !written(out.write_all(text.as_bytes()))? {
-            // Whoever reads has seen enough.
+        if reader == Reader::Gone {
             break;
         }
     }
     if !args.json {
-        written(out.write_all(show::summary(&verdicts).as_bytes()))?;
+        print::lines(show::summary(&verdicts))?;
     }
     if args.requeue_bad
         && let Err(error) = requeue(&state, &damaged)
@@ -136,15 +136,6 @@ fn requeue(state: &JobState, damaged: &[(i64, String)]) -> Result<(), CliError> 
         );
     }
     Ok(())
-}
-
-/// Whether somebody still reads.
-fn written(result: io::Result<()>) -> Result<bool, CliError> {
-    match result {
-        Err(e) if e.kind() == io::ErrorKind::BrokenPipe => Ok(false),
-        Err(e) => Err(CliError::io(Path::new("standard output"))(e)),
-        Ok(()) => Ok(true),
-    }
 }
 
 fn chosen<'a>(

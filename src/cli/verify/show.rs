@@ -1,10 +1,9 @@
 //! Verdicts for people and for scripts.
 
-use std::fmt::Write as _;
-
 use serde_json::{Value, json};
 
 use super::{FrameVerdict, Verdict, Verified};
+use crate::cli::print::json_line;
 use crate::cli::work::list;
 
 /// All, with their names in JSON and what people are told.
@@ -26,18 +25,18 @@ impl Verdict {
 
 impl FrameVerdict {
     /// One line of JSON, or a line for each bad file.
-    pub(super) fn text(&self, json: bool) -> String {
+    pub(super) fn lines(&self, json: bool) -> Vec<String> {
         if json {
-            return format!("{}\n", self.to_json());
+            return vec![json_line(&self.to_json())];
         }
-        let mut text = String::new();
-        for file in self.files.iter().filter(|f| f.verdict != Verdict::Sound) {
+        let line = |file: &Verified| {
             let reason = file.reason.as_deref().unwrap_or_default();
             let (frame, path) = (self.frame, &file.path);
             let verdict = file.verdict.name();
-            let _ = writeln!(text, "frame {frame}: {path}: {verdict}: {reason}");
-        }
-        text
+            format!("frame {frame}: {path}: {verdict}: {reason}")
+        };
+        let bad = self.files.iter().filter(|f| f.verdict != Verdict::Sound);
+        bad.map(line).collect()
     }
 
     fn to_json(&self) -> Value {
@@ -61,14 +60,14 @@ impl Verified {
 }
 
 /// How many frames stand how, and which.
-pub(super) fn summary(verdicts: &[(i64, Verdict)]) -> String {
-    let mut text = String::new();
+pub(super) fn summary(verdicts: &[(i64, Verdict)]) -> Vec<String> {
+    let mut lines = Vec::new();
     for (wanted, _, told) in VERDICTS {
         let these = verdicts.iter().filter(|(_, verdict)| *verdict == wanted);
         let frames: Vec<i64> = these.map(|(frame, _)| *frame).collect();
         if !frames.is_empty() {
-            let _ = writeln!(text, "{told:<18} {} ({})", frames.len(), list(&frames));
+            lines.push(format!("{told:<18} {} ({})", frames.len(), list(&frames)));
         }
     }
-    text
+    lines
 }

@@ -30,7 +30,7 @@ fn typing_errors_get_the_nearest_word() {
         &workshop,
         &["--color-by", "velocity", "--map", "viridi"],
         &[
-            "material.color.map: wants one of viridis, ",
+            "--map: material.color.map: unknown colour map `viridi`; choose one of viridis, turbo",
             "did you mean viridis?",
         ],
     );
@@ -166,6 +166,16 @@ fn numbers_have_ranges() {
             ["--set", "image=7"],
             "--set image=7: image: wants a table, not 7",
         ),
+        (
+            ["--width", "4k"],
+            "invalid value '4k' for '--width <WIDTH>': wants a number of pixels, as in --width 3840",
+        ),
+        (["--samples", "many"], "wants a whole number, as in 16"),
+        (["--idle", "1h"], "wants seconds as a number"),
+        (
+            ["--threads", "2000"],
+            "--threads: job.threads: wants \"all\" or a whole number from 1 to 1024, not 2000",
+        ),
         (["--threads", "0"], "--threads"),
         (["--threads", "many"], "--threads"),
         (["--up", "w"], "--up: input.up: wants one of x, y, z"),
@@ -271,10 +281,198 @@ fn colours_by_what_is_not_there() {
         &["--set", "input.radius={ attribute = \"size\" }"],
         &["input.radius: no attribute `size` in any frame looked at; there are `density`"],
     );
-    not_rendered(&workshop, &["--map", "turbo"], &["--color-by"]);
+    let plain = "input.path = \"in\"\nmaterial.color = [1, 0, 0]\n";
+    std::fs::write(workshop.join("plain.toml"), plain).expect("a file");
+    refused(
+        &workshop,
+        &["render", "plain.toml", "--map", "turbo"],
+        &["--map: material.color.map: material.color is a list of 3, which has no keys"],
+    );
     not_rendered(
         &workshop,
         &["--color-by", "velocity", "--range", "3", "3"],
         &["material.color.range: wants two rising numbers"],
     );
+}
+
+#[test]
+fn a_map_goes_with_the_colour_that_is_there() {
+    let workshop = one_frame();
+    let kept = |key: &str| {
+        let text = std::fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
+        let line = text.lines().find(|line| line.starts_with(key));
+        line.expect("the key").to_owned()
+    };
+    // By speed, as nothing else is asked for.
+    workshop
+        .render(&["--map", "turbo"])
+        .expect(0)
+        .tells("colour by `velocity`");
+    assert!(kept("color = ").starts_with("color = { map = \"turbo\" }"));
+    let plain = workshop.render_to("plain", &[]).expect(0);
+    drop(plain);
+    let image = |dir: &str| std::fs::read(workshop.join(dir).join("f.0001.exr")).expect("an image");
+    assert!(image("out") != image("plain"), "the map is used");
+    // Over a manifest that says "auto", and over one that names an attribute.
+    workshop
+        .run(&["render", "plain/job.toml", "--map", "turbo", "--force"])
+        .expect(0);
+    assert!(image("out") == image("plain"));
+    workshop
+        .render(&["--color-by", "density", "--force"])
+        .expect(0);
+    workshop
+        .run(&[
+            "render",
+            "out/job.toml",
+            "--map",
+            "magma",
+            "--range",
+            "1",
+            "2",
+            "--force",
+        ])
+        .expect(0);
+    let color = kept("color = ");
+    assert!(
+        color.starts_with(
+            "color = { attribute = \"density\", map = \"magma\", range = [1.0, 2.0] }"
+        ),
+        "{color}"
+    );
+    std::fs::write(workshop.join("a.xyz"), "0 0 0\n1 1 1\n").expect("a file");
+    let bare = ["render", "a.xyz", "-o", "bare/f.exr", "--map", "turbo"];
+    refused(
+        &workshop,
+        &bare,
+        &["material.color: no attribute `velocity` in any frame looked at"],
+    );
+}
+
+#[test]
+fn patterns_and_ranges_of_any_size() {
+    let workshop = one_frame();
+    for (pattern, wanted) in [
+        (
+            "#".repeat(70_000),
+            "more than 32 digits for the frame number",
+        ),
+        ("%0999999d".to_owned(), "more than 32 digits"),
+        (
+            "%099999999999999999999999d".to_owned(),
+            "more than 32 digits",
+        ),
+    ] {
+        let output = format!("out/f.{pattern}.exr");
+        refused(&workshop, &["render", "in", "-o", &output], &[wanted]);
+    }
+    for pattern in [
+        "#".repeat(70_000),
+        "*?".repeat(60_000),
+        "%0999999d".to_owned(),
+    ] {
+        let input = format!("in/{pattern}.nosuch");
+        refused(
+            &workshop,
+            &["render", &input],
+            &["no file name fits this pattern"],
+        );
+    }
+    for (range, wanted) in [
+        ("1-99999999999999999999", "does not fit in 64 bits"),
+        ("1-10x99999999999999999999", "does not fit in 64 bits"),
+        ("0-9000000000000000000x7", "has none of the frames"),
+    ] {
+        not_rendered(&workshop, &["--frames", range], &[wanted]);
+    }
+}
+
+/// The first and the last frame number that there are.
+#[test]
+fn frame_numbers_at_both_ends() {
+    let workshop = one_frame();
+    for number in [i64::MIN, i64::MAX] {
+        let name = format!("in/f_{number}.bgeo");
+        std::fs::copy(workshop.join("in/f_1.bgeo"), workshop.join(name)).expect("a file");
+    }
+    for options in [&[][..], &["--set", "camera.mode=turntable"]] {
+        let ran = workshop.render(&[options, &["--force"]].concat()).expect(0);
+        assert!(!ran.errors().contains("fault"), "{}", ran.errors());
+        for name in [
+            "f.-9223372036854775808.exr",
+            "f.0001.exr",
+            "f.9223372036854775807.exr",
+        ] {
+            assert!(workshop.join("out").join(name).exists(), "{name}");
+        }
+    }
+    workshop.run(&["status", "out"]).expect(0);
+    workshop.run(&["verify", "out"]).expect(0);
+    workshop.run(&["check", "out/job.toml"]).expect(0);
+    workshop.run(&["inspect", "in"]).expect(0);
+    workshop.run(&["convert", "in", "-o", "native"]).expect(0);
+    workshop.run(&["export", "slurm", "out/job.toml"]).expect(0);
+    let shard = [
+        "--shard",
+        "2/3",
+        "--frames",
+        "-9223372036854775808-9223372036854775807",
+    ];
+    workshop.render_to("shard", &shard).expect(0);
+}
+
+#[test]
+fn threads_are_as_many_as_are_of_use() {
+    let workshop = one_frame();
+    workshop
+        .render(&["--threads", "1000"])
+        .expect(0)
+        .tells("note: --threads 1000: ");
+    for command in [
+        &["verify", "out"][..],
+        &["convert", "in", "-o", "native"],
+        &["scale", "--particles", "10"],
+    ] {
+        let arguments = [command, &["--threads", "2000"]].concat();
+        let ran = workshop.run(&arguments).expect(2);
+        ran.tells("2000 is not in 1..=1024");
+    }
+}
+
+#[test]
+fn a_manifest_that_is_not_there_gets_the_help_of_a_directory() {
+    let workshop = one_frame();
+    std::fs::write(workshop.join("dam.toml"), "input.path = \"in\"\n").expect("a file");
+    for arguments in [
+        &["render", "dan.toml"][..],
+        &["check", "dan.toml"],
+        &["status", "dan.toml"],
+        &["export", "slurm", "dan.toml"],
+    ] {
+        refused(
+            &workshop,
+            arguments,
+            &["error: dan.toml: no such file or directory; ", "dam.toml"],
+        );
+    }
+}
+
+#[test]
+fn conversions_write_directories() {
+    let workshop = one_frame();
+    for (output, wanted) in [
+        (
+            "x.vtk",
+            "x.vtk: is a file's name: convert writes native frames (.spf) alone",
+        ),
+        ("x.csv.gz", "name a directory, as in -o x"),
+        (
+            "out/f.spf",
+            "as frame.NUMBER.spf; name a directory, as in -o out/f",
+        ),
+    ] {
+        refused(&workshop, &["convert", "in", "-o", output], &[wanted]);
+        assert!(!workshop.join(output).exists());
+    }
+    workshop.run(&["convert", "in", "-o", "v1.2"]).expect(0);
 }

@@ -166,16 +166,18 @@ fn progress_for_programs_tells_each_frame() {
     fs::write(&file, &fs::read(&file).expect("a frame")[..100]).expect("a file");
     let ran = workshop.render(&["--progress", "json"]).expect(1);
     let lines: Vec<Value> = ran
-        .errors()
+        .text()
         .lines()
-        .filter(|line| line.starts_with('{'))
         .map(|line| serde_json::from_str(line).expect("JSON"))
         .collect();
     let told: Vec<(i64, &str)> = lines
         .iter()
-        .filter_map(|l| Some((l["frame"].as_i64()?, l["status"].as_str()?)))
+        .filter_map(|l| Some((l["frame"].as_i64()?, l["event"].as_str()?)))
         .collect();
-    assert_eq!(told, [(1, "done"), (2, "failed"), (3, "done")]);
+    assert_eq!(
+        told,
+        [(1, "frame_done"), (2, "frame_failed"), (3, "frame_done")]
+    );
 
     let ran = workshop
         .render(&["--progress", "openjd", "--force"])

@@ -1,0 +1,86 @@
+//! Help and the messages about arguments: what users read first.
+
+use crate::harness::{Workshop, dam_break};
+
+fn help(arguments: &[&str]) -> String {
+    Workshop::new().run(arguments).expect(0).text()
+}
+
+#[test]
+fn options_come_in_groups_with_examples() {
+    for command in ["render", "check"] {
+        let text = help(&[command, "-h"]);
+        let headings = [
+            "Input:",
+            "Camera:",
+            "Image:",
+            "Look:",
+            "Output:",
+            "Job:",
+            "Examples:",
+        ];
+        let places: Vec<usize> = headings
+            .iter()
+            .map(|heading| text.find(&format!("\n{heading}\n")).expect(heading))
+            .collect();
+        assert!(places.is_sorted(), "{text}");
+        for default in [
+            "[default: 1920]",
+            "[default: all]",
+            "[default: out/frame.####.exr]",
+        ] {
+            assert!(text.contains(default), "{default}");
+        }
+    }
+    for command in [
+        &["render"][..],
+        &["check"],
+        &["convert"],
+        &["scale"],
+        &["generate"],
+        &["inspect"],
+        &["export"],
+    ] {
+        let short = help(&[command, &["-h"]].concat());
+        let long = help(&[command, &["--help"]].concat());
+        for text in [&short, &long] {
+            let (_, examples) = text.split_once("Examples:\n").expect("examples");
+            let first = format!("  spherule {} ", command[0]);
+            let count = examples.lines().filter(|l| l.starts_with(&first)).count();
+            assert_eq!(count, 3, "{examples}");
+        }
+        assert!(short.len() <= long.len());
+    }
+}
+
+#[test]
+fn hidden_commands_are_neither_listed_nor_suggested() {
+    let workshop = Workshop::new();
+    let listed = help(&["--help"]);
+    for (typed, hidden) in [
+        ("render-fram", "render-frame"),
+        ("render-frames", "render-frame"),
+        ("scale-cel", "scale-cell"),
+        ("scale-cells", "scale-cell"),
+    ] {
+        assert!(!listed.contains(hidden));
+        let errors = workshop.run(&[typed]).expect(2).errors();
+        assert!(!errors.contains(&format!("'{hidden}'")), "{errors}");
+    }
+}
+
+/// Help and examples say what the program does.
+#[test]
+fn the_manual_of_maps_is_complete() {
+    let text = help(&["render", "--help"]);
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), [1]);
+    let errors = workshop
+        .run(&["render", "in", "--map", "jet"])
+        .expect(2)
+        .errors();
+    let (_, list) = errors.split_once("choose one of ").expect("a list");
+    for name in list.lines().next().expect("a line").split(", ") {
+        assert!(text.contains(name), "{name}");
+    }
+}
