@@ -119,7 +119,7 @@ fn arguments_and_manifests_are_quoted_escaped() {
         format!("input.path = \"in\"\nrender.surface = \"{key}\"\n"),
         format!("input.path = \"in\"\nmaterial.color = {{ attribute = \"v\", map = \"{key}\" }}\n"),
         format!("input.path = \"{key}\"\n"),
-        format!("input.path = \"in\"\noutput.path = \"{key}\"\n"),
+        format!("input.path = \"in\"\n\"render.{key}\".x = 1\n"),
     ];
     for text in manifests {
         fs::write(workshop.join("hostile.toml"), &text).expect("a file");
