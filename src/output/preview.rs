@@ -5,7 +5,7 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{
     OutputError,
-    view::{byte_from_linear, view_transform},
+    view::{byte_from_linear, dither_threshold, view_transform},
 };
 use crate::render::Film;
 
@@ -19,17 +19,20 @@ pub struct PreviewOptions {
     pub backdrop: Option<Vec3>,
 }
 
-/// Encodes `film` as an 8-bit sRGB PNG.
+/// Encodes `film` as an 8-bit sRGB PNG, dithered.
 ///
 /// # Errors
 /// If the encoder refuses the image.
 pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, OutputError> {
     let gain = options.exposure.exp2();
     let mut pixels = Vec::with_capacity(film.color.len() * 3);
-    for &[r, g, b, a] in &film.color {
+    let places = (0..film.height).flat_map(|y| (0..film.width).map(move |x| (x, y)));
+    for (&[r, g, b, a], (x, y)) in film.color.iter().zip(places) {
         let behind = options.backdrop.unwrap_or_default() * (1.0 - a);
         let shown = view_transform((Vec3::new(r, g, b) + behind) * gain);
-        pixels.extend(shown.to_array().map(byte_from_linear));
+        // One threshold for all components: grey stays grey.
+        let threshold = dither_threshold(x, y);
+        pixels.extend(shown.to_array().map(|v| byte_from_linear(v, threshold)));
     }
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
@@ -41,6 +44,7 @@ pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::output::view::srgb_from_linear;
     use crate::render::Channels;
 
     fn decode(png: &[u8]) -> image::RgbImage {
@@ -48,21 +52,64 @@ mod tests {
         image.unwrap().into_rgb8()
     }
 
-    fn film() -> Film {
-        let mut film = Film::new(2, 1, Channels::COLOR);
-        film.color = vec![[0.18, 0.18, 0.18, 0.0], [0.09, 0.0, 50.0, 0.5]];
+    /// A film of one colour.
+    fn film(color: [f32; 4]) -> Film {
+        let mut film = Film::new(24, 8, Channels::COLOR);
+        film.color.fill(color);
         film
+    }
+
+    /// The mean of each component of a film of one `color`, in bytes.
+    fn mean(color: [f32; 4], options: &PreviewOptions) -> Vec3 {
+        let image = decode(&encode_preview(&film(color), options).unwrap());
+        let count = f32::from(u8::try_from(image.pixels().len()).unwrap());
+        let bytes = |pixel: &image::Rgb<u8>| Vec3::from_array(pixel.0.map(f32::from));
+        image.pixels().map(bytes).sum::<Vec3>() / count
+    }
+
+    fn assert_near(shown: f32, linear: f32) {
+        let wanted = 255.0 * srgb_from_linear(linear);
+        assert!((shown - wanted).abs() < 0.05, "{shown} {wanted}");
     }
 
     #[test]
     fn shows_the_film_in_srgb() {
-        let png = encode_preview(&film(), &PreviewOptions::default()).unwrap();
-        let image = decode(&png);
-        assert_eq!(image.dimensions(), (2, 1));
-        assert_eq!(image.get_pixel(0, 0).0, [118; 3]);
-        assert!(image.get_pixel(1, 0).0[2] >= 254);
-        let again = encode_preview(&film(), &PreviewOptions::default()).unwrap();
+        let options = PreviewOptions::default();
+        let png = encode_preview(&film([0.18, 0.02, 50.0, 0.5]), &options).unwrap();
+        assert_eq!(decode(&png).dimensions(), (24, 8));
+        let again = encode_preview(&film([0.18, 0.02, 50.0, 0.5]), &options).unwrap();
         assert_eq!(png, again);
+        let shown = mean([0.18, 0.02, 0.5, 0.0], &options);
+        assert_near(shown.x, 0.18);
+        assert_near(shown.y, 0.02);
+        assert_near(shown.z, 0.5);
+    }
+
+    #[test]
+    fn black_and_white_are_exact() {
+        let options = PreviewOptions::default();
+        assert_eq!(mean([1.0, 1.0, 1.0, 0.0], &options), Vec3::splat(255.0));
+        assert_eq!(mean([0.0, 0.0, 0.0, 1.0], &options), Vec3::ZERO);
+        assert_eq!(mean([7.0, 7.0, 7.0, 1.0], &options), Vec3::splat(255.0));
+    }
+
+    #[test]
+    fn a_faint_gradient_has_no_bands() {
+        // Three bytes from left to right: in bands each would be hundreds of pixels wide.
+        let mut film = Film::new(600, 16, Channels::COLOR);
+        for (index, color) in film.color.iter_mut().enumerate() {
+            let across = (index % 600) as f32 / 600.0;
+            *color = [0.2 + 0.006 * across, 0.2, 0.2, 1.0];
+        }
+        let image = decode(&encode_preview(&film, &PreviewOptions::default()).unwrap());
+        for left in (0..600).step_by(16).filter(|left| left + 16 <= 600) {
+            let (mut shown, mut wanted) = (0.0, 0.0);
+            for (x, y) in (0..256).map(|i| (left + i % 16, i / 16)) {
+                shown += f32::from(image.get_pixel(x, y).0[0]) / 256.0;
+                wanted += 255.0 * srgb_from_linear(0.2 + 0.006 * x as f32 / 600.0) / 256.0;
+            }
+            assert!((shown - wanted).abs() < 0.05, "{left}: {shown} {wanted}");
+        }
     }
 
     #[test]
@@ -71,13 +118,11 @@ mod tests {
             exposure: 1.0,
             backdrop: None,
         };
-        let image = decode(&encode_preview(&film(), &options).unwrap());
-        assert_eq!(image.get_pixel(0, 0).0, [byte_from_linear(0.36); 3]);
+        assert_near(mean([0.18, 0.0, 0.0, 1.0], &options).x, 0.36);
         let options = PreviewOptions {
             exposure: 0.0,
             backdrop: Some(Vec3::new(0.18, 0.2, 0.0)),
         };
-        let image = decode(&encode_preview(&film(), &options).unwrap());
-        assert_eq!(image.get_pixel(0, 0).0[0], byte_from_linear(0.36));
+        assert_near(mean([0.09, 0.0, 0.0, 0.5], &options).x, 0.18);
     }
 }

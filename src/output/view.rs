@@ -1,17 +1,15 @@
-//! From scene light to a screen: a shoulder for highlights, then the sRGB transfer function.
+//! From scene light to a screen: highlights beyond white, the sRGB transfer function, and 8 bits.
 //!
-//! The shoulder has the form of Khronos's PBR neutral tone mapper (2024): colours whose brightest
-//! component stays under [`KNEE`] are left exactly as they are; above, that component runs into 1
-//! along a hyperbola of matching slope, the others keep their ratio to it, and very bright ones
-//! slowly lose saturation so that a highlight ends white. That mapper's dark end, which takes out
-//! reflections of a white sky, is left out: nothing is taken from dark colours here.
+//! Colours whose brightest component stays within 1 are left exactly as they are, so that a white background is
+//! white and colours of a colour map are those of its legend. A shoulder below 1, as tone mappers for film have,
+//! would need room there and make every white grey (243 of 255 with a knee at 0.8). Brighter colours follow the
+//! part of Khronos's PBR neutral tone mapper (2024) that keeps hues: all components are scaled until the brightest
+//! is 1, and the more light that takes away, the more the colour loses saturation, so that a highlight on a
+//! coloured sphere still has a gradient and ends white. Shades of grey beyond 1 are white.
 
 use glam::Vec3;
 
-/// Brightest component (linear) up to which colours stay true; about 231 of 255 on the screen.
-pub const KNEE: f32 = 0.8;
-
-/// How fast highlights go to white with the light that the shoulder takes away.
+/// How fast highlights go to white with the light that is taken away.
 const DESATURATION: f32 = 0.15;
 
 /// Linear scene light to linear screen light in 0 to 1.
@@ -20,13 +18,11 @@ pub fn view_transform(color: Vec3) -> Vec3 {
     let color = Vec3::select(color.is_nan_mask(), Vec3::ZERO, color);
     let color = color.clamp(Vec3::ZERO, Vec3::splat(f32::MAX));
     let peak = color.max_element();
-    if peak <= KNEE {
+    if peak <= 1.0 {
         return color;
     }
-    let room = 1.0 - KNEE;
-    let shown = 1.0 - room * room / (peak - KNEE + room);
-    let white = 1.0 - 1.0 / (DESATURATION * (peak - shown) + 1.0);
-    (color * (shown / peak)).lerp(Vec3::splat(shown), white)
+    let white = 1.0 - 1.0 / (DESATURATION * (peak - 1.0) + 1.0);
+    (color / peak).lerp(Vec3::ONE, white)
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) for linear light in 0 to 1.
@@ -38,14 +34,33 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     }
 }
 
-/// A screen's byte for linear light.
+/// A screen's byte for linear light, rounded up where what is left of it is above `1 - threshold`: 0.5 rounds to the
+/// nearest. Thresholds between 1/512 and 511/512 leave light that is a byte's own as that byte.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "in 0 to 255 after clamping; NaN becomes 0"
 )]
-pub fn byte_from_linear(linear: f32) -> u8 {
-    (srgb_from_linear(linear.clamp(0.0, 1.0)) * 255.0 + 0.5) as u8
+pub fn byte_from_linear(linear: f32, threshold: f32) -> u8 {
+    (srgb_from_linear(linear.clamp(0.0, 1.0)) * 255.0 + threshold) as u8
+}
+
+/// Where the pixel in column `x` and row `y` rounds up, from 1/512 to 511/512: dithering, so that gradients do not
+/// band in 8 bits.
+///
+/// The fractions `x / p + y / p^2`, with `p` the plastic number, fill the interval evenly over any few neighbouring
+/// pixels, much as blue noise does but without a table (Roberts, "The unreasonable effectiveness of quasirandom
+/// sequences", 2018). The triangle wave takes away the jump from 1 to 0. All of it are integers, so that pictures
+/// are the same everywhere.
+pub fn dither_threshold(x: u32, y: u32) -> f32 {
+    /// `2^32 / p` and `2^32 / p^2`.
+    const STEPS: [u32; 2] = [3_242_174_889, 2_447_445_414];
+    let sawtooth = x
+        .wrapping_mul(STEPS[0])
+        .wrapping_add(y.wrapping_mul(STEPS[1]));
+    let is_falling = sawtooth >> 31 == 1;
+    let triangle = (if is_falling { !sawtooth } else { sawtooth }) << 1;
+    ((triangle >> 24) as f32 + 0.5) / 256.0
 }
 
 #[cfg(test)]
@@ -53,43 +68,76 @@ mod tests {
     use super::*;
 
     #[test]
-    fn middle_tones_stay_true() {
+    fn what_a_screen_can_show_stays_true() {
         for color in [
+            Vec3::ZERO,
             Vec3::splat(0.18),
             Vec3::new(0.8, 0.1, 0.0),
-            Vec3::new(0.02, 0.5, 0.7),
+            Vec3::new(0.02, 1.0, 0.7),
+            Vec3::ONE,
         ] {
             assert_eq!(view_transform(color), color);
         }
-        assert_eq!(byte_from_linear(0.18), 118);
-        assert_eq!(byte_from_linear(0.0), 0);
-        assert_eq!(byte_from_linear(1.0), 255);
+        assert_eq!(byte_from_linear(0.18, 0.5), 118);
         // The linear piece: 0.002 * 12.92 * 255 = 6.59.
-        assert_eq!(byte_from_linear(0.002), 7);
+        assert_eq!(byte_from_linear(0.002, 0.5), 7);
+        assert_eq!(byte_from_linear(0.002, 0.25), 6);
     }
 
     #[test]
-    fn the_shoulder_is_smooth_and_never_clips() {
-        let shown = |v: f32| view_transform(Vec3::splat(v)).x;
-        let mut last = shown(0.79);
-        let mut step = 0.79_f32;
-        while step < 100.0 {
-            step *= 1.01;
-            let next = shown(step);
-            assert!(next > last && next < 1.0, "{step}: {next}");
+    fn white_is_white_and_bytes_stay_themselves_under_every_threshold() {
+        let linear_from_byte = |byte: u8| {
+            let value = f64::from(byte) / 255.0;
+            let linear = match value <= 0.04045 {
+                true => value / 12.92,
+                false => ((value + 0.055) / 1.055).powf(2.4),
+            };
+            #[expect(clippy::cast_possible_truncation, reason = "a value in 0 to 1")]
+            let linear = linear as f32;
+            linear
+        };
+        for step in 0..256_u16 {
+            let threshold = (f32::from(step) + 0.5) / 256.0;
+            for byte in 0..=255 {
+                let linear = view_transform(Vec3::splat(linear_from_byte(byte))).x;
+                assert_eq!(byte_from_linear(linear, threshold), byte, "{threshold}");
+            }
+        }
+    }
+
+    #[test]
+    fn dithering_keeps_the_mean_of_few_neighbours() {
+        let side = 16;
+        for (left, top) in [(0, 0), (1000, 3), (65_520, 65_520)] {
+            for (level, wanted) in [(0.25, 100.25), (0.5, 100.5), (0.9, 100.9)] {
+                let mut sum = 0.0;
+                for (x, y) in (0..side * side).map(|i| (left + i % side, top + i / side)) {
+                    let threshold = dither_threshold(x, y);
+                    assert!((1.0 / 512.0..=511.0 / 512.0).contains(&threshold));
+                    sum += (100.0 + level + threshold).floor();
+                }
+                let mean = sum / (side * side) as f32;
+                assert!((mean - wanted).abs() < 0.02, "{left} {top} {level}: {mean}");
+            }
+        }
+    }
+
+    #[test]
+    fn highlights_keep_their_hue_and_end_white() {
+        // No step where white begins.
+        let below = view_transform(Vec3::new(1.0, 0.5, 0.25));
+        let above = view_transform(Vec3::new(1.001, 0.5005, 0.250_25));
+        assert!((above - below).abs().max_element() < 1e-3);
+        let mild = view_transform(Vec3::new(2.0, 1.0, 0.5));
+        let bright = view_transform(Vec3::new(100.0, 50.0, 25.0));
+        assert!(mild.x == 1.0 && bright.x == 1.0);
+        assert!(mild.z < 0.4 && bright.z > 0.8);
+        let mut last = 0.0;
+        for step in 0..200_u8 {
+            let next = view_transform(Vec3::new(1.0, 0.5, 0.25) * f32::from(step)).z;
+            assert!(next > last || step == 0, "{step}");
             last = next;
         }
-        // Slope 1 on both sides of the knee.
-        let slope = (shown(KNEE + 1e-3) - shown(KNEE)) / 1e-3;
-        assert!((slope - 1.0).abs() < 0.02, "{slope}");
-    }
-
-    #[test]
-    fn very_bright_colours_go_to_white() {
-        let mild = view_transform(Vec3::new(1.0, 0.5, 0.25));
-        let bright = view_transform(Vec3::new(100.0, 50.0, 25.0));
-        assert!(mild.z / mild.x < 0.3);
-        assert!(bright.z / bright.x > 0.8);
         let wild = Vec3::new(f32::NAN, f32::INFINITY, -3.0);
         assert!(view_transform(wild).is_finite());
     }
