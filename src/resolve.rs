@@ -169,6 +169,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     let mut render = RenderSettings::new(image.width, image.height);
     render.samples = image.samples;
     render.max_depth = manifest.render.max_depth;
+    render.min_weight = manifest.render.min_weight;
     render.channels = channels;
     render.transparent_background = output.transparent;
     let setup = Setup {

@@ -189,7 +189,9 @@ impl<'a> Check<'a> {
     }
 
     fn disk_bytes(&self) -> Option<f64> {
-        Some(self.probe?.image_bytes * self.to_do().count() as f64)
+        // An image that was given up tells no size.
+        let probe = self.probe.filter(|probe| !probe.is_lower_bound)?;
+        Some(probe.image_bytes * self.to_do().count() as f64)
     }
 
     fn seconds(&self) -> Option<f64> {

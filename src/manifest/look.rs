@@ -6,7 +6,7 @@ use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml, described};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
-use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
+use crate::render::{DEFAULT_MIN_WEIGHT, MAX_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS};
 use crate::report::Bytes;
 use crate::scene::ground;
 use crate::surface::SurfaceKind;
@@ -80,6 +80,8 @@ pub struct Render {
     pub sbvh: SbvhSettings,
     /// Reflections and refractions in a row.
     pub max_depth: u32,
+    /// Path weight below which one of the two branches at a transmissive sphere is followed; 0 follows both.
+    pub min_weight: f32,
     /// What rays see that meet nothing.
     pub background: Background,
     /// Whether there is a ground that takes shadows.
@@ -114,6 +116,7 @@ impl Default for Render {
             bvh_leaves: BvhLeaves::default(),
             sbvh: SbvhSettings::DEFAULT,
             max_depth: 3,
+            min_weight: DEFAULT_MIN_WEIGHT,
             background: Background::Auto,
             ground: false,
             ground_height: GroundHeight::Auto,
@@ -172,6 +175,11 @@ impl Render {
                 }),
             },
             max_depth: section.value("max_depth", default.max_depth, |f| f.count(1, MAX_DEPTH)),
+            min_weight: section.value("min_weight", default.min_weight, |f| {
+                f.number32("0, or a number from 1e-5 to 1", |v| {
+                    v == 0.0 || MIN_WEIGHTS.contains(&v)
+                })
+            }),
             background: section.value("background", default.background, Background::read),
             ground: section.value("ground", default.ground, Field::bool),
             ground_height: section.value("ground_height", default.ground_height, |f| {
@@ -233,6 +241,11 @@ impl Render {
             "max_depth",
             &self.max_depth,
             "1 is direct light only; each more follows reflections and refractions once",
+        );
+        out.put(
+            "min_weight",
+            &self.min_weight,
+            "transmissive spheres: path weight below which one of two branches is followed; 0 follows both",
         );
         out.put(
             "background",

@@ -7,7 +7,8 @@
 use std::fmt;
 use std::path::Path;
 
-use crate::surface::SurfaceSettings;
+use crate::render::MAX_LITERAL_DEPTH;
+use crate::surface::{SurfaceKind, SurfaceSettings};
 
 use reader::{Problem, Problems, Section};
 use tree::{Node, Place};
@@ -215,8 +216,27 @@ impl Manifest {
         if several && !manifest.output.path.has_number() {
             root.section("output").wrong("path", NEEDS_NUMBER);
         }
+        if manifest.doubles_rays_too_often() {
+            let depth = manifest.render.max_depth;
+            root.section("render").wrong(
+                "min_weight",
+                &format!(
+                    "0 follows both branches at transmissive spheres, which doubles the rays at each level; with \
+                     max_depth = {depth} choose at least 1e-5, or a max_depth of at most {MAX_LITERAL_DEPTH}"
+                ),
+            );
+        }
         root.finish();
         manifest
+    }
+
+    /// Whether both branches at transmissive spheres are to be followed deeper than rays can be counted.
+    fn doubles_rays_too_often(&self) -> bool {
+        self.surface.kind == SurfaceKind::Spheres
+            && self.render.min_weight == 0.0
+            && self.render.max_depth > MAX_LITERAL_DEPTH
+            && self.material.reflection > 0.0
+            && self.material.transmission > 0.0
     }
 
     /// Whether each of `frame_count` frames gets an image of its own.

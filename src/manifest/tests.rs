@@ -445,6 +445,30 @@ fn sets_that_will_not_do() {
 }
 
 #[test]
+fn both_branches_are_followed_to_a_bounded_depth() {
+    let glass = "[input]\npath = \"a\"\n[material]\ntransmission = 0.5\n";
+    let with = |render: &str| {
+        let text = format!("{glass}[render]\n{render}\n");
+        Manifest::parse(&text, path()).map_err(|e| e.to_string())
+    };
+    assert_eq!(parse(glass).render.min_weight, 1.0 / 1024.0);
+    assert!(with("min_weight = 0\nmax_depth = 8").is_ok());
+    let error = with("min_weight = 0\nmax_depth = 9").unwrap_err();
+    assert!(
+        error.starts_with(
+            "job.toml: line 6, column 1: render.min_weight: 0 follows both branches at transmissive spheres"
+        ),
+        "{error}"
+    );
+    assert!(error.contains("max_depth of at most 8"), "{error}");
+    assert!(with("min_weight = 1e-5\nmax_depth = 64").is_ok());
+    assert!(with("min_weight = 0\nmax_depth = 64\nsurface = \"medium\"").is_ok());
+    assert!(with("min_weight = 1e-6").is_err() && with("min_weight = 1.5").is_err());
+    let opaque = "[input]\npath = \"a\"\n[render]\nmin_weight = 0\nmax_depth = 64\n";
+    assert_eq!(parse(opaque).render.min_weight, 0.0);
+}
+
+#[test]
 fn settings_are_what_images_depend_on() {
     let base = parse(EXAMPLE).settings();
     let same = [

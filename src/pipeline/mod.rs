@@ -38,10 +38,11 @@ pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, probe};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, RadiusRule, Setup};
-pub use single::{SingleFault, make_image};
+pub use single::{PictureKind, SingleFault, make_image, make_picture};
 pub use trace::{BuiltFrame, FrameTracer, TraceError, TracedFrame};
 
 use crate::mishap::guarded;
+use crate::render::Stop;
 use crate::report::FrameReport;
 
 /// One image to make.
@@ -102,7 +103,7 @@ struct InHand<T> {
 
 /// Renders those of `tasks` that no other worker does, in order, and records each in `job`; returns when all
 /// are ended, by whomever. Ends early, with the frame in hand finished,
-/// once `interrupt` is raised. Without `overlap` a frame is read only when the one before is written
+/// once `interrupt` is raised, and without it once it says to stop now. Without `overlap` a frame is read only when the one before is written
 /// and nothing of it is left.
 ///
 /// # Errors
@@ -116,7 +117,7 @@ pub fn run(
     interrupt: &Interrupt,
     watch: Watch,
 ) -> Result<(), JobError> {
-    let stop = AtomicBool::new(false);
+    let is_over = AtomicBool::new(false);
     thread::scope(|scope| {
         // Capacity 0: a stage holds its result until the next one is free to take it.
         let (to_trace, loaded) = sync_channel(0);
@@ -137,15 +138,18 @@ pub fn run(
         });
         // The first of the threads finds the memory that whoever looked at the frames has left.
         let _ = has_begun.recv();
-        let stop_all = &stop;
+        let writer_ended = &is_over;
         let writer = scope.spawn(move || {
             let ended = encode::write_stage(setup, traced, is_written, job, watch);
-            stop_all.store(ended.is_err(), Ordering::Relaxed);
+            writer_ended.store(ended.is_err(), Ordering::Relaxed);
             ended
         });
         let stage = TraceStage {
             setup,
-            stop: &stop,
+            stop: DropFrame {
+                is_over: &is_over,
+                interrupt,
+            },
             interrupt,
             watch,
         };
@@ -219,9 +223,21 @@ impl Next {
     }
 }
 
+/// When the frame that is traced is dropped: nothing further can be recorded, or there is no time for it.
+struct DropFrame<'a> {
+    is_over: &'a AtomicBool,
+    interrupt: &'a Interrupt,
+}
+
+impl Stop for DropFrame<'_> {
+    fn is_raised(&self) -> bool {
+        self.is_over.load(Ordering::Relaxed) || self.interrupt.stop_now()
+    }
+}
+
 struct TraceStage<'a> {
     setup: &'a Setup,
-    stop: &'a AtomicBool,
+    stop: DropFrame<'a>,
     interrupt: &'a Interrupt,
     watch: Watch<'a>,
 }
@@ -256,12 +272,12 @@ impl TraceStage<'_> {
             }
             let traced = built.and_then(|mut frame| {
                 told.tell(std::mem::take(&mut frame.notes), self.watch);
-                let trace = || tracer.trace(self.setup, frame, self.stop);
+                let trace = || tracer.trace(self.setup, frame, &self.stop);
                 guarded(|| trace().map_err(|e| e.to_string()))
             });
             let passed = match traced {
                 Ok(traced) => Passed::Frame(traced),
-                Err(_) if self.stop.load(Ordering::Relaxed) => return,
+                Err(_) if self.stop.is_raised() => return,
                 Err(reason) => {
                     // Whatever happened may have left the buffers half filled.
                     tracer = FrameTracer::new();

@@ -3,16 +3,16 @@
 //!
 //! An estimate. A coarse image's rays are less alike than a fine one's, so it rather takes too long;
 //! other frames are taken in proportion to their files; the machine is taken to be as busy as it is
-//! now.
+//! now. Tracing has a time box: what is not done by its end gives a lower bound.
 
-use std::sync::atomic::AtomicBool;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use spherule_formats::sequence::Sequence;
 
-use super::{FrameSize, FrameTracer, ImageTask, Overlap, Setup, load_frame};
+use super::{FrameSize, FrameTracer, ImageTask, Overlap, Setup, TraceError, load_frame};
 use crate::output::{encode_exr, encode_preview};
+use crate::render::{Deadline, Film, RenderError};
 
 /// Pixels across of the first image that is tried; each further has twice as many.
 const FIRST_WIDTH: u32 = 96;
@@ -38,6 +38,17 @@ pub struct Probe {
     pub image_bytes: f64,
     /// The part of the camera's rays that were traced.
     pub traced_part: f64,
+    /// Whether the time for the measurement was over before the smallest image was traced, so that tracing takes
+    /// longer than estimated.
+    pub is_lower_bound: bool,
+}
+
+/// A small image that was tried.
+struct Trial {
+    film: Film,
+    seconds: f64,
+    /// Whether it was given up.
+    is_cut_off: bool,
 }
 
 /// Measures the frame of `task`.
@@ -45,12 +56,24 @@ pub struct Probe {
 /// # Errors
 /// Why it cannot be rendered.
 pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Probe, String> {
+    probe_for(Probe::TIME_BOX, setup, sequence, task)
+}
+
+/// As [`probe`], with no more than `time_box` to trace in.
+pub(super) fn probe_for(
+    time_box: Duration,
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+) -> Result<Probe, String> {
     let loaded = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
     let read = loaded.read_time.as_secs_f64();
     let mut tracer = FrameTracer::new();
     let frame = tracer.build(setup, loaded).map_err(|e| e.to_string())?;
+    let deadline = Deadline(Instant::now() + time_box);
     let full = &setup.render;
     let rays = |width: u32, height: u32| f64::from(width) * f64::from(height);
+    let mut last: Option<Trial> = None;
     let mut width = FIRST_WIDTH.min(full.width);
     loop {
         let mut small = setup.clone();
@@ -58,13 +81,38 @@ pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Pro
         small.render.height = (full.height / (full.width / width)).max(1);
         small.render.samples = 1;
         let start = Instant::now();
-        let traced = tracer.image(&small, &frame, &AtomicBool::new(false));
-        let (film, _) = traced.map_err(|e| e.to_string())?;
-        let trace = start.elapsed().as_secs_f64();
-        if trace < ENOUGH && 2 * width <= full.width {
+        let traced = tracer.image(&small, &frame, &deadline);
+        let seconds = start.elapsed().as_secs_f64();
+        let trial = match (traced, last.take()) {
+            (Ok((film, _)), _) => Trial {
+                film,
+                seconds,
+                is_cut_off: false,
+            },
+            // The image before, a quarter of this one, tells enough.
+            (Err(TraceError::Render(RenderError::Interrupted)), Some(whole)) => whole,
+            (Err(TraceError::Render(RenderError::Interrupted)), None) => Trial {
+                film: Film::new(
+                    small.render.width,
+                    small.render.height,
+                    small.render.channels,
+                ),
+                seconds,
+                is_cut_off: true,
+            },
+            (Err(error), _) => return Err(error.to_string()),
+        };
+        let is_whole = !trial.is_cut_off && trial.film.width == width;
+        if is_whole && trial.seconds < ENOUGH && 2 * width <= full.width {
+            last = Some(trial);
             width *= 2;
             continue;
         }
+        let Trial {
+            film,
+            seconds: trace,
+            is_cut_off,
+        } = trial;
         let start = Instant::now();
         let exr = encode_exr(&film, &small.exr).map_err(|e| e.to_string())?;
         let mut bytes = exr.bytes.len();
@@ -85,12 +133,20 @@ pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Pro
             trace: trace * pixels * samples,
             encode: encode * pixels,
             image_bytes: bytes as f64 * pixels,
-            traced_part: 1.0 / (pixels * samples),
+            traced_part: if is_cut_off {
+                0.0
+            } else {
+                1.0 / (pixels * samples)
+            },
+            is_lower_bound: is_cut_off,
         });
     }
 }
 
 impl Probe {
+    /// Tracing on trial takes no longer than this.
+    pub const TIME_BOX: Duration = Duration::from_secs(3);
+
     /// Seconds for frames of these sizes, of which `probed` is the one that was measured. Tracing and
     /// encoding share the processors; reading goes beside them where frames overlap.
     pub fn seconds_for(&self, frames: &[FrameSize], probed: &FrameSize, overlap: Overlap) -> f64 {
@@ -105,5 +161,37 @@ impl Probe {
                 }
         };
         frames.iter().map(seconds).sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::path::{Path, PathBuf};
+
+    use spherule_formats::SequenceInput;
+
+    use super::*;
+
+    #[test]
+    fn no_time_to_trace_gives_a_lower_bound() {
+        let example = "examples/dam-break/ParticleData_Fluid_1.bgeo";
+        let file = Path::new(env!("CARGO_MANIFEST_DIR")).join(example);
+        let sequence = Sequence::open(&SequenceInput::from_path(&file)).expect("a frame");
+        let manifest = crate::manifest::Manifest::new("in");
+        let question = crate::resolve::question(&manifest);
+        let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
+        let setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
+        let task = ImageTask {
+            frame: 1,
+            index: 0,
+            image: PathBuf::new(),
+            preview: None,
+            refused: None,
+        };
+        let cut_off = probe_for(Duration::ZERO, &setup, &sequence, &task).expect("a probe");
+        assert!(cut_off.is_lower_bound && cut_off.traced_part == 0.0);
+        assert!(cut_off.particles > 0 && cut_off.trace > 0.0);
+        let whole = probe_for(Duration::from_secs(3600), &setup, &sequence, &task);
+        assert!(whole.is_ok_and(|probe| !probe.is_lower_bound && probe.traced_part > 0.0));
     }
 }

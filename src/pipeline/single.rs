@@ -1,17 +1,20 @@
-//! One image by itself, in a process of its own: nothing of another frame is there.
+//! One image by itself: nothing of another frame is in memory.
 
 use std::io;
 use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
+use std::time::Instant;
 
 use spherule_formats::Sequence;
+use spherule_jobs::publish;
 
 use super::ImageTask;
 use super::encode::{WriteError, write_frame};
 use super::load::load_frame;
 use super::setup::Setup;
-use super::trace::FrameTracer;
+use super::trace::{FrameTracer, TracedFrame};
 use crate::mishap::{guarded, is_place_at_fault};
+use crate::output::encode_preview;
 use crate::report::{FrameReport, MemoryPeaks};
 
 /// Why there is no image.
@@ -23,6 +26,15 @@ pub enum SingleFault {
     Place(PathBuf, io::Error),
 }
 
+/// The file format of a picture that is no part of a job.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum PictureKind {
+    /// OpenEXR, as a job writes it.
+    Exr,
+    /// PNG, as the previews of a job.
+    Png,
+}
+
 /// Makes the image of `task` with its preview; what the user should know goes to `note`.
 ///
 /// # Errors
@@ -31,8 +43,36 @@ pub fn make_image(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-    mut note: impl FnMut(&str),
+    note: impl FnMut(&str),
 ) -> Result<FrameReport, SingleFault> {
+    let traced = trace_single(setup, sequence, task, note)?;
+    write_guarded(|| write_frame(setup, traced, &mut MemoryPeaks::default()))
+}
+
+/// Makes the image of `task` alone, in a file of this `kind`; what the user should know goes to `note`.
+///
+/// # Errors
+/// See [`SingleFault`]; nothing is left behind then.
+pub fn make_picture(
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    kind: PictureKind,
+    note: impl FnMut(&str),
+) -> Result<FrameReport, SingleFault> {
+    let traced = trace_single(setup, sequence, task, note)?;
+    write_guarded(|| match kind {
+        PictureKind::Exr => write_frame(setup, traced, &mut MemoryPeaks::default()),
+        PictureKind::Png => write_png(setup, &traced),
+    })
+}
+
+fn trace_single(
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+    mut note: impl FnMut(&str),
+) -> Result<TracedFrame, SingleFault> {
     let traced = guarded(|| {
         let mut frame = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
         std::mem::take(&mut frame.notes)
@@ -46,10 +86,24 @@ pub fn make_image(
         let stop = AtomicBool::new(false);
         tracer.trace(setup, built, &stop).map_err(|e| e.to_string())
     });
-    let traced = traced.map_err(SingleFault::Frame)?;
-    let mut peaks = MemoryPeaks::default();
-    let written = guarded(|| Ok(write_frame(setup, traced, &mut peaks)));
-    match written.map_err(SingleFault::Frame)? {
+    traced.map_err(SingleFault::Frame)
+}
+
+/// The preview of `frame` in the place of its image.
+fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, WriteError> {
+    let start = Instant::now();
+    let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
+    let path = frame.task.image.clone();
+    publish(&path, &png).map_err(|source| WriteError::Io { path, source })?;
+    let mut report = frame.report.clone();
+    report.seconds.encode = start.elapsed().as_secs_f64();
+    Ok(report)
+}
+
+fn write_guarded(
+    write: impl FnOnce() -> Result<FrameReport, WriteError>,
+) -> Result<FrameReport, SingleFault> {
+    match guarded(|| Ok(write())).map_err(SingleFault::Frame)? {
         Ok(report) => Ok(report),
         Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
             Err(SingleFault::Place(path, source))

@@ -1,7 +1,6 @@
 //! What rays meet in a frame: the spheres of its tree as the setup asks for them, and what is made for that
 //! beside the tree.
 
-use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use spherule_formats::Radius;
@@ -10,7 +9,7 @@ use super::decoded::DecodedFrame;
 use super::setup::Setup;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
-use crate::render::{Film, RayCounts, RenderError, ShadeSource, render};
+use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render};
 use crate::report::memory::available;
 use crate::report::{FrameReport, MemoryUse};
 use crate::scene::Scene;
@@ -156,7 +155,7 @@ impl SurfaceBuilder {
         tree: TreeView<'_>,
         scene: &Scene,
         source: &C,
-        stop: &AtomicBool,
+        stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), RenderError> {
         let normals = shading_normals(&setup.surface);
         match setup.surface.kind {
@@ -180,7 +179,7 @@ impl SurfaceBuilder {
         setup: &Setup,
         scene: &Scene,
         source: &C,
-        stop: &AtomicBool,
+        stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), RenderError> {
         let surface = WithSpray::new(body, self.drops());
         render(&surface, scene, source, &setup.render, stop)

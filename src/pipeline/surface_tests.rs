@@ -1,6 +1,7 @@
 //! Every kind of surface through all of the pipeline but the encoding.
 
 use std::path::{Path, PathBuf};
+use std::sync::atomic::AtomicBool;
 
 use glam::{DVec3, Vec3};
 use spherule_formats::native::{Bound, Encoding, StoreSettings, store};

@@ -1,7 +1,6 @@
 //! Second stage: the tree is built and the image traced.
 
 use std::path::PathBuf;
-use std::sync::atomic::AtomicBool;
 use std::time::{Duration, Instant};
 
 use spherule_formats::FrameError;
@@ -14,7 +13,7 @@ use super::setup::{ColorRule, Setup};
 use super::surface::{SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
-use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError};
+use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, Stop};
 use crate::report::frame::FileBytes;
 use crate::report::{FrameReport, MemoryUse};
 use crate::scene::material::DEFAULT_COLOR;
@@ -167,13 +166,13 @@ impl FrameTracer {
     /// Renders `frame`, the one that was built last.
     ///
     /// # Errors
-    /// [`RenderError::Interrupted`] once `stop` is set, [`TraceError::File`] if a native frame changed
+    /// [`RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
     /// meanwhile; the others are settings that were checked before.
     pub fn trace(
         &self,
         setup: &Setup,
         frame: BuiltFrame,
-        stop: &AtomicBool,
+        stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         let start = Instant::now();
         let (film, rays) = self.image(setup, &frame, stop)?;
@@ -204,7 +203,7 @@ impl FrameTracer {
         &self,
         setup: &Setup,
         frame: &BuiltFrame,
-        stop: &AtomicBool,
+        stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), TraceError> {
         let scene = setup.scene_at(frame.task.frame)?;
         let surface = &self.surface;

@@ -112,16 +112,16 @@ impl Path {
         ))
     }
 
-    fn mirrored(self) -> Self {
+    pub(super) fn mirrored(self) -> Self {
         Self(mix(self.0.wrapping_add(1)))
     }
 
-    fn passed(self) -> Self {
+    pub(super) fn passed(self) -> Self {
         Self(mix(self.0.wrapping_add(2)))
     }
 
     /// 0..1 in steps of 2^-24.
-    fn draw(self) -> f32 {
+    pub(super) fn draw(self) -> f32 {
         (mix(self.0) >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 }
@@ -216,7 +216,7 @@ impl<S: Surface, C: ShadeSource> Tracer<'_, S, C> {
         let Crossing { mirrored, passed } = crossing;
         let both = mirrored.weight + passed.weight;
         let seen = weight * kept.max_element();
-        if leg.level.depth >= self.max_depth || seen * both < self.min_weight {
+        if leg.level.depth >= self.max_depth {
             for child in [mirrored, passed] {
                 *sum += *kept * child.weight * self.scene.background.color(child.ray.direction);
             }

@@ -5,13 +5,11 @@
 //! its pixels' coordinates alone and sums its samples in a fixed order, so the film is the same to
 //! the bit whatever the number of threads.
 
-use std::sync::atomic::{AtomicBool, Ordering};
-
 use rayon::prelude::*;
 use thiserror::Error;
 
 use crate::{
-    scene::{MaterialError, Scene},
+    scene::{Material, MaterialError, Scene},
     surface::Surface,
 };
 
@@ -24,12 +22,15 @@ mod floor;
 mod lights;
 mod sampler;
 mod source;
+mod stop;
 mod tile;
 mod tracer;
 mod whitted;
 
 #[cfg(test)]
 mod body_tests;
+#[cfg(test)]
+mod branch_tests;
 #[cfg(test)]
 mod image_tests;
 #[cfg(test)]
@@ -42,6 +43,7 @@ pub use film::{Channels, Film, UnknownChannel};
 pub use sampler::PixelSampler;
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
+pub use stop::{Deadline, Stop};
 
 use tile::Tile;
 use tracer::Tracer;
@@ -49,9 +51,17 @@ use tracer::Tracer;
 /// Most samples per pixel: more than any picture needs, and few enough to count in f32.
 pub const MAX_SAMPLES: u32 = 4096;
 
-/// Deepest recursion: transparent surfaces double the rays at every level, and a level takes some
-/// stack.
+/// Deepest recursion: a level takes some stack.
 pub const MAX_DEPTH: u32 = 64;
+
+/// Deepest recursion that follows both branches at transmissive spheres always: the rays double at each level.
+pub const MAX_LITERAL_DEPTH: u32 = 8;
+
+/// Path weight below which one of two branches is drawn, unless something else is asked for.
+pub const DEFAULT_MIN_WEIGHT: f32 = 1.0 / 1024.0;
+
+/// Path weights that can be asked for beside 0. A sample has at most `1 / min_weight` paths.
+pub const MIN_WEIGHTS: std::ops::RangeInclusive<f32> = 1e-5..=1.0;
 
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 65_536;
@@ -68,8 +78,10 @@ pub struct RenderSettings {
     /// 1 shades what the camera sees with direct light only; each level more follows reflections
     /// and refractions once more. Where it ends, a ray sees the background.
     pub max_depth: u32,
-    /// Rays that weigh less than this in their sample are not traced and see the background; 0
-    /// traces them all.
+    /// Where a ray meets a transmissive sphere, both the reflected and the refracted branch are followed while
+    /// each has a path weight (the product of the weights of its branches) of at least this; below, one of the
+    /// two is drawn, with the weight of both. 0 follows both always: equation 4.1 to the letter, to
+    /// [`MAX_LITERAL_DEPTH`]. Surfaces of one body have a rule of their own.
     pub min_weight: f32,
     /// Leaves the background out of the colour of pixels and fades the ground out in `A`; by
     /// default the background is in `RGB` where `A` is 0.
@@ -86,7 +98,7 @@ impl RenderSettings {
             height,
             samples: 1,
             max_depth: 3,
-            min_weight: 0.0,
+            min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,
             channels: Channels::COLOR,
         }
@@ -102,6 +114,18 @@ impl RenderSettings {
             if !(1..=max).contains(&value) {
                 return Err(RenderError::OutOfRange { name, value, max });
             }
+        }
+        if self.min_weight != 0.0 && !MIN_WEIGHTS.contains(&self.min_weight) {
+            return Err(RenderError::MinWeight(self.min_weight));
+        }
+        Ok(())
+    }
+
+    /// Checks that the rays of spheres of `material` do not double at each level for too many levels.
+    fn validate_branches(&self, material: &Material) -> Result<(), RenderError> {
+        let max_depth = self.max_depth;
+        if self.min_weight == 0.0 && material.branches() && max_depth > MAX_LITERAL_DEPTH {
+            return Err(RenderError::TooManyBranches { max_depth });
         }
         Ok(())
     }
@@ -143,7 +167,7 @@ impl std::ops::Add for RayCounts {
 /// Why there is no image.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum RenderError {
-    /// The caller's flag was raised.
+    /// The caller asked to stop.
     #[error("rendering was interrupted")]
     Interrupted,
     /// A setting makes no image.
@@ -155,6 +179,18 @@ pub enum RenderError {
         value: u32,
         /// The largest that works.
         max: u32,
+    },
+    /// The path weight from which on one branch is drawn is out of range.
+    #[error("min_weight = {0} is out of range, it must be 0 or lie in {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
+    MinWeight(f32),
+    /// Both branches are to be followed for too many levels.
+    #[error(
+        "min_weight = 0 follows both branches at transmissive spheres, which doubles the rays at each level; \
+         max_depth = {max_depth} is too deep for that, it must be at most {MAX_LITERAL_DEPTH}"
+    )]
+    TooManyBranches {
+        /// The depth.
+        max_depth: u32,
     },
     /// A constant of the material is out of range.
     #[error(transparent)]
@@ -174,16 +210,19 @@ pub fn band_bytes(settings: &RenderSettings) -> u64 {
 /// background never exceeds the background's brightest colour.
 ///
 /// # Errors
-/// If `interrupt` is raised (looked at before each tile), or a setting is out of range.
+/// If `stop` is raised (looked at for each packet of samples), or a setting is out of range.
 pub fn render<S: Surface, C: ShadeSource>(
     surface: &S,
     scene: &Scene,
     source: &C,
     settings: &RenderSettings,
-    interrupt: &AtomicBool,
+    stop: &dyn Stop,
 ) -> Result<(Film, RayCounts), RenderError> {
     settings.validate()?;
     scene.material.validate()?;
+    if !S::ONE_BODY {
+        settings.validate_branches(&scene.material)?;
+    }
     let tracer = Tracer::new(surface, scene, source, settings);
     let mut film = Film::new(settings.width, settings.height, settings.channels);
     // A band of tiles owns its rows of every plane. Bands run at once and their tiles do too, so
@@ -195,11 +234,9 @@ pub fn render<S: Surface, C: ShadeSource>(
             let rendered = (0..settings.width.div_ceil(tile::SIDE))
                 .into_par_iter()
                 .map(|column| {
-                    if interrupt.load(Ordering::Relaxed) {
-                        return Err(RenderError::Interrupted);
-                    }
                     let tile = Tile::in_band(&band, column, settings);
-                    Ok(tile.render(&tracer, settings))
+                    let rendered = tile.render(&tracer, settings, stop);
+                    rendered.ok_or(RenderError::Interrupted)
                 })
                 .collect::<Result<Vec<_>, _>>()?;
             let mut counts = RayCounts::default();

@@ -3,7 +3,7 @@
 use glam::{Vec2, Vec4};
 
 use super::{
-    RayCounts, RenderSettings, ShadeSource,
+    RayCounts, RenderSettings, ShadeSource, Stop,
     aov::DataSample,
     film::Band,
     sampler::PixelSampler,
@@ -47,18 +47,26 @@ impl Tile {
     }
 
     /// Renders all pixels. Samples go in packets of 16, pixel after pixel along a Z-order curve: a
-    /// packet is a square of 4x4 pixels, or the samples of a smaller one.
+    /// packet is a square of 4x4 pixels, or the samples of a smaller one. None once `stop` is raised.
     pub(super) fn render<S: Surface, C: ShadeSource>(
         &self,
         tracer: &Tracer<'_, S, C>,
         settings: &RenderSettings,
-    ) -> RenderedTile {
+        stop: &dyn Stop,
+    ) -> Option<RenderedTile> {
         let mut scratch = Scratch::default();
         let mut sampler = PixelSampler::new(settings.samples);
         let count = self.width as usize * self.height as usize;
         let mut pixels = vec![(Vec4::ZERO, DataSample::MISS); count];
         let mut packet = SamplePacket::default();
+        let mut is_stopped = stop.is_raised();
         let mut flush = |packet: &mut SamplePacket| {
+            // What a sample takes is bounded, what a pixel takes hardly is.
+            is_stopped = is_stopped || stop.is_raised();
+            if is_stopped {
+                packet.len = 0;
+                return;
+            }
             tracer.samples(packet.films(), &mut scratch, |lane, sample| {
                 let (sum, data) = &mut pixels[packet.pixels[lane]];
                 *sum += sample.color.extend(sample.coverage);
@@ -79,14 +87,17 @@ impl Tile {
             });
         }
         flush(&mut packet);
+        if is_stopped {
+            return None;
+        }
         let share = 1.0 / settings.samples as f32;
         let mean = |(sum, data): (Vec4, DataSample)| ((sum * share).to_array(), data);
-        RenderedTile {
+        Some(RenderedTile {
             left: self.left,
             width: self.width,
             pixels: pixels.into_iter().map(mean).collect(),
             counts: scratch.counts,
-        }
+        })
     }
 }
 

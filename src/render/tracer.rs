@@ -175,10 +175,11 @@ impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
             depth: 1,
             weight: 1.0,
         };
+        let path = Path::from_film(film);
         let color = if self.is_one_medium() {
-            self.through(ray, hit, self.eye, Path::from_film(film), scratch)
+            self.through(ray, hit, self.eye, path, scratch)
         } else {
-            self.shade(ray, hit, FIRST, lit, scratch)
+            self.shade(ray, hit, FIRST, path, lit, scratch)
         };
         let particle = if self.optics.wants_particle {
             self.surface.particle_at(hit)

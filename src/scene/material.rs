@@ -62,6 +62,11 @@ impl Material {
         extinction: Vec3::ZERO,
     };
 
+    /// Whether rays go on in two directions where they meet it: mirrored and refracted.
+    pub fn branches(&self) -> bool {
+        self.reflection > 0.0 && self.transmission > 0.0
+    }
+
     /// Checks that the constants make sense; with reflection and transmission in 0 to 1 a ray's
     /// children never weigh more than itself.
     ///

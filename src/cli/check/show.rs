@@ -9,7 +9,7 @@ use crate::accel::Structure;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
 use crate::cli::work::list;
-use crate::pipeline::{Overlap, RadiusRule, Setup};
+use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
 use crate::report::Bytes;
 use crate::survey::Survey;
 
@@ -68,7 +68,11 @@ impl Check<'_> {
         );
         put(
             "time",
-            json!({"estimate": self.seconds(), "probe": self.probe}),
+            json!({
+                "estimate": self.seconds(),
+                "is_lower_bound": self.probe.map(|probe| probe.is_lower_bound),
+                "probe": self.probe,
+            }),
         );
         Value::Object(all)
     }
@@ -154,6 +158,17 @@ impl Check<'_> {
 
     fn time_line(&self) -> Option<String> {
         let probe = self.probe?;
+        if probe.is_lower_bound {
+            return Some(format!(
+                "time       more than {}, a lower bound: frame {} read in {:.3} s and built in {:.3} s just now; \
+                 tracing a small image of it took longer than {:.0} s and was given up",
+                duration(self.seconds()?),
+                probe.frame,
+                probe.read,
+                probe.build,
+                Probe::TIME_BOX.as_secs_f64()
+            ));
+        }
         Some(format!(
             "time       about {}, an estimate: frame {} read in {:.3} s and built in {:.3} s just \
              now, {:.2} % of its rays traced",

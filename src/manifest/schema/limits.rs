@@ -7,7 +7,7 @@ use super::{NAME_PATTERN, rgb_schema};
 use crate::accel::SbvhSettings;
 use crate::manifest::surface::{MAX_THRESHOLD, SMOOTHING_LENGTHS, VOXELS};
 use crate::manifest::work::MAX_RETRIES;
-use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
+use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS};
 
 /// Keys without a default.
 pub(super) const REQUIRED: [&str; 7] = [
@@ -34,6 +34,9 @@ pub(super) fn limits(key: &str) -> Value {
         "image.width" | "image.height" => from_to(1, MAX_SIDE),
         "image.samples" => from_to(1, MAX_SAMPLES),
         "render.max_depth" => from_to(1, MAX_DEPTH),
+        "render.min_weight" => {
+            json!({ "anyOf": [{ "const": 0 }, from_to(*MIN_WEIGHTS.start(), *MIN_WEIGHTS.end())] })
+        }
         "render.sbvh_alpha" => from_to(*SbvhSettings::ALPHAS.start(), *SbvhSettings::ALPHAS.end()),
         "render.sbvh_budget" => {
             from_to(*SbvhSettings::BUDGETS.start(), *SbvhSettings::BUDGETS.end())
