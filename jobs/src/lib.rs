@@ -45,7 +45,7 @@ pub use job::{Foreseen, Job};
 pub use ledger::{Details, Entry, Ledger, OutputFile, Status};
 pub use plan::{PLAN_FILE, Plan, PlannedFrame, PlannedInput};
 pub use process::{owner, work_on_behalf_of};
-pub use publish::{Publisher, discard_parts, publish, publish_with};
+pub use publish::{Publisher, discard_own_parts, discard_parts, publish, publish_with};
 pub use queue::{Queue, QueueNews};
 pub use range::{FrameRange, RangeError};
 pub use regular::{open_regular, read_regular, read_regular_text};

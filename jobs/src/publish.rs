@@ -9,8 +9,12 @@ use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use crate::process::owner;
+
+/// The temporary files that this process is writing.
+static OPEN_PARTS: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
 /// A file being written. Dropped without [`Publisher::commit`], it leaves nothing behind.
 #[derive(Debug)]
@@ -35,12 +39,15 @@ impl Publisher {
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         part.push(format!(".{}.{count}.part", owner()));
         let part = dst.with_file_name(part);
+        let mut open = open_parts();
         let file = OpenOptions::new()
             .read(true)
             .write(true)
             .create(true)
             .truncate(true)
             .open(&part)?;
+        open.push(part.clone());
+        drop(open);
         Ok(Self {
             dst: dst.to_owned(),
             part,
@@ -66,6 +73,7 @@ impl Publisher {
         if result.is_err() {
             discard(writer, &self.part);
         }
+        open_parts().retain(|part| *part != self.part);
         result
     }
 
@@ -94,8 +102,25 @@ impl Drop for Publisher {
     fn drop(&mut self) {
         if let Some(writer) = self.file.take() {
             discard(writer, &self.part);
+            open_parts().retain(|part| *part != self.part);
         }
     }
+}
+
+fn open_parts() -> MutexGuard<'static, Vec<PathBuf>> {
+    // A list of paths is whole after every step.
+    OPEN_PARTS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Removes all temporary files that this process is writing. For a process that ends while its threads still
+/// write: from here on none of them can begin a file.
+pub fn discard_own_parts() {
+    let mut open = open_parts();
+    for part in open.drain(..) {
+        let _ = fs::remove_file(part);
+    }
+    // Never unlocked, so that whoever wants to begin a file waits for the end.
+    std::mem::forget(open);
 }
 
 /// Closes without writing what is still buffered, and removes.
@@ -232,6 +257,23 @@ mod tests {
         assert_eq!(names(dir.path()), ["a.exr", "taken"]);
         assert!(publish(&dir.path().join("no/such"), b"x").is_err());
         assert!(publish(Path::new("/"), b"x").is_err());
+    }
+
+    #[test]
+    fn what_is_being_written_is_known() {
+        let dir = tempfile::tempdir().unwrap();
+        let dst = dir.path().join("a.exr");
+        for commits in [true, false] {
+            let file = Publisher::create(&dst).unwrap();
+            let part = file.part.clone();
+            assert!(open_parts().contains(&part));
+            if commits {
+                file.commit().unwrap();
+            } else {
+                drop(file);
+            }
+            assert!(!open_parts().contains(&part));
+        }
     }
 
     #[test]

@@ -11,6 +11,7 @@ use std::time::Duration;
 
 use serde::Serialize;
 use serde::de::DeserializeOwned;
+use spherule_jobs::discard_own_parts;
 
 use super::{CliError, INTERRUPTED};
 
@@ -111,6 +112,7 @@ pub(super) fn task<T: DeserializeOwned>(whose: &str) -> Result<T, CliError> {
 fn end_with_parent() {
     let mut rest = [0; 64];
     while io::stdin().read(&mut rest).is_ok_and(|n| n > 0) {}
+    discard_own_parts();
     std::process::exit(i32::from(INTERRUPTED));
 }
 

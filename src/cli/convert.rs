@@ -2,7 +2,7 @@
 
 use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
@@ -13,7 +13,7 @@ use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
 use super::job::{absolute, apart};
-use super::numbers::{USUAL_BOUND, not_negative, positive};
+use super::numbers::{USUAL_BOUND, not_negative, positive, seconds};
 use super::progress::Progress;
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
@@ -96,6 +96,9 @@ pub(super) struct ConvertArgs {
     /// Threads to use [default: all]; at most 4 for each processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
     threads: Option<u32>,
+    /// Seconds that a frame may take after TERM or Ctrl-C; then it is dropped.
+    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "30", allow_negative_numbers = true)]
+    grace: Duration,
     /// How progress is shown.
     #[arg(long, value_enum, default_value = "auto", help_heading = "Job")]
     progress: ProgressMode,
@@ -136,7 +139,7 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     tell_kept(&job, tasks.len());
     let progress = Progress::new(args.progress, CONVERT, tasks.len(), &args.output);
     let start = Instant::now();
-    let interrupt = signals.at_work();
+    let interrupt = signals.at_work_within(args.grace);
     let result = conversion::run(
         &conversion,
         &plan.sequence,

@@ -31,6 +31,9 @@ pub(super) struct JobArgs {
     /// Seconds without a sign of life after which another machine's frames are taken over [default: 60]
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     takeover_after: Option<f64>,
+    /// Seconds that a frame may take after TERM or Ctrl-C; then it is dropped [default: 30].
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true)]
+    grace: Option<f64>,
     /// Go on with frames that a running simulation writes.
     #[arg(long)]
     follow: bool,
@@ -75,6 +78,7 @@ impl JobArgs {
                 seconds(self.takeover_after),
                 "--takeover-after",
             ),
+            ("grace", seconds(self.grace), "--grace"),
             ("follow", self.follow.then_some(true.into()), "--follow"),
             ("idle", seconds(self.idle), "--idle"),
             ("settle", seconds(self.settle), "--settle"),

@@ -12,7 +12,7 @@ use crate::manifest::Manifest;
 const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard"];
 
 /// Every other option with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 31] = [
+const FLAGS: [(&str, &str); 32] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -46,6 +46,7 @@ const FLAGS: [(&str, &str); 31] = [
     ),
     ("--retries 7", "job.retries = 7"),
     ("--takeover-after 7", "job.takeover_after = 7.0"),
+    ("--grace 7", "job.grace = 7.0"),
     ("--follow", "job.follow = true"),
     ("--idle 7", "job.idle = 7.0"),
     ("--settle 7", "job.settle = 7.0"),

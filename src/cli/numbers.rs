@@ -1,5 +1,7 @@
 //! Numbers on the command line that commands have in common.
 
+use std::time::Duration;
+
 /// The bound that coded positions keep if none is given: a fraction of the radius.
 pub(super) const USUAL_BOUND: f64 = 0.02;
 
@@ -44,6 +46,13 @@ pub(super) fn not_negative(text: &str) -> Result<f64, String> {
     } else {
         Err(format!("`{text}` is no error; 0.02 is one"))
     }
+}
+
+/// A time in seconds: 0 or more.
+pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+    let time = text.parse().ok();
+    let time = time.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+    time.ok_or_else(|| format!("`{text}` is not a time in seconds; 30 is one"))
 }
 
 /// A radius: above 0.

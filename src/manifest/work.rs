@@ -75,6 +75,8 @@ pub struct Work {
     /// How long a worker on another machine may give no sign of life before its frames are taken over;
     /// above 0.
     pub takeover_after: Seconds,
+    /// How long a frame in hand may take after TERM or Ctrl-C before it is dropped.
+    pub grace: Seconds,
     /// Whether the run goes on with frames that a running simulation writes.
     pub follow: bool,
     /// How long no new frame may come before following ends; above 0.
@@ -95,6 +97,7 @@ impl Default for Work {
             memory_ceiling: None,
             retries: 1,
             takeover_after: Seconds(60.0),
+            grace: Seconds(30.0),
             follow: false,
             idle: Seconds(600.0),
             settle: Seconds(2.0),
@@ -120,6 +123,7 @@ impl Work {
             memory_ceiling: section.optional("memory_ceiling", read_size),
             retries: section.value("retries", default.retries, |f| f.count(0, MAX_RETRIES)),
             takeover_after: section.value("takeover_after", default.takeover_after, above_0),
+            grace: section.value("grace", default.grace, from_0),
             follow: section.value("follow", default.follow, Field::bool),
             idle: section.value("idle", default.idle, above_0),
             settle: section.value("settle", default.settle, from_0),
@@ -179,6 +183,12 @@ impl Work {
             "takeover_after",
             &self.takeover_after,
             "seconds without a sign of life after which another machine's frames are taken over",
+        );
+        put(
+            out,
+            "grace",
+            &self.grace,
+            "seconds that a frame may take after TERM or Ctrl-C before it is dropped",
         );
     }
 

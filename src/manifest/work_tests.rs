@@ -6,13 +6,14 @@ use std::time::Duration;
 use super::*;
 
 /// Every key of `[job]` with a value that is not the default, and what that needs.
-const OTHERS: [(&str, &str); 10] = [
+const OTHERS: [(&str, &str); 11] = [
     ("threads=3", ""),
     ("progress=json", ""),
     ("isolate=true", ""),
     ("memory_ceiling=4GiB", "isolate=true"),
     ("retries=0", ""),
     ("takeover_after=0.5", ""),
+    ("grace=0", ""),
     ("follow=true", ""),
     ("idle=1e9", ""),
     ("settle=0", ""),

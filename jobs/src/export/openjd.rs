@@ -14,7 +14,7 @@ pub const FRAMES: &str = "{{Task.Param.Frame}}";
 /// Seconds that a task may take; a farm without a limit would wait for a hung host for ever.
 const MOST_SECONDS: u64 = 24 * 60 * 60;
 /// Seconds between being told to stop and being stopped: as long as a frame may take.
-const NOTIFY_SECONDS: u64 = 120;
+pub const NOTIFY_SECONDS: u64 = 120;
 /// Characters in a job's name.
 const LONGEST_NAME: usize = 128;
 /// Characters in a description.

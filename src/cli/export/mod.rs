@@ -51,6 +51,12 @@ pub(super) fn run(args: &ExportArgs) -> Result<Outcome, CliError> {
     }
 }
 
+/// The grace period of a task that is told to stop `ahead` seconds before it is killed: a tenth is left to record
+/// what was done.
+fn grace(ahead: u64) -> String {
+    (ahead * 9 / 10).to_string()
+}
+
 /// What all engines are told.
 #[derive(Debug, Args)]
 struct CommonArgs {

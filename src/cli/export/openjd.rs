@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use spherule_jobs::export::openjd::{
-    FRAMES, HostRequirements, JobTemplate, PathParameter, Spelling, literal, parameter,
+    FRAMES, HostRequirements, JobTemplate, NOTIFY_SECONDS, PathParameter, Spelling, literal,
+    parameter,
 };
 
 use super::super::job::absolute;
 use super::super::{CliError, Outcome};
 use super::place::inside;
-use super::{CommonArgs, Work, deliver, text, tidy};
+use super::{CommonArgs, Work, deliver, grace, text, tidy};
 use crate::manifest::OutputPattern;
 
 #[derive(Debug, Args)]
@@ -146,6 +147,8 @@ fn template<'a>(
         &format!("{}/{image}", parameter("OutDir")),
         "--progress",
         "openjd",
+        "--grace",
+        &grace(NOTIFY_SECONDS),
     ];
     Ok(JobTemplate {
         name: &work.name,

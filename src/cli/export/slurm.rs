@@ -10,7 +10,7 @@ use spherule_jobs::export::slurm::{ArrayScript, FrameCommand, MOST_TASKS, Resour
 
 use super::super::job::absolute;
 use super::super::{CliError, Outcome};
-use super::{CommonArgs, Work, deliver, text, tidy};
+use super::{CommonArgs, Work, deliver, grace, text, tidy};
 use crate::manifest::MAX_THREADS;
 use crate::report::Bytes;
 
@@ -79,13 +79,14 @@ fn script(args: &SlurmArgs, work: &Work, logs: &str) -> Result<String, CliError>
     let (asked, limit) = (args.common.mem, work.memory_limit);
     // Without --mem what the manifest allows, and a tenth for what its limit does not count.
     let memory = asked.or(limit.map(|l| Bytes(l.0.saturating_add(l.0 / 9))));
+    let grace = grace(args.signal_ahead.into());
     let script = ArrayScript {
         name: &work.name,
         title: &work.title(),
         command: FrameCommand {
             program: text(&work.program)?,
             variable: "SPHERULE",
-            arguments: &["render", text(&work.manifest_file)?],
+            arguments: &["render", text(&work.manifest_file)?, "--grace", &grace],
             // The manifest's own limit holds unless it is the larger one.
             limit_memory: limit.is_none_or(|limit| asked.is_some_and(|asked| asked <= limit)),
         },

@@ -57,7 +57,7 @@ pub(super) fn run(args: &WorkArgs, asked: Asked, signals: &Listener) -> Result<O
         arrivals: Arrivals::new(work.settle.duration()),
         stop_file,
         idle: work.idle.duration(),
-        interrupt: signals.at_work(),
+        interrupt: signals.at_work_within(work.grace.duration()),
         busy: Instant::now(),
         is_waiting: false,
         asked: asked.clone(),

@@ -47,13 +47,14 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     if asked.manifest.job.follow {
         return follow::run(&args.run.work, asked, &signals);
     }
+    let grace = asked.manifest.job.grace.duration();
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
     let mut run = Run::begin(&args.run.work, asked, sequence)?;
     run.tell_kept();
-    let interrupt = signals.at_work();
+    let interrupt = signals.at_work_within(grace);
     let result = run.make_pending(interrupt);
     Ok(run.end(result, interrupt))
 }

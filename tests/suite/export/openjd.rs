@@ -105,7 +105,9 @@ fn tasks_call_render() {
             "--output",
             "{{Param.OutDir}}/f.####.exr",
             "--progress",
-            "openjd"
+            "openjd",
+            "--grace",
+            "108"
         ])
     );
     let program = parameter(&found, "Spherule")["default"]

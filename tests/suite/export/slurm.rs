@@ -158,7 +158,8 @@ fn what_is_asked_of_the_cluster() {
         ],
     );
     assert!(script.contains("--memory-limit"));
-    has(
+    assert!(script.contains("--grace 108"), "{script}");
+    let script = has(
         &[
             "--partition",
             "long",
@@ -174,6 +175,7 @@ fn what_is_asked_of_the_cluster() {
             "requeue",
         ],
     );
+    assert!(script.contains("--grace 270"), "{script}");
     // What the manifest limits itself to, and a little more.
     let manifest = workshop.join("data/job.toml");
     let text = fs::read_to_string(&manifest).expect("a manifest");

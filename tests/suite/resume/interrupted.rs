@@ -2,7 +2,7 @@
 
 use std::fs;
 
-use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
+use crate::harness::{SMALL, Workshop, dam_break, files, images, ledger, no_leftovers};
 
 const FRAMES: usize = 30;
 /// A signal may come after the last frame on a busy machine; then it is tried again.
@@ -117,6 +117,53 @@ fn a_second_term_stops_at_once() {
     assert!(in_hand, "there never was a frame in hand");
     assert!(images(&workshop.join("out")).is_empty());
     assert!(ledger(&workshop.join("out")).lines.is_empty());
+}
+
+#[test]
+fn a_frame_that_outlasts_the_grace_period_is_dropped() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=2);
+    for (out, options) in [("out", &[][..]), ("apart", &["--isolate"])] {
+        let pattern = format!("{out}/f.####.exr");
+        let arguments = ["render", "in", "-o", &pattern, "--grace", "0"];
+        let arguments = [&arguments[..], &LONG, options].concat();
+        let in_hand = (0..TRIES).any(|_| {
+            let mut running = workshop.start(&arguments);
+            assert!(running.wait_for_line("colour by"));
+            running.signal("TERM");
+            let (told, status) = running.end();
+            assert_eq!(status.code(), Some(75), "{told}");
+            told.contains("the grace period of 0 s is over (--grace): stopping now")
+        });
+        assert!(in_hand, "there never was a frame in hand");
+        let out = workshop.join(out);
+        assert!(images(&out).is_empty() && ledger(&out).lines.is_empty());
+        let parts = files(&out)
+            .into_keys()
+            .filter(|name| name.ends_with(".part"));
+        assert_eq!(parts.count(), 0);
+    }
+}
+
+#[test]
+fn a_frame_within_the_grace_period_is_finished() {
+    let workshop = Workshop::new();
+    let input = workshop.join("in");
+    dam_break(&input, 1..=FRAMES);
+    let in_hand = (0..TRIES).any(|n| {
+        let pattern = format!("out{n}/f.####.exr");
+        let options = ["render", "in", "-o", &pattern, "--set", "job.grace=600"];
+        let mut running = workshop.start(&[&options[..], &SMALL].concat());
+        assert!(running.wait_for_line("] frame "));
+        running.signal("TERM");
+        let (told, status) = running.end();
+        let in_time = status.code() == Some(75);
+        assert!(in_time || status.code() == Some(0), "{told}");
+        assert!(!told.contains("is over"), "{told}");
+        let done = ledger(&workshop.join(format!("out{n}"))).done();
+        in_time && !done.is_empty() && told.contains("(grace period: 600 s)")
+    });
+    assert!(in_hand, "no signal came in time");
 }
 
 #[test]
