@@ -46,6 +46,7 @@ mod schema;
 mod shard;
 mod signals;
 mod status;
+mod still;
 mod verify;
 mod work;
 
@@ -63,6 +64,8 @@ struct Cli {
 enum Command {
     /// Render a directory, pattern or list of particle files, or a manifest, to images.
     Render(Box<render::RenderArgs>),
+    /// Render one picture of one frame, PNG or EXR, without a job: for trying looks.
+    Still(Box<still::StillArgs>),
     /// Tell what `render` would do, in what memory and time; touch nothing.
     Check(Box<check::CheckArgs>),
     /// Tell how a job stands: frames done, failed, missing and running, rate and time left.
@@ -150,6 +153,7 @@ fn parse(arguments: &[OsString]) -> Result<Command, u8> {
 fn run(command: Command) -> Result<Outcome, CliError> {
     match command {
         Command::Render(args) => render::run(&args),
+        Command::Still(args) => still::run(*args),
         Command::Check(args) => check::run(&args),
         Command::Status(args) => status::run(&args),
         Command::Init(args) => init::run(&args),

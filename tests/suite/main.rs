@@ -20,6 +20,7 @@ mod samples;
 mod scale;
 mod schema;
 mod status;
+mod still;
 mod structures;
 mod surface;
 mod thesis;

@@ -14,7 +14,7 @@ mod run;
 mod show;
 
 use run::Run;
-pub(super) use show::{parts_text, radius_text};
+pub(super) use show::{parts_text, radius_text, tell};
 
 const EXAMPLES: &str = "\
 Examples:

@@ -44,7 +44,7 @@ fn told(report: &FrameReport) -> String {
 }
 
 /// What was decided for the user, so that nothing is a surprise.
-pub(super) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+pub(in crate::cli) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
     say!(
         "{}, up to {}",
         counted(sequence.frames().len(), "frame"),

@@ -1,0 +1,204 @@
+//! `spherule still`: one picture of one frame, for trying looks. No job: no plan, ledger, manifest or report.
+
+use std::ffi::OsStr;
+use std::fs::{self, File};
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+use std::time::Instant;
+
+use clap::Args;
+use spherule_formats::Sequence;
+use spherule_jobs::{FrameRange, Job};
+
+use super::job::{Asked, ManifestArgs, absolute};
+use super::plan::{Plan, one_fits};
+use super::render::tell;
+use super::work::{chosen, list, use_threads};
+use super::{CliError, Outcome, print, signals};
+use crate::pipeline::{PictureKind, SingleFault, make_picture};
+use crate::render::Channels;
+
+/// How files begin that a still may replace: OpenEXR and PNG.
+const IMAGE_STARTS: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
+
+const EXAMPLES: &str = "Examples:
+  spherule still dump -o look.png
+  spherule still dump --frame 120 --color-by velocity --map turbo -o look.png
+  spherule still out/job.toml --set material.transmission=1 --width 960 --height 540 -o glass.exr";
+
+#[derive(Debug, Args)]
+#[command(
+    after_help = EXAMPLES,
+    mut_arg("output", |a| a.required(true).value_name("FILE").help(
+        "Picture to write: look.png or look.exr. An image of that name is replaced."
+    )),
+    mut_arg("frames", no_job),
+    mut_arg("progress", no_job),
+    mut_arg("isolate", no_job),
+    mut_arg("memory_ceiling", no_job),
+    mut_arg("retries", no_job),
+    mut_arg("takeover_after", no_job),
+    mut_arg("grace", no_job),
+    mut_arg("follow", no_job),
+    mut_arg("idle", no_job),
+    mut_arg("settle", no_job),
+    mut_arg("stop_file", no_job),
+)]
+pub(super) struct StillArgs {
+    #[command(flatten)]
+    manifest: ManifestArgs,
+    /// Frame to render, by its number; otherwise the one in the middle.
+    #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
+    frame: Option<i64>,
+}
+
+/// An option that means something for jobs alone: without one it is refused.
+fn no_job(option: clap::Arg) -> clap::Arg {
+    option.hide(true).conflicts_with("output")
+}
+
+const WORDS: signals::Words = signals::Words {
+    asked: "stopping",
+    at_once: "stopped; no picture was written",
+};
+
+pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
+    let start = Instant::now();
+    let _signals = signals::listen(WORDS)?;
+    let shown = args.manifest.output.take().map(PathBuf::from);
+    let shown = shown.ok_or_else(|| CliError::other("--output: is missing"))?;
+    let kind = kind(&shown)?;
+    let output = absolute(&shown)?;
+    let mut asked = args.manifest.manifest()?;
+    use_threads(asked.manifest.job.threads)?;
+    let sequence = asked.sequence()?;
+    for note in sequence.notes() {
+        say!("note: {note}");
+    }
+    guard(&shown, &output, asked.file.as_deref(), &sequence)?;
+    let frame = frame(args.frame, &asked, &sequence)?;
+    asked.manifest.input.frames = FrameRange::from_frames([frame]);
+
+    let plan = Plan::new(asked, &sequence, None)?;
+    let (survey, mut setup) = plan.survey(&sequence)?;
+    if kind == PictureKind::Png {
+        setup.render.channels = Channels::COLOR;
+    }
+    tell(&sequence, &survey, &setup);
+    let mut tasks = plan.tasks(&sequence, &[frame]);
+    for task in &mut tasks {
+        task.image.clone_from(&output);
+        task.preview = None;
+    }
+    plan.fit(&sequence, &setup, &mut tasks);
+    one_fits(&tasks)?;
+    let task = tasks.first().expect("the frame is in the sequence");
+    make_directory(&output)?;
+    let made = make_picture(&setup, &sequence, task, kind, |note| say!("note: {note}"));
+    match made {
+        Ok(report) => print(&format!(
+            "{}: frame {frame}, {} particles, {:.2} s\n",
+            shown.display(),
+            report.particles,
+            start.elapsed().as_secs_f64()
+        )),
+        Err(SingleFault::Frame(reason)) => {
+            say!("error: frame {frame}: {reason}");
+            Ok(Outcome::SomeFailed)
+        }
+        Err(SingleFault::Place(_, error)) => Err(CliError::io(&shown)(error)),
+    }
+}
+
+/// The file format by the name.
+fn kind(path: &Path) -> Result<PictureKind, CliError> {
+    let extension = path.extension().map(OsStr::to_ascii_lowercase);
+    match extension.as_ref().and_then(|e| e.to_str()) {
+        Some("exr") => Ok(PictureKind::Exr),
+        Some("png") => Ok(PictureKind::Png),
+        _ => Err(CliError::other(format!(
+            "--output {}: the name must end in .png or .exr, which says what is written",
+            path.display()
+        ))),
+    }
+}
+
+/// The frame asked for, or that in the middle of those that the manifest selects: a simulation's first frame is
+/// seldom what a look is for.
+fn frame(wanted: Option<i64>, asked: &Asked, sequence: &Sequence) -> Result<i64, CliError> {
+    let Some(wanted) = wanted else {
+        let range = asked.manifest.input.frames.as_ref();
+        let frames = chosen(sequence, range, "input.frames")?;
+        return Ok(frames[frames.len() / 2]);
+    };
+    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
+    if numbers.contains(&wanted) {
+        return Ok(wanted);
+    }
+    Err(CliError::other(format!(
+        "--frame {wanted}: is not among the frames: {}",
+        list(&numbers)
+    )))
+}
+
+/// Refuses to replace anything but an image that is no part of the input or of a job.
+fn guard(
+    shown: &Path,
+    output: &Path,
+    manifest: Option<&Path>,
+    sequence: &Sequence,
+) -> Result<(), CliError> {
+    let refused = |why: &str| {
+        let text = format!("{}: {why}; choose another name", shown.display());
+        Err(CliError::Other(text))
+    };
+    if is_planned(output)? {
+        return refused("is an image of the job in that directory");
+    }
+    let Ok(there) = fs::metadata(output) else {
+        return Ok(());
+    };
+    let real = output.canonicalize().map_err(CliError::io(shown))?;
+    let inputs = (0..sequence.frames().len()).flat_map(|index| sequence.inputs(index));
+    let is_output = |path: &Path| path.canonicalize().is_ok_and(|path| path == real);
+    if inputs.chain(manifest).any(is_output) {
+        return refused("is an input and would be overwritten");
+    }
+    if !there.is_file() {
+        return refused("is not a file");
+    }
+    if !is_image(output).map_err(CliError::io(shown))? {
+        return refused("is not an image and would be overwritten");
+    }
+    Ok(())
+}
+
+/// Whether a job beside `output` makes a file of this name.
+fn is_planned(output: &Path) -> Result<bool, CliError> {
+    let (Some(dir), Some(name)) = (output.parent(), output.file_name()) else {
+        return Ok(false);
+    };
+    let Some(plan) = Job::peek(dir)? else {
+        return Ok(false);
+    };
+    let mut outputs = plan.frames().iter().flat_map(|frame| &frame.outputs);
+    Ok(outputs.any(|planned| {
+        let planned = dir.join(planned);
+        planned == output || (planned.parent() == Some(dir) && planned.file_name() == Some(name))
+    }))
+}
+
+/// Whether the file begins as an image does; an empty one has nothing to lose.
+fn is_image(path: &Path) -> io::Result<bool> {
+    let mut start = Vec::new();
+    File::open(path)?.take(8).read_to_end(&mut start)?;
+    let is_known = IMAGE_STARTS.iter().any(|known| start.starts_with(known));
+    Ok(is_known || start.is_empty())
+}
+
+fn make_directory(output: &Path) -> Result<(), CliError> {
+    match output.parent() {
+        Some(dir) => fs::create_dir_all(dir).map_err(CliError::io(dir)),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,168 @@
+//! `still`: one picture without a job.
+
+use std::fs;
+
+use crate::harness::{Ran, SMALL, Workshop, dam_break, files, no_leftovers};
+
+/// Five frames in `in`.
+fn workshop() -> Workshop {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=5);
+    workshop
+}
+
+fn still(workshop: &Workshop, options: &[&str]) -> Ran {
+    workshop.run(&[&["still", "in"][..], &SMALL, options].concat())
+}
+
+#[test]
+fn one_picture_and_nothing_else() {
+    let workshop = workshop();
+    let made = still(&workshop, &["-o", "looks/a.png"]).expect(0);
+    // The frame in the middle.
+    let line = made.text();
+    assert!(line.starts_with("looks/a.png: frame 3, "), "{line}");
+    assert!(
+        line.ends_with(" s\n") && line.lines().count() == 1,
+        "{line}"
+    );
+    let first = still(&workshop, &["--frame", "1", "-o", "looks/b.png"]).expect(0);
+    assert!(first.text().starts_with("looks/b.png: frame 1, "));
+    still(&workshop, &["-o", "looks/c.exr"]).expect(0);
+    let looks = files(&workshop.join("looks"));
+    let names: Vec<&str> = looks.keys().map(String::as_str).collect();
+    assert_eq!(names, ["a.png", "b.png", "c.exr"]);
+    assert_ne!(looks["a.png"], looks["b.png"]);
+    no_leftovers(&workshop.join("looks"));
+}
+
+#[test]
+fn the_picture_is_that_of_a_job() {
+    let workshop = workshop();
+    let look = [
+        "--color-by",
+        "velocity",
+        "--map",
+        "turbo",
+        "--set",
+        "camera.fov=50",
+    ];
+    workshop.render(&look).expect(0);
+    for (name, image) in [("a.png", "f.0004.png"), ("a.exr", "f.0004.exr")] {
+        let options = [&look[..], &["--frame", "4", "-o", name]].concat();
+        still(&workshop, &options).expect(0);
+        let job = fs::read(workshop.join("out").join(image)).expect("an image");
+        assert!(
+            fs::read(workshop.join(name)).expect("a picture") == job,
+            "{name}"
+        );
+    }
+    // By the job's own manifest, too; its frames are those to choose the middle from.
+    let made = workshop
+        .run(&["still", "out/job.toml", "-o", "b.exr"])
+        .expect(0);
+    assert!(made.text().starts_with("b.exr: frame 3, "));
+    let job = fs::read(workshop.join("out/f.0003.exr")).expect("an image");
+    assert!(fs::read(workshop.join("b.exr")).expect("a picture") == job);
+    let some = [
+        "still",
+        "out/job.toml",
+        "--set",
+        "input.frames=1-2",
+        "-o",
+        "b.exr",
+    ];
+    assert!(
+        workshop
+            .run(&some)
+            .expect(0)
+            .text()
+            .starts_with("b.exr: frame 2, ")
+    );
+}
+
+#[test]
+fn replaces_images_and_nothing_else() {
+    let workshop = workshop();
+    still(&workshop, &["-o", "a.png"]).expect(0);
+    let before = fs::read(workshop.join("a.png")).expect("a picture");
+    still(&workshop, &["--frame", "5", "-o", "a.png"]).expect(0);
+    assert_ne!(fs::read(workshop.join("a.png")).expect("a picture"), before);
+
+    fs::write(workshop.join("notes.png"), b"not a picture").expect("a file");
+    let refused = |options: &[&str], why: &str| {
+        still(&workshop, options).expect(2).tells(why);
+    };
+    refused(
+        &["-o", "notes.png"],
+        "notes.png: is not an image and would be overwritten;",
+    );
+    assert_eq!(
+        fs::read(workshop.join("notes.png")).expect("a file"),
+        b"not a picture"
+    );
+    fs::create_dir(workshop.join("dir.exr")).expect("a directory");
+    refused(&["-o", "dir.exr"], "dir.exr: is not a file;");
+    refused(
+        &["-o", "look.jpg"],
+        "--output look.jpg: the name must end in .png or .exr",
+    );
+    refused(&["-o", "look"], "the name must end in .png or .exr");
+    refused(
+        &["--frame", "9", "-o", "a.png"],
+        "--frame 9: is not among the frames: 1-5",
+    );
+    refused(&["--follow", "-o", "a.png"], "--follow");
+    refused(&[], "--output");
+
+    // The input under the name of an image.
+    let frame = fs::read(workshop.join("in/f_1.bgeo")).expect("a frame");
+    fs::write(workshop.join("in.exr"), &frame).expect("a file");
+    std::os::unix::fs::symlink("../a.png", workshop.join("in/f_6.bgeo")).expect("a link");
+    let ran = still(&workshop, &["--frame", "1", "-o", "a.png"]);
+    ran.expect(2)
+        .tells("a.png: is an input and would be overwritten;");
+}
+
+#[test]
+fn images_of_a_job_are_its_own() {
+    let workshop = workshop();
+    workshop.render(&["--frames", "1-2"]).expect(0);
+    for name in ["out/f.0001.exr", "out/f.0001.png", "out/f.0005.exr"] {
+        still(&workshop, &["-o", name])
+            .expect(2)
+            .tells("is an image of the job in that directory; choose another name");
+    }
+    still(&workshop, &["-o", "out/look.png"]).expect(0);
+    workshop.run(&["verify", "out"]).expect(0);
+}
+
+#[test]
+fn a_frame_that_cannot_be_read_has_failed() {
+    let workshop = workshop();
+    let file = workshop.join("in/f_5.bgeo");
+    let good = fs::read(&file).expect("a frame");
+    fs::write(&file, &good[..good.len() / 2]).expect("a file");
+    still(&workshop, &["--frame", "5", "-o", "a.png"])
+        .expect(1)
+        .tells("error: frame 5: ");
+    assert!(!workshop.join("a.png").exists());
+    still(&workshop, &["--frame", "4", "-o", "a.png"]).expect(0);
+}
+
+#[test]
+fn help_has_examples_and_no_options_of_jobs() {
+    let workshop = Workshop::new();
+    let help = workshop.run(&["still", "--help"]).expect(0).text();
+    for shown in [
+        "Examples:",
+        "spherule still dump -o look.png",
+        "--frame <NUMBER>",
+        "look.exr",
+    ] {
+        assert!(help.contains(shown), "no {shown} in\n{help}");
+    }
+    for hidden in ["--frames", "--follow", "--isolate", "--retries"] {
+        assert!(!help.contains(hidden), "{hidden} in\n{help}");
+    }
+}
