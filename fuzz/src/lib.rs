@@ -129,7 +129,7 @@ fn check_error(error: &ParseError, len: u64) {
             assert!(*at <= len, "byte {at} of {len}: {what}");
             check_message(what);
         }
-        ParseError::Unsupported { what } => check_message(what),
+        ParseError::Unsupported { what } | ParseError::TooLarge { what } => check_message(what),
     }
 }
 

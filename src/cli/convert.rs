@@ -13,7 +13,7 @@ use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
 use super::job::{absolute, apart};
-use super::numbers::{USUAL_BOUND, not_negative, positive, seconds};
+use super::numbers::{USUAL_BOUND, duration, not_negative, positive};
 use super::progress::Progress;
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
@@ -97,7 +97,7 @@ pub(super) struct ConvertArgs {
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
     threads: Option<u32>,
     /// Seconds that a frame may take after TERM or Ctrl-C; then it is dropped.
-    #[arg(long, value_name = "SECONDS", value_parser = seconds, default_value = "30", allow_negative_numbers = true)]
+    #[arg(long, value_name = "SECONDS", value_parser = duration, default_value = "30", allow_negative_numbers = true)]
     grace: Duration,
     /// How progress is shown.
     #[arg(long, value_enum, default_value = "auto", help_heading = "Job")]

@@ -49,7 +49,7 @@ pub(super) fn not_negative(text: &str) -> Result<f64, String> {
 }
 
 /// A time in seconds: 0 or more.
-pub(super) fn seconds(text: &str) -> Result<Duration, String> {
+pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let time = text.parse().ok();
     let time = time.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
     time.ok_or_else(|| format!("`{text}` is not a time in seconds; 30 is one"))

@@ -73,7 +73,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     use_threads(asked.manifest.job.threads)?;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
-        say!("note: {note}");
+        note!("{note}");
     }
     guard(&shown, &output, asked.file.as_deref(), &sequence)?;
     let frame = frame(args.frame, &asked, &sequence)?;
@@ -94,14 +94,17 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
-    let made = make_picture(&setup, &sequence, task, kind, |note| say!("note: {note}"));
+    let made = make_picture(&setup, &sequence, task, kind, |note| note!("{note}"));
     match made {
-        Ok(report) => print(&format!(
-            "{}: frame {frame}, {} particles, {:.2} s\n",
-            shown.display(),
-            report.particles,
-            start.elapsed().as_secs_f64()
-        )),
+        Ok(report) => {
+            print::lines([format!(
+                "{}: frame {frame}, {} particles, {:.2} s",
+                shown.display(),
+                report.particles,
+                start.elapsed().as_secs_f64()
+            )])?;
+            Ok(Outcome::Done)
+        }
         Err(SingleFault::Frame(reason)) => {
             say!("error: frame {frame}: {reason}");
             Ok(Outcome::SomeFailed)

@@ -80,9 +80,7 @@ impl Inspected<'_> {
                 "  values of attributes are from a sample of {sample} particles"
             ));
         }
-        for note in &self.notes {
-            writeln!(out, "  note: {note}")?;
-        }
+        lines.extend(self.notes.iter().map(|note| format!("  note: {note}")));
         if self.verified {
             let what = match self.native {
                 Some(_) => "checksums, nodes, positions, radii and padding are sound",
