@@ -155,10 +155,11 @@ fn csv() {
 #[test]
 fn xyz() {
     let numbers = " 7".repeat(MANY);
+    // The element is one more.
     has(
         Format::Xyz,
         format!("1\n\nH 1 2 3{numbers}\n").as_bytes(),
-        MANY,
+        MANY + 1,
     );
     let properties: String = numbered(MANY).map(|n| format!(":{n}:I:1")).collect();
     let file = format!("1\nProperties=pos:R:3{properties}\n1 2 3{numbers}\n");

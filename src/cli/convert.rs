@@ -161,12 +161,11 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     Ok(finished.tell(result.map_err(CliError::from)))
 }
 
-/// Refuses a file's name where a directory is wanted.
+/// Refuses the name of a file of another format where a directory or a native frame is wanted.
 fn guard_name(output: &Path) -> Result<(), CliError> {
     let why = match Format::by_name(output) {
-        None => return Ok(()),
+        None | Some(Format::Spf) => return Ok(()),
         Some(_) if output.is_dir() => return Ok(()),
-        Some(Format::Spf) => "the frames of a sequence go into a directory, as frame.NUMBER.spf",
         Some(_) => "convert writes native frames (.spf) alone, and a directory of them",
     };
     let dir = output.with_extension("");

@@ -21,6 +21,9 @@ use crate::render::Channels;
 /// How files begin that a still may replace: OpenEXR and PNG.
 const IMAGE_STARTS: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
 
+const OUTPUT_HELP: &str =
+    "Picture to write: look.png or look.exr. An image of that name is replaced.";
+
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png
   spherule still dump --frame 120 --color-by velocity --map turbo -o look.png
@@ -29,9 +32,7 @@ const EXAMPLES: &str = "Examples:
 #[derive(Debug, Args)]
 #[command(
     after_help = EXAMPLES,
-    mut_arg("output", |a| a.required(true).value_name("FILE").help(
-        "Picture to write: look.png or look.exr. An image of that name is replaced."
-    )),
+    mut_arg("output", |a| a.required(true).value_name("FILE").help(OUTPUT_HELP).long_help(OUTPUT_HELP)),
     mut_arg("frames", no_job),
     mut_arg("progress", no_job),
     mut_arg("isolate", no_job),

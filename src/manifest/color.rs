@@ -135,7 +135,11 @@ impl Toml for ColorSetting {
                 map,
                 range,
             } => {
-                format!("{{ attribute = {}{} }}", attribute.toml(), mapping(*map, *range))
+                format!(
+                    "{{ attribute = {}{} }}",
+                    attribute.toml(),
+                    mapping(*map, *range)
+                )
             }
         }
     }

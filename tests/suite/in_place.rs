@@ -123,8 +123,9 @@ fn radii_and_ids_of_their_own() {
 #[test]
 fn coincident_particles_have_the_ids_of_the_source() {
     let shop = Workshop::new();
+    // Exact in f32, so that both have the same camera.
     let part = |i: u32, salt: u32| {
-        f64::from(((i % 150) * 7919 + salt).wrapping_mul(2_654_435_761) >> 8) / 2e7
+        f64::from(((i % 150) * 7919 + salt).wrapping_mul(2_654_435_761) >> 22) / 1024.0
     };
     let row = |i: u32| {
         format!(

@@ -43,9 +43,6 @@ impl Inspected<'_> {
         if let Some(native) = &self.native {
             object["native"] = native.to_json();
         }
-        if !self.notes.is_empty() {
-            object["notes"] = json!(self.notes);
-        }
         if self.verified {
             object["verified"] = json!(true);
         }

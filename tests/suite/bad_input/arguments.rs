@@ -466,10 +466,6 @@ fn conversions_write_directories() {
             "x.vtk: is a file's name: convert writes native frames (.spf) alone",
         ),
         ("x.csv.gz", "name a directory, as in -o x"),
-        (
-            "out/f.spf",
-            "as frame.NUMBER.spf; name a directory, as in -o out/f",
-        ),
     ] {
         refused(&workshop, &["convert", "in", "-o", output], &[wanted]);
         assert!(!workshop.join(output).exists());

@@ -82,7 +82,15 @@ fn one_frame_needs_no_number_in_its_name() {
     // Another frame would take the place of the first.
     let mut other = arguments.clone();
     other[5] = "3";
-    refused(&workshop, &other, &["one/f.exr", "frame"]);
+    refused(
+        &workshop,
+        &other,
+        &[
+            "one: this job was made from other files",
+            "f_3.bgeo",
+            "choose another output",
+        ],
+    );
     assert!(made == image("one/f.exr"));
     for frames in ["1-2", "all"] {
         let several = ["render", "in", "-o", "two/f.exr", "--frames", frames];

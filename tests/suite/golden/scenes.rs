@@ -90,6 +90,8 @@ impl Shot {
             },
             settings: RenderSettings {
                 samples: 4,
+                // Equation 4.1 to the letter.
+                min_weight: 0.0,
                 ..RenderSettings::new(WIDTH, HEIGHT)
             },
         }

@@ -161,12 +161,13 @@ fn named_columns(names: &[String]) -> Option<Columns> {
     Some((fields, targets))
 }
 
-/// Vectors and radii are real, even if all of a file happen to be integers.
+/// Vectors and radii are real, even if all of a file happen to be integers. Integers of a colour are codes and stay
+/// what they are.
 fn numbers_of(group: &names::Group) -> Numbers {
-    let is_length = ["radius", "diameter", "pscale"]
-        .iter()
-        .any(|name| group.name.eq_ignore_ascii_case(name));
-    if group.columns.len() > 1 || is_length {
+    let is_one_of = |names: &[&str]| names.iter().any(|n| group.name.eq_ignore_ascii_case(n));
+    let is_length = is_one_of(&["radius", "diameter", "pscale"]);
+    let is_color = is_one_of(&["color", "colors", "rgb", "rgba"]);
+    if (group.columns.len() > 1 && !is_color) || is_length {
         Numbers::Real
     } else {
         Numbers::WholeIfAll
