@@ -139,8 +139,8 @@ fn values_in_every_kind_of_table() {
     );
     told(
         "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",
-        "line 2, column 43: material.color.map: wants one of viridis, turbo, plasma, inferno, magma, \
-         cividis, red-blue, greys, not the text \"trubo\"; did you mean turbo?",
+        "line 2, column 43: material.color.map: unknown colour map `trubo`; choose one of viridis, turbo, \
+         plasma, inferno, magma, cividis, red-blue, greys; did you mean turbo?",
     );
 }
 

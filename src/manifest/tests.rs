@@ -200,7 +200,7 @@ fn wrong_types_say_what_is_wanted() {
     refused("[material]\ncolor = [0.1, nan, 0.3]", &["material.color"]);
     refused("[material]\ncolor = [0.1, 1e39, 0.3]", &["material.color"]);
     refused(
-        "[material]\ncolor = { map = \"viridis\" }",
+        "[material]\ncolor = {}",
         &["material.color.attribute: is missing"],
     );
     refused(
@@ -418,6 +418,42 @@ fn sets_lie_over_the_file() {
 }
 
 #[test]
+fn a_map_alone_is_laid_into_what_is_there() {
+    let auto = |range| ColorSetting::AutoWith {
+        map: ColorMap::Turbo,
+        range,
+    };
+    let color = |sets: &[&str]| {
+        let sets = sets.iter().map(|s| Override::parse(s).unwrap()).collect();
+        let manifest = Manifest::parse_with("input.path = \"data\"", path(), sets);
+        manifest.unwrap().material.color
+    };
+    assert_eq!(color(&["material.color.map=turbo"]), auto(None));
+    let both = [
+        "material.color=auto",
+        "material.color.map=turbo",
+        "material.color.range=[1, 2]",
+    ];
+    assert_eq!(color(&both), auto(Some([1.0, 2.0])));
+    let mut manifest = Manifest::new("data");
+    manifest.material.color = auto(Some([1.0, 2.0]));
+    let text = manifest.to_commented_toml();
+    assert_eq!(Manifest::parse(&text, path()), Ok(manifest));
+}
+
+#[test]
+fn strings_that_control_a_terminal_are_escapes() {
+    let hostile = "a\u{1b}[2J\nb\u{9b}\u{202e}\"\\";
+    let text = Manifest::new(hostile).to_commented_toml();
+    let raw = text
+        .chars()
+        .find(|c| *c != '\n' && spherule_formats::is_control(*c));
+    assert_eq!(raw, None);
+    let again = Manifest::parse(&text, path());
+    assert_eq!(again, Ok(Manifest::new(hostile)));
+}
+
+#[test]
 fn sets_that_will_not_do() {
     let wrong = |set: &str, part: &str| {
         let error = with_sets(&[set]).unwrap_err().to_string();
@@ -431,7 +467,10 @@ fn sets_that_will_not_do() {
         "image.width=wide",
         "--set image.width=wide: image.width: wants",
     );
-    wrong("image.width.x=1", "image.width.x: what is above it");
+    wrong(
+        "image.width.x=1",
+        "image.width.x: image.width is 1920, which has no keys; set image.width itself",
+    );
     wrong("light.1.intensity=1", "light.1: the list has no such item");
     for (set, part) in [
         ("a", "no `=`"),

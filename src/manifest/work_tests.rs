@@ -65,8 +65,8 @@ fn values_that_will_not_do() {
         let wanted = format!("--set job.{set}: job.{what}");
         assert!(error.to_string().starts_with(&wanted), "{error}");
     }
-    for wrong in ["0", "-1", "65536", "1.5", "many", "true"] {
-        let wanted = "threads: wants \"all\" or a whole number from 1 to 65535, not";
+    for wrong in ["0", "-1", "1025", "1.5", "many", "true"] {
+        let wanted = "threads: wants \"all\" or a whole number from 1 to 1024, not";
         refused(&format!("threads={wrong}"), wanted);
     }
     refused(
