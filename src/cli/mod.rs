@@ -24,6 +24,7 @@ macro_rules! note {
     };
 }
 
+mod allocator;
 mod check;
 mod child;
 mod convert;
@@ -90,6 +91,7 @@ enum Command {
 
 /// Parses the arguments of the process, runs the command, reports what went wrong.
 pub fn main() -> ExitCode {
+    allocator::return_large_pieces();
     let arguments: Vec<OsString> = env::args_os().collect();
     let result = match own_command(&arguments) {
         Some(command) => command(),

@@ -158,9 +158,8 @@ const PROGRAM: u64 = 7 << 20;
 /// The same for each thread.
 const THREAD: u64 = 256 << 10;
 
-/// Pieces from this size on go back to the system when they are freed: glibc's
-/// `DEFAULT_MMAP_THRESHOLD_MAX`. Other allocators keep less, as a rule.
-const RETURNED: u64 = 32 << 20;
+/// Pieces from this size on go back to the system when they are freed: `cli/allocator.rs` sees to that.
+const RETURNED: u64 = 1 << 20;
 
 /// One particle of so many is taken to be spray.
 const SPRAY_PART: u64 = 10;

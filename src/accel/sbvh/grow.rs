@@ -43,6 +43,17 @@ impl Grown {
             Self::Split(bounds, _) => inner(*bounds, 0),
         }
     }
+
+    /// Nodes and references in all of it.
+    pub(super) fn lengths(&self) -> (usize, usize) {
+        match self {
+            Self::Tree(tree) => (tree.nodes.len(), tree.references.len()),
+            Self::Split(_, halves) => halves.iter().fold((1, 0), |(nodes, references), half| {
+                let (more_nodes, more_references) = half.lengths();
+                (nodes + more_nodes, references + more_references)
+            }),
+        }
+    }
 }
 
 /// An inner node whose children lie at `first`.
@@ -81,6 +92,9 @@ impl<'a> Grower<'a> {
             let mut tree = BinaryTree::default();
             tree.nodes.push(inner(bounds, 0));
             self.grow_in(&mut tree, 0, node, depth);
+            // All of them are held until the last is there.
+            tree.nodes.shrink_to_fit();
+            tree.references.shrink_to_fit();
             return Grown::Tree(tree);
         }
         let [below, above] = match self.choose(&node, depth) {

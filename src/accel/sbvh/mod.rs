@@ -124,6 +124,10 @@ pub(super) fn build(
 /// All trees as one, depth first.
 fn joined(grown: Grown) -> BinaryTree {
     let mut tree = BinaryTree::default();
+    // A growing vector would hold up to three times what it needs.
+    let (nodes, references) = grown.lengths();
+    tree.nodes.reserve_exact(nodes);
+    tree.references.reserve_exact(references);
     tree.nodes.push(grown.root());
     join_at(&mut tree, 0, grown);
     tree

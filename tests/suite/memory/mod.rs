@@ -10,6 +10,8 @@ use spherule_formats::{Attribute, AttributeData, write};
 
 use crate::harness::{Ran, Workshop};
 
+#[cfg(target_os = "linux")]
+mod bombs;
 mod check;
 #[cfg(target_os = "linux")]
 mod generate;

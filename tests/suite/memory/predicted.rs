@@ -1,15 +1,21 @@
 //! What `check` predicts is what `render` takes: within 15 % of the peak of anonymous memory. Of a smooth
 //! surface it is told as if the particles splashed, and may be more.
 
+use std::fmt::Write as _;
 use std::fs;
+use std::io::{Cursor, Write as _};
 use std::path::Path;
 
+use flate2::Compression;
+use flate2::write::GzEncoder;
 use glam::{DVec3, Vec3};
 use spherule_formats::convert::{BlockSettings, BlockSource, ParticleSource};
 use spherule_formats::{ParticleFrame, Positions, RawParticles, native, write};
 
 use super::{AWAY, answer, particles, report, vtk};
 use crate::harness::Workshop;
+use zip::ZipWriter;
+use zip::write::SimpleFileOptions;
 
 /// Runs both over three frames like `first` and compares.
 #[track_caller]
@@ -77,6 +83,65 @@ fn npy(path: &Path, count: usize) {
     write::npy::write(path, &particles(count)).expect("a file");
 }
 
+fn gz(path: &Path, bytes: &[u8]) {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+    encoder.write_all(bytes).expect("memory takes all");
+    let packed = encoder.finish().expect("memory takes all");
+    fs::write(path, packed).expect("a file");
+}
+
+fn csv(count: usize) -> String {
+    let mut text = String::from("x,y,z,id\n");
+    for (id, p) in particles(count).into_iter().enumerate() {
+        writeln!(text, "{:.6},{:.6},{:.6},{id}", p.x, p.y, p.z).expect("memory takes all");
+    }
+    text
+}
+
+fn dump(count: usize) -> String {
+    let mut text =
+        format!("ITEM: TIMESTEP\n1\nITEM: NUMBER OF ATOMS\n{count}\nITEM: ATOMS x y z\n");
+    for p in particles(count) {
+        writeln!(text, "{:.6} {:.6} {:.6}", p.x, p.y, p.z).expect("memory takes all");
+    }
+    text
+}
+
+/// The bytes that `npy` writes beside `path`.
+fn npy_bytes(path: &Path, count: usize) -> Vec<u8> {
+    let plain = path.with_file_name("plain");
+    npy(&plain, count);
+    let bytes = fs::read(&plain).expect("a file");
+    fs::remove_file(&plain).expect("a file");
+    bytes
+}
+
+fn npz(path: &Path, count: usize) {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
+    zip.start_file("positions.npy", SimpleFileOptions::default())
+        .expect("memory takes all");
+    zip.write_all(&npy_bytes(path, count))
+        .expect("memory takes all");
+    let archive = zip.finish().expect("memory takes all").into_inner();
+    fs::write(path, archive).expect("a file");
+}
+
+fn vtu(path: &Path, count: usize) {
+    let positions = particles(count);
+    let values = positions.iter().flat_map(|p| p.to_array());
+    let data: Vec<u8> = values.flat_map(f32::to_le_bytes).collect();
+    let head = format!(
+        "<VTKFile type=\"UnstructuredGrid\" header_type=\"UInt64\"><UnstructuredGrid>\
+         <Piece NumberOfPoints=\"{count}\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" \
+         format=\"appended\" offset=\"0\"/></Points></Piece></UnstructuredGrid><AppendedData encoding=\"raw\">_"
+    );
+    let mut file = head.into_bytes();
+    file.extend((data.len() as u64).to_le_bytes());
+    file.extend(data);
+    file.extend(b"</AppendedData></VTKFile>");
+    fs::write(path, file).expect("a file");
+}
+
 const SMALL: [&str; 6] = ["--width", "320", "--height", "180", "--channels", "RGBA"];
 const LARGE: [&str; 4] = ["--width", "1280", "--height", "720"];
 const ALL: [&str; 2] = ["--channels", "RGBA,Z,N,id,P,V,albedo"];
@@ -96,6 +161,33 @@ fn many_attributes_and_all_channels() {
 fn many_particles_in_a_small_image() {
     compare("spf", |path| spf(path, 1_000_000), &SMALL);
     compare("vtk", |path| vtk(path, 1_000_000, false), &SMALL);
+}
+
+#[test]
+fn every_structure() {
+    for structure in ["lbvh", "bvh", "sbvh", "kdtree"] {
+        let options = [&SMALL[..], &["--accelerator", structure]].concat();
+        compare("npy", |path| npy(path, 400_000), &options);
+    }
+}
+
+#[test]
+fn every_way_to_store_particles() {
+    const COUNT: usize = 400_000;
+    compare(
+        "csv",
+        |path| fs::write(path, csv(COUNT)).expect("a file"),
+        &SMALL,
+    );
+    compare("csv.gz", |path| gz(path, csv(COUNT).as_bytes()), &SMALL);
+    compare("npy.gz", |path| gz(path, &npy_bytes(path, COUNT)), &SMALL);
+    compare("npz", |path| npz(path, COUNT), &SMALL);
+    compare("vtu", |path| vtu(path, COUNT), &SMALL);
+    compare(
+        "lammpstrj",
+        |path| fs::write(path, dump(COUNT)).expect("a file"),
+        &SMALL,
+    );
 }
 
 #[test]

@@ -65,6 +65,7 @@ impl TableStream {
             for piece in parsed {
                 values.append(piece?)?;
             }
+            lines.take_back(some);
         }
         Ok(particles(self.targets, values.into_values()))
     }
@@ -82,6 +83,8 @@ struct LinePieces<'s> {
     source: &'s mut dyn ByteSource,
     /// The beginning of a line.
     rest: Vec<u8>,
+    /// Memory of pieces that are done.
+    spare: Vec<Vec<u8>>,
     /// Its offset.
     at: usize,
     ended: bool,
@@ -108,6 +111,7 @@ impl<'s> LinePieces<'s> {
         Ok(Self {
             source,
             rest: Vec::new(),
+            spare: Vec::new(),
             at: start,
             ended: false,
             budget,
@@ -125,15 +129,26 @@ impl<'s> LinePieces<'s> {
         Ok(pieces)
     }
 
+    /// Uses the memory of `pieces` for those to come.
+    fn take_back(&mut self, pieces: Vec<LinePiece>) {
+        self.spare
+            .extend(pieces.into_iter().map(|piece| piece.bytes));
+    }
+
     fn next(&mut self) -> Result<Option<LinePiece>, SourceError> {
-        let mut bytes = std::mem::take(&mut self.rest);
+        let mut bytes = self.spare.pop().unwrap_or_default();
+        bytes.clear();
+        bytes.append(&mut self.rest);
         let mut looked_at = 0;
         while !self.ended {
             bytes.reserve_exact(PIECE);
             self.ended = self.source.fill(&mut bytes, PIECE)? < PIECE;
             let new = bytes.get(looked_at..).unwrap_or_default();
             if let Some(newline) = memrchr(b'\n', new).filter(|_| !self.ended) {
-                self.rest = bytes.split_off(looked_at + newline + 1);
+                let end = looked_at + newline + 1;
+                self.rest
+                    .extend_from_slice(bytes.get(end..).unwrap_or_default());
+                bytes.truncate(end);
                 break;
             }
             looked_at = bytes.len();

@@ -1,0 +1,105 @@
+//! A small file that becomes very large costs its own frame and no other, within little memory.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+use std::process::Command;
+
+use flate2::Compression;
+use flate2::write::GzEncoder;
+
+use super::AWAY;
+use crate::harness::{Ran, Workshop, ledger};
+
+/// Data of the process in KiB: a third of what the bomb takes as text, a fifteenth as numbers.
+const ALLOWED: usize = 96 << 10;
+
+const SMALL: [&str; 8] = [
+    "--width",
+    "32",
+    "--height",
+    "18",
+    "--samples",
+    "1",
+    "--threads",
+    "2",
+];
+
+fn gz(bytes: &[u8]) -> Vec<u8> {
+    let mut encoder = GzEncoder::new(Vec::new(), Compression::default());
+    encoder.write_all(bytes).expect("memory takes all");
+    encoder.finish().expect("memory takes all")
+}
+
+/// Three frames of which the second is a bomb; gzip states the length of its last part only, so that nothing
+/// is known before it is unpacked.
+fn frames(dir: &Path) {
+    fs::create_dir_all(dir).expect("a directory");
+    let good = |frame: usize| format!("x,y,z\n0,0,0\n1,0,{frame}\n0,1,0\n");
+    let piece = gz("1,2,3\n".repeat(1 << 20).as_bytes());
+    let mut bomb = gz(b"x,y,z\n");
+    (0..48).for_each(|_| bomb.extend(&piece));
+    bomb.extend(gz(b"1,2,3\n"));
+    assert!(bomb.len() < 1 << 19, "{} bytes", bomb.len());
+    for (frame, bytes) in [
+        (1, gz(good(1).as_bytes())),
+        (2, bomb),
+        (3, gz(good(3).as_bytes())),
+    ] {
+        fs::write(dir.join(format!("f_{frame}.csv.gz")), bytes).expect("a file");
+    }
+}
+
+/// Runs the program with little memory.
+fn limited(workshop: &Workshop, arguments: &[&str]) -> Ran {
+    let script = format!("ulimit -d {ALLOWED} && exec \"$0\" \"$@\"");
+    let output = Command::new("sh")
+        .current_dir(workshop.path())
+        .args(["-c", &script, env!("CARGO_BIN_EXE_spherule")])
+        .args(arguments)
+        .output();
+    Ran(output.expect("a shell"))
+}
+
+#[test]
+fn a_bomb_costs_one_frame() {
+    for options in [
+        &[][..],
+        &["--memory-limit", "64MiB"],
+        &[
+            "--memory-limit",
+            "64MiB",
+            "--isolate",
+            "--memory-ceiling",
+            "64MiB",
+        ],
+    ] {
+        let workshop = Workshop::new();
+        frames(&workshop.join("in"));
+        let render = ["render", "in", "-o", "out/f.####.exr", "--radius", "0.1"];
+        let ran = limited(&workshop, &[&render[..], &SMALL, &AWAY, options].concat());
+        let ran = ran
+            .expect(1)
+            .tells("f_2.csv.gz: in memory its numbers are larger than")
+            .tells("failed: 2");
+        assert_eq!(ran.rendered(), [1, 3], "{options:?}");
+        let lines = ledger(&workshop.join("out")).lines;
+        let failed = lines.iter().filter(|l| l["status"] == "failed");
+        assert_eq!(failed.count(), 1);
+    }
+}
+
+#[test]
+fn check_and_inspect_name_a_bomb() {
+    let workshop = Workshop::new();
+    frames(&workshop.join("in"));
+    let check = ["check", "in", "-o", "out/f.####.exr"];
+    let ran = limited(&workshop, &[&check[..], &SMALL, &AWAY].concat());
+    assert!(matches!(ran.code(), Some(0 | 1)), "{}", ran.errors());
+    let ran = limited(&workshop, &["inspect", "in"]).expect(1);
+    let told = ran.text() + &ran.errors();
+    assert!(
+        told.contains("f_2.csv.gz") && told.contains("larger than"),
+        "{told}"
+    );
+}
