@@ -1,176 +1,51 @@
 //! What the fuzz targets do with their bytes, and what must hold of whatever comes out.
 //!
-//! One function a target; the replay of the corpus in `formats/tests/corpus.rs` includes this file, so
-//! that the stable toolchain checks the same. Each returns how many steps gave particles.
+//! One function a target. Ordinary tests replay the corpus through the same functions with the stable
+//! toolchain: `formats/tests/corpus.rs` includes `readers`, `tests/suite/corpus.rs` includes `program`.
 
-use spherule_formats::detect::Format;
-use spherule_formats::stats::FrameStats;
-use spherule_formats::{ParseError, ParticleFrame, RawParticles, choose_origin};
+use std::borrow::Cow;
 
-mod native;
-mod packed;
+pub mod program;
+pub mod readers;
 
-pub use native::native;
-pub use packed::{npz, open};
+pub use readers::Target;
 
-/// A target: takes any bytes, panics where a promise is broken, returns the steps that were read.
-pub type Target = fn(&[u8]) -> usize;
-
-/// Every target by the name of its binary and of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 11] = [
-    ("vtk", vtk),
-    ("vtk_xml", vtk_xml),
-    ("bgeo", bgeo),
-    ("ply", ply),
-    ("xyz", xyz),
-    ("lammps", lammps),
-    ("npy", npy),
-    ("npz", npz),
-    ("csv", csv),
-    ("open", open),
-    ("native", native),
-];
-
-/// Steps read of one input: the rest goes the same way.
-const MOST_STEPS: usize = 4;
-/// Bytes of particles for a byte of the file: text of one digit and a blank becomes eight bytes.
-const EXPANSION: u64 = 8;
-/// What the tightest packing that is read gives for a byte: xz, then deflate.
-const XZ_RATIO: u64 = 16_384;
-const DEFLATE_RATIO: u64 = 1032;
-/// Headers that stand for values without bytes in the file (a radius common to all).
-const SLACK: u64 = 4096;
-
-/// Legacy VTK.
-pub fn vtk(bytes: &[u8]) -> usize {
-    read_all(Format::VtkLegacy, bytes, 1)
+/// Every target by the name of its folder in `corpus`.
+pub fn targets() -> impl Iterator<Item = (&'static str, Target)> {
+    readers::TARGETS.into_iter().chain(program::TARGETS)
 }
 
-/// XML VTK.
-pub fn vtk_xml(bytes: &[u8]) -> usize {
-    let packs = |name: &str| bytes.windows(name.len()).any(|w| w == name.as_bytes());
-    let ratio = match () {
-        () if !packs("compressor") => 1,
-        () if !packs("LZMA") => DEFLATE_RATIO,
-        () => XZ_RATIO,
+/// Set in a choice: it is one of the places where lines, words and tags begin or end, not any byte.
+const AT_CUT: u16 = 0x8000;
+
+/// `bytes` as an input of about `size` bytes: a part of them, which the last four bytes choose, is repeated. libFuzzer
+/// alone seldom makes large inputs, and only those show what takes more than linear time or memory.
+pub fn repeated(bytes: &[u8], size: usize) -> Cow<'_, [u8]> {
+    let Some((rest, choice)) = bytes.split_last_chunk::<4>() else {
+        return Cow::Borrowed(bytes);
     };
-    read_all(Format::VtkXml, bytes, ratio)
+    let [start, end] = [[choice[0], choice[1]], [choice[2], choice[3]]].map(u16::from_le_bytes);
+    let start = place(rest, 0, start);
+    let end = place(rest, start, end);
+    let (before, part, after) = (&rest[..start], &rest[start..end], &rest[end..]);
+    if part.is_empty() {
+        return Cow::Borrowed(rest);
+    }
+    let count = size.saturating_sub(before.len() + after.len()) / part.len();
+    Cow::Owned([before, &part.repeat(count.max(1)), after].concat())
 }
 
-/// Classic BGEO.
-pub fn bgeo(bytes: &[u8]) -> usize {
-    read_all(Format::Bgeo, bytes, 1)
-}
-
-/// PLY.
-pub fn ply(bytes: &[u8]) -> usize {
-    read_all(Format::Ply, bytes, 1)
-}
-
-/// Raw, bare and molecular XYZ.
-pub fn xyz(bytes: &[u8]) -> usize {
-    read_all(Format::Xyz, bytes, 1)
-}
-
-/// LAMMPS text dumps.
-pub fn lammps(bytes: &[u8]) -> usize {
-    read_all(Format::Lammps, bytes, 1)
-}
-
-/// One NPY array.
-pub fn npy(bytes: &[u8]) -> usize {
-    let packing = if bytes.starts_with(b"PK") {
-        DEFLATE_RATIO
-    } else {
-        1
+/// The place in `bytes` from `least` on that `choice` stands for.
+fn place(bytes: &[u8], least: usize, choice: u16) -> usize {
+    let number = usize::from(choice & !AT_CUT);
+    let is_cut = |at: &usize| {
+        let before = at.checked_sub(1).and_then(|before| bytes.get(before));
+        matches!(bytes.get(*at), None | Some(b'<')) || before.is_none_or(|b| b"\n,;> }".contains(b))
     };
-    read_all(Format::Npy, bytes, packing)
-}
-
-/// CSV.
-pub fn csv(bytes: &[u8]) -> usize {
-    read_all(Format::Csv, bytes, 1)
-}
-
-/// Reads `bytes` as `format`, the first steps and the last. `packing` is the ratio that
-/// compression inside the format may reach; places in what is unpacked count from its start.
-fn read_all(format: Format, bytes: &[u8], packing: u64) -> usize {
-    let len = (bytes.len() as u64).saturating_mul(packing);
-    let steps = match format.steps(bytes) {
-        Ok(steps) => steps,
-        Err(error) => {
-            check_error(&error, len);
-            return 0;
-        }
-    };
-    let mut read = 0;
-    for (place, step) in steps.iter().enumerate() {
-        assert_eq!(step.index, place);
-        assert!(step.span.start <= step.span.end && step.span.end <= bytes.len());
-        if place >= MOST_STEPS && place + 1 != steps.len() {
-            continue;
-        }
-        match format.read(bytes, step) {
-            Ok(particles) => {
-                check_particles(&particles, len);
-                prepare(particles);
-                read += 1;
-            }
-            Err(error) => check_error(&error, len),
-        }
+    if choice & AT_CUT == 0 {
+        return least + number % (bytes.len() - least + 1);
     }
-    read
-}
-
-/// The place is inside the file, and the message is one line that a terminal can show.
-fn check_error(error: &ParseError, len: u64) {
-    match error {
-        ParseError::Malformed { at, what } => {
-            assert!(*at <= len, "byte {at} of {len}: {what}");
-            check_message(what);
-        }
-        ParseError::Unsupported { what } | ParseError::TooLarge { what } => check_message(what),
-    }
-}
-
-fn check_message(what: &str) {
-    assert!(
-        !what.is_empty() && what.len() < 4000,
-        "{} bytes: {what:.200}",
-        what.len()
-    );
-    assert!(!what.contains(char::is_control), "{what:?}");
-}
-
-/// Each attribute has one group a particle, and nothing came out of nothing.
-fn check_particles(particles: &RawParticles, len: u64) {
-    let count = particles.positions.len();
-    for attribute in &particles.attributes {
-        assert!(attribute.components > 0, "{} is empty", attribute.name);
-        assert_eq!(
-            attribute.data.len(),
-            count * attribute.components,
-            "{} of {count} particles",
-            attribute.name
-        );
-    }
-    let most = len.saturating_mul(EXPANSION) + SLACK;
-    assert!(
-        particles.byte_len() <= most,
-        "{} bytes of particles from a file of {len}",
-        particles.byte_len()
-    );
-}
-
-/// What the pipeline does with particles before a tree is built.
-fn prepare(particles: RawParticles) {
-    let count = particles.positions.len();
-    let stats = FrameStats::of(&particles);
-    let origin = stats.bounds.map(|(min, max)| choose_origin(min, max));
-    let frame = ParticleFrame::from_raw(particles, origin.unwrap_or_default());
-    assert_eq!(frame.len() as u64 + frame.dropped, count as u64);
-    assert!(frame.positions.iter().all(|p| p.is_finite()));
-    for attribute in &frame.attributes {
-        assert_eq!(attribute.data.len(), frame.len() * attribute.components);
-    }
+    let cuts: Vec<usize> = (least..=bytes.len()).filter(is_cut).collect();
+    // The end is one.
+    cuts[number % cuts.len()]
 }

@@ -68,7 +68,10 @@ impl FrameRange {
 
     /// Whether there is more than one frame.
     pub fn has_several(&self) -> bool {
-        self.iter().nth(1).is_some()
+        // Two of each part are enough, and looking back as `iter` does would take quadratic time in a long list.
+        let mut frames = self.parts.iter().flat_map(|part| part.iter().take(2));
+        let first = frames.next();
+        frames.any(|frame| Some(frame) != first)
     }
 
     /// Those of the `available` frames that are in the range, in the range's order, each once.

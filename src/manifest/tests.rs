@@ -420,7 +420,7 @@ fn sets_lie_over_the_file() {
 #[test]
 fn a_map_alone_is_laid_into_what_is_there() {
     let auto = |range| ColorSetting::AutoWith {
-        map: ColorMap::Turbo,
+        map: Some(ColorMap::Turbo),
         range,
     };
     let color = |sets: &[&str]| {

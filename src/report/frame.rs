@@ -136,7 +136,7 @@ impl From<RayCounts> for RaySummary {
 impl RaySummary {
     /// Rays of all kinds.
     pub const fn total(&self) -> u64 {
-        self.primary + self.shadow + self.reflection + self.refraction
+        saturating_sum(&[self.primary, self.shadow, self.reflection, self.refraction])
     }
 }
 
@@ -164,12 +164,14 @@ impl FrameReport {
     /// Sum of the stages.
     pub fn total(&self) -> Duration {
         let s = &self.seconds;
-        Duration::from_secs_f64(s.read + s.build + s.surface + s.trace + s.encode)
+        let seconds = s.read + s.build + s.surface + s.trace + s.encode;
+        // Of a damaged ledger they may be negative, or more than there are.
+        Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(Duration::MAX)
     }
 
     /// Bytes of positions, radii and tree for a particle; None without particles.
     pub fn bytes_per_particle(&self) -> Option<f64> {
-        let bytes = self.bytes.positions + self.bytes.structure;
+        let bytes = self.bytes.positions.saturating_add(self.bytes.structure);
         ratio(bytes, float(self.particles))
     }
 
@@ -180,20 +182,20 @@ impl FrameReport {
 
     /// Adds what can be summed over frames; of memory the larger value stays.
     pub(super) fn add(&mut self, frame: &Self) {
-        self.particles += frame.particles;
-        self.dropped += frame.dropped;
-        self.clamped_radii += frame.clamped_radii;
-        self.clamped_pixels += frame.clamped_pixels;
+        add(&mut self.particles, frame.particles);
+        add(&mut self.dropped, frame.dropped);
+        add(&mut self.clamped_radii, frame.clamped_radii);
+        add(&mut self.clamped_pixels, frame.clamped_pixels);
         self.seconds.read += frame.seconds.read;
         self.seconds.build += frame.seconds.build;
         self.seconds.surface += frame.seconds.surface;
         self.seconds.trace += frame.seconds.trace;
         self.seconds.encode += frame.seconds.encode;
         self.seconds.wall += frame.seconds.wall;
-        self.rays.primary += frame.rays.primary;
-        self.rays.shadow += frame.rays.shadow;
-        self.rays.reflection += frame.rays.reflection;
-        self.rays.refraction += frame.rays.refraction;
+        add(&mut self.rays.primary, frame.rays.primary);
+        add(&mut self.rays.shadow, frame.rays.shadow);
+        add(&mut self.rays.reflection, frame.rays.reflection);
+        add(&mut self.rays.refraction, frame.rays.refraction);
         self.rss.anonymous_peak = self.rss.anonymous_peak.max(frame.rss.anonymous_peak);
         self.rss.file_peak = self.rss.file_peak.max(frame.rss.file_peak);
         self.rss.total_peak = self.rss.total_peak.max(frame.rss.total_peak);
@@ -215,7 +217,12 @@ impl FrameBytes {
 
     /// Held while tracing: positions, structure, surface and attributes.
     pub const fn held(&self) -> u64 {
-        self.positions + self.structure + self.surface + self.attributes
+        saturating_sum(&[
+            self.positions,
+            self.structure,
+            self.surface,
+            self.attributes,
+        ])
     }
 
     /// The part of [`Self::held`] that lies in anonymous memory.
@@ -227,8 +234,23 @@ impl FrameBytes {
 impl FileBytes {
     /// Of all parts.
     pub const fn total(&self) -> u64 {
-        self.positions + self.structure + self.attributes
+        saturating_sum(&[self.positions, self.structure, self.attributes])
     }
+}
+
+/// What a ledger says may be anything.
+fn add(to: &mut u64, value: u64) {
+    *to = to.saturating_add(value);
+}
+
+/// The same for several.
+const fn saturating_sum(values: &[u64]) -> u64 {
+    let (mut sum, mut rest) = (0_u64, values);
+    while let [first, others @ ..] = rest {
+        sum = sum.saturating_add(*first);
+        rest = others;
+    }
+    sum
 }
 
 fn ratio(of: u64, to: f64) -> Option<f64> {

@@ -7,6 +7,7 @@ mod bad_input;
 mod camera;
 mod colors;
 mod convert;
+mod corpus;
 mod damaged;
 mod export;
 mod golden;

@@ -63,6 +63,20 @@ const fn run_bytes(width: usize) -> usize {
 }
 
 impl Limits {
+    /// The smallest of all, and nothing stays in memory.
+    pub(super) const SMALLEST: Self = Self {
+        is_whole: false,
+        part_len: 1024,
+        run_len: 1024,
+        batch_len: 256,
+        window: 2,
+        window_bytes: 0,
+        chunk_len: SMALLEST_CHUNK,
+        chunks: 0,
+        parts: 8,
+        sample_len: 1024,
+    };
+
     /// For `count` particles with rows of `width` bytes, of which the source has up to `widest` bytes for one
     /// attribute.
     pub(super) fn of(settings: &ConvertSettings, count: u64, width: usize, widest: usize) -> Self {

@@ -67,6 +67,27 @@ pub fn convert(
     convert_within(asked, columns, limits)
 }
 
+/// [`convert`] of a source that is much too large for the memory: in the smallest parts, all of which go to disk.
+/// For fuzzing, since the memory that settings can ask for holds any source of a few megabytes.
+///
+/// # Errors
+/// As [`convert`].
+#[doc(hidden)]
+pub fn convert_in_parts(
+    source: &dyn ParticleSource,
+    path: &Path,
+    settings: &ConvertSettings,
+) -> Result<ConvertReport, ConvertError> {
+    let asked = Asked {
+        source,
+        path,
+        settings,
+        progress: &(),
+    };
+    let columns = Columns::choose(source, settings, path)?;
+    convert_within(asked, columns, Limits::SMALLEST)
+}
+
 /// Converts within `limits`.
 fn convert_within(
     asked: Asked,

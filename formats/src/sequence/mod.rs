@@ -20,6 +20,7 @@ use crate::open::FrameFile;
 use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles};
 
 mod error;
+mod from_names;
 mod group;
 mod merge;
 mod name;
@@ -27,6 +28,8 @@ mod pattern;
 mod scan;
 
 pub use error::{GroupSummary, SequenceError};
+#[doc(hidden)]
+pub use from_names::{frames_of_list, frames_of_names};
 pub use merge::{PART_ATTRIBUTE, merge};
 
 use group::Group;

@@ -143,3 +143,19 @@ proptest! {
         let _ = text.parse::<FrameRange>();
     }
 }
+
+#[test]
+fn a_long_list_of_one_frame_is_one_frame() {
+    let list = "7,".repeat(100_000);
+    let has_several = |last: &str| {
+        format!("{list}{last}")
+            .parse::<FrameRange>()
+            .unwrap()
+            .has_several()
+    };
+    assert!(!has_several("7"));
+    assert!(!has_several("7-7x2"));
+    assert!(!has_several("6-8y2"));
+    assert!(has_several("7-8"));
+    assert!(has_several("8"));
+}

@@ -1,0 +1,59 @@
+//! Verification of images.
+
+use std::io::Cursor;
+
+use spherule::output::{ImageFault, ImageShape, verify_exr, verify_preview};
+use spherule::render::Channels;
+
+/// Every channel.
+const ALL: Channels = Channels {
+    depth: true,
+    normal: true,
+    position: true,
+    velocity: true,
+    albedo: true,
+    id: true,
+};
+
+/// What the seeds are, and what no file of theirs can be. The first byte picks one.
+const SHAPES: [ImageShape; 4] = [
+    shape(5, 3, Channels::COLOR),
+    shape(5, 3, ALL),
+    shape(40, 37, Channels::COLOR),
+    shape(1 << 15, 1 << 15, ALL),
+];
+
+const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
+    ImageShape {
+        width,
+        height,
+        channels,
+    }
+}
+
+/// An OpenEXR file.
+pub fn exr(bytes: &[u8]) -> usize {
+    verified(bytes, |file, wanted| verify_exr(file, wanted))
+}
+
+/// A preview.
+pub fn png(bytes: &[u8]) -> usize {
+    verified(bytes, |file, wanted| verify_preview(file, wanted))
+}
+
+fn verified(
+    bytes: &[u8],
+    verify: impl Fn(Cursor<&[u8]>, &ImageShape) -> Result<(), ImageFault>,
+) -> usize {
+    let Some((choice, bytes)) = bytes.split_first() else {
+        return 0;
+    };
+    let wanted = &SHAPES[usize::from(*choice) % SHAPES.len()];
+    match verify(Cursor::new(bytes), wanted) {
+        Ok(()) => 1,
+        Err(fault) => {
+            assert!(!fault.to_string().is_empty());
+            0
+        }
+    }
+}
