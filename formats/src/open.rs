@@ -11,6 +11,7 @@ use std::sync::OnceLock;
 use std::time::SystemTime;
 
 use flate2::bufread::GzDecoder;
+use memchr::memmem;
 use rkyv::util::AlignedVec;
 
 use crate::detect::{Format, HEAD_LEN};
@@ -235,6 +236,21 @@ impl FrameFile {
             Content::Streamed(_) => held + stream_bytes(),
             Content::Plain(_) | Content::Aligned(_) => held,
         }
+    }
+
+    /// Bytes that are held on the way from the content to the numbers of `particles`: of arrays that are packed,
+    /// or text, in the content.
+    pub fn unpacked_arrays_len(&self, particles: &RawParticles) -> u64 {
+        let has = |text: &[u8]| memmem::find(self.bytes(), text).is_some();
+        let is_packed = match self.format {
+            Format::Npz => (self.bytes().len() as u64) < particles.byte_len(),
+            Format::VtkXml => has(b"compressor=") || !has(b"encoding=\"raw\""),
+            Format::Ply if has(b"\nformat ascii") => return particles.byte_len(),
+            _ => false,
+        };
+        let arrays = particles.attributes.iter().map(|a| a.data.byte_len());
+        let all = arrays.chain([particles.positions.byte_len()]);
+        all.max().filter(|_| is_packed).unwrap_or(0)
     }
 
     /// Oddities that did not stop the file from being understood; those at the end of a large table once it

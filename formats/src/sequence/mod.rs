@@ -312,10 +312,12 @@ impl Sequence {
         let mut parts = Vec::with_capacity(frame.parts.len());
         for part in &frame.parts {
             let (file, step) = self.file_of(part)?;
-            parts.push((part.part, file.read(step)?));
+            let particles = file.read(step)?;
             notes.extend_from_slice(file.notes());
             all_bytes += file.unpacked_len();
-            content_bytes = content_bytes.max(file.held_len());
+            let held = file.held_len() + file.unpacked_arrays_len(&particles);
+            content_bytes = content_bytes.max(held);
+            parts.push((part.part, particles));
         }
         let only = if self.parts.len() < 2 {
             parts.pop().map(|(_, only)| only)

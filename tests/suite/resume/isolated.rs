@@ -61,7 +61,7 @@ fn a_frame_beyond_the_ceiling_costs_one_frame() {
         .run(&arguments(&options))
         .expect(1)
         .tells("error: frame 2: ")
-        .tells("f_2.npy: the file is larger than 24 MiB; raise job.memory_ceiling")
+        .tells("f_2.npy: the frame needs about")
         .tells("failed: 2");
     assert_eq!(ran.rendered(), [1, 3]);
     no_leftovers(&workshop.join("out"));
