@@ -18,8 +18,12 @@ pub fn targets() -> impl Iterator<Item = (&'static str, Target)> {
 /// Set in a choice: it is one of the places where lines, words and tags begin or end, not any byte.
 const AT_CUT: u16 = 0x8000;
 
+/// Stands for the number of the copy in a part that is repeated.
+const COUNTER: u8 = 0x01;
+
 /// `bytes` as an input of about `size` bytes: a part of them, which the last four bytes choose, is repeated. libFuzzer
-/// alone seldom makes large inputs, and only those show what takes more than linear time or memory.
+/// alone seldom makes large inputs, and only those show what takes more than linear time or memory. Where the part
+/// has a `COUNTER`, each copy has its number there, so that names differ.
 pub fn repeated(bytes: &[u8], size: usize) -> Cow<'_, [u8]> {
     let Some((rest, choice)) = bytes.split_last_chunk::<4>() else {
         return Cow::Borrowed(bytes);
@@ -31,8 +35,23 @@ pub fn repeated(bytes: &[u8], size: usize) -> Cow<'_, [u8]> {
     if part.is_empty() {
         return Cow::Borrowed(rest);
     }
-    let count = size.saturating_sub(before.len() + after.len()) / part.len();
-    Cow::Owned([before, &part.repeat(count.max(1)), after].concat())
+    let mut all = before.to_vec();
+    let mut number = 0_u32;
+    while number == 0 || all.len() + part.len() + after.len() < size {
+        push_numbered(&mut all, part, number);
+        number += 1;
+    }
+    all.extend_from_slice(after);
+    Cow::Owned(all)
+}
+
+fn push_numbered(to: &mut Vec<u8>, part: &[u8], number: u32) {
+    let mut pieces = part.split(|byte| *byte == COUNTER);
+    to.extend_from_slice(pieces.next().unwrap_or_default());
+    for piece in pieces {
+        to.extend_from_slice(number.to_string().as_bytes());
+        to.extend_from_slice(piece);
+    }
 }
 
 /// The place in `bytes` from `least` on that `choice` stands for.
