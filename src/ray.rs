@@ -35,8 +35,10 @@ impl Ray {
 /// Rays of a packet: as many as a 512-bit register has lanes.
 pub const PACKET_SIZE: usize = 16;
 
-/// Up to 16 rays to be traced together, one array per component. Worth while for rays that lie close
-/// to one another and point nearly the same way; any others are just as right.
+/// Up to 16 rays to be traced together, one array per component. [`Coherence`] tells how they lie: close
+/// together and nearly the same way is fastest, any others are just as right.
+///
+/// [`Coherence`]: crate::accel::Coherence
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[repr(align(64))]
 pub struct RayPacket {

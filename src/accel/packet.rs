@@ -1,63 +1,69 @@
-//! The traversal for packets: one walk for up to 16 rays, as wide as the beam around them.
+//! The traversals for packets, and the one for rays that lie close together: one walk for up to 16 rays,
+//! as wide as the beam around them. Packets without a beam go the way of [`super::hybrid`].
 //!
 //! Nodes and blocks are tested with the beam, and only the spheres inside it with the rays, all of them
 //! at once. What each ray finds is what it would find alone, to the bit.
 
 use std::borrow::Borrow;
 
+use super::hits::{Coherence, LanesOf, TreeHits};
 use super::leaves::{Leaves, LoadedRadii};
-use super::simd::{Beam, LaneHits, PacketKernel, PacketSphere, lanes_near};
+use super::simd::{Beam, PacketKernel, PacketSphere, lanes_near};
 use super::topology::Topology;
 use super::traverse::TreeHit;
 use super::view::{Resolved, TreeTask, TreeView};
-use super::walk::walk;
+use super::walk::{Walker, walk_with};
 use crate::ray::{PACKET_SIZE, RayPacket};
-use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii, Node};
 
 impl TreeView<'_> {
     /// [`TreeView::nearest`] of each ray.
-    pub fn nearest_packet(&self, packet: &RayPacket) -> [Option<TreeHit>; PACKET_SIZE] {
-        self.run(NearestOfPacket { packet })
+    pub fn nearest_lanes(&self, rays: &RayPacket, coherence: Coherence, hits: &mut TreeHits) {
+        let lanes = match coherence {
+            Coherence::Coherent => self.run(NearestInBeam { rays, hits }),
+            Coherence::Incoherent => ALL_LANES,
+        };
+        if lanes != 0 {
+            self.nearest_by_lanes(rays, lanes, hits);
+        }
     }
 
     /// [`TreeView::any_hit`] of each ray, a bit for each lane.
+    pub fn occluded_lanes(&self, rays: &RayPacket, coherence: Coherence) -> u32 {
+        let (occluded, lanes) = match coherence {
+            Coherence::Coherent => self.run(AnyInBeam { rays }),
+            Coherence::Incoherent => (0, ALL_LANES),
+        };
+        if lanes == 0 {
+            occluded
+        } else {
+            occluded | self.occluded_by_lanes(rays, lanes)
+        }
+    }
+
+    /// [`TreeView::nearest_lanes`] of coherent rays.
+    pub fn nearest_packet(&self, packet: &RayPacket) -> [Option<TreeHit>; PACKET_SIZE] {
+        let mut hits = TreeHits::default();
+        self.nearest_lanes(packet, Coherence::Coherent, &mut hits);
+        std::array::from_fn(|lane| {
+            let (t, slot) = (hits.t[lane], hits.slot[lane]);
+            (slot != TreeHits::NO_SLOT).then_some(TreeHit { t, slot })
+        })
+    }
+
+    /// [`TreeView::occluded_lanes`] of coherent rays.
     pub fn any_hit_packet(&self, packet: &RayPacket) -> u32 {
-        self.run(AnyOfPacket { packet })
+        self.occluded_lanes(packet, Coherence::Coherent)
     }
 }
 
-/// Blocks after which the rays of a packet go on alone: such a beam is too wide for the spheres (its
+/// Every ray of a packet.
+const ALL_LANES: u32 = (1 << PACKET_SIZE) - 1;
+
+/// Blocks after which the rays of a beam are traced anew without it: such a beam is too wide for the spheres (its
 /// rays start far apart), and tests many that few of its rays meet. Measured on the thesis's box: beams
 /// around pixels that are neighbours seldom need half as many.
 const MOST_BLOCKS: u32 = 64;
-
-/// Lanes with these bits.
-#[inline(always)]
-fn lanes_of(mut bits: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        (bits != 0).then(|| {
-            let lane = bits.trailing_zeros() as usize & (PACKET_SIZE - 1);
-            bits &= bits - 1;
-            lane
-        })
-    })
-}
-
-/// Rays at the start: those in `lanes` count up to their ends, the others not at all.
-#[inline(always)]
-fn unmet(packet: &RayPacket, lanes: u32) -> LaneHits {
-    LaneHits {
-        limit: std::array::from_fn(|lane| {
-            if lanes >> lane & 1 == 1 {
-                // The end is exclusive for the ray and inclusive for ties.
-                packet.t_max[lane].next_down()
-            } else {
-                -1.0
-            }
-        }),
-        slot: [LaneHits::NO_SLOT; PACKET_SIZE],
-    }
-}
 
 /// A block for a packet.
 struct PacketBlock<'a> {
@@ -73,7 +79,10 @@ impl PacketBlock<'_> {
     #[inline(always)]
     fn sphere(&self, lane: usize) -> PacketSphere {
         let centers = self.centers;
-        let radius = self.radii.map_or(self.radius, |r| r.0[lane]);
+        let radius = match self.radii {
+            Some(radii) => radii.0[lane],
+            None => self.radius,
+        };
         #[expect(
             clippy::cast_possible_truncation,
             reason = "slots are counted in 32 bits"
@@ -86,102 +95,15 @@ impl PacketBlock<'_> {
     }
 }
 
-struct NearestOfPacket<'r> {
-    packet: &'r RayPacket,
+/// Finds the nearest hits, if there is a beam for the rays. Returns the lanes for which it did not; what
+/// `hits` has of these means nothing then: where boxes are rounded, to be shortened by it could lose a
+/// hit just in front of one.
+struct NearestInBeam<'r, 'h> {
+    rays: &'r RayPacket,
+    hits: &'h mut TreeHits,
 }
 
-impl TreeTask for NearestOfPacket<'_> {
-    type Output = [Option<TreeHit>; PACKET_SIZE];
-
-    #[inline(always)]
-    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
-        self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
-    ) -> Self::Output {
-        let (packet, view) = (self.packet, tree.view);
-        let lanes = lanes_near(packet, &view.bounds);
-        if lanes == 0 {
-            return [None; PACKET_SIZE];
-        }
-        let mut hits = unmet(packet, lanes);
-        let Some(beam) = Beam::around(packet, lanes, view.radius, view.padding) else {
-            return nearest_one_by_one(view, packet, &hits);
-        };
-        let mut blocks_left = MOST_BLOCKS;
-        walk(
-            kernel,
-            tree,
-            |node, limit| kernel.test_node_with_beam(&beam, node, limit),
-            hits.farthest(),
-            |index, limit| {
-                let centers = tree.leaves.load(kernel, index);
-                let radii = LoadedRadii::of(&view.radii, index);
-                let (centers, radii) = (centers.borrow(), radii.as_ref());
-                let found = kernel.spheres_in_beam(&beam, centers, radii, limit);
-                let block = PacketBlock {
-                    index,
-                    centers,
-                    radii,
-                    radius: view.radius,
-                };
-                for lane in lanes_of(found) {
-                    let sphere = block.sphere(lane);
-                    let tied = kernel.nearest_of_packet(packet, &sphere, &mut hits);
-                    if tied != 0 {
-                        settle_ties(view, tied, sphere.slot, &mut hits);
-                    }
-                }
-                blocks_left -= 1;
-                if blocks_left == 0 {
-                    return -1.0;
-                }
-                hits.farthest()
-            },
-        );
-        if blocks_left == 0 {
-            return nearest_one_by_one(view, packet, &hits);
-        }
-        std::array::from_fn(|lane| {
-            let (t, slot) = (hits.limit[lane], hits.slot[lane]);
-            (slot != LaneHits::NO_SLOT).then_some(TreeHit { t, slot })
-        })
-    }
-}
-
-/// Gives `slot` to those of the `tied` lanes in which it comes before what they have.
-#[cold]
-fn settle_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut LaneHits) {
-    for lane in lanes_of(tied) {
-        let held = &mut hits.slot[lane];
-        if tree.tie_order(slot, *held).is_lt() {
-            *held = slot;
-        }
-    }
-}
-
-/// Traces those rays alone that a packet has not put aside. What it has found does not shorten them:
-/// where boxes are rounded, that could lose a hit just in front of one.
-#[cold]
-fn nearest_one_by_one(
-    tree: &TreeView,
-    packet: &RayPacket,
-    hits: &LaneHits,
-) -> [Option<TreeHit>; PACKET_SIZE] {
-    let mut found = [None; PACKET_SIZE];
-    for (lane, limit) in hits.limit.into_iter().enumerate() {
-        if limit >= 0.0 {
-            found[lane] = tree.nearest(&packet.ray(lane));
-        }
-    }
-    found
-}
-
-struct AnyOfPacket<'r> {
-    packet: &'r RayPacket,
-}
-
-impl TreeTask for AnyOfPacket<'_> {
+impl TreeTask for NearestInBeam<'_, '_> {
     type Output = u32;
 
     #[inline(always)]
@@ -190,57 +112,162 @@ impl TreeTask for AnyOfPacket<'_> {
         kernel: K,
         tree: Resolved<'a, T, L>,
     ) -> u32 {
-        let (packet, view) = (self.packet, tree.view);
-        let lanes = lanes_near(packet, &view.bounds);
+        let (rays, hits, view) = (self.rays, self.hits, tree.view);
+        let lanes = lanes_near(rays, &view.bounds);
+        hits.start(rays, lanes);
         if lanes == 0 {
             return 0;
         }
-        let mut hits = unmet(packet, lanes);
-        let Some(beam) = Beam::around(packet, lanes, view.radius, view.padding) else {
-            return any_one_by_one(view, packet, &hits);
+        let Some(beam) = Beam::around(rays, lanes, view.radius, view.padding) else {
+            return lanes;
         };
-        let mut met = 0;
-        let mut blocks_left = MOST_BLOCKS;
-        walk(
-            kernel,
+        let limit = hits.farthest();
+        let mut search = NearestOfBeam {
             tree,
-            |node, limit| kernel.test_node_with_beam(&beam, node, limit),
-            hits.farthest(),
-            |index, mut limit| {
-                let centers = tree.leaves.load(kernel, index);
-                let radii = LoadedRadii::of(&view.radii, index);
-                let (centers, radii) = (centers.borrow(), radii.as_ref());
-                let inside = kernel.spheres_in_beam(&beam, centers, radii, limit);
-                let block = PacketBlock {
-                    index,
-                    centers,
-                    radii,
-                    radius: view.radius,
-                };
-                let mut found = 0;
-                for lane in lanes_of(inside) {
-                    found |= kernel.any_of_packet(packet, &block.sphere(lane), &hits);
-                }
-                if found != 0 {
-                    met |= found;
-                    hits.finish(found);
-                    limit = hits.farthest();
-                }
-                blocks_left -= 1;
-                if blocks_left == 0 { -1.0 } else { limit }
-            },
-        );
-        if blocks_left == 0 {
-            met |= any_one_by_one(view, packet, &hits);
-        }
-        met
+            beam: &beam,
+            rays,
+            hits,
+            blocks_left: MOST_BLOCKS,
+        };
+        walk_with(kernel, tree, &mut search, limit);
+        if search.blocks_left == 0 { lanes } else { 0 }
     }
 }
 
-/// Tests those rays alone that a packet left undecided.
+/// A beam whose rays look for their nearest hits.
+struct NearestOfBeam<'r, 'a, T, L> {
+    tree: Resolved<'a, T, L>,
+    beam: &'r Beam,
+    rays: &'r RayPacket,
+    hits: &'r mut TreeHits,
+    blocks_left: u32,
+}
+
+impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBeam<'_, 'a, T, L> {
+    #[inline(always)]
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        kernel.test_node_with_beam(self.beam, node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, kernel: K, index: usize, limit: f32) -> f32 {
+        let view = self.tree.view;
+        let centers = self.tree.leaves.load(kernel, index);
+        let radii = LoadedRadii::of(&view.radii, index);
+        let (centers, radii) = (centers.borrow(), radii.as_ref());
+        let found = kernel.spheres_in_beam(self.beam, centers, radii, limit);
+        let block = PacketBlock {
+            index,
+            centers,
+            radii,
+            radius: view.radius,
+        };
+        for lane in LanesOf(found) {
+            let sphere = block.sphere(lane);
+            let tied = kernel.nearest_of_packet(self.rays, &sphere, self.hits);
+            if tied != 0 {
+                settle_ties(view, tied, sphere.slot, self.hits);
+            }
+        }
+        self.blocks_left -= 1;
+        if self.blocks_left == 0 {
+            return -1.0;
+        }
+        self.hits.farthest()
+    }
+}
+
+/// Gives `slot` to those of the `tied` lanes in which it comes before what they have.
 #[cold]
-fn any_one_by_one(tree: &TreeView, packet: &RayPacket, hits: &LaneHits) -> u32 {
-    (0..PACKET_SIZE)
-        .filter(|lane| hits.limit[*lane] >= 0.0 && tree.any_hit(&packet.ray(*lane)))
-        .fold(0, |met, lane| met | 1 << lane)
+fn settle_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut TreeHits) {
+    for lane in LanesOf(tied) {
+        let held = &mut hits.slot[lane];
+        if tree.tie_order(slot, *held).is_lt() {
+            *held = slot;
+        }
+    }
+}
+
+/// Finds the rays that hit anything, if there is a beam for them. Returns their lanes, and those that are
+/// still undecided.
+struct AnyInBeam<'r> {
+    rays: &'r RayPacket,
+}
+
+impl TreeTask for AnyInBeam<'_> {
+    type Output = (u32, u32);
+
+    #[inline(always)]
+    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        self,
+        kernel: K,
+        tree: Resolved<'a, T, L>,
+    ) -> (u32, u32) {
+        let (rays, view) = (self.rays, tree.view);
+        let lanes = lanes_near(rays, &view.bounds);
+        if lanes == 0 {
+            return (0, 0);
+        }
+        let mut hits = TreeHits::default();
+        hits.start(rays, lanes);
+        let Some(beam) = Beam::around(rays, lanes, view.radius, view.padding) else {
+            return (0, lanes);
+        };
+        let limit = hits.farthest();
+        let mut search = AnyOfBeam {
+            tree,
+            beam: &beam,
+            rays,
+            hits,
+            occluded: 0,
+            blocks_left: MOST_BLOCKS,
+        };
+        walk_with(kernel, tree, &mut search, limit);
+        let occluded = search.occluded;
+        let is_decided = search.blocks_left > 0;
+        (occluded, if is_decided { 0 } else { lanes & !occluded })
+    }
+}
+
+/// A beam whose rays look for any hit.
+struct AnyOfBeam<'r, 'a, T, L> {
+    tree: Resolved<'a, T, L>,
+    beam: &'r Beam,
+    rays: &'r RayPacket,
+    hits: TreeHits,
+    occluded: u32,
+    blocks_left: u32,
+}
+
+impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfBeam<'_, 'a, T, L> {
+    #[inline(always)]
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        kernel.test_node_with_beam(self.beam, node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, kernel: K, index: usize, mut limit: f32) -> f32 {
+        let view = self.tree.view;
+        let centers = self.tree.leaves.load(kernel, index);
+        let radii = LoadedRadii::of(&view.radii, index);
+        let (centers, radii) = (centers.borrow(), radii.as_ref());
+        let inside = kernel.spheres_in_beam(self.beam, centers, radii, limit);
+        let block = PacketBlock {
+            index,
+            centers,
+            radii,
+            radius: view.radius,
+        };
+        let mut found = 0;
+        for lane in LanesOf(inside) {
+            found |= kernel.any_of_packet(self.rays, &block.sphere(lane), &self.hits);
+        }
+        if found != 0 {
+            self.occluded |= found;
+            self.hits.finish(found);
+            limit = self.hits.farthest();
+        }
+        self.blocks_left -= 1;
+        if self.blocks_left == 0 { -1.0 } else { limit }
+    }
 }

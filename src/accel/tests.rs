@@ -15,6 +15,7 @@ use crate::ray::Ray;
 use spherule_formats::blocks::Node;
 
 mod encode;
+mod hybrid;
 mod intervals;
 mod packets;
 mod stored;

@@ -2,13 +2,14 @@
 
 use std::borrow::Borrow;
 
+use super::hits::TreeHits;
 use super::leaves::{Leaves, LoadedRadii};
 use super::simd::{PacketKernel, SLAB_SLACK, finite_inverse};
 use super::topology::Topology;
 use super::view::{Resolved, TreeTask, TreeView};
-use super::walk::walk;
+use super::walk::{Walker, walk, walk_with};
 use crate::ray::Ray;
-use spherule_formats::blocks::BLOCK_SIZE;
+use spherule_formats::blocks::{BLOCK_SIZE, Node};
 
 /// A ray's meeting with a sphere of the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -114,31 +115,53 @@ impl TreeTask for Nearest<'_> {
         tree: Resolved<'a, T, L>,
     ) -> Option<TreeHit> {
         let (ray, view) = (self.ray, tree.view);
-        let prepared = kernel.prepare(ray, view.radius, view.padding);
-        let mut best: Option<TreeHit> = None;
-        // The end is exclusive for the ray and inclusive for ties.
-        walk(
-            kernel,
+        let mut search = NearestOfRay {
             tree,
-            |node, limit| kernel.test_node(&prepared, node, limit),
-            ray.t_max.next_down(),
-            |block, limit| {
-                let centers = tree.leaves.load(kernel, block);
-                let radii = LoadedRadii::of(&view.radii, block);
-                let Some((t, lanes)) =
-                    kernel.nearest_in_block(&prepared, centers.borrow(), radii.as_ref(), limit)
-                else {
-                    return limit;
-                };
-                let slot = first_of_tied(view, block, lanes);
-                match &best {
-                    Some(held) if held.t == t && view.tie_order(held.slot, slot).is_le() => {}
-                    _ => best = Some(TreeHit { t, slot }),
-                }
-                t
+            ray: &kernel.prepare(ray, view.radius, view.padding),
+            best: TreeHit {
+                // The end is exclusive for the ray and inclusive for ties.
+                t: ray.t_max.next_down(),
+                slot: TreeHits::NO_SLOT,
             },
-        );
-        best
+        };
+        let limit = search.best.t;
+        walk_with(kernel, tree, &mut search, limit);
+        (search.best.slot != TreeHits::NO_SLOT).then_some(search.best)
+    }
+}
+
+/// A ray that looks for its nearest hit.
+pub(super) struct NearestOfRay<'r, 'a, R, T, L> {
+    pub(super) tree: Resolved<'a, T, L>,
+    pub(super) ray: &'r R,
+    /// The best so far; without any, [`TreeHits::NO_SLOT`] and the farthest distance that counts.
+    pub(super) best: TreeHit,
+}
+
+impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K>
+    for NearestOfRay<'_, 'a, K::Ray, T, L>
+{
+    #[inline(always)]
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        kernel.test_node(self.ray, node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, kernel: K, block: usize, limit: f32) -> f32 {
+        let view = self.tree.view;
+        let centers = self.tree.leaves.load(kernel, block);
+        let radii = LoadedRadii::of(&view.radii, block);
+        let Some((t, lanes)) =
+            kernel.nearest_in_block(self.ray, centers.borrow(), radii.as_ref(), limit)
+        else {
+            return limit;
+        };
+        let slot = first_of_tied(view, block, lanes);
+        let is_tied = self.best.t == t && self.best.slot != TreeHits::NO_SLOT;
+        if !(is_tied && view.tie_order(self.best.slot, slot).is_le()) {
+            self.best = TreeHit { t, slot };
+        }
+        t
     }
 }
 
@@ -176,21 +199,35 @@ impl TreeTask for AnyHit<'_> {
         tree: Resolved<'a, T, L>,
     ) -> bool {
         let (ray, view) = (self.ray, tree.view);
-        let prepared = kernel.prepare(ray, view.radius, view.padding);
-        let mut found = false;
-        walk(
-            kernel,
+        let mut search = AnyOfRay {
             tree,
-            |node, limit| kernel.test_node(&prepared, node, limit),
-            ray.t_max.next_down(),
-            |block, limit| {
-                let centers = tree.leaves.load(kernel, block);
-                let radii = LoadedRadii::of(&view.radii, block);
-                found = kernel.any_in_block(&prepared, centers.borrow(), radii.as_ref(), limit);
-                if found { -1.0 } else { limit }
-            },
-        );
-        found
+            ray: &kernel.prepare(ray, view.radius, view.padding),
+            found: false,
+        };
+        walk_with(kernel, tree, &mut search, ray.t_max.next_down());
+        search.found
+    }
+}
+
+/// A ray that looks for any hit.
+pub(super) struct AnyOfRay<'r, 'a, R, T, L> {
+    pub(super) tree: Resolved<'a, T, L>,
+    pub(super) ray: &'r R,
+    pub(super) found: bool,
+}
+
+impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfRay<'_, 'a, K::Ray, T, L> {
+    #[inline(always)]
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        kernel.test_node(self.ray, node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, kernel: K, block: usize, limit: f32) -> f32 {
+        let centers = self.tree.leaves.load(kernel, block);
+        let radii = LoadedRadii::of(&self.tree.view.radii, block);
+        self.found = kernel.any_in_block(self.ray, centers.borrow(), radii.as_ref(), limit);
+        if self.found { -1.0 } else { limit }
     }
 }
 

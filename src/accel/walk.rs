@@ -29,34 +29,98 @@ impl Pending {
     }
 }
 
-/// Visits the blocks whose boxes are entered before `limit`, nearest boxes first. `test` is
-/// [`Kernel::test_node`] for whatever walks: a ray or a beam of them. `visit` gets each block's number
-/// and the limit, and returns the new limit; negative ends the walk.
+/// What a walk has still to visit. One serves several walks, one after another.
+pub(super) struct WalkStack([Pending; STACK_SIZE]);
+
+impl WalkStack {
+    #[inline(always)]
+    pub(super) fn new() -> Self {
+        Self([Pending::default(); STACK_SIZE])
+    }
+}
+
+/// What goes through a tree: a ray or a beam of them, and what it does in blocks.
+///
+/// Implementations must be `inline(always)`: only what is inlined gets the kernel's instructions, and
+/// closures that are used in two places may not be.
+pub(super) trait Walker<K: Kernel> {
+    /// [`Kernel::test_node`], for whatever walks.
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys);
+
+    /// Gets the number of a block that may be reached up to `limit`, and returns the new limit; negative
+    /// ends the walk.
+    fn visit(&mut self, kernel: K, block: usize, limit: f32) -> f32;
+}
+
+/// A walker of two closures, for what is walked in one place only.
+struct OfClosures<A, B> {
+    test: A,
+    visit: B,
+}
+
+impl<K: Kernel, A, B> Walker<K> for OfClosures<A, B>
+where
+    A: Fn(&Node, f32) -> (usize, K::Keys),
+    B: FnMut(usize, f32) -> f32,
+{
+    #[inline(always)]
+    fn test(&self, _: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        (self.test)(node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, _: K, block: usize, limit: f32) -> f32 {
+        (self.visit)(block, limit)
+    }
+}
+
+/// [`walk_with`] two closures, as in [`Walker`].
 #[inline(always)]
 pub(super) fn walk<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
     tree: Resolved<'a, T, L>,
     test: impl Fn(&Node, f32) -> (usize, K::Keys),
-    mut limit: f32,
-    mut visit: impl FnMut(usize, f32) -> f32,
+    limit: f32,
+    visit: impl FnMut(usize, f32) -> f32,
 ) {
-    if tree.view.is_empty() {
-        return;
+    walk_with(kernel, tree, &mut OfClosures { test, visit }, limit);
+}
+
+/// Visits the blocks whose boxes are entered before `limit`, nearest boxes first.
+#[inline(always)]
+pub(super) fn walk_with<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
+    kernel: K,
+    tree: Resolved<'a, T, L>,
+    walker: &mut impl Walker<K>,
+    limit: f32,
+) {
+    if !tree.view.is_empty() {
+        walk_from(kernel, tree, T::ROOT, &mut WalkStack::new(), walker, limit);
     }
+}
+
+/// [`walk_with`] through the subtree with `code`, which must be one of the tree.
+#[inline(always)]
+pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
+    kernel: K,
+    tree: Resolved<'a, T, L>,
+    mut code: u32,
+    WalkStack(stack): &mut WalkStack,
+    walker: &mut impl Walker<K>,
+    mut limit: f32,
+) {
     let topology = tree.topology;
-    let mut stack = [Pending::default(); STACK_SIZE];
     let mut depth = 0;
-    let mut code = T::ROOT;
     loop {
         match topology.place(code) {
             Place::Block(block) => {
-                limit = visit(block, limit);
+                limit = walker.visit(kernel, block, limit);
                 if limit < 0.0 {
                     return;
                 }
             }
             Place::Node(node) => {
-                let (found, keys) = test(node, limit);
+                let (found, keys) = walker.test(kernel, node, limit);
                 let below = Below {
                     tree,
                     children: topology.children(code),
@@ -105,21 +169,21 @@ pub(super) fn walk<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
 }
 
 /// What is below a node, seen from it.
-struct Below<'a, T: Topology<'a>, L> {
-    tree: Resolved<'a, T, L>,
-    children: T::Children,
+pub(super) struct Below<'a, T: Topology<'a>, L> {
+    pub(super) tree: Resolved<'a, T, L>,
+    pub(super) children: T::Children,
 }
 
 impl<'a, T: Topology<'a>, L: Leaves> Below<'a, T, L> {
     /// Code of the child that a key is for.
     #[inline(always)]
-    fn code(&self, key: u32) -> u32 {
+    pub(super) fn code(&self, key: u32) -> u32 {
         self.tree.topology.child(self.children, key & 7)
     }
 
     /// Asks for the memory of a child that will be visited, well before it is.
     #[inline(always)]
-    fn prefetch<K: Kernel>(&self, kernel: K, code: u32) {
+    pub(super) fn prefetch<K: Kernel>(&self, kernel: K, code: u32) {
         match self.tree.topology.place(code) {
             Place::Block(block) => self.tree.leaves.prefetch(kernel, block),
             Place::Node(node) => kernel.prefetch(node),
@@ -130,7 +194,7 @@ impl<'a, T: Topology<'a>, L: Leaves> Below<'a, T, L> {
 /// Insertion sort: two or three keys are usual, eight the most. Keys are the bits of distances that
 /// are not negative, which order like integers.
 #[inline(always)]
-fn sort_descending(keys: &mut [u32]) {
+pub(super) fn sort_descending(keys: &mut [u32]) {
     for i in 1..keys.len() {
         let key = keys[i];
         let mut j = i;

@@ -51,19 +51,19 @@ pub(in super::super) struct Beam {
 
 /// As SIMD has it: `b` where one is NaN.
 #[inline(always)]
-fn smaller(a: f32, b: f32) -> f32 {
+pub(super) fn smaller(a: f32, b: f32) -> f32 {
     if a < b { a } else { b }
 }
 
 /// As SIMD has it: `b` where one is NaN.
 #[inline(always)]
-pub(super) fn larger(a: f32, b: f32) -> f32 {
+pub(in super::super) fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
 /// All lanes made one by halves, which compilers turn into whole registers.
 #[inline(always)]
-pub(super) fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
+pub(in super::super) fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
     macro_rules! halve {
         ($($half:literal)*) => {$(
             for lane in 0..$half {
@@ -77,18 +77,68 @@ pub(super) fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
 
 /// Inverse directions with every component finite: [`super::finite_inverse`] of all lanes.
 #[inline(always)]
-fn inverses(directions: &Lanes) -> Lanes {
-    directions.map(|d| {
+pub(super) fn inverses(directions: &Lanes) -> Lanes {
+    let mut inverses = *directions;
+    for d in &mut inverses {
         let kept = if d.abs() < MIN_DIRECTION {
-            MIN_DIRECTION.copysign(d)
+            MIN_DIRECTION.copysign(*d)
         } else {
-            d
+            *d
         };
-        1.0 / kept
-    })
+        *d = 1.0 / kept;
+    }
+    inverses
 }
 
-/// The lanes whose rays come near `bounds`; a superset of those that meet anything inside.
+/// Values of the rays in `lanes`; lanes out of use stand in for the one in `first`.
+#[inline(always)]
+fn used(values: &Lanes, lanes: u32, first: usize) -> Lanes {
+    let stand_in = values[first];
+    let mut used = *values;
+    for (lane, value) in used.iter_mut().enumerate() {
+        *value = if lanes >> lane & 1 == 1 {
+            *value
+        } else {
+            stand_in
+        };
+    }
+    used
+}
+
+/// The greatest distance of any of the points from `middle`.
+#[inline(always)]
+fn farthest_from(middle: Vec3, points: &[Lanes; 3]) -> f32 {
+    let mut squared = [0.0; PACKET_SIZE];
+    for axis in 0..3 {
+        for lane in 0..PACKET_SIZE {
+            let d = points[axis][lane] - middle[axis];
+            squared[lane] += d * d;
+        }
+    }
+    fold(squared, larger).sqrt()
+}
+
+/// The lanes of rays that are all numbers, with finite origins and directions: no other hits anything.
+#[inline(always)]
+fn sound_lanes(packet: &RayPacket) -> u32 {
+    // A product with zero is zero of what is finite, and NaN of all else.
+    let mut rest = [0.0; PACKET_SIZE];
+    for axis in 0..3 {
+        let (origin, direction) = (&packet.origin[axis], &packet.direction[axis]);
+        for (lane, rest) in rest.iter_mut().enumerate() {
+            *rest += 0.0 * origin[lane] + 0.0 * direction[lane];
+        }
+    }
+    let mut lanes = 0;
+    for (lane, rest) in rest.iter().enumerate() {
+        let has_ends = !packet.t_min[lane].is_nan() && !packet.t_max[lane].is_nan();
+        lanes |= u32::from(*rest == 0.0 && has_ends) << lane;
+    }
+    lanes
+}
+
+/// The lanes whose rays come near `bounds`; a superset of those that meet anything inside. All of them
+/// are sound: no component is NaN, origins and directions are finite.
 #[inline(always)]
 pub(in super::super) fn lanes_near(packet: &RayPacket, bounds: &Aabb) -> u32 {
     let mut near = packet.t_min;
@@ -110,7 +160,7 @@ pub(in super::super) fn lanes_near(packet: &RayPacket, bounds: &Aabb) -> u32 {
         let misses = near[lane] > far[lane];
         lanes |= u32::from(!misses) << lane;
     }
-    lanes & ((1 << packet.len()) - 1)
+    lanes & sound_lanes(packet) & ((1 << packet.len()) - 1)
 }
 
 impl Beam {
@@ -124,18 +174,7 @@ impl Beam {
         radius: f32,
         padding: f32,
     ) -> Option<Self> {
-        let first = lanes.trailing_zeros() as usize & (PACKET_SIZE - 1);
-        // Lanes out of use stand in for the first one.
-        let used = |values: &Lanes| -> Lanes {
-            let stand_in = values[first];
-            std::array::from_fn(|lane| {
-                if lanes >> lane & 1 == 1 {
-                    values[lane]
-                } else {
-                    stand_in
-                }
-            })
-        };
+        let first_lane = lanes.trailing_zeros() as usize & (PACKET_SIZE - 1);
         let mut beam = Self {
             origin_near: [0.0; 4],
             origin_far: [0.0; 4],
@@ -143,7 +182,7 @@ impl Beam {
             sign: [0.0; 4],
             near_side: [0; 3],
             padding,
-            t_min: fold(used(&packet.t_min), smaller),
+            t_min: fold(used(&packet.t_min, lanes, first_lane), smaller),
             center: Vec3::ZERO,
             axis: Vec3::ZERO,
             radius,
@@ -151,8 +190,11 @@ impl Beam {
             growth: 0.0,
         };
         let mut sound = beam.t_min >= 0.0;
+        let (mut origins, mut directions) = (packet.origin, packet.direction);
         for axis in 0..3 {
-            let inverse = inverses(&used(&packet.direction[axis]));
+            origins[axis] = used(&packet.origin[axis], lanes, first_lane);
+            directions[axis] = used(&packet.direction[axis], lanes, first_lane);
+            let inverse = inverses(&directions[axis]);
             let (low, high) = (fold(inverse, smaller), fold(inverse, larger));
             sound &= low.is_sign_negative() == high.is_sign_negative();
             sound &= low.is_finite() && high.is_finite();
@@ -160,8 +202,7 @@ impl Beam {
             beam.inverse[1][axis] = high;
             // Inverses order the other way round.
             beam.axis[axis] = 0.5 * (1.0 / low + 1.0 / high);
-            let origin = used(&packet.origin[axis]);
-            let (first, last) = (fold(origin, smaller), fold(origin, larger));
+            let (first, last) = (fold(origins[axis], smaller), fold(origins[axis], larger));
             sound &= first <= last;
             beam.center[axis] = 0.5 * (first + last);
             let backward = high < 0.0;
@@ -178,18 +219,8 @@ impl Beam {
             return None;
         }
         beam.axis = beam.axis.normalize_or_zero();
-        let apart = |v: &[Lanes; 3], middle: Vec3| {
-            let mut squared = [0.0; PACKET_SIZE];
-            for axis in 0..3 {
-                for (sum, value) in squared.iter_mut().zip(used(&v[axis])) {
-                    let d = value - middle[axis];
-                    *sum += d * d;
-                }
-            }
-            fold(squared, larger).sqrt()
-        };
-        let turn = apart(&packet.direction, beam.axis) + CONE_SLACK;
-        beam.spread = apart(&packet.origin, beam.center);
+        let turn = farthest_from(beam.axis, &directions) + CONE_SLACK;
+        beam.spread = farthest_from(beam.center, &origins);
         beam.growth = turn / (1.0 - turn);
         // Also false for NaN.
         (turn < WIDEST && beam.spread.is_finite()).then_some(beam)

@@ -1,7 +1,10 @@
 //! Packets in plain loops, for kernels that have no packet tests of their own.
 
+use super::super::hits::TreeHits;
+use super::beam::{fold, larger, smaller};
+use super::packet::{EnteredChildren, LaneSlabs, key_of};
 use super::portable::keys_of;
-use super::{Beam, Kernel, LaneHits, PacketKernel, PacketSphere, SLAB_SLACK};
+use super::{Beam, Kernel, PacketKernel, PacketSphere, SLAB_SLACK};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
@@ -47,17 +50,17 @@ fn distance<const FUSED: bool>(
 fn nearest<const FUSED: bool>(
     packet: &RayPacket,
     sphere: &PacketSphere,
-    hits: &mut LaneHits,
+    hits: &mut TreeHits,
 ) -> u32 {
     let mut tied = 0;
     for lane in 0..PACKET_SIZE {
-        let Some(t) = distance::<FUSED>(packet, lane, sphere, hits.limit[lane]) else {
+        let Some(t) = distance::<FUSED>(packet, lane, sphere, hits.t[lane]) else {
             continue;
         };
-        if t == hits.limit[lane] && hits.slot[lane] != LaneHits::NO_SLOT {
+        if t == hits.t[lane] && hits.slot[lane] != TreeHits::NO_SLOT {
             tied |= 1 << lane;
         } else {
-            hits.limit[lane] = t;
+            hits.t[lane] = t;
             hits.slot[lane] = sphere.slot;
         }
     }
@@ -65,10 +68,56 @@ fn nearest<const FUSED: bool>(
 }
 
 #[inline(always)]
-fn any<const FUSED: bool>(packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+fn any<const FUSED: bool>(packet: &RayPacket, sphere: &PacketSphere, hits: &TreeHits) -> u32 {
     (0..PACKET_SIZE)
-        .filter(|lane| distance::<FUSED>(packet, *lane, sphere, hits.limit[*lane]).is_some())
+        .filter(|lane| distance::<FUSED>(packet, *lane, sphere, hits.t[*lane]).is_some())
         .fold(0, |lanes, lane| lanes | 1 << lane)
+}
+
+/// Where rays cross the planes of a node along one axis: at `step * plane + base`, within `slack`.
+struct AxisSlabs {
+    step: [f32; PACKET_SIZE],
+    base: [f32; PACKET_SIZE],
+    slack: [f32; PACKET_SIZE],
+}
+
+impl AxisSlabs {
+    #[inline(always)]
+    fn new(rays: &LaneSlabs, node: &Node, axis: usize) -> Self {
+        let scale = f32::from_bits(u32::from(node.exponent[axis]) << 23);
+        let mut slabs = Self {
+            step: [0.0; PACKET_SIZE],
+            base: [0.0; PACKET_SIZE],
+            slack: [0.0; PACKET_SIZE],
+        };
+        for lane in 0..PACKET_SIZE {
+            let inverse = rays.inverse[axis][lane];
+            let step = scale * inverse;
+            let base = (node.origin[axis] - rays.origin[axis][lane]) * inverse;
+            let terms = step.abs() * 255.0 + base.abs();
+            slabs.step[lane] = step;
+            slabs.base[lane] = base;
+            slabs.slack[lane] = terms * SLAB_SLACK + rays.reach[axis][lane];
+        }
+        slabs
+    }
+
+    /// Shortens the rays to where they are within `half` of `middle`, in planes. A NaN is no bound.
+    #[inline(always)]
+    fn clip(
+        &self,
+        middle: f32,
+        half: f32,
+        near: &mut [f32; PACKET_SIZE],
+        far: &mut [f32; PACKET_SIZE],
+    ) {
+        for lane in 0..PACKET_SIZE {
+            let at = middle * self.step[lane] + self.base[lane];
+            let extent = half * self.step[lane].abs() + self.slack[lane];
+            near[lane] = larger(at - extent, near[lane]);
+            far[lane] = smaller(at + extent, far[lane]);
+        }
+    }
 }
 
 impl<K: LoopPackets> PacketKernel for K {
@@ -92,6 +141,56 @@ impl<K: LoopPackets> PacketKernel for K {
             }
         }
         keys_of(node, &near, &far)
+    }
+
+    fn test_node_with_lanes(
+        self,
+        rays: &LaneSlabs,
+        node: &Node,
+        alive: u32,
+        limits: &[f32; PACKET_SIZE],
+        entered: &mut EnteredChildren,
+    ) -> usize {
+        let slabs = [
+            AxisSlabs::new(rays, node, 0),
+            AxisSlabs::new(rays, node, 1),
+            AxisSlabs::new(rays, node, 2),
+        ];
+        let mut found = 0;
+        for slot in 0..node.child_count() {
+            let mut near = rays.t_min;
+            let mut far = *limits;
+            for (axis, slab) in slabs.iter().enumerate() {
+                let [first, second] = &node.planes[axis];
+                let (first, second) = (f32::from(first[slot]), f32::from(second[slot]));
+                let (middle, half) = (0.5 * (first + second), 0.5 * (second - first));
+                slab.clip(middle, half, &mut near, &mut far);
+            }
+            let mut any = false;
+            for lane in 0..PACKET_SIZE {
+                let is_entered = alive >> lane & 1 == 1 && near[lane] <= far[lane];
+                near[lane] = if is_entered {
+                    near[lane]
+                } else {
+                    f32::INFINITY
+                };
+                any |= is_entered;
+            }
+            if any {
+                entered.near[slot] = near;
+                entered.keys[found] = key_of(fold(near, smaller), slot);
+                found += 1;
+            }
+        }
+        found
+    }
+
+    fn lanes_within(self, near: &[f32; PACKET_SIZE], limits: &[f32; PACKET_SIZE]) -> u32 {
+        let mut lanes = 0;
+        for lane in 0..PACKET_SIZE {
+            lanes |= u32::from(near[lane] <= limits[lane]) << lane;
+        }
+        lanes
     }
 
     fn spheres_in_beam(
@@ -120,7 +219,7 @@ impl<K: LoopPackets> PacketKernel for K {
         self,
         packet: &RayPacket,
         sphere: &PacketSphere,
-        hits: &mut LaneHits,
+        hits: &mut TreeHits,
     ) -> u32 {
         if K::FUSED {
             nearest::<true>(packet, sphere, hits)
@@ -129,7 +228,7 @@ impl<K: LoopPackets> PacketKernel for K {
         }
     }
 
-    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &TreeHits) -> u32 {
         if K::FUSED {
             any::<true>(packet, sphere, hits)
         } else {

@@ -20,8 +20,8 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(super) use beam::{Beam, lanes_near};
-pub(super) use packet::{LaneHits, PacketKernel, PacketSphere};
+pub(super) use beam::{Beam, fold, lanes_near, larger};
+pub(super) use packet::{EnteredChildren, LaneSlabs, PacketKernel, PacketSphere};
 
 /// Instructions to trace with.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -4,6 +4,7 @@ use super::*;
 use crate::accel::topology::{Implicit, Link};
 use crate::accel::traverse::TreeHit;
 use crate::accel::wide::WideTree;
+use crate::accel::{Coherence, TreeHits};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::Node;
 
@@ -79,29 +80,39 @@ pub(super) fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPac
 /// Returns how many rays hit.
 #[track_caller]
 pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> usize {
-    let hits = tree.nearest_packet(packet);
-    let met = tree.any_hit_packet(packet);
-    for (lane, hit) in hits.iter().enumerate() {
-        let ray = (lane < packet.len()).then(|| packet.ray(lane));
-        let alone = ray.and_then(|ray| tree.nearest(&ray));
-        // Which of several copies is found depends on the leaves that were visited.
-        let sphere = |slot| {
-            if tree.has_copies {
-                tree.particle(slot)
-            } else {
-                slot
-            }
-        };
-        let bits = |hit: &Option<TreeHit>| hit.map(|hit| (hit.t.to_bits(), sphere(hit.slot)));
-        assert_eq!(bits(hit), bits(&alone), "{what}, lane {lane} of {packet:?}");
-        let any = ray.is_some_and(|ray| tree.any_hit(&ray));
-        assert_eq!(
-            met >> lane & 1 == 1,
-            any,
-            "{what}, lane {lane} of {packet:?}"
-        );
+    // Which of several copies is found depends on the leaves that were visited.
+    let sphere = |slot| {
+        if tree.has_copies {
+            tree.particle(slot)
+        } else {
+            slot
+        }
+    };
+    let bits = |hit: TreeHit| (hit.t.to_bits(), sphere(hit.slot));
+    let alone: Vec<_> = packet
+        .rays()
+        .map(|ray| (tree.nearest(&ray).map(bits), tree.any_hit(&ray)))
+        .collect();
+    for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+        let mut hits = TreeHits::default();
+        tree.nearest_lanes(packet, coherence, &mut hits);
+        let occluded = tree.occluded_lanes(packet, coherence);
+        for lane in 0..PACKET_SIZE {
+            let (t, slot) = (hits.t[lane], hits.slot[lane]);
+            let is_hit = slot != TreeHits::NO_SLOT;
+            assert_eq!(is_hit, hits.mask() >> lane & 1 == 1);
+            let together = (
+                is_hit.then(|| bits(TreeHit { t, slot })),
+                occluded >> lane & 1 == 1,
+            );
+            let expected = alone.get(lane).copied().unwrap_or((None, false));
+            assert_eq!(
+                together, expected,
+                "{what}, {coherence:?}, lane {lane} of {packet:?}"
+            );
+        }
     }
-    hits.iter().flatten().count()
+    alone.iter().filter(|(hit, _)| hit.is_some()).count()
 }
 
 /// The same tree with links.
@@ -172,16 +183,15 @@ fn an_empty_packet_finds_nothing() {
     let scene = Scene::common("one", vec![Vec3::ZERO], 1.0);
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());
-    let nothing = RayPacket::default();
-    assert!(
-        builder
-            .tree()
-            .view()
-            .nearest_packet(&nothing)
-            .iter()
-            .all(Option::is_none)
-    );
-    assert_eq!(builder.tree().view().any_hit_packet(&nothing), 0);
+    let view = builder.tree().view();
+    // Also one that held rays before.
+    let mut emptied = RayPacket::default();
+    emptied.push(&Ray::new(Vec3::X * -3.0, Vec3::X));
+    assert_eq!(check_packet(&view, &emptied, "one ray"), 1);
+    emptied.clear();
+    for nothing in [RayPacket::default(), emptied] {
+        assert_eq!(check_packet(&view, &nothing, "no rays"), 0);
+    }
 }
 
 #[test]
@@ -199,9 +209,15 @@ fn ties_in_a_packet_go_to_the_lower_index() {
     }
     for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
         builder.tree_mut().set_simd(level);
-        for hit in builder.tree().view().nearest_packet(&packet) {
-            let slot = hit.expect("aimed at it").slot;
-            assert_eq!(builder.tree().view().particle(slot), 0, "{level:?}");
+        let view = builder.tree().view();
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let mut hits = TreeHits::default();
+            view.nearest_lanes(&packet, coherence, &mut hits);
+            assert_eq!(
+                hits.slot.map(|slot| view.particle(slot)),
+                [0; PACKET_SIZE],
+                "{level:?} {coherence:?}"
+            );
         }
     }
 }

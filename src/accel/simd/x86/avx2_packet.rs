@@ -2,12 +2,13 @@
 
 use std::arch::x86_64::*;
 
-use super::super::{Beam, LaneHits, PacketKernel, PacketSphere};
+use super::super::super::hits::TreeHits;
+use super::super::packet::{EnteredChildren, LaneSlabs};
+use super::super::{Beam, PacketKernel, PacketSphere};
 use super::avx2::{Avx2, packed_keys};
-use super::beam;
+use super::{avx2_lanes, beam};
 use crate::ray::{PACKET_SIZE, RayPacket};
-use spherule_formats::blocks::Node;
-use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
+use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii, Node};
 
 /// The crossing of each ray in lanes `half * 8 .. half * 8 + 8` with `sphere` that counts, and the
 /// lanes where it lies in `t_min..=limit`. The operations on each pair of ray and sphere are those of
@@ -19,7 +20,7 @@ use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 unsafe fn distances(
     packet: &RayPacket,
     sphere: &PacketSphere,
-    hits: &LaneHits,
+    hits: &TreeHits,
     half: usize,
 ) -> (__m256, __m256) {
     let load = |lanes: &[f32; PACKET_SIZE]| {
@@ -53,7 +54,7 @@ unsafe fn distances(
         let ahead = _mm256_cmp_ps::<_CMP_GE_OQ>(near, t_min);
         let t = _mm256_blendv_ps(far, near, ahead);
         let after = _mm256_cmp_ps::<_CMP_GE_OQ>(t, t_min);
-        let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, load(&hits.limit));
+        let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, load(&hits.t));
         (t, _mm256_and_ps(hit, _mm256_and_ps(after, before)))
     }
 }
@@ -104,6 +105,25 @@ unsafe fn spheres_in_beam(
 
 impl PacketKernel for Avx2 {
     #[inline(always)]
+    fn test_node_with_lanes(
+        self,
+        rays: &LaneSlabs,
+        node: &Node,
+        alive: u32,
+        limits: &[f32; PACKET_SIZE],
+        entered: &mut EnteredChildren,
+    ) -> usize {
+        // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
+        unsafe { avx2_lanes::test_node(rays, node, alive, limits, entered) }
+    }
+
+    #[inline(always)]
+    fn lanes_within(self, near: &[f32; PACKET_SIZE], limits: &[f32; PACKET_SIZE]) -> u32 {
+        // SAFETY: this kernel is only used inside functions with AVX2.
+        unsafe { avx2_lanes::within(near, limits) }
+    }
+
+    #[inline(always)]
     fn test_node_with_beam(self, beam: &Beam, node: &Node, limit: f32) -> (usize, __m256i) {
         // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
         unsafe {
@@ -132,7 +152,7 @@ impl PacketKernel for Avx2 {
         self,
         packet: &RayPacket,
         sphere: &PacketSphere,
-        hits: &mut LaneHits,
+        hits: &mut TreeHits,
     ) -> u32 {
         let mut tied_lanes = 0;
         for half in 0..2 {
@@ -143,11 +163,11 @@ impl PacketKernel for Avx2 {
                 if _mm256_movemask_ps(lanes) == 0 {
                     continue;
                 }
-                let limit_at = hits.limit.as_mut_ptr().add(half * 8);
+                let limit_at = hits.t.as_mut_ptr().add(half * 8);
                 let slot_at = hits.slot.as_mut_ptr().add(half * 8).cast::<i32>();
                 let limit = _mm256_loadu_ps(limit_at);
                 let held = _mm256_loadu_si256(slot_at.cast());
-                let none = _mm256_set1_epi32(LaneHits::NO_SLOT.cast_signed());
+                let none = _mm256_set1_epi32(TreeHits::NO_SLOT.cast_signed());
                 let equal = _mm256_and_ps(lanes, _mm256_cmp_ps::<_CMP_EQ_OQ>(t, limit));
                 let empty = _mm256_castsi256_ps(_mm256_cmpeq_epi32(held, none));
                 let tied = _mm256_andnot_ps(empty, equal);
@@ -162,11 +182,12 @@ impl PacketKernel for Avx2 {
     }
 
     #[inline(always)]
-    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &TreeHits) -> u32 {
         // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
-        let half = |half: usize| unsafe {
-            _mm256_movemask_ps(distances(packet, sphere, hits, half).1).cast_unsigned()
-        };
-        half(0) | half(1) << 8
+        unsafe {
+            let low = distances(packet, sphere, hits, 0).1;
+            let high = distances(packet, sphere, hits, 1).1;
+            (_mm256_movemask_ps(low) | _mm256_movemask_ps(high) << 8).cast_unsigned()
+        }
     }
 }

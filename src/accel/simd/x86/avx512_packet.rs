@@ -2,13 +2,14 @@
 
 use std::arch::x86_64::*;
 
-use super::super::{Beam, LaneHits, PacketKernel, PacketSphere};
+use super::super::super::hits::TreeHits;
+use super::super::packet::{EnteredChildren, LaneSlabs, key_of};
+use super::super::{Beam, PacketKernel, PacketSphere, SLAB_SLACK};
 use super::avx512::Avx512;
 use super::beam;
-use super::lanes::keys_of;
-use crate::ray::RayPacket;
-use spherule_formats::blocks::Node;
-use spherule_formats::blocks::{Block, BlockRadii};
+use super::lanes::{ChildBoxes, keys_of};
+use crate::ray::{PACKET_SIZE, RayPacket};
+use spherule_formats::blocks::{Block, BlockRadii, Node};
 
 /// The crossing of each ray with `sphere` that counts, and the lanes where it lies in
 /// `t_min..=limit`. The operations on each pair of ray and sphere are those of the test of one ray.
@@ -19,7 +20,7 @@ use spherule_formats::blocks::{Block, BlockRadii};
 unsafe fn distances(
     packet: &RayPacket,
     sphere: &PacketSphere,
-    hits: &LaneHits,
+    hits: &TreeHits,
 ) -> (__m512, __mmask16) {
     let load = |lanes: &[f32; 16]| {
         // SAFETY: AVX-512 by contract; 16 values are read from an array of 16.
@@ -52,12 +53,119 @@ unsafe fn distances(
         let ahead = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(near, t_min);
         let t = _mm512_mask_blend_ps(ahead, far, near);
         let after = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(hit, t, t_min);
-        let before = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(after, t, load(&hits.limit));
+        let before = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(after, t, load(&hits.t));
         (t, before)
     }
 }
 
+/// Where 16 rays cross the planes of a node along one axis: at `step * plane + base`, within `slack`.
+#[derive(Clone, Copy)]
+struct AxisSlabs {
+    step: __m512,
+    base: __m512,
+    slack: __m512,
+}
+
+impl AxisSlabs {
+    /// # Safety
+    /// The caller's machine has AVX-512 F and DQ.
+    #[inline(always)]
+    unsafe fn new(rays: &LaneSlabs, node: &Node, axis: usize) -> Self {
+        let scale = f32::from_bits(u32::from(node.exponent[axis]) << 23);
+        // SAFETY: AVX-512 by contract; the loads are of arrays of 16.
+        unsafe {
+            let inverse = _mm512_loadu_ps(rays.inverse[axis].as_ptr());
+            let origin = _mm512_loadu_ps(rays.origin[axis].as_ptr());
+            let reach = _mm512_loadu_ps(rays.reach[axis].as_ptr());
+            let step = _mm512_mul_ps(_mm512_set1_ps(scale), inverse);
+            let to_node = _mm512_sub_ps(_mm512_set1_ps(node.origin[axis]), origin);
+            let base = _mm512_mul_ps(to_node, inverse);
+            let widest = _mm512_set1_ps(255.0);
+            let terms = _mm512_fmadd_ps(_mm512_abs_ps(step), widest, _mm512_abs_ps(base));
+            let slack = _mm512_fmadd_ps(terms, _mm512_set1_ps(SLAB_SLACK), reach);
+            Self { step, base, slack }
+        }
+    }
+}
+
+/// [`PacketKernel::test_node_with_lanes`].
+///
+/// # Safety
+/// The caller's machine has AVX-512 F, BW, DQ and VL.
+#[inline(always)]
+unsafe fn test_node_with_lanes(
+    rays: &LaneSlabs,
+    node: &Node,
+    alive: u32,
+    limits: &[f32; PACKET_SIZE],
+    entered: &mut EnteredChildren,
+) -> usize {
+    // SAFETY: AVX-512 by contract; loads and stores are of arrays of 16.
+    unsafe {
+        let boxes = ChildBoxes::of(node);
+        let slabs = [
+            AxisSlabs::new(rays, node, 0),
+            AxisSlabs::new(rays, node, 1),
+            AxisSlabs::new(rays, node, 2),
+        ];
+        let start = _mm512_loadu_ps(rays.t_min.as_ptr());
+        let limit = _mm512_loadu_ps(limits.as_ptr());
+        let never = _mm512_set1_ps(f32::INFINITY);
+        #[expect(clippy::cast_possible_truncation, reason = "16 lanes")]
+        let alive = alive as __mmask16;
+        let mut found = 0;
+        for slot in 0..node.child_count() {
+            // Shorten all rays to where they are in the child's box
+            let (mut near, mut far) = (start, limit);
+            for (axis, slab) in slabs.iter().enumerate() {
+                let AxisSlabs { step, base, slack } = *slab;
+                let middle = _mm512_set1_ps(boxes.middle[axis][slot]);
+                let half = _mm512_set1_ps(boxes.half[axis][slot]);
+                let at = _mm512_fmadd_ps(middle, step, base);
+                let extent = _mm512_fmadd_ps(half, _mm512_abs_ps(step), slack);
+                // A NaN yields the second operand: no bound.
+                near = _mm512_max_ps(_mm512_sub_ps(at, extent), near);
+                far = _mm512_min_ps(_mm512_add_ps(at, extent), far);
+            }
+            let lanes = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(alive, near, far);
+            if lanes == 0 {
+                continue;
+            }
+            // Keep where they enter, and the first of them as the child's key
+            let near = _mm512_mask_blend_ps(lanes, never, near);
+            _mm512_storeu_ps(entered.near[slot].as_mut_ptr(), near);
+            entered.keys[found] = key_of(_mm512_reduce_min_ps(near), slot);
+            found += 1;
+        }
+        found
+    }
+}
+
 impl PacketKernel for Avx512 {
+    #[inline(always)]
+    fn test_node_with_lanes(
+        self,
+        rays: &LaneSlabs,
+        node: &Node,
+        alive: u32,
+        limits: &[f32; PACKET_SIZE],
+        entered: &mut EnteredChildren,
+    ) -> usize {
+        // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL.
+        unsafe { test_node_with_lanes(rays, node, alive, limits, entered) }
+    }
+
+    #[inline(always)]
+    fn lanes_within(self, near: &[f32; PACKET_SIZE], limits: &[f32; PACKET_SIZE]) -> u32 {
+        // SAFETY: this kernel is only used inside functions with AVX-512; the loads are of arrays of
+        // 16.
+        unsafe {
+            let near = _mm512_loadu_ps(near.as_ptr());
+            let limits = _mm512_loadu_ps(limits.as_ptr());
+            u32::from(_mm512_cmp_ps_mask::<_CMP_LE_OQ>(near, limits))
+        }
+    }
+
     #[inline(always)]
     fn test_node_with_beam(self, beam: &Beam, node: &Node, limit: f32) -> (usize, __m256i) {
         // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL.
@@ -114,7 +222,7 @@ impl PacketKernel for Avx512 {
         self,
         packet: &RayPacket,
         sphere: &PacketSphere,
-        hits: &mut LaneHits,
+        hits: &mut TreeHits,
     ) -> u32 {
         // SAFETY: this kernel is only used inside functions with AVX-512; loads and stores are of
         // arrays of 16.
@@ -123,21 +231,21 @@ impl PacketKernel for Avx512 {
             if lanes == 0 {
                 return 0;
             }
-            let limit = _mm512_loadu_ps(hits.limit.as_ptr());
+            let limit = _mm512_loadu_ps(hits.t.as_ptr());
             let held = _mm512_loadu_si512(hits.slot.as_ptr().cast());
-            let none = _mm512_set1_epi32(LaneHits::NO_SLOT.cast_signed());
+            let none = _mm512_set1_epi32(TreeHits::NO_SLOT.cast_signed());
             let equal = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(lanes, t, limit);
             let tied = _mm512_mask_cmpneq_epi32_mask(equal, held, none);
             let nearer = lanes & !tied;
             let slot = _mm512_set1_epi32(sphere.slot.cast_signed());
-            _mm512_mask_storeu_ps(hits.limit.as_mut_ptr(), nearer, t);
+            _mm512_mask_storeu_ps(hits.t.as_mut_ptr(), nearer, t);
             _mm512_mask_storeu_epi32(hits.slot.as_mut_ptr().cast(), nearer, slot);
             u32::from(tied)
         }
     }
 
     #[inline(always)]
-    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &LaneHits) -> u32 {
+    fn any_of_packet(self, packet: &RayPacket, sphere: &PacketSphere, hits: &TreeHits) -> u32 {
         // SAFETY: this kernel is only used inside functions with AVX-512.
         unsafe { u32::from(distances(packet, sphere, hits).1) }
     }

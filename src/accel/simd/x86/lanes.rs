@@ -3,7 +3,7 @@
 use std::arch::x86_64::*;
 
 use super::super::LINE;
-use spherule_formats::blocks::WIDTH;
+use spherule_formats::blocks::{Node, WIDTH};
 
 /// Eight planes as floats.
 ///
@@ -13,6 +13,42 @@ use spherule_formats::blocks::WIDTH;
 pub(super) unsafe fn planes(bytes: &[u8; WIDTH]) -> __m256 {
     // SAFETY: eight bytes are read from an array of eight; AVX2 by contract.
     unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.as_ptr().cast()))) }
+}
+
+/// The children's boxes in planes, as [`PacketKernel::test_node_with_lanes`] has them.
+///
+/// [`PacketKernel::test_node_with_lanes`]: super::super::PacketKernel::test_node_with_lanes
+#[repr(align(32))]
+pub(super) struct ChildBoxes {
+    /// Middles, per axis and slot.
+    pub(super) middle: [[f32; WIDTH]; 3],
+    /// Half widths.
+    pub(super) half: [[f32; WIDTH]; 3],
+}
+
+impl ChildBoxes {
+    /// # Safety
+    /// The caller's machine has AVX2.
+    #[inline(always)]
+    pub(super) unsafe fn of(node: &Node) -> Self {
+        let mut boxes = Self {
+            middle: [[0.0; WIDTH]; 3],
+            half: [[0.0; WIDTH]; 3],
+        };
+        for axis in 0..3 {
+            // SAFETY: AVX2 by contract; stores fill arrays of eight.
+            unsafe {
+                let first = planes(&node.planes[axis][0]);
+                let second = planes(&node.planes[axis][1]);
+                let half = _mm256_set1_ps(0.5);
+                let middle = _mm256_mul_ps(_mm256_add_ps(first, second), half);
+                let half = _mm256_mul_ps(_mm256_sub_ps(second, first), half);
+                _mm256_storeu_ps(boxes.middle[axis].as_mut_ptr(), middle);
+                _mm256_storeu_ps(boxes.half[axis].as_mut_ptr(), half);
+            }
+        }
+        boxes
+    }
 }
 
 /// One lane (chosen by `SHUFFLE`) in all eight.

@@ -7,6 +7,7 @@
 use super::{KernelTask, SimdLevel, Supported};
 
 mod avx2;
+mod avx2_lanes;
 mod avx2_packet;
 mod avx512;
 mod avx512_packet;

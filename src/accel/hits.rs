@@ -1,0 +1,111 @@
+//! What the rays of a packet hit, lane by lane.
+
+use super::simd::{fold, larger};
+use crate::ray::{PACKET_SIZE, RayPacket};
+
+/// How the rays of a packet lie. It decides how they are traced, never what they hit.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Coherence {
+    /// Close together and nearly the same direction: one beam around them tests boxes and spheres.
+    Coherent,
+    /// Any rays: each box is tested with each ray.
+    Incoherent,
+}
+
+/// What each ray of a packet hits first: distance and slot in tree order.
+///
+/// During a traversal `t` is the farthest distance that still counts, inclusive, and negative for
+/// rays that are finished.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub struct TreeHits {
+    /// Distances along the rays; unspecified where nothing was hit.
+    pub t: [f32; PACKET_SIZE],
+    /// Slots of the particles in tree order, or [`TreeHits::NO_SLOT`].
+    pub slot: [u32; PACKET_SIZE],
+}
+
+impl Default for TreeHits {
+    fn default() -> Self {
+        Self {
+            t: [-1.0; PACKET_SIZE],
+            slot: [Self::NO_SLOT; PACKET_SIZE],
+        }
+    }
+}
+
+impl TreeHits {
+    /// The slot of a ray that hits nothing.
+    pub const NO_SLOT: u32 = u32::MAX;
+
+    /// The lanes that hit, a bit each.
+    #[inline(always)]
+    pub fn mask(&self) -> u32 {
+        let mut mask = 0;
+        for (lane, slot) in self.slot.iter().enumerate() {
+            mask |= u32::from(*slot != Self::NO_SLOT) << lane;
+        }
+        mask
+    }
+
+    /// Before a traversal: the rays in `lanes` count up to their ends, the others are finished.
+    #[inline(always)]
+    pub(super) fn start(&mut self, packet: &RayPacket, lanes: u32) {
+        for (lane, limit) in self.t.iter_mut().enumerate() {
+            // The end is exclusive for the ray and inclusive for ties.
+            let end = packet.t_max[lane].next_down();
+            *limit = if lanes >> lane & 1 == 1 { end } else { -1.0 };
+        }
+        self.slot = [Self::NO_SLOT; PACKET_SIZE];
+    }
+
+    /// The farthest distance that counts for any ray.
+    #[inline(always)]
+    pub(super) fn farthest(&self) -> f32 {
+        fold(self.t, larger)
+    }
+
+    /// Nothing counts any more for the rays in `lanes`.
+    #[inline(always)]
+    pub(super) fn finish(&mut self, lanes: u32) {
+        for (lane, limit) in self.t.iter_mut().enumerate() {
+            if lanes >> lane & 1 == 1 {
+                *limit = -1.0;
+            }
+        }
+    }
+}
+
+/// The lanes of a mask, lowest first. A type instead of a closure, because all of a kernel's code must
+/// be inlined to get the kernel's instructions.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct LanesOf(pub(super) u32);
+
+impl Iterator for LanesOf {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize & (PACKET_SIZE - 1);
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_mask_has_a_bit_for_each_lane_that_hit() {
+        let mut hits = TreeHits::default();
+        assert_eq!(hits.mask(), 0);
+        hits.slot[3] = 0;
+        hits.slot[15] = 7;
+        assert_eq!(hits.mask(), 1 << 3 | 1 << 15);
+        assert_eq!(LanesOf(hits.mask()).collect::<Vec<_>>(), [3, 15]);
+    }
+}
