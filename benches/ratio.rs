@@ -21,7 +21,8 @@ mod support;
 use stored::{Encoding, OwnedLeaves};
 use support::obvhs::ObvhsBuilder;
 use support::rays::{
-    trace_primary, trace_primary_packets, trace_reflection, trace_shadow, trace_shadow_packets,
+    trace_primary, trace_primary_packets, trace_reflection, trace_reflection_packets, trace_shadow,
+    trace_shadow_packets,
 };
 use support::{Case, build_ours, is_quick_run, particle_counts, structures};
 
@@ -198,6 +199,19 @@ impl Table<'_> {
             || trace_reflection(obvhs, points),
         );
         self.print_row(name, "reflection, Mrays/s", &turns.text(unit));
+        let turns = Turns::take(
+            self.rounds,
+            || trace_reflection_packets(tree, points),
+            || trace_reflection(obvhs, points),
+        );
+        self.print_row(name, "in hybrid packets", &turns.text(unit));
+        // What incoherent packets gain: single rays of the same tree take the other turn.
+        let turns = Turns::take(
+            self.rounds,
+            || trace_reflection_packets(tree, points),
+            || trace_reflection(tree, points),
+        );
+        self.print_row(name, "  against ours alone", &turns.text(unit));
     }
 
     fn print_row(&self, name: &str, what: &str, figures: &str) {

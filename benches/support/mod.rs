@@ -97,6 +97,11 @@ impl Case {
             rays::trace_shadow_packets(tree, &self.points),
             "packets"
         );
+        assert_eq!(
+            hits,
+            rays::trace_reflection_packets(tree, &self.points),
+            "hybrid packets"
+        );
         builder
     }
 }
