@@ -26,6 +26,7 @@ pub mod accel;
 pub mod cli;
 pub mod conversion;
 pub mod manifest;
+pub mod math;
 mod mishap;
 pub mod output;
 pub mod pipeline;

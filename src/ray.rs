@@ -79,6 +79,21 @@ impl RayPacket {
         self.len += 1;
     }
 
+    /// Makes it a packet of `len` rays, whose components are set one by one.
+    #[inline(always)]
+    pub(crate) fn set_len(&mut self, len: usize) {
+        debug_assert!(len <= PACKET_SIZE);
+        self.len = len;
+    }
+
+    /// Rays to be filled in: without an end, and none of them counts yet.
+    #[inline(always)]
+    pub(crate) fn reset(&mut self) {
+        self.t_min = [0.0; PACKET_SIZE];
+        self.t_max = [f32::INFINITY; PACKET_SIZE];
+        self.len = 0;
+    }
+
     /// Removes all rays.
     pub fn clear(&mut self) {
         self.len = 0;

@@ -6,9 +6,11 @@ use std::cmp::Ordering;
 use glam::Vec3;
 
 use super::Aabb;
+use super::hits::TreeHits;
 use super::leaves::{Coded, Exact, Leaves};
-use super::simd::{KernelTask, PacketKernel, SimdLevel, Supported};
+use super::simd::{KernelTask, PacketKernel, RunTask, SimdLevel, Supported};
 use super::topology::{Implicit, Link, Linked, Topology};
+use crate::math::{LANES, Lanes, Lanes3, lanes_in, set_lane3};
 use spherule_formats::blocks::{BLOCK_SIZE, Node, StoredBlocks, StoredRadii};
 
 /// Levels that a code of an implicit tree can tell apart.
@@ -47,6 +49,12 @@ pub struct TreeView<'a> {
     /// Box of the spheres.
     pub(super) bounds: Aabb,
     pub(super) simd: Supported,
+}
+
+/// Block and lane of a slot.
+#[inline(always)]
+fn place_of(slot: u32) -> (usize, usize) {
+    (slot as usize / BLOCK_SIZE, slot as usize % BLOCK_SIZE)
 }
 
 /// Who comes first of two particles at equal distance.
@@ -104,7 +112,7 @@ impl<'a> TreeView<'a> {
     /// # Panics
     /// If there is no such slot.
     pub fn sphere(&self, slot: u32) -> (Vec3, f32) {
-        let (block, lane) = (slot as usize / BLOCK_SIZE, slot as usize % BLOCK_SIZE);
+        let (block, lane) = place_of(slot);
         let center = match self.blocks {
             StoredBlocks::F32(blocks) => blocks[block].center(lane),
             StoredBlocks::Q16(blocks) => Coded::new(blocks, self.leaf_nodes()).center(block, lane),
@@ -117,6 +125,32 @@ impl<'a> TreeView<'a> {
             StoredRadii::U8 { codes, low, step } => low + f32::from(codes[block][lane]) * step,
         };
         (center, radius)
+    }
+
+    /// Centres and radii of the spheres in the slots of `lanes`.
+    ///
+    /// # Panics
+    /// If there is no such slot.
+    pub(crate) fn gather_spheres(
+        &self,
+        hits: &TreeHits,
+        lanes: u32,
+        centers: &mut Lanes3,
+        radii: &mut Lanes,
+    ) {
+        if let (StoredBlocks::F32(blocks), StoredRadii::None) = (self.blocks, self.radii) {
+            *radii = [self.radius; LANES];
+            for lane in lanes_in(lanes) {
+                let (block, place) = place_of(hits.slot[lane]);
+                set_lane3(centers, lane, blocks[block].center(place));
+            }
+            return;
+        }
+        for lane in lanes_in(lanes) {
+            let (center, radius) = self.sphere(hits.slot[lane]);
+            set_lane3(centers, lane, center);
+            radii[lane] = radius;
+        }
     }
 
     /// Whether a particle may be met in several slots, so that [`TreeView::visit_crossings`] brings the

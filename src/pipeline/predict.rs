@@ -16,7 +16,7 @@ use spherule_formats::sequence::Sequence;
 
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
-use crate::render::{Film, band_bytes};
+use crate::render::{Film, scratch_bytes};
 use crate::report::Bytes;
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
@@ -376,7 +376,7 @@ impl<'a> MemoryModel<'a> {
             particles: self.shading(frame),
             tree,
             surface: surface.kept,
-            images: film + film_before + band_bytes(render) * threads,
+            images: film + film_before + scratch_bytes() * threads,
             encoding: encoding_before,
             ..idle
         };

@@ -3,10 +3,7 @@
 use glam::Vec3;
 use thiserror::Error;
 
-use super::{
-    aov::{DataSample, NO_ID},
-    tile::RenderedTile,
-};
+use super::aov::{DataSample, NO_ID};
 
 /// Which planes a film has beside `R G B A`, which are always there.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -173,16 +170,15 @@ fn chunks<T>(plane: &mut Option<Vec<T>>, length: usize) -> Chunks<'_, T> {
     plane.as_mut().map(|values| values.chunks_mut(length))
 }
 
-fn next<'a, T>(chunks: &mut Chunks<'a, T>) -> Option<&'a mut [T]> {
-    chunks.as_mut().and_then(Iterator::next)
+fn next<T>(pieces: &mut Option<impl Iterator<Item = T>>) -> Option<T> {
+    pieces.as_mut().and_then(Iterator::next)
 }
 
 /// Some whole rows of every plane.
 pub(super) struct Band<'a> {
     /// First row of the image in this band.
-    pub(super) top: u32,
-    /// Rows in this band.
-    pub(super) rows: u32,
+    top: u32,
+    rows: u32,
     width: u32,
     color: &'a mut [[f32; 4]],
     depth: Option<&'a mut [f32]>,
@@ -194,36 +190,95 @@ pub(super) struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Puts a finished tile of this band in its place.
-    pub(super) fn store(&mut self, tile: &RenderedTile) {
-        let width = tile.width as usize;
-        for (row, pixels) in tile.pixels.chunks(width).enumerate() {
-            let start = row * self.width as usize + tile.left as usize;
-            let data = || pixels.iter().map(|(_, data)| data);
-            let colors = pixels.iter().map(|(color, _)| *color);
-            for (slot, color) in self.color[start..].iter_mut().zip(colors) {
-                *slot = color;
-            }
-            fill(&mut self.depth, start, data(), |d| d.z);
-            fill(&mut self.normal, start, data(), |d| d.normal);
-            fill(&mut self.position, start, data(), |d| d.position);
-            fill(&mut self.velocity, start, data(), |d| d.velocity);
-            fill(&mut self.albedo, start, data(), |d| d.albedo);
-            fill(&mut self.id, start, data(), |d| d.id);
-        }
+    /// Cuts the band into tiles of `side` columns, from the left; the last may have fewer.
+    pub(super) fn tiles(&mut self, side: u32) -> Vec<FilmTile<'_>> {
+        let (width, columns) = (self.width as usize, side as usize);
+        let mut color = rows_of_tiles(self.color, width, columns).into_iter();
+        let mut depth = planes(&mut self.depth, width, columns);
+        let mut normal = planes(&mut self.normal, width, columns);
+        let mut position = planes(&mut self.position, width, columns);
+        let mut velocity = planes(&mut self.velocity, width, columns);
+        let mut albedo = planes(&mut self.albedo, width, columns);
+        let mut id = planes(&mut self.id, width, columns);
+        let tile = |left: u32| FilmTile {
+            left,
+            top: self.top,
+            width: side.min(self.width - left),
+            rows: self.rows,
+            color: color.next().unwrap_or_default(),
+            depth: next(&mut depth),
+            normal: next(&mut normal),
+            position: next(&mut position),
+            velocity: next(&mut velocity),
+            albedo: next(&mut albedo),
+            id: next(&mut id),
+        };
+        (0..self.width).step_by(columns).map(tile).collect()
     }
 }
 
-fn fill<'d, T>(
-    plane: &mut Option<&mut [T]>,
-    start: usize,
-    data: impl Iterator<Item = &'d DataSample>,
-    value: impl Fn(&DataSample) -> T,
-) {
-    if let Some(plane) = plane {
-        for (slot, sample) in plane[start..].iter_mut().zip(data) {
-            *slot = value(sample);
+/// The rows of one plane inside a tile.
+type Rows<'a, T> = Vec<&'a mut [T]>;
+
+/// The rows of each tile of `columns` columns, out of a band of a plane.
+fn rows_of_tiles<T>(band: &mut [T], width: usize, columns: usize) -> Vec<Rows<'_, T>> {
+    let mut tiles = Vec::new();
+    tiles.resize_with(width.div_ceil(columns), Rows::new);
+    for row in band.chunks_mut(width) {
+        for (tile, piece) in tiles.iter_mut().zip(row.chunks_mut(columns)) {
+            tile.push(piece);
         }
+    }
+    tiles
+}
+
+type Pieces<'a, T> = Option<std::vec::IntoIter<Rows<'a, T>>>;
+
+fn planes<'a, T>(plane: &'a mut Option<&mut [T]>, width: usize, columns: usize) -> Pieces<'a, T> {
+    let plane = plane.as_mut();
+    plane.map(|plane| rows_of_tiles(plane, width, columns).into_iter())
+}
+
+/// A rectangle of every plane, to be filled by one thread.
+pub(super) struct FilmTile<'a> {
+    /// First column of the image in this tile.
+    pub(super) left: u32,
+    /// First row.
+    pub(super) top: u32,
+    /// Pixels across.
+    pub(super) width: u32,
+    /// Pixels down.
+    pub(super) rows: u32,
+    color: Rows<'a, [f32; 4]>,
+    depth: Option<Rows<'a, f32>>,
+    normal: Option<Rows<'a, Vec3>>,
+    position: Option<Rows<'a, Vec3>>,
+    velocity: Option<Rows<'a, Vec3>>,
+    albedo: Option<Rows<'a, Vec3>>,
+    id: Option<Rows<'a, u32>>,
+}
+
+impl FilmTile<'_> {
+    /// Stores the colour of the pixel in `column` and `row` of the tile.
+    pub(super) fn set_color(&mut self, column: u32, row: u32, color: [f32; 4]) {
+        self.color[row as usize][column as usize] = color;
+    }
+
+    /// Stores the data of the pixel in `column` and `row` of the tile, as far as there are planes for it.
+    pub(super) fn set_data(&mut self, column: u32, row: u32, data: &DataSample) {
+        let at = (column as usize, row as usize);
+        put(&mut self.depth, at, data.z);
+        put(&mut self.normal, at, data.normal);
+        put(&mut self.position, at, data.position);
+        put(&mut self.velocity, at, data.velocity);
+        put(&mut self.albedo, at, data.albedo);
+        put(&mut self.id, at, data.id);
+    }
+}
+
+fn put<T>(plane: &mut Option<Rows<'_, T>>, (column, row): (usize, usize), value: T) {
+    if let Some(rows) = plane {
+        rows[row][column] = value;
     }
 }
 
@@ -245,12 +300,44 @@ mod tests {
     }
 
     #[test]
-    fn bands_cover_the_image_once() {
-        let mut film = Film::new(5, 35, Channels::ALL);
-        let bands = film.bands_mut(16);
-        let rows: Vec<_> = bands.iter().map(|b| (b.top, b.rows)).collect();
-        assert_eq!(rows, [(0, 16), (16, 16), (32, 3)]);
-        assert_eq!(bands[2].color.len(), 15);
-        assert_eq!(bands[2].id.as_ref().unwrap().len(), 15);
+    fn tiles_cover_the_image_once() {
+        let mut film = Film::new(21, 35, Channels::ALL);
+        let mut bands = film.bands_mut(16);
+        let mut tiles: Vec<_> = bands.iter_mut().flat_map(|band| band.tiles(16)).collect();
+        let sizes: Vec<_> = tiles
+            .iter()
+            .map(|t| (t.left, t.top, t.width, t.rows))
+            .collect();
+        let wanted = [
+            (0, 0, 16, 16),
+            (16, 0, 5, 16),
+            (0, 16, 16, 16),
+            (16, 16, 5, 16),
+            (0, 32, 16, 3),
+            (16, 32, 5, 3),
+        ];
+        assert_eq!(sizes, wanted);
+        for (number, tile) in (1_u8..).zip(&mut tiles) {
+            let (width, rows) = (tile.width, tile.rows);
+            for pixel in 0..width * rows {
+                let (column, row) = (pixel % width, pixel / width);
+                let id = u32::from(number);
+                tile.set_color(column, row, [f32::from(number); 4]);
+                tile.set_data(
+                    column,
+                    row,
+                    &DataSample {
+                        id,
+                        ..DataSample::MISS
+                    },
+                );
+            }
+        }
+        let of_tile = |x: usize, y: usize| 1.0 + (y / 16 * 2 + x / 16) as f32;
+        for (place, color) in film.color.iter().enumerate() {
+            let number = of_tile(place % 21, place / 21);
+            assert_eq!(color[0], number);
+            assert_eq!(film.id.as_ref().unwrap()[place] as f32, number);
+        }
     }
 }

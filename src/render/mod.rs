@@ -5,6 +5,8 @@
 //! its pixels' coordinates alone and sums its samples in a fixed order, so the film is the same to
 //! the bit whatever the number of threads.
 
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
 use rayon::prelude::*;
 use thiserror::Error;
 
@@ -19,10 +21,14 @@ mod body;
 pub(crate) mod brute;
 mod film;
 mod floor;
+mod integrator;
 mod lights;
+mod recursive;
 mod sampler;
+mod shading;
 mod source;
 mod stop;
+mod stream;
 mod tile;
 mod tracer;
 mod whitted;
@@ -45,7 +51,7 @@ pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
 
-use tile::Tile;
+use integrator::WhittedIntegrator;
 use tracer::Tracer;
 
 /// Most samples per pixel: more than any picture needs, and few enough to count in f32.
@@ -197,10 +203,9 @@ pub enum RenderError {
     Material(#[from] MaterialError),
 }
 
-/// Bytes that the finished tiles of a row of tiles take until the row is whole; each thread is at one.
-pub fn band_bytes(settings: &RenderSettings) -> u64 {
-    let pixels = u64::from(settings.width) * u64::from(tile::SIDE.min(settings.height));
-    pixels * size_of::<tile::Pixel>() as u64
+/// Bytes that each thread takes while it renders, beside the film.
+pub const fn scratch_bytes() -> u64 {
+    integrator::SCRATCH_BYTES
 }
 
 /// Renders one image on the current rayon pool.
@@ -223,29 +228,36 @@ pub fn render<S: Surface, C: ShadeSource>(
     if !S::ONE_BODY {
         settings.validate_branches(&scene.material)?;
     }
-    let tracer = Tracer::new(surface, scene, source, settings);
     let mut film = Film::new(settings.width, settings.height, settings.channels);
-    // A band of tiles owns its rows of every plane. Bands run at once and their tiles do too, so
-    // that a slow corner of the image keeps all threads busy; finished tiles wait for their band.
+    let tracer = Tracer::new(surface, scene, source, settings);
+    let integrator = WhittedIntegrator::new(surface, scene, source, settings);
+    let is_opaque = scene.material.transmission <= 0.0;
+    let scratch = Mutex::new(Vec::new());
+    let render_tile = |tile: &mut film::FilmTile<'_>| {
+        if !is_opaque {
+            let counts = recursive::render_tile(&tracer, settings, stop, tile);
+            return counts.ok_or(RenderError::Interrupted);
+        }
+        // As many as there are threads; they live until the image is done.
+        let mut own = lock(&scratch).pop().unwrap_or_default();
+        let counts = integrator.render_tile(tile, stop, &mut own);
+        lock(&scratch).push(own);
+        counts.ok_or(RenderError::Interrupted)
+    };
+    // Bands run at once and their tiles do too, so that a slow corner of the image keeps all threads busy.
     let counts = film
         .bands_mut(tile::SIDE)
         .into_par_iter()
         .map(|mut band| {
-            let rendered = (0..settings.width.div_ceil(tile::SIDE))
-                .into_par_iter()
-                .map(|column| {
-                    let tile = Tile::in_band(&band, column, settings);
-                    let rendered = tile.render(&tracer, settings, stop);
-                    rendered.ok_or(RenderError::Interrupted)
-                })
-                .collect::<Result<Vec<_>, _>>()?;
-            let mut counts = RayCounts::default();
-            for tile in rendered {
-                band.store(&tile);
-                counts = counts + tile.counts;
-            }
-            Ok::<_, RenderError>(counts)
+            let tiles = band.tiles(tile::SIDE).into_par_iter();
+            tiles
+                .map(|mut tile| render_tile(&mut tile))
+                .try_reduce(RayCounts::default, |a, b| Ok(a + b))
         })
         .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
     Ok((film, counts))
+}
+
+fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {
+    shared.lock().unwrap_or_else(PoisonError::into_inner)
 }

@@ -8,6 +8,7 @@ use super::{
     aov::DataSample,
     body::{Optics, Path},
     floor::GroundHit,
+    integrator::SPRAY,
     lights::{Known, Lit},
 };
 use crate::{
@@ -15,9 +16,6 @@ use crate::{
     scene::Scene,
     surface::{Side, Substance, Surface, SurfaceHit},
 };
-
-/// Colour of foam and spray, linear RGB.
-pub(super) const SPRAY: Vec3 = Vec3::splat(0.9);
 
 /// What a tile's rays leave behind: counts, and memory for the next ray.
 #[derive(Debug, Default)]

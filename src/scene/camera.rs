@@ -189,6 +189,16 @@ impl Camera {
         self.forward
     }
 
+    /// Unit vectors to the right, up and along the view.
+    pub(crate) const fn axes(&self) -> [Vec3; 3] {
+        [self.right, self.up, self.forward]
+    }
+
+    /// Tangents of half the horizontal and vertical field of view.
+    pub(crate) const fn half_extent(&self) -> Vec2 {
+        self.half_extent
+    }
+
     /// The pinhole, relative to the sequence's origin.
     pub const fn eye(&self) -> Vec3 {
         self.eye

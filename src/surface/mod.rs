@@ -4,11 +4,14 @@
 
 use glam::Vec3;
 
+use crate::accel::Coherence;
+use crate::math::lanes_in;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 mod dimming;
 pub mod field;
 mod gradient;
+mod intersections;
 pub mod medium;
 mod neighbours;
 mod normals;
@@ -20,6 +23,7 @@ pub mod spray;
 
 pub(crate) use dimming::Dimming;
 pub use gradient::GradientNormals;
+pub use intersections::{Intersections, MaterialId};
 pub use normals::ShadingNormals;
 pub use pca::PcaNormals;
 pub use settings::{NormalKind, SurfaceKind, SurfaceSettings};
@@ -75,6 +79,16 @@ impl Side {
         match self {
             Self::Outside => Self::Inside,
             Self::Inside => Self::Outside,
+        }
+    }
+
+    /// Where the ray in `lane` is, by a mask of those inside.
+    #[inline(always)]
+    pub(crate) const fn of_lane(inside: u32, lane: usize) -> Self {
+        if inside >> lane & 1 == 1 {
+            Self::Inside
+        } else {
+            Self::Outside
         }
     }
 }
@@ -149,5 +163,42 @@ pub trait Surface: Sync {
     fn occluded_packet(&self, packet: &RayPacket) -> u32 {
         let bit = |(lane, ray): (u32, Ray)| u32::from(self.occluded(&ray)) << lane;
         (0..).zip(packet.rays()).map(bit).sum()
+    }
+
+    /// Puts the nearest intersection of each ray into `hits`, where one lies before the ray's end, and ends the ray
+    /// there. Rays of lanes in `inside` start inside of one body.
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        coherence: Coherence,
+        inside: u32,
+        hits: &mut Intersections,
+    ) {
+        let mut found = match coherence {
+            Coherence::Coherent if inside == 0 => self.nearest_packet(rays),
+            _ => [None; PACKET_SIZE],
+        };
+        if coherence == Coherence::Incoherent || inside != 0 {
+            for (lane, ray) in rays.rays().enumerate() {
+                let side = Side::of_lane(inside, lane);
+                found[lane] = self.crossing(&ray, side);
+            }
+        }
+        for (lane, hit) in found.iter().enumerate() {
+            if let Some(hit) = hit {
+                hits.set(lane, hit);
+                rays.t_max[lane] = hit.t;
+            }
+        }
+    }
+
+    /// [`Surface::occluded`] of the rays in `lanes`: a bit for each.
+    fn occluded_lanes(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+        if coherence == Coherence::Coherent && lanes.count_ones() as usize == rays.len() {
+            return self.occluded_packet(rays);
+        }
+        lanes_in(lanes).fold(0, |met, lane| {
+            met | u32::from(self.occluded(&rays.ray(lane))) << lane
+        })
     }
 }

@@ -4,9 +4,11 @@ use std::cell::RefCell;
 
 use glam::Vec3;
 
-use super::{Dimming, ShadingNormals, Substance, Surface, SurfaceHit};
+use super::{Dimming, Intersections, MaterialId, ShadingNormals, Substance, Surface, SurfaceHit};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
+use crate::accel::{Coherence, TreeHits};
+use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in};
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 /// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
@@ -20,6 +22,7 @@ const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 pub struct SphereSurface<'a> {
     tree: TreeView<'a>,
     normals: ShadingNormals,
+    simd: Supported,
 }
 
 impl<'a> SphereSurface<'a> {
@@ -28,6 +31,7 @@ impl<'a> SphereSurface<'a> {
         Self {
             tree,
             normals: ShadingNormals::Sphere,
+            simd: Supported::or_best(tree.simd()),
         }
     }
 
@@ -95,6 +99,58 @@ impl Surface for SphereSurface<'_> {
         self.tree.any_hit_packet(packet)
     }
 
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        coherence: Coherence,
+        _inside: u32,
+        hits: &mut Intersections,
+    ) {
+        let mut found = TreeHits {
+            t: [0.0; LANES],
+            slot: [TreeHits::NO_SLOT; LANES],
+        };
+        self.tree.nearest_lanes(rays, coherence, &mut found);
+        let met = found.mask() & first_lanes(rays.len());
+        if met == 0 {
+            return;
+        }
+        // Gather centres and radii.
+        let mut centers = [[0.0; LANES]; 3];
+        let mut radii = [1.0; LANES];
+        self.tree
+            .gather_spheres(&found, met, &mut centers, &mut radii);
+        intersections(self.simd, rays, &found.t, &centers, &radii, met, hits);
+        for lane in lanes_in(met) {
+            rays.t_max[lane] = found.t[lane];
+            hits.particle[lane] = self.tree.particle(found.slot[lane]);
+            hits.material[lane] = MaterialId::PARTICLES;
+        }
+        hits.mask |= met;
+        // Normals of neighbourhoods are found place by place.
+        if self.normals != ShadingNormals::Sphere {
+            for lane in lanes_in(met) {
+                let ray = rays.ray(lane);
+                let hit = self
+                    .normals
+                    .shade(&self.tree, &ray, hits.get(lane), radii[lane]);
+                hits.set(lane, &hit);
+            }
+        }
+    }
+
+    fn occluded_lanes(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+        if lanes == first_lanes(rays.len()) {
+            return self.tree.occluded_lanes(rays, coherence);
+        }
+        // Rays that end before they start meet nothing.
+        let mut rest = *rays;
+        for lane in lanes_in(!lanes & first_lanes(rays.len())) {
+            rest.t_max[lane] = -1.0;
+        }
+        self.tree.occluded_lanes(&rest, coherence)
+    }
+
     fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
         let mut dimming = Dimming::default();
         if self.tree.has_copies() {
@@ -108,6 +164,74 @@ impl Surface for SphereSurface<'_> {
         }
         dimming.product()
     }
+}
+
+/// Where rays meet spheres, as [`sphere_hit`] operation by operation, for the lanes in `met`.
+#[inline(always)]
+fn intersections_body(
+    rays: &RayPacket,
+    t: &Lanes,
+    centers: &Lanes3,
+    radii: &Lanes,
+    met: u32,
+    hits: &mut Intersections,
+) {
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    for l in 0..LANES {
+        let is_met = met >> l & 1 == 1;
+        let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
+        let d = [
+            rays.direction[0][l],
+            rays.direction[1][l],
+            rays.direction[2][l],
+        ];
+        let c = [centers[0][l], centers[1][l], centers[2][l]];
+        // The outward normal; against the ray for a sphere too small to have one.
+        let v = [
+            o[0] + d[0] * t[l] - c[0],
+            o[1] + d[1] * t[l] - c[1],
+            o[2] + d[2] * t[l] - c[2],
+        ];
+        let inverse = 1.0 / (v[0] * v[0] + v[1] * v[1] + v[2] * v[2]).sqrt();
+        let has_direction = inverse > 0.0 && inverse < f32::INFINITY && radii[l] > 0.0;
+        let mut n = [0.0; 3];
+        let mut p = [0.0; 3];
+        for axis in 0..3 {
+            n[axis] = if has_direction {
+                v[axis] * inverse
+            } else {
+                -d[axis]
+            };
+            p[axis] = c[axis] + n[axis] * radii[l];
+        }
+        // Step off the surface by more than rounding.
+        let of_point = larger(larger(p[0].abs(), p[1].abs()), p[2].abs());
+        let of_origin = larger(larger(o[0].abs(), o[1].abs()), o[2].abs());
+        let largest = larger(of_point, of_origin);
+        let offset = larger(OFFSET_OF_RADIUS * radii[l], OFFSET_OF_ROUNDING * largest);
+        for axis in 0..3 {
+            let keep = |new: f32, old: f32| if is_met { new } else { old };
+            hits.point[axis][l] = keep(p[axis], hits.point[axis][l]);
+            hits.anchor[axis][l] = keep(p[axis], hits.anchor[axis][l]);
+            hits.normal[axis][l] = keep(n[axis], hits.normal[axis][l]);
+            hits.shading_normal[axis][l] = keep(n[axis], hits.shading_normal[axis][l]);
+        }
+        hits.t[l] = if is_met { t[l] } else { hits.t[l] };
+        hits.offset[l] = if is_met { offset } else { hits.offset[l] };
+        hits.lift[l] = if is_met { 0.0 } else { hits.lift[l] };
+        hits.opacity[l] = if is_met { 1.0 } else { hits.opacity[l] };
+    }
+}
+
+lane_kernel! {
+    fn intersections(
+        rays: &RayPacket,
+        t: &Lanes,
+        centers: &Lanes3,
+        radii: &Lanes,
+        met: u32,
+        hits: &mut Intersections,
+    ) = intersections_body;
 }
 
 impl SphereSurface<'_> {

@@ -4,8 +4,10 @@
 use glam::Vec3;
 
 use super::spheres::SphereSurface;
-use super::{Side, Substance, Surface, SurfaceHit};
+use super::{Intersections, MaterialId, Side, Substance, Surface, SurfaceHit};
+use crate::accel::Coherence;
 use crate::accel::view::TreeView;
+use crate::math::lanes_in;
 use crate::ray::{PACKET_SIZE, Ray, RayPacket};
 
 /// A particle with fewer neighbours is spray (Ihmsen et al. 2012, "Unified spray, foam and air bubbles for
@@ -129,6 +131,36 @@ impl<S: Surface> Surface for WithSpray<'_, S> {
             *hit = drop.map(|drop| spray.drop(drop)).or(*hit);
         }
         hits
+    }
+
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        coherence: Coherence,
+        inside: u32,
+        hits: &mut Intersections,
+    ) {
+        self.body.intersect(rays, coherence, inside, hits);
+        let Some(spray) = &self.spray else {
+            return;
+        };
+        let body = hits.mask;
+        hits.mask = 0;
+        spray.spheres.intersect(rays, coherence, 0, hits);
+        for lane in lanes_in(hits.mask) {
+            hits.particle[lane] += spray.first;
+            hits.material[lane] = MaterialId::SPRAY;
+        }
+        hits.mask |= body;
+    }
+
+    fn occluded_lanes(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+        let body = self.body.occluded_lanes(rays, coherence, lanes);
+        let rest = lanes & !body;
+        match &self.spray {
+            Some(spray) if rest != 0 => body | spray.spheres.occluded_lanes(rays, coherence, rest),
+            _ => body,
+        }
     }
 
     fn occluded_packet(&self, packet: &RayPacket) -> u32 {

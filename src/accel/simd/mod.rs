@@ -6,6 +6,8 @@
 
 use glam::Vec3;
 
+pub use crate::math::SimdLevel;
+pub(super) use crate::math::Supported;
 use crate::ray::Ray;
 use spherule_formats::blocks::{
     BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, Q10Block, Q16Block, WIDTH,
@@ -22,73 +24,6 @@ mod x86;
 
 pub(super) use beam::{Beam, fold, lanes_near, larger};
 pub(super) use packet::{EnteredChildren, LaneSlabs, PacketKernel, PacketSphere};
-
-/// Instructions to trace with.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum SimdLevel {
-    /// Whatever the compiler makes of plain loops.
-    Portable,
-    /// 128-bit NEON, which every 64-bit Arm processor has.
-    Neon,
-    /// 256-bit AVX2 with fused multiply-add.
-    Avx2,
-    /// 512-bit AVX-512 F, BW, DQ, VL.
-    Avx512,
-}
-
-impl Default for SimdLevel {
-    fn default() -> Self {
-        Self::best()
-    }
-}
-
-impl SimdLevel {
-    /// All levels, slowest first.
-    pub const ALL: [Self; 4] = [Self::Portable, Self::Neon, Self::Avx2, Self::Avx512];
-
-    /// The best level of this machine.
-    pub fn best() -> Self {
-        Self::ALL
-            .into_iter()
-            .rev()
-            .find(|level| level.is_supported())
-            .unwrap_or(Self::Portable)
-    }
-
-    /// Whether this machine has the instructions.
-    pub fn is_supported(self) -> bool {
-        match self {
-            Self::Portable => true,
-            Self::Neon => cfg!(target_arch = "aarch64"),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx2 => x86::has_avx2(),
-            #[cfg(target_arch = "x86_64")]
-            Self::Avx512 => x86::has_avx512(),
-            #[cfg(not(target_arch = "x86_64"))]
-            Self::Avx2 | Self::Avx512 => false,
-        }
-    }
-
-    /// Itself where supported, else the best level.
-    #[must_use]
-    pub fn or_best(self) -> Self {
-        if self.is_supported() {
-            self
-        } else {
-            Self::best()
-        }
-    }
-
-    /// Name in reports.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Portable => "portable",
-            Self::Neon => "neon",
-            Self::Avx2 => "avx2",
-            Self::Avx512 => "avx512",
-        }
-    }
-}
 
 /// Slack of the slab test, as a fraction of the larger terms: covers the rounding of planes,
 /// inverses and products (about five roundings of 2^-24), so that no sphere is lost at a box's edge.
@@ -205,25 +140,16 @@ pub(super) trait KernelTask {
     fn run<K: PacketKernel>(self, kernel: K) -> Self::Output;
 }
 
-/// A level that this machine was asked for and has: proof that its kernel may run.
-#[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Supported(SimdLevel);
-
-impl Supported {
-    /// `level` where supported, else the best one.
-    pub(super) fn or_best(level: SimdLevel) -> Self {
-        Self(level.or_best())
-    }
-
-    /// The level.
-    pub(super) fn level(self) -> SimdLevel {
-        self.0
-    }
-
+/// Runs tasks with the kernel of a level that the machine has.
+pub(super) trait RunTask {
     /// Does `task` with the kernel of this level.
+    fn run<T: KernelTask>(self, task: T) -> T::Output;
+}
+
+impl RunTask for Supported {
     #[inline]
-    pub(super) fn run<T: KernelTask>(self, task: T) -> T::Output {
-        match self.0 {
+    fn run<T: KernelTask>(self, task: T) -> T::Output {
+        match self.level() {
             #[cfg(target_arch = "aarch64")]
             SimdLevel::Neon => task.run(neon::Neon),
             #[cfg(target_arch = "x86_64")]

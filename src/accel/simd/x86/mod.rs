@@ -19,21 +19,6 @@ mod slab;
 use avx2::Avx2;
 use avx512::Avx512;
 
-pub(super) fn has_avx2() -> bool {
-    is_x86_feature_detected!("avx2")
-        && is_x86_feature_detected!("fma")
-        && is_x86_feature_detected!("popcnt")
-        && is_x86_feature_detected!("bmi1")
-}
-
-pub(super) fn has_avx512() -> bool {
-    has_avx2()
-        && is_x86_feature_detected!("avx512f")
-        && is_x86_feature_detected!("avx512bw")
-        && is_x86_feature_detected!("avx512dq")
-        && is_x86_feature_detected!("avx512vl")
-}
-
 /// A task compiled with a kernel's instructions.
 macro_rules! compiled {
     ($run:ident, $kernel:expr, $level:path, $features:literal) => {

@@ -1,0 +1,70 @@
+//! Arithmetic on 16 lanes at once: the elementary functions that shading needs, and the compilation of plain loops
+//! over lanes for each instruction set.
+//!
+//! Shading bodies are plain Rust over arrays of [`LANES`] numbers. [`lane_kernel!`] compiles such a body once for each
+//! instruction set and picks one at run time. No body uses fused multiply-add or the C library, so every instruction
+//! set, compiler back end and platform gives the same bits.
+
+mod dispatch;
+pub mod functions;
+
+pub use dispatch::SimdLevel;
+pub(crate) use dispatch::{Supported, lane_kernel};
+
+/// Numbers that are worked on together: as many as a 512-bit register holds.
+pub const LANES: usize = 16;
+
+/// One number for each lane.
+pub type Lanes = [f32; LANES];
+
+/// A vector or a linear RGB colour for each lane, one array per component.
+pub type Lanes3 = [Lanes; 3];
+
+/// The same number in all lanes.
+pub const fn splat(value: f32) -> Lanes {
+    [value; LANES]
+}
+
+/// The same vector in all lanes.
+pub fn splat3(value: glam::Vec3) -> Lanes3 {
+    value.to_array().map(splat)
+}
+
+/// The vector in `lane`.
+///
+/// # Panics
+/// If there is no such lane.
+#[inline(always)]
+pub fn lane3(lanes: &Lanes3, lane: usize) -> glam::Vec3 {
+    glam::Vec3::new(lanes[0][lane], lanes[1][lane], lanes[2][lane])
+}
+
+/// Puts `value` into `lane`.
+///
+/// # Panics
+/// If there is no such lane.
+#[inline(always)]
+pub fn set_lane3(lanes: &mut Lanes3, lane: usize, value: glam::Vec3) {
+    for (axis, lanes) in lanes.iter_mut().enumerate() {
+        lanes[lane] = value[axis];
+    }
+}
+
+/// The numbers of the lanes whose bits are set in `mask`, ascending.
+#[inline(always)]
+pub fn lanes_in(mut mask: u32) -> impl Iterator<Item = usize> {
+    std::iter::from_fn(move || {
+        (mask != 0).then(|| {
+            let lane = mask.trailing_zeros() as usize & (LANES - 1);
+            mask &= mask - 1;
+            lane
+        })
+    })
+}
+
+/// A bit for each of the first `count` lanes.
+#[inline(always)]
+pub const fn first_lanes(count: usize) -> u32 {
+    debug_assert!(count <= LANES);
+    (1_u32 << count) - 1
+}

@@ -1,0 +1,158 @@
+//! Path segments on their way, in packets of 16.
+
+use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
+use crate::ray::RayPacket;
+
+/// The path segments that are traced together.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(super) struct SegmentPacket {
+    pub(super) rays: RayPacket,
+    /// What of the radiance along each ray arrives at its sample, linear RGB.
+    pub(super) throughput: Lanes3,
+    /// The sample that each ray belongs to, within its batch.
+    pub(super) sample: [u32; LANES],
+}
+
+impl Default for SegmentPacket {
+    fn default() -> Self {
+        Self {
+            rays: RayPacket::default(),
+            throughput: [splat(1.0); 3],
+            sample: [0; LANES],
+        }
+    }
+}
+
+impl SegmentPacket {
+    /// A bit for each lane that holds a ray.
+    #[inline(always)]
+    pub(super) fn lanes(&self) -> u32 {
+        first_lanes(self.rays.len())
+    }
+}
+
+/// Rays that leave the surfaces of a packet, one for each lane.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(super) struct ScatteredRays {
+    pub(super) origin: Lanes3,
+    pub(super) direction: Lanes3,
+    pub(super) throughput: Lanes3,
+}
+
+impl Default for ScatteredRays {
+    fn default() -> Self {
+        let zero = [splat(0.0); 3];
+        Self {
+            origin: zero,
+            direction: zero,
+            throughput: zero,
+        }
+    }
+}
+
+/// Path segments of one depth, packed without gaps. Its memory lives on when it is cleared.
+#[derive(Debug, Default)]
+pub(super) struct RayStream {
+    packets: Vec<SegmentPacket>,
+    len: usize,
+}
+
+impl RayStream {
+    /// Removes all segments.
+    pub(super) fn clear(&mut self) {
+        self.len = 0;
+    }
+
+    /// Segments in the stream.
+    pub(super) fn len(&self) -> usize {
+        self.len
+    }
+
+    /// All packets; the last may have fewer rays than lanes.
+    pub(super) fn packets(&self) -> &[SegmentPacket] {
+        &self.packets[..self.len.div_ceil(LANES)]
+    }
+
+    /// Appends the rays in `lanes`, in order; `sample` names their samples.
+    pub(super) fn push(&mut self, lanes: u32, rays: &ScatteredRays, sample: &[u32; LANES]) {
+        // There is always room for a whole packet more.
+        let needed = (self.len + LANES).div_ceil(LANES) + 1;
+        if self.packets.len() < needed {
+            self.packets.resize_with(needed, SegmentPacket::default);
+        }
+        for lane in lanes_in(lanes) {
+            let (packet, to) = (self.len / LANES, self.len % LANES);
+            let segment = &mut self.packets[packet];
+            if to == 0 {
+                segment.rays.reset();
+            }
+            for axis in 0..3 {
+                segment.rays.origin[axis][to] = rays.origin[axis][lane];
+                segment.rays.direction[axis][to] = rays.direction[axis][lane];
+                segment.throughput[axis][to] = rays.throughput[axis][lane];
+            }
+            segment.sample[to] = sample[lane];
+            segment.rays.set_len(to + 1);
+            self.len += 1;
+        }
+    }
+}
+
+/// The sum over a packet's lanes in a fixed order that vectorises: halves onto halves.
+#[inline(always)]
+pub(super) fn sum_of_lanes(mut lanes: Lanes) -> f32 {
+    macro_rules! halve {
+        ($($half:literal)*) => {$(
+            for lane in 0..$half {
+                lanes[lane] += lanes[lane + $half];
+            }
+        )*};
+    }
+    halve!(8 4 2 1);
+    lanes[0]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_are_packed_in_order_and_memory_is_reused() {
+        let mut stream = RayStream::default();
+        for round in 0..2 {
+            stream.clear();
+            let mut wanted = Vec::new();
+            for first in [0_u32, 100, 200, 300] {
+                let mut rays = ScatteredRays::default();
+                let mut next = first;
+                let sample: [u32; LANES] = [0_u32; LANES].map(|_| {
+                    next += 1;
+                    next - 1
+                });
+                rays.origin[0] = sample.map(|s| s as f32);
+                let lanes = 0b1010_1100_0000_0111 << (first / 100 % 2);
+                stream.push(lanes & 0xffff, &rays, &sample);
+                wanted.extend(lanes_in(lanes & 0xffff).map(|lane| sample[lane]));
+            }
+            assert_eq!(stream.len(), wanted.len(), "{round}");
+            let packets = stream.packets();
+            let found: Vec<u32> = packets
+                .iter()
+                .flat_map(|p| p.sample[..p.rays.len()].to_vec())
+                .collect();
+            assert_eq!(found, wanted);
+            let origins = packets
+                .iter()
+                .flat_map(|p| p.rays.rays().map(|r| r.origin.x));
+            assert!(origins.eq(wanted.iter().map(|s| *s as f32)));
+        }
+    }
+
+    #[test]
+    fn sums_take_every_lane() {
+        let lanes = std::array::from_fn(|lane| lane as f32);
+        assert_eq!(sum_of_lanes(lanes), 120.0);
+    }
+}
