@@ -9,21 +9,19 @@ use glam::Vec3;
 
 use super::{
     RayCounts, RenderSettings, ShadeSource, Stop,
-    aov::{DataSample, NO_ID},
+    aov::DataSample,
     film::FilmTile,
     sampler::PixelSampler,
     shading::{
         BackgroundLanes, CameraLanes, LightLanes, LightSamples, ShadingPoints, WhittedLanes, add,
-        add_background, camera_rays, depths, intersect_ground, occluded_by_ground, product,
-        sample_light, scale, shading_points,
+        add_background, camera_rays, intersect_ground, occluded_by_ground, product, sample_light,
+        scale, shading_points,
     },
     stream::{RayStream, SegmentPacket, sum_of_lanes},
     tile::pixels_of,
 };
 use crate::accel::Coherence;
-use crate::math::{
-    LANES, Lanes, Lanes3, Supported, first_lanes, lane3, lanes_in, set_lane3, splat, splat3,
-};
+use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
 use crate::scene::{Ground, Scene, ground};
 use crate::surface::{Intersections, MaterialId, Surface};
@@ -41,25 +39,25 @@ pub(super) const SCRATCH_BYTES: u64 = (BATCH as u64 / LANES as u64 + 2)
 
 /// Renders tiles by Whitted's method over streams.
 pub(super) struct WhittedIntegrator<'a, S, C> {
-    surface: &'a S,
-    source: &'a C,
-    scene: &'a Scene,
-    settings: &'a RenderSettings,
-    simd: Supported,
-    camera: CameraLanes,
+    pub(super) surface: &'a S,
+    pub(super) source: &'a C,
+    pub(super) scene: &'a Scene,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) simd: Supported,
+    pub(super) camera: CameraLanes,
     background: BackgroundLanes,
     lights: Vec<LightLanes>,
     /// By [`MaterialId`].
     materials: [WhittedLanes; MaterialId::COUNT],
     /// Base colour of all particles, if it is one.
-    color: Option<Vec3>,
+    pub(super) color: Option<Vec3>,
 }
 
 /// The pixels of a batch and what is gathered for them.
-struct Pixel {
-    column: u32,
-    row: u32,
-    data: DataSample,
+pub(super) struct Pixel {
+    pub(super) column: u32,
+    pub(super) row: u32,
+    pub(super) data: DataSample,
 }
 
 /// Memory for the samples of a batch; it lives on from tile to tile.
@@ -82,16 +80,16 @@ pub(super) struct Scratch {
 
 /// Memory for one packet.
 #[derive(Default)]
-struct PacketScratch {
-    camera: SegmentPacket,
-    hits: Intersections,
-    points: ShadingPoints,
-    light: LightSamples,
-    base: Lanes3,
-    weight: Lanes3,
-    radiance: Lanes3,
+pub(super) struct PacketScratch {
+    pub(super) camera: SegmentPacket,
+    pub(super) hits: Intersections,
+    pub(super) points: ShadingPoints,
+    pub(super) light: LightSamples,
+    pub(super) base: Lanes3,
+    pub(super) weight: Lanes3,
+    pub(super) radiance: Lanes3,
     /// Particles that a place between them takes its colour from.
-    blend: Vec<(u32, f32)>,
+    pub(super) blend: Vec<(u32, f32)>,
 }
 
 /// What is the same for all segments of a depth.
@@ -407,127 +405,6 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
         // Rays that the floor stops need not be traced; those that are not lit end before they start.
         let others = first_lanes(rays.len()) & !blocked;
         blocked | self.surface.occluded_lanes(rays, depth.coherence, others)
-    }
-
-    /// Base colours of what a packet meets.
-    fn base_colors(&self, packet: &mut PacketScratch) {
-        let PacketScratch {
-            hits, base, blend, ..
-        } = packet;
-        let particles = hits.lanes_of(MaterialId::PARTICLES);
-        if let Some(color) = self.color {
-            *base = splat3(color);
-        } else {
-            for lane in lanes_in(particles) {
-                set_lane3(base, lane, self.particle_color(hits, lane, blend));
-            }
-        }
-        for lane in lanes_in(hits.mask & !particles) {
-            let color = self.fixed_color(hits, lane);
-            set_lane3(base, lane, color);
-        }
-    }
-
-    /// Base colour of the particle, or of the place between particles, in `lane`.
-    fn particle_color(
-        &self,
-        hits: &Intersections,
-        lane: usize,
-        blend: &mut Vec<(u32, f32)>,
-    ) -> Vec3 {
-        if let Some(color) = self.color {
-            return color;
-        }
-        if !S::ONE_BODY {
-            return self.source.color(hits.particle[lane]);
-        }
-        blend.clear();
-        let hit = hits.get(lane);
-        self.surface
-            .blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
-        self.source.blended_color(blend)
-    }
-
-    /// Base colour of what is not a particle of the body.
-    fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
-        match (hits.material[lane], &self.scene.ground) {
-            (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
-            _ => SPRAY,
-        }
-    }
-
-    /// What of each sample surfaces cover: a fading floor covers all, unless the background is left out.
-    fn coverage(&self, hits: &Intersections) -> Lanes {
-        std::array::from_fn(|lane| match hits.mask >> lane & 1 {
-            0 => 0.0,
-            _ if self.settings.transparent_background => hits.opacity[lane],
-            _ => 1.0,
-        })
-    }
-
-    /// Keeps for each pixel the data of its nearest sample, the first of equal ones.
-    fn gather_data(
-        &self,
-        rays: &RayPacket,
-        first: usize,
-        packet: &mut PacketScratch,
-        pixels: &mut [Pixel],
-    ) {
-        if self.settings.channels == super::Channels::COLOR || packet.hits.mask == 0 {
-            return;
-        }
-        let mut z = splat(f32::INFINITY);
-        depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
-        let samples = self.settings.samples as usize;
-        let mut lane = 0;
-        while lane < rays.len() {
-            // The lanes of one pixel.
-            let pixel = (first + lane) / samples;
-            let end = rays.len().min((pixel + 1) * samples - first);
-            let nearest = (lane..end).fold(lane, |best, l| if z[l] < z[best] { l } else { best });
-            if z[nearest] < pixels[pixel].data.z {
-                pixels[pixel].data = self.data(rays, z[nearest], nearest, packet);
-            }
-            lane = end;
-        }
-    }
-
-    /// The data of what the camera ray in `lane` meets.
-    fn data(
-        &self,
-        rays: &RayPacket,
-        z: f32,
-        lane: usize,
-        packet: &mut PacketScratch,
-    ) -> DataSample {
-        let PacketScratch { hits, blend, .. } = packet;
-        let channels = self.settings.channels;
-        let is_particle = hits.material[lane] != MaterialId::GROUND;
-        let wants_particle = is_particle && (channels.id || channels.velocity);
-        let particle = wants_particle.then(|| self.surface.particle_at(&hits.get(lane)));
-        let normal = lane3(&hits.normal, lane);
-        let direction = lane3(&rays.direction, lane);
-        let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {
-            MaterialId::PARTICLES => self.particle_color(hits, lane, blend),
-            _ => self.fixed_color(hits, lane),
-        };
-        let point = lane3(&hits.point, lane).as_dvec3();
-        DataSample {
-            z,
-            normal: if direction.dot(normal) < 0.0 {
-                normal
-            } else {
-                -normal
-            },
-            position: (self.scene.origin + point).as_vec3(),
-            velocity: particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle)),
-            albedo: if channels.albedo {
-                albedo(blend)
-            } else {
-                Vec3::ZERO
-            },
-            id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
-        }
     }
 
     /// Sums the samples of each pixel of a batch and stores the pixels.

@@ -16,6 +16,7 @@ use crate::{
 };
 
 mod aov;
+mod attributes;
 mod body;
 #[cfg(test)]
 pub(crate) mod brute;

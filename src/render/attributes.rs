@@ -1,0 +1,136 @@
+//! What is looked up where camera rays meet something: base colours, and the data of a pixel beside its colour.
+
+use glam::Vec3;
+
+use super::{
+    Channels, ShadeSource,
+    aov::{DataSample, NO_ID},
+    integrator::{PacketScratch, Pixel, SPRAY, WhittedIntegrator},
+    shading::depths,
+};
+use crate::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
+use crate::ray::RayPacket;
+use crate::surface::{Intersections, MaterialId, Surface};
+
+impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+    /// Base colours of what a packet meets.
+    pub(super) fn base_colors(&self, packet: &mut PacketScratch) {
+        let PacketScratch {
+            hits, base, blend, ..
+        } = packet;
+        let particles = hits.lanes_of(MaterialId::PARTICLES);
+        if let Some(color) = self.color {
+            *base = splat3(color);
+        } else {
+            for lane in lanes_in(particles) {
+                set_lane3(base, lane, self.particle_color(hits, lane, blend));
+            }
+        }
+        for lane in lanes_in(hits.mask & !particles) {
+            let color = self.fixed_color(hits, lane);
+            set_lane3(base, lane, color);
+        }
+    }
+
+    /// Base colour of the particle, or of the place between particles, in `lane`.
+    fn particle_color(
+        &self,
+        hits: &Intersections,
+        lane: usize,
+        blend: &mut Vec<(u32, f32)>,
+    ) -> Vec3 {
+        if let Some(color) = self.color {
+            return color;
+        }
+        if !S::ONE_BODY {
+            return self.source.color(hits.particle[lane]);
+        }
+        blend.clear();
+        let hit = hits.get(lane);
+        self.surface
+            .blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
+        self.source.blended_color(blend)
+    }
+
+    /// Base colour of what is not a particle of the body.
+    fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
+        match (hits.material[lane], &self.scene.ground) {
+            (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
+            _ => SPRAY,
+        }
+    }
+
+    /// What of each sample surfaces cover: a fading floor covers all, unless the background is left out.
+    pub(super) fn coverage(&self, hits: &Intersections) -> Lanes {
+        std::array::from_fn(|lane| match hits.mask >> lane & 1 {
+            0 => 0.0,
+            _ if self.settings.transparent_background => hits.opacity[lane],
+            _ => 1.0,
+        })
+    }
+
+    /// Keeps for each pixel the data of its nearest sample, the first of equal ones.
+    pub(super) fn gather_data(
+        &self,
+        rays: &RayPacket,
+        first: usize,
+        packet: &mut PacketScratch,
+        pixels: &mut [Pixel],
+    ) {
+        if self.settings.channels == Channels::COLOR || packet.hits.mask == 0 {
+            return;
+        }
+        let mut z = splat(f32::INFINITY);
+        depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
+        let samples = self.settings.samples as usize;
+        let mut lane = 0;
+        while lane < rays.len() {
+            // The lanes of one pixel.
+            let pixel = (first + lane) / samples;
+            let end = rays.len().min((pixel + 1) * samples - first);
+            let nearest = (lane..end).fold(lane, |best, l| if z[l] < z[best] { l } else { best });
+            if z[nearest] < pixels[pixel].data.z {
+                pixels[pixel].data = self.data(rays, z[nearest], nearest, packet);
+            }
+            lane = end;
+        }
+    }
+
+    /// The data of what the camera ray in `lane` meets.
+    fn data(
+        &self,
+        rays: &RayPacket,
+        z: f32,
+        lane: usize,
+        packet: &mut PacketScratch,
+    ) -> DataSample {
+        let PacketScratch { hits, blend, .. } = packet;
+        let channels = self.settings.channels;
+        let is_particle = hits.material[lane] != MaterialId::GROUND;
+        let wants_particle = is_particle && (channels.id || channels.velocity);
+        let particle = wants_particle.then(|| self.surface.particle_at(&hits.get(lane)));
+        let normal = lane3(&hits.normal, lane);
+        let direction = lane3(&rays.direction, lane);
+        let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {
+            MaterialId::PARTICLES => self.particle_color(hits, lane, blend),
+            _ => self.fixed_color(hits, lane),
+        };
+        let point = lane3(&hits.point, lane).as_dvec3();
+        DataSample {
+            z,
+            normal: if direction.dot(normal) < 0.0 {
+                normal
+            } else {
+                -normal
+            },
+            position: (self.scene.origin + point).as_vec3(),
+            velocity: particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle)),
+            albedo: if channels.albedo {
+                albedo(blend)
+            } else {
+                Vec3::ZERO
+            },
+            id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
+        }
+    }
+}

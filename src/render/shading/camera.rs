@@ -1,0 +1,91 @@
+//! Camera rays, and how far along the view axis they meet something.
+
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
+use glam::Vec3;
+
+use crate::math::{LANES, Lanes, lane_kernel};
+use crate::ray::RayPacket;
+use crate::scene::Camera;
+use crate::surface::Intersections;
+
+/// A camera as lanes see it.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct CameraLanes {
+    eye: Vec3,
+    right: Vec3,
+    up: Vec3,
+    forward: Vec3,
+    /// Tangents of half the field of view.
+    half_extent: [f32; 2],
+    /// Pixels of the image.
+    size: [f32; 2],
+}
+
+impl CameraLanes {
+    pub(in crate::render) fn new(camera: &Camera, width: u32, height: u32) -> Self {
+        let [right, up, forward] = camera.axes();
+        Self {
+            eye: camera.eye(),
+            right,
+            up,
+            forward,
+            half_extent: camera.half_extent().to_array(),
+            size: [width as f32, height as f32],
+        }
+    }
+}
+
+/// Rays through points of the film, in pixels from its top left corner.
+#[inline(always)]
+fn camera_rays_body(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) {
+    let (r, u, f) = (camera.right, camera.up, camera.forward);
+    for l in 0..LANES {
+        let a = (2.0 * (x[l] / camera.size[0]) - 1.0) * camera.half_extent[0];
+        let b = (1.0 - 2.0 * (y[l] / camera.size[1])) * camera.half_extent[1];
+        let d = [
+            f.x + a * r.x + b * u.x,
+            f.y + a * r.y + b * u.y,
+            f.z + a * r.z + b * u.z,
+        ];
+        let inverse = 1.0 / (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt();
+        for axis in 0..3 {
+            rays.direction[axis][l] = d[axis] * inverse;
+            rays.origin[axis][l] = camera.eye[axis];
+        }
+        rays.t_min[l] = 0.0;
+        rays.t_max[l] = f32::INFINITY;
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn camera_rays(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) = camera_rays_body;
+}
+
+/// Distance along the view axis of what camera rays meet; infinite where they meet nothing.
+#[inline(always)]
+fn depths_body(camera: &CameraLanes, rays: &RayPacket, hits: &Intersections, z: &mut Lanes) {
+    let f = camera.forward;
+    let d = &rays.direction;
+    for l in 0..LANES {
+        let along = d[0][l] * f.x + d[1][l] * f.y + d[2][l] * f.z;
+        let is_hit = hits.mask >> l & 1 == 1;
+        z[l] = if is_hit {
+            hits.t[l] * along
+        } else {
+            f32::INFINITY
+        };
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn depths(
+        camera: &CameraLanes,
+        rays: &RayPacket,
+        hits: &Intersections,
+        z: &mut Lanes,
+    ) = depths_body;
+}

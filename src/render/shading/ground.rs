@@ -1,0 +1,101 @@
+//! Where rays meet the floor.
+
+use crate::math::{LANES, lane_kernel};
+use crate::ray::RayPacket;
+use crate::scene::Ground;
+use crate::surface::{Intersections, MaterialId};
+
+/// Intersects rays with a floor, which is met from above only.
+#[inline(always)]
+fn intersect_ground_body(
+    ground: &Ground,
+    rays: &mut RayPacket,
+    lanes: u32,
+    hits: &mut Intersections,
+) {
+    let up = ground.up;
+    let span = ground.fade_end - ground.fade_start;
+    let span = if span > f32::MIN_POSITIVE {
+        span
+    } else {
+        f32::MIN_POSITIVE
+    };
+    let larger = |a: f32, b: f32| if a > b { a } else { b };
+    let mut met = 0;
+    for l in 0..LANES {
+        let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
+        let d = [
+            rays.direction[0][l],
+            rays.direction[1][l],
+            rays.direction[2][l],
+        ];
+        let slope = d[0] * up.x + d[1] * up.y + d[2] * up.z;
+        let height = o[0] * up.x + o[1] * up.y + o[2] * up.z;
+        let t = (ground.height - height) / slope;
+        let p = [o[0] + d[0] * t, o[1] + d[1] * t, o[2] + d[2] * t];
+        // How much of the floor is left, by the distance from its middle.
+        let c = [
+            p[0] - ground.center.x,
+            p[1] - ground.center.y,
+            p[2] - ground.center.z,
+        ];
+        let distance = (c[0] * c[0] + c[1] * c[1] + c[2] * c[2]).sqrt();
+        let x = (ground.fade_end - distance) / span;
+        let x = if x < 0.0 { 0.0 } else { x };
+        let x = if x > 1.0 { 1.0 } else { x };
+        let presence = x * x * (3.0 - 2.0 * x);
+        let is_ahead = slope < 0.0 && t >= rays.t_min[l] && t < rays.t_max[l] && t < f32::INFINITY;
+        let is_met = is_ahead && presence > 0.0 && lanes >> l & 1 == 1;
+        met |= u32::from(is_met) << l;
+        let largest = larger(larger(larger(p[0].abs(), p[1].abs()), p[2].abs()), t);
+        let largest = larger(largest, ground.height.abs());
+        let offset = larger(8.0 * f32::EPSILON * largest, f32::MIN_POSITIVE);
+        for axis in 0..3 {
+            let keep = |new: f32, old: f32| if is_met { new } else { old };
+            hits.point[axis][l] = keep(p[axis], hits.point[axis][l]);
+            hits.anchor[axis][l] = keep(p[axis], hits.anchor[axis][l]);
+            hits.normal[axis][l] = keep(up[axis], hits.normal[axis][l]);
+            hits.shading_normal[axis][l] = keep(up[axis], hits.shading_normal[axis][l]);
+        }
+        hits.t[l] = if is_met { t } else { hits.t[l] };
+        rays.t_max[l] = if is_met { t } else { rays.t_max[l] };
+        hits.offset[l] = if is_met { offset } else { hits.offset[l] };
+        hits.lift[l] = if is_met { 0.0 } else { hits.lift[l] };
+        hits.opacity[l] = if is_met { presence } else { hits.opacity[l] };
+    }
+    for lane in 0..LANES {
+        if met >> lane & 1 == 1 {
+            hits.material[lane] = MaterialId::GROUND;
+        }
+    }
+    hits.mask |= met;
+}
+
+lane_kernel! {
+    pub(in crate::render) fn intersect_ground(
+        ground: &Ground,
+        rays: &mut RayPacket,
+        lanes: u32,
+        hits: &mut Intersections,
+    ) = intersect_ground_body;
+}
+
+/// The lanes whose rays a floor stops, whole or faded.
+#[inline(always)]
+fn occluded_by_ground_body(ground: &Ground, rays: &RayPacket) -> u32 {
+    let up = ground.up;
+    let mut met = 0;
+    for l in 0..LANES {
+        let slope =
+            rays.direction[0][l] * up.x + rays.direction[1][l] * up.y + rays.direction[2][l] * up.z;
+        let height = rays.origin[0][l] * up.x + rays.origin[1][l] * up.y + rays.origin[2][l] * up.z;
+        let t = (ground.height - height) / slope;
+        let is_met = slope < 0.0 && t >= rays.t_min[l] && t < rays.t_max[l] && t < f32::INFINITY;
+        met |= u32::from(is_met) << l;
+    }
+    met
+}
+
+lane_kernel! {
+    pub(in crate::render) fn occluded_by_ground(ground: &Ground, rays: &RayPacket) -> u32 = occluded_by_ground_body;
+}

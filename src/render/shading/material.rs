@@ -1,0 +1,170 @@
+//! Eq. 4.1 and 4.3: the constants of a material, and the shading points where rays meet it.
+
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
+use glam::Vec3;
+
+use crate::math::{LANES, Lanes3, lane_kernel, splat};
+use crate::ray::RayPacket;
+use crate::render::stream::ScatteredRays;
+use crate::scene::{Fresnel, Material};
+use crate::surface::Intersections;
+
+/// The constants of eq. 4.1 to 4.3, settled for a scene.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct WhittedLanes {
+    /// `Ka` times the ambient light, linear RGB.
+    pub(in crate::render) ambient: Vec3,
+    pub(in crate::render) diffuse: f32,
+    pub(in crate::render) specular: f32,
+    pub(in crate::render) shininess: f32,
+    ior: f32,
+    r0: f32,
+    is_exact: bool,
+    /// Weight of the reflected ray.
+    pub(in crate::render) reflection: f32,
+}
+
+impl WhittedLanes {
+    pub(in crate::render) fn new(material: &Material, ambient_light: Vec3) -> Self {
+        Self {
+            ambient: material.ambient * ambient_light,
+            diffuse: material.diffuse,
+            specular: material.specular,
+            shininess: material.shininess,
+            ior: material.ior,
+            r0: material.r0(),
+            is_exact: material.fresnel == Fresnel::Exact,
+            reflection: material.reflection,
+        }
+    }
+
+    /// An opaque material that only scatters.
+    pub(in crate::render) fn matte(ambient: f32, diffuse: f32, ambient_light: Vec3) -> Self {
+        let material = Material {
+            ambient,
+            diffuse,
+            specular: 0.0,
+            reflection: 0.0,
+            ..Material::DEFAULT
+        };
+        Self::new(&material, ambient_light)
+    }
+}
+
+/// Where the rays of a packet meet surfaces, as light and further rays see it.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(in crate::render) struct ShadingPoints {
+    /// Unit normal to shade by, on the side that the ray comes from.
+    pub(in crate::render) normal: Lanes3,
+    /// Where rays to lights start.
+    pub(in crate::render) start: Lanes3,
+    /// Reflected rays; their throughput is the weight of eq. 4.1 times that of the path.
+    pub(in crate::render) reflected: ScatteredRays,
+}
+
+impl Default for ShadingPoints {
+    fn default() -> Self {
+        let zero = [splat(0.0); 3];
+        Self {
+            normal: zero,
+            start: zero,
+            reflected: ScatteredRays::default(),
+        }
+    }
+}
+
+/// Fresnel's equations (see [`crate::scene::material::dielectric`]).
+#[inline(always)]
+fn dielectric(cosine: f32, ratio: f32) -> f32 {
+    let c = if cosine > 1.0 { 1.0 } else { cosine };
+    let sin2_out = ratio * ratio * (1.0 - c * c);
+    let is_total = sin2_out >= 1.0;
+    let cos_out = (1.0 - if is_total { 1.0 } else { sin2_out }).sqrt();
+    let across = (ratio * c - cos_out) / (ratio * c + cos_out);
+    let along = (c - ratio * cos_out) / (c + ratio * cos_out);
+    let mean = 0.5 * (across * across + along * along);
+    if is_total { 1.0 } else { mean }
+}
+
+/// From intersections to shading points; `throughput` is that of the paths up to here.
+#[inline(always)]
+fn shading_points_body(
+    material: &WhittedLanes,
+    rays: &RayPacket,
+    hits: &Intersections,
+    throughput: &Lanes3,
+    points: &mut ShadingPoints,
+) {
+    for l in 0..LANES {
+        let d = [
+            rays.direction[0][l],
+            rays.direction[1][l],
+            rays.direction[2][l],
+        ];
+        let n = [hits.normal[0][l], hits.normal[1][l], hits.normal[2][l]];
+        let s = [
+            hits.shading_normal[0][l],
+            hits.shading_normal[1][l],
+            hits.shading_normal[2][l],
+        ];
+        // Normals face the viewer, as the thesis's `faceforward` turns them.
+        let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+        let is_entering = along < 0.0;
+        let side = if is_entering { 1.0 } else { -1.0 };
+        let cosine = if is_entering { -along } else { along };
+        let shading_along = d[0] * s[0] + d[1] * s[1] + d[2] * s[2];
+        let shading_side = if shading_along < 0.0 { 1.0 } else { -1.0 };
+        // The reflected part, 1 under total reflection.
+        let ratio = if is_entering {
+            1.0 / material.ior
+        } else {
+            material.ior
+        };
+        let rest = 1.0 - cosine * cosine;
+        let sin2_out = ratio * ratio * if rest > 0.0 { rest } else { 0.0 };
+        let x = 1.0 - cosine;
+        let x = if x < 0.0 { 0.0 } else { x };
+        let x = if x > 1.0 { 1.0 } else { x };
+        let x2 = x * x;
+        let schlick = material.r0 + (1.0 - material.r0) * (x2 * x2 * x);
+        let r = if material.is_exact {
+            dielectric(cosine, ratio)
+        } else {
+            schlick
+        };
+        let r = if sin2_out >= 1.0 { 1.0 } else { r };
+        let weight = material.reflection * r;
+        // The mirrored direction, normalised so that errors do not add up over a path.
+        let twice = 2.0 * -cosine;
+        let m = [
+            d[0] - twice * (n[0] * side),
+            d[1] - twice * (n[1] * side),
+            d[2] - twice * (n[2] * side),
+        ];
+        let inverse = 1.0 / (m[0] * m[0] + m[1] * m[1] + m[2] * m[2]).sqrt();
+        for axis in 0..3 {
+            let start = hits.anchor[axis][l] + hits.offset[l] * (n[axis] * side);
+            let normal = s[axis] * shading_side;
+            points.normal[axis][l] = normal;
+            points.start[axis][l] = start + hits.lift[l] * normal;
+            points.reflected.origin[axis][l] = start;
+            points.reflected.direction[axis][l] = m[axis] * inverse;
+            points.reflected.throughput[axis][l] = throughput[axis][l] * weight;
+        }
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn shading_points(
+        material: &WhittedLanes,
+        rays: &RayPacket,
+        hits: &Intersections,
+        throughput: &Lanes3,
+        points: &mut ShadingPoints,
+    ) = shading_points_body;
+}
