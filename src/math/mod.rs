@@ -1,7 +1,7 @@
 //! Arithmetic on 16 lanes at once: the elementary functions that shading needs, and the compilation of plain loops
 //! over lanes for each instruction set.
 //!
-//! Shading bodies are plain Rust over arrays of [`LANES`] numbers. [`lane_kernel!`] compiles such a body once for each
+//! Shading bodies are plain Rust over arrays of [`LANES`] numbers. `lane_kernel!` compiles such a body once for each
 //! instruction set and picks one at run time. No body uses fused multiply-add or the C library, so every instruction
 //! set, compiler back end and platform gives the same bits.
 

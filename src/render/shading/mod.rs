@@ -1,6 +1,6 @@
 //! Arithmetic of shading for the 16 lanes of a packet: eq. 4.1 to 4.3 of the thesis, lights, background and floor.
 //!
-//! Every function here is compiled for each instruction set by [`lane_kernel!`]; see `math` for what that asks of the
+//! Every function here is compiled for each instruction set by `lane_kernel!`; see `math` for what that asks of the
 //! bodies. A lane whose numbers are infinite or not numbers never touches another lane: results are selected, not
 //! multiplied by zero.
 
