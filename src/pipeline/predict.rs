@@ -376,7 +376,7 @@ impl<'a> MemoryModel<'a> {
             particles: self.shading(frame),
             tree,
             surface: surface.kept,
-            images: film + film_before + scratch_bytes() * threads,
+            images: film + film_before + self.tracing_scratch() * threads,
             encoding: encoding_before,
             ..idle
         };
@@ -386,6 +386,12 @@ impl<'a> MemoryModel<'a> {
             ..idle
         };
         first_read.larger(building).larger(tracing).larger(encoding)
+    }
+
+    /// What a thread takes while it traces.
+    fn tracing_scratch(&self) -> u64 {
+        let is_body = self.setup.surface.kind != SurfaceKind::Spheres;
+        scratch_bytes(&self.setup.render, &self.setup.scene.material, is_body)
     }
 
     /// What encoding an image takes beside its planes: one of them turned into what the file has, and the

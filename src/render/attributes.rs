@@ -5,12 +5,15 @@ use glam::Vec3;
 use super::{
     Channels, ShadeSource,
     aov::{DataSample, NO_ID},
-    integrator::{PacketScratch, Pixel, SPRAY, WhittedIntegrator},
+    integrator::{PacketScratch, Pixel, WhittedIntegrator},
     shading::depths,
 };
 use crate::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
 use crate::ray::RayPacket;
 use crate::surface::{Intersections, MaterialId, Surface};
+
+/// Colour of foam and spray, linear RGB.
+const SPRAY: Vec3 = Vec3::splat(0.9);
 
 impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
     /// Base colours of what a packet meets.
@@ -21,7 +24,7 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         let particles = hits.lanes_of(MaterialId::PARTICLES);
         if let Some(color) = self.color {
             *base = splat3(color);
-        } else {
+        } else if self.materials[0].has_color() {
             for lane in lanes_in(particles) {
                 set_lane3(base, lane, self.particle_color(hits, lane, blend));
             }

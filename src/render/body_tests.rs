@@ -7,8 +7,8 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{
     brute::{Ball, Balls},
+    integrator::WhittedIntegrator,
     solid::Solid,
-    tracer::{Scratch, Tracer},
     *,
 };
 use crate::scene::{
@@ -86,14 +86,11 @@ fn depth(max_depth: u32) -> RenderSettings {
 /// The middle of the film; `split` is the weight from which on both children are followed.
 fn middle_with(split: f32, solid: &Solid, scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
     let source = ParticleShading::constant(Vec3::ONE);
-    let mut tracer = Tracer::new(solid, scene, &source, &depth(max_depth));
-    tracer.optics.split = split;
-    let mut scratch = Scratch::default();
-    let mut color = Vec3::ZERO;
-    tracer.samples(&[Vec2::splat(0.5)], &mut scratch, |_, sample| {
-        color = sample.color;
-    });
-    (color, scratch.counts)
+    let settings = depth(max_depth);
+    let mut integrator = WhittedIntegrator::new(solid, scene, &source, &settings);
+    integrator.split.least = split;
+    let (colors, counts) = integrator.radiance_at(&[Vec2::splat(0.5)]);
+    (colors[0], counts)
 }
 
 /// The same with every child followed.
@@ -212,14 +209,11 @@ fn roulette_has_the_mean_of_splitting() {
         .map(|i| Vec2::new((i % 64) as f32, (i / 64) as f32) / 64.0)
         .collect();
     let colors = |split: f32| {
-        let mut tracer = Tracer::new(&solid, &scene, &source, &depth(8));
-        tracer.optics.split = split;
-        let mut scratch = Scratch::default();
-        let mut colors = Vec::new();
-        for films in films.chunks(16) {
-            tracer.samples(films, &mut scratch, |_, sample| colors.push(sample.color.x));
-        }
-        (colors, scratch.counts.total())
+        let settings = depth(8);
+        let mut integrator = WhittedIntegrator::new(&solid, &scene, &source, &settings);
+        integrator.split.least = split;
+        let (colors, counts) = integrator.radiance_at(&films);
+        (colors.into_iter().map(|c| c.x).collect::<Vec<_>>(), counts.total())
     };
     let (all, all_rays) = colors(0.0);
     let (drawn, drawn_rays) = colors(1.0);
@@ -247,7 +241,7 @@ fn more_samples_draw_sooner() {
             samples,
             ..depth(8)
         };
-        Tracer::new(&solid, &scene, &source, &settings).optics.split
+        WhittedIntegrator::new(&solid, &scene, &source, &settings).split.least
     };
     assert_eq!([1, 16, 4096].map(split), [0.02, 0.2, 1.0]);
 }

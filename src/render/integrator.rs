@@ -1,21 +1,22 @@
-//! Whitted ray tracing over streams of rays: eq. 4.1 of the thesis for opaque surfaces, one depth after the other.
+//! Whitted ray tracing over streams of rays: eq. 4.1 of the thesis, one depth after the other.
 //!
-//! A tile is sampled in batches. The camera rays of a batch go through `generate -> intersect -> shade -> occlude ->
-//! accumulate` packet by packet; what they reflect is appended to a stream without gaps, which is the next depth.
-//! A sample's radiance is summed in an order that depends on the sample alone: by depth, then by light. Nothing
-//! depends on threads, on the tile's size or on which rays share a packet.
+//! A tile is sampled in groups of pixels. The camera rays of a batch go through `generate -> intersect -> shade ->
+//! occlude -> accumulate` packet by packet; what they reflect and refract is appended to two streams without gaps,
+//! which are the next depth. A sample's radiance is summed in an order that depends on the sample alone: by depth,
+//! reflected rays before refracted ones, and each by the order of the rays that they leave. Nothing depends on threads,
+//! on the tile's size or on which rays share a packet.
 
-use glam::Vec3;
+use glam::{Vec2, Vec3};
 
 use super::{
     RayCounts, RenderSettings, ShadeSource, Stop,
     aov::DataSample,
     film::FilmTile,
+    roulette::{PathHash, SplitRule},
     sampler::PixelSampler,
     shading::{
-        BackgroundLanes, CameraLanes, LightLanes, LightSamples, ShadingPoints, WhittedLanes, add,
-        add_background, camera_rays, intersect_ground, occluded_by_ground, product, sample_light,
-        scale, shading_points,
+        BackgroundLanes, CameraLanes, LightLanes, LightSamples, ShadingPoints, WhittedLanes,
+        camera_rays, intersect_ground,
     },
     stream::{RayStream, SegmentPacket, sum_of_lanes},
     tile::pixels_of,
@@ -23,19 +24,17 @@ use super::{
 use crate::accel::Coherence;
 use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
-use crate::scene::{Ground, Scene, ground};
-use crate::surface::{Intersections, MaterialId, Surface};
+use crate::scene::{Material, Scene, ground};
+use crate::surface::{Intersections, MaterialId, Side, Surface};
 
-/// Colour of foam and spray, linear RGB.
-pub(super) const SPRAY: Vec3 = Vec3::splat(0.9);
+/// Samples whose place on the film and radiance are held, unless one pixel has more.
+const GROUP: u32 = 4096;
 
-/// Samples that are traced together, at most: their rays and radiance take about half a mebibyte.
-const BATCH: u32 = 4096;
+/// Path segments of one depth, at most, as far as batches of a packet of samples allow.
+const SEGMENTS: usize = 16_384;
 
-/// Bytes of the [`Scratch`] of one thread, rounded up: two streams of rays, and what is gathered for samples.
-pub(super) const SCRATCH_BYTES: u64 = (BATCH as u64 / LANES as u64 + 2)
-    * (2 * size_of::<SegmentPacket>() + 6 * size_of::<Lanes>()) as u64
-    + 65_536;
+/// Highlights of clear bodies below this part of the light are dark.
+const DARKEST_HIGHLIGHT: f32 = 1.0 / 4096.0;
 
 /// Renders tiles by Whitted's method over streams.
 pub(super) struct WhittedIntegrator<'a, S, C> {
@@ -45,47 +44,77 @@ pub(super) struct WhittedIntegrator<'a, S, C> {
     pub(super) settings: &'a RenderSettings,
     pub(super) simd: Supported,
     pub(super) camera: CameraLanes,
-    background: BackgroundLanes,
-    lights: Vec<LightLanes>,
+    pub(super) background: BackgroundLanes,
+    pub(super) lights: Vec<LightLanes>,
     /// By [`MaterialId`].
-    materials: [WhittedLanes; MaterialId::COUNT],
+    pub(super) materials: [WhittedLanes; MaterialId::COUNT],
     /// Base colour of all particles, if it is one.
     pub(super) color: Option<Vec3>,
+    pub(super) interior: Interior,
+    /// Which of two rays are followed.
+    pub(super) split: SplitRule,
+    /// Whether the camera is inside of a connected body.
+    is_eye_inside: bool,
 }
 
-/// The pixels of a batch and what is gathered for them.
+/// What lies behind the surface of the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Interior {
+    /// Nothing that light gets to.
+    Opaque,
+    /// The inside of a sphere, each a body of its own. A ray's angle with the normal tells whether it enters or leaves.
+    Spheres,
+    /// One connected body. Which side of it a ray is on belongs to the ray; all of its depth are crossings, and the way
+    /// between them costs nothing, whatever particles lie there.
+    Body,
+}
+
+/// The pixels of a group and what is gathered for them.
 pub(super) struct Pixel {
     pub(super) column: u32,
     pub(super) row: u32,
     pub(super) data: DataSample,
 }
 
-/// Memory for the samples of a batch; it lives on from tile to tile.
+/// Memory for the samples of a group and the rays of a batch; it lives on from tile to tile.
 #[derive(Default)]
 pub(super) struct Scratch {
     /// Where samples lie on the film, pixels.
     film: Vec<[Lanes; 2]>,
+    /// Samples on the film.
+    samples: usize,
     /// Radiance of each sample.
     radiance: Vec<Lanes3>,
     /// What of each sample surfaces cover.
     coverage: Vec<Lanes>,
     pixels: Vec<Pixel>,
     /// The depth that is traced, and the one after it.
-    now: RayStream,
-    next: RayStream,
+    now: NextRays,
+    next: NextRays,
     /// What one packet takes.
     packet: Box<PacketScratch>,
     counts: RayCounts,
 }
 
+/// Rays of the next depth by how they left a surface.
+#[derive(Debug, Default)]
+pub(super) struct NextRays {
+    pub(super) reflected: RayStream,
+    pub(super) refracted: RayStream,
+}
+
 /// Memory for one packet.
 #[derive(Default)]
 pub(super) struct PacketScratch {
-    pub(super) camera: SegmentPacket,
+    camera: SegmentPacket,
     pub(super) hits: Intersections,
     pub(super) points: ShadingPoints,
     pub(super) light: LightSamples,
+    /// What rays to a light go through.
+    pub(super) crossings: Intersections,
     pub(super) base: Lanes3,
+    /// What of the radiance at the intersections arrives at the samples.
+    pub(super) throughput: Lanes3,
     pub(super) weight: Lanes3,
     pub(super) radiance: Lanes3,
     /// Particles that a place between them takes its colour from.
@@ -94,12 +123,61 @@ pub(super) struct PacketScratch {
 
 /// What is the same for all segments of a depth.
 #[derive(Clone, Copy)]
-struct Depth {
+pub(super) struct Depth {
     /// 1 for camera rays.
-    number: u32,
-    coherence: Coherence,
+    pub(super) number: u32,
+    pub(super) coherence: Coherence,
     /// Whether rays that meet nothing see the background.
-    sees_background: bool,
+    pub(super) sees_background: bool,
+}
+
+impl Interior {
+    fn of<S: Surface>(material: &Material) -> Self {
+        match (material.transmission > 0.0, S::ONE_BODY) {
+            (false, _) => Self::Opaque,
+            (true, false) => Self::Spheres,
+            (true, true) => Self::Body,
+        }
+    }
+}
+
+impl NextRays {
+    fn clear(&mut self) {
+        self.reflected.clear();
+        self.refracted.clear();
+    }
+
+    fn is_empty(&self) -> bool {
+        self.reflected.len() + self.refracted.len() == 0
+    }
+}
+
+/// Bytes of the [`Scratch`] of one thread, rounded up: what is gathered for samples, and the rays of two depths.
+pub(super) fn scratch_bytes(settings: &RenderSettings, is_transmissive: bool, is_body: bool) -> u64 {
+    let rule = split_rule(settings, is_body);
+    let paths = most_paths(&rule, settings, is_transmissive);
+    let samples = u64::from(GROUP.max(settings.samples)) / LANES as u64 + 1;
+    let rays = (batch(paths) * paths / LANES) as u64 + 4;
+    samples * (6 * size_of::<Lanes>()) as u64 + rays * 2 * size_of::<SegmentPacket>() as u64 + 65_536
+}
+
+fn split_rule(settings: &RenderSettings, is_body: bool) -> SplitRule {
+    match is_body {
+        true => SplitRule::body(settings),
+        false => SplitRule::spheres(settings),
+    }
+}
+
+fn most_paths(rule: &SplitRule, settings: &RenderSettings, is_transmissive: bool) -> usize {
+    match is_transmissive {
+        true => rule.most_paths(settings.max_depth),
+        false => 1,
+    }
+}
+
+/// Samples that are traced together where each may have so many paths: whole packets.
+fn batch(paths: usize) -> usize {
+    (SEGMENTS / paths).min(GROUP as usize).max(LANES) / LANES * LANES
 }
 
 impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
@@ -111,6 +189,12 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
     ) -> Self {
         let ambient = scene.ambient_light;
         let matte = WhittedLanes::matte(ground::AMBIENT, ground::DIFFUSE, ambient);
+        let interior = Interior::of::<S>(&scene.material);
+        let mut particles = WhittedLanes::new(&scene.material, ambient);
+        let is_body = interior == Interior::Body;
+        if is_body && !particles.has_color() {
+            particles.darkest_highlight = DARKEST_HIGHLIGHT;
+        }
         Self {
             surface,
             source,
@@ -120,8 +204,11 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
             camera: CameraLanes::new(&scene.camera, settings.width, settings.height),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(LightLanes::from).collect(),
-            materials: [WhittedLanes::new(&scene.material, ambient), matte, matte],
+            materials: [particles, matte, matte],
             color: source.constant_color(),
+            interior,
+            split: split_rule(settings, is_body),
+            is_eye_inside: is_body && surface.side_of(scene.camera.eye()) == Side::Inside,
         }
     }
 
@@ -134,36 +221,27 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
     ) -> Option<RayCounts> {
         scratch.counts = RayCounts::default();
         let mut sampler = PixelSampler::new(self.settings.samples);
-        let most = (BATCH / self.settings.samples).max(1) as usize;
+        let most = (GROUP / self.settings.samples).max(1) as usize;
         let mut pixels = pixels_of(tile).peekable();
         while pixels.peek().is_some() {
-            let batch = pixels.by_ref().take(most);
-            self.generate(tile, batch, &mut sampler, scratch);
-            self.trace_camera_rays(stop, scratch)?;
-            for number in 2..=self.settings.max_depth {
-                std::mem::swap(&mut scratch.now, &mut scratch.next);
-                if scratch.now.len() == 0 {
-                    break;
-                }
-                self.trace_reflections(number, stop, scratch)?;
-            }
+            let group = pixels.by_ref().take(most);
+            self.generate(tile, group, &mut sampler, scratch);
+            self.trace(stop, scratch)?;
             self.accumulate(tile, scratch);
         }
         Some(scratch.counts)
     }
 
-    /// Places the samples of a batch on the film, pixel by pixel.
+    /// Places the samples of a group of pixels on the film, pixel by pixel.
     fn generate(
         &self,
         tile: &FilmTile<'_>,
-        batch: impl Iterator<Item = (u32, u32)>,
+        group: impl Iterator<Item = (u32, u32)>,
         sampler: &mut PixelSampler,
         scratch: &mut Scratch,
     ) {
-        scratch.pixels.clear();
-        scratch.film.clear();
-        let mut count = 0;
-        for (column, row) in batch {
+        scratch.clear();
+        for (column, row) in group {
             scratch.pixels.push(Pixel {
                 column,
                 row,
@@ -171,243 +249,137 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
             });
             let (x, y) = (tile.left + column, tile.top + row);
             sampler.for_each(x, y, |point| {
-                if count % LANES == 0 {
-                    scratch.film.push([splat(0.0); 2]);
-                }
-                if let Some(film) = scratch.film.last_mut() {
-                    film[0][count % LANES] = x as f32 + point.x;
-                    film[1][count % LANES] = y as f32 + point.y;
-                }
-                count += 1;
+                scratch.place(x as f32 + point.x, y as f32 + point.y);
             });
         }
-        scratch.counts.primary += count as u64;
-        let packets = scratch.film.len();
-        scratch.radiance.clear();
-        scratch.radiance.resize(packets, [splat(0.0); 3]);
-        scratch.coverage.resize(packets, splat(0.0));
-        scratch.next.clear();
     }
 
-    fn trace_camera_rays(&self, stop: &dyn Stop, scratch: &mut Scratch) -> Option<()> {
+    /// Traces all samples of a group, in batches whose rays fit into memory.
+    fn trace(&self, stop: &dyn Stop, scratch: &mut Scratch) -> Option<()> {
+        let packets = scratch.film.len();
+        scratch.radiance.resize(packets, [splat(0.0); 3]);
+        scratch.coverage.resize(packets, splat(0.0));
+        scratch.counts.primary += scratch.samples as u64;
+        let is_transmissive = self.interior != Interior::Opaque;
+        let paths = most_paths(&self.split, self.settings, is_transmissive);
+        for first in (0..packets).step_by(batch(paths) / LANES) {
+            let end = packets.min(first + batch(paths) / LANES);
+            scratch.next.clear();
+            self.trace_camera_rays(first..end, stop, scratch)?;
+            for number in 2..=self.settings.max_depth {
+                std::mem::swap(&mut scratch.now, &mut scratch.next);
+                if scratch.now.is_empty() {
+                    break;
+                }
+                self.trace_depth(number, stop, scratch)?;
+            }
+        }
+        Some(())
+    }
+
+    fn trace_camera_rays(
+        &self,
+        packets: std::ops::Range<usize>,
+        stop: &dyn Stop,
+        scratch: &mut Scratch,
+    ) -> Option<()> {
         let depth = Depth {
             number: 1,
             coherence: Coherence::Coherent,
             sees_background: !self.settings.transparent_background,
         };
-        let total = scratch.pixels.len() * self.settings.samples as usize;
-        let mut packet = std::mem::take(&mut scratch.packet);
-        for number in 0..scratch.film.len() {
+        let mut segments = std::mem::take(&mut scratch.packet.camera);
+        for number in packets {
             if stop.is_raised() {
                 return None;
             }
             let first = number * LANES;
-            let [x, y] = &scratch.film[number];
-            camera_rays(self.simd, &self.camera, x, y, &mut packet.camera.rays);
-            packet.camera.rays.set_len(LANES.min(total - first));
-            packet.camera.throughput = [splat(1.0); 3];
-            #[expect(clippy::cast_possible_truncation, reason = "batches are small")]
-            let sample = std::array::from_fn(|lane| (first + lane) as u32);
-            packet.camera.sample = sample;
-            let mut segments = std::mem::take(&mut packet.camera);
-            self.intersect(&mut segments.rays, depth, &mut packet.hits);
-            self.gather_data(&segments.rays, first, &mut packet, &mut scratch.pixels);
+            self.camera_segments(&scratch.film[number], first, scratch.samples, &mut segments);
+            let packet = &mut scratch.packet;
+            let inside = segments.inside;
+            self.intersect(&mut segments.rays, depth, inside, &mut packet.hits);
+            self.gather_data(&segments.rays, first, packet, &mut scratch.pixels);
             scratch.coverage[number] = self.coverage(&packet.hits);
             packet.radiance = [splat(0.0); 3];
-            self.shade(
-                &segments,
-                depth,
-                &mut packet,
-                &mut scratch.next,
-                &mut scratch.counts,
-            );
+            let counts = &mut scratch.counts;
+            self.shade(&segments, depth, packet, &mut scratch.next, counts);
             scratch.radiance[number] = packet.radiance;
-            packet.camera = segments;
         }
-        scratch.packet = packet;
+        scratch.packet.camera = segments;
         Some(())
     }
 
-    fn trace_reflections(&self, number: u32, stop: &dyn Stop, scratch: &mut Scratch) -> Option<()> {
+    /// The camera rays of the samples from `first` on, of `samples` in all.
+    fn camera_segments(
+        &self,
+        film: &[Lanes; 2],
+        first: usize,
+        samples: usize,
+        segments: &mut SegmentPacket,
+    ) {
+        let [x, y] = film;
+        camera_rays(self.simd, &self.camera, x, y, &mut segments.rays);
+        let len = LANES.min(samples - first);
+        segments.rays.set_len(len);
+        segments.throughput = [splat(1.0); 3];
+        #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
+        let sample = std::array::from_fn(|lane| (first + lane) as u32);
+        segments.sample = sample;
+        segments.inside = if self.is_eye_inside { first_lanes(len) } else { 0 };
+        if self.interior != Interior::Opaque {
+            let size = Vec2::new(self.settings.width as f32, self.settings.height as f32);
+            segments.path =
+                std::array::from_fn(|lane| PathHash::from_film(Vec2::new(x[lane], y[lane]) / size));
+        }
+    }
+
+    fn trace_depth(&self, number: u32, stop: &dyn Stop, scratch: &mut Scratch) -> Option<()> {
         let depth = Depth {
             number,
             coherence: Coherence::Incoherent,
             sees_background: true,
         };
-        scratch.next.clear();
-        scratch.counts.reflection += scratch.now.len() as u64;
-        let mut packet = std::mem::take(&mut scratch.packet);
-        for segments in scratch.now.packets() {
+        let Scratch {
+            now,
+            next,
+            packet,
+            radiance,
+            counts,
+            ..
+        } = scratch;
+        next.clear();
+        counts.reflection += now.reflected.len() as u64;
+        counts.refraction += now.refracted.len() as u64;
+        for segments in now.reflected.packets().iter().chain(now.refracted.packets()) {
             if stop.is_raised() {
                 return None;
             }
             let mut rays = segments.rays;
-            self.intersect(&mut rays, depth, &mut packet.hits);
+            self.intersect(&mut rays, depth, segments.inside, &mut packet.hits);
             packet.radiance = [splat(0.0); 3];
-            self.shade(
-                segments,
-                depth,
-                &mut packet,
-                &mut scratch.next,
-                &mut scratch.counts,
-            );
-            // No two rays of a depth belong to one sample.
+            self.shade(segments, depth, packet, next, counts);
+            // In order, as several rays of a packet may belong to one sample.
             for lane in lanes_in(segments.lanes()) {
                 let sample = segments.sample[lane] as usize;
-                let sum = &mut scratch.radiance[sample / LANES];
+                let sum = &mut radiance[sample / LANES];
                 for (sum, radiance) in sum.iter_mut().zip(&packet.radiance) {
                     sum[sample % LANES] += radiance[lane];
                 }
             }
         }
-        scratch.packet = packet;
         Some(())
     }
 
     /// Finds the nearest intersection of each ray with the shapes of the scene, and ends the ray there.
-    fn intersect(&self, rays: &mut RayPacket, depth: Depth, hits: &mut Intersections) {
+    fn intersect(&self, rays: &mut RayPacket, depth: Depth, inside: u32, hits: &mut Intersections) {
         hits.clear();
         if let Some(ground) = &self.scene.ground {
             intersect_ground(self.simd, ground, rays, first_lanes(rays.len()), hits);
         }
-        self.surface.intersect(rays, depth.coherence, 0, hits);
+        self.surface.intersect(rays, depth.coherence, inside, hits);
     }
 
-    /// Adds to the radiance of a packet what its segments see, and appends what they reflect to `next`.
-    fn shade(
-        &self,
-        segments: &SegmentPacket,
-        depth: Depth,
-        packet: &mut PacketScratch,
-        next: &mut RayStream,
-        counts: &mut RayCounts,
-    ) {
-        let rays = &segments.rays;
-        // The background, where nothing is met and through what is only partly there.
-        let faded = packet.hits.lanes_of(MaterialId::GROUND);
-        let missed = segments.lanes() & !packet.hits.mask;
-        if depth.sees_background && (missed | faded) != 0 {
-            let opacity = |lane: usize| {
-                let is_met = packet.hits.mask >> lane & 1 == 1;
-                1.0 - if is_met {
-                    packet.hits.opacity[lane]
-                } else {
-                    0.0
-                }
-            };
-            let seen = std::array::from_fn(opacity);
-            scale(self.simd, &segments.throughput, &seen, &mut packet.weight);
-            let lanes = missed | faded;
-            let sum = &mut packet.radiance;
-            add_background(
-                self.simd,
-                &self.background,
-                &rays.direction,
-                &packet.weight,
-                lanes,
-                sum,
-            );
-        }
-        if packet.hits.mask == 0 {
-            return;
-        }
-        self.base_colors(packet);
-        for (number, material) in (0..).zip(&self.materials) {
-            let id = MaterialId(number);
-            let lanes = packet.hits.lanes_of(id);
-            if lanes != 0 {
-                self.shade_material(segments, material, lanes, depth, packet, next, counts);
-            }
-        }
-    }
-
-    /// Eq. 4.1 for the `lanes` of a packet that meet one material.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "one stage; all of them are needed"
-    )]
-    fn shade_material(
-        &self,
-        segments: &SegmentPacket,
-        material: &WhittedLanes,
-        lanes: u32,
-        depth: Depth,
-        packet: &mut PacketScratch,
-        next: &mut RayStream,
-        counts: &mut RayCounts,
-    ) {
-        let rays = &segments.rays;
-        let PacketScratch {
-            hits,
-            points,
-            light,
-            base,
-            weight,
-            radiance,
-            ..
-        } = packet;
-        scale(self.simd, &segments.throughput, &hits.opacity, weight);
-        shading_points(self.simd, material, rays, hits, weight, points);
-        // Ambient light.
-        let mut colored = [splat(0.0); 3];
-        product(self.simd, base, weight, &mut colored);
-        add(self.simd, &colored, &material.ambient, lanes, radiance);
-        // Lights.
-        for lamp in &self.lights {
-            sample_light(
-                self.simd, lamp, material, rays, points, base, weight, lanes, light,
-            );
-            if light.lanes == 0 {
-                continue;
-            }
-            let mut visible = light.lanes;
-            if lamp.casts_shadow {
-                light.shadow_rays.set_len(rays.len());
-                counts.shadow += u64::from(light.lanes.count_ones());
-                visible &= !self.occluded(&light.shadow_rays, light.lanes, depth);
-            }
-            add(
-                self.simd,
-                &light.contribution,
-                &Vec3::ONE,
-                visible,
-                radiance,
-            );
-        }
-        // Reflection; where the recursion ends, it sees the background.
-        if material.reflection > 0.0 {
-            let reflected = &points.reflected;
-            if depth.number < self.settings.max_depth {
-                next.push(lanes, reflected, &segments.sample);
-            } else {
-                let (direction, weight) = (&reflected.direction, &reflected.throughput);
-                add_background(
-                    self.simd,
-                    &self.background,
-                    direction,
-                    weight,
-                    lanes,
-                    radiance,
-                );
-            }
-        }
-    }
-
-    /// The `lanes` whose rays to a light meet anything.
-    fn occluded(&self, rays: &RayPacket, lanes: u32, depth: Depth) -> u32 {
-        let ground = self.scene.ground.as_ref();
-        let by_ground = |ground: &Ground| occluded_by_ground(self.simd, ground, rays) & lanes;
-        let blocked = ground.map_or(0, by_ground);
-        let rest = lanes & !blocked;
-        if rest == 0 {
-            return blocked;
-        }
-        // Rays that the floor stops need not be traced; those that are not lit end before they start.
-        let others = first_lanes(rays.len()) & !blocked;
-        blocked | self.surface.occluded_lanes(rays, depth.coherence, others)
-    }
-
-    /// Sums the samples of each pixel of a batch and stores the pixels.
+    /// Sums the samples of each pixel of a group and stores the pixels.
     fn accumulate(&self, tile: &mut FilmTile<'_>, scratch: &mut Scratch) {
         let samples = self.settings.samples as usize;
         let share = 1.0 / self.settings.samples as f32;
@@ -417,6 +389,29 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
             tile.set_color(pixel.column, pixel.row, sum.map(|v| v * share));
             tile.set_data(pixel.column, pixel.row, &pixel.data);
         }
+    }
+}
+
+impl Scratch {
+    /// Forgets a group.
+    fn clear(&mut self) {
+        self.pixels.clear();
+        self.film.clear();
+        self.radiance.clear();
+        self.samples = 0;
+    }
+
+    /// Adds a sample at a place on the film, pixels.
+    fn place(&mut self, x: f32, y: f32) {
+        let lane = self.samples % LANES;
+        if lane == 0 {
+            self.film.push([splat(0.0); 2]);
+        }
+        if let Some(film) = self.film.last_mut() {
+            film[0][lane] = x;
+            film[1][lane] = y;
+        }
+        self.samples += 1;
     }
 }
 
@@ -441,4 +436,25 @@ fn pixel_sum(radiance: &[Lanes3], coverage: &[Lanes], range: std::ops::Range<usi
         sum[3] += coverage[packet][lane];
     }
     sum
+}
+
+#[cfg(test)]
+impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+    /// The radiance at places on the film, 0 to 1 on both axes.
+    pub(super) fn radiance_at(&self, films: &[Vec2]) -> (Vec<Vec3>, RayCounts) {
+        let mut scratch = Scratch::default();
+        for film in films {
+            let (x, y) = (film.x * self.settings.width as f32, film.y * self.settings.height as f32);
+            scratch.place(x, y);
+            scratch.pixels.push(Pixel {
+                column: 0,
+                row: 0,
+                data: DataSample::MISS,
+            });
+        }
+        let never = std::sync::atomic::AtomicBool::new(false);
+        self.trace(&never, &mut scratch).unwrap();
+        let radiance = |sample| crate::math::lane3(&scratch.radiance[sample / LANES], sample % LANES);
+        ((0..films.len()).map(radiance).collect(), scratch.counts)
+    }
 }

@@ -17,21 +17,18 @@ use crate::{
 
 mod aov;
 mod attributes;
-mod body;
 #[cfg(test)]
 pub(crate) mod brute;
 mod film;
-mod floor;
 mod integrator;
-mod lights;
-mod recursive;
+mod roulette;
 mod sampler;
 mod shading;
 mod source;
 mod stop;
 mod stream;
 mod tile;
-mod tracer;
+mod visibility;
 mod whitted;
 
 #[cfg(test)]
@@ -53,7 +50,6 @@ pub use source::{Colors, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
 
 use integrator::WhittedIntegrator;
-use tracer::Tracer;
 
 /// Most samples per pixel: more than any picture needs, and few enough to count in f32.
 pub const MAX_SAMPLES: u32 = 4096;
@@ -204,9 +200,10 @@ pub enum RenderError {
     Material(#[from] MaterialError),
 }
 
-/// Bytes that each thread takes while it renders, beside the film.
-pub const fn scratch_bytes() -> u64 {
-    integrator::SCRATCH_BYTES
+/// Bytes that each thread takes while it renders, beside the film, at most. `is_body` says that the particles make one
+/// connected body.
+pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bool) -> u64 {
+    integrator::scratch_bytes(settings, material.transmission > 0.0, is_body)
 }
 
 /// Renders one image on the current rayon pool.
@@ -230,15 +227,9 @@ pub fn render<S: Surface, C: ShadeSource>(
         settings.validate_branches(&scene.material)?;
     }
     let mut film = Film::new(settings.width, settings.height, settings.channels);
-    let tracer = Tracer::new(surface, scene, source, settings);
     let integrator = WhittedIntegrator::new(surface, scene, source, settings);
-    let is_opaque = scene.material.transmission <= 0.0;
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
-        if !is_opaque {
-            let counts = recursive::render_tile(&tracer, settings, stop, tile);
-            return counts.ok_or(RenderError::Interrupted);
-        }
         // As many as there are threads; they live until the image is done.
         let mut own = lock(&scratch).pop().unwrap_or_default();
         let counts = integrator.render_tile(tile, stop, &mut own);

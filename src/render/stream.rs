@@ -1,5 +1,6 @@
 //! Path segments on their way, in packets of 16.
 
+use super::roulette::PathHash;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
 
@@ -12,6 +13,10 @@ pub(super) struct SegmentPacket {
     pub(super) throughput: Lanes3,
     /// The sample that each ray belongs to, within its batch.
     pub(super) sample: [u32; LANES],
+    /// The way that each ray came; kept where paths branch.
+    pub(super) path: [PathHash; LANES],
+    /// Lanes whose rays start inside of one connected body.
+    pub(super) inside: u32,
 }
 
 impl Default for SegmentPacket {
@@ -20,6 +25,8 @@ impl Default for SegmentPacket {
             rays: RayPacket::default(),
             throughput: [splat(1.0); 3],
             sample: [0; LANES],
+            path: [PathHash::default(); LANES],
+            inside: 0,
         }
     }
 }
@@ -38,6 +45,9 @@ impl SegmentPacket {
 pub(super) struct ScatteredRays {
     pub(super) origin: Lanes3,
     pub(super) direction: Lanes3,
+    /// Part of the radiance along each ray that goes the way that the packet came: a weight of eq. 4.1.
+    pub(super) weight: Lanes,
+    /// The same times the throughput of the packet.
     pub(super) throughput: Lanes3,
 }
 
@@ -47,6 +57,7 @@ impl Default for ScatteredRays {
         Self {
             origin: zero,
             direction: zero,
+            weight: splat(0.0),
             throughput: zero,
         }
     }
@@ -75,8 +86,16 @@ impl RayStream {
         &self.packets[..self.len.div_ceil(LANES)]
     }
 
-    /// Appends the rays in `lanes`, in order; `sample` names their samples.
-    pub(super) fn push(&mut self, lanes: u32, rays: &ScatteredRays, sample: &[u32; LANES]) {
+    /// Appends the rays in `lanes`, in order, which leave surfaces that `parents` meet; those in `inside` start inside
+    /// of a connected body.
+    pub(super) fn push(
+        &mut self,
+        lanes: u32,
+        rays: &ScatteredRays,
+        parents: &SegmentPacket,
+        inside: u32,
+        path: impl Fn(PathHash) -> PathHash,
+    ) {
         // There is always room for a whole packet more.
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
         if self.packets.len() < needed {
@@ -87,13 +106,16 @@ impl RayStream {
             let segment = &mut self.packets[packet];
             if to == 0 {
                 segment.rays.reset();
+                segment.inside = 0;
             }
             for axis in 0..3 {
                 segment.rays.origin[axis][to] = rays.origin[axis][lane];
                 segment.rays.direction[axis][to] = rays.direction[axis][lane];
                 segment.throughput[axis][to] = rays.throughput[axis][lane];
             }
-            segment.sample[to] = sample[lane];
+            segment.sample[to] = parents.sample[lane];
+            segment.path[to] = path(parents.path[lane]);
+            segment.inside |= (inside >> lane & 1) << to;
             segment.rays.set_len(to + 1);
             self.len += 1;
         }
@@ -132,9 +154,15 @@ mod tests {
                     next - 1
                 });
                 rays.origin[0] = sample.map(|s| s as f32);
-                let lanes = 0b1010_1100_0000_0111 << (first / 100 % 2);
-                stream.push(lanes & 0xffff, &rays, &sample);
-                wanted.extend(lanes_in(lanes & 0xffff).map(|lane| sample[lane]));
+                let parents = SegmentPacket {
+                    sample,
+                    path: sample.map(|s| PathHash(u64::from(s))),
+                    ..SegmentPacket::default()
+                };
+                let lanes = (0b1010_1100_0000_0111 << (first / 100 % 2)) & 0xffff;
+                let odd = 0b1010_1010_1010_1010;
+                stream.push(lanes, &rays, &parents, odd, |path| PathHash(path.0 + 1));
+                wanted.extend(lanes_in(lanes).map(|lane| sample[lane]));
             }
             assert_eq!(stream.len(), wanted.len(), "{round}");
             let packets = stream.packets();
@@ -147,6 +175,13 @@ mod tests {
                 .iter()
                 .flat_map(|p| p.rays.rays().map(|r| r.origin.x));
             assert!(origins.eq(wanted.iter().map(|s| *s as f32)));
+            for packet in packets {
+                for lane in 0..packet.rays.len() {
+                    let sample = packet.sample[lane];
+                    assert_eq!(packet.path[lane].0, u64::from(sample) + 1);
+                    assert_eq!(packet.inside >> lane & 1, sample % 2);
+                }
+            }
         }
     }
 

@@ -1,151 +1,203 @@
-//! Whitted's recursion with the intensities of the thesis:
-//! `I = ambient + sum of lights + reflection*r*S + transmission*(1-r)*T` (eq. 4.1), Blinn-Phong per
-//! light (4.2, program 3.1), `r` by Schlick (4.3). Both weights 1 give 4.1 to the letter.
+//! Eq. 4.1 for the rays of a packet: `I = ambient + sum of lights + reflection*r*S + transmission*(1-r)*T`, with
+//! Blinn and Phong's reflection of lights (4.2, program 3.1) and `r` by Schlick (4.3). Both weights 1 give 4.1 to the
+//! letter.
 //!
-//! Normals face the ray that sees them, as the thesis's `faceforward` does, so a surface seen from
-//! inside is lit from inside. Under total internal reflection `r` is 1.
-//!
-//! Followed to the letter, eq. 4.1 doubles the rays at each level. So both branches are followed only while the
-//! lesser one has a path weight of at least `min_weight`; below that one of them is drawn (Russian roulette; Arvo
-//! and Kirk, "Particle transport and image synthesis", 1990). The path weights of a sample never add up to more
-//! than 1, so at most `1 / min_weight` of its paths are alive at any depth.
+//! The surface of one connected body is lit from outside alone; from inside it only reflects and refracts.
 
 use glam::Vec3;
 
 use super::{
     RayCounts, ShadeSource,
-    body::Path,
-    lights::{Face, Known, Place},
-    tracer::{Level, Met, Scratch, Tracer, facing},
+    integrator::{Depth, Interior, NextRays, PacketScratch, WhittedIntegrator},
+    roulette::PathHash,
+    shading::{
+        WhittedLanes, add, add_background, attenuate, interface_points, leaving, product,
+        refracted_rays, sample_light, scale, shading_points,
+    },
+    stream::{RayStream, ScatteredRays, SegmentPacket},
 };
-use crate::{
-    ray::Ray,
-    scene::material::{reflect, refract},
-    surface::{Side, Substance, Surface, SurfaceHit},
-};
+use crate::math::{lane3, lanes_in, splat};
+use crate::surface::{MaterialId, Surface};
 
-impl<'a, S: Surface, C: ShadeSource> Tracer<'a, S, C> {
-    fn meet(&self, ray: &Ray) -> Met<'a> {
-        let floor = self.floor(ray);
-        let t_max = floor.as_ref().map_or(ray.t_max, |hit| hit.t);
-        Met::nearer(self.surface.nearest(&Ray { t_max, ..*ray }), floor)
-    }
-
-    /// Light that comes back along `ray`.
-    fn radiance(&self, ray: &Ray, level: Level, path: Path, scratch: &mut Scratch) -> Vec3 {
-        match self.meet(ray) {
-            Met::Nothing => self.scene.background.color(ray.direction),
-            Met::Particle(hit) => self.shade(ray, &hit, level, path, None, scratch),
-            Met::Ground(hit) => self.ground_radiance(ray, &hit, Side::Outside, scratch),
-        }
-    }
-
-    /// Eq. 4.1 at `hit`; `lit` where that is known.
+impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+    /// Adds to the radiance of a packet what its segments see, and appends what they reflect and refract to `next`.
     pub(super) fn shade(
         &self,
-        ray: &Ray,
-        hit: &SurfaceHit,
-        level: Level,
-        path: Path,
-        lit: Option<Known<'_>>,
-        scratch: &mut Scratch,
-    ) -> Vec3 {
-        let material = &self.scene.material;
-        let direction = ray.direction;
-        let entering = direction.dot(hit.normal) < 0.0;
-        let normal = facing(hit.normal, direction);
-        let start = hit.anchor + hit.offset * normal;
-        let face = Face {
-            place: Place::of(hit, direction, Side::Outside),
-            to_viewer: -direction,
-            base: self.base(hit, scratch),
-        };
-        if hit.substance == Substance::Spray {
-            return self.scattered(&face, lit, scratch);
+        segments: &SegmentPacket,
+        depth: Depth,
+        packet: &mut PacketScratch,
+        next: &mut NextRays,
+        counts: &mut RayCounts,
+    ) {
+        packet.throughput = segments.throughput;
+        self.attenuate_on_the_way(segments, packet);
+        if depth.sees_background {
+            self.add_seen_background(segments, packet);
         }
-        let mut intensity = self.direct(&face, lit, scratch);
-
-        let ratio = if entering {
-            1.0 / material.ior
-        } else {
-            material.ior
-        };
-        let refracted = refract(direction, normal, ratio);
-        let r = match refracted {
-            Some(_) => material.mirrored(-direction.dot(normal), ratio),
-            None => 1.0,
-        };
-        // Behind a ray that leaves here lies the way through the sphere.
-        let transmittance = if entering {
-            Vec3::ONE
-        } else {
-            self.optics.kept_after(hit.t)
-        };
-        let path_weight = level.weight * transmittance.max_element();
-        let level = Level {
-            weight: path_weight,
-            ..level
-        };
-        let weights = [
-            material.reflection * r,
-            match refracted {
-                Some(_) => material.transmission * (1.0 - r),
-                None => 0.0,
-            },
-        ];
-        let [mirrored, passed] = self.branch_weights(weights, level, path);
-        if mirrored > 0.0 {
-            let next = Ray::new(start, reflect(direction, normal));
-            let level = level.below(mirrored);
-            let traced = |counts: &mut RayCounts| counts.reflection += 1;
-            intensity += mirrored * self.secondary(&next, level, path.mirrored(), scratch, traced);
+        if packet.hits.mask == 0 {
+            return;
         }
-        if let Some(onward) = refracted
-            && passed > 0.0
-        {
-            let next = Ray::new(hit.anchor - hit.offset * normal, onward);
-            let level = level.below(passed);
-            let traced = |counts: &mut RayCounts| counts.refraction += 1;
-            intensity += passed * self.secondary(&next, level, path.passed(), scratch, traced);
-        }
-        if !entering {
-            intensity *= transmittance;
-        }
-        intensity
-    }
-
-    /// The weights with which the reflected and the refracted branch of a hit are followed: their own while the
-    /// lesser one has a path weight of at least `min_weight`. Else one branch is drawn with probability
-    /// proportional to its weight and has the weight of both, so that the mean stays the same.
-    fn branch_weights(&self, weights: [f32; 2], level: Level, path: Path) -> [f32; 2] {
-        let [mirrored, passed] = weights;
-        let lesser = mirrored.min(passed);
-        // Where the recursion ends, both branches see the background without a ray.
-        let ends = level.depth >= self.max_depth;
-        if lesser <= 0.0 || ends || level.weight * lesser >= self.min_weight {
-            return weights;
-        }
-        let both = mirrored + passed;
-        if path.draw() * both < mirrored {
-            [both, 0.0]
-        } else {
-            [0.0, both]
+        self.base_colors(packet);
+        for (number, material) in (0..).zip(&self.materials) {
+            let id = MaterialId(number);
+            let lanes = packet.hits.lanes_of(id);
+            if lanes == 0 {
+                continue;
+            }
+            let rays = &segments.rays;
+            let is_interface = self.interior == Interior::Body && id == MaterialId::PARTICLES;
+            let PacketScratch { hits, points, .. } = packet;
+            if is_interface {
+                let inside = segments.inside;
+                interface_points(self.simd, material, rays, hits, inside, points);
+                self.add_direct(segments, material, lanes & !inside, depth, packet, counts);
+            } else {
+                shading_points(self.simd, material, rays, hits, points);
+                self.add_direct(segments, material, lanes, depth, packet, counts);
+            }
+            if id == MaterialId::PARTICLES {
+                self.scatter(segments, material, lanes, depth, packet, next);
+            }
         }
     }
 
-    /// Light along a reflected or refracted ray: the background where the recursion ends.
-    fn secondary(
+    /// Takes from the throughput what the medium takes between the start of the rays and their intersections.
+    fn attenuate_on_the_way(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+        let extinction = self.materials[0].extinction;
+        if extinction == Vec3::ZERO {
+            return;
+        }
+        let hits = &packet.hits;
+        let lanes = match self.interior {
+            Interior::Opaque => 0,
+            // Behind a ray that leaves a sphere lies the way through it.
+            Interior::Spheres => {
+                hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)
+            }
+            // A way inside that has no end is a crack in the surface, and its length unknown.
+            Interior::Body => segments.inside & hits.mask,
+        };
+        if lanes != 0 {
+            attenuate(self.simd, &extinction, &hits.t, lanes, &mut packet.throughput);
+        }
+    }
+
+    /// Adds the background, where nothing is met and through what is only partly there.
+    fn add_seen_background(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+        let hits = &packet.hits;
+        let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        if lanes == 0 {
+            return;
+        }
+        let seen = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
+            0 => 1.0,
+            _ => 1.0 - hits.opacity[lane],
+        });
+        scale(self.simd, &packet.throughput, &seen, &mut packet.weight);
+        let direction = &segments.rays.direction;
+        let (weight, radiance) = (&packet.weight, &mut packet.radiance);
+        add_background(self.simd, &self.background, direction, weight, lanes, radiance);
+    }
+
+    /// Adds ambient light and that of lights at the shading points of `lanes`.
+    fn add_direct(
         &self,
-        ray: &Ray,
-        level: Level,
-        path: Path,
-        scratch: &mut Scratch,
-        traced: impl FnOnce(&mut RayCounts),
-    ) -> Vec3 {
-        if level.depth > self.max_depth {
-            return self.scene.background.color(ray.direction);
+        segments: &SegmentPacket,
+        material: &WhittedLanes,
+        lanes: u32,
+        depth: Depth,
+        packet: &mut PacketScratch,
+        counts: &mut RayCounts,
+    ) {
+        if lanes == 0 {
+            return;
         }
-        traced(&mut scratch.counts);
-        self.radiance(ray, level, path, scratch)
+        let simd = self.simd;
+        scale(simd, &packet.throughput, &packet.hits.opacity, &mut packet.weight);
+        let mut colored = [splat(0.0); 3];
+        product(simd, &packet.base, &packet.weight, &mut colored);
+        add(simd, &colored, &material.ambient, lanes, &mut packet.radiance);
+        if !material.scatters() {
+            return;
+        }
+        for light in &self.lights {
+            let PacketScratch {
+                points,
+                light: samples,
+                base,
+                weight,
+                radiance,
+                crossings,
+                ..
+            } = packet;
+            let rays = &segments.rays;
+            sample_light(simd, light, material, rays, points, base, weight, lanes, samples);
+            if samples.lanes == 0 {
+                continue;
+            }
+            let mut visible = samples.lanes;
+            if light.casts_shadow {
+                samples.shadow_rays.set_len(rays.len());
+                counts.shadow += u64::from(visible.count_ones());
+                let inside = segments.inside;
+                visible = self.visible(samples, depth.coherence, inside, crossings);
+            }
+            add(simd, &samples.contribution, &Vec3::ONE, visible, radiance);
+        }
+    }
+
+    /// Appends the rays that leave the shading points of `lanes` to `next`. Where the recursion ends, they see the
+    /// background.
+    fn scatter(
+        &self,
+        segments: &SegmentPacket,
+        material: &WhittedLanes,
+        lanes: u32,
+        depth: Depth,
+        packet: &mut PacketScratch,
+        next: &mut NextRays,
+    ) {
+        let PacketScratch {
+            hits,
+            points,
+            throughput,
+            radiance,
+            ..
+        } = packet;
+        let ends = depth.number >= self.settings.max_depth;
+        let (inside, passed) = match self.interior {
+            Interior::Opaque => (0, 0),
+            Interior::Spheres => {
+                refracted_rays(self.simd, material, &segments.rays, hits, points);
+                (0, 0)
+            }
+            Interior::Body => (segments.inside, !segments.inside),
+        };
+        if self.interior != Interior::Opaque && !ends {
+            for lane in lanes_in(lanes) {
+                let weights = [points.reflected.weight[lane], points.refracted.weight[lane]];
+                let arriving = lane3(throughput, lane).max_element();
+                let path = segments.path[lane];
+                let weights = self.split.weights(weights, arriving, depth.number, path);
+                [points.reflected.weight[lane], points.refracted.weight[lane]] = weights;
+            }
+        }
+        let mut send = |rays: &mut ScatteredRays, stream: &mut RayStream, inside, path: fn(_) -> _| {
+            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
+            let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
+            scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
+            if ends {
+                let (direction, weight) = (&rays.direction, &rays.throughput);
+                add_background(self.simd, &self.background, direction, weight, lanes, radiance);
+            } else {
+                stream.push(lanes, rays, segments, inside, path);
+            }
+        };
+        if material.reflection > 0.0 {
+            send(&mut points.reflected, &mut next.reflected, inside, PathHash::reflected);
+        }
+        if material.transmission > 0.0 {
+            send(&mut points.refracted, &mut next.refracted, passed, PathHash::refracted);
+        }
     }
 }

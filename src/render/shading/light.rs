@@ -107,8 +107,7 @@ fn sample_light_body(
         }
         // Not a number at the place of a point light, and then not lit.
         let cosine = n[0] * v[0] + n[1] * v[1] + n[2] * v[2];
-        let is_lit = cosine > 0.0 && lanes >> l & 1 == 1;
-        lit |= u32::from(is_lit) << l;
+        let is_facing = cosine > 0.0 && lanes >> l & 1 == 1;
         let mut highlight = 0.0;
         if material.specular > 0.0 {
             let h = [
@@ -122,8 +121,16 @@ fn sample_light_body(
             let along = if inverse < f32::INFINITY { along } else { 1.0 };
             let along = if along > 0.0 { along } else { 0.0 };
             let along = if along < 1.0 { along } else { 1.0 };
-            highlight = material.specular * pow(along, material.shininess);
+            let part = pow(along, material.shininess);
+            highlight = if part > material.darkest_highlight {
+                material.specular * part
+            } else {
+                0.0
+            };
         }
+        // What is dark needs no shadow ray.
+        let is_lit = is_facing && (material.diffuse > 0.0 || highlight > 0.0);
+        lit |= u32::from(is_lit) << l;
         let scattered = material.diffuse * cosine;
         for axis in 0..3 {
             let reflected = scattered * base[axis][l] + highlight;

@@ -1,4 +1,7 @@
 //! Eq. 4.1 and 4.3: the constants of a material, and the shading points where rays meet it.
+//!
+//! Normals face the ray that sees them, as the thesis's `faceforward` turns them, so that a surface seen from inside
+//! is lit from inside. Under total internal reflection `r` is 1.
 
 #![expect(
     clippy::needless_range_loop,
@@ -21,11 +24,17 @@ pub(in crate::render) struct WhittedLanes {
     pub(in crate::render) diffuse: f32,
     pub(in crate::render) specular: f32,
     pub(in crate::render) shininess: f32,
-    ior: f32,
+    /// Highlights up to this part of the light are left out.
+    pub(in crate::render) darkest_highlight: f32,
+    pub(super) ior: f32,
     r0: f32,
     is_exact: bool,
     /// Weight of the reflected ray.
     pub(in crate::render) reflection: f32,
+    /// Weight of the refracted ray.
+    pub(in crate::render) transmission: f32,
+    /// What is taken of light inside, per length, linear RGB.
+    pub(in crate::render) extinction: Vec3,
 }
 
 impl WhittedLanes {
@@ -35,10 +44,55 @@ impl WhittedLanes {
             diffuse: material.diffuse,
             specular: material.specular,
             shininess: material.shininess,
+            darkest_highlight: 0.0,
             ior: material.ior,
             r0: material.r0(),
             is_exact: material.fresnel == Fresnel::Exact,
             reflection: material.reflection,
+            transmission: material.transmission,
+            extinction: material.extinction,
+        }
+    }
+
+    /// Whether its base colour is seen.
+    pub(in crate::render) fn has_color(&self) -> bool {
+        self.ambient != Vec3::ZERO || self.diffuse > 0.0
+    }
+
+    /// Whether it scatters the light of lights.
+    pub(in crate::render) fn scatters(&self) -> bool {
+        self.diffuse > 0.0 || self.specular > 0.0
+    }
+
+    /// The part that is reflected at an absolute `cosine` with the normal, and the squared sine of the refracted ray,
+    /// which is 1 or more under total reflection. `ratio` is the index of refraction before the surface over the one
+    /// behind it.
+    #[inline(always)]
+    pub(super) fn fresnel(&self, cosine: f32, ratio: f32) -> (f32, f32) {
+        let rest = 1.0 - cosine * cosine;
+        let sin2_out = ratio * ratio * if rest > 0.0 { rest } else { 0.0 };
+        let r = self.reflected_part(cosine, ratio);
+        (if sin2_out >= 1.0 { 1.0 } else { r }, sin2_out)
+    }
+
+    /// What a ray to a light keeps where it goes straight through the surface, at an absolute `cosine` with the normal:
+    /// as seen from outside, from wherever it comes.
+    #[inline(always)]
+    pub(in crate::render) fn passed_straight(&self, cosine: f32) -> f32 {
+        self.transmission * (1.0 - self.reflected_part(cosine, 1.0 / self.ior))
+    }
+
+    #[inline(always)]
+    fn reflected_part(&self, cosine: f32, ratio: f32) -> f32 {
+        let x = 1.0 - cosine;
+        let x = if x < 0.0 { 0.0 } else { x };
+        let x = if x > 1.0 { 1.0 } else { x };
+        let x2 = x * x;
+        let schlick = self.r0 + (1.0 - self.r0) * (x2 * x2 * x);
+        if self.is_exact {
+            dielectric(cosine, ratio)
+        } else {
+            schlick
         }
     }
 
@@ -63,8 +117,10 @@ pub(in crate::render) struct ShadingPoints {
     pub(in crate::render) normal: Lanes3,
     /// Where rays to lights start.
     pub(in crate::render) start: Lanes3,
-    /// Reflected rays; their throughput is the weight of eq. 4.1 times that of the path.
+    /// Reflected rays.
     pub(in crate::render) reflected: ScatteredRays,
+    /// Refracted rays, of transmissive materials alone.
+    pub(in crate::render) refracted: ScatteredRays,
 }
 
 impl Default for ShadingPoints {
@@ -74,6 +130,7 @@ impl Default for ShadingPoints {
             normal: zero,
             start: zero,
             reflected: ScatteredRays::default(),
+            refracted: ScatteredRays::default(),
         }
     }
 }
@@ -91,13 +148,12 @@ fn dielectric(cosine: f32, ratio: f32) -> f32 {
     if is_total { 1.0 } else { mean }
 }
 
-/// From intersections to shading points; `throughput` is that of the paths up to here.
+/// From intersections to shading points with reflected rays.
 #[inline(always)]
 fn shading_points_body(
     material: &WhittedLanes,
     rays: &RayPacket,
     hits: &Intersections,
-    throughput: &Lanes3,
     points: &mut ShadingPoints,
 ) {
     for l in 0..LANES {
@@ -112,7 +168,6 @@ fn shading_points_body(
             hits.shading_normal[1][l],
             hits.shading_normal[2][l],
         ];
-        // Normals face the viewer, as the thesis's `faceforward` turns them.
         let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
         let is_entering = along < 0.0;
         let side = if is_entering { 1.0 } else { -1.0 };
@@ -125,20 +180,7 @@ fn shading_points_body(
         } else {
             material.ior
         };
-        let rest = 1.0 - cosine * cosine;
-        let sin2_out = ratio * ratio * if rest > 0.0 { rest } else { 0.0 };
-        let x = 1.0 - cosine;
-        let x = if x < 0.0 { 0.0 } else { x };
-        let x = if x > 1.0 { 1.0 } else { x };
-        let x2 = x * x;
-        let schlick = material.r0 + (1.0 - material.r0) * (x2 * x2 * x);
-        let r = if material.is_exact {
-            dielectric(cosine, ratio)
-        } else {
-            schlick
-        };
-        let r = if sin2_out >= 1.0 { 1.0 } else { r };
-        let weight = material.reflection * r;
+        let (r, _) = material.fresnel(cosine, ratio);
         // The mirrored direction, normalised so that errors do not add up over a path.
         let twice = 2.0 * -cosine;
         let m = [
@@ -154,8 +196,8 @@ fn shading_points_body(
             points.start[axis][l] = start + hits.lift[l] * normal;
             points.reflected.origin[axis][l] = start;
             points.reflected.direction[axis][l] = m[axis] * inverse;
-            points.reflected.throughput[axis][l] = throughput[axis][l] * weight;
         }
+        points.reflected.weight[l] = material.reflection * r;
     }
 }
 
@@ -164,7 +206,6 @@ lane_kernel! {
         material: &WhittedLanes,
         rays: &RayPacket,
         hits: &Intersections,
-        throughput: &Lanes3,
         points: &mut ShadingPoints,
     ) = shading_points_body;
 }
