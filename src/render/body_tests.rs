@@ -213,7 +213,10 @@ fn roulette_has_the_mean_of_splitting() {
         let mut integrator = WhittedIntegrator::new(&solid, &scene, &source, &settings);
         integrator.split.least = split;
         let (colors, counts) = integrator.radiance_at(&films);
-        (colors.into_iter().map(|c| c.x).collect::<Vec<_>>(), counts.total())
+        (
+            colors.into_iter().map(|c| c.x).collect::<Vec<_>>(),
+            counts.total(),
+        )
     };
     let (all, all_rays) = colors(0.0);
     let (drawn, drawn_rays) = colors(1.0);
@@ -241,7 +244,9 @@ fn more_samples_draw_sooner() {
             samples,
             ..depth(8)
         };
-        WhittedIntegrator::new(&solid, &scene, &source, &settings).split.least
+        WhittedIntegrator::new(&solid, &scene, &source, &settings)
+            .split
+            .least
     };
     assert_eq!([1, 16, 4096].map(split), [0.02, 0.2, 1.0]);
 }

@@ -153,12 +153,18 @@ impl NextRays {
 }
 
 /// Bytes of the [`Scratch`] of one thread, rounded up: what is gathered for samples, and the rays of two depths.
-pub(super) fn scratch_bytes(settings: &RenderSettings, is_transmissive: bool, is_body: bool) -> u64 {
+pub(super) fn scratch_bytes(
+    settings: &RenderSettings,
+    is_transmissive: bool,
+    is_body: bool,
+) -> u64 {
     let rule = split_rule(settings, is_body);
     let paths = most_paths(&rule, settings, is_transmissive);
     let samples = u64::from(GROUP.max(settings.samples)) / LANES as u64 + 1;
     let rays = (batch(paths) * paths / LANES) as u64 + 4;
-    samples * (6 * size_of::<Lanes>()) as u64 + rays * 2 * size_of::<SegmentPacket>() as u64 + 65_536
+    samples * (6 * size_of::<Lanes>()) as u64
+        + rays * 2 * size_of::<SegmentPacket>() as u64
+        + 65_536
 }
 
 fn split_rule(settings: &RenderSettings, is_body: bool) -> SplitRule {
@@ -325,7 +331,11 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
         #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
         let sample = std::array::from_fn(|lane| (first + lane) as u32);
         segments.sample = sample;
-        segments.inside = if self.is_eye_inside { first_lanes(len) } else { 0 };
+        segments.inside = if self.is_eye_inside {
+            first_lanes(len)
+        } else {
+            0
+        };
         if self.interior != Interior::Opaque {
             let size = Vec2::new(self.settings.width as f32, self.settings.height as f32);
             segments.path =
@@ -350,7 +360,12 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
         next.clear();
         counts.reflection += now.reflected.len() as u64;
         counts.refraction += now.refracted.len() as u64;
-        for segments in now.reflected.packets().iter().chain(now.refracted.packets()) {
+        for segments in now
+            .reflected
+            .packets()
+            .iter()
+            .chain(now.refracted.packets())
+        {
             if stop.is_raised() {
                 return None;
             }
@@ -444,7 +459,10 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
     pub(super) fn radiance_at(&self, films: &[Vec2]) -> (Vec<Vec3>, RayCounts) {
         let mut scratch = Scratch::default();
         for film in films {
-            let (x, y) = (film.x * self.settings.width as f32, film.y * self.settings.height as f32);
+            let (x, y) = (
+                film.x * self.settings.width as f32,
+                film.y * self.settings.height as f32,
+            );
             scratch.place(x, y);
             scratch.pixels.push(Pixel {
                 column: 0,
@@ -454,7 +472,8 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         }
         let never = std::sync::atomic::AtomicBool::new(false);
         self.trace(&never, &mut scratch).unwrap();
-        let radiance = |sample| crate::math::lane3(&scratch.radiance[sample / LANES], sample % LANES);
+        let radiance =
+            |sample| crate::math::lane3(&scratch.radiance[sample / LANES], sample % LANES);
         ((0..films.len()).map(radiance).collect(), scratch.counts)
     }
 }

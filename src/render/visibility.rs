@@ -46,7 +46,9 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         }
         let mut kept = [splat(1.0); 3];
         let reached = match self.interior {
-            Interior::Body => self.through_body(rays, coherence, lanes, inside, crossings, &mut kept),
+            Interior::Body => {
+                self.through_body(rays, coherence, lanes, inside, crossings, &mut kept)
+            }
             _ => self.through_spheres(rays, lanes, &mut kept),
         };
         let arriving = samples.contribution;
@@ -87,15 +89,30 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
                 ahead.t_max[lane] = -1.0;
             }
             hits.clear();
-            self.surface.intersect(&mut ahead, coherence, inside & alive, hits);
+            self.surface
+                .intersect(&mut ahead, coherence, inside & alive, hits);
             let met = hits.mask & alive;
             // The way inside, to a crossing or to the light; one without an end is a crack in the surface.
             let mut length = splat(0.0);
             for lane in lanes_in(alive & inside) {
-                let end = if met >> lane & 1 == 1 { hits.t[lane] } else { rays.t_max[lane] };
-                length[lane] = if end.is_finite() { end - from[lane] } else { 0.0 };
+                let end = if met >> lane & 1 == 1 {
+                    hits.t[lane]
+                } else {
+                    rays.t_max[lane]
+                };
+                length[lane] = if end.is_finite() {
+                    end - from[lane]
+                } else {
+                    0.0
+                };
             }
-            attenuate(self.simd, &material.extinction, &length, alive & inside, kept);
+            attenuate(
+                self.simd,
+                &material.extinction,
+                &length,
+                alive & inside,
+                kept,
+            );
             // Crossings; spray is opaque.
             passed_straight(self.simd, material, rays, hits, met, kept);
             let is_dark = |lane: usize| {

@@ -78,7 +78,13 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
             Interior::Body => segments.inside & hits.mask,
         };
         if lanes != 0 {
-            attenuate(self.simd, &extinction, &hits.t, lanes, &mut packet.throughput);
+            attenuate(
+                self.simd,
+                &extinction,
+                &hits.t,
+                lanes,
+                &mut packet.throughput,
+            );
         }
     }
 
@@ -96,7 +102,14 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         scale(self.simd, &packet.throughput, &seen, &mut packet.weight);
         let direction = &segments.rays.direction;
         let (weight, radiance) = (&packet.weight, &mut packet.radiance);
-        add_background(self.simd, &self.background, direction, weight, lanes, radiance);
+        add_background(
+            self.simd,
+            &self.background,
+            direction,
+            weight,
+            lanes,
+            radiance,
+        );
     }
 
     /// Adds ambient light and that of lights at the shading points of `lanes`.
@@ -113,10 +126,21 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
             return;
         }
         let simd = self.simd;
-        scale(simd, &packet.throughput, &packet.hits.opacity, &mut packet.weight);
+        scale(
+            simd,
+            &packet.throughput,
+            &packet.hits.opacity,
+            &mut packet.weight,
+        );
         let mut colored = [splat(0.0); 3];
         product(simd, &packet.base, &packet.weight, &mut colored);
-        add(simd, &colored, &material.ambient, lanes, &mut packet.radiance);
+        add(
+            simd,
+            &colored,
+            &material.ambient,
+            lanes,
+            &mut packet.radiance,
+        );
         if !material.scatters() {
             return;
         }
@@ -131,7 +155,9 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
                 ..
             } = packet;
             let rays = &segments.rays;
-            sample_light(simd, light, material, rays, points, base, weight, lanes, samples);
+            sample_light(
+                simd, light, material, rays, points, base, weight, lanes, samples,
+            );
             if samples.lanes == 0 {
                 continue;
             }
@@ -182,22 +208,40 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
                 [points.reflected.weight[lane], points.refracted.weight[lane]] = weights;
             }
         }
-        let mut send = |rays: &mut ScatteredRays, stream: &mut RayStream, inside, path: fn(_) -> _| {
-            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
-            let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
-            scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
-            if ends {
-                let (direction, weight) = (&rays.direction, &rays.throughput);
-                add_background(self.simd, &self.background, direction, weight, lanes, radiance);
-            } else {
-                stream.push(lanes, rays, segments, inside, path);
-            }
-        };
+        let mut send =
+            |rays: &mut ScatteredRays, stream: &mut RayStream, inside, path: fn(_) -> _| {
+                let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
+                let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
+                scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
+                if ends {
+                    let (direction, weight) = (&rays.direction, &rays.throughput);
+                    add_background(
+                        self.simd,
+                        &self.background,
+                        direction,
+                        weight,
+                        lanes,
+                        radiance,
+                    );
+                } else {
+                    stream.push(lanes, rays, segments, inside, path);
+                }
+            };
         if material.reflection > 0.0 {
-            send(&mut points.reflected, &mut next.reflected, inside, PathHash::reflected);
+            send(
+                &mut points.reflected,
+                &mut next.reflected,
+                inside,
+                PathHash::reflected,
+            );
         }
         if material.transmission > 0.0 {
-            send(&mut points.refracted, &mut next.refracted, passed, PathHash::refracted);
+            send(
+                &mut points.refracted,
+                &mut next.refracted,
+                passed,
+                PathHash::refracted,
+            );
         }
     }
 }

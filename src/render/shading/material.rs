@@ -3,11 +3,6 @@
 //! Normals face the ray that sees them, as the thesis's `faceforward` turns them, so that a surface seen from inside
 //! is lit from inside. Under total internal reflection `r` is 1.
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "one index for the lanes of many arrays"
-)]
-
 use glam::Vec3;
 
 use crate::math::{LANES, Lanes3, lane_kernel, splat};
