@@ -38,7 +38,7 @@ impl Positions {
     }
 
     /// The largest distance that a position moves when it is rounded to f32 relative to `origin`, as
-    /// [`ParticleFrame::from_raw`] does; those that are not finite then do not count.
+    /// [`ParticleFrame::from_raw`] does; those that are dropped then do not count.
     pub fn rounding(&self, origin: DVec3) -> f64 {
         if matches!(self, Self::F32(_)) && origin == DVec3::ZERO {
             return 0.0;
@@ -46,7 +46,7 @@ impl Positions {
         let moved = |i: usize| {
             let (position, rounded) = (self.get(i), (self.get(i) - origin).as_vec3());
             let distance = (rounded.as_dvec3() + origin).distance(position);
-            if rounded.is_finite() { distance } else { 0.0 }
+            if is_near(&rounded) { distance } else { 0.0 }
         };
         let all = (0..self.len()).into_par_iter().with_min_len(4096);
         all.map(moved).reduce(|| 0.0, f64::max)
@@ -109,14 +109,28 @@ pub struct ParticleFrame {
     pub attributes: Vec<Attribute>,
     /// Simulation time, if known.
     pub time: Option<f64>,
-    /// Particles left out because a coordinate was NaN or infinite.
+    /// Particles left out because a coordinate was no number or beyond [`FARTHEST`].
     pub dropped: u64,
     /// File-order index of each kept particle; `None` when nothing was dropped (then it is `i`).
     pub file_index: Option<Vec<u32>>,
 }
 
+/// The largest coordinate relative to a sequence's origin, and the largest radius, of a particle that is kept: boxes
+/// around such spheres and the quantised planes of tree nodes are finite, with room for what rounds them up.
+pub const FARTHEST: f32 = f32::MAX / 16.0;
+
+/// Whether a position relative to the origin is finite and within [`FARTHEST`].
+pub fn is_near(position: &Vec3) -> bool {
+    position.abs().cmple(Vec3::splat(FARTHEST)).all()
+}
+
+/// Whether a radius is a number from 0 to [`FARTHEST`].
+pub fn is_radius(radius: f32) -> bool {
+    (0.0..=FARTHEST).contains(&radius)
+}
+
 impl ParticleFrame {
-    /// Drops particles with a non-finite coordinate (counted), subtracts `origin` in f64 and
+    /// Drops particles that are not [near](is_near) (counted), subtracts `origin` in f64 and
     /// rounds to f32.
     pub fn from_raw(raw: RawParticles, origin: DVec3) -> Self {
         let RawParticles {
@@ -126,7 +140,7 @@ impl ParticleFrame {
             step: _,
         } = raw;
         let relative = relative_positions(positions, origin);
-        let keep: Vec<bool> = relative.iter().map(|p| p.is_finite()).collect();
+        let keep: Vec<bool> = relative.iter().map(is_near).collect();
         let kept = keep.iter().filter(|k| **k).count();
         let dropped = (relative.len() - kept) as u64;
         if dropped == 0 {

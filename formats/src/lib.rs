@@ -30,7 +30,7 @@ pub mod write;
 pub use attribute::{Attribute, AttributeData, ID_NAMES};
 pub use budget::MemoryBudget;
 pub use error::{FrameError, ParseError};
-pub use frame::{ParticleFrame, Positions, Radius, RawParticles};
+pub use frame::{FARTHEST, ParticleFrame, Positions, Radius, RawParticles, is_near, is_radius};
 pub use message::{escape_controls, is_control};
 pub use open::FrameFile;
 pub use origin::choose_origin;

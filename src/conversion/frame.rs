@@ -170,7 +170,7 @@ impl fmt::Display for ConvertedFrame {
             write!(f, " ({fraction:.2e} of the smallest radius)")?;
         }
         if self.dropped > 0 {
-            write!(f, ", {} dropped (not finite)", self.dropped)?;
+            write!(f, ", {} dropped (not finite or too far away)", self.dropped)?;
         }
         write!(f, ", {:.2} s", self.seconds)
     }

@@ -4,7 +4,7 @@
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
-use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius};
+use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radius};
 
 use super::load::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
@@ -172,7 +172,7 @@ fn radii(setup: &Setup, frame: &ParticleFrame, file: &str) -> Result<(Radius, u6
     let mut clamped = 0;
     let mut raise = |radius: &mut f32| {
         // Also true for NaN.
-        if !(*radius >= least && radius.is_finite()) {
+        if !(*radius >= least && is_radius(*radius)) {
             *radius = least;
             clamped += 1;
         }

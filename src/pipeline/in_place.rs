@@ -7,7 +7,7 @@ use spherule_formats::blocks::StoredLeaves;
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFrame, StoredType};
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{FrameError, ScalarType};
+use spherule_formats::{FrameError, ScalarType, is_radius};
 
 use super::load::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
@@ -252,7 +252,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         }
     };
     // Also of what is no number.
-    let is_seen = common >= setup.least_radius && common.is_finite();
+    let is_seen = common >= setup.least_radius && is_radius(common);
     Ok(PlacedRadius {
         common: Some(if is_seen { common } else { setup.least_radius }),
         raised: if is_seen { 0 } else { index.count },

@@ -113,7 +113,7 @@ pub fn load_frame(
     };
     loaded.note_count(
         loaded.dropped,
-        "particles left out: a coordinate is not finite",
+        "particles left out: a coordinate is not finite or too far away",
     );
     loaded.note_count(
         loaded.clamped_radii,

@@ -3,7 +3,7 @@
 use glam::Vec3;
 use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
-use spherule_formats::{ParticleFrame, Radius};
+use spherule_formats::{ParticleFrame, Radius, is_radius};
 
 use super::{CellRequest, FrameSource, Source, Stage};
 use crate::accel::{SphereRadius, Spheres};
@@ -109,7 +109,7 @@ impl Particles {
     fn raise_radii(&mut self, least: f32) {
         // Also true for NaN.
         let raise = |radius: &mut f32| {
-            if !(*radius >= least && radius.is_finite()) {
+            if !(*radius >= least && is_radius(*radius)) {
                 *radius = least;
             }
         };

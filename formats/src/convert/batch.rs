@@ -6,7 +6,7 @@ use glam::{DVec3, Vec3};
 
 use super::columns::{Columns, RadiusColumn};
 use super::source::ParticleSource;
-use crate::FrameError;
+use crate::{FrameError, is_near};
 
 /// Particles of one stretch of the source, and room to read them.
 #[derive(Debug, Default)]
@@ -55,13 +55,13 @@ impl Batch {
         self.kept.clear();
         let relative = |p: &DVec3| (*p - origin).as_vec3();
         self.positions.extend(self.world.iter().map(relative));
-        if self.positions.iter().all(|p| p.is_finite()) {
+        if self.positions.iter().all(is_near) {
             return Ok(());
         }
         let numbered = (0..).zip(&self.positions);
-        let finite = numbered.filter(|(_, p)| p.is_finite());
+        let finite = numbered.filter(|(_, p)| is_near(p));
         self.kept.extend(finite.map(|(number, _)| number));
-        self.positions.retain(|p| p.is_finite());
+        self.positions.retain(is_near);
         Ok(())
     }
 

@@ -7,7 +7,7 @@ use half::f16;
 use super::settings::{AttributeChoice, ConvertError, ConvertSettings, RadiusRule};
 use super::source::{ParticleSource, SourceAttribute};
 use crate::native::{AttributeSpec, StoredType};
-use crate::{ID_NAMES, ScalarType};
+use crate::{ID_NAMES, ScalarType, is_radius};
 
 /// The rows of a conversion: the radius in f32 first where particles have their own, then attributes as they
 /// will be stored.
@@ -288,8 +288,4 @@ fn check(
         return Err(ConvertError::refused(path, what));
     }
     Ok(())
-}
-
-pub(super) fn is_radius(radius: f32) -> bool {
-    radius.is_finite() && radius >= 0.0
 }

@@ -7,10 +7,11 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::batch::{Batch, Shelf, Stretch};
-use super::columns::{Columns, is_radius};
+use super::columns::Columns;
 use super::settings::{ConvertError, ConvertSettings, Phase, Progress};
 use super::source::ParticleSource;
 use crate::native::StoredType;
+use crate::{is_near, is_radius};
 
 /// What is known of a source that was read once.
 #[derive(Debug)]
@@ -173,7 +174,7 @@ fn sample_of(batch: &Batch, origin: glam::DVec3, stretch: Stretch, stride: u64) 
             sample.push((position - origin).as_vec3());
         }
     }
-    sample.retain(|p| p.is_finite());
+    sample.retain(is_near);
     sample
 }
 

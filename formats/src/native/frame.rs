@@ -12,7 +12,7 @@ use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_
 use crate::attribute::with_values;
 use crate::blocks::Block;
 use crate::order::kd;
-use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius};
+use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius, is_near, is_radius};
 
 /// How a frame is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -64,7 +64,7 @@ fn store_checked(
     step: Option<i64>,
     settings: &StoreSettings,
 ) -> io::Result<FrameIndex> {
-    let is_kept = |a: &&Attribute| frame.radius.is_none() || !is_radius(a);
+    let is_kept = |a: &&Attribute| frame.radius.is_none() || !holds_radii(a);
     let kept: Vec<&Attribute> = frame.attributes.iter().filter(is_kept).collect();
     let own_radii = match &frame.radius {
         Some(Radius::PerParticle(radii)) => Some(&radii[..]),
@@ -143,7 +143,7 @@ fn smallest(radii: &[f32]) -> f32 {
 }
 
 /// Whether radii are read from this attribute first, so that it need not be stored beside them.
-fn is_radius(attribute: &Attribute) -> bool {
+fn holds_radii(attribute: &Attribute) -> bool {
     let is_float = matches!(
         attribute.data,
         AttributeData::F32(_) | AttributeData::F64(_)
@@ -201,14 +201,15 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
             let (radii, particles) = (radii.len(), frame.len());
             return bad(format!("{radii} radii for {particles} particles"));
         }
-        if !radii.iter().all(|r| r.is_finite() && *r >= 0.0) {
+        if !radii.iter().all(|r| is_radius(*r)) {
             return bad(
-                "a radius is negative or no number; give one for all (--radius)".to_owned(),
+                "a radius is negative, no number or too large; give one for all (--radius)"
+                    .to_owned(),
             );
         }
     }
-    if !frame.positions.par_iter().all(|p| p.is_finite()) {
-        return bad("a position is not finite".to_owned());
+    if !frame.positions.par_iter().all(is_near) {
+        return bad("a position is no number or too far away".to_owned());
     }
     Ok(())
 }

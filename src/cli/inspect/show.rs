@@ -54,7 +54,7 @@ impl Inspected<'_> {
         let mut lines = vec![self.heading()];
         let dropped = match stats.dropped {
             0 => String::new(),
-            n => format!(", {n} dropped (not finite)"),
+            n => format!(", {n} dropped (not finite or too far away)"),
         };
         lines.push(format!(
             "  {}, {} positions: {} particles{dropped}",

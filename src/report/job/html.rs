@@ -95,7 +95,10 @@ impl JobReport {
             ("Peak memory, anonymous", bytes(totals.rss.anonymous_peak)),
             ("Peak memory, file-backed", bytes(totals.rss.file_peak)),
             ("Peak of all resident memory", bytes(totals.rss.total_peak)),
-            ("Particles dropped (not finite)", count(totals.dropped)),
+            (
+                "Particles dropped (not finite or too far away)",
+                count(totals.dropped),
+            ),
             ("Radii clamped (too small)", count(totals.clamped_radii)),
             ("Pixels clamped (too bright)", count(totals.clamped_pixels)),
         ]);
