@@ -6,14 +6,16 @@
 //! reflected rays before refracted ones, and each by the order of the rays that they leave. Nothing depends on threads,
 //! on the tile's size or on which rays share a packet.
 
-use glam::{Vec2, Vec3};
+#[cfg(test)]
+use glam::Vec2;
+use glam::Vec3;
 
 use super::{
     RayCounts, RenderSettings, ShadeSource, Stop,
     aov::DataSample,
     film::FilmTile,
-    roulette::{PathHash, SplitRule},
-    sampler::PixelSampler,
+    roulette::SplitRule,
+    sampler::{FilmSampler, PathSeed},
     shading::{
         BackgroundLanes, CameraLanes, LightLanes, LightSamples, ShadingPoints, WhittedLanes,
         camera_rays, intersect_ground,
@@ -55,6 +57,7 @@ pub(super) struct WhittedIntegrator<'a, S, C> {
     pub(super) split: SplitRule,
     /// Whether the camera is inside of a connected body.
     is_eye_inside: bool,
+    sampler: FilmSampler,
 }
 
 /// What lies behind the surface of the particles.
@@ -73,6 +76,7 @@ pub(super) enum Interior {
 pub(super) struct Pixel {
     pub(super) column: u32,
     pub(super) row: u32,
+    path: PathSeed,
     pub(super) data: DataSample,
 }
 
@@ -214,6 +218,7 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
             color: source.constant_color(),
             interior,
             split: split_rule(settings, is_body),
+            sampler: FilmSampler::new(settings.samples),
             is_eye_inside: is_body && surface.side_of(scene.camera.eye()) == Side::Inside,
         }
     }
@@ -226,12 +231,11 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
         scratch: &mut Scratch,
     ) -> Option<RayCounts> {
         scratch.counts = RayCounts::default();
-        let mut sampler = PixelSampler::new(self.settings.samples);
         let most = (GROUP / self.settings.samples).max(1) as usize;
         let mut pixels = pixels_of(tile).peekable();
         while pixels.peek().is_some() {
             let group = pixels.by_ref().take(most);
-            self.generate(tile, group, &mut sampler, scratch);
+            self.generate(tile, group, scratch);
             self.trace(stop, scratch)?;
             self.accumulate(tile, scratch);
         }
@@ -243,20 +247,21 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
         &self,
         tile: &FilmTile<'_>,
         group: impl Iterator<Item = (u32, u32)>,
-        sampler: &mut PixelSampler,
         scratch: &mut Scratch,
     ) {
         scratch.clear();
         for (column, row) in group {
+            let (x, y) = (tile.left + column, tile.top + row);
             scratch.pixels.push(Pixel {
                 column,
                 row,
+                path: PathSeed::of_pixel(x, y),
                 data: DataSample::MISS,
             });
-            let (x, y) = (tile.left + column, tile.top + row);
-            sampler.for_each(x, y, |point| {
-                scratch.place(x as f32 + point.x, y as f32 + point.y);
-            });
+            let (across, down) = self.sampler.points(x, y);
+            for (across, down) in across.iter().zip(down) {
+                scratch.place(x as f32 + across, y as f32 + down);
+            }
         }
     }
 
@@ -300,7 +305,7 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
                 return None;
             }
             let first = number * LANES;
-            self.camera_segments(&scratch.film[number], first, scratch.samples, &mut segments);
+            self.camera_segments(scratch, number, &mut segments);
             let packet = &mut scratch.packet;
             let inside = segments.inside;
             self.intersect(&mut segments.rays, depth, inside, &mut packet.hits);
@@ -315,17 +320,12 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
         Some(())
     }
 
-    /// The camera rays of the samples from `first` on, of `samples` in all.
-    fn camera_segments(
-        &self,
-        film: &[Lanes; 2],
-        first: usize,
-        samples: usize,
-        segments: &mut SegmentPacket,
-    ) {
-        let [x, y] = film;
+    /// The camera rays of packet `number` of a group.
+    fn camera_segments(&self, scratch: &Scratch, number: usize, segments: &mut SegmentPacket) {
+        let [x, y] = &scratch.film[number];
         camera_rays(self.simd, &self.camera, x, y, &mut segments.rays);
-        let len = LANES.min(samples - first);
+        let first = number * LANES;
+        let len = LANES.min(scratch.samples - first);
         segments.rays.set_len(len);
         segments.throughput = [splat(1.0); 3];
         #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
@@ -337,9 +337,10 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
             0
         };
         if self.interior != Interior::Opaque {
-            let size = Vec2::new(self.settings.width as f32, self.settings.height as f32);
-            segments.path =
-                std::array::from_fn(|lane| PathHash::from_film(Vec2::new(x[lane], y[lane]) / size));
+            let samples = self.settings.samples as usize;
+            for (lane, path) in segments.path.iter_mut().enumerate().take(len) {
+                *path = scratch.pixels[(first + lane) / samples].path;
+            }
         }
     }
 
@@ -467,6 +468,7 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
             scratch.pixels.push(Pixel {
                 column: 0,
                 row: 0,
+                path: PathSeed::of_pixel(film.x.to_bits(), film.y.to_bits()),
                 data: DataSample::MISS,
             });
         }

@@ -44,7 +44,7 @@ mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
-pub use sampler::PixelSampler;
+pub use sampler::{FilmSampler, MultiJitter, PathSeed};
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};

@@ -3,11 +3,9 @@
 //! Followed to the letter, eq. 4.1 doubles the rays at each depth. So both are followed only while the lesser one
 //! carries enough of its sample; below that one of them is drawn (Russian roulette; Arvo and Kirk, "Particle transport
 //! and image synthesis", 1990). The weights of both always add up to what they were, and so does their mean.
-//! Draws come of the place on the film and the path since, so that they do not depend on threads.
+//! Draws come of the pixel, the sample and the path since, so that they do not depend on threads.
 
-use glam::Vec2;
-
-use super::{MAX_DEPTH, RenderSettings, sampler::mix};
+use super::{MAX_DEPTH, RenderSettings, sampler::PathSeed};
 
 /// Path weight in a connected body from which on both rays are followed, times the samples of a pixel: noise that few
 /// samples do not even out costs fewer rays than it is worth. Bounded by [`SPLIT_LEAST`] for few samples.
@@ -20,31 +18,12 @@ const SPLIT_LEAST: f32 = 0.02;
 /// of a split, else in proportion: what the camera sees first is seen best.
 const FIRST_CHANCE: f32 = 2.0;
 
-/// The way that a ray came, as a number to draw from.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
-pub(super) struct PathHash(pub(super) u64);
+/// Continuations of a path.
+pub(super) const REFLECTED: u32 = 0;
+pub(super) const REFRACTED: u32 = 1;
 
-impl PathHash {
-    /// The path that begins at a place on the film, 0 to 1 on both axes.
-    pub(super) fn from_film(film: Vec2) -> Self {
-        Self(mix(
-            u64::from(film.x.to_bits()) << 32 | u64::from(film.y.to_bits())
-        ))
-    }
-
-    pub(super) fn reflected(self) -> Self {
-        Self(mix(self.0.wrapping_add(1)))
-    }
-
-    pub(super) fn refracted(self) -> Self {
-        Self(mix(self.0.wrapping_add(2)))
-    }
-
-    /// 0..1 in steps of 2^-24.
-    fn draw(self) -> f32 {
-        (mix(self.0) >> 40) as f32 * (1.0 / 16_777_216.0)
-    }
-}
+/// The dimension of a path that decides which ray is followed.
+const BRANCH: u32 = 0;
 
 /// From which weight on both rays are followed.
 #[derive(Debug, Clone, Copy)]
@@ -85,13 +64,14 @@ impl SplitRule {
     }
 
     /// The weights with which the reflected and the refracted ray are followed, of their own `weights`. `arriving` is
-    /// the path weight of the ray that they leave, at `depth`.
+    /// the path weight of the ray that they leave, at `depth`; `sample` is the number of the sample in its pixel.
     pub(super) fn weights(
         &self,
         weights: [f32; 2],
         arriving: f32,
         depth: u32,
-        path: PathHash,
+        path: PathSeed,
+        sample: u32,
     ) -> [f32; 2] {
         let [reflected, refracted] = weights;
         let both = reflected + refracted;
@@ -108,7 +88,7 @@ impl SplitRule {
         } else {
             share
         };
-        let of_lesser = match (path.draw() < chance, is_first) {
+        let of_lesser = match (path.get_1d(BRANCH, sample) < chance, is_first) {
             (false, _) => 0.0,
             (true, true) => lesser / chance,
             (true, false) => both,

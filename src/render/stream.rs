@@ -1,6 +1,6 @@
 //! Path segments on their way, in packets of 16.
 
-use super::roulette::PathHash;
+use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
 
@@ -13,8 +13,8 @@ pub(super) struct SegmentPacket {
     pub(super) throughput: Lanes3,
     /// The sample that each ray belongs to, within its batch.
     pub(super) sample: [u32; LANES],
-    /// The way that each ray came; kept where paths branch.
-    pub(super) path: [PathHash; LANES],
+    /// What is drawn along the way that each ray came; kept where paths branch.
+    pub(super) path: [PathSeed; LANES],
     /// Lanes whose rays start inside of one connected body.
     pub(super) inside: u32,
 }
@@ -25,7 +25,7 @@ impl Default for SegmentPacket {
             rays: RayPacket::default(),
             throughput: [splat(1.0); 3],
             sample: [0; LANES],
-            path: [PathHash::default(); LANES],
+            path: [PathSeed::default(); LANES],
             inside: 0,
         }
     }
@@ -87,14 +87,14 @@ impl RayStream {
     }
 
     /// Appends the rays in `lanes`, in order, which leave surfaces that `parents` meet; those in `inside` start inside
-    /// of a connected body.
+    /// of a connected body. They are continuation `branch` of the paths.
     pub(super) fn push(
         &mut self,
         lanes: u32,
         rays: &ScatteredRays,
         parents: &SegmentPacket,
         inside: u32,
-        path: impl Fn(PathHash) -> PathHash,
+        branch: u32,
     ) {
         // There is always room for a whole packet more.
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
@@ -114,7 +114,7 @@ impl RayStream {
                 segment.throughput[axis][to] = rays.throughput[axis][lane];
             }
             segment.sample[to] = parents.sample[lane];
-            segment.path[to] = path(parents.path[lane]);
+            segment.path[to] = parents.path[lane].child(branch);
             segment.inside |= (inside >> lane & 1) << to;
             segment.rays.set_len(to + 1);
             self.len += 1;
@@ -156,12 +156,12 @@ mod tests {
                 rays.origin[0] = sample.map(|s| s as f32);
                 let parents = SegmentPacket {
                     sample,
-                    path: sample.map(|s| PathHash(u64::from(s))),
+                    path: sample.map(|s| PathSeed::of_pixel(s, 0)),
                     ..SegmentPacket::default()
                 };
                 let lanes = (0b1010_1100_0000_0111 << (first / 100 % 2)) & 0xffff;
                 let odd = 0b1010_1010_1010_1010;
-                stream.push(lanes, &rays, &parents, odd, |path| PathHash(path.0 + 1));
+                stream.push(lanes, &rays, &parents, odd, 1);
                 wanted.extend(lanes_in(lanes).map(|lane| sample[lane]));
             }
             assert_eq!(stream.len(), wanted.len(), "{round}");
@@ -178,7 +178,7 @@ mod tests {
             for packet in packets {
                 for lane in 0..packet.rays.len() {
                     let sample = packet.sample[lane];
-                    assert_eq!(packet.path[lane].0, u64::from(sample) + 1);
+                    assert_eq!(packet.path[lane], PathSeed::of_pixel(sample, 0).child(1));
                     assert_eq!(packet.inside >> lane & 1, sample % 2);
                 }
             }

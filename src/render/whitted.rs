@@ -9,7 +9,7 @@ use glam::Vec3;
 use super::{
     RayCounts, ShadeSource,
     integrator::{Depth, Interior, NextRays, PacketScratch, WhittedIntegrator},
-    roulette::PathHash,
+    roulette::{REFLECTED, REFRACTED},
     shading::{
         WhittedLanes, add, add_background, attenuate, interface_points, leaving, product,
         refracted_rays, sample_light, scale, shading_points,
@@ -203,36 +203,38 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
             for lane in lanes_in(lanes) {
                 let weights = [points.reflected.weight[lane], points.refracted.weight[lane]];
                 let arriving = lane3(throughput, lane).max_element();
-                let path = segments.path[lane];
-                let weights = self.split.weights(weights, arriving, depth.number, path);
+                let (path, sample) = (segments.path[lane], segments.sample[lane]);
+                let sample = sample % self.settings.samples;
+                let weights = self
+                    .split
+                    .weights(weights, arriving, depth.number, path, sample);
                 [points.reflected.weight[lane], points.refracted.weight[lane]] = weights;
             }
         }
-        let mut send =
-            |rays: &mut ScatteredRays, stream: &mut RayStream, inside, path: fn(_) -> _| {
-                let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
-                let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
-                scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
-                if ends {
-                    let (direction, weight) = (&rays.direction, &rays.throughput);
-                    add_background(
-                        self.simd,
-                        &self.background,
-                        direction,
-                        weight,
-                        lanes,
-                        radiance,
-                    );
-                } else {
-                    stream.push(lanes, rays, segments, inside, path);
-                }
-            };
+        let mut send = |rays: &mut ScatteredRays, stream: &mut RayStream, inside, branch| {
+            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
+            let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
+            scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
+            if ends {
+                let (direction, weight) = (&rays.direction, &rays.throughput);
+                add_background(
+                    self.simd,
+                    &self.background,
+                    direction,
+                    weight,
+                    lanes,
+                    radiance,
+                );
+            } else {
+                stream.push(lanes, rays, segments, inside, branch);
+            }
+        };
         if material.reflection > 0.0 {
             send(
                 &mut points.reflected,
                 &mut next.reflected,
                 inside,
-                PathHash::reflected,
+                REFLECTED,
             );
         }
         if material.transmission > 0.0 {
@@ -240,7 +242,7 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
                 &mut points.refracted,
                 &mut next.refracted,
                 passed,
-                PathHash::refracted,
+                REFRACTED,
             );
         }
     }

@@ -1,23 +1,25 @@
-//! Where in a pixel its samples lie.
+//! Sets of points in a square.
 //!
 //! Correlated multi-jittered sampling for any count (Kensler, "Correlated multi-jittered sampling",
 //! Pixar technical memo 13-01, 2013): `n` points are stratified in a grid of about sqrt(n) by
 //! sqrt(n) cells and along each axis alone. The shuffles are drawn from a generator seeded by the
-//! pixel's coordinates, so a pixel's points depend on nothing else.
+//! number of the set, so its points depend on nothing else.
 
 use glam::Vec2;
 
-/// Makes the sample points of one pixel after another; its buffers are reused.
+use super::hash::{STEP, mix};
+
+/// Makes sets of points; its buffers are reused.
 #[derive(Debug, Clone)]
-pub struct PixelSampler {
+pub struct MultiJitter {
     samples: u32,
     column_order: Vec<u32>,
     row_order: Vec<u32>,
     random: SplitMix64,
 }
 
-impl PixelSampler {
-    /// A sampler for `samples` points a pixel (at least one).
+impl MultiJitter {
+    /// For sets of `samples` points (at least one).
     pub fn new(samples: u32) -> Self {
         let samples = samples.max(1);
         let columns = samples.isqrt();
@@ -30,15 +32,15 @@ impl PixelSampler {
         }
     }
 
-    /// Calls `each` with the points of pixel `(x, y)` in order, both coordinates in 0..1. A single
-    /// point is the pixel's centre exactly.
-    pub fn for_each(&mut self, x: u32, y: u32, mut each: impl FnMut(Vec2)) {
+    /// Calls `each` with the points of set number `set` in order, both coordinates in 0..1. A single point is the
+    /// middle exactly.
+    pub fn for_each(&mut self, set: u64, mut each: impl FnMut(Vec2)) {
         if self.samples == 1 {
             each(Vec2::splat(0.5));
             return;
         }
-        self.random = SplitMix64(u64::from(y) << 32 | u64::from(x));
-        // Neighbouring seeds are neighbouring states; one step apart they would share outputs.
+        self.random = SplitMix64(set);
+        // Neighbouring numbers are neighbouring states; one step apart they would share outputs.
         self.random.0 = self.random.next();
         reorder(&mut self.column_order, &mut self.random);
         reorder(&mut self.row_order, &mut self.random);
@@ -69,17 +71,6 @@ fn reorder(order: &mut [u32], random: &mut SplitMix64) {
 #[derive(Debug, Clone, Copy)]
 struct SplitMix64(u64);
 
-/// From state to state of [`SplitMix64`].
-const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-
-/// What [`SplitMix64`] gives in `state`: bits that have nothing to do with those of other states.
-pub(super) const fn mix(state: u64) -> u64 {
-    let mut z = state.wrapping_add(STEP);
-    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
-    z ^ (z >> 31)
-}
-
 impl SplitMix64 {
     const fn next(&mut self) -> u64 {
         let value = mix(self.0);
@@ -108,9 +99,9 @@ impl SplitMix64 {
 mod tests {
     use super::*;
 
-    fn points(samples: u32, x: u32, y: u32) -> Vec<Vec2> {
+    fn points(samples: u32, set: u64) -> Vec<Vec2> {
         let mut points = Vec::new();
-        PixelSampler::new(samples).for_each(x, y, |p| points.push(p));
+        MultiJitter::new(samples).for_each(set, |p| points.push(p));
         points
     }
 
@@ -133,14 +124,14 @@ mod tests {
 
     #[test]
     fn one_sample_is_the_centre() {
-        assert_eq!(points(1, 7, 9), [Vec2::splat(0.5)]);
+        assert_eq!(points(1, 7), [Vec2::splat(0.5)]);
     }
 
     #[test]
     fn any_count_is_stratified_along_each_axis() {
         for samples in [2, 3, 4, 5, 7, 16, 17, 64, 100, 4096] {
-            for (x, y) in [(0, 0), (1919, 1079), (5, 65_535)] {
-                let points = points(samples, x, y);
+            for set in [0, 1919, 65_535] {
+                let points = points(samples, set);
                 assert_eq!(points.len(), samples as usize);
                 assert!(points.iter().all(|p| p.min_element() >= 0.0));
                 assert!(points.iter().all(|p| p.max_element() < 1.0));
@@ -159,7 +150,7 @@ mod tests {
     #[test]
     fn square_counts_fill_every_cell() {
         for side in [2, 4, 8] {
-            let cells = points(side * side, 3, 4);
+            let cells = points(side * side, 3);
             let cell = |p: &Vec2| (stratum(p.x, side), stratum(p.y, side));
             let mut seen: Vec<_> = cells.iter().map(cell).collect();
             seen.sort_unstable();
@@ -169,21 +160,20 @@ mod tests {
     }
 
     #[test]
-    fn depends_on_the_pixel_and_on_nothing_else() {
-        let mut sampler = PixelSampler::new(16);
-        sampler.for_each(100, 200, |_| ());
+    fn depends_on_the_set_and_on_nothing_else() {
+        let mut sets = MultiJitter::new(16);
+        sets.for_each(100, |_| ());
         let mut again = Vec::new();
-        sampler.for_each(3, 4, |p| again.push(p));
-        assert_eq!(again, points(16, 3, 4));
-        assert_ne!(again, points(16, 4, 3));
-        assert_ne!(again, points(16, 4, 4));
+        sets.for_each(3, |p| again.push(p));
+        assert_eq!(again, points(16, 3));
+        assert_ne!(again, points(16, 4));
     }
 
     #[test]
-    fn means_are_unbiased_over_pixels() {
+    fn means_are_unbiased_over_sets() {
         let mut sum = Vec2::ZERO;
         for x in 0..1000 {
-            for p in points(5, x, 1) {
+            for p in points(5, x) {
                 sum += p;
             }
         }

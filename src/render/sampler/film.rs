@@ -1,0 +1,76 @@
+//! The places of a pixel's samples on the film.
+//!
+//! The points of a pixel come from a table of correlated multi-jittered sets, picked by a hash of the pixel: as even as
+//! a set made for every pixel, for a fraction of the time.
+
+use super::hash::mix;
+use super::multi_jitter::MultiJitter;
+
+/// Sets in a table, unless they are very large.
+const MOST_SETS: usize = 256;
+/// Points in a table, roughly; at least [`LEAST_SETS`] sets are made.
+const TABLE_POINTS: usize = 1 << 16;
+/// Sets in a table, however large they are.
+const LEAST_SETS: usize = 16;
+
+/// Sample points for the pixels of a film.
+#[derive(Debug, Clone)]
+pub struct FilmSampler {
+    samples: usize,
+    /// Coordinates of the points of all sets, one set after the other.
+    x: Vec<f32>,
+    y: Vec<f32>,
+}
+
+impl FilmSampler {
+    /// A sampler for `samples` points a pixel (at least one).
+    pub fn new(samples: u32) -> Self {
+        let mut sets = MultiJitter::new(samples);
+        let samples = samples.max(1) as usize;
+        let count = (TABLE_POINTS / samples).clamp(LEAST_SETS, MOST_SETS);
+        let (mut x, mut y) = (Vec::new(), Vec::new());
+        for set in (0_u64..).take(count) {
+            sets.for_each(set, |point| {
+                x.push(point.x);
+                y.push(point.y);
+            });
+        }
+        Self { samples, x, y }
+    }
+
+    /// The points of pixel `(x, y)`, both coordinates in 0..1. A single point is the pixel's centre.
+    pub fn points(&self, x: u32, y: u32) -> (&[f32], &[f32]) {
+        let sets = self.x.len() / self.samples;
+        let hash = mix(u64::from(y) << 32 | u64::from(x)) >> 32;
+        let set = ((hash * sets as u64) >> 32) as usize;
+        let range = set * self.samples..(set + 1) * self.samples;
+        (&self.x[range.clone()], &self.y[range])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn pixels_take_whole_sets_and_many_of_them() {
+        for samples in [1, 3, 16, 4096] {
+            let sampler = FilmSampler::new(samples);
+            let mut sets = HashSet::new();
+            for pixel in 0..2000 {
+                let (x, y) = sampler.points(pixel, 7);
+                assert_eq!((x.len(), y.len()), (samples as usize, samples as usize));
+                let mean = y.iter().sum::<f32>() / samples as f32;
+                assert!(
+                    (mean - 0.5).abs() <= 0.5 / samples as f32 + 1e-5,
+                    "{samples}: {mean}"
+                );
+                sets.insert(x[0].to_bits());
+            }
+            assert!(samples == 1 || sets.len() > 12, "{samples}: {}", sets.len());
+        }
+        assert_eq!(FilmSampler::new(1).points(3, 4), (&[0.5][..], &[0.5][..]));
+    }
+}
