@@ -14,7 +14,7 @@ use spherule::scene::material::{reflect, refract};
 use spherule::surface::medium::MediumSurface;
 use spherule::surface::smooth::SmoothGrid;
 use spherule::surface::spheres::SphereSurface;
-use spherule::surface::{Side, Surface, SurfaceHit, SurfaceSettings};
+use spherule::surface::{Intersection, Shape, Side, SurfaceSettings};
 use spherule_formats::generate::{BoxSettings, fill_box};
 
 const IOR: f32 = 1.333;
@@ -66,7 +66,7 @@ fn main() {
     }
 }
 
-fn tell<S: Surface>(of: &str, name: &str, surface: &S) {
+fn tell<S: Shape>(of: &str, name: &str, surface: &S) {
     let paths: Vec<Events> = rays().map(|ray| follow(surface, ray)).collect();
     let percent = |events: fn(&Events) -> Option<usize>, most: usize| {
         let within = |path: &&Events| events(path).is_some_and(|needed| needed <= most);
@@ -94,7 +94,7 @@ fn rays() -> impl Iterator<Item = Ray> {
     })
 }
 
-fn follow<S: Surface>(surface: &S, mut ray: Ray) -> Events {
+fn follow<S: Shape>(surface: &S, mut ray: Ray) -> Events {
     let forward = ray.direction;
     let is_beyond = |point: Vec3| (point - CENTER).dot(forward) > 0.0;
     let mut side = Side::Outside;
@@ -103,7 +103,7 @@ fn follow<S: Surface>(surface: &S, mut ray: Ray) -> Events {
         to_leave: None,
     };
     for events in 0..=EVENTS[EVENTS.len() - 1] {
-        let hit = next(surface, &ray, side);
+        let hit = surface.crossing(&ray, side);
         let is_past = match &hit {
             Some(hit) => is_beyond(hit.point),
             None => ray.direction.dot(forward) > 0.0,
@@ -120,16 +120,8 @@ fn follow<S: Surface>(surface: &S, mut ray: Ray) -> Events {
     found
 }
 
-fn next<S: Surface>(surface: &S, ray: &Ray, side: Side) -> Option<SurfaceHit> {
-    if S::ONE_BODY {
-        surface.crossing(ray, side)
-    } else {
-        surface.nearest(ray)
-    }
-}
-
 /// Where a path goes on, and on which side of one body.
-fn bend(ray: &Ray, hit: &SurfaceHit, side: Side) -> (Ray, Side) {
+fn bend(ray: &Ray, hit: &Intersection, side: Side) -> (Ray, Side) {
     let entering = ray.direction.dot(hit.normal) < 0.0;
     let (normal, ratio) = if entering {
         (hit.normal, 1.0 / IOR)

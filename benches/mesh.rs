@@ -18,7 +18,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule::ray::Ray;
 use spherule::surface::smooth::SmoothGrid;
-use spherule::surface::{Side, Surface, SurfaceKind, SurfaceSettings};
+use spherule::surface::{Shape, Side, SurfaceKind, SurfaceSettings};
 use spherule_formats::{FrameFile, ParticleFrame};
 
 /// Radii along the normal in which the surface is looked for.
@@ -136,7 +136,7 @@ fn triple(text: &str) -> Vec3 {
 }
 
 /// The surface nearest to `vertex` along its normal; None where there is none in reach.
-fn difference(surface: &impl Surface, vertex: &Vertex, radius: f32) -> Option<Difference> {
+fn difference(surface: &impl Shape, vertex: &Vertex, radius: f32) -> Option<Difference> {
     let side = surface.side_of(vertex.point);
     let outward = if side == Side::Outside { -1.0 } else { 1.0 };
     let ray = Ray {

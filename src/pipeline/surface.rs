@@ -16,9 +16,10 @@ use crate::scene::Scene;
 use crate::surface::medium::MediumSurface;
 use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
-use crate::surface::spray::{DROP_RADIUS, Drops, WithSpray, spray_of};
+use crate::surface::spray::{DROP_RADIUS, spray_of};
 use crate::surface::{
-    GradientNormals, NormalKind, PcaNormals, ShadingNormals, Surface, SurfaceKind, SurfaceSettings,
+    GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind,
+    SurfaceSettings,
 };
 
 /// Radii that differ by no more than this part are the same.
@@ -140,49 +141,30 @@ impl SurfaceBuilder {
         built
     }
 
-    fn drops(&self) -> Option<Drops<'_>> {
-        let tree = self.spray.tree().view();
-        (!tree.is_empty()).then(|| Drops::new(tree, self.body))
-    }
-
     /// The image of the surface that `setup` asks for over the spheres of `tree`.
     ///
     /// # Errors
     /// As [`render`].
-    pub(super) fn draw<C: ShadeSource>(
+    pub(super) fn draw(
         &self,
         setup: &Setup,
         tree: TreeView<'_>,
         scene: &Scene,
-        source: &C,
+        source: &dyn ShadeSource,
         stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), RenderError> {
         let normals = shading_normals(&setup.surface);
-        match setup.surface.kind {
-            SurfaceKind::Spheres => {
-                let body = SphereSurface::new(tree).shaded_by(normals);
-                self.draw_body(body, setup, scene, source, stop)
-            }
-            SurfaceKind::Medium => {
-                let body = MediumSurface::new(tree).shaded_by(normals);
-                self.draw_body(body, setup, scene, source, stop)
-            }
-            SurfaceKind::Smooth => {
-                self.draw_body(self.smooth.surface(), setup, scene, source, stop)
-            }
+        let body: Box<dyn Shape + '_> = match setup.surface.kind {
+            SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
+            SurfaceKind::Medium => Box::new(MediumSurface::new(tree).shaded_by(normals)),
+            SurfaceKind::Smooth => Box::new(self.smooth.surface()),
+        };
+        let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);
+        let mut shapes: Vec<&dyn Shape> = vec![&*body];
+        if !self.spray.tree().view().is_empty() {
+            shapes.push(&spray);
         }
-    }
-
-    fn draw_body<S: Surface, C: ShadeSource>(
-        &self,
-        body: S,
-        setup: &Setup,
-        scene: &Scene,
-        source: &C,
-        stop: &dyn Stop,
-    ) -> Result<(Film, RayCounts), RenderError> {
-        let surface = WithSpray::new(body, self.drops());
-        render(&surface, scene, source, &setup.render, stop)
+        render(&shapes, scene, source, &setup.render, stop)
     }
 }
 

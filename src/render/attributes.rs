@@ -3,19 +3,19 @@
 use glam::Vec3;
 
 use super::{
-    Channels, ShadeSource,
+    Channels,
     aov::{DataSample, NO_ID},
     integrator::{PacketScratch, Pixel, WhittedIntegrator},
     shading::depths,
 };
 use crate::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
 use crate::ray::RayPacket;
-use crate::surface::{Intersections, MaterialId, Surface};
+use crate::surface::{Intersections, MaterialId};
 
 /// Colour of foam and spray, linear RGB.
 const SPRAY: Vec3 = Vec3::splat(0.9);
 
-impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+impl WhittedIntegrator<'_> {
     /// Base colours of what a packet meets.
     pub(super) fn base_colors(&self, packet: &mut PacketScratch) {
         let PacketScratch {
@@ -45,13 +45,13 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         if let Some(color) = self.color {
             return color;
         }
-        if !S::ONE_BODY {
+        let particles = self.particles.filter(|shape| shape.is_connected());
+        let Some(particles) = particles else {
             return self.source.color(hits.particle[lane]);
-        }
+        };
         blend.clear();
         let hit = hits.get(lane);
-        self.surface
-            .blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
+        particles.blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
         self.source.blended_color(blend)
     }
 
@@ -99,6 +99,14 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         }
     }
 
+    /// The particle of the intersection in `lane`.
+    fn particle_at(&self, hits: &Intersections, lane: usize) -> u32 {
+        match (hits.material[lane], self.particles) {
+            (MaterialId::PARTICLES, Some(particles)) => particles.particle_at(&hits.get(lane)),
+            _ => hits.particle[lane],
+        }
+    }
+
     /// The data of what the camera ray in `lane` meets.
     fn data(
         &self,
@@ -111,7 +119,7 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         let channels = self.settings.channels;
         let is_particle = hits.material[lane] != MaterialId::GROUND;
         let wants_particle = is_particle && (channels.id || channels.velocity);
-        let particle = wants_particle.then(|| self.surface.particle_at(&hits.get(lane)));
+        let particle = wants_particle.then(|| self.particle_at(hits, lane));
         let normal = lane3(&hits.normal, lane);
         let direction = lane3(&rays.direction, lane);
         let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {

@@ -11,10 +11,12 @@ use super::{
     solid::Solid,
     *,
 };
+use crate::ray::Ray;
 use crate::scene::{
     Background, Camera, CameraView, Checker, Fresnel, Ground, Light, Material, ground,
     material::{dielectric, extinction},
 };
+use crate::surface::{Intersection, MaterialId, Side};
 
 const CLEAR: Material = Material {
     ambient: 0.0,
@@ -83,19 +85,47 @@ fn depth(max_depth: u32) -> RenderSettings {
     }
 }
 
-/// The middle of the film; `split` is the weight from which on both children are followed.
-fn middle_with(split: f32, solid: &Solid, scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
+/// The radiance at places on the film; `split` is the weight from which on both rays are followed.
+fn radiance_at(
+    films: &[Vec2],
+    split: f32,
+    shapes: &[&dyn Shape],
+    scene: &Scene,
+    settings: &RenderSettings,
+) -> (Vec<Vec3>, RayCounts) {
     let source = ParticleShading::constant(Vec3::ONE);
-    let settings = depth(max_depth);
-    let mut integrator = WhittedIntegrator::new(solid, scene, &source, &settings);
+    let plane = scene.ground.as_ref().map(Plane::new);
+    let floor = plane.iter().map(|plane| plane as &dyn Shape);
+    let shapes = floor.chain(shapes.iter().copied()).collect();
+    let mut integrator = WhittedIntegrator::new(shapes, scene, &source, settings);
     integrator.split.least = split;
-    let (colors, counts) = integrator.radiance_at(&[Vec2::splat(0.5)]);
+    integrator.radiance_at(films)
+}
+
+/// The middle of the film with every ray followed.
+fn middle_of(shapes: &[&dyn Shape], scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
+    let films = [Vec2::splat(0.5)];
+    let (colors, counts) = radiance_at(&films, 0.0, shapes, scene, &depth(max_depth));
     (colors[0], counts)
 }
 
-/// The same with every child followed.
 fn middle(solid: &Solid, scene: &Scene, max_depth: u32) -> Vec3 {
-    middle_with(0.0, solid, scene, max_depth).0
+    middle_of(&[solid], scene, max_depth).0
+}
+
+/// White opaque balls.
+struct Drops(Balls);
+
+impl Shape for Drops {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
+        let material = self.material();
+        let hit = self.0.crossing(ray, side)?;
+        Some(Intersection { material, ..hit })
+    }
+
+    fn material(&self) -> MaterialId {
+        MaterialId::SPRAY
+    }
 }
 
 #[track_caller]
@@ -107,7 +137,9 @@ fn assert_within(limit: f32, value: Vec3, wanted: Vec3) {
 fn film(solid: &Solid, scene: &Scene, settings: &RenderSettings) -> Film {
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    render(solid, scene, &source, settings, &never).unwrap().0
+    render(&[solid], scene, &source, settings, &never)
+        .unwrap()
+        .0
 }
 
 #[test]
@@ -204,19 +236,13 @@ fn roulette_has_the_mean_of_splitting() {
         up: Vec3::Z,
     };
     let solid = Solid::ball(1.0);
-    let source = ParticleShading::constant(Vec3::ONE);
     let films: Vec<Vec2> = (0..4096)
         .map(|i| Vec2::new((i % 64) as f32, (i / 64) as f32) / 64.0)
         .collect();
     let colors = |split: f32| {
-        let settings = depth(8);
-        let mut integrator = WhittedIntegrator::new(&solid, &scene, &source, &settings);
-        integrator.split.least = split;
-        let (colors, counts) = integrator.radiance_at(&films);
-        (
-            colors.into_iter().map(|c| c.x).collect::<Vec<_>>(),
-            counts.total(),
-        )
+        let (colors, counts) = radiance_at(&films, split, &[&solid], &scene, &depth(8));
+        let red: Vec<f32> = colors.into_iter().map(|color| color.x).collect();
+        (red, counts.total())
     };
     let (all, all_rays) = colors(0.0);
     let (drawn, drawn_rays) = colors(1.0);
@@ -244,9 +270,9 @@ fn more_samples_draw_sooner() {
             samples,
             ..depth(8)
         };
-        WhittedIntegrator::new(&solid, &scene, &source, &settings)
-            .split
-            .least
+        let shapes: Vec<&dyn Shape> = vec![&solid];
+        let integrator = WhittedIntegrator::new(shapes, &scene, &source, &settings);
+        integrator.split.least
     };
     assert_eq!([1, 16, 4096].map(split), [0.02, 0.2, 1.0]);
 }
@@ -260,7 +286,7 @@ fn an_eye_inside_sees_total_reflection_and_a_wet_floor() {
     let up = DVec3::new(0.0, 3.0_f64.sqrt(), 1.0);
     let mut scene = scene(eye, up, with_loss(Vec3::new(0.5, 1.0, 0.25), 5.0));
     scene.ground = Some(floor(-0.5));
-    let (value, counts) = middle_with(0.0, &solid, &scene, 8);
+    let (value, counts) = middle_of(&[&solid], &scene, 8);
     let bare = 0.5 * ground::AMBIENT;
     assert_within(1e-5, value, bare * Vec3::new(0.5, 1.0, 0.25));
     assert_eq!((counts.reflection, counts.refraction), (1, 0));
@@ -304,13 +330,12 @@ fn the_floor_is_seen_bent_through_a_slab() {
 
 /// The floor under a slab, seen from between them, by a light straight above.
 fn under_a_slab(material: Material, spray: Vec<Ball>) -> f32 {
-    let mut solid = Solid::slab(2.0, 4.0);
-    solid.spray = spray;
+    let (solid, drops) = (Solid::slab(2.0, 4.0), Drops(Balls(spray)));
     let mut scene = from_above(1.0, material);
     scene.ground = Some(floor(0.0));
     scene.ambient_light = Vec3::ZERO;
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
-    middle(&solid, &scene, 4).x
+    middle_of(&[&solid, &drops], &scene, 4).0.x
 }
 
 #[test]
@@ -348,8 +373,7 @@ fn spray_is_white_and_stops_light() {
         assert_eq!(under_a_slab(CLEAR, vec![ball(height)]), 0.0);
     }
     // In a slab, straight under its surface and under the light.
-    let mut solid = Solid::slab(-5.0, 1.0);
-    solid.spray = vec![ball(0.0)];
+    let (solid, drops) = (Solid::slab(-5.0, 1.0), Drops(Balls(vec![ball(0.0)])));
     let half = Material {
         reflection: 0.0,
         ..with_loss(Vec3::splat(0.5), 0.5)
@@ -358,7 +382,8 @@ fn spray_is_white_and_stops_light() {
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     let lit = ground::AMBIENT + ground::DIFFUSE * 0.5 * (1.0 - R);
     let wanted = 0.9 * lit * 0.5 * (1.0 - R);
-    assert_within(1e-4, middle(&solid, &scene, 4), Vec3::splat(wanted));
+    let (value, _) = middle_of(&[&solid, &drops], &scene, 4);
+    assert_within(1e-4, value, Vec3::splat(wanted));
 }
 
 #[test]
@@ -376,11 +401,13 @@ fn an_opaque_body_is_shaded_as_a_sphere() {
     };
     let source = ParticleShading::constant(Vec3::new(0.2, 0.4, 0.8));
     let never = AtomicBool::new(false);
-    let body = render(&Solid::ball(1.0), &scene, &source, &settings, &never)
+    let body = render(&[&Solid::ball(1.0)], &scene, &source, &settings, &never)
         .unwrap()
         .0;
     let ball = Balls::one(Vec3::ZERO, 1.0);
-    let sphere = render(&ball, &scene, &source, &settings, &never).unwrap().0;
+    let sphere = render(&[&ball], &scene, &source, &settings, &never)
+        .unwrap()
+        .0;
     for (body, sphere) in body
         .color
         .iter()

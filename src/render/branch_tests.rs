@@ -14,7 +14,7 @@ use crate::scene::{
     Background, Camera, CameraView,
     material::{reflect, refract},
 };
-use crate::surface::{Surface, spheres::SphereSurface};
+use crate::surface::{Shape, spheres::SphereSurface};
 
 const AMBIENT: f32 = 0.125;
 
@@ -60,9 +60,16 @@ fn glass_scene() -> Scene {
     }
 }
 
-fn trace(surface: &impl Surface, scene: &Scene, settings: &RenderSettings) -> (Film, RayCounts) {
+fn trace(surface: &dyn Shape, scene: &Scene, settings: &RenderSettings) -> (Film, RayCounts) {
     let source = ParticleShading::constant(Vec3::ONE);
-    render(surface, scene, &source, settings, &AtomicBool::new(false)).unwrap()
+    render(
+        &[surface],
+        scene,
+        &source,
+        settings,
+        &AtomicBool::new(false),
+    )
+    .unwrap()
 }
 
 /// Equation 4.1 with nothing but ambient light, both branches always.
@@ -196,7 +203,14 @@ fn what_would_never_end_is_refused() {
             min_weight,
             ..RenderSettings::new(2, 2)
         };
-        render(&balls, scene, &source, &settings, &AtomicBool::new(false)).err()
+        render(
+            &[&balls],
+            scene,
+            &source,
+            &settings,
+            &AtomicBool::new(false),
+        )
+        .err()
     };
     let mut scene = glass_scene();
     assert_eq!(refused(&scene, MAX_LITERAL_DEPTH, 0.0), None);

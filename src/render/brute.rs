@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     ray::Ray,
-    surface::{Substance, Surface, SurfaceHit},
+    surface::{Intersection, MaterialId, Shape, Side},
 };
 
 /// Centre and radius.
@@ -14,7 +14,7 @@ pub(crate) struct Ball {
     pub(crate) radius: f32,
 }
 
-/// A [`Surface`] over a few spheres.
+/// A [`Shape`] over a few spheres.
 pub(crate) struct Balls(pub(crate) Vec<Ball>);
 
 impl Balls {
@@ -23,7 +23,7 @@ impl Balls {
     }
 
     /// Every meeting of `ray` with a ball in its range.
-    fn all<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = SurfaceHit> + 'a {
+    fn all<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = Intersection> + 'a {
         self.0.iter().zip(0_u32..).flat_map(move |(ball, index)| {
             ball.roots(ray)
                 .into_iter()
@@ -46,14 +46,14 @@ impl Ball {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "surfaces answer in f32")]
-    fn hit(&self, ray: &Ray, t: f64, particle: u32) -> Option<SurfaceHit> {
+    fn hit(&self, ray: &Ray, t: f64, particle: u32) -> Option<Intersection> {
         let in_range = t >= f64::from(ray.t_min) && t < f64::from(ray.t_max);
         in_range.then(|| {
             let free: DVec3 = ray.origin.as_dvec3() + t * ray.direction.as_dvec3();
             let normal = (free - self.center.as_dvec3()).normalize();
             let point = self.center.as_dvec3() + f64::from(self.radius) * normal;
             let scale = point.abs().max_element().max(t) as f32;
-            SurfaceHit {
+            Intersection {
                 t: t as f32,
                 point: point.as_vec3(),
                 normal: normal.as_vec3(),
@@ -61,25 +61,21 @@ impl Ball {
                 lift: 0.0,
                 particle,
                 anchor: point.as_vec3(),
-                substance: Substance::Body,
+                material: MaterialId::PARTICLES,
                 offset: (1e-4 * self.radius).max(8.0 * f32::EPSILON * scale),
             }
         })
     }
 }
 
-impl Surface for Balls {
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
+impl Shape for Balls {
+    fn crossing(&self, ray: &Ray, _side: Side) -> Option<Intersection> {
         self.all(ray)
             .reduce(|best, hit| if hit.t < best.t { hit } else { best })
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.all(ray).next().is_some()
-    }
-
-    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
-        let cosine = |hit: SurfaceHit| hit.normal.dot(ray.direction).abs();
-        self.all(ray).map(|hit| kept(cosine(hit))).product()
+    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
+        let cosine = |hit: Intersection| hit.normal.dot(ray.direction).abs();
+        self.all(ray).map(|hit| passed(cosine(hit))).product()
     }
 }

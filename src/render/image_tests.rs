@@ -13,7 +13,7 @@ use crate::ray::Ray;
 use crate::scene::{
     Background, Bounds, Camera, CameraView, Framing, Ground, Material, default_lights,
 };
-use crate::surface::{SurfaceHit, spheres::SphereSurface};
+use crate::surface::{Intersection, Side, spheres::SphereSurface};
 
 /// A heap of balls, some overlapping, all different.
 fn heap(count: u32) -> Balls {
@@ -69,7 +69,7 @@ fn the_same_film_on_any_number_of_threads() {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
             let pool = pool.build().unwrap();
             let never = AtomicBool::new(false);
-            pool.install(|| render(&heap, &scene, &source, &settings(), &never).unwrap())
+            pool.install(|| render(&[&heap], &scene, &source, &settings(), &never).unwrap())
         };
         let (film, counts) = on(1);
         assert!(film.color.iter().flatten().all(|v| v.is_finite()));
@@ -106,7 +106,7 @@ fn data_planes_hold_the_nearest_sample() {
     };
     let ball = Balls::one(Vec3::ZERO, 1.0);
     let never = AtomicBool::new(false);
-    let (film, _) = render(&ball, &scene, &source, &settings, &never).unwrap();
+    let (film, _) = render(&[&ball], &scene, &source, &settings, &never).unwrap();
     let middle = 16 * 33 + 16;
     assert!((film.depth.as_ref().unwrap()[middle] - 4.0).abs() < 1e-5);
     assert!((film.normal.as_ref().unwrap()[middle] - Vec3::NEG_Z).length() < 1e-5);
@@ -137,7 +137,14 @@ fn row_zero_is_the_top() {
     let never = AtomicBool::new(false);
     // Up and to the right of the middle.
     let ball = Balls::one(Vec3::new(1.0, 0.0, 1.0), 0.3);
-    let (film, _) = render(&ball, &scene, &source, &RenderSettings::new(8, 8), &never).unwrap();
+    let (film, _) = render(
+        &[&ball],
+        &scene,
+        &source,
+        &RenderSettings::new(8, 8),
+        &never,
+    )
+    .unwrap();
     let covered = |x: usize, y: usize| film.color[y * 8 + x][3] == 1.0;
     assert!(covered(6, 1) && !covered(6, 6) && !covered(1, 1));
 }
@@ -153,14 +160,14 @@ fn transparent_background_is_left_out() {
     };
     let nothing = Balls(Vec::new());
     scene.ground = None;
-    let (film, counts) = render(&nothing, &scene, &source, &settings, &never).unwrap();
+    let (film, counts) = render(&[&nothing], &scene, &source, &settings, &never).unwrap();
     assert!(film.color.iter().all(|c| *c == [0.0; 4]));
     assert_eq!(counts.total(), counts.primary);
     let opaque = RenderSettings {
         transparent_background: false,
         ..settings
     };
-    let (film, _) = render(&nothing, &scene, &source, &opaque, &never).unwrap();
+    let (film, _) = render(&[&nothing], &scene, &source, &opaque, &never).unwrap();
     assert!(film.color.iter().all(|c| c[0] > 0.0 && c[3] == 0.0));
 }
 
@@ -170,7 +177,7 @@ fn interruption_and_bad_settings_are_errors() {
     let source = ParticleShading::constant(Vec3::ONE);
     let nothing = Balls(Vec::new());
     let raised = AtomicBool::new(true);
-    let result = render(&nothing, &scene, &source, &settings(), &raised);
+    let result = render(&[&nothing], &scene, &source, &settings(), &raised);
     assert_eq!(result.unwrap_err(), RenderError::Interrupted);
     let never = AtomicBool::new(false);
     for bad in [
@@ -185,29 +192,25 @@ fn interruption_and_bad_settings_are_errors() {
             ..settings()
         },
     ] {
-        let result = render(&nothing, &scene, &source, &bad, &never);
+        let result = render(&[&nothing], &scene, &source, &bad, &never);
         assert!(matches!(result, Err(RenderError::OutOfRange { .. })));
     }
     let mut wild = scene;
     wild.material.transmission = 2.0;
-    let result = render(&nothing, &wild, &source, &settings(), &never);
+    let result = render(&[&nothing], &wild, &source, &settings(), &never);
     assert!(matches!(result, Err(RenderError::Material(_))));
 }
 
 /// A surface without packets of its own.
 struct OneByOne<'a>(SphereSurface<'a>);
 
-impl Surface for OneByOne<'_> {
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
-        self.0.nearest(ray)
+impl Shape for OneByOne<'_> {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
+        self.0.crossing(ray, side)
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.0.occluded(ray)
-    }
-
-    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
-        self.0.transmittance(ray, kept)
+    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
+        self.0.transmittance(ray, passed)
     }
 }
 
@@ -232,9 +235,9 @@ fn packets_make_the_same_film_as_single_rays() {
                 samples,
                 ..settings()
             };
-            let packets = render(&surface, &scene, &source, &settings, &never).unwrap();
+            let packets = render(&[&surface], &scene, &source, &settings, &never).unwrap();
             let single = OneByOne(surface);
-            let singles = render(&single, &scene, &source, &settings, &never).unwrap();
+            let singles = render(&[&single], &scene, &source, &settings, &never).unwrap();
             assert!(packets.1.shadow > 0 && packets.1.primary == 75 * 50 * u64::from(samples));
             assert_eq!(packets, singles, "{samples} samples, {transmission}");
         }

@@ -18,7 +18,7 @@ use super::{
     sampler::{FilmSampler, PathSeed},
     shading::{
         BackgroundLanes, CameraLanes, LightLanes, LightSamples, ShadingPoints, WhittedLanes,
-        camera_rays, intersect_ground,
+        camera_rays,
     },
     stream::{RayStream, SegmentPacket, sum_of_lanes},
     tile::pixels_of,
@@ -27,7 +27,7 @@ use crate::accel::Coherence;
 use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
 use crate::scene::{Material, Scene, ground};
-use crate::surface::{Intersections, MaterialId, Side, Surface};
+use crate::surface::{Intersections, MaterialId, Shape, Side};
 
 /// Samples whose place on the film and radiance are held, unless one pixel has more.
 const GROUP: u32 = 4096;
@@ -39,9 +39,12 @@ const SEGMENTS: usize = 16_384;
 const DARKEST_HIGHLIGHT: f32 = 1.0 / 4096.0;
 
 /// Renders tiles by Whitted's method over streams.
-pub(super) struct WhittedIntegrator<'a, S, C> {
-    pub(super) surface: &'a S,
-    pub(super) source: &'a C,
+pub(super) struct WhittedIntegrator<'a> {
+    /// Whatever rays meet; the floor is first, as it is soonest asked.
+    pub(super) shapes: Vec<&'a dyn Shape>,
+    /// The particles, opaque or transmissive; all other shapes are opaque.
+    pub(super) particles: Option<&'a dyn Shape>,
+    pub(super) source: &'a dyn ShadeSource,
     pub(super) scene: &'a Scene,
     pub(super) settings: &'a RenderSettings,
     pub(super) simd: Supported,
@@ -136,8 +139,8 @@ pub(super) struct Depth {
 }
 
 impl Interior {
-    fn of<S: Surface>(material: &Material) -> Self {
-        match (material.transmission > 0.0, S::ONE_BODY) {
+    fn of(material: &Material, is_connected: bool) -> Self {
+        match (material.transmission > 0.0, is_connected) {
             (false, _) => Self::Opaque,
             (true, false) => Self::Spheres,
             (true, true) => Self::Body,
@@ -190,23 +193,30 @@ fn batch(paths: usize) -> usize {
     (SEGMENTS / paths).min(GROUP as usize).max(LANES) / LANES * LANES
 }
 
-impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
+impl<'a> WhittedIntegrator<'a> {
     pub(super) fn new(
-        surface: &'a S,
+        shapes: Vec<&'a dyn Shape>,
         scene: &'a Scene,
-        source: &'a C,
+        source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
         let ambient = scene.ambient_light;
         let matte = WhittedLanes::matte(ground::AMBIENT, ground::DIFFUSE, ambient);
-        let interior = Interior::of::<S>(&scene.material);
-        let mut particles = WhittedLanes::new(&scene.material, ambient);
+        let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
+        let particles = shapes.iter().find(is_particles).copied();
+        let is_connected = particles.is_some_and(|shape| shape.is_connected());
+        let interior = Interior::of(&scene.material, is_connected);
+        let mut material = WhittedLanes::new(&scene.material, ambient);
         let is_body = interior == Interior::Body;
-        if is_body && !particles.has_color() {
-            particles.darkest_highlight = DARKEST_HIGHLIGHT;
+        if is_body && !material.has_color() {
+            material.darkest_highlight = DARKEST_HIGHLIGHT;
         }
+        let eye = scene.camera.eye();
+        let is_eye_inside = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
-            surface,
+            is_eye_inside: is_body && particles.is_some_and(is_eye_inside),
+            shapes,
+            particles,
             source,
             scene,
             settings,
@@ -214,12 +224,11 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
             camera: CameraLanes::new(&scene.camera, settings.width, settings.height),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(LightLanes::from).collect(),
-            materials: [particles, matte, matte],
+            materials: [material, matte, matte],
             color: source.constant_color(),
             interior,
             split: split_rule(settings, is_body),
             sampler: FilmSampler::new(settings.samples),
-            is_eye_inside: is_body && surface.side_of(scene.camera.eye()) == Side::Inside,
         }
     }
 
@@ -389,10 +398,9 @@ impl<'a, S: Surface, C: ShadeSource> WhittedIntegrator<'a, S, C> {
     /// Finds the nearest intersection of each ray with the shapes of the scene, and ends the ray there.
     fn intersect(&self, rays: &mut RayPacket, depth: Depth, inside: u32, hits: &mut Intersections) {
         hits.clear();
-        if let Some(ground) = &self.scene.ground {
-            intersect_ground(self.simd, ground, rays, first_lanes(rays.len()), hits);
+        for shape in &self.shapes {
+            shape.intersect(rays, depth.coherence, inside, hits);
         }
-        self.surface.intersect(rays, depth.coherence, inside, hits);
     }
 
     /// Sums the samples of each pixel of a group and stores the pixels.
@@ -455,7 +463,7 @@ fn pixel_sum(radiance: &[Lanes3], coverage: &[Lanes], range: std::ops::Range<usi
 }
 
 #[cfg(test)]
-impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+impl WhittedIntegrator<'_> {
     /// The radiance at places on the film, 0 to 1 on both axes.
     pub(super) fn radiance_at(&self, films: &[Vec2]) -> (Vec<Vec3>, RayCounts) {
         let mut scratch = Scratch::default();

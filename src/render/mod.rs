@@ -1,4 +1,4 @@
-//! Rays in, planes out: samples every pixel of a [`Scene`] over a [`Surface`] and fills a [`Film`].
+//! Rays in, planes out: samples every pixel of a [`Scene`] over a list of [`Shape`]s and fills a [`Film`].
 //! No I/O; encoding is `output`'s business.
 //!
 //! The image is cut into tiles of 16x16 pixels that rayon hands out. Every tile is computed from
@@ -12,7 +12,7 @@ use thiserror::Error;
 
 use crate::{
     scene::{Material, MaterialError, Scene},
-    surface::Surface,
+    surface::{Plane, Shape},
 };
 
 mod aov;
@@ -214,20 +214,23 @@ pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bo
 ///
 /// # Errors
 /// If `stop` is raised (looked at for each packet of samples), or a setting is out of range.
-pub fn render<S: Surface, C: ShadeSource>(
-    surface: &S,
+pub fn render(
+    shapes: &[&dyn Shape],
     scene: &Scene,
-    source: &C,
+    source: &dyn ShadeSource,
     settings: &RenderSettings,
     stop: &dyn Stop,
 ) -> Result<(Film, RayCounts), RenderError> {
     settings.validate()?;
     scene.material.validate()?;
-    if !S::ONE_BODY {
+    if !shapes.iter().any(|shape| shape.is_connected()) {
         settings.validate_branches(&scene.material)?;
     }
     let mut film = Film::new(settings.width, settings.height, settings.channels);
-    let integrator = WhittedIntegrator::new(surface, scene, source, settings);
+    let plane = scene.ground.as_ref().map(Plane::new);
+    let floor = plane.iter().map(|plane| plane as &dyn Shape);
+    let shapes = floor.chain(shapes.iter().copied()).collect();
+    let integrator = WhittedIntegrator::new(shapes, scene, source, settings);
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // As many as there are threads; they live until the image is done.

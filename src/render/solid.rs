@@ -2,15 +2,14 @@
 
 use glam::{DVec3, Vec3};
 
-use super::brute::{Ball, Balls};
 use crate::{
     ray::Ray,
-    surface::{Side, Substance, Surface, SurfaceHit},
+    surface::{Intersection, MaterialId, Shape, Side},
 };
 
 /// What a body fills.
 #[derive(Debug, Clone, Copy)]
-pub(crate) enum Shape {
+pub(crate) enum Body {
     Ball {
         center: Vec3,
         radius: f32,
@@ -22,36 +21,32 @@ pub(crate) enum Shape {
     },
 }
 
-/// A body, and balls of spray.
+/// A body.
 pub(crate) struct Solid {
-    pub(crate) shape: Shape,
-    pub(crate) spray: Vec<Ball>,
+    body: Body,
 }
 
 impl Solid {
     pub(crate) const fn ball(radius: f32) -> Self {
-        Self::of(Shape::Ball {
+        Self::of(Body::Ball {
             center: Vec3::ZERO,
             radius,
         })
     }
 
     pub(crate) const fn slab(low: f32, high: f32) -> Self {
-        Self::of(Shape::Slab { low, high })
+        Self::of(Body::Slab { low, high })
     }
 
-    const fn of(shape: Shape) -> Self {
-        Self {
-            shape,
-            spray: Vec::new(),
-        }
+    const fn of(body: Body) -> Self {
+        Self { body }
     }
 
     /// Distances of entry and exit; empty if the ray misses.
     fn inside(&self, ray: &Ray) -> [f64; 2] {
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
-        match self.shape {
-            Shape::Ball { center, radius } => {
+        match self.body {
+            Body::Ball { center, radius } => {
                 let center = center.as_dvec3() - origin;
                 let middle = center.dot(direction);
                 let across = (center - middle * direction).length_squared();
@@ -59,7 +54,7 @@ impl Solid {
                 // No number, if the ray misses.
                 [middle - half, middle + half]
             }
-            Shape::Slab { low, high } => {
+            Body::Slab { low, high } => {
                 let at = |height: f32| (f64::from(height) - origin.z) / direction.z;
                 let (a, b) = (at(low), at(high));
                 [a.min(b), a.max(b)]
@@ -68,21 +63,21 @@ impl Solid {
     }
 
     #[expect(clippy::cast_possible_truncation, reason = "surfaces answer in f32")]
-    fn hit(&self, ray: &Ray, t: f64) -> SurfaceHit {
+    fn hit(&self, ray: &Ray, t: f64) -> Intersection {
         let free: DVec3 = ray.origin.as_dvec3() + t * ray.direction.as_dvec3();
-        let (point, normal) = match self.shape {
-            Shape::Ball { center, radius } => {
+        let (point, normal) = match self.body {
+            Body::Ball { center, radius } => {
                 let normal = (free - center.as_dvec3()).normalize();
                 (center.as_dvec3() + f64::from(radius) * normal, normal)
             }
-            Shape::Slab { low, high } => {
+            Body::Slab { low, high } => {
                 let up = free.z > f64::from(0.5 * (low + high));
                 let z = f64::from(if up { high } else { low });
                 (free.with_z(z), if up { DVec3::Z } else { DVec3::NEG_Z })
             }
         };
         let scale = point.abs().max_element().max(t) as f32;
-        SurfaceHit {
+        Intersection {
             t: t as f32,
             point: point.as_vec3(),
             normal: normal.as_vec3(),
@@ -91,23 +86,13 @@ impl Solid {
             particle: 0,
             offset: 1e-5 * scale.max(1.0),
             anchor: point.as_vec3(),
-            substance: Substance::Body,
+            material: MaterialId::PARTICLES,
         }
-    }
-
-    fn nearest_spray(&self, ray: &Ray) -> Option<SurfaceHit> {
-        let hit = Balls(self.spray.clone()).nearest(ray)?;
-        Some(SurfaceHit {
-            substance: Substance::Spray,
-            ..hit
-        })
     }
 }
 
-impl Surface for Solid {
-    const ONE_BODY: bool = true;
-
-    fn crossing(&self, ray: &Ray, side: Side) -> Option<SurfaceHit> {
+impl Shape for Solid {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
         let [enter, leave] = self.inside(ray);
         let [low, high] = [f64::from(ray.t_min), f64::from(ray.t_max)];
         let is_in = enter <= low && low < leave;
@@ -117,26 +102,18 @@ impl Surface for Solid {
             // Rounding put it on the wrong side.
             Side::Outside | Side::Inside => low,
         };
-        let body = (t >= low && t < high).then(|| self.hit(ray, t));
-        match (body, self.nearest_spray(ray)) {
-            (Some(body), Some(spray)) => Some(if spray.t < body.t { spray } else { body }),
-            (body, spray) => body.or(spray),
-        }
+        (t >= low && t < high).then(|| self.hit(ray, t))
+    }
+
+    fn is_connected(&self) -> bool {
+        true
     }
 
     fn side_of(&self, point: Vec3) -> Side {
-        let is_in = match self.shape {
-            Shape::Ball { center, radius } => point.distance(center) < radius,
-            Shape::Slab { low, high } => point.z > low && point.z < high,
+        let is_in = match self.body {
+            Body::Ball { center, radius } => point.distance(center) < radius,
+            Body::Slab { low, high } => point.z > low && point.z < high,
         };
         if is_in { Side::Inside } else { Side::Outside }
-    }
-
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
-        self.crossing(ray, Side::Outside)
-    }
-
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.nearest(ray).is_some()
     }
 }

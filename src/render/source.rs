@@ -8,7 +8,7 @@ use glam::Vec3;
 use super::NO_ID;
 use crate::scene::ColorMap;
 
-/// Looks up what belongs to particle `index` of the frame, as [`crate::surface::SurfaceHit`] counts
+/// Looks up what belongs to particle `index` of the frame, as [`crate::surface::Intersection`] counts
 /// them.
 pub trait ShadeSource: Sync {
     /// Base colour, linear RGB.

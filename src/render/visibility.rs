@@ -6,14 +6,13 @@
 //! does not absorb.
 
 use super::{
-    ShadeSource,
     integrator::{Interior, WhittedIntegrator},
-    shading::{LightSamples, attenuate, occluded_by_ground, passed_straight, product},
+    shading::{LightSamples, attenuate, passed_straight, product},
 };
 use crate::accel::Coherence;
 use crate::math::{Lanes3, first_lanes, lane3, lanes_in, set_lane3, splat};
 use crate::ray::RayPacket;
-use crate::surface::{Intersections, MaterialId, Surface};
+use crate::surface::{Intersections, MaterialId, Shape};
 
 /// Most crossings of one body that a ray to a light is followed through.
 const MAX_CROSSINGS: u32 = 64;
@@ -21,7 +20,7 @@ const MAX_CROSSINGS: u32 = 64;
 /// Light below this part is dark.
 const DARK: f32 = 1.0 / 4096.0;
 
-impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+impl WhittedIntegrator<'_> {
     /// The lanes that a light reaches. Its contribution is dimmed by what it comes through; shading points in `inside`
     /// lie in one connected body.
     pub(super) fn visible(
@@ -32,24 +31,27 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
         crossings: &mut Intersections,
     ) -> u32 {
         let rays = &samples.shadow_rays;
-        // Rays that the floor stops need not be traced.
-        let ground = self.scene.ground.as_ref();
-        let below = ground.map_or(0, |ground| occluded_by_ground(self.simd, ground, rays));
-        let lanes = samples.lanes & !below;
+        // Rays that an opaque shape stops need not be traced on.
+        let mut lanes = samples.lanes;
+        for shape in &self.shapes {
+            let is_opaque =
+                self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES;
+            if is_opaque && lanes != 0 {
+                lanes &= !shape.occluded(rays, coherence, lanes);
+            }
+        }
+        let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
+            return lanes;
+        };
         if lanes == 0 {
             return 0;
         }
-        if self.interior == Interior::Opaque {
-            // Those that are not lit end before they start.
-            let others = first_lanes(rays.len()) & !below;
-            return lanes & !self.surface.occluded_lanes(rays, coherence, others);
-        }
         let mut kept = [splat(1.0); 3];
         let reached = match self.interior {
-            Interior::Body => {
-                self.through_body(rays, coherence, lanes, inside, crossings, &mut kept)
-            }
-            _ => self.through_spheres(rays, lanes, &mut kept),
+            Interior::Body => self.through_body(
+                particles, rays, coherence, lanes, inside, crossings, &mut kept,
+            ),
+            _ => self.through_spheres(particles, rays, lanes, &mut kept),
         };
         let arriving = samples.contribution;
         product(self.simd, &arriving, &kept, &mut samples.contribution);
@@ -57,11 +59,17 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
     }
 
     /// What rays keep on their way through spheres that are bodies of their own. The lanes where that is anything.
-    fn through_spheres(&self, rays: &RayPacket, lanes: u32, kept: &mut Lanes3) -> u32 {
+    fn through_spheres(
+        &self,
+        spheres: &dyn Shape,
+        rays: &RayPacket,
+        lanes: u32,
+        kept: &mut Lanes3,
+    ) -> u32 {
         let material = &self.materials[0];
         let passed = |cosine: f32| material.passed_straight(cosine);
         lanes_in(lanes).fold(0, |reached, lane| {
-            let part = self.surface.transmittance(&rays.ray(lane), passed);
+            let part = spheres.transmittance(&rays.ray(lane), &passed);
             set_lane3(kept, lane, glam::Vec3::splat(part));
             reached | u32::from(part > 0.0) << lane
         })
@@ -69,8 +77,13 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
 
     /// What rays keep on their way through one connected body, crossing after crossing of all rays at once. The lanes
     /// where that is anything.
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "what rays carry, and where results go"
+    )]
     fn through_body(
         &self,
+        body: &dyn Shape,
         rays: &RayPacket,
         mut coherence: Coherence,
         lanes: u32,
@@ -89,8 +102,7 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
                 ahead.t_max[lane] = -1.0;
             }
             hits.clear();
-            self.surface
-                .intersect(&mut ahead, coherence, inside & alive, hits);
+            body.intersect(&mut ahead, coherence, inside & alive, hits);
             let met = hits.mask & alive;
             // The way inside, to a crossing or to the light; one without an end is a crack in the surface.
             let mut length = splat(0.0);
@@ -113,12 +125,8 @@ impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
                 alive & inside,
                 kept,
             );
-            // Crossings; spray is opaque.
             passed_straight(self.simd, material, rays, hits, met, kept);
-            let is_dark = |lane: usize| {
-                let spray = hits.material[lane] == MaterialId::SPRAY;
-                spray || lane3(kept, lane).max_element() < DARK
-            };
+            let is_dark = |lane: usize| lane3(kept, lane).max_element() < DARK;
             let dark = lanes_in(met).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane);
             reached &= !dark;
             alive = met & !dark;

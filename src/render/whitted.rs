@@ -7,7 +7,7 @@
 use glam::Vec3;
 
 use super::{
-    RayCounts, ShadeSource,
+    RayCounts,
     integrator::{Depth, Interior, NextRays, PacketScratch, WhittedIntegrator},
     roulette::{REFLECTED, REFRACTED},
     shading::{
@@ -17,9 +17,9 @@ use super::{
     stream::{RayStream, ScatteredRays, SegmentPacket},
 };
 use crate::math::{lane3, lanes_in, splat};
-use crate::surface::{MaterialId, Surface};
+use crate::surface::MaterialId;
 
-impl<S: Surface, C: ShadeSource> WhittedIntegrator<'_, S, C> {
+impl WhittedIntegrator<'_> {
     /// Adds to the radiance of a packet what its segments see, and appends what they reflect and refract to `next`.
     pub(super) fn shade(
         &self,

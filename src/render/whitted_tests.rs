@@ -49,15 +49,23 @@ fn middle(surface: &Balls, scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
         ..RenderSettings::new(1, 1)
     };
     let source = ParticleShading::constant(Vec3::ONE);
-    let (film, counts) =
-        render(surface, scene, &source, &settings, &AtomicBool::new(false)).unwrap();
+    let (film, counts) = render(
+        &[surface],
+        scene,
+        &source,
+        &settings,
+        &AtomicBool::new(false),
+    )
+    .unwrap();
     (Vec3::from_slice(&film.color[0][..3]), counts)
 }
 
 fn image(surface: &Balls, scene: &Scene, settings: &RenderSettings) -> Film {
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    render(surface, scene, &source, settings, &never).unwrap().0
+    render(&[surface], scene, &source, settings, &never)
+        .unwrap()
+        .0
 }
 
 #[track_caller]
@@ -370,7 +378,7 @@ fn a_glass_ball_has_no_acne_inside() {
         let source = ParticleShading::constant(Vec3::ONE);
         let never = AtomicBool::new(false);
         let ball = Balls::one(Vec3::ZERO, scale);
-        let (film, counts) = render(&ball, &scene, &source, &settings, &never).unwrap();
+        let (film, counts) = render(&[&ball], &scene, &source, &settings, &never).unwrap();
         let hits = film.color.iter().filter(|c| c[3] == 1.0).count() as u64;
         assert_eq!(counts.refraction, 2 * hits, "{scale}");
     }

@@ -198,7 +198,7 @@ pub(super) fn trace(
             .map_err(|e| format!("camera: {e}"))?;
         let start = Instant::now();
         let (film, rays) =
-            render(&surface, &scene, &shading, &settings, &never).map_err(|e| e.to_string())?;
+            render(&[&surface], &scene, &shading, &settings, &never).map_err(|e| e.to_string())?;
         let seconds = start.elapsed().as_secs_f64();
         peaks.look();
         drop(film);

@@ -1,16 +1,18 @@
 //! A product of many factors that does not depend on their order.
 
+use crate::math::functions::{exp2, log2};
+
 /// Adds up logarithms in fixed point, where addition is exact in any order: structures that find
 /// crossings in different orders come to the same light to the bit, without sorting.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct Dimming {
-    /// Minus the natural logarithm of the product, in units of 2^-32.
+    /// Minus the logarithm of the product to base 2, in units of 2^-32.
     loss: u64,
 }
 
-/// Loss beyond which nothing is left: 32 ln 2 in units. 2^-32 of the light is less than a hundredth of
-/// the smallest number that a half float holds.
-const DARK: u64 = 95_265_423_099;
+/// Loss beyond which nothing is left: 2^-32 of the light is less than a hundredth of the smallest number that a half
+/// float holds.
+const DARK: u64 = 32 << 32;
 const UNIT: f64 = 4_294_967_296.0;
 
 impl Dimming {
@@ -23,7 +25,7 @@ impl Dimming {
         reason = "casts saturate, and a factor above 1 loses nothing"
     )]
     pub(crate) fn by(&mut self, kept: f32) -> bool {
-        let loss = (f64::from(-kept.ln()) * UNIT) as u64;
+        let loss = (f64::from(-log2(kept)) * UNIT) as u64;
         self.loss = self.loss.saturating_add(loss);
         self.loss <= DARK
     }
@@ -34,7 +36,7 @@ impl Dimming {
         if self.loss > DARK {
             0.0
         } else {
-            (-(self.loss as f64) / UNIT).exp() as f32
+            exp2((-(self.loss as f64) / UNIT) as f32)
         }
     }
 }

@@ -2,7 +2,7 @@
 //! `sum_j W(x - x_j)` with the cubic spline (Monaghan 1992) and all particles alike (Müller, Charypar and Gross
 //! 2003, eq. 16). For surfaces of spheres; the smooth surface has a field of its own.
 
-use super::SurfaceHit;
+use super::Intersection;
 use super::field::kernel::slope;
 use super::neighbours::{each_neighbour, fixed};
 use super::pca::towards_viewer;
@@ -31,9 +31,9 @@ impl GradientNormals {
         &self,
         tree: &TreeView,
         ray: &Ray,
-        hit: SurfaceHit,
+        hit: Intersection,
         radius: f32,
-    ) -> SurfaceHit {
+    ) -> Intersection {
         let mut sum = [0_i64; 3];
         let is_whole = each_neighbour(tree, hit.point, self.support * radius, |at| {
             let pull = -at * steepness(2.0 * at.length());
@@ -43,7 +43,7 @@ impl GradientNormals {
         });
         let outward = glam::DVec3::from_array(sum.map(|sum| sum as f64)).try_normalize();
         match outward {
-            Some(outward) if is_whole => SurfaceHit {
+            Some(outward) if is_whole => Intersection {
                 shading: towards_viewer(outward.as_vec3(), hit.normal, ray.direction),
                 ..hit
             },

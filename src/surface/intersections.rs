@@ -1,6 +1,7 @@
 //! What the rays of a packet meet, one array per component.
 
-use super::{Substance, SurfaceHit};
+use glam::Vec3;
+
 use crate::math::{Lanes, Lanes3, lane3, set_lane3, splat};
 use crate::ray::PACKET_SIZE;
 
@@ -17,6 +18,31 @@ impl MaterialId {
     pub const GROUND: Self = Self(2);
     /// Materials that there are.
     pub const COUNT: usize = 3;
+}
+
+/// The intersection of one ray.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Intersection {
+    /// Distance along the ray, scene units.
+    pub t: f32,
+    /// The point, put back onto the surface so that it is exact to a few units in the last place.
+    pub point: Vec3,
+    /// Outward geometric unit normal; the ray enters the body if it points against the ray.
+    pub normal: Vec3,
+    /// Unit normal to shade by, seen from the same side as `normal`; `normal` where nothing smoother is known.
+    pub shading: Vec3,
+    /// Length along `shading` by which rays to lights start higher, so that what it smooths over casts no
+    /// shadow on itself; 0 where it smooths over nothing.
+    pub lift: f32,
+    /// Index of the particle in the frame.
+    pub particle: u32,
+    /// Length to step along the normal (either side) so that the next ray does not meet the same
+    /// place again.
+    pub offset: f32,
+    /// Where to step from: `point`, unless that lies on a finer surface than rays meet.
+    pub anchor: Vec3,
+    /// What the surface is made of.
+    pub material: MaterialId,
 }
 
 /// The nearest intersection of each ray of a packet. The fields of lanes outside `mask` mean nothing.
@@ -36,7 +62,7 @@ pub struct Intersections {
     pub anchor: Lanes3,
     /// Length to step along the geometric normal, to either side, so that the next ray does not meet the same place.
     pub offset: Lanes,
-    /// Length along the shading normal by which rays to lights start higher (see [`SurfaceHit::lift`]).
+    /// Length along the shading normal by which rays to lights start higher (see [`Intersection::lift`]).
     pub lift: Lanes,
     /// Part of the surface that is there: 1, less where a floor fades into the background.
     pub opacity: Lanes,
@@ -77,7 +103,7 @@ impl Intersections {
     ///
     /// # Panics
     /// If there is no such lane.
-    pub fn set(&mut self, lane: usize, hit: &SurfaceHit) {
+    pub fn set(&mut self, lane: usize, hit: &Intersection) {
         self.mask |= 1 << lane;
         self.t[lane] = hit.t;
         set_lane3(&mut self.point, lane, hit.point);
@@ -88,18 +114,15 @@ impl Intersections {
         self.lift[lane] = hit.lift;
         self.opacity[lane] = 1.0;
         self.particle[lane] = hit.particle;
-        self.material[lane] = match hit.substance {
-            Substance::Body => MaterialId::PARTICLES,
-            Substance::Spray => MaterialId::SPRAY,
-        };
+        self.material[lane] = hit.material;
     }
 
-    /// The intersection in `lane`, which must not be the floor's.
+    /// The intersection in `lane`.
     ///
     /// # Panics
     /// If there is no such lane.
-    pub fn get(&self, lane: usize) -> SurfaceHit {
-        SurfaceHit {
+    pub fn get(&self, lane: usize) -> Intersection {
+        Intersection {
             t: self.t[lane],
             point: lane3(&self.point, lane),
             normal: lane3(&self.normal, lane),
@@ -108,11 +131,14 @@ impl Intersections {
             offset: self.offset[lane],
             lift: self.lift[lane],
             particle: self.particle[lane],
-            substance: match self.material[lane] {
-                MaterialId::SPRAY => Substance::Spray,
-                _ => Substance::Body,
-            },
+            material: self.material[lane],
         }
+    }
+
+    /// What the first `count` rays meet, one by one.
+    pub fn all(&self, count: usize) -> Vec<Option<Intersection>> {
+        let found = |lane| (self.mask >> lane & 1 == 1).then(|| self.get(lane));
+        (0..count).map(found).collect()
     }
 
     /// The lanes of `material`.

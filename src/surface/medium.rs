@@ -4,11 +4,12 @@
 use glam::Vec3;
 
 use super::spheres::{SphereSurface, sphere_hit};
-use super::{ShadingNormals, Side, Surface, SurfaceHit};
+use super::{Intersection, Intersections, ShadingNormals, Shape, Side};
+use crate::accel::Coherence;
 use crate::accel::intervals::TreeExit;
 use crate::accel::traverse::TreeHit;
 use crate::accel::view::TreeView;
-use crate::ray::{PACKET_SIZE, Ray, RayPacket};
+use crate::ray::{Ray, RayPacket};
 
 /// Cosine between ray and normal under which a sphere may be touched and no more.
 const TOUCHING: f32 = 1e-2;
@@ -42,15 +43,15 @@ impl<'a> MediumSurface<'a> {
         }
     }
 
-    fn entry(&self, ray: &Ray) -> Option<SurfaceHit> {
+    fn entry(&self, ray: &Ray) -> Option<Intersection> {
         Some(self.hit(ray, self.tree.entry(ray)?))
     }
 
-    fn hit(&self, ray: &Ray, hit: TreeHit) -> SurfaceHit {
+    fn hit(&self, ray: &Ray, hit: TreeHit) -> Intersection {
         sphere_hit(&self.tree, ray, hit, &self.normals)
     }
 
-    fn exit(&self, ray: &Ray) -> Option<SurfaceHit> {
+    fn exit(&self, ray: &Ray) -> Option<Intersection> {
         match self.tree.exit(ray) {
             TreeExit::Here(hit) => Some(self.hit(ray, hit)),
             TreeExit::Beyond => None,
@@ -60,16 +61,16 @@ impl<'a> MediumSurface<'a> {
 
     /// Out where the ray starts, by the sphere that lies before it, or else behind it: it must have come
     /// from some.
-    fn at_once(&self, ray: &Ray) -> Option<SurfaceHit> {
+    fn at_once(&self, ray: &Ray) -> Option<Intersection> {
         let forth = Ray {
             t_max: f32::INFINITY,
             ..*ray
         };
         let back = Ray::new(ray.at(ray.t_min), -ray.direction);
-        let near = |ray: &Ray| self.spheres.nearest(ray);
+        let near = |ray: &Ray| self.spheres.crossing(ray, Side::Outside);
         let hit = near(&forth).or_else(|| near(&back))?;
         let point = ray.at(ray.t_min);
-        (ray.t_min < ray.t_max).then_some(SurfaceHit {
+        (ray.t_min < ray.t_max).then_some(Intersection {
             t: ray.t_min,
             point,
             normal: ray.direction,
@@ -81,14 +82,16 @@ impl<'a> MediumSurface<'a> {
     }
 }
 
-impl Surface for MediumSurface<'_> {
-    const ONE_BODY: bool = true;
-
-    fn crossing(&self, ray: &Ray, side: Side) -> Option<SurfaceHit> {
+impl Shape for MediumSurface<'_> {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
         match side {
             Side::Outside => self.entry(ray),
             Side::Inside => self.exit(ray),
         }
+    }
+
+    fn is_connected(&self) -> bool {
+        true
     }
 
     fn side_of(&self, point: Vec3) -> Side {
@@ -99,36 +102,70 @@ impl Surface for MediumSurface<'_> {
         }
     }
 
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
-        self.entry(ray)
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        coherence: Coherence,
+        inside: u32,
+        hits: &mut Intersections,
+    ) {
+        if coherence == Coherence::Coherent && inside == 0 {
+            self.enter(rays, hits);
+            return;
+        }
+        for lane in 0..rays.len() {
+            let ray = rays.ray(lane);
+            if ray.t_max > ray.t_min {
+                let found = self.crossing(&ray, Side::of_lane(inside, lane));
+                end_at(found, lane, rays, hits);
+            }
+        }
     }
 
     /// Also for rays that start inside: what is met are the surfaces of spheres.
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.spheres.occluded(ray)
+    fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+        self.spheres.occluded(rays, coherence, lanes)
     }
+}
 
-    fn occluded_packet(&self, packet: &RayPacket) -> u32 {
-        self.spheres.occluded_packet(packet)
-    }
-
-    fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {
-        let mut hits = self.spheres.nearest_packet(packet);
-        // Rays from outside all spheres enter the first that they meet, unless they only touch it.
+impl MediumSurface<'_> {
+    /// Where rays that lie close together enter. From outside all spheres that is the first sphere that they meet,
+    /// unless they only touch it.
+    fn enter(&self, rays: &mut RayPacket, hits: &mut Intersections) {
+        let mut ahead = *rays;
+        let mut met = Intersections::default();
+        self.spheres
+            .intersect(&mut ahead, Coherence::Coherent, 0, &mut met);
         let mut start = None;
-        for (hit, ray) in hits.iter_mut().zip(packet.rays()) {
+        for lane in 0..rays.len() {
+            let ray = rays.ray(lane);
             let begins = ray.at(ray.t_min);
             let is_inside = match start {
                 Some((at, is_inside)) if at == begins => is_inside,
                 _ => self.tree.contains(begins),
             };
             start = Some((begins, is_inside));
-            let is_touched = |hit: &SurfaceHit| hit.normal.dot(ray.direction).abs() < TOUCHING;
-            if is_inside || hit.as_ref().is_some_and(is_touched) {
-                *hit = self.entry(&ray);
-            }
+            let found = (met.mask >> lane & 1 == 1).then(|| met.get(lane));
+            let is_touched = |hit: &Intersection| hit.normal.dot(ray.direction).abs() < TOUCHING;
+            let found = if is_inside || found.as_ref().is_some_and(is_touched) {
+                self.entry(&ray)
+            } else {
+                found
+            };
+            end_at(found, lane, rays, hits);
         }
-        hits
+    }
+}
+
+fn end_at(
+    found: Option<Intersection>,
+    lane: usize,
+    rays: &mut RayPacket,
+    hits: &mut Intersections,
+) {
+    if let Some(hit) = found {
+        hits.set(lane, &hit);
+        rays.t_max[lane] = hit.t;
     }
 }
 

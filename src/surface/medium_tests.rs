@@ -1,5 +1,6 @@
 use super::*;
 use crate::accel::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
+use crate::ray::PACKET_SIZE;
 
 /// A small generator: tests must not change with a crate's version.
 struct Random(u32);
@@ -55,12 +56,6 @@ fn what_lies_inside_is_not_met() {
             side = side.other();
         }
         assert_eq!(body.crossing(&ray, side), None);
-        let ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X);
-        assert_eq!(body.transmittance(&ray, |_| 0.5), 0.0625);
-        let half = Ray { t_max: 10.0, ..ray };
-        assert_eq!(body.transmittance(&half, |_| 0.5), 0.25);
-        let from_within = Ray::new(Vec3::X, Vec3::X);
-        assert_eq!(body.transmittance(&from_within, |_| 0.5), 0.125);
     });
 }
 
@@ -137,8 +132,13 @@ fn packets_meet_what_single_rays_meet() {
                     let aim = aim + 0.05 * random.direction();
                     packet.push(&Ray::new(origin, (aim - origin).normalize_or(Vec3::X)));
                 }
-                let single: Vec<_> = packet.rays().map(|ray| body.nearest(&ray)).collect();
-                assert_eq!(body.nearest_packet(&packet)[..], single);
+                let single = packet.rays().map(|ray| body.crossing(&ray, Side::Outside));
+                let single: Vec<_> = single.collect();
+                for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                    let mut hits = Intersections::default();
+                    body.intersect(&mut packet.clone(), coherence, 0, &mut hits);
+                    assert_eq!(hits.all(packet.len()), single);
+                }
             }
         }
     });

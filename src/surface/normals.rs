@@ -1,6 +1,6 @@
 //! Which way spheres are said to face when they are shaded.
 
-use super::SurfaceHit;
+use super::Intersection;
 use super::gradient::GradientNormals;
 use super::pca::PcaNormals;
 use crate::accel::view::TreeView;
@@ -26,9 +26,9 @@ impl ShadingNormals {
         &self,
         tree: &TreeView,
         ray: &Ray,
-        hit: SurfaceHit,
+        hit: Intersection,
         radius: f32,
-    ) -> SurfaceHit {
+    ) -> Intersection {
         match self {
             Self::Sphere => hit,
             Self::Pca(normals) => normals.shade(tree, ray, hit, radius),

@@ -4,12 +4,12 @@ use std::cell::RefCell;
 
 use glam::Vec3;
 
-use super::{Dimming, Intersections, MaterialId, ShadingNormals, Substance, Surface, SurfaceHit};
+use super::{Dimming, Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
 use crate::accel::{Coherence, TreeHits};
 use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in};
-use crate::ray::{PACKET_SIZE, Ray, RayPacket};
+use crate::ray::{Ray, RayPacket};
 
 /// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
 /// was put back onto its sphere, small enough not to be seen.
@@ -22,6 +22,9 @@ const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 pub struct SphereSurface<'a> {
     tree: TreeView<'a>,
     normals: ShadingNormals,
+    material: MaterialId,
+    /// Index in the frame of the tree's particle 0.
+    first: u32,
     simd: Supported,
 }
 
@@ -31,6 +34,8 @@ impl<'a> SphereSurface<'a> {
         Self {
             tree,
             normals: ShadingNormals::Sphere,
+            material: MaterialId::PARTICLES,
+            first: 0,
             simd: Supported::or_best(tree.simd()),
         }
     }
@@ -41,9 +46,14 @@ impl<'a> SphereSurface<'a> {
         Self { normals, ..self }
     }
 
-    #[inline]
-    fn surface_hit(&self, ray: &Ray, hit: TreeHit) -> SurfaceHit {
-        sphere_hit(&self.tree, ray, hit, &self.normals)
+    /// Made of `material`, with the particles of the frame from `first` on.
+    #[must_use]
+    pub fn of(self, material: MaterialId, first: u32) -> Self {
+        Self {
+            material,
+            first,
+            ..self
+        }
     }
 }
 
@@ -54,7 +64,7 @@ pub(super) fn sphere_hit(
     ray: &Ray,
     hit: TreeHit,
     normals: &ShadingNormals,
-) -> SurfaceHit {
+) -> Intersection {
     let (center, radius) = tree.sphere(hit.slot);
     let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
     let point = center + normal * radius;
@@ -62,7 +72,7 @@ pub(super) fn sphere_hit(
         .abs()
         .max_element()
         .max(ray.origin.abs().max_element());
-    let met = SurfaceHit {
+    let met = Intersection {
         t: hit.t,
         point,
         normal,
@@ -70,33 +80,26 @@ pub(super) fn sphere_hit(
         lift: 0.0,
         particle: tree.particle(hit.slot),
         anchor: point,
-        substance: Substance::Body,
+        material: MaterialId::PARTICLES,
         offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
     };
     normals.shade(tree, ray, met, radius)
 }
 
-impl Surface for SphereSurface<'_> {
+impl Shape for SphereSurface<'_> {
     #[inline]
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
-        Some(self.surface_hit(ray, self.tree.nearest(ray)?))
-    }
-
-    #[inline]
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.tree.any_hit(ray)
-    }
-
-    fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {
-        let hits = self.tree.nearest_packet(packet);
-        std::array::from_fn(|lane| {
-            let hit = hits[lane]?;
-            Some(self.surface_hit(&packet.ray(lane), hit))
+    fn crossing(&self, ray: &Ray, _side: Side) -> Option<Intersection> {
+        let hit = self.tree.nearest(ray)?;
+        let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
+        Some(Intersection {
+            particle: self.first + hit.particle,
+            material: self.material,
+            ..hit
         })
     }
 
-    fn occluded_packet(&self, packet: &RayPacket) -> u32 {
-        self.tree.any_hit_packet(packet)
+    fn material(&self) -> MaterialId {
+        self.material
     }
 
     fn intersect(
@@ -123,8 +126,8 @@ impl Surface for SphereSurface<'_> {
         intersections(self.simd, rays, &found.t, &centers, &radii, met, hits);
         for lane in lanes_in(met) {
             rays.t_max[lane] = found.t[lane];
-            hits.particle[lane] = self.tree.particle(found.slot[lane]);
-            hits.material[lane] = MaterialId::PARTICLES;
+            hits.particle[lane] = self.first + self.tree.particle(found.slot[lane]);
+            hits.material[lane] = self.material;
         }
         hits.mask |= met;
         // Normals of neighbourhoods are found place by place.
@@ -139,7 +142,7 @@ impl Surface for SphereSurface<'_> {
         }
     }
 
-    fn occluded_lanes(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+    fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
         if lanes == first_lanes(rays.len()) {
             return self.tree.occluded_lanes(rays, coherence);
         }
@@ -151,15 +154,15 @@ impl Surface for SphereSurface<'_> {
         self.tree.occluded_lanes(&rest, coherence)
     }
 
-    fn transmittance(&self, ray: &Ray, kept: impl Fn(f32) -> f32) -> f32 {
+    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
         let mut dimming = Dimming::default();
         if self.tree.has_copies() {
             self.each_crossing_once(ray, |crossing| {
-                dimming.by(kept(self.cosine(ray, &crossing)))
+                dimming.by(passed(self.cosine(ray, &crossing)))
             });
         } else {
             self.tree.visit_crossings(ray, |crossing| {
-                dimming.by(kept(self.cosine(ray, &crossing)))
+                dimming.by(passed(self.cosine(ray, &crossing)))
             });
         }
         dimming.product()

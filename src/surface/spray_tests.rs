@@ -1,6 +1,12 @@
+use glam::Vec3;
+
 use super::*;
+use crate::accel::Coherence;
 use crate::accel::{BuildSettings, SbvhSettings, SphereRadius, Spheres, Structure, TreeBuilder};
+use crate::ray::{Ray, RayPacket};
 use crate::surface::medium::MediumSurface;
+use crate::surface::spheres::SphereSurface;
+use crate::surface::{Intersections, MaterialId, Shape, Side};
 
 fn built(centers: &[Vec3], radius: f32, settings: &BuildSettings) -> TreeBuilder {
     let mut builder = TreeBuilder::new();
@@ -71,46 +77,31 @@ fn drops_are_met_beside_and_before_a_body() {
     ];
     let spray = built(&drops, 0.25, &BuildSettings::default());
     let medium = MediumSurface::new(body.tree().view());
-    let alone = WithSpray::new(medium, None);
-    let surface = WithSpray::new(medium, Some(Drops::new(spray.tree().view(), 2)));
+    let drops = SphereSurface::new(spray.tree().view()).of(MaterialId::SPRAY, 2);
+    let shapes: [&dyn Shape; 2] = [&medium, &drops];
     let along = |y: f32| Ray::new(Vec3::new(-10.0, y, 0.0), Vec3::X);
-
-    let drop = surface
-        .crossing(&along(0.0), Side::Outside)
-        .expect("a drop");
-    assert_eq!(
-        (drop.t, drop.particle, drop.substance),
-        (5.75, 2, Substance::Spray)
-    );
-    assert_eq!(surface.nearest(&along(0.0)), Some(drop));
-    let entry = surface
-        .crossing(&along(0.5), Side::Outside)
-        .expect("the body");
-    assert_eq!((entry.particle, entry.substance), (0, Substance::Body));
-    assert_eq!(alone.crossing(&along(0.5), Side::Outside), Some(entry));
     let inside = Ray::new(Vec3::ZERO, Vec3::X);
-    let drop = surface
-        .crossing(&inside, Side::Inside)
-        .expect("a drop in the body");
-    assert_eq!((drop.t, drop.particle), (0.25, 3));
-    let exit = alone.crossing(&inside, Side::Inside).expect("out");
-    assert_eq!((exit.t, exit.particle), (2.0, 1));
-
-    assert!(surface.occluded(&along(5.0)) && !alone.occluded(&along(5.0)));
-    assert_eq!(surface.transmittance(&along(5.0), |_| 0.5), 0.0);
-    assert_eq!(surface.transmittance(&along(0.5), |_| 0.5), 0.25);
-    assert_eq!(surface.side_of(Vec3::ZERO), Side::Inside);
-    assert_eq!(surface.side_of(drops[0]), Side::Outside);
-
-    let mut packet = RayPacket::default();
-    let rays: Vec<Ray> = (0..16_i16).map(|i| along(0.35 * f32::from(i))).collect();
-    rays.iter().for_each(|ray| packet.push(ray));
-    let single: Vec<_> = rays.iter().map(|ray| surface.nearest(ray)).collect();
-    assert_eq!(surface.nearest_packet(&packet)[..], single);
-    assert!(single.iter().filter(|hit| hit.is_some()).count() > 3);
-    let occluded = surface.occluded_packet(&packet);
-    let expected = (0..)
-        .zip(&rays)
-        .map(|(i, ray)| u32::from(surface.occluded(ray)) << i);
-    assert_eq!(occluded, expected.sum::<u32>());
+    let mut rays = RayPacket::default();
+    for ray in [along(0.0), along(0.5), along(5.0), inside] {
+        rays.push(&ray);
+    }
+    for order in [[0, 1], [1, 0]] {
+        for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+            let (mut ahead, mut hits) = (rays, Intersections::default());
+            for shape in order {
+                shapes[shape].intersect(&mut ahead, coherence, 0b1000, &mut hits);
+            }
+            let found = |lane: usize| (hits.t[lane], hits.particle[lane], hits.material[lane]);
+            assert_eq!(hits.mask, 0b1111);
+            assert_eq!(found(0), (5.75, 2, MaterialId::SPRAY));
+            assert_eq!(found(1), (hits.t[1], 0, MaterialId::PARTICLES));
+            assert_eq!(found(2).1, 4);
+            assert_eq!(found(3), (0.25, 3, MaterialId::SPRAY));
+            assert_eq!(ahead.t_max[..4], hits.t[..4]);
+        }
+    }
+    let met = drops.occluded(&rays, Coherence::Incoherent, 0b1111);
+    assert_eq!(met, 0b1101);
+    assert_eq!(drops.occluded(&rays, Coherence::Coherent, 0b0110), 0b0100);
+    assert_eq!(medium.side_of(Vec3::ZERO), Side::Inside);
 }

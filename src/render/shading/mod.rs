@@ -7,7 +7,6 @@
 mod arithmetic;
 mod background;
 mod camera;
-mod ground;
 mod interface;
 mod light;
 mod material;
@@ -15,7 +14,6 @@ mod material;
 pub(super) use arithmetic::{add, product, scale};
 pub(super) use background::{BackgroundLanes, add_background};
 pub(super) use camera::{CameraLanes, camera_rays, depths};
-pub(super) use ground::{intersect_ground, occluded_by_ground};
 pub(super) use interface::{attenuate, interface_points, leaving, passed_straight, refracted_rays};
 pub(super) use light::{LightLanes, LightSamples, sample_light};
 pub(super) use material::{ShadingPoints, WhittedLanes, shading_points};

@@ -8,7 +8,7 @@
 
 use glam::{DVec3, Vec3};
 
-use super::SurfaceHit;
+use super::Intersection;
 use super::neighbours::{UNIT, each_neighbour, fixed};
 use crate::accel::view::TreeView;
 use crate::ray::Ray;
@@ -49,16 +49,16 @@ impl PcaNormals {
         &self,
         tree: &TreeView,
         ray: &Ray,
-        hit: SurfaceHit,
+        hit: Intersection,
         radius: f32,
-    ) -> SurfaceHit {
+    ) -> Intersection {
         let reach = self.support * radius;
         let moments = Moments::about(tree, hit.point, reach);
         let Some((smooth, smoothed)) = moments.and_then(|m| m.outward(hit.normal.as_dvec3()))
         else {
             return hit;
         };
-        SurfaceHit {
+        Intersection {
             shading: towards_viewer(smooth, hit.normal, ray.direction),
             lift: LIFT * radius * smoothed,
             ..hit

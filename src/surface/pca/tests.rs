@@ -1,6 +1,6 @@
 use super::*;
 use crate::accel::{BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
-use crate::surface::Surface;
+use crate::surface::Shape;
 use crate::surface::normals::ShadingNormals;
 use crate::surface::spheres::SphereSurface;
 

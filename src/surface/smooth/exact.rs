@@ -2,7 +2,7 @@
 
 use super::layout::Layout;
 use crate::ray::Ray;
-use crate::surface::SurfaceHit;
+use crate::surface::Intersection;
 use crate::surface::field::FieldParticles;
 
 /// Newton steps; they gain twice as many digits each.
@@ -18,8 +18,8 @@ pub(super) fn refined(
     field: &FieldParticles,
     layout: &Layout,
     ray: &Ray,
-    hit: SurfaceHit,
-) -> SurfaceHit {
+    hit: Intersection,
+) -> Intersection {
     let mut point = hit.point;
     let mut gradient = None;
     for _ in 0..STEPS {
@@ -43,7 +43,7 @@ pub(super) fn refined(
     }
     let normal = gradient.and_then(|gradient| (-gradient).try_normalize());
     let normal = normal.unwrap_or(hit.normal);
-    SurfaceHit {
+    Intersection {
         t: hit.t + (point - hit.point).dot(ray.direction),
         point,
         normal,

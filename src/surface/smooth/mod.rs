@@ -8,9 +8,11 @@
 use glam::Vec3;
 
 use super::field::FieldParticles;
-use super::{Side, Substance, Surface, SurfaceHit, SurfaceSettings};
+use super::{Intersection, Intersections, MaterialId, Shape, Side, SurfaceSettings};
+use crate::accel::Coherence;
 use crate::accel::simd::{ArrayLanes, ArrayTask};
-use crate::ray::{PACKET_SIZE, Ray, RayPacket};
+use crate::math::lanes_in;
+use crate::ray::{Ray, RayPacket};
 
 mod blocks;
 mod blur;
@@ -83,43 +85,57 @@ struct Cross<'a> {
 }
 
 impl ArrayTask for Cross<'_> {
-    type Output = Option<SurfaceHit>;
+    type Output = Option<Intersection>;
 
     #[inline(always)]
-    fn run(self) -> Option<SurfaceHit> {
+    fn run(self) -> Option<Intersection> {
         let tree = &self.surface.built.tree;
         let meeting = tree.first_crossing(self.ray, self.from)?;
         Some(self.surface.hit(self.ray, &meeting, self.from))
     }
 }
 
-/// The first crossing of each ray of a packet that is outside.
+/// The first crossing of each ray of a packet.
 struct CrossPacket<'a> {
     surface: &'a SmoothSurface<'a>,
-    packet: &'a RayPacket,
+    rays: &'a mut RayPacket,
+    inside: u32,
+    coherence: Coherence,
+    hits: &'a mut Intersections,
 }
 
 impl ArrayTask for CrossPacket<'_> {
-    type Output = [Option<SurfaceHit>; PACKET_SIZE];
+    type Output = ();
 
     #[inline(always)]
-    fn run(self) -> Self::Output {
+    fn run(self) {
         let built = self.surface.built;
-        let mut hits = [None; PACKET_SIZE];
-        let free = built.near.free_way(self.packet);
-        for (lane, ray) in near::rest_of(self.packet, free) {
-            if let Some(meeting) = built.tree.first_crossing(&ray, Side::Outside) {
-                hits[lane] = Some(self.surface.hit(&ray, &meeting, Side::Outside));
+        let is_together = self.coherence == Coherence::Coherent && self.inside == 0;
+        let free = if is_together {
+            built.near.free_way(self.rays)
+        } else {
+            f32::NEG_INFINITY
+        };
+        for lane in 0..self.rays.len() {
+            let Some(ray) = near::rest_of(&self.rays.ray(lane), free) else {
+                continue;
+            };
+            let from = Side::of_lane(self.inside, lane);
+            if let Some(meeting) = built.tree.first_crossing(&ray, from) {
+                let hit = self.surface.hit(&ray, &meeting, from);
+                self.hits.set(lane, &hit);
+                self.rays.t_max[lane] = hit.t;
             }
         }
-        hits
     }
 }
 
 /// Which rays of a packet meet anything.
 struct OccludePacket<'a> {
     surface: &'a SmoothSurface<'a>,
-    packet: &'a RayPacket,
+    rays: &'a RayPacket,
+    coherence: Coherence,
+    lanes: u32,
 }
 
 impl ArrayTask for OccludePacket<'_> {
@@ -128,34 +144,21 @@ impl ArrayTask for OccludePacket<'_> {
     #[inline(always)]
     fn run(self) -> u32 {
         let built = self.surface.built;
-        let free = built.near.free_way(self.packet);
-        let rays = near::rest_of(self.packet, free);
-        rays.fold(0, |occluded, (lane, ray)| {
-            let met = built.tree.first_crossing(&ray, Side::Outside);
+        let free = match self.coherence {
+            Coherence::Coherent => built.near.free_way(self.rays),
+            Coherence::Incoherent => f32::NEG_INFINITY,
+        };
+        lanes_in(self.lanes).fold(0, |occluded, lane| {
+            let rest = near::rest_of(&self.rays.ray(lane), free);
+            let met = rest.and_then(|ray| built.tree.first_crossing(&ray, Side::Outside));
             occluded | u32::from(met.is_some()) << lane
         })
     }
 }
 
-/// Whether there is any crossing.
-struct Occlude<'a> {
-    surface: &'a SmoothSurface<'a>,
-    ray: &'a Ray,
-}
-
-impl ArrayTask for Occlude<'_> {
-    type Output = bool;
-
-    #[inline(always)]
-    fn run(self) -> bool {
-        let tree = &self.surface.built.tree;
-        tree.first_crossing(self.ray, Side::Outside).is_some()
-    }
-}
-
 impl SmoothSurface<'_> {
     #[inline(always)]
-    fn hit(&self, ray: &Ray, meeting: &Meeting, from: Side) -> SurfaceHit {
+    fn hit(&self, ray: &Ray, meeting: &Meeting, from: Side) -> Intersection {
         let tree = &self.built.tree;
         let point = ray.at(meeting.t);
         let against = match from {
@@ -169,7 +172,7 @@ impl SmoothSurface<'_> {
             .and_then(|gradient| (-gradient).try_normalize())
             .unwrap_or(against);
         let largest = point.abs().max(ray.origin.abs()).max_element();
-        let hit = SurfaceHit {
+        let hit = Intersection {
             t: meeting.t,
             point,
             normal,
@@ -178,7 +181,7 @@ impl SmoothSurface<'_> {
             particle: 0,
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,
-            substance: Substance::Body,
+            material: MaterialId::PARTICLES,
         };
         match (&self.built.field, &self.built.exact) {
             (Some(field), Some(layout)) => exact::refined(field, layout, ray, hit),
@@ -191,14 +194,8 @@ impl SmoothSurface<'_> {
     }
 }
 
-impl Surface for SmoothSurface<'_> {
-    const ONE_BODY: bool = true;
-
-    fn nearest(&self, ray: &Ray) -> Option<SurfaceHit> {
-        self.crossing(ray, Side::Outside)
-    }
-
-    fn crossing(&self, ray: &Ray, side: Side) -> Option<SurfaceHit> {
+impl Shape for SmoothSurface<'_> {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
         self.lanes.run(Cross {
             surface: self,
             ray,
@@ -206,40 +203,50 @@ impl Surface for SmoothSurface<'_> {
         })
     }
 
+    fn is_connected(&self) -> bool {
+        true
+    }
+
     fn side_of(&self, point: Vec3) -> Side {
         self.built.tree.side_of(point)
     }
 
-    fn occluded(&self, ray: &Ray) -> bool {
-        self.lanes.run(Occlude { surface: self, ray })
-    }
-
-    fn nearest_packet(&self, packet: &RayPacket) -> [Option<SurfaceHit>; PACKET_SIZE] {
-        if packet.is_empty() {
-            return [None; PACKET_SIZE];
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        coherence: Coherence,
+        inside: u32,
+        hits: &mut Intersections,
+    ) {
+        if !rays.is_empty() {
+            self.lanes.run(CrossPacket {
+                surface: self,
+                rays,
+                inside,
+                coherence,
+                hits,
+            });
         }
-        self.lanes.run(CrossPacket {
-            surface: self,
-            packet,
-        })
     }
 
-    fn occluded_packet(&self, packet: &RayPacket) -> u32 {
-        if packet.is_empty() {
+    fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+        if lanes == 0 {
             return 0;
         }
         self.lanes.run(OccludePacket {
             surface: self,
-            packet,
+            rays,
+            coherence,
+            lanes,
         })
     }
 
-    fn particle_at(&self, hit: &SurfaceHit) -> u32 {
+    fn particle_at(&self, hit: &Intersection) -> u32 {
         let nearest = self.field().and_then(|field| field.nearest(hit.point));
         nearest.unwrap_or(hit.particle)
     }
 
-    fn blend(&self, hit: &SurfaceHit, each: &mut dyn FnMut(u32, f32)) {
+    fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
         let mut found = false;
         if let Some(field) = self.field() {
             field.neighbours(hit.point, &mut |index, part| {

@@ -98,14 +98,11 @@ fn widened(cells: &[(u64, u64)], axis: usize) -> Vec<(u64, u64)> {
     merged(found)
 }
 
-/// Rays of a packet from where they may meet something; those that end before meet nothing.
+/// A ray of a packet from where it may meet something; None if it ends before.
 #[inline(always)]
-pub(super) fn rest_of(packet: &RayPacket, free: f32) -> impl Iterator<Item = (usize, Ray)> + '_ {
-    (0..packet.len()).filter_map(move |lane| {
-        let ray = packet.ray(lane);
-        let t_min = ray.t_min.max(free);
-        (t_min < ray.t_max).then_some((lane, Ray { t_min, ..ray }))
-    })
+pub(super) fn rest_of(ray: &Ray, free: f32) -> Option<Ray> {
+    let t_min = ray.t_min.max(free);
+    (t_min < ray.t_max).then_some(Ray { t_min, ..*ray })
 }
 
 #[cfg(test)]

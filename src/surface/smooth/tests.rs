@@ -373,13 +373,14 @@ fn packets_find_what_single_rays_find() {
                 };
                 packet.push(&far);
             }
-            let hits = surface.nearest_packet(&packet);
-            let occluded = surface.occluded_packet(&packet);
-            for (lane, ray) in packet.rays().enumerate() {
-                assert_eq!(hits[lane], surface.nearest(&ray), "{ray:?}");
-                assert_eq!(occluded >> lane & 1 == 1, surface.occluded(&ray));
-                met += usize::from(hits[lane].is_some());
+            let mut hits = Intersections::default();
+            surface.intersect(&mut packet.clone(), Coherence::Coherent, 0, &mut hits);
+            let single: Vec<_> = packet.rays().map(|ray| surface.nearest(&ray)).collect();
+            assert_eq!(hits.all(packet.len()), single);
+            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
+                assert_eq!(surface.occluded(&packet, coherence, 0xffff), hits.mask);
             }
+            met += hits.mask.count_ones();
         }
     }
     assert!(met > 3000, "{met}");

@@ -47,7 +47,8 @@ fn trace(shot: &Shot, simd: SimdLevel) -> Film {
     };
     let surface = SphereSurface::new(builder.tree().view());
     let never = AtomicBool::new(false);
-    let (film, _) = render(&surface, &shot.scene, &source, &shot.settings, &never).expect("a film");
+    let (film, _) =
+        render(&[&surface], &shot.scene, &source, &shot.settings, &never).expect("a film");
     film
 }
 

@@ -1,13 +1,61 @@
-//! Where rays meet the floor.
+//! The floor: an endless plane that fades into the background, met from above only.
 
-use crate::math::{LANES, lane_kernel};
-use crate::ray::RayPacket;
+use super::{Intersection, Intersections, MaterialId, Shape, Side};
+use crate::accel::Coherence;
+use crate::math::{LANES, Supported, first_lanes, lane_kernel};
+use crate::ray::{Ray, RayPacket};
 use crate::scene::Ground;
-use crate::surface::{Intersections, MaterialId};
+
+/// A floor as rays meet it.
+#[derive(Debug, Clone, Copy)]
+pub struct Plane<'a> {
+    ground: &'a Ground,
+    simd: Supported,
+}
+
+impl<'a> Plane<'a> {
+    /// The plane of `ground`.
+    pub fn new(ground: &'a Ground) -> Self {
+        Self {
+            ground,
+            simd: Supported::default(),
+        }
+    }
+}
+
+impl Shape for Plane<'_> {
+    fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
+        let _ = side;
+        let mut rays = RayPacket::default();
+        rays.push(ray);
+        let mut hits = Intersections::default();
+        self.intersect(&mut rays, Coherence::Coherent, 0, &mut hits);
+        (hits.mask != 0).then(|| hits.get(0))
+    }
+
+    fn material(&self) -> MaterialId {
+        MaterialId::GROUND
+    }
+
+    fn intersect(
+        &self,
+        rays: &mut RayPacket,
+        _coherence: Coherence,
+        _inside: u32,
+        hits: &mut Intersections,
+    ) {
+        intersect_plane(self.simd, self.ground, rays, first_lanes(rays.len()), hits);
+    }
+
+    /// Also where it has faded: what lies under the horizon is dark.
+    fn occluded(&self, rays: &RayPacket, _coherence: Coherence, lanes: u32) -> u32 {
+        occluded_by_plane(self.simd, self.ground, rays) & lanes
+    }
+}
 
 /// Intersects rays with a floor, which is met from above only.
 #[inline(always)]
-fn intersect_ground_body(
+fn intersect_plane_body(
     ground: &Ground,
     rays: &mut RayPacket,
     lanes: u32,
@@ -72,17 +120,17 @@ fn intersect_ground_body(
 }
 
 lane_kernel! {
-    pub(in crate::render) fn intersect_ground(
+    fn intersect_plane(
         ground: &Ground,
         rays: &mut RayPacket,
         lanes: u32,
         hits: &mut Intersections,
-    ) = intersect_ground_body;
+    ) = intersect_plane_body;
 }
 
 /// The lanes whose rays a floor stops, whole or faded.
 #[inline(always)]
-fn occluded_by_ground_body(ground: &Ground, rays: &RayPacket) -> u32 {
+fn occluded_by_plane_body(ground: &Ground, rays: &RayPacket) -> u32 {
     let up = ground.up;
     let mut met = 0;
     for l in 0..LANES {
@@ -97,5 +145,5 @@ fn occluded_by_ground_body(ground: &Ground, rays: &RayPacket) -> u32 {
 }
 
 lane_kernel! {
-    pub(in crate::render) fn occluded_by_ground(ground: &Ground, rays: &RayPacket) -> u32 = occluded_by_ground_body;
+    fn occluded_by_plane(ground: &Ground, rays: &RayPacket) -> u32 = occluded_by_plane_body;
 }
