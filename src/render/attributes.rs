@@ -24,7 +24,7 @@ impl WhittedIntegrator<'_> {
         let particles = hits.lanes_of(MaterialId::PARTICLES);
         if let Some(color) = self.color {
             *base = splat3(color);
-        } else if self.materials[0].has_color() {
+        } else if self.particle_constants().has_color() {
             for lane in lanes_in(particles) {
                 set_lane3(base, lane, self.particle_color(hits, lane, blend));
             }

@@ -14,19 +14,18 @@ use super::{
     RayCounts, RenderSettings, ShadeSource, Stop,
     aov::DataSample,
     film::FilmTile,
+    lights::{Light, LightSamples, light_of},
+    materials::{Material, ShadingPoints, WhittedMaterial, materials_of},
     roulette::SplitRule,
     sampler::{FilmSampler, PathSeed},
-    shading::{
-        BackgroundLanes, CameraLanes, LightLanes, LightSamples, ShadingPoints, WhittedLanes,
-        camera_rays,
-    },
+    shading::{BackgroundLanes, CameraLanes, camera_rays},
     stream::{RayStream, SegmentPacket, sum_of_lanes},
     tile::pixels_of,
 };
 use crate::accel::Coherence;
 use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
-use crate::scene::{Material, Scene, ground};
+use crate::scene::{self, Scene};
 use crate::surface::{Intersections, MaterialId, Shape, Side};
 
 /// Samples whose place on the film and radiance are held, unless one pixel has more.
@@ -34,9 +33,6 @@ const GROUP: u32 = 4096;
 
 /// Path segments of one depth, at most, as far as batches of a packet of samples allow.
 const SEGMENTS: usize = 16_384;
-
-/// Highlights of clear bodies below this part of the light are dark.
-const DARKEST_HIGHLIGHT: f32 = 1.0 / 4096.0;
 
 /// Renders tiles by Whitted's method over streams.
 pub(super) struct WhittedIntegrator<'a> {
@@ -50,9 +46,9 @@ pub(super) struct WhittedIntegrator<'a> {
     pub(super) simd: Supported,
     pub(super) camera: CameraLanes,
     pub(super) background: BackgroundLanes,
-    pub(super) lights: Vec<LightLanes>,
+    pub(super) lights: Vec<Box<dyn Light>>,
     /// By [`MaterialId`].
-    pub(super) materials: [WhittedLanes; MaterialId::COUNT],
+    pub(super) materials: [Box<dyn Material>; MaterialId::COUNT],
     /// Base colour of all particles, if it is one.
     pub(super) color: Option<Vec3>,
     pub(super) interior: Interior,
@@ -139,7 +135,7 @@ pub(super) struct Depth {
 }
 
 impl Interior {
-    fn of(material: &Material, is_connected: bool) -> Self {
+    fn of(material: &scene::Material, is_connected: bool) -> Self {
         match (material.transmission > 0.0, is_connected) {
             (false, _) => Self::Opaque,
             (true, false) => Self::Spheres,
@@ -200,17 +196,11 @@ impl<'a> WhittedIntegrator<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
-        let ambient = scene.ambient_light;
-        let matte = WhittedLanes::matte(ground::AMBIENT, ground::DIFFUSE, ambient);
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
         let interior = Interior::of(&scene.material, is_connected);
-        let mut material = WhittedLanes::new(&scene.material, ambient);
         let is_body = interior == Interior::Body;
-        if is_body && !material.has_color() {
-            material.darkest_highlight = DARKEST_HIGHLIGHT;
-        }
         let eye = scene.camera.eye();
         let is_eye_inside = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
@@ -223,13 +213,18 @@ impl<'a> WhittedIntegrator<'a> {
             simd: Supported::default(),
             camera: CameraLanes::new(&scene.camera, settings.width, settings.height),
             background: BackgroundLanes::from(&scene.background),
-            lights: scene.lights.iter().map(LightLanes::from).collect(),
-            materials: [material, matte, matte],
+            lights: scene.lights.iter().map(light_of).collect(),
+            materials: materials_of(scene, is_connected),
             color: source.constant_color(),
             interior,
             split: split_rule(settings, is_body),
             sampler: FilmSampler::new(settings.samples),
         }
+    }
+
+    /// The constants of the particles' material.
+    pub(super) fn particle_constants(&self) -> &WhittedMaterial {
+        self.materials[usize::from(MaterialId::PARTICLES.0)].constants()
     }
 
     /// Renders all pixels of `tile`. None once `stop` is raised, which is looked at for each packet.

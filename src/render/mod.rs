@@ -21,6 +21,8 @@ mod attributes;
 pub(crate) mod brute;
 mod film;
 mod integrator;
+mod lights;
+mod materials;
 mod roulette;
 mod sampler;
 mod shading;

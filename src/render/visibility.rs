@@ -7,7 +7,9 @@
 
 use super::{
     integrator::{Interior, WhittedIntegrator},
-    shading::{LightSamples, attenuate, passed_straight, product},
+    lights::LightSamples,
+    materials::{attenuate, passed_straight},
+    shading::product,
 };
 use crate::accel::Coherence;
 use crate::math::{Lanes3, first_lanes, lane3, lanes_in, set_lane3, splat};
@@ -30,7 +32,7 @@ impl WhittedIntegrator<'_> {
         inside: u32,
         crossings: &mut Intersections,
     ) -> u32 {
-        let rays = &samples.shadow_rays;
+        let rays = &samples.rays;
         // Rays that an opaque shape stops need not be traced on.
         let mut lanes = samples.lanes;
         for shape in &self.shapes {
@@ -53,8 +55,8 @@ impl WhittedIntegrator<'_> {
             ),
             _ => self.through_spheres(particles, rays, lanes, &mut kept),
         };
-        let arriving = samples.contribution;
-        product(self.simd, &arriving, &kept, &mut samples.contribution);
+        let arriving = samples.radiance;
+        product(self.simd, &arriving, &kept, &mut samples.radiance);
         reached
     }
 
@@ -66,7 +68,7 @@ impl WhittedIntegrator<'_> {
         lanes: u32,
         kept: &mut Lanes3,
     ) -> u32 {
-        let material = &self.materials[0];
+        let material = self.particle_constants();
         let passed = |cosine: f32| material.passed_straight(cosine);
         lanes_in(lanes).fold(0, |reached, lane| {
             let part = spheres.transmittance(&rays.ray(lane), &passed);
@@ -91,7 +93,7 @@ impl WhittedIntegrator<'_> {
         hits: &mut Intersections,
         kept: &mut Lanes3,
     ) -> u32 {
-        let material = &self.materials[0];
+        let material = self.particle_constants();
         let mut ahead = *rays;
         let mut reached = lanes;
         let mut alive = lanes;

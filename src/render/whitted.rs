@@ -9,11 +9,9 @@ use glam::Vec3;
 use super::{
     RayCounts,
     integrator::{Depth, Interior, NextRays, PacketScratch, WhittedIntegrator},
+    materials::{Material, WhittedMaterial, attenuate, leaving},
     roulette::{REFLECTED, REFRACTED},
-    shading::{
-        WhittedLanes, add, add_background, attenuate, interface_points, leaving, product,
-        refracted_rays, sample_light, scale, shading_points,
-    },
+    shading::{add, add_background, product, scale},
     stream::{RayStream, ScatteredRays, SegmentPacket},
 };
 use crate::math::{lane3, lanes_in, splat};
@@ -44,26 +42,19 @@ impl WhittedIntegrator<'_> {
             if lanes == 0 {
                 continue;
             }
-            let rays = &segments.rays;
-            let is_interface = self.interior == Interior::Body && id == MaterialId::PARTICLES;
-            let PacketScratch { hits, points, .. } = packet;
-            if is_interface {
-                let inside = segments.inside;
-                interface_points(self.simd, material, rays, hits, inside, points);
-                self.add_direct(segments, material, lanes & !inside, depth, packet, counts);
-            } else {
-                shading_points(self.simd, material, rays, hits, points);
-                self.add_direct(segments, material, lanes, depth, packet, counts);
-            }
+            let (rays, inside) = (&segments.rays, segments.inside);
+            material.shading_points(self.simd, rays, &packet.hits, inside, &mut packet.points);
+            let lit = material.lit_lanes(lanes, inside);
+            self.add_direct(segments, &**material, lit, depth, packet, counts);
             if id == MaterialId::PARTICLES {
-                self.scatter(segments, material, lanes, depth, packet, next);
+                self.scatter(segments, material.constants(), lanes, depth, packet, next);
             }
         }
     }
 
     /// Takes from the throughput what the medium takes between the start of the rays and their intersections.
     fn attenuate_on_the_way(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
-        let extinction = self.materials[0].extinction;
+        let extinction = self.particle_constants().extinction;
         if extinction == Vec3::ZERO {
             return;
         }
@@ -116,7 +107,7 @@ impl WhittedIntegrator<'_> {
     fn add_direct(
         &self,
         segments: &SegmentPacket,
-        material: &WhittedLanes,
+        material: &dyn Material,
         lanes: u32,
         depth: Depth,
         packet: &mut PacketScratch,
@@ -137,11 +128,11 @@ impl WhittedIntegrator<'_> {
         add(
             simd,
             &colored,
-            &material.ambient,
+            &material.constants().ambient,
             lanes,
             &mut packet.radiance,
         );
-        if !material.scatters() {
+        if !material.constants().scatters() {
             return;
         }
         for light in &self.lights {
@@ -155,20 +146,18 @@ impl WhittedIntegrator<'_> {
                 ..
             } = packet;
             let rays = &segments.rays;
-            sample_light(
-                simd, light, material, rays, points, base, weight, lanes, samples,
-            );
+            light.sample_li(simd, &points.start, samples);
+            material.reflect(simd, rays, points, base, weight, lanes, samples);
             if samples.lanes == 0 {
                 continue;
             }
             let mut visible = samples.lanes;
-            if light.casts_shadow {
-                samples.shadow_rays.set_len(rays.len());
+            if light.casts_shadow() {
+                samples.rays.set_len(rays.len());
                 counts.shadow += u64::from(visible.count_ones());
-                let inside = segments.inside;
-                visible = self.visible(samples, depth.coherence, inside, crossings);
+                visible = self.visible(samples, depth.coherence, segments.inside, crossings);
             }
-            add(simd, &samples.contribution, &Vec3::ONE, visible, radiance);
+            add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
         }
     }
 
@@ -177,14 +166,13 @@ impl WhittedIntegrator<'_> {
     fn scatter(
         &self,
         segments: &SegmentPacket,
-        material: &WhittedLanes,
+        material: &WhittedMaterial,
         lanes: u32,
         depth: Depth,
         packet: &mut PacketScratch,
         next: &mut NextRays,
     ) {
         let PacketScratch {
-            hits,
             points,
             throughput,
             radiance,
@@ -192,11 +180,7 @@ impl WhittedIntegrator<'_> {
         } = packet;
         let ends = depth.number >= self.settings.max_depth;
         let (inside, passed) = match self.interior {
-            Interior::Opaque => (0, 0),
-            Interior::Spheres => {
-                refracted_rays(self.simd, material, &segments.rays, hits, points);
-                (0, 0)
-            }
+            Interior::Opaque | Interior::Spheres => (0, 0),
             Interior::Body => (segments.inside, !segments.inside),
         };
         if self.interior != Interior::Opaque && !ends {

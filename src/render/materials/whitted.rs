@@ -1,19 +1,19 @@
-//! Eq. 4.1 and 4.3: the constants of a material, and the shading points where rays meet it.
+//! Eq. 4.1 and 4.3 for surfaces that are opaque or bound spheres, each a body of its own.
 //!
 //! Normals face the ray that sees them, as the thesis's `faceforward` turns them, so that a surface seen from inside
 //! is lit from inside. Under total internal reflection `r` is 1.
 
 use glam::Vec3;
 
-use crate::math::{LANES, Lanes3, lane_kernel, splat};
+use super::{Material, ShadingPoints};
+use crate::math::{LANES, Supported, lane_kernel};
 use crate::ray::RayPacket;
-use crate::render::stream::ScatteredRays;
-use crate::scene::{Fresnel, Material};
+use crate::scene::{self, Fresnel};
 use crate::surface::Intersections;
 
 /// The constants of eq. 4.1 to 4.3, settled for a scene.
 #[derive(Debug, Clone, Copy)]
-pub(in crate::render) struct WhittedLanes {
+pub(in crate::render) struct WhittedMaterial {
     /// `Ka` times the ambient light, linear RGB.
     pub(in crate::render) ambient: Vec3,
     pub(in crate::render) diffuse: f32,
@@ -32,8 +32,8 @@ pub(in crate::render) struct WhittedLanes {
     pub(in crate::render) extinction: Vec3,
 }
 
-impl WhittedLanes {
-    pub(in crate::render) fn new(material: &Material, ambient_light: Vec3) -> Self {
+impl WhittedMaterial {
+    pub(in crate::render) fn new(material: &scene::Material, ambient_light: Vec3) -> Self {
         Self {
             ambient: material.ambient * ambient_light,
             diffuse: material.diffuse,
@@ -93,39 +93,33 @@ impl WhittedLanes {
 
     /// An opaque material that only scatters.
     pub(in crate::render) fn matte(ambient: f32, diffuse: f32, ambient_light: Vec3) -> Self {
-        let material = Material {
+        let material = scene::Material {
             ambient,
             diffuse,
             specular: 0.0,
             reflection: 0.0,
-            ..Material::DEFAULT
+            ..scene::Material::DEFAULT
         };
         Self::new(&material, ambient_light)
     }
 }
 
-/// Where the rays of a packet meet surfaces, as light and further rays see it.
-#[derive(Debug, Clone)]
-#[repr(C, align(64))]
-pub(in crate::render) struct ShadingPoints {
-    /// Unit normal to shade by, on the side that the ray comes from.
-    pub(in crate::render) normal: Lanes3,
-    /// Where rays to lights start.
-    pub(in crate::render) start: Lanes3,
-    /// Reflected rays.
-    pub(in crate::render) reflected: ScatteredRays,
-    /// Refracted rays, of transmissive materials alone.
-    pub(in crate::render) refracted: ScatteredRays,
-}
+impl Material for WhittedMaterial {
+    fn constants(&self) -> &WhittedMaterial {
+        self
+    }
 
-impl Default for ShadingPoints {
-    fn default() -> Self {
-        let zero = [splat(0.0); 3];
-        Self {
-            normal: zero,
-            start: zero,
-            reflected: ScatteredRays::default(),
-            refracted: ScatteredRays::default(),
+    fn shading_points(
+        &self,
+        simd: Supported,
+        rays: &RayPacket,
+        hits: &Intersections,
+        _inside: u32,
+        points: &mut ShadingPoints,
+    ) {
+        reflected_rays(simd, self, rays, hits, points);
+        if self.transmission > 0.0 {
+            refracted_rays(simd, self, rays, hits, points);
         }
     }
 }
@@ -145,8 +139,8 @@ fn dielectric(cosine: f32, ratio: f32) -> f32 {
 
 /// From intersections to shading points with reflected rays.
 #[inline(always)]
-fn shading_points_body(
-    material: &WhittedLanes,
+fn reflected_rays_body(
+    material: &WhittedMaterial,
     rays: &RayPacket,
     hits: &Intersections,
     points: &mut ShadingPoints,
@@ -197,10 +191,63 @@ fn shading_points_body(
 }
 
 lane_kernel! {
-    pub(in crate::render) fn shading_points(
-        material: &WhittedLanes,
+    fn reflected_rays(
+        material: &WhittedMaterial,
         rays: &RayPacket,
         hits: &Intersections,
         points: &mut ShadingPoints,
-    ) = shading_points_body;
+    ) = reflected_rays_body;
+}
+
+/// The refracted rays at the shading points of spheres that are bodies of their own.
+#[inline(always)]
+fn refracted_rays_body(
+    material: &WhittedMaterial,
+    rays: &RayPacket,
+    hits: &Intersections,
+    points: &mut ShadingPoints,
+) {
+    for l in 0..LANES {
+        let mut d = [0.0; 3];
+        let mut n = [0.0; 3];
+        for axis in 0..3 {
+            d[axis] = rays.direction[axis][l];
+            n[axis] = hits.normal[axis][l];
+        }
+        let along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+        let is_entering = along < 0.0;
+        let side = if is_entering { 1.0 } else { -1.0 };
+        let cosine = if is_entering { -along } else { along };
+        let ratio = if is_entering {
+            1.0 / material.ior
+        } else {
+            material.ior
+        };
+        let (r, sin2_out) = material.fresnel(cosine, ratio);
+        let is_total = sin2_out >= 1.0;
+        let along_normal = ratio * cosine - (1.0 - if is_total { 1.0 } else { sin2_out }).sqrt();
+        let mut onward = [0.0; 3];
+        for axis in 0..3 {
+            onward[axis] = ratio * d[axis] + along_normal * (n[axis] * side);
+        }
+        // Normalised so that errors do not add up over a path.
+        let length2 = onward[0] * onward[0] + onward[1] * onward[1] + onward[2] * onward[2];
+        let inverse = 1.0 / length2.sqrt();
+        for axis in 0..3 {
+            let step = hits.offset[l] * (n[axis] * side);
+            points.refracted.origin[axis][l] = hits.anchor[axis][l] - step;
+            points.refracted.direction[axis][l] = onward[axis] * inverse;
+        }
+        let weight = material.transmission * (1.0 - r);
+        points.refracted.weight[l] = if is_total { 0.0 } else { weight };
+    }
+}
+
+lane_kernel! {
+    fn refracted_rays(
+        material: &WhittedMaterial,
+        rays: &RayPacket,
+        hits: &Intersections,
+        points: &mut ShadingPoints,
+    ) = refracted_rays_body;
 }

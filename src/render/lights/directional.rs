@@ -1,0 +1,29 @@
+//! Light from infinitely far.
+
+use glam::Vec3;
+
+use super::{Light, LightSamples};
+use crate::math::{Lanes3, Supported, splat, splat3};
+
+/// Parallel light.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct DirectionalLight {
+    /// Unit vector.
+    pub(super) to_light: Vec3,
+    pub(super) radiance: Vec3,
+    pub(super) casts_shadow: bool,
+}
+
+impl Light for DirectionalLight {
+    fn sample_li(&self, _simd: Supported, start: &Lanes3, samples: &mut LightSamples) {
+        samples.rays.origin = *start;
+        samples.rays.direction = splat3(self.to_light);
+        samples.rays.t_min = splat(0.0);
+        samples.rays.t_max = splat(f32::INFINITY);
+        samples.radiance = splat3(self.radiance);
+    }
+
+    fn casts_shadow(&self) -> bool {
+        self.casts_shadow
+    }
+}
