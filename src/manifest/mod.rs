@@ -29,6 +29,7 @@ mod places_tests;
 mod preset;
 mod reader;
 mod rebase;
+mod same;
 mod schema;
 mod surface;
 #[cfg(test)]
@@ -232,9 +233,14 @@ impl Manifest {
 
     /// Whether both branches at transmissive spheres are to be followed deeper than rays can be counted.
     fn doubles_rays_too_often(&self) -> bool {
-        self.surface.kind == SurfaceKind::Spheres
+        self.branches_at_spheres()
             && self.render.min_weight == 0.0
             && self.render.max_depth > MAX_LITERAL_DEPTH
+    }
+
+    /// Whether rays go on in two directions where they meet a sphere: `render.min_weight` is for these pictures alone.
+    fn branches_at_spheres(&self) -> bool {
+        self.surface.kind == SurfaceKind::Spheres
             && self.material.reflection > 0.0
             && self.material.transmission > 0.0
     }
@@ -262,7 +268,8 @@ impl Manifest {
 
     /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
     /// order. Left out: `input.path` and frames, which are told by the files themselves, the
-    /// accelerator, the directory of the images, and all of `[job]`.
+    /// accelerator, what no ray of these pictures meets (`render.min_weight` for opaque spheres), the
+    /// directory of the images, and all of `[job]`.
     pub fn settings(&self) -> Vec<(String, String)> {
         self.entries().settings()
     }
@@ -287,7 +294,8 @@ impl Manifest {
         self.input.entries(&mut out);
         self.camera.entries(&mut out);
         self.image.entries(&mut out);
-        self.render.entries(self.surface.kind, &mut out);
+        let branches = self.branches_at_spheres();
+        self.render.entries(self.surface.kind, branches, &mut out);
         surface::entries(&self.surface, &mut out);
         self.material.entries(&mut out);
         self.output.entries(&mut out);

@@ -78,7 +78,7 @@ impl Run {
     /// Takes in the frames `new` of a `sequence` that has grown; they are to be done next. Those that were
     /// finished and have changed since are done again.
     pub(super) fn extend(&mut self, sequence: Sequence, new: &[i64]) -> Result<(), CliError> {
-        let request = self.plan.request_for(&sequence, new);
+        let request = self.plan.request_for(&sequence, new)?;
         for change in self.job.extend(&request)? {
             let note = format!("note: {change} since it was rendered; it is rendered again");
             self.progress.note(&note);
