@@ -7,6 +7,8 @@
 use std::fmt;
 use std::path::Path;
 
+use spherule_jobs::FrameRange;
+
 use crate::render::MAX_LITERAL_DEPTH;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
@@ -209,14 +211,6 @@ impl Manifest {
             output: Output::read(root.section("output")),
             job: Work::read(root.section("job")),
         };
-        let several = manifest
-            .input
-            .frames
-            .as_ref()
-            .is_some_and(|f| f.has_several());
-        if several && !manifest.output.path.has_number() {
-            root.section("output").wrong("path", NEEDS_NUMBER);
-        }
         if manifest.doubles_rays_too_often() {
             let depth = manifest.render.max_depth;
             root.section("render").wrong(
@@ -250,7 +244,8 @@ impl Manifest {
     /// # Errors
     /// There are several frames, or more may come, but the output's name has no number.
     pub fn check_frame_count(&self, frame_count: usize) -> Result<(), ManifestError> {
-        let more_may_come = self.job.follow && self.input.frames.is_none();
+        let range = self.input.frames.as_ref();
+        let more_may_come = self.job.follow && range.is_none_or(FrameRange::has_several);
         if self.output.path.has_number() || (frame_count <= 1 && !more_may_come) {
             return Ok(());
         }
