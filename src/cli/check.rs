@@ -102,6 +102,9 @@ impl<'a> Check<'a> {
             let request = self.plan.request(self.sequence, args.work.mode());
             let foreseen = request.and_then(|r| Ok(Job::foresee(&self.plan.dir, &r)?));
             self.foreseen = self.noted(foreseen);
+            for change in self.foreseen.iter().flat_map(|f| &f.requeued) {
+                note!("{change} since it was rendered; it would be rendered again");
+            }
         }
         let pictures = match self.foreseen.as_ref().and_then(|f| f.resolved.as_ref()) {
             Some(resolved) => self.plan.settle(resolved, self.sequence),

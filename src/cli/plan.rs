@@ -151,7 +151,11 @@ impl Plan {
                 .map(|name| self.dir.join(name))
                 .into(),
             selection: Some(self.selected(sequence)),
-            mode,
+            mode: match mode {
+                // A simulation that still runs may have paused in the middle of a file.
+                Mode::Resume if self.manifest.job.follow => Mode::RequeueChanged,
+                mode => mode,
+            },
             patience: self.manifest.job.takeover_after.duration(),
         })
     }
