@@ -15,11 +15,11 @@ use std::thread;
 use serde_json::Value;
 
 use crate::ledger::{ENDED, LedgerFile, LedgerWriter, News, fold, ledger_files, remove};
-use crate::planning::{Prints, merged_plan, new_plan, stored_path};
+use crate::planning::{Extension, Prints, merged_plan, new_plan, stored_path};
 use crate::work::{Desk, WorkerView, sweep_parts, workers};
 use crate::{
-    Claims, Entry, FrameState, JobError, JobRequest, JobState, Ledger, Mode, OutputFile, Plan,
-    Status, Summary, foreign,
+    Claims, Entry, FrameState, InputChange, JobError, JobRequest, JobState, Ledger, Mode,
+    OutputFile, Plan, Status, Summary, foreign,
 };
 
 /// So many ledgers of workers that have ended may lie about before they are brought together in one.
@@ -34,6 +34,9 @@ pub struct Foreseen {
     pub selected: Vec<i64>,
     /// What "auto" turned into when the job began; None if that would be settled anew.
     pub resolved: Option<Value>,
+    /// Finished frames that would be made again because their inputs have changed
+    /// ([`Mode::RequeueChanged`]).
+    pub requeued: Vec<InputChange>,
 }
 
 /// A job opened for work.
@@ -43,6 +46,7 @@ pub struct Job {
     writer: LedgerWriter,
     pub(crate) claims: Claims,
     pub(crate) selected: Vec<i64>,
+    requeued: Vec<InputChange>,
 }
 
 impl Job {
@@ -110,7 +114,7 @@ impl Job {
         } else {
             (Plan::load(dir)?, Ledger::read(dir)?)
         };
-        let (plan, ledger, settled_anew) = match old {
+        let (plan, ledger, settled_anew, requeued) = match old {
             None => {
                 if !forgotten {
                     refuse_ledgers(dir)?;
@@ -118,24 +122,31 @@ impl Job {
                 if request.mode != Mode::Force {
                     foreign::refuse_at_begin(request)?;
                 }
-                (new_plan(dir, request, &mut prints)?, ledger, true)
+                let plan = new_plan(dir, request, &mut prints)?;
+                (plan, ledger, true, Vec::new())
             }
             Some(old) => {
                 let state = JobState::new(dir, old, ledger);
                 let mut anew = false;
-                let plan = merged_plan(&state, request, &selected, &mut prints, |_| {
-                    anew = true;
-                    Ok::<_, JobError>(Value::Null)
-                })?;
+                let Extension { plan, changes } =
+                    merged_plan(&state, request, &selected, &mut prints, |_| {
+                        anew = true;
+                        Ok::<_, JobError>(Value::Null)
+                    })?;
                 foreign::refuse_new(&state, &plan)?;
-                (plan, state.ledger, anew)
+                (plan, state.ledger, anew, changes)
             }
         };
         let resolved = (!settled_anew).then(|| plan.resolved().clone());
+        let mut state = JobState::new(dir, plan, ledger);
+        for change in &requeued {
+            state.states.insert(change.frame, FrameState::Pending);
+        }
         Ok(Foreseen {
-            state: JobState::new(dir, plan, ledger),
+            state,
             selected,
             resolved,
+            requeued,
         })
     }
 
@@ -154,6 +165,28 @@ impl Job {
         request: JobRequest,
         resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
     ) -> Result<Self, JobError> {
+        if request.mode != Mode::RequeueChanged {
+            return Self::open_as_planned(dir, request, resolve);
+        }
+        request.check()?;
+        // Opened without the frames that may have changed, the job then takes them in as it does those that
+        // change while it is open.
+        let without = JobRequest {
+            selection: Some(Vec::new()),
+            mode: Mode::Resume,
+            ..request.clone()
+        };
+        let mut job = Self::open_as_planned(dir, without, resolve)?;
+        job.requeued = job.extend(&request)?;
+        Ok(job)
+    }
+
+    /// Opens it in any mode but [`Mode::RequeueChanged`].
+    fn open_as_planned<E: Into<Box<dyn Error + Send + Sync>>>(
+        dir: &Path,
+        request: JobRequest,
+        resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
+    ) -> Result<Self, JobError> {
         let dir = named(dir);
         request.check()?;
         let selected = request.selected();
@@ -161,7 +194,7 @@ impl Job {
         // The slow part is done before others are kept waiting.
         let known = match request.mode {
             Mode::Force => None,
-            Mode::Resume | Mode::KeepDone => Plan::load(dir)?,
+            _ => Plan::load(dir)?,
         };
         let mut prints = Prints::ahead(&request, &selected, known.as_ref());
         let desk = Desk::take(dir, request.patience)
@@ -175,15 +208,15 @@ impl Job {
         }
         let old = match request.mode {
             Mode::Force => None,
-            Mode::Resume | Mode::KeepDone => Plan::load(dir)?,
+            _ => Plan::load(dir)?,
         };
         let ledger = Ledger::read(dir)?;
         let state = match old {
             None => begin(dir, &request, ledger, &mut prints, resolve)?,
             Some(plan) => {
                 let old = JobState::new(dir, plan, ledger);
-                let plan = merged_plan(&old, &request, &selected, &mut prints, resolve)?;
-                go_on(old, plan, &desk)?
+                let merged = merged_plan(&old, &request, &selected, &mut prints, resolve)?;
+                go_on(old, merged.plan, &desk)?
             }
         };
         let news = if fold_ended(dir, &state.ledger, &desk)? {
@@ -198,7 +231,14 @@ impl Job {
             claims: Claims::new(dir, desk, news),
             state,
             selected,
+            requeued: Vec::new(),
         })
+    }
+
+    /// Finished frames that were set back when the job was opened, because their inputs had changed
+    /// ([`Mode::RequeueChanged`]).
+    pub fn requeued(&self) -> &[InputChange] {
+        &self.requeued
     }
 
     /// What the frames of this job are claimed by, before they are worked on.

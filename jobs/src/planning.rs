@@ -25,26 +25,35 @@ pub(crate) fn new_plan(
     Ok(Plan::new(settings, Value::Null, dirs, frames))
 }
 
-/// The plan of a job that goes on.
+/// The plan of a job that goes on. Changed inputs of finished frames are refused, or reported, as the
+/// request's mode says.
 pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     state: &JobState,
     request: &JobRequest,
     selected: &[i64],
     prints: &mut Prints,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
-) -> Result<Plan, JobError> {
+) -> Result<Extension, JobError> {
     check_input(state, request, prints)?;
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
-    if request.mode == Mode::Resume && !changes.is_empty() {
+    if request.mode != Mode::KeepDone && !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
-    let frames = prints.plan(&dir, wanted(request, selected, Some(&state.plan)))?;
-    if request.mode == Mode::Resume {
-        let changes = changed_inputs(state, &frames);
-        if !changes.is_empty() {
-            return Err(JobError::InputChanged { dir, changes });
+    let mut frames = prints.plan(&dir, wanted(request, selected, Some(&state.plan)))?;
+    let mut stale = Vec::new();
+    match request.mode {
+        Mode::Resume => {
+            let changes = changed_inputs(state, &frames);
+            if !changes.is_empty() {
+                return Err(JobError::InputChanged { dir, changes });
+            }
         }
+        Mode::RequeueChanged => {
+            keep_cleared_away(state, &mut frames);
+            stale = changed_inputs(state, &frames);
+        }
+        Mode::Force | Mode::KeepDone => {}
     }
     let resolved = if changes.is_empty() {
         state.plan.resolved().clone()
@@ -60,7 +69,10 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     let mut plan = Plan::new(settings, resolved, dirs, state.plan.frames().to_vec());
     plan.merge(frames);
     refuse_shared_outputs(&dir, &plan)?;
-    Ok(plan)
+    Ok(Extension {
+        plan,
+        changes: stale,
+    })
 }
 
 /// A request may have other frames than the plan, under a name that one of the plan's has.
@@ -81,7 +93,7 @@ fn refuse_shared_outputs(dir: &Path, plan: &Plan) -> Result<(), JobError> {
     Ok(())
 }
 
-/// What comes of a sequence that has grown.
+/// What comes of a sequence that may have grown.
 pub(crate) struct Extension {
     pub(crate) plan: Plan,
     /// Finished frames that are to be made anew.
@@ -101,13 +113,18 @@ pub(crate) fn extended_plan(
         return Err(JobError::SettingsChanged { dir, changes });
     }
     let mut frames = prints.plan(&dir, wanted(request, new, Some(&state.plan)))?;
-    // An image is not stale because its input has been cleared away since.
-    let is_readable = |f: &PlannedFrame| f.inputs.iter().all(|i| i.fingerprint.is_some());
-    frames.retain(|now| is_readable(now) || !state.is_done(now.number));
+    keep_cleared_away(state, &mut frames);
     let changes = changed_inputs(state, &frames);
     let mut plan = state.plan.clone();
     plan.merge(frames);
     Ok(Extension { plan, changes })
+}
+
+/// Leaves finished frames that cannot be read any more out of `frames`, so that the plan keeps them as they were: an
+/// image is not stale because its input has been cleared away since.
+fn keep_cleared_away(state: &JobState, frames: &mut Vec<PlannedFrame>) {
+    let is_readable = |f: &PlannedFrame| f.inputs.iter().all(|i| i.fingerprint.is_some());
+    frames.retain(|now| is_readable(now) || !state.is_done(now.number));
 }
 
 /// Only finished frames can be stale; the others will be made from what is there now.

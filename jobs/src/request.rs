@@ -13,6 +13,9 @@ pub enum Mode {
     /// outputs are there already.
     #[default]
     Resume,
+    /// As [`Mode::Resume`], but finished frames whose inputs have changed are made again
+    /// ([`crate::Job::requeued`]): for inputs that a running simulation still writes.
+    RequeueChanged,
     /// Forget plan and ledgers, and replace whatever has the names of outputs. Images stay until then.
     Force,
     /// Finished frames stay finished whatever has changed; the rest is done as asked now.

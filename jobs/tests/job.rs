@@ -427,6 +427,49 @@ fn what_others_rely_on_does_not_change_under_them() {
 }
 
 #[test]
+fn changed_inputs_are_made_again_where_that_is_asked_for() {
+    let place = Place::new(0..3);
+    place.started(0..3, &[0, 1]);
+    fs::write(place.input(1), "one that has grown").unwrap();
+    fs::remove_file(place.input(0)).unwrap();
+    let request = |selection: &[i64]| JobRequest {
+        mode: Mode::RequeueChanged,
+        selection: Some(selection.to_vec()),
+        ..place.request(0..3)
+    };
+    let error = place
+        .open(JobRequest {
+            mode: Mode::Resume,
+            ..request(&[1, 2])
+        })
+        .unwrap_err();
+    assert!(matches!(error, JobError::InputChanged { .. }), "{error}");
+    let foreseen = Job::foresee(&place.dir(), &request(&[2, 1, 0])).unwrap();
+    assert_eq!(foreseen.pending(), [2, 1]);
+    assert_eq!(foreseen.requeued.len(), 1);
+
+    // Others are not looked at.
+    let job = place.open(request(&[2])).unwrap();
+    assert_eq!((job.pending(), job.requeued()), (vec![2], &[][..]));
+    drop(job);
+    let mut job = place.open(request(&[2, 1, 0])).unwrap();
+    assert_eq!(job.requeued(), foreseen.requeued);
+    assert_eq!(job.selected(), [2, 1, 0]);
+    assert_eq!(job.pending(), [2, 1]);
+    place.finish(&mut job, 1);
+    drop(job);
+    let job = place.open(request(&[2, 1, 0])).unwrap();
+    assert_eq!((job.pending(), job.requeued()), (vec![2], &[][..]));
+    drop(job);
+    let other = JobRequest {
+        settings: settings(5),
+        ..request(&[2])
+    };
+    let error = place.open(other).unwrap_err();
+    assert!(matches!(error, JobError::SettingsChanged { .. }), "{error}");
+}
+
+#[test]
 fn workers_that_begin_at_once_make_one_plan() {
     let place = Place::new(0..20);
     let resolved: Vec<Value> = std::thread::scope(|scope| {

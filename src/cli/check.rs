@@ -100,8 +100,11 @@ impl<'a> Check<'a> {
     fn look(&mut self, args: &RunArgs) {
         if self.look_at_place(args.work.mode()) {
             let request = self.plan.request(self.sequence, args.work.mode());
-            let foreseen = Job::foresee(&self.plan.dir, &request).map_err(CliError::from);
+            let foreseen = request.and_then(|r| Ok(Job::foresee(&self.plan.dir, &r)?));
             self.foreseen = self.noted(foreseen);
+            for change in self.foreseen.iter().flat_map(|f| &f.requeued) {
+                note!("{change} since it was rendered; it would be rendered again");
+            }
         }
         let pictures = match self.foreseen.as_ref().and_then(|f| f.resolved.as_ref()) {
             Some(resolved) => self.plan.settle(resolved, self.sequence),

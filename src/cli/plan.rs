@@ -136,21 +136,50 @@ impl Plan {
     }
 
     /// What is asked of the job.
-    pub(super) fn request(&self, sequence: &Sequence, mode: Mode) -> JobRequest {
+    ///
+    /// # Errors
+    /// The plan of the job that is there cannot be read.
+    pub(super) fn request(&self, sequence: &Sequence, mode: Mode) -> Result<JobRequest, CliError> {
         let outputs = |frame| {
             let image = std::iter::once(self.image(frame));
             image.chain(self.preview(frame)).collect()
         };
-        JobRequest {
-            settings: self.manifest.settings(),
+        Ok(JobRequest {
+            settings: self.settings(mode)?,
             frames: self.frames_of_job(requests(sequence, outputs)),
             extra_outputs: [JSON_FILE, HTML_FILE]
                 .map(|name| self.dir.join(name))
                 .into(),
             selection: Some(self.selected(sequence)),
-            mode,
+            mode: match mode {
+                // A simulation that still runs may have paused in the middle of a file.
+                Mode::Resume if self.manifest.job.follow => Mode::RequeueChanged,
+                mode => mode,
+            },
             patience: self.manifest.job.takeover_after.duration(),
-        }
+        })
+    }
+
+    /// What the images depend on, in the words of the job that is gone on with, where that makes no difference.
+    fn settings(&self, mode: Mode) -> Result<Vec<(String, String)>, CliError> {
+        let settings = self.manifest.settings();
+        let planned = match mode {
+            Mode::Force => None,
+            _ => Job::peek(&self.dir)?,
+        };
+        let Some(planned) = planned else {
+            return Ok(settings);
+        };
+        let has_rgb = planned.resolved().get("rgb").is_some_and(Value::is_object);
+        let as_planned = self
+            .manifest
+            .settings_as_planned(planned.settings(), has_rgb);
+        // What is settled anew is settled by what is asked for now.
+        let is_settled_anew = mode == Mode::KeepDone && !planned.changes_to(&as_planned).is_empty();
+        Ok(match is_settled_anew {
+            true => settings,
+            false => as_planned,
+        })
     }
 
     /// The frames that the job has: all of the sequence, or the one that is asked for if there is but one name.
@@ -163,15 +192,22 @@ impl Plan {
     }
 
     /// What is asked of a job that goes on with the frames `new`.
-    pub(super) fn request_for(&self, sequence: &Sequence, new: &[i64]) -> JobRequest {
-        JobRequest {
+    ///
+    /// # Errors
+    /// The plan cannot be read.
+    pub(super) fn request_for(
+        &self,
+        sequence: &Sequence,
+        new: &[i64],
+    ) -> Result<JobRequest, CliError> {
+        Ok(JobRequest {
             selection: Some(new.to_vec()),
-            ..self.request(sequence, Mode::Resume)
-        }
+            ..self.request(sequence, Mode::Resume)?
+        })
     }
 
     pub(super) fn open(&self, sequence: &Sequence, mode: Mode) -> Result<Job, CliError> {
-        let request = self.request(sequence, mode);
+        let request = self.request(sequence, mode)?;
         // A new job is begun, and an old one forgotten, only for pictures that can be.
         let surveyed = if mode == Mode::Force || Job::peek(&self.dir)?.is_none() {
             Some(self.survey_to_begin(sequence)?)

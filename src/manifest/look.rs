@@ -200,7 +200,8 @@ impl Render {
         render
     }
 
-    pub(super) fn entries(&self, surface: SurfaceKind, out: &mut Entries) {
+    /// `branches`: whether both a mirrored and a refracted ray leave from the spheres.
+    pub(super) fn entries(&self, surface: SurfaceKind, branches: bool, out: &mut Entries) {
         out.section("render");
         out.put(
             "surface",
@@ -247,6 +248,9 @@ impl Render {
             &self.min_weight,
             "transmissive spheres: path weight below which one of two branches is followed; 0 follows both",
         );
+        if !branches {
+            out.depends_on(None);
+        }
         out.put(
             "background",
             &self.background,

@@ -7,6 +7,8 @@
 use std::fmt;
 use std::path::Path;
 
+use spherule_jobs::FrameRange;
+
 use crate::render::MAX_LITERAL_DEPTH;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
@@ -29,6 +31,7 @@ mod places_tests;
 mod preset;
 mod reader;
 mod rebase;
+mod same;
 mod schema;
 mod surface;
 #[cfg(test)]
@@ -208,14 +211,6 @@ impl Manifest {
             output: Output::read(root.section("output")),
             job: Work::read(root.section("job")),
         };
-        let several = manifest
-            .input
-            .frames
-            .as_ref()
-            .is_some_and(|f| f.has_several());
-        if several && !manifest.output.path.has_number() {
-            root.section("output").wrong("path", NEEDS_NUMBER);
-        }
         if manifest.doubles_rays_too_often() {
             let depth = manifest.render.max_depth;
             root.section("render").wrong(
@@ -232,9 +227,14 @@ impl Manifest {
 
     /// Whether both branches at transmissive spheres are to be followed deeper than rays can be counted.
     fn doubles_rays_too_often(&self) -> bool {
-        self.surface.kind == SurfaceKind::Spheres
+        self.branches_at_spheres()
             && self.render.min_weight == 0.0
             && self.render.max_depth > MAX_LITERAL_DEPTH
+    }
+
+    /// Whether rays go on in two directions where they meet a sphere: `render.min_weight` is for these pictures alone.
+    fn branches_at_spheres(&self) -> bool {
+        self.surface.kind == SurfaceKind::Spheres
             && self.material.reflection > 0.0
             && self.material.transmission > 0.0
     }
@@ -244,7 +244,8 @@ impl Manifest {
     /// # Errors
     /// There are several frames, or more may come, but the output's name has no number.
     pub fn check_frame_count(&self, frame_count: usize) -> Result<(), ManifestError> {
-        let more_may_come = self.job.follow && self.input.frames.is_none();
+        let range = self.input.frames.as_ref();
+        let more_may_come = self.job.follow && range.is_none_or(FrameRange::has_several);
         if self.output.path.has_number() || (frame_count <= 1 && !more_may_come) {
             return Ok(());
         }
@@ -262,7 +263,8 @@ impl Manifest {
 
     /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
     /// order. Left out: `input.path` and frames, which are told by the files themselves, the
-    /// accelerator, the directory of the images, and all of `[job]`.
+    /// accelerator, what no ray of these pictures meets (`render.min_weight` for opaque spheres), the
+    /// directory of the images, and all of `[job]`.
     pub fn settings(&self) -> Vec<(String, String)> {
         self.entries().settings()
     }
@@ -287,7 +289,8 @@ impl Manifest {
         self.input.entries(&mut out);
         self.camera.entries(&mut out);
         self.image.entries(&mut out);
-        self.render.entries(self.surface.kind, &mut out);
+        let branches = self.branches_at_spheres();
+        self.render.entries(self.surface.kind, branches, &mut out);
         surface::entries(&self.surface, &mut out);
         self.material.entries(&mut out);
         self.output.entries(&mut out);

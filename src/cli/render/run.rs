@@ -3,7 +3,7 @@
 use std::time::Instant;
 
 use spherule_formats::Sequence;
-use spherule_jobs::{Interrupt, Job};
+use spherule_jobs::{InputChange, Interrupt, Job};
 
 use super::isolate;
 use super::show::{show, tell};
@@ -42,6 +42,9 @@ impl Run {
         plan.guard_directory(mode)?;
         plan.guard_manifest()?;
         let job = plan.open(&sequence, mode)?;
+        for change in job.requeued() {
+            note!("{}", again(change));
+        }
         let (survey, setup) = plan.settle(job.resolved(), &sequence)?;
         let mut tasks = plan.tasks(&sequence, &job.pending());
         let schedule = plan.fit(&sequence, &setup, &mut tasks);
@@ -78,10 +81,9 @@ impl Run {
     /// Takes in the frames `new` of a `sequence` that has grown; they are to be done next. Those that were
     /// finished and have changed since are done again.
     pub(super) fn extend(&mut self, sequence: Sequence, new: &[i64]) -> Result<(), CliError> {
-        let request = self.plan.request_for(&sequence, new);
+        let request = self.plan.request_for(&sequence, new)?;
         for change in self.job.extend(&request)? {
-            let note = format!("note: {change} since it was rendered; it is rendered again");
-            self.progress.note(&note);
+            self.progress.note(&again(&change));
         }
         let mut pending = self.job.pending();
         pending.retain(|frame| new.contains(frame));
@@ -140,4 +142,9 @@ impl Run {
         };
         finished.tell(result)
     }
+}
+
+/// That the file of a finished frame has changed, and what is done about it.
+fn again(change: &InputChange) -> String {
+    format!("{change} since it was rendered; it is rendered again")
 }

@@ -38,6 +38,19 @@ fn names_that_will_not_do() {
             "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into it",
         ],
     );
+    // One of those chosen will do if only one is there.
+    let several = |frames| ["render", "in", "-o", "one/f.exr", "--frames", frames];
+    refused(
+        &workshop,
+        &several("2-9"),
+        &["output.path: one/f.exr for 2 frames: several frames would get the same name"],
+    );
+    workshop
+        .run(&[&several("3-9")[..], &SMALL].concat())
+        .expect(0)
+        .tells("1 of 1 frames done");
+    assert!(workshop.join("one/f.exr").is_file());
+    fs::remove_dir_all(workshop.join("one")).expect("the job");
     let ending = "--output: output.path: must end in .exr, as in out/frame.####.exr";
     for pattern in ["out/f.####.png", "out/", "out", "", "out/f.####"] {
         not_there(&workshop, pattern, &[ending]);

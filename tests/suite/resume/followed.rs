@@ -160,3 +160,51 @@ fn a_finished_frame_whose_file_grows_is_rendered_again() {
         fs::remove_file(file(3)).expect("a file");
     }
 }
+
+/// The run ended while the simulator paused inside a file.
+#[test]
+fn a_frame_that_grew_between_two_runs_is_rendered_again() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 1..=3);
+    let (whole, other) = (frame(&workshop, 2), frame(&workshop, 4));
+    workshop.run(&arguments(&["--idle", "0.5"])).expect(0);
+    let before = images(&workshop.join("out"));
+    fs::write(workshop.join("in/f_2.bgeo"), &other).expect("a file");
+    // What is cleared away has been rendered, and stays.
+    fs::remove_file(workshop.join("in/f_1.bgeo")).expect("a file");
+
+    let plainly = [&["render", "in", "-o", "out/f.####.exr"][..], &SMALL].concat();
+    workshop
+        .run(&plainly)
+        .expect(2)
+        .tells("inputs of finished frames have changed: frame 2: in/f_2.bgeo: length ");
+    let check = [&["check"], &arguments(&["--idle", "0.5"])[1..]].concat();
+    let checked = workshop
+        .run(&check)
+        .expect(0)
+        .tells("note: frame 2: in/f_2.bgeo: length ");
+    assert!(checked.text().contains("to do 1 (2)"), "{}", checked.text());
+    for (content, options) in [(&other, &[][..]), (&whole, &["--isolate"])] {
+        fs::write(workshop.join("in/f_2.bgeo"), content).expect("a file");
+        let ran = workshop
+            .run(&arguments(&[&["--idle", "0.5"], options].concat()))
+            .expect(0)
+            .tells("note: frame 2: in/f_2.bgeo: length ")
+            .tells(" since it was rendered; it is rendered again");
+        assert_eq!(ran.rendered(), [2]);
+        let is_as_before = images(&workshop.join("out")) == before;
+        assert_eq!(is_as_before, content == &whole);
+    }
+    let ran = workshop.run(&arguments(&["--idle", "0.5"])).expect(0);
+    assert!(ran.rendered().is_empty());
+    workshop.run(&plainly).expect(0);
+
+    // Finished frames can be kept all the same; other settings are refused as ever.
+    fs::write(workshop.join("in/f_2.bgeo"), &other).expect("a file");
+    let ran = workshop.run(&arguments(&["--idle", "0.5", "--keep-done"]));
+    assert!(ran.expect(0).rendered().is_empty());
+    workshop
+        .run(&arguments(&["--idle", "0.5", "--max-depth", "1"]))
+        .expect(2)
+        .tells("settings have changed since this job began: render.max_depth: 3 -> 1");
+}

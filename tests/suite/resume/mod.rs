@@ -9,6 +9,7 @@ mod isolated;
 mod killed;
 mod ledger;
 mod mixed;
+mod older;
 mod report;
 mod shared;
 mod threads;
