@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use crate::read::xyz::Kind;
-use crate::read::{self, CUT_SHORT, Step, TextInput};
+use crate::read::{self, CUT_SHORT, Step, TextInput, stream_bytes};
 use crate::{MemoryBudget, ParseError, RawParticles, native};
 
 mod foreign;
@@ -220,6 +220,11 @@ impl Format {
             Self::Npy | Self::Npz => read::npy::read(bytes, step, budget),
             Self::Csv => read::csv::read(text, budget),
         }
+    }
+
+    /// Bytes that are held beside the numbers while a text is read in pieces.
+    pub(crate) fn stream_bytes(self) -> u64 {
+        stream_bytes(matches!(self, Self::Lammps | Self::Csv | Self::Xyz))
     }
 
     /// Whether a file that begins with `head`, and goes on, is text that can be read in pieces.

@@ -17,7 +17,7 @@ use rkyv::util::AlignedVec;
 use crate::detect::{Format, HEAD_LEN};
 use crate::message::one_line;
 use crate::native;
-use crate::read::{Step, TextInput, remarks, stream_bytes};
+use crate::read::{Step, TextInput, remarks};
 use crate::unpack::{ByteSource, SourceError, Unpacker};
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
@@ -44,7 +44,7 @@ enum Content {
     /// Native frames: their sections are used as they lie.
     Aligned(AlignedVec<64>),
     /// On the disk: they are read whenever they are wanted.
-    Streamed(Streamed),
+    Streamed(Box<Streamed>),
 }
 
 /// Text that is not in memory.
@@ -79,10 +79,10 @@ impl Content {
     }
 
     /// Bytes that are held beside the numbers while these are read.
-    fn held_len(&self) -> u64 {
+    fn held_len(&self, format: Format) -> u64 {
         let held = self.bytes().len() as u64;
         match self {
-            Self::Streamed(_) => held + stream_bytes(),
+            Self::Streamed(_) => held + format.stream_bytes(),
             Self::Plain(_) | Self::Aligned(_) => held,
         }
     }
@@ -132,7 +132,7 @@ impl FrameFile {
                 end: OnceLock::new(),
                 parked: Mutex::new(None),
             };
-            let content = Content::Streamed(streamed);
+            let content = Content::Streamed(Box::new(streamed));
             return Self::new(path, content, stamp.len, Vec::new(), budget);
         }
         let notes = if is_whole {
@@ -195,7 +195,7 @@ impl FrameFile {
     ) -> Result<Self, FrameError> {
         let in_file = |e: ParseError| e.in_file(path);
         let format = Format::detect(content.bytes(), path).map_err(in_file)?;
-        let left = budget.less(content.held_len());
+        let left = budget.less(content.held_len(format));
         let steps = match &content {
             Content::Streamed(streamed) => streamed.steps(path, format, left)?,
             held => {
@@ -253,7 +253,7 @@ impl FrameFile {
 
     /// Bytes that are held beside the numbers while these are read.
     pub fn held_len(&self) -> u64 {
-        self.content.held_len()
+        self.content.held_len(self.format)
     }
 
     /// Bytes that are held on the way from the content to the numbers of `particles`: of arrays that are packed,

@@ -21,9 +21,11 @@ const WHOLE_PIECE: usize = 1 << 20;
 /// Bytes of a piece of a stream: smaller, since all pieces at work are held.
 const PIECE: usize = 1 << 18;
 
-/// Bytes that are held while a stream is read: the window, the pieces at work, and what is found in them, as much.
-pub(crate) fn stream_bytes() -> u64 {
-    (2 * PIECE * (pieces_at_once() + 1)) as u64
+/// Bytes that are held while a stream is read: the window, which has the end of what was there before a load; and of
+/// rows the pieces at work, and what is found in them, as much.
+pub(crate) fn stream_bytes(is_rows: bool) -> u64 {
+    let pieces = if is_rows { pieces_at_once() } else { 0 };
+    (2 * PIECE * (pieces + 1)) as u64
 }
 
 /// Text of which some is in memory.
