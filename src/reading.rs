@@ -12,8 +12,6 @@ const LEAST: u64 = 8 << 20;
 /// What reading one file may take in a job with `limit` on its memory whose frames are made in processes with
 /// a `ceiling`.
 pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
-    // Something is left for the tree and the image.
-    let part = |free: u64| free / 4 * 3;
     let of_job = limit.map(|bytes| {
         let remedy = "raise render.memory_limit (--memory-limit) if there is more memory";
         MemoryBudget::new(bytes, remedy)
@@ -22,6 +20,20 @@ pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
         let remedy = "raise job.memory_ceiling (--memory-ceiling) if there is more memory";
         MemoryBudget::new(part(bytes), remedy)
     });
+    least([of_job, of_frame])
+}
+
+/// What reading one file may take in a conversion that may hold `memory`.
+pub fn conversion_budget(memory: Option<u64>) -> MemoryBudget {
+    let of_conversion = memory.map(|bytes| {
+        let remedy = "raise --memory if there is more memory";
+        MemoryBudget::new(bytes, remedy)
+    });
+    least([of_conversion, None])
+}
+
+/// The least of `asked` and of what the process and the machine have.
+fn least(asked: [Option<MemoryBudget>; 2]) -> MemoryBudget {
     let of_process = process_room().map(|bytes| {
         let remedy = "raise the memory limit of the process (ulimit, --memory-ceiling)";
         MemoryBudget::new(part(bytes), remedy)
@@ -30,12 +42,14 @@ pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
         let remedy = "that is what free memory allows: free some, or use a machine with more";
         MemoryBudget::new(part(bytes), remedy)
     });
-    let all = [of_job, of_frame, of_process, of_machine];
-    let least = all
-        .into_iter()
-        .flatten()
-        .min_by_key(|budget| budget.bytes());
+    let all = asked.into_iter().chain([of_process, of_machine]).flatten();
+    let least = all.min_by_key(|budget| budget.bytes());
     least.map_or(MemoryBudget::UNLIMITED, |budget| budget.at_least(LEAST))
+}
+
+/// The part of `free` memory that reading may take: something is left for the tree and the image.
+const fn part(free: u64) -> u64 {
+    free / 4 * 3
 }
 
 #[cfg(test)]
@@ -47,5 +61,7 @@ mod tests {
         assert_eq!(read_budget(Some(20 << 20), Some(1 << 40)).bytes(), 20 << 20);
         assert_eq!(read_budget(Some(1 << 40), Some(40 << 20)).bytes(), 30 << 20);
         assert_eq!(read_budget(Some(1), None).bytes(), LEAST);
+        assert_eq!(conversion_budget(Some(20 << 20)).bytes(), 20 << 20);
+        assert_eq!(conversion_budget(None), read_budget(None, None));
     }
 }

@@ -54,6 +54,31 @@ macro_rules! with_values {
 pub(crate) use with_values;
 
 impl AttributeData {
+    /// Makes room for `more` numbers if it can be had: pages that are not used cost nothing.
+    pub(crate) fn reserve(&mut self, more: usize) {
+        with_values!(self, v => {
+            let _ = v.try_reserve_exact(more);
+        });
+    }
+
+    /// Moves the numbers of `more`, which has the same type, behind its own; without effect for another type.
+    pub(crate) fn append(&mut self, more: &mut Self) {
+        macro_rules! append {
+            ($($variant:ident),*) => {
+                match (self, more) {
+                    $((Self::$variant(all), Self::$variant(more)) => all.append(more),)*
+                    _ => {}
+                }
+            };
+        }
+        append!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64);
+    }
+
+    /// Gives back room that is not used.
+    pub(crate) fn shrink(&mut self) {
+        with_values!(self, v => v.shrink_to_fit());
+    }
+
     /// Number of scalars.
     pub fn len(&self) -> usize {
         with_values!(self, v => v.len())

@@ -7,7 +7,8 @@
 
 use std::path::Path;
 
-use crate::read::{self, Step};
+use crate::read::xyz::Kind;
+use crate::read::{self, CUT_SHORT, Step, TextInput, stream_bytes};
 use crate::{MemoryBudget, ParseError, RawParticles, native};
 
 mod foreign;
@@ -160,25 +161,26 @@ impl Format {
     /// # Errors
     /// What the reader of the format says.
     pub fn steps(self, bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-        self.steps_within(bytes, MemoryBudget::UNLIMITED)
+        self.steps_within(&mut TextInput::whole(bytes), MemoryBudget::UNLIMITED)
     }
 
-    /// [`Self::steps`] within a budget.
+    /// [`Self::steps`] of what `text` gives, within a budget.
     pub(crate) fn steps_within(
         self,
-        bytes: &[u8],
+        text: &mut TextInput<'_>,
         budget: MemoryBudget,
     ) -> Result<Vec<Step>, ParseError> {
+        let bytes = text.as_whole().unwrap_or_default();
         match self {
             Self::Spf => native::steps(bytes),
-            Self::VtkLegacy => read::vtk::steps(bytes),
-            Self::VtkXml => read::vtk_xml::steps(bytes),
+            Self::VtkLegacy => Ok(read::vtk::steps(text, budget)),
+            Self::VtkXml => read::vtk_xml::steps(bytes, budget),
             Self::Bgeo => read::bgeo::steps(bytes),
-            Self::Ply => read::ply::steps(bytes),
-            Self::Xyz => read::xyz::steps(bytes),
-            Self::Lammps => read::lammps::steps(bytes),
-            Self::Npy | Self::Npz => read::npy::steps_within(bytes, budget),
-            Self::Csv => read::csv::steps(bytes),
+            Self::Ply => read::ply::steps(text),
+            Self::Xyz => read::xyz::steps(text, budget),
+            Self::Lammps => read::lammps::steps(text, budget),
+            Self::Npy | Self::Npz => read::npy::steps(bytes, budget),
+            Self::Csv => read::csv::steps(text),
         }
     }
 
@@ -187,29 +189,57 @@ impl Format {
     /// # Errors
     /// What the reader of the format says.
     pub fn read(self, bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-        self.read_within(bytes, step, MemoryBudget::UNLIMITED)
+        self.read_within(&mut TextInput::whole(bytes), step, MemoryBudget::UNLIMITED)
     }
 
-    /// [`Self::read`] if the numbers fit into a budget, apart from `bytes`.
+    /// [`Self::read`] of what `text` gives if the numbers fit into a budget, apart from what is in memory of `text`.
     ///
     /// # Errors
     /// As [`Self::read`], and [`ParseError::TooLarge`].
-    pub fn read_within(
+    pub(crate) fn read_within(
         self,
-        bytes: &[u8],
+        text: &mut TextInput<'_>,
         step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
+        let bytes = text.as_whole().unwrap_or_default();
+        if text.as_whole().is_some()
+            && (bytes.len() < step.span.end || step.span.end < step.span.start)
+        {
+            let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
+            return Err(ParseError::malformed(bytes.len(), what));
+        }
         match self {
             Self::Spf => native::read(bytes, step),
-            Self::VtkLegacy => read::vtk::read(bytes, step),
-            Self::VtkXml => read::vtk_xml::read_within(bytes, step, budget),
+            Self::VtkLegacy => read::vtk::read(text, budget),
+            Self::VtkXml => read::vtk_xml::read(bytes, step, budget),
             Self::Bgeo => read::bgeo::read(bytes, step),
-            Self::Ply => read::ply::read(bytes, step),
-            Self::Xyz => read::xyz::read_within(bytes, step, budget),
-            Self::Lammps => read::lammps::read_within(bytes, step, budget),
-            Self::Npy | Self::Npz => read::npy::read_within(bytes, step, budget),
-            Self::Csv => read::csv::read_within(bytes, step, budget),
+            Self::Ply => read::ply::read(text, budget),
+            Self::Xyz => read::xyz::read(text, step, budget),
+            Self::Lammps => read::lammps::read(text, step, budget),
+            Self::Npy | Self::Npz => read::npy::read(bytes, step, budget),
+            Self::Csv => read::csv::read(text, budget),
+        }
+    }
+
+    /// Bytes that are held beside the numbers while a text is read in pieces.
+    pub(crate) fn stream_bytes(self) -> u64 {
+        stream_bytes(matches!(self, Self::Lammps | Self::Csv | Self::Xyz))
+    }
+
+    /// Whether a file that begins with `head`, and goes on, is text that can be read in pieces.
+    pub(crate) fn is_streamed(self, head: &[u8]) -> bool {
+        match self {
+            Self::Lammps => true,
+            Self::Csv => read::csv::is_told_by(head),
+            Self::Xyz => match read::xyz::kind(head) {
+                Ok(Kind::Molecular) => true,
+                Ok(Kind::Bare) => read::csv::is_told_by(head),
+                Ok(Kind::Raw) | Err(_) => false,
+            },
+            Self::Ply => read::ply::is_text(head),
+            Self::VtkLegacy => read::vtk::is_text(head),
+            Self::Spf | Self::VtkXml | Self::Bgeo | Self::Npy | Self::Npz => false,
         }
     }
 }

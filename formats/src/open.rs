@@ -1,13 +1,13 @@
 //! Opens one file of particles: reads it, takes gzip off, finds the format and the steps inside.
 //!
-//! The only place that reads foreign files; the readers see bytes. Tables are read in pieces from the disk,
+//! The only place that reads foreign files; the readers see bytes. Text is read in pieces from the disk,
 //! other files as a whole, and both within a [`MemoryBudget`]. A file that changes while it is
 //! read is told as such, because a simulation that is still running is the usual cause.
 
 use std::fs::{self, File};
-use std::io::{self, BufReader, Read, Seek};
+use std::io::{self, BufReader, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
-use std::sync::OnceLock;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 use std::time::SystemTime;
 
 use flate2::bufread::GzDecoder;
@@ -17,7 +17,7 @@ use rkyv::util::AlignedVec;
 use crate::detect::{Format, HEAD_LEN};
 use crate::message::one_line;
 use crate::native;
-use crate::read::{Step, csv, remarks, stream_bytes, xyz};
+use crate::read::{Step, TextInput, remarks};
 use crate::unpack::{ByteSource, SourceError, Unpacker};
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
@@ -44,18 +44,22 @@ enum Content {
     /// Native frames: their sections are used as they lie.
     Aligned(AlignedVec<64>),
     /// On the disk: they are read whenever they are wanted.
-    Streamed(Streamed),
+    Streamed(Box<Streamed>),
 }
 
-/// A table that is not in memory.
+/// Text that is not in memory.
 #[derive(Debug)]
 struct Streamed {
     /// Its beginning, unpacked.
-    head: Vec<u8>,
+    head: Arc<[u8]>,
+    is_packed: bool,
     /// What the file was when it was opened.
     stamp: Stamp,
-    /// Found when it was first read: bytes once unpacked, and oddities.
+    /// Found when it was first read to its end: bytes once unpacked, and oddities.
     end: OnceLock<(u64, Vec<String>)>,
+    /// Where the step that was read last ends: the next one often begins there, and packed files have no other way
+    /// to it than from their beginning.
+    parked: Mutex<Option<TextInput<'static>>>,
 }
 
 /// What tells a file from one that was written to.
@@ -71,6 +75,15 @@ impl Content {
             Self::Plain(bytes) => bytes,
             Self::Aligned(bytes) => bytes,
             Self::Streamed(streamed) => &streamed.head,
+        }
+    }
+
+    /// Bytes that are held beside the numbers while these are read.
+    fn held_len(&self, format: Format) -> u64 {
+        let held = self.bytes().len() as u64;
+        match self {
+            Self::Streamed(_) => held + format.stream_bytes(),
+            Self::Plain(_) | Self::Aligned(_) => held,
         }
     }
 }
@@ -113,11 +126,13 @@ impl FrameFile {
         Format::detect(&bytes, path).map_err(|e| e.in_file(path))?;
         if !is_whole && is_streamed(&bytes, path) {
             let streamed = Streamed {
-                head: bytes,
+                head: bytes.into(),
+                is_packed: source.is_packed(),
                 stamp,
                 end: OnceLock::new(),
+                parked: Mutex::new(None),
             };
-            let content = Content::Streamed(streamed);
+            let content = Content::Streamed(Box::new(streamed));
             return Self::new(path, content, stamp.len, Vec::new(), budget);
         }
         let notes = if is_whole {
@@ -160,7 +175,7 @@ impl FrameFile {
         let mut notes = Vec::new();
         let bytes = if is_gzip(&bytes) {
             let mut unpacked = Vec::new();
-            let source = Unpacker::new(bytes.as_slice()).map_err(SourceError::Io);
+            let source = Unpacker::new(Cursor::new(bytes)).map_err(SourceError::Io);
             let source = source.map_err(in_file)?;
             let left = source.finish(&mut unpacked, budget.for_content());
             notes.extend(left.map_err(in_file)?);
@@ -180,12 +195,18 @@ impl FrameFile {
     ) -> Result<Self, FrameError> {
         let in_file = |e: ParseError| e.in_file(path);
         let format = Format::detect(content.bytes(), path).map_err(in_file)?;
-        let left = budget.less(content.bytes().len() as u64);
-        let steps = format.steps_within(content.bytes(), left);
+        let left = budget.less(content.held_len(format));
+        let steps = match &content {
+            Content::Streamed(streamed) => streamed.steps(path, format, left)?,
+            held => {
+                let mut text = TextInput::whole(held.bytes());
+                format.steps_within(&mut text, left).map_err(in_file)?
+            }
+        };
         Ok(Self {
             path: path.to_owned(),
             format,
-            steps: steps.map_err(in_file)?,
+            steps,
             content,
             stored_len,
             notes,
@@ -208,7 +229,7 @@ impl FrameFile {
         &self.steps
     }
 
-    /// The uncompressed content; of a large table its beginning.
+    /// The uncompressed content; of a large text its beginning.
     pub fn bytes(&self) -> &[u8] {
         self.content.bytes()
     }
@@ -218,11 +239,12 @@ impl FrameFile {
         self.stored_len
     }
 
-    /// Bytes of the uncompressed content. Of a packed table a guess until it was read.
+    /// Bytes of the uncompressed content. Of a packed text a guess until it was read to its end.
     pub fn unpacked_len(&self) -> u64 {
         match &self.content {
             Content::Streamed(streamed) => match streamed.end.get() {
                 Some((len, _)) => *len,
+                None if !streamed.is_packed => streamed.stamp.len,
                 None => unpacked_len(&self.path).unwrap_or(self.stored_len),
             },
             held => held.bytes().len() as u64,
@@ -231,21 +253,16 @@ impl FrameFile {
 
     /// Bytes that are held beside the numbers while these are read.
     pub fn held_len(&self) -> u64 {
-        let held = self.bytes().len() as u64;
-        match &self.content {
-            Content::Streamed(_) => held + stream_bytes(),
-            Content::Plain(_) | Content::Aligned(_) => held,
-        }
+        self.content.held_len(self.format)
     }
 
     /// Bytes that are held on the way from the content to the numbers of `particles`: of arrays that are packed,
-    /// or text, in the content.
+    /// or text in XML, in the content.
     pub fn unpacked_arrays_len(&self, particles: &RawParticles) -> u64 {
         let has = |text: &[u8]| memmem::find(self.bytes(), text).is_some();
         let is_packed = match self.format {
             Format::Npz => (self.bytes().len() as u64) < particles.byte_len(),
             Format::VtkXml => has(b"compressor=") || !has(b"encoding=\"raw\""),
-            Format::Ply if has(b"\nformat ascii") => return particles.byte_len(),
             _ => false,
         };
         let arrays = particles.attributes.iter().map(|a| a.data.byte_len());
@@ -253,7 +270,7 @@ impl FrameFile {
         all.max().filter(|_| is_packed).unwrap_or(0)
     }
 
-    /// Oddities that did not stop the file from being understood; those at the end of a large table once it
+    /// Oddities that did not stop the file from being understood; those at the end of a large text once it
     /// was read.
     pub fn notes(&self) -> &[String] {
         match &self.content {
@@ -278,9 +295,10 @@ impl FrameFile {
         })?;
         let left = self.budget.less(self.held_len());
         if let Content::Streamed(streamed) = &self.content {
-            return streamed.read(&self.path, left);
+            return streamed.read(&self.path, self.format, (step, self.steps.len()), left);
         }
-        let particles = self.format.read_within(self.bytes(), step, left);
+        let mut text = TextInput::whole(self.bytes());
+        let particles = self.format.read_within(&mut text, step, left);
         let fits = particles.and_then(|particles| {
             left.check(particles.byte_len(), "in memory its numbers are")?;
             Ok(particles)
@@ -290,29 +308,81 @@ impl FrameFile {
 }
 
 impl Streamed {
-    /// Reads the particles of the file at `path`.
-    fn read(&self, path: &Path, budget: MemoryBudget) -> Result<RawParticles, FrameError> {
+    /// The time steps of the file at `path`.
+    fn steps(
+        &self,
+        path: &Path,
+        format: Format,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, FrameError> {
+        let mut text = self.text(path, budget)?;
+        let steps = format.steps_within(&mut text, budget);
+        self.outcome(path, &mut text, steps)
+    }
+
+    /// Reads one of so many steps of the file at `path`.
+    fn read(
+        &self,
+        path: &Path,
+        format: Format,
+        (step, steps): (&Step, usize),
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, FrameError> {
         self.stamp.check(path)?;
-        let mut source = unpacker(path)?;
-        let len = unpacked_len(path).unwrap_or(self.stamp.len);
-        let read = csv::read_stream(&self.head, &mut source, len, budget);
-        let particles = read.map_err(|e| e.in_file(path));
+        let parked = || self.parked.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = parked().take();
+        let mut text = match last.filter(|text| text.can_reach(step.span.start)) {
+            Some(text) => text,
+            None => self.text(path, budget)?,
+        };
+        let particles = format.read_within(&mut text, step, budget);
+        // Only the end of a packed file tells whether all of it is sound.
+        if self.is_packed && self.end.get().is_none() && particles.is_ok() {
+            text.finish();
+        }
+        let particles = self.outcome(path, &mut text, particles)?;
+        if steps > 1 {
+            text.end_at(usize::MAX);
+            *parked() = Some(text);
+        }
+        Ok(particles)
+    }
+
+    /// The file at `path` from its beginning.
+    fn text(&self, path: &Path, budget: MemoryBudget) -> Result<TextInput<'static>, FrameError> {
+        let source = Box::new(unpacker(path)?);
+        let about = unpacked_len(path).unwrap_or(self.stamp.len);
+        let about = usize::try_from(about).unwrap_or(usize::MAX);
+        let len = match self.end.get() {
+            Some((len, _)) => usize::try_from(*len).ok(),
+            None => (!self.is_packed).then_some(about),
+        };
+        let head = Arc::clone(&self.head);
+        let lens = (len, len.unwrap_or(about));
+        Ok(TextInput::stream(source, head, lens, budget))
+    }
+
+    /// What reading `text` gave, unless something else explains it.
+    fn outcome<T>(
+        &self,
+        path: &Path,
+        text: &mut TextInput<'_>,
+        read: Result<T, ParseError>,
+    ) -> Result<T, FrameError> {
+        if let Some((len, notes)) = text.ended() {
+            let _ = self.end.set((len as u64, notes.to_vec()));
+        }
+        let source = text.check_source().map_err(|e| e.in_file(path));
         // What changed meanwhile explains any other fault.
         self.stamp.check(path)?;
-        let end = (source.len() as u64, source.into_notes());
-        let _ = self.end.set(end);
-        particles
+        source?;
+        read.map_err(|e| e.in_file(path))
     }
 }
 
-/// Whether the file at `path`, which begins with `head` and goes on, is a table that can be read in pieces.
+/// Whether the file at `path`, which begins with `head` and goes on, is text that can be read in pieces.
 fn is_streamed(head: &[u8], path: &Path) -> bool {
-    let is_table = match Format::detect(head, path) {
-        Ok(Format::Csv) => true,
-        Ok(Format::Xyz) => xyz::kind(head) == Ok(xyz::Kind::Bare),
-        _ => false,
-    };
-    is_table && csv::is_told_by(head)
+    Format::detect(head, path).is_ok_and(|format| format.is_streamed(head))
 }
 
 fn unpacker(path: &Path) -> Result<Unpacker<BufReader<File>>, FrameError> {

@@ -1,6 +1,6 @@
 //! The bytes of a file from front to back, gzip taken off on the way.
 
-use std::io::{self, BufRead, Read};
+use std::io::{self, BufRead, Read, Seek};
 
 use flate2::bufread::GzDecoder;
 
@@ -43,6 +43,12 @@ pub(crate) trait ByteSource {
     /// # Errors
     /// [`SourceError`].
     fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError>;
+
+    /// Passes over `count` bytes if that takes no reading; else nothing happens, and it is false.
+    fn pass(&mut self, count: usize) -> bool;
+
+    /// How many bytes there were, and oddities, once all have been given.
+    fn ended(&self) -> Option<(usize, &[String])>;
 }
 
 /// The content of a file, compressed by gzip or not.
@@ -60,7 +66,7 @@ enum State<R> {
     Ended,
 }
 
-impl<R: BufRead> Unpacker<R> {
+impl<R: BufRead + Seek> Unpacker<R> {
     /// What `reader` gives, from its beginning.
     ///
     /// # Errors
@@ -112,11 +118,6 @@ impl<R: BufRead> Unpacker<R> {
         self.is_packed
     }
 
-    /// Uncompressed bytes so far.
-    pub(crate) const fn len(&self) -> usize {
-        self.at
-    }
-
     /// Oddities so far.
     pub(crate) fn into_notes(self) -> Vec<String> {
         self.notes
@@ -151,7 +152,22 @@ impl<R: BufRead> Unpacker<R> {
 /// What the message about too large a content begins with.
 const TOO_LARGE: &str = "decompressed it is";
 
-impl<R: BufRead> ByteSource for Unpacker<R> {
+impl<R: BufRead + Seek> ByteSource for Unpacker<R> {
+    fn pass(&mut self, count: usize) -> bool {
+        let State::Plain(reader) = &mut self.state else {
+            return false;
+        };
+        let passed = i64::try_from(count).is_ok_and(|count| reader.seek_relative(count).is_ok());
+        if passed {
+            self.at += count;
+        }
+        passed
+    }
+
+    fn ended(&self) -> Option<(usize, &[String])> {
+        matches!(self.state, State::Ended).then_some((self.at, &self.notes))
+    }
+
     fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError> {
         let start = to.len();
         while to.len() - start < most {

@@ -7,8 +7,8 @@ use std::fs;
 use std::io::{Cursor, Write};
 use std::path::{Path, PathBuf};
 
-use flate2::Compression;
 use flate2::write::{GzEncoder, ZlibEncoder};
+use flate2::{Compression, Crc};
 use spherule_formats::{FrameError, FrameFile, MemoryBudget, RawParticles};
 use tempfile::TempDir;
 use zip::ZipWriter;
@@ -116,25 +116,211 @@ fn other_formats_in_gzip() {
         format!("{head}\n{rows}").into_bytes()
     };
     let rows = "1 2 3\n";
-    bomb(
-        "dump.0.gz",
-        &gz(&dump(&rows.repeat(LARGE / 6), LARGE / 6)),
-        "decompressed it is",
-    );
-    // The text fits, its numbers do not.
-    let count = 500_000;
+    let count = LARGE / 6;
+    let rows_of = |head: String| gz((head + &rows.repeat(count)).as_bytes());
     bomb(
         "dump.0.gz",
         &gz(&dump(&rows.repeat(count), count)),
+        "larger than",
+    );
+    bomb(
+        "a.xyz.gz",
+        &gz(format!("{count}\n\n{}", "H 1 2 3\n".repeat(count)).as_bytes()),
+        "larger than",
+    );
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+         property float z\nend_header\n"
+    );
+    bomb("a.ply.gz", &rows_of(ply), "larger than");
+    let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n";
+    let points = format!("{vtk}POINTS {count} float\n");
+    bomb("a.vtk.gz", &rows_of(points), "larger than");
+    // The text fits, its numbers do not.
+    let few = 500_000;
+    bomb(
+        "dump.0.gz",
+        &gz(&dump(&rows.repeat(few), few)),
         "in memory its numbers are",
     );
-    let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nPOINTS 9000000 float\n";
+    // Lists of steps.
     bomb(
-        "a.vtk.gz",
-        &gz(format!("{vtk}{}", "1 ".repeat(LARGE / 2)).as_bytes()),
-        "decompressed it is",
+        "dump.0.gz",
+        &gz("ITEM: TIMESTEP\n".repeat(LARGE / 15).as_bytes()),
+        "larger than",
     );
+    bomb(
+        "a.xyz.gz",
+        &gz("0\n\n".repeat(LARGE / 3).as_bytes()),
+        "larger than",
+    );
+    // One line.
+    let line = "ITEM: ATOMS x".to_owned() + &" y".repeat(LARGE / 2);
+    bomb("dump.0.gz", &gz(&dump(&line, 3)), "larger than");
     bomb("a.npy.gz", &gz(&npy(LARGE / 12)), "decompressed it is");
+}
+
+#[test]
+fn absurd_counts_in_gzip() {
+    let dir = Dir::new();
+    let rows = "1 2 3\n".repeat(500_000);
+    let count = usize::MAX / 32;
+    let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n";
+    let ply = "ply\nformat ascii 1.0\n";
+    let properties = "property float x\nproperty float y\nproperty float z\nend_header\n";
+    for (name, text, words) in [
+        (
+            "dump.0.gz",
+            format!("ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{count}\nITEM: ATOMS x y z\n{rows}"),
+            "500000 lines follow",
+        ),
+        (
+            "a.ply.gz",
+            format!("{ply}element vertex {count}\n{properties}{rows}"),
+            "file ends before",
+        ),
+        (
+            "a.vtk.gz",
+            format!("{vtk}POINTS {count} float\n{rows}"),
+            "the text ends after 1500000",
+        ),
+    ] {
+        let path = dir.file(name, &gz(text.as_bytes()));
+        let budget = MemoryBudget::new(64 << 20, "take care");
+        let error = read(&path, budget).expect_err("absurd").to_string();
+        assert!(error.contains(words), "{name}: {error}");
+    }
+}
+
+/// Texts of `rows` particles in every format but tables, some in two steps, with numbers of many digits.
+fn texts(rows: usize) -> [(&'static str, String); 4] {
+    let zeros = "0".repeat(40);
+    let row = |i: usize| format!("{zeros}{i}.25 {zeros}{}e-1 -{zeros}7", i * 3);
+    let [mut dump, mut xyz] = [String::new(), String::new()];
+    let mut points = String::new();
+    for i in 0..rows {
+        writeln!(points, "{}", row(i)).expect("memory takes all");
+    }
+    for step in 0..2 {
+        write!(
+            dump,
+            "ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{rows}\nITEM: ATOMS x y z id element\n"
+        )
+        .expect("memory takes all");
+        writeln!(xyz, "{rows}\nTime={step}.5").expect("memory takes all");
+        for i in 0..rows {
+            let text = row(i + step);
+            writeln!(dump, "{text} {i} He").expect("memory takes all");
+            writeln!(xyz, "He {text}").expect("memory takes all");
+        }
+    }
+    let properties = "property float x\nproperty double y\nproperty float z\n";
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement camera 2\nproperty int a\nelement vertex {rows}\n\
+         {properties}end_header\n1\n2\n\n{points}"
+    );
+    let vtk = format!(
+        "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\nFIELD FieldData 1\nTIME 1 1 double\n2.5\n\
+         POINTS {rows} float\n{points}METADATA\nCOMPONENT_NAMES\nX\nY\nZ\n\nVERTICES 1 2\n1 0\n\
+         POINT_DATA {rows}\nVECTORS velocity double\n{points}"
+    );
+    [
+        ("dump.0", dump),
+        ("a.xyz", xyz),
+        ("a.ply", ply),
+        ("a.vtk", vtk),
+    ]
+}
+
+/// All steps of the text.
+fn all(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameError> {
+    let file = file?;
+    (0..file.steps().len())
+        .map(|step| file.read(step))
+        .collect()
+}
+
+#[test]
+fn texts_in_pieces_are_what_they_are_as_a_whole() {
+    let dir = Dir::new();
+    for (name, text) in texts(30_000) {
+        let whole = FrameFile::from_bytes(Path::new(name), text.clone().into_bytes());
+        let expected = all(whole).expect(name);
+        let plain = dir.file(name, text.as_bytes());
+        let gz = dir.file(&format!("{name}.gz"), &gz(text.as_bytes()));
+        for path in [plain, gz] {
+            let file = FrameFile::open(&path).expect(name);
+            assert!(file.bytes().len() < text.len(), "{name} is in pieces");
+            // Forwards, backwards, and once more.
+            let steps = 0..file.steps().len();
+            for index in steps.clone().chain(steps.clone().rev()).chain(steps) {
+                let particles = file.read(index).expect(name);
+                assert_eq!(particles.positions.len(), 30_000);
+                assert!(particles == expected[index], "{name} {index}");
+            }
+            assert_eq!(file.unpacked_len(), text.len() as u64, "{name}");
+        }
+    }
+}
+
+#[test]
+fn texts_may_be_larger_than_the_budget() {
+    let dir = Dir::new();
+    let budget = MemoryBudget::new(12 << 20, "take care");
+    for (name, text) in texts(90_000) {
+        assert!(text.len() as u64 > budget.bytes(), "{name}: {}", text.len());
+        let plain = dir.file(name, text.as_bytes());
+        let gz = dir.file(&format!("{name}.gz"), &gz(text.as_bytes()));
+        for path in [plain, gz] {
+            let particles = read(&path, budget).expect(name);
+            assert_eq!(particles.positions.len(), 90_000);
+        }
+    }
+}
+
+#[test]
+fn faults_of_texts_in_pieces_are_told_at_their_place() {
+    let dir = Dir::new();
+    for (name, text) in texts(30_000) {
+        let at = text.len() - 100_000;
+        let line = text[..at].rfind('\n').expect("a line") + 1;
+        let mut word = text.clone();
+        word.replace_range(line..line + 1, "?");
+        let mut long = text.clone();
+        long.insert_str(line, "1 2 3 4 5 6 7\n1\n");
+        let cut = text[..text.len() - 9].to_owned();
+        let half = text[..text.len() / 2].to_owned();
+        for bad in [word, long, cut, half] {
+            let whole = FrameFile::from_bytes(Path::new(name), bad.clone().into_bytes());
+            let expected = all(whole).map_err(|e| e.to_string());
+            let plain = dir.file(name, bad.as_bytes());
+            let found = all(FrameFile::open(&plain));
+            let found = found.map_err(|e| e.to_string().replace(&*plain.to_string_lossy(), name));
+            assert!(
+                found == expected,
+                "{name}: {:?} {:?}",
+                found.err(),
+                expected.err()
+            );
+        }
+        // A stream that breaks off, and one with something behind it.
+        let packed = gz(text.as_bytes());
+        let path = dir.file(&format!("{name}.gz"), &packed[..packed.len() - 99]);
+        let error = all(FrameFile::open(&path)).expect_err("cut").to_string();
+        assert!(error.contains("still being written"), "{error}");
+        let mut sum = packed.clone();
+        let crc = sum.len() - 8;
+        sum[crc] ^= 1;
+        let path = dir.file(&format!("{name}.gz"), &sum);
+        let error = all(FrameFile::open(&path))
+            .expect_err("damaged")
+            .to_string();
+        assert!(error.contains("damaged"), "{name}: {error}");
+        let path = dir.file(&format!("{name}.gz"), &[packed, b"junk".to_vec()].concat());
+        let file = FrameFile::open(&path).expect(name);
+        file.read(0).expect(name);
+        assert_eq!(file.notes(), ["4 bytes after the gzip stream are ignored"]);
+    }
 }
 
 #[test]
@@ -183,44 +369,90 @@ fn members_of_archives() {
     bomb("a.npz", &npz(&members), "decompressed it is");
 }
 
+/// Points of zeros as one block of `unpacked` bytes, or several blocks alike.
+fn vtp(compressor: &str, blocks: &[&[u8]], unpacked: usize) -> Vec<u8> {
+    let points = blocks.len() * unpacked / 12;
+    let head = format!(
+        "<VTKFile type=\"PolyData\" compressor=\"{compressor}\"><PolyData>\
+         <Piece NumberOfPoints=\"{points}\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" \
+         format=\"appended\" offset=\"0\"/></Points></Piece></PolyData><AppendedData encoding=\"raw\">_"
+    );
+    let mut file = head.into_bytes();
+    let lens = blocks.iter().map(|block| block.len());
+    for number in [blocks.len(), unpacked, 0].into_iter().chain(lens) {
+        file.extend(u32::try_from(number).expect("short").to_le_bytes());
+    }
+    file.extend(blocks.concat());
+    file.extend(b"</AppendedData></VTKFile>");
+    file
+}
+
+/// `bytes` as an xz stream of one stored chunk, with a dictionary of 2^`bits` bytes.
+fn xz(bytes: &[u8], bits: u8) -> Vec<u8> {
+    let crc = |bytes: &[u8]| {
+        let mut crc = Crc::new();
+        crc.update(bytes);
+        crc.sum().to_le_bytes()
+    };
+    let with_crc = |bytes: &[u8]| [bytes, &crc(bytes)].concat();
+    let flags = [0, 0];
+    let head = [&b"\xfd7zXZ\0"[..], &with_crc(&flags)].concat();
+    let block = with_crc(&[2, 0, 0x21, 1, 2 * (bits - 12), 0, 0, 0]);
+    let len = u16::try_from(bytes.len() - 1).expect("short").to_be_bytes();
+    let chunk = [&[1][..], &len, bytes, &[0]].concat();
+    let padding = vec![0; chunk.len().next_multiple_of(4) - chunk.len()];
+    let mut index = vec![0, 1];
+    for mut number in [block.len() + chunk.len(), bytes.len()] {
+        while number > 0x7f {
+            index.push(0x80 | u8::try_from(number & 0x7f).expect("seven bits"));
+            number >>= 7;
+        }
+        index.push(u8::try_from(number).expect("seven bits"));
+    }
+    index.resize(index.len().next_multiple_of(4), 0);
+    let index = with_crc(&index);
+    let words = u32::try_from(index.len() / 4 - 1).expect("short");
+    let sizes = [&words.to_le_bytes()[..], &flags].concat();
+    let foot = [&crc(&sizes)[..], &sizes, b"YZ"].concat();
+    [head, block, chunk, padding, index, foot].concat()
+}
+
 #[test]
 fn blocks_of_vtk_xml() {
-    let vtu = |compressor: &str, block: &[u8], unpacked: usize| {
-        let points = unpacked / 12;
-        let head = format!(
-            "<VTKFile type=\"PolyData\" compressor=\"{compressor}\"><PolyData>\
-             <Piece NumberOfPoints=\"{points}\"><Points><DataArray type=\"Float32\" NumberOfComponents=\"3\" \
-             format=\"appended\" offset=\"0\"/></Points></Piece></PolyData><AppendedData encoding=\"raw\">_"
-        );
-        let mut file = head.into_bytes();
-        for number in [1, unpacked, 0, block.len()] {
-            file.extend(u32::try_from(number).expect("short").to_le_bytes());
-        }
-        file.extend(block);
-        file.extend(b"</AppendedData></VTKFile>");
-        file
-    };
     let len = LARGE / 12 * 12;
     let zeros = vec![0; len];
     let words = "decompressed its arrays are";
-    bomb(
-        "a.vtp",
-        &vtu("vtkZLibDataCompressor", &zlib(&zeros), len),
-        words,
-    );
-    bomb(
-        "a.vtp",
-        &vtu(
-            "vtkLZ4DataCompressor",
-            &lz4_flex::block::compress(&zeros),
-            len,
-        ),
-        words,
-    );
+    let zlib = zlib(&zeros);
+    bomb("a.vtp", &vtp("vtkZLibDataCompressor", &[&zlib], len), words);
+    let lz4 = lz4_flex::block::compress(&zeros);
+    bomb("a.vtp", &vtp("vtkLZ4DataCompressor", &[&lz4], len), words);
     // No more than its length counts before it is unpacked.
     let mut xz = b"\xfd7zXZ\0".to_vec();
     xz.resize(8192, 0);
-    bomb("a.vtp", &vtu("vtkLZMADataCompressor", &xz, len), words);
+    bomb("a.vtp", &vtp("vtkLZMADataCompressor", &[&xz], len), words);
+}
+
+#[test]
+fn dictionaries_of_xz() {
+    const LEN: usize = 12 << 10;
+    let vtp = |block: &[u8], count: usize| vtp("vtkLZMADataCompressor", &vec![block; count], LEN);
+    let dir = Dir::new();
+    // Decoders of 4 MiB fit one at a time.
+    for (bits, count) in [(12, 1), (20, 50), (22, 20)] {
+        let path = dir.file("a.vtp", &vtp(&xz(&[0; LEN], bits), count));
+        let particles = read(&path, BUDGET).expect("enough memory");
+        assert_eq!(particles.positions.len(), count * LEN / 12);
+    }
+    for (bits, needed) in [(23, 9), (26, 65)] {
+        let words = format!("needs {needed} MiB for its dictionary, which is larger than");
+        bomb("a.vtp", &vtp(&xz(&[0; LEN], bits), 3), &words);
+    }
+    for budget in [BUDGET, MemoryBudget::UNLIMITED] {
+        let path = dir.file("b.vtp", &vtp(&xz(&[0; LEN], 30), 1));
+        let error = read(&path, budget).expect_err("absurd").to_string();
+        let words = "needs 1025 MiB for its dictionary, presets of xz no more than 80 MiB";
+        assert!(error.contains(words), "{error}");
+    }
 }
 
 /// Rows of which columns turn from integers to fractions and to text where `turn` says.

@@ -22,7 +22,7 @@ use super::work::{
 use super::{CliError, Outcome, events, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
 use crate::manifest::{MAX_THREADS, ProgressMode, real_dir};
-use crate::reading::read_budget;
+use crate::reading::conversion_budget;
 use crate::report::Bytes;
 use crate::survey::Survey;
 
@@ -87,8 +87,8 @@ pub(super) struct ConvertArgs {
     ids: bool,
     /// Memory that the conversion may hold: 4GiB, 512MiB [default: 2GiB]
     ///
-    /// A frame that does not fit is ordered in parts, which lie on the disk of the output meanwhile. Text and packed
-    /// files are read whole.
+    /// A frame that does not fit is ordered in parts, which lie on the disk of the output meanwhile. The particles of
+    /// text and packed files are read into memory first; if they need more than a given SIZE, their frame fails.
     #[arg(long, value_name = "SIZE", help_heading = "Job")]
     memory: Option<Bytes>,
     #[command(flatten)]
@@ -117,7 +117,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     guard_name(&args.output)?;
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
-    let sequence = apart(|| Sequence::open_within(&input, read_budget(None, None)))?;
+    let budget = conversion_budget(args.memory.map(|memory| memory.0));
+    let sequence = apart(|| Sequence::open_within(&input, budget))?;
     for note in sequence.notes() {
         note!("{note}");
     }

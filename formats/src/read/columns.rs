@@ -9,7 +9,9 @@ mod fill;
 use glam::{DVec3, Vec3};
 
 use self::fill::fill;
-use crate::{Attribute, AttributeData, Endian, ParseError, Positions, RawParticles, ScalarType};
+use crate::{
+    Attribute, AttributeData, Endian, MemoryBudget, ParseError, Positions, RawParticles, ScalarType,
+};
 
 /// Particles decoded for all columns before moving on: the bytes of a block stay in the cache, so
 /// that a file with many properties still crosses the memory bus once.
@@ -128,17 +130,24 @@ impl ParticleLayout {
     /// As [`Self::check`].
     pub(super) fn particles(self, bytes: &[u8]) -> Result<RawParticles, ParseError> {
         self.check(bytes.len())?;
+        let columns: Vec<Column> = self.columns().cloned().collect();
+        let gathered = gather(bytes, self.count, &columns);
+        Ok(self.assemble(gathered))
+    }
+
+    /// Axes, the homogeneous coordinate, attributes.
+    fn columns(&self) -> impl Iterator<Item = &Column> {
+        let columns = self.axes.iter().chain(&self.weight);
+        columns.chain(&self.attributes)
+    }
+
+    /// The particles whose [`Self::columns`] have been decoded.
+    fn assemble(self, mut gathered: Vec<AttributeData>) -> RawParticles {
         let axes = self.axes.len();
-        let mut columns = self.axes;
-        columns.extend(self.attributes);
-        let first_attribute = axes + usize::from(self.weight.is_some());
-        columns.splice(axes..axes, self.weight);
-        let mut gathered = gather(bytes, self.count, &columns);
-        let data = gathered.split_off(first_attribute);
+        let data = gathered.split_off(axes + usize::from(self.weight.is_some()));
         let weight = gathered.split_off(axes).pop();
-        let attributes = columns
-            .drain(first_attribute..)
-            .zip(data)
+        let attributes = self.attributes.into_iter().zip(data);
+        let attributes = attributes
             .map(|(column, data)| Attribute {
                 name: column.name,
                 components: column.lanes.len(),
@@ -149,12 +158,74 @@ impl ParticleLayout {
         if let Some(weight) = weight {
             divide(&mut positions, weight);
         }
-        Ok(RawParticles {
+        RawParticles {
             positions,
             attributes,
             time: self.time,
             step: self.step,
-        })
+        }
+    }
+}
+
+/// Particles that are decoded some at a time, within a budget.
+pub(super) struct GrowingParticles {
+    layout: ParticleLayout,
+    data: Vec<AttributeData>,
+    /// How many there are so far.
+    count: usize,
+    budget: MemoryBudget,
+}
+
+impl GrowingParticles {
+    /// None yet; there is room for `room`, which are a guess, if `budget` allows as many.
+    pub(super) fn new(layout: ParticleLayout, room: usize, budget: MemoryBudget) -> Self {
+        let each = layout.columns().map(|c| c.lanes.len() * c.scalar.size());
+        let need = each.fold(0, usize::saturating_add).saturating_mul(room);
+        let room = if need as u64 <= budget.bytes() {
+            room
+        } else {
+            0
+        };
+        let empty = |column: &Column| {
+            let mut data = zeros(column.scalar, 0);
+            data.reserve(column.lanes.len().saturating_mul(room));
+            data
+        };
+        Self {
+            data: layout.columns().map(empty).collect(),
+            layout,
+            count: 0,
+            budget,
+        }
+    }
+
+    /// Adds the `count` particles of `records`, which begin at its first byte.
+    ///
+    /// # Errors
+    /// [`ParseError::TooLarge`].
+    pub(super) fn append(&mut self, records: &[u8], count: usize) -> Result<(), ParseError> {
+        self.count += count;
+        let held: u64 = self.data.iter().map(AttributeData::byte_len).sum();
+        let more = self
+            .layout
+            .columns()
+            .map(|c| c.lanes.len() * c.scalar.size() * count);
+        self.budget.check(
+            held + more.sum::<usize>() as u64,
+            "in memory its numbers are",
+        )?;
+        for (column, data) in self.layout.columns().zip(&mut self.data) {
+            let mut block = zeros(column.scalar, column.lanes.len() * count);
+            fill(&mut block, records, column, 0, count);
+            data.append(&mut block);
+        }
+        Ok(())
+    }
+
+    pub(super) fn into_particles(mut self) -> RawParticles {
+        self.data.iter_mut().for_each(AttributeData::shrink);
+        self.layout.count = self.count;
+        self.layout.assemble(self.data)
     }
 }
 

@@ -55,27 +55,6 @@ impl<'a> Lines<'a> {
     fn rest(&self) -> &'a [u8] {
         self.bytes.get(self.at..self.end).unwrap_or_default()
     }
-
-    /// Passes over `count` lines without looking into them; returns how many there were. A last
-    /// line without a newline counts.
-    pub(super) fn pass(&mut self, count: usize) -> usize {
-        if count == 0 {
-            return 0;
-        }
-        let mut skipped = 0;
-        for newline in memchr::memchr_iter(b'\n', self.rest()) {
-            skipped += 1;
-            if skipped == count {
-                self.at += newline + 1;
-                return skipped;
-            }
-        }
-        if !self.rest().is_empty() && !self.rest().ends_with(b"\n") {
-            skipped += 1;
-        }
-        self.at = self.end;
-        skipped
-    }
 }
 
 impl<'a> Iterator for Lines<'a> {
@@ -353,9 +332,6 @@ mod tests {
             .collect();
         let expected: [(usize, &[u8]); 4] = [(0, b"ab"), (4, b""), (5, b" c"), (8, b"last")];
         assert_eq!(found, expected);
-        let mut lines = Lines::new(bytes, 0..bytes.len());
-        assert_eq!((lines.pass(2), lines.at()), (2, 5));
-        assert_eq!((lines.pass(9), lines.is_at_end()), (2, true));
         assert_eq!(Lines::new(bytes, 40..70).next(), None);
     }
 

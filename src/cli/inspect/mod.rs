@@ -180,7 +180,10 @@ fn read(file: &FrameFile, index: usize, number: Option<i64>) -> Result<Inspected
         .flatten();
     let all = stats.count + stats.dropped;
     stats.dropped += native.as_ref().map_or(0, |index| index.dropped);
-    let share = step.span.len() as f64 / file.bytes().len().max(1) as f64;
+    let share = match file.steps().len() {
+        1 => 1.0,
+        _ => step.span.len() as f64 / file.unpacked_len().max(1) as f64,
+    };
     let stored = file.stored_len() as f64 * share;
     Ok(Inspected {
         file: file.path(),

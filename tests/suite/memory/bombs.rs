@@ -103,3 +103,58 @@ fn check_and_inspect_name_a_bomb() {
         "{told}"
     );
 }
+
+/// The text of 400 000 particles in numbers of so many digits that it takes 80 MB, twenty times of what they take.
+fn wide_rows(prefix: &str) -> String {
+    let number = "0".repeat(66) + "1.5";
+    format!("{prefix}{number} {number} {number}\n").repeat(400_000)
+}
+
+#[test]
+fn packed_text_is_never_in_memory_as_a_whole() {
+    let count = 400_000;
+    let ply = format!(
+        "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
+         property float z\nend_header\n"
+    );
+    let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n";
+    let dump = |step: usize| {
+        format!("ITEM: TIMESTEP\n{step}\nITEM: NUMBER OF ATOMS\n{count}\nITEM: ATOMS x y z\n")
+    };
+    let rows = wide_rows("");
+    let atoms = wide_rows("He ");
+    for (name, text) in [
+        ("a.ply.gz", [&ply, &rows].map(|s| &**s).concat()),
+        ("a.vtk.gz", format!("{vtk}POINTS {count} float\n{rows}")),
+        ("a.xyz.gz", format!("{count}\n\n{atoms}{count}\n\n{atoms}")),
+        (
+            "dump.0.gz",
+            [&dump(0), &rows, &dump(1), &rows].map(|s| &**s).concat(),
+        ),
+    ] {
+        let workshop = Workshop::new();
+        fs::write(workshop.join(name), gz(text.as_bytes())).expect("a file");
+        drop(text);
+        let ran = limited(&workshop, &["inspect", name, "--json"]).expect(0);
+        assert!(ran.text().contains("400000"), "{name}: {}", ran.text());
+    }
+}
+
+#[test]
+fn the_memory_of_a_conversion_bounds_reading() {
+    let workshop = Workshop::new();
+    fs::create_dir(workshop.join("in")).expect("a directory");
+    let count = 500_000;
+    let text = format!("x,y,z\n{}", "1,2,3\n".repeat(count));
+    fs::write(workshop.join("in/f_1.csv"), text).expect("a file");
+    fs::write(workshop.join("in/f_2.csv"), "x,y,z\n0,0,0\n1,0,0\n").expect("a file");
+    let convert = ["convert", "in", "-o", "out", "--radius", "0.1"];
+    let ran = workshop.run(&[&convert[..], &["--memory", "10MiB"]].concat());
+    ran.expect(1)
+        .tells("f_1.csv: in memory its numbers are larger than")
+        .tells("raise --memory");
+    assert!(workshop.join("out/frame.0002.spf").exists());
+    let ran = workshop.run(&[&convert[..], &["--memory", "64MiB"]].concat());
+    ran.expect(0);
+    assert!(workshop.join("out/frame.0001.spf").exists());
+}

@@ -107,6 +107,30 @@ fn dump(count: usize) -> String {
     text
 }
 
+/// Lines of `prefix`, x, y and z.
+fn rows(count: usize, prefix: &str) -> String {
+    let mut text = String::new();
+    for p in particles(count) {
+        writeln!(text, "{prefix}{:.6} {:.6} {:.6}", p.x, p.y, p.z).expect("memory takes all");
+    }
+    text
+}
+
+fn ply(count: usize) -> String {
+    let head = format!("ply\nformat ascii 1.0\nelement vertex {count}\n");
+    let properties = "property float x\nproperty float y\nproperty float z\nend_header\n";
+    head + properties + &rows(count, "")
+}
+
+fn xyz(count: usize) -> String {
+    format!("{count}\n\n{}", rows(count, "He "))
+}
+
+fn vtk_text(count: usize) -> String {
+    let head = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n";
+    format!("{head}POINTS {count} float\n{}", rows(count, ""))
+}
+
 /// The bytes that `npy` writes beside `path`.
 fn npy_bytes(path: &Path, count: usize) -> Vec<u8> {
     let plain = path.with_file_name("plain");
@@ -186,6 +210,25 @@ fn every_way_to_store_particles() {
     compare(
         "lammpstrj",
         |path| fs::write(path, dump(COUNT)).expect("a file"),
+        &SMALL,
+    );
+}
+
+#[test]
+fn every_way_to_write_text() {
+    const COUNT: usize = 400_000;
+    compare(
+        "lammpstrj.gz",
+        |path| gz(path, dump(COUNT).as_bytes()),
+        &SMALL,
+    );
+    let write = |path: &Path, text: String| fs::write(path, text).expect("a file");
+    compare("ply", |path| write(path, ply(COUNT)), &SMALL);
+    compare("xyz", |path| write(path, xyz(COUNT)), &SMALL);
+    compare("vtk", |path| write(path, vtk_text(COUNT)), &SMALL);
+    compare(
+        "vtk.gz",
+        |path| gz(path, vtk_text(COUNT).as_bytes()),
         &SMALL,
     );
 }

@@ -1,7 +1,7 @@
 //! Files of other programs as sources of particles that are never in memory as a whole.
 //!
 //! Which files can be is decided here, by format: their numbers must lie at fixed steps in the file itself.
-//! Text, compressed files and files of several steps are read whole by [`crate::FrameFile`] instead.
+//! Text, compressed files and files of several steps are read into memory by [`crate::FrameFile`] instead.
 
 use std::path::Path;
 

@@ -5,8 +5,8 @@
 //! names; `read::table` parses the rows.
 
 use super::Step;
-use super::table::{CUT_SHORT, Numbers, OnText, Place, Table, TableStream, Target};
-use crate::unpack::{ByteSource, SourceError};
+use super::input::TextInput;
+use super::table::{Numbers, OnText, Place, Table, Target};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
 mod layout;
@@ -21,15 +21,15 @@ pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 ///
 /// # Errors
 /// [`ParseError::Unsupported`] for UTF-16; other faults are left to [`read`].
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    let time = match Layout::find(bytes) {
+pub(crate) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
+    let time = match Layout::find(text.head()) {
         Ok(layout) => layout.time,
         Err(error @ ParseError::Unsupported { .. }) => return Err(error),
         Err(_) => None,
     };
     Ok(vec![Step {
         time,
-        ..Step::whole(bytes.len())
+        ..Step::whole(text.left_about())
     }])
 }
 
@@ -40,31 +40,32 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if there are no positions among the columns, a row has another
-/// number of cells, or a position is no number; [`ParseError::Unsupported`] for UTF-16.
-pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    read_within(bytes, step, MemoryBudget::UNLIMITED)
-}
-
-/// [`read`] within a budget.
-pub(crate) fn read_within(
-    bytes: &[u8],
-    step: &Step,
+/// number of cells, or a position is no number; [`ParseError::Unsupported`] for UTF-16;
+/// [`ParseError::TooLarge`] beyond `budget`.
+pub(crate) fn read(
+    text: &mut TextInput<'_>,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
-    if bytes.len() < step.span.end {
-        let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
-        return Err(ParseError::malformed(bytes.len(), what));
-    }
-    let layout = Layout::find(bytes)?;
+    let head = text.head();
+    let layout = Layout::find(head)?;
     let (fields, targets) = layout_columns(&layout)?;
+    let rows = head.get(layout.rows.clone()).unwrap_or_default();
+    let lines = memchr::memchr_iter(b'\n', rows).count() as u64;
+    let guess = if text.as_whole().is_some() {
+        lines.saturating_add(1)
+    } else {
+        // A little more than in proportion: rows may become shorter.
+        let len = text.left_about() as u64;
+        len.saturating_mul(lines) / rows.len().max(1) as u64 / 16 * 17
+    };
     let table = Table {
-        bytes,
-        span: layout.rows,
         dialect: layout.dialect,
         fields,
         targets,
+        rows: usize::try_from(guess).unwrap_or(usize::MAX),
     };
-    let (positions, attributes) = table.particles(budget)?;
+    text.go_to(layout.rows.start);
+    let (positions, attributes) = table.particles(text, usize::MAX, budget).content?;
     Ok(RawParticles {
         positions,
         attributes,
@@ -76,8 +77,7 @@ pub(crate) fn read_within(
 /// Lines that decide what a table is like: more than are looked at from the first row on, and for separators.
 const TELLING_LINES: usize = 300;
 
-/// True if `head`, the beginning of a file, tells all about the table but its rows: then [`read_stream`] finds
-/// what [`read`] would.
+/// True if `head`, the beginning of a file, tells all about the table but its rows.
 pub(crate) fn is_told_by(head: &[u8]) -> bool {
     let Ok(layout) = Layout::find(head) else {
         return false;
@@ -85,36 +85,6 @@ pub(crate) fn is_told_by(head: &[u8]) -> bool {
     let rows = head.get(layout.rows).unwrap_or_default();
     let lines = memchr::memchr_iter(b'\n', rows).take(TELLING_LINES);
     lines.count() == TELLING_LINES
-}
-
-/// [`read`] of a table that begins with `head` and is told by it. `source` gives all of it from the beginning,
-/// about `len` bytes.
-pub(crate) fn read_stream(
-    head: &[u8],
-    source: &mut dyn ByteSource,
-    len: u64,
-    budget: MemoryBudget,
-) -> Result<RawParticles, SourceError> {
-    let layout = Layout::find(head)?;
-    let (fields, targets) = layout_columns(&layout)?;
-    let rows = head.get(layout.rows.clone()).unwrap_or_default();
-    let lines = memchr::memchr_iter(b'\n', rows).count() as u64;
-    // A little more than in proportion: rows may become shorter.
-    let guess = len.saturating_mul(lines) / rows.len().max(1) as u64 / 16 * 17;
-    let table = TableStream {
-        start: layout.rows.start,
-        dialect: layout.dialect,
-        fields,
-        targets,
-        rows: usize::try_from(guess).unwrap_or(usize::MAX),
-    };
-    let (positions, attributes) = table.particles(source, budget)?;
-    Ok(RawParticles {
-        positions,
-        attributes,
-        time: layout.time,
-        step: None,
-    })
 }
 
 fn layout_columns(layout: &Layout) -> Result<Columns, ParseError> {

@@ -12,15 +12,32 @@ pub(super) struct Bounds {
     edges: [DVec3; 3],
 }
 
+/// One of the three lines after `ITEM: BOX BOUNDS`.
+#[derive(Debug)]
+pub(super) struct Axis {
+    at: usize,
+    /// None if something else is among them.
+    numbers: Vec<f64>,
+}
+
+impl Axis {
+    /// The numbers of `line`.
+    pub(super) fn parse(line: Line<'_>) -> Self {
+        // One more than there may be tells enough.
+        let numbers: Option<Vec<f64>> = text::words(line.text).take(5).map(text::number).collect();
+        Self {
+            at: line.at,
+            numbers: numbers.unwrap_or_default(),
+        }
+    }
+}
+
 impl Bounds {
-    /// Reads the three lines after `ITEM: BOX BOUNDS`: `lo hi` for an orthogonal box, `lo hi tilt`
+    /// Takes the three lines after `ITEM: BOX BOUNDS`: `lo hi` for an orthogonal box, `lo hi tilt`
     /// for a triclinic one, an edge and a coordinate of the corner for a general triclinic one. The
     /// number of values tells them apart, since not all programs write the flags.
-    pub(super) fn parse(axes: [Line<'_>; 3]) -> Result<Self, ParseError> {
-        let [x, y, z] = axes.map(|line| {
-            let numbers: Option<Vec<f64>> = text::words(line.text).map(text::number).collect();
-            numbers.unwrap_or_default()
-        });
+    pub(super) fn new(axes: [Axis; 3]) -> Result<Self, ParseError> {
+        let [x, y, z] = axes.each_ref().map(|axis| &axis.numbers);
         match (&x[..], &y[..], &z[..]) {
             (&[xlo, xhi], &[ylo, yhi], &[zlo, zhi]) => Ok(Self::triclinic(
                 DVec3::new(xlo, ylo, zlo),

@@ -40,8 +40,8 @@ pub(super) struct Columns {
 
 impl Columns {
     /// Plans for the columns of `header`; those that are no numbers in `first_row` are left out.
-    pub(super) fn find(header: &Header<'_>, first_row: Option<&[u8]>) -> Result<Self, ParseError> {
-        let column = |name: &str| header.names.iter().position(|n| *n == name.as_bytes());
+    pub(super) fn find(header: &Header, first_row: Option<&[u8]>) -> Result<Self, ParseError> {
+        let column = |name: &str| header.names.iter().position(|n| n == name.as_bytes());
         let (axes, scaled) = position_columns(column).ok_or_else(|| no_positions(header))?;
         let scaled_by = match (scaled, header.bounds) {
             (false, _) => None,
@@ -71,7 +71,7 @@ impl Columns {
 
     fn add_attributes(
         &mut self,
-        header: &Header<'_>,
+        header: &Header,
         column: impl Fn(&str) -> Option<usize>,
         first_row: Option<&[u8]>,
     ) {
@@ -131,7 +131,7 @@ fn position_columns(column: impl Fn(&str) -> Option<usize>) -> Option<([Option<u
     solid.or(flat).copied()
 }
 
-fn no_positions(header: &Header<'_>) -> ParseError {
+fn no_positions(header: &Header) -> ParseError {
     let names: Vec<_> = header
         .names
         .iter()

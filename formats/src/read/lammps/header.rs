@@ -1,11 +1,12 @@
 //! The `ITEM:` lines before the atoms of a step.
 
 use super::ITEM;
-use super::bounds::Bounds;
-use crate::ParseError;
+use super::bounds::{Axis, Bounds};
 use crate::read::Step;
+use crate::read::input::TextInput;
 use crate::read::table::CUT_SHORT;
-use crate::read::text::{self, Line, Lines};
+use crate::read::text::{self, Line};
+use crate::{MemoryBudget, ParseError};
 
 /// What a header line announces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -54,7 +55,7 @@ impl Item {
 
 /// All that is said before the first atom.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Header<'a> {
+pub(super) struct Header {
     /// Number of the step.
     pub(super) number: Option<i64>,
     /// Simulation time.
@@ -68,7 +69,7 @@ pub(super) struct Header<'a> {
     /// Where the columns are named.
     pub(super) names_at: usize,
     /// Names of the columns.
-    pub(super) names: Vec<&'a [u8]>,
+    pub(super) names: Vec<Vec<u8>>,
 }
 
 /// Why a header could not be read.
@@ -87,15 +88,13 @@ impl From<ParseError> for Fault {
 }
 
 impl Fault {
-    /// The error for `step` of the file `bytes`. What is wrong in the last line of the file is
+    /// The error for `step`, whose header ends where `text` is. What is wrong in the last line of the file is
     /// wrong because the rest is missing.
-    pub(super) fn explain(self, bytes: &[u8], step: &Step) -> ParseError {
+    pub(super) fn explain(self, text: &mut TextInput<'_>, step: &Step) -> ParseError {
         match self {
-            Self::Ends(at) => cut_short(bytes, step, at, "the header of the step ends here"),
-            Self::Wrong(error @ ParseError::Malformed { at, .. })
-                if usize::try_from(at).is_ok_and(|at| {
-                    memchr::memchr(b'\n', bytes.get(at..).unwrap_or_default()).is_none()
-                }) =>
+            Self::Ends(at) => cut_short(text, step, at, "the header of the step ends here"),
+            Self::Wrong(error @ ParseError::Malformed { .. })
+                if !text.is_behind_newline() && text.is_file_end() =>
             {
                 error.retold(|what| format!("{what}: {CUT_SHORT}"))
             }
@@ -105,19 +104,27 @@ impl Fault {
 }
 
 /// The error for a step that has too little; the file's end and a later step are told apart.
-pub(super) fn cut_short(bytes: &[u8], step: &Step, at: usize, what: &str) -> ParseError {
-    let end = step.span.end;
-    let why = if end >= bytes.len() {
+pub(super) fn cut_short(
+    text: &mut TextInput<'_>,
+    step: &Step,
+    at: usize,
+    what: &str,
+) -> ParseError {
+    let why = if text.is_file_end() {
         CUT_SHORT.to_owned()
     } else {
+        let end = step.span.end;
         format!("the step is broken off at byte {end}, where the next one begins")
     };
     ParseError::malformed(at, format!("{what}: {why}"))
 }
 
-impl<'a> Header<'a> {
-    /// Reads up to and including the `ITEM: ATOMS` line.
-    pub(super) fn parse(lines: &mut Lines<'a>) -> Result<Self, Fault> {
+/// Bytes that a column takes on the way to its array, with its name.
+const COLUMN: usize = 256;
+
+impl Header {
+    /// Reads up to and including the `ITEM: ATOMS` line. Its columns may take as much as `budget` allows.
+    pub(super) fn parse(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Self, Fault> {
         let mut header = Self {
             number: None,
             time: None,
@@ -129,29 +136,34 @@ impl<'a> Header<'a> {
         };
         let mut count = None;
         loop {
-            let line = lines.next().ok_or(Fault::Ends(lines.at()))?;
+            let Some(line) = text.line() else {
+                return Err(Fault::Ends(text.at()));
+            };
             if !line.text.starts_with(ITEM) {
                 continue; // the value of an item unknown here
             }
             match Item::of(line.text) {
-                Item::TimeStep => header.number = Some(header.step_number(value(lines)?)?),
-                Item::Time => header.time = text::number(value(lines)?.text.trim_ascii()),
+                Item::TimeStep => header.number = Some(step_number(value(text)?)?),
+                Item::Time => header.time = text::number(value(text)?.text.trim_ascii()),
                 Item::Count => {
-                    let line = value(lines)?;
+                    let line = value(text)?;
                     header.count_at = line.at;
                     count = Some(atom_count(line)?);
                 }
                 Item::Bounds => {
-                    let axes = [value(lines)?, value(lines)?, value(lines)?];
-                    header.bounds = Some(Bounds::parse(axes)?);
+                    let mut axis = || value(text).map(Axis::parse);
+                    header.bounds = Some(Bounds::new([axis()?, axis()?, axis()?])?);
                 }
                 Item::Foreign => {
                     let what = "a dump of entries or grid cells, not of atoms: use dump custom";
                     return Err(ParseError::unsupported(what).into());
                 }
                 Item::Atoms => {
+                    let columns = text::words(line.text).count();
+                    let need = columns.saturating_mul(COLUMN) as u64;
+                    budget.check(need, "what its columns take is")?;
                     header.names_at = line.at;
-                    header.names = text::words(line.text).skip(2).collect();
+                    header.names = text::words(line.text).skip(2).map(<[u8]>::to_vec).collect();
                     break;
                 }
                 Item::Other => {}
@@ -165,19 +177,20 @@ impl<'a> Header<'a> {
         })?;
         Ok(header)
     }
+}
 
-    fn step_number(&self, line: Line<'_>) -> Result<i64, ParseError> {
-        let token = line.text.trim_ascii();
-        text::integer(token).ok_or_else(|| {
-            let what = format!("the step is {}, not an integer", text::shown(token));
-            ParseError::malformed(line.at, what)
-        })
-    }
+fn step_number(line: Line<'_>) -> Result<i64, ParseError> {
+    let token = line.text.trim_ascii();
+    text::integer(token).ok_or_else(|| {
+        let what = format!("the step is {}, not an integer", text::shown(token));
+        ParseError::malformed(line.at, what)
+    })
 }
 
 /// The line with the value of an item.
-fn value<'a>(lines: &mut Lines<'a>) -> Result<Line<'a>, Fault> {
-    lines.next().ok_or(Fault::Ends(lines.at()))
+fn value<'t>(text: &'t mut TextInput<'_>) -> Result<Line<'t>, Fault> {
+    let at = text.at();
+    text.line().ok_or(Fault::Ends(at))
 }
 
 fn atom_count(line: Line<'_>) -> Result<usize, ParseError> {

@@ -5,12 +5,15 @@
 
 use std::collections::HashSet;
 
-use memchr::{memchr, memmem};
+use memchr::memmem;
 use rayon::prelude::*;
 
 use super::Step;
-use super::table::{CUT_SHORT, Comments, Decimal, Dialect, Separator, Surplus, Table};
-use super::text::{self, Lines};
+use super::input::TextInput;
+use super::table::{
+    CUT_SHORT, Comments, Decimal, Dialect, RowsRead, Separator, Surplus, Table, most_rows,
+};
+use super::text;
 use crate::{MemoryBudget, ParseError, Positions, RawParticles};
 
 mod bounds;
@@ -25,48 +28,64 @@ pub(super) use remarks::remarks;
 /// What every header line begins with.
 const ITEM: &[u8] = b"ITEM:";
 
-/// The time steps that `bytes` hold, in file order. Of a step that occurs twice (after a restart)
+/// The time steps that `text` holds, in file order. Of a step that occurs twice (after a restart)
 /// the last stays. One that is cut short is listed, so that reading it can say so.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if there are no `ITEM:` lines or something else comes first,
-/// [`ParseError::Unsupported`] for a binary dump.
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+/// [`ParseError::Unsupported`] for a binary dump,
+/// [`ParseError::TooLarge`] if the list of steps needs more than `budget`.
+pub(crate) fn steps(
+    text: &mut TextInput<'_>,
+    budget: MemoryBudget,
+) -> Result<Vec<Step>, ParseError> {
     let mut steps: Vec<Step> = Vec::new();
     let mut seen = Seen::default();
     let mut pair = LinePair::default();
-    for at in memmem::find_iter(bytes, ITEM) {
-        if steps.is_empty() {
-            check_start(bytes, at)?;
-        }
-        pair.go_to(bytes, at);
-        let item = Item::of(bytes.get(at..pair.end).unwrap_or_default());
+    check_start(text)?;
+    let finder = memmem::Finder::new(ITEM);
+    while go_to_item(text, &finder) {
+        let at = text.at();
+        pair.go_to_next(text);
+        let line = text.rest();
+        let item = Item::of(line.get(..pair.end - at).unwrap_or(line));
         if steps.is_empty() || seen.ends_before(item) {
             if let Some(last) = steps.last_mut() {
                 last.span.end = at;
             }
-            steps.push(Step {
-                index: steps.len(),
-                span: at..bytes.len(),
-                number: None,
-                time: None,
-            });
+            Step::push(&mut steps, at..at, budget)?;
             seen = Seen::default();
         }
         seen.note(item);
-        if let (Some(step), Some(value)) = (steps.last_mut(), pair.value()) {
+        if let (Some(step), Some(value)) = (steps.last_mut(), pair.value) {
             match item {
                 Item::TimeStep => step.number = value.integer,
                 Item::Time => step.time = value.number,
                 _ => {}
             }
         }
+        text.advance(ITEM.len());
     }
-    if steps.is_empty() {
-        return Err(not_a_dump(bytes));
+    match steps.last_mut() {
+        Some(last) => last.span.end = text.at(),
+        None => return Err(not_a_dump(text.head())),
     }
     keep_last(&mut steps);
     Ok(steps)
+}
+
+/// Goes to the next `ITEM:`, or to the end.
+fn go_to_item(text: &mut TextInput<'_>, finder: &memmem::Finder<'_>) -> bool {
+    while text.want(ITEM.len()) >= ITEM.len() {
+        if let Some(found) = finder.find(text.rest()) {
+            text.advance(found);
+            return true;
+        }
+        // The last letters may be the first of one.
+        text.advance(text.rest().len() + 1 - ITEM.len());
+    }
+    text.advance(ITEM.len());
+    false
 }
 
 /// Reads one of the [`steps`]: scaled positions are put into the box, `vx vy vz` become `velocity`,
@@ -74,42 +93,42 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if the step is cut short or breaks the format,
-/// [`ParseError::Unsupported`] for dumps of other things than atoms.
-pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    read_within(bytes, step, MemoryBudget::UNLIMITED)
-}
-
-/// [`read`] within a budget.
-pub(crate) fn read_within(
-    bytes: &[u8],
+/// [`ParseError::Unsupported`] for dumps of other things than atoms,
+/// [`ParseError::TooLarge`] beyond `budget`.
+pub(crate) fn read(
+    text: &mut TextInput<'_>,
     step: &Step,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
-    if bytes.len() < step.span.end || step.span.end < step.span.start {
-        let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
-        return Err(ParseError::malformed(bytes.len(), what));
-    }
-    let mut lines = Lines::new(bytes, step.span.clone());
-    let header = Header::parse(&mut lines).map_err(|fault| fault.explain(bytes, step))?;
-    let start = lines.at();
-    let found = lines.pass(header.count);
+    text.go_to(step.span.start);
+    text.end_at(step.span.end);
+    let header = match Header::parse(text, budget) {
+        Ok(header) => header,
+        Err(fault) => return Err(fault.explain(text, step)),
+    };
+    let blank = text.pass_blank_lines(header.count);
+    let most = header.count - blank;
+    let first = if most > 0 { text.peek_line() } else { None };
+    let columns = Columns::find(&header, first.map(|line| line.text));
+    let (rows, scaled_by) = match columns {
+        Ok(columns) => {
+            let table = Table {
+                dialect: DIALECT,
+                rows: most_rows(text.left_about(), columns.fields.len()).min(header.count),
+                fields: columns.fields,
+                targets: columns.targets,
+            };
+            (table.particles(text, most, budget), columns.scaled_by)
+        }
+        Err(error) => (RowsRead::without(error, text, most), None),
+    };
+    let found = blank + rows.lines;
     if found < header.count {
         let what = format!("{} atoms announced, {found} lines follow", header.count);
-        return Err(header::cut_short(bytes, step, header.count_at, &what));
+        return Err(header::cut_short(text, step, header.count_at, &what));
     }
-    let rows = start..lines.at();
-    check_end(bytes, lines, header.count)?;
-
-    let first = Lines::new(bytes, rows.clone()).find(|line| !line.is_blank());
-    let columns = Columns::find(&header, first.map(|line| line.text))?;
-    let table = Table {
-        bytes,
-        span: rows,
-        dialect: DIALECT,
-        fields: columns.fields,
-        targets: columns.targets,
-    };
-    let (mut positions, attributes) = table.particles(budget)?;
+    check_end(text, header.count)?;
+    let (mut positions, attributes) = rows.content?;
     if positions.len() != header.count {
         let what = format!(
             "{} atoms announced, {} found: blank lines between them",
@@ -118,7 +137,7 @@ pub(crate) fn read_within(
         );
         return Err(ParseError::malformed(header.count_at, what));
     }
-    if let (Some(bounds), Positions::F64(v)) = (columns.scaled_by, &mut positions) {
+    if let (Some(bounds), Positions::F64(v)) = (scaled_by, &mut positions) {
         v.par_iter_mut().for_each(|p| *p = bounds.place(*p));
     }
     Ok(RawParticles {
@@ -138,10 +157,9 @@ const DIALECT: Dialect = Dialect {
 
 /// A line with one `ITEM:` or many, and the next line, which is looked at once for all of them.
 #[derive(Debug, Default)]
-struct LinePair<'a> {
+struct LinePair {
     /// Where the line ends.
     end: usize,
-    next: Option<&'a [u8]>,
     value: Option<Value>,
 }
 
@@ -152,29 +170,26 @@ struct Value {
     number: Option<f64>,
 }
 
-impl<'a> LinePair<'a> {
-    /// Goes to the line that has byte `at`, which is not before that of the last call.
-    fn go_to(&mut self, bytes: &'a [u8], at: usize) {
-        if at < self.end {
+impl LinePair {
+    /// Goes to the line that `text` is in, which is not before that of the last call.
+    fn go_to_next(&mut self, text: &mut TextInput<'_>) {
+        if text.at() < self.end {
             return;
         }
-        let mut lines = Lines::new(bytes, at..bytes.len());
-        self.end = lines
-            .next()
-            .map_or(bytes.len(), |line| line.at + line.text.len());
-        // A value without a newline may lack digits.
-        let next = lines.next().filter(|v| v.at + v.text.len() < bytes.len());
-        self.next = next.map(|line| line.text.trim_ascii());
-        self.value = None;
-    }
-
-    fn value(&mut self) -> Option<Value> {
-        let next = self.next?;
-        let value = || Value {
-            integer: text::integer(next),
-            number: text::number(next),
-        };
-        Some(*self.value.get_or_insert_with(value))
+        (self.end, self.value) = text.ahead(|text| {
+            let line = text.line();
+            let end = line.map(|line| line.at + line.text.len());
+            let next = text.line().map(|line| {
+                let token = line.text.trim_ascii();
+                Value {
+                    integer: text::integer(token),
+                    number: text::number(token),
+                }
+            });
+            // A value without a newline may lack digits.
+            let next = next.filter(|_| text.is_behind_newline());
+            (end.unwrap_or(text.at()), next)
+        });
     }
 }
 
@@ -199,13 +214,16 @@ impl Seen {
 }
 
 /// Only blank lines (and a byte order mark) may stand before the first item.
-fn check_start(bytes: &[u8], first: usize) -> Result<(), ParseError> {
-    let before = bytes.get(..first).unwrap_or_default();
-    let before = before.strip_prefix(b"\xef\xbb\xbf").unwrap_or(before);
-    if before.trim_ascii().is_empty() {
+fn check_start(text: &mut TextInput<'_>) -> Result<(), ParseError> {
+    if text.head().starts_with(b"\xef\xbb\xbf") {
+        text.go_to(3);
+    }
+    text.pass_blanks();
+    text.want(ITEM.len());
+    if text.rest().starts_with(ITEM) {
         Ok(())
     } else {
-        Err(not_a_dump(bytes))
+        Err(not_a_dump(text.head()))
     }
 }
 
@@ -245,12 +263,16 @@ fn keep_last(steps: &mut Vec<Step>) {
 }
 
 /// After the last atom come blank lines, or the first letters of the next step's `ITEM:`.
-fn check_end(bytes: &[u8], rest: Lines<'_>, count: usize) -> Result<(), ParseError> {
-    for line in rest {
-        let unfinished = memchr(b'\n', bytes.get(line.at..).unwrap_or_default()).is_none();
-        if !(line.is_blank() || unfinished && ITEM.starts_with(line.text)) {
+fn check_end(text: &mut TextInput<'_>, count: usize) -> Result<(), ParseError> {
+    while let Some(line) = text.line() {
+        let at = line.at;
+        if line.is_blank() {
+            continue;
+        }
+        let may_be_item = ITEM.starts_with(line.text);
+        if !(may_be_item && !text.is_behind_newline() && text.is_file_end()) {
             let what = format!("more lines than the {count} atoms announced");
-            return Err(ParseError::malformed(line.at, what));
+            return Err(ParseError::malformed(at, what));
         }
     }
     Ok(())

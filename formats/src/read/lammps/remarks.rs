@@ -1,10 +1,13 @@
 //! What a dump says that is not in the particles.
 
+use super::ITEM;
 use super::columns::NAMES;
 use super::header::{Header, Item};
-use super::{ITEM, Lines};
+use crate::MemoryBudget;
+use crate::read::category;
+use crate::read::input::TextInput;
 use crate::read::remarks::unused_cell;
-use crate::read::{category, text};
+use crate::read::text::{self, Lines};
 
 /// See [`crate::read::remarks`].
 pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
@@ -22,11 +25,11 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
         let is_periodic = flags.iter().any(|flag| flag.contains('p'));
         remarks.push(unused_cell(is_periodic.then(|| flags.join(" ")).as_deref()));
     }
-    let mut lines = Lines::new(head, 0..head.len());
-    let Ok(header) = Header::parse(&mut lines) else {
+    let mut text = TextInput::whole(head);
+    let Ok(header) = Header::parse(&mut text, MemoryBudget::UNLIMITED) else {
         return remarks;
     };
-    let start = lines.at();
+    let start = text.at();
     // The last line may be cut off.
     let end = head.iter().rposition(|b| *b == b'\n').unwrap_or(start);
     for (column, name) in header.names.iter().enumerate() {

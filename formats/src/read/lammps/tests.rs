@@ -1,7 +1,17 @@
 use super::*;
+use crate::detect::Format;
+use crate::read::pieces;
 use crate::read::text_samples::*;
 use glam::DVec3;
 use proptest::prelude::*;
+
+fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    pieces::steps(Format::Lammps, bytes)
+}
+
+fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    pieces::read(Format::Lammps, bytes, step)
+}
 
 /// The only step of `text`.
 #[track_caller]

@@ -25,12 +25,8 @@ use crate::{MemoryBudget, ParseError, RawParticles};
 /// # Errors
 /// [`ParseError::Malformed`] for damaged files; [`ParseError::Unsupported`] for pickled objects and
 /// for arrays that are no positions, saying what to save instead.
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    steps_within(bytes, MemoryBudget::UNLIMITED)
-}
-
-/// [`steps`] within a budget: the times are a member of an archive.
-pub(crate) fn steps_within(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
+/// [`ParseError::TooLarge`] if the times, a member of an archive, need more than `budget`.
+pub(crate) fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     if archive::is_zip(bytes) {
         return archive::Archive::open(bytes)?.steps(budget);
     }
@@ -46,12 +42,7 @@ pub(crate) fn steps_within(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Ste
 ///
 /// # Errors
 /// As [`steps`]; [`ParseError::Malformed`] if there is no such step.
-pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    read_within(bytes, step, MemoryBudget::UNLIMITED)
-}
-
-/// [`read`] within a budget.
-pub(crate) fn read_within(
+pub(crate) fn read(
     bytes: &[u8],
     step: &Step,
     budget: MemoryBudget,

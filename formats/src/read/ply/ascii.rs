@@ -1,92 +1,119 @@
-//! The text body of ascii PLY, turned into little-endian records.
+//! The text body of ascii PLY, turned into little-endian records, some at a time.
 
 use std::str::FromStr;
 
-use super::header::{Element, Property, shorten};
-use crate::{ParseError, ScalarType};
+use super::header::{Element, Header, Property, shorten};
+use crate::read::columns::{GrowingParticles, ParticleLayout};
+use crate::read::input::TextInput;
+use crate::{MemoryBudget, ParseError, RawParticles, ScalarType};
 
-/// Walks the lines of the body; blank ones do not count.
-pub(super) struct Text<'a> {
-    bytes: &'a [u8],
-    at: usize,
+/// Records that are turned into numbers before these are put behind those that are there.
+const BATCH: usize = 4096;
+
+/// Reads the records of `vertices`, an element of `header`, with `layout`.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the file ends early, or at a line with too few or too many
+/// values or with something that is no number of the declared type; [`ParseError::TooLarge`] beyond `budget`.
+pub(super) fn read(
+    text: &mut TextInput<'_>,
+    header: &Header,
+    vertices: &Element,
+    layout: ParticleLayout,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
+    text.go_to(header.body);
+    let before = header.elements.iter();
+    for element in before.take_while(|e| !std::ptr::eq(*e, vertices)) {
+        skip(text, element)?;
+    }
+    check_room(text, vertices)?;
+    let room = vertices
+        .count
+        .min(most_records(text.left_about(), vertices));
+    let mut growing = GrowingParticles::new(layout, room, budget);
+    // Records without properties have no lines.
+    let lines = if vertices.properties.is_empty() {
+        0
+    } else {
+        vertices.count
+    };
+    let mut packed = Vec::new();
+    let mut left = lines;
+    while left > 0 {
+        packed.clear();
+        let batch = left.min(BATCH);
+        for _ in 0..batch {
+            let (at, line) = next_line(text, vertices)?;
+            pack_line(&mut packed, at, line, vertices)?;
+        }
+        growing.append(&packed, batch)?;
+        left -= batch;
+    }
+    Ok(growing.into_particles())
 }
 
-impl<'a> Text<'a> {
-    /// The text from byte `at` on.
-    pub(super) fn new(bytes: &'a [u8], at: usize) -> Self {
-        Self { bytes, at }
-    }
-
-    /// Skips the lines of `element`.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`] if the file ends before.
-    pub(super) fn skip(&mut self, element: &Element) -> Result<(), ParseError> {
-        if element.properties.is_empty() {
-            return Ok(());
-        }
-        for _ in 0..element.count {
-            self.line(element)?;
-        }
-        Ok(())
-    }
-
-    /// The scalars of all records of `element` as packed little-endian numbers.
-    ///
-    /// # Errors
-    /// [`ParseError::Malformed`] if the file ends early, or at a line with too few or too many
-    /// values or with something that is no number of the declared type.
-    pub(super) fn pack(&mut self, element: &Element) -> Result<Vec<u8>, ParseError> {
-        // A value takes a character and the white space after it; only the last may lack that.
-        let least = element.properties.len().saturating_mul(2);
-        let left = self.bytes.len().saturating_sub(self.at) + 1;
-        if !matches!(element.count.checked_mul(least), Some(need) if need <= left || element.count == 0)
-        {
-            return Err(ParseError::malformed(
-                self.at,
+/// Refuses a count that the rest of the file cannot hold, if that is known.
+fn check_room(text: &TextInput<'_>, element: &Element) -> Result<(), ParseError> {
+    match text.left() {
+        Some(left) if element.count > 0 && element.count > most_records(left, element) => {
+            Err(ParseError::malformed(
+                text.at(),
                 format!(
-                    "{} particles of {} values do not fit the {} bytes left in the file",
+                    "{} particles of {} values do not fit the {left} bytes left in the file",
                     element.count,
                     element.properties.len(),
-                    left - 1
+                ),
+            ))
+        }
+        _ => Ok(()),
+    }
+}
+
+/// The most records of `element` that `bytes` bytes can hold.
+fn most_records(bytes: usize, element: &Element) -> usize {
+    // A value takes a character and the white space after it; only the last may lack that.
+    let least = element.properties.len().saturating_mul(2);
+    (bytes + 1).checked_div(least).unwrap_or(usize::MAX)
+}
+
+/// Skips the lines of `element`.
+fn skip(text: &mut TextInput<'_>, element: &Element) -> Result<(), ParseError> {
+    if element.properties.is_empty() {
+        return Ok(());
+    }
+    for _ in 0..element.count {
+        next_line(text, element)?;
+    }
+    Ok(())
+}
+
+/// The next line with something on it, and its offset.
+fn next_line<'t>(
+    text: &'t mut TextInput<'_>,
+    element: &Element,
+) -> Result<(usize, &'t [u8]), ParseError> {
+    loop {
+        let at = text.at();
+        let Some(len) = text.line_len() else {
+            return Err(ParseError::malformed(
+                at,
+                format!(
+                    "file ends before {} lines of element {}",
+                    element.count, element.name
                 ),
             ));
+        };
+        let is_blank = text
+            .rest()
+            .get(..len)
+            .unwrap_or_default()
+            .trim_ascii()
+            .is_empty();
+        if !is_blank {
+            return Ok((at, text.take_line(len)));
         }
-        let mut packed = Vec::with_capacity(element.count * element.scalar_bytes());
-        if element.properties.is_empty() {
-            return Ok(packed);
-        }
-        for _ in 0..element.count {
-            let (at, line) = self.line(element)?;
-            pack_line(&mut packed, at, line, element)?;
-        }
-        Ok(packed)
-    }
-
-    /// The next line with something on it, and its offset.
-    fn line(&mut self, element: &Element) -> Result<(usize, &'a [u8]), ParseError> {
-        loop {
-            let rest = self.bytes.get(self.at..).unwrap_or_default();
-            if rest.is_empty() {
-                return Err(ParseError::malformed(
-                    self.at,
-                    format!(
-                        "file ends before {} lines of element {}",
-                        element.count, element.name
-                    ),
-                ));
-            }
-            let len = rest
-                .iter()
-                .position(|b| matches!(b, b'\n' | b'\r'))
-                .unwrap_or(rest.len());
-            let start = self.at;
-            self.at += (len + 1).min(rest.len());
-            let line = rest.get(..len).unwrap_or_default();
-            if !line.trim_ascii().is_empty() {
-                return Ok((start, line));
-            }
-        }
+        text.advance(len + 1);
     }
 }
 

@@ -1,9 +1,8 @@
-//! Finds the vertex records behind the header: skips the elements before them, and repacks them when
-//! they are text or have lists in between, so that every record has the same size.
+//! Finds the binary vertex records behind the header: skips the elements before them, and repacks them when
+//! they have lists in between, so that every record has the same size.
 
 use std::borrow::Cow;
 
-use super::ascii;
 use super::header::{Element, Encoding, Header};
 use crate::read::columns::check_room;
 use crate::{Endian, ParseError, ScalarType};
@@ -18,10 +17,10 @@ pub(super) struct Records<'a> {
     pub(super) stride: usize,
 }
 
-/// The records of `vertices`, an element of `header`. Text becomes little-endian numbers.
+/// The records of `vertices`, an element of `header`; none in text.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] if the file ends early or holds text that is no number.
+/// [`ParseError::Malformed`] if the file ends early.
 pub(super) fn vertex_records<'a>(
     bytes: &'a [u8],
     header: &Header,
@@ -33,13 +32,7 @@ pub(super) fn vertex_records<'a>(
         .take_while(|e| !std::ptr::eq(*e, vertices));
     let stride = vertices.scalar_bytes();
     let packed = match header.encoding {
-        Encoding::Ascii => {
-            let mut text = ascii::Text::new(bytes, header.body);
-            for element in before {
-                text.skip(element)?;
-            }
-            text.pack(vertices)?
-        }
+        Encoding::Ascii => Vec::new(),
         Encoding::Binary(endian) => {
             let mut at = header.body;
             for element in before {

@@ -14,17 +14,18 @@ use self::body::Records;
 use self::header::{Element, Encoding, Header};
 use super::Step;
 use super::columns::{self, Column, Lane, ParticleLayout};
-use crate::{Endian, ParseError, RawParticles};
+use super::input::TextInput;
+use crate::{Endian, MemoryBudget, ParseError, RawParticles};
 
-/// The time steps that `bytes` hold: one.
+/// The time steps that `text` holds: one.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
 /// without vertices.
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    let header = Header::parse(bytes)?;
+pub(crate) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
+    let header = Header::parse(text.head())?;
     vertices(&header)?;
-    Ok(vec![Step::whole(bytes.len())])
+    Ok(vec![Step::whole(text.left_about())])
 }
 
 /// Reads the vertices with all their scalar properties as attributes.
@@ -34,12 +35,26 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 /// `double` (or a 32-bit integer), else f32.
 ///
 /// # Errors
-/// As [`steps`]; [`ParseError::Malformed`] if the data does not match the header.
-pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
+/// As [`steps`]; [`ParseError::Malformed`] if the data does not match the header, [`ParseError::TooLarge`] beyond
+/// `budget`.
+pub(crate) fn read(
+    text: &mut TextInput<'_>,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
+    let bytes = text.head();
     let header = Header::parse(bytes)?;
     let vertices = vertices(&header)?;
+    if header.encoding == Encoding::Ascii {
+        let layout = vertices_layout(&header, vertices, 0, vertices.scalar_bytes())?;
+        return ascii::read(text, &header, vertices, layout, budget);
+    }
     let records = body::vertex_records(bytes, &header, vertices)?;
     records_layout(&header, vertices, &records)?.particles(&records.bytes)
+}
+
+/// True if `head`, the beginning of a file, is all of its header, and text follows.
+pub(crate) fn is_text(head: &[u8]) -> bool {
+    Header::parse(head).is_ok_and(|header| header.encoding == Encoding::Ascii)
 }
 
 /// Where the vertices are; none if they are text, or have lists between their numbers.
@@ -61,11 +76,21 @@ fn records_layout(
     vertices: &Element,
     records: &Records<'_>,
 ) -> Result<ParticleLayout, ParseError> {
+    vertices_layout(header, vertices, records.start, records.stride)
+}
+
+/// For records of `stride` bytes from byte `start` on.
+fn vertices_layout(
+    header: &Header,
+    vertices: &Element,
+    start: usize,
+    stride: usize,
+) -> Result<ParticleLayout, ParseError> {
     let endian = match header.encoding {
         Encoding::Ascii => Endian::Little,
         Encoding::Binary(endian) => endian,
     };
-    let mut properties = vertex_columns(vertices, records, endian);
+    let mut properties = vertex_columns(vertices, (start, stride), endian);
     let mut axes = Vec::with_capacity(3);
     for axis in ["x", "y", "z"] {
         let Some(index) = properties.iter().position(|c| is_named(c, axis)) else {
@@ -104,8 +129,12 @@ fn vertices(header: &Header) -> Result<&Element, ParseError> {
 }
 
 /// One column for each scalar property, in the order of the header.
-fn vertex_columns(vertices: &Element, records: &Records<'_>, endian: Endian) -> Vec<Column> {
-    let mut offset = records.start;
+fn vertex_columns(
+    vertices: &Element,
+    (start, stride): (usize, usize),
+    endian: Endian,
+) -> Vec<Column> {
+    let mut offset = start;
     let mut columns = Vec::with_capacity(vertices.properties.len());
     for property in vertices.properties.iter().filter(|p| p.length.is_none()) {
         let name = property.name.strip_prefix("scalar_");
@@ -115,7 +144,7 @@ fn vertex_columns(vertices: &Element, records: &Records<'_>, endian: Endian) -> 
             endian,
             lanes: vec![Lane {
                 start: offset,
-                stride: records.stride,
+                stride,
             }],
         });
         offset += property.scalar.size();

@@ -5,29 +5,25 @@
 //! same loop has to serve runs of blanks, decimal commas and comments, cut a file into pieces at
 //! newlines, and name the byte of a fault.
 
-use std::ops::Range;
-
 use memchr::memchr;
 use rayon::prelude::*;
 
 use super::category;
+use super::input::{LinePiece, TextInput};
 use super::text::{self, Line, Lines};
 use crate::{Attribute, MemoryBudget, ParseError, Positions};
 
 mod cells;
 mod grow;
-mod stream;
 mod values;
 
 pub(super) use cells::cells;
 use cells::is_blank;
 use grow::Growing;
-pub(super) use stream::TableStream;
-pub(crate) use stream::stream_bytes;
 pub(super) use values::Values;
 
 /// What to say of a line that ends where the file does.
-pub(super) const CUT_SHORT: &str = "the file is cut short, perhaps still being written";
+pub(crate) const CUT_SHORT: &str = "the file is cut short, perhaps still being written";
 
 /// What stands between two fields.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -154,77 +150,100 @@ pub(super) struct Place {
 
 /// Rows to parse.
 #[derive(Debug)]
-pub(super) struct Table<'a> {
-    /// The file.
-    pub(super) bytes: &'a [u8],
-    /// The bytes that hold the rows.
-    pub(super) span: Range<usize>,
+pub(super) struct Table {
     /// How a row is written.
     pub(super) dialect: Dialect,
     /// Where each field of a row goes; `None` passes over it. A row has at least that many fields.
     pub(super) fields: Vec<Option<Place>>,
-    /// The arrays to fill.
+    /// The arrays to fill, positions first.
     pub(super) targets: Vec<Target>,
-}
-
-/// Bytes that one thread parses in one go; large enough to hide the cost of a task.
-const PIECE: usize = 1 << 20;
-
-/// How the rows of a table are parsed, wherever they are.
-#[derive(Debug, Clone, Copy)]
-struct RowFormat<'t> {
-    dialect: Dialect,
-    fields: &'t [Option<Place>],
-    targets: &'t [Target],
-}
-
-/// Rows in memory.
-struct Rows<'t> {
-    bytes: &'t [u8],
-    dialect: Dialect,
-    fields: &'t [Option<Place>],
-    targets: &'t [Target],
+    /// How many rows there may be: a guess, for which room is made.
+    pub(super) rows: usize,
 }
 
 /// Positions and attributes.
 pub(super) type Particles = (Positions, Vec<Attribute>);
 
-impl Table<'_> {
-    /// Parses all rows; the values are in the order of the targets, each `components` times the
+/// What came of the rows of a table.
+#[derive(Debug)]
+pub(super) struct RowsRead<T = Particles> {
+    /// Lines that there were, blank ones and those behind a fault included.
+    pub(super) lines: usize,
+    /// What is in them.
+    pub(super) content: Result<T, ParseError>,
+}
+
+impl RowsRead {
+    /// Of up to `most` lines that are not looked into because of `error`.
+    pub(super) fn without(error: ParseError, text: &mut TextInput<'_>, most: usize) -> Self {
+        Self {
+            lines: text.pass_lines(most),
+            content: Err(error),
+        }
+    }
+}
+
+impl Table {
+    /// Parses up to `most` lines of `text`; the values are in the order of the targets, each `components` times the
     /// number of rows long. Some pieces are parsed at a time, so that little is held but the values.
     ///
-    /// # Errors
-    /// [`ParseError::Malformed`] at the first field (in file order) that has no place or does not
-    /// fit, whatever the number of threads; [`ParseError::TooLarge`] if the values need more memory than
+    /// The error is [`ParseError::Malformed`] at the first field (in file order) that has no place or does not
+    /// fit, whatever the number of threads; or [`ParseError::TooLarge`] if the values need more memory than
     /// `budget` allows.
-    pub(super) fn parse(&self, budget: MemoryBudget) -> Result<Vec<Values>, ParseError> {
-        let format = self.format();
-        let rows = format.in_bytes(self.bytes);
-        let span = self.bytes.get(self.span.clone()).unwrap_or_default();
-        let mut values = Growing::new(format.targets, rows.most_rows(span), budget);
-        for some in pieces(self.bytes, self.span.clone()).chunks(pieces_at_once()) {
-            let parsed: Vec<Result<Vec<Values>, ParseError>> = some
-                .into_par_iter()
-                .map(|piece| rows.parse_piece(piece.clone()))
-                .collect();
-            for piece in parsed {
-                values.append(piece?)?;
+    pub(super) fn parse(
+        &self,
+        text: &mut TextInput<'_>,
+        most: usize,
+        budget: MemoryBudget,
+    ) -> RowsRead<Vec<Values>> {
+        let mut values = Growing::new(&self.targets, self.rows, budget);
+        let mut lines = 0;
+        let fault = loop {
+            let some = text.pieces(most - lines);
+            if some.is_empty() {
+                break None;
             }
+            lines += some.iter().map(|piece| piece.lines).sum::<usize>();
+            let parsed: Vec<Result<Vec<Values>, ParseError>> = some
+                .par_iter()
+                .map(|piece| {
+                    let parsed = self.rows_of(piece).parse();
+                    parsed.map_err(|error| error.behind(piece.at))
+                })
+                .collect();
+            let fault = parsed
+                .into_iter()
+                .find_map(|piece| piece.and_then(|piece| values.append(piece)).err());
+            text.take_back(some);
+            if fault.is_some() {
+                lines += text.pass_lines(most - lines);
+                break fault;
+            }
+        };
+        RowsRead {
+            lines,
+            content: fault.map_or_else(|| Ok(values.into_values()), Err),
         }
-        Ok(values.into_values())
     }
 
     /// [`Self::parse`] with target 0 taken for the positions and the rest for attributes.
-    ///
-    /// # Errors
-    /// As [`Self::parse`].
-    pub(super) fn particles(self, budget: MemoryBudget) -> Result<Particles, ParseError> {
-        let values = self.parse(budget)?;
-        Ok(particles(self.targets, values))
+    pub(super) fn particles(
+        self,
+        text: &mut TextInput<'_>,
+        most: usize,
+        budget: MemoryBudget,
+    ) -> RowsRead {
+        let read = self.parse(text, most, budget);
+        RowsRead {
+            lines: read.lines,
+            content: read.content.map(|values| particles(self.targets, values)),
+        }
     }
 
-    fn format(&self) -> RowFormat<'_> {
-        RowFormat {
+    fn rows_of<'t>(&'t self, piece: &'t LinePiece<'_>) -> Rows<'t> {
+        Rows {
+            bytes: &piece.bytes,
+            ends_file: piece.ends_file,
             dialect: self.dialect,
             fields: &self.fields,
             targets: &self.targets,
@@ -233,8 +252,24 @@ impl Table<'_> {
 }
 
 /// Pieces that are parsed before their values are put together.
-fn pieces_at_once() -> usize {
+pub(super) fn pieces_at_once() -> usize {
     2 * rayon::current_num_threads()
+}
+
+/// The most rows of `fields` fields that `bytes` bytes can have, if none is empty.
+pub(super) fn most_rows(bytes: usize, fields: usize) -> usize {
+    // A field takes two bytes with what follows it.
+    bytes / (2 * fields).max(1) + 1
+}
+
+/// Rows in memory.
+struct Rows<'t> {
+    bytes: &'t [u8],
+    /// Whether the file ends with them.
+    ends_file: bool,
+    dialect: Dialect,
+    fields: &'t [Option<Place>],
+    targets: &'t [Target],
 }
 
 fn particles(targets: Vec<Target>, values: Vec<Values>) -> Particles {
@@ -255,33 +290,10 @@ fn particles(targets: Vec<Target>, values: Vec<Values>) -> Particles {
     (positions, attributes)
 }
 
-impl<'t> RowFormat<'t> {
-    fn in_bytes(self, bytes: &'t [u8]) -> Rows<'t> {
-        let Self {
-            dialect,
-            fields,
-            targets,
-        } = self;
-        Rows {
-            bytes,
-            dialect,
-            fields,
-            targets,
-        }
-    }
-}
-
 impl Rows<'_> {
-    /// The most rows that `bytes` can have.
-    fn most_rows(&self, bytes: &[u8]) -> usize {
-        let newlines = memchr::memchr_iter(b'\n', bytes).count();
-        // A field takes two bytes with what follows it, save empty ones.
-        newlines.min(bytes.len() / (2 * self.fields.len()).max(1)) + 1
-    }
-
-    fn parse_piece(&self, piece: Range<usize>) -> Result<Vec<Values>, ParseError> {
-        let bytes = self.bytes.get(piece.clone()).unwrap_or_default();
-        let rows = self.most_rows(bytes);
+    fn parse(&self) -> Result<Vec<Values>, ParseError> {
+        let newlines = memchr::memchr_iter(b'\n', self.bytes).count();
+        let rows = most_rows(self.bytes.len(), self.fields.len()).min(newlines + 1);
         let mut values: Vec<Values> = self
             .targets
             .iter()
@@ -290,7 +302,7 @@ impl Rows<'_> {
                 Numbers::WholeIfAll => Values::Whole(Vec::with_capacity(rows * target.components)),
             })
             .collect();
-        for line in Lines::new(self.bytes, piece) {
+        for line in Lines::new(self.bytes, 0..self.bytes.len()) {
             if line.is_blank() || self.dialect.comments.include(line.text) {
                 continue;
             }
@@ -407,7 +419,7 @@ impl Rows<'_> {
     /// Adds the likely cause if the fault at byte `at` is in an unfinished last line.
     fn with_cause(&self, at: usize, what: String) -> String {
         let rest = self.bytes.get(at..).unwrap_or_default();
-        if memchr(b'\n', rest).is_none() {
+        if self.ends_file && memchr(b'\n', rest).is_none() {
             format!("{what}: {CUT_SHORT}")
         } else {
             what
@@ -421,20 +433,6 @@ impl Comments {
         let text = text.trim_ascii_start();
         self == Self::HashOrSlashes && (text.starts_with(b"#") || text.starts_with(b"//"))
     }
-}
-
-/// Cuts `span` into pieces of about [`PIECE`] bytes that end with a newline.
-fn pieces(bytes: &[u8], span: Range<usize>) -> Vec<Range<usize>> {
-    let end = span.end.min(bytes.len());
-    let mut start = span.start.min(end);
-    let mut pieces = Vec::with_capacity((end - start) / PIECE + 1);
-    while start < end {
-        let wanted = (start + PIECE).min(end);
-        let cut = memchr(b'\n', &bytes[wanted..end]).map_or(end, |newline| wanted + newline + 1);
-        pieces.push(start..cut);
-        start = cut;
-    }
-    pieces
 }
 
 #[cfg(test)]

@@ -14,36 +14,56 @@ fn scalar(numbers: Numbers, on_text: OnText) -> Target {
 }
 
 /// A table of one column for each of `targets`.
-fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<Target>) -> Table<'_> {
+fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<Target>) -> InMemory<'_> {
     let place = |target| {
         Some(Place {
             target,
             component: 0,
         })
     };
-    Table {
-        bytes,
-        span: 0..bytes.len(),
+    let table = Table {
         dialect,
         fields: (0..targets.len()).map(place).collect(),
         targets,
+        rows: 0,
+    };
+    InMemory { bytes, table }
+}
+
+/// A table and its text.
+struct InMemory<'a> {
+    bytes: &'a [u8],
+    table: Table,
+}
+
+impl InMemory<'_> {
+    /// As a whole, and the same in pieces.
+    fn parse(&self, budget: MemoryBudget) -> Result<Vec<Values>, ParseError> {
+        let parse = |mut text| self.table.parse(&mut text, usize::MAX, budget).content;
+        let whole = parse(TextInput::whole(self.bytes));
+        let pieces = parse(TextInput::in_pieces(self.bytes, false, 1000));
+        assert_eq!(format!("{whole:?}"), format!("{pieces:?}"));
+        whole
     }
 }
+
+/// Bytes of several pieces.
+const PIECE: usize = 1 << 20;
 
 #[test]
 fn fields_go_where_they_belong() {
     let bytes = b"7 3 1 2\n\n  8\t6 4 5 \r\n";
     let place = |target, component| Some(Place { target, component });
     let table = Table {
-        bytes,
-        span: 0..bytes.len(),
         dialect: WORDS,
         fields: vec![place(1, 0), place(0, 2), place(0, 0), place(0, 1)],
         targets: vec![
             Target::positions(),
             scalar(Numbers::WholeIfAll, OnText::Fault),
         ],
+        rows: 2,
     };
+    let table = InMemory { bytes, table };
     let mut values = table.parse(MemoryBudget::UNLIMITED).unwrap();
     assert_eq!(values.pop(), Some(Values::Whole(vec![7, 8])));
     assert_eq!(

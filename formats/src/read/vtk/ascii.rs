@@ -1,65 +1,98 @@
 //! Numbers written as text, for the ASCII variants of both VTK formats: free-form, any number a
 //! line, with the odd spellings of NaN and infinity that C libraries print.
 
-use crate::{AttributeData, ParseError, ScalarType};
+use crate::read::input::TextInput;
+use crate::{AttributeData, MemoryBudget, ParseError, ScalarType};
 
-/// Parses `count` numbers of type `scalar` from `text` beginning at byte `at`; returns them and the
-/// byte after the last.
+/// [`read_values`] of `text` from byte `at` on; returns them and the byte after the last.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] if there are fewer, or one is no number of that type; nothing is
-/// allocated for a count that the text cannot hold.
+/// As [`read_values`].
 pub(in crate::read) fn parse_values(
     text: &[u8],
     at: usize,
     count: usize,
     scalar: ScalarType,
 ) -> Result<(AttributeData, usize), ParseError> {
-    let rest = text.get(at..).unwrap_or_default();
-    // A number takes a digit and a separator at least.
-    if count > rest.len().div_ceil(2) {
-        return Err(too_few(at, count, rest.len()));
-    }
-    macro_rules! parse {
-        ($variant:ident, $ty:ty) => {{
-            let (values, end) = parse_tokens::<$ty>(text, at, count)?;
-            (AttributeData::$variant(values), end)
-        }};
+    let mut text = TextInput::whole(text);
+    text.go_to(at);
+    let data = read_values(&mut text, count, scalar, MemoryBudget::UNLIMITED)?;
+    Ok((data, text.at()))
+}
+
+/// Parses the next `count` numbers of `text`, of type `scalar`.
+///
+/// # Errors
+/// [`ParseError::Malformed`] if there are fewer, or one is no number of that type; nothing is
+/// allocated for a count that the text cannot hold. [`ParseError::TooLarge`] if they take more than `budget`.
+pub(super) fn read_values(
+    text: &mut TextInput<'_>,
+    count: usize,
+    scalar: ScalarType,
+    budget: MemoryBudget,
+) -> Result<AttributeData, ParseError> {
+    check_room(text, count)?;
+    macro_rules! read {
+        ($variant:ident, $ty:ty) => {
+            AttributeData::$variant(read_numbers::<$ty>(text, count, budget)?)
+        };
     }
     Ok(match scalar {
-        ScalarType::I8 => parse!(I8, i8),
-        ScalarType::U8 => parse!(U8, u8),
-        ScalarType::I16 => parse!(I16, i16),
-        ScalarType::U16 => parse!(U16, u16),
-        ScalarType::I32 => parse!(I32, i32),
-        ScalarType::U32 => parse!(U32, u32),
-        ScalarType::I64 => parse!(I64, i64),
-        ScalarType::U64 => parse!(U64, u64),
-        ScalarType::F32 => parse!(F32, f32),
-        ScalarType::F64 => parse!(F64, f64),
+        ScalarType::I8 => read!(I8, i8),
+        ScalarType::U8 => read!(U8, u8),
+        ScalarType::I16 => read!(I16, i16),
+        ScalarType::U16 => read!(U16, u16),
+        ScalarType::I32 => read!(I32, i32),
+        ScalarType::U32 => read!(U32, u32),
+        ScalarType::I64 => read!(I64, i64),
+        ScalarType::U64 => read!(U64, u64),
+        ScalarType::F32 => read!(F32, f32),
+        ScalarType::F64 => read!(F64, f64),
     })
 }
 
-/// The byte after the next `count` words from `at` on, whatever they are.
+/// Passes over the next `count` words, whatever they are.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if there are fewer.
-pub(in crate::read) fn skip_words(
-    text: &[u8],
-    at: usize,
+pub(super) fn skip_words(text: &mut TextInput<'_>, count: usize) -> Result<(), ParseError> {
+    check_room(text, count)?;
+    each_word(text, count, |_, _| Ok(()))
+}
+
+/// Refuses a count that the rest of the file cannot hold, if that is known.
+fn check_room(text: &TextInput<'_>, count: usize) -> Result<(), ParseError> {
+    match text.left() {
+        // A number takes a digit and a separator at least.
+        Some(left) if count > left.div_ceil(2) => Err(too_few(text.at(), count, left)),
+        _ => Ok(()),
+    }
+}
+
+/// Shows the next `count` words with their places, and stays behind the last.
+fn each_word(
+    text: &mut TextInput<'_>,
     count: usize,
-) -> Result<usize, ParseError> {
-    let left = text.len().saturating_sub(at);
-    if count > left.div_ceil(2) {
-        return Err(too_few(at, count, left));
-    }
-    let mut words = Words { text, at };
-    for done in 0..count {
-        if words.next().is_none() {
-            return Err(ends_after(text.len(), done, count));
+    mut show: impl FnMut(usize, &[u8]) -> Result<(), ParseError>,
+) -> Result<(), ParseError> {
+    let mut done = 0;
+    while done < count {
+        let at = text.at();
+        let near = text.words(count - done);
+        if near.is_empty() {
+            return Err(ends_after(at, done, count));
         }
+        let mut words = Words { text: near, at: 0 };
+        while done < count
+            && let Some(word) = words.next()
+        {
+            show(at + words.at - word.len(), word)?;
+            done += 1;
+        }
+        let used = if done < count { near.len() } else { words.at };
+        text.advance(used);
     }
-    Ok(words.at)
+    Ok(())
 }
 
 fn too_few(at: usize, count: usize, left: usize) -> ParseError {
@@ -95,28 +128,33 @@ impl<'a> Iterator for Words<'a> {
     }
 }
 
-fn parse_tokens<T: Number>(
-    text: &[u8],
-    at: usize,
+fn read_numbers<T: Number>(
+    text: &mut TextInput<'_>,
     count: usize,
-) -> Result<(Vec<T>, usize), ParseError> {
-    let mut words = Words { text, at };
-    let mut values = Vec::with_capacity(count);
-    while values.len() < count {
-        let Some(word) = words.next() else {
-            return Err(ends_after(text.len(), values.len(), count));
-        };
+    budget: MemoryBudget,
+) -> Result<Vec<T>, ParseError> {
+    let most = usize::try_from(budget.bytes()).unwrap_or(usize::MAX) / size_of::<T>();
+    let mut values = Vec::new();
+    let room = count.min(text.left_about().div_ceil(2)).min(most);
+    // Pages that are not used cost nothing.
+    let _ = values.try_reserve_exact(room);
+    each_word(text, count, |at, word| {
         let parsed = std::str::from_utf8(word).ok().and_then(T::parse);
         let Some(value) = parsed else {
             let shown = word.get(..24).unwrap_or(word).escape_ascii();
             return Err(ParseError::malformed(
-                words.at - word.len(),
+                at,
                 format!("`{shown}` is no {}", T::NAME),
             ));
         };
+        if values.len() == most {
+            return Err(budget.exceeded("in memory its numbers are"));
+        }
         values.push(value);
-    }
-    Ok((values, words.at))
+        Ok(())
+    })?;
+    values.shrink_to_fit();
+    Ok(values)
 }
 
 trait Number: Sized {
@@ -218,7 +256,9 @@ mod tests {
     fn counts_beyond_the_text_are_refused_at_once() {
         assert!(parse_values(b"1 2 3", 0, usize::MAX, ScalarType::F64).is_err());
         assert!(parse_values(b"1  2 ", 0, 3, ScalarType::F64).is_err());
-        assert!(skip_words(b"1 2 3", 0, usize::MAX).is_err());
-        assert_eq!(skip_words(b"1 2 3", 0, 2), Ok(3));
+        assert!(skip_words(&mut TextInput::whole(b"1 2 3"), usize::MAX).is_err());
+        let mut text = TextInput::whole(b"1 2 3");
+        assert_eq!(skip_words(&mut text, 2), Ok(()));
+        assert_eq!(text.at(), 3);
     }
 }

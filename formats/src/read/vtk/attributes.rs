@@ -19,7 +19,7 @@ pub(super) struct Header {
 ///
 /// # Errors
 /// Malformed if it is missing, negative or no integer.
-pub(super) fn count(line: &Line<'_>, word: Option<&&[u8]>) -> Result<usize, ParseError> {
+pub(super) fn count(line: &Line, word: Option<&&[u8]>) -> Result<usize, ParseError> {
     word.and_then(|w| parse_count(w)).ok_or_else(|| {
         ParseError::malformed(line.at, format!("`{}`: a count is expected", line.shown()))
     })
@@ -32,8 +32,8 @@ fn parse_count(word: &[u8]) -> Option<usize> {
 /// The array that an attribute keyword line announces; `None` if the keyword is none of an
 /// attribute. Takes the `LOOKUP_TABLE` line after `SCALARS` too, if it is there.
 pub(super) fn keyword_array(
-    line: &Line<'_>,
-    cursor: &mut Cursor<'_>,
+    line: &Line,
+    cursor: &mut Cursor<'_, '_>,
     encoding: Encoding,
 ) -> Result<Option<Header>, ParseError> {
     let keyword = line.first_word().to_ascii_uppercase();
@@ -64,7 +64,7 @@ pub(super) fn keyword_array(
 }
 
 /// `SCALARS name type [components]`; a name may hold blanks, so this reads from the right.
-fn scalars(line: &Line<'_>) -> Result<Header, ParseError> {
+fn scalars(line: &Line) -> Result<Header, ParseError> {
     let words = line.words();
     let (name, stored, components) = match words.as_slice() {
         [_, name @ .., stored, k]
@@ -84,7 +84,7 @@ fn scalars(line: &Line<'_>) -> Result<Header, ParseError> {
 }
 
 /// `COLOR_SCALARS name k`: bytes in binary, numbers from 0 to 1 in ASCII.
-fn color_scalars(line: &Line<'_>, encoding: Encoding) -> Result<Header, ParseError> {
+fn color_scalars(line: &Line, encoding: Encoding) -> Result<Header, ParseError> {
     let words = line.words();
     let [_, name @ .., components] = words.as_slice() else {
         return Err(incomplete(line));
@@ -101,7 +101,7 @@ fn color_scalars(line: &Line<'_>, encoding: Encoding) -> Result<Header, ParseErr
 }
 
 /// `TEXTURE_COORDINATES name dimensions type`.
-fn texture_coordinates(line: &Line<'_>) -> Result<Header, ParseError> {
+fn texture_coordinates(line: &Line) -> Result<Header, ParseError> {
     let words = line.words();
     let [_, name @ .., components, stored] = words.as_slice() else {
         return Err(incomplete(line));
@@ -115,7 +115,7 @@ fn texture_coordinates(line: &Line<'_>) -> Result<Header, ParseError> {
 }
 
 /// `name components tuples type` inside a FIELD; `None` if the line is not that.
-pub(super) fn field_array(line: &Line<'_>) -> Option<Header> {
+pub(super) fn field_array(line: &Line) -> Option<Header> {
     let words = line.words();
     let [name @ .., components, tuples, stored] = words.as_slice() else {
         return None;
@@ -130,29 +130,24 @@ pub(super) fn field_array(line: &Line<'_>) -> Option<Header> {
 
 /// Steps over `LOOKUP_TABLE name`, which some writers leave out. With a size behind the name it is
 /// a table of its own and not the reference that belongs to SCALARS.
-fn skip_lookup_reference(cursor: &mut Cursor<'_>) -> Result<(), ParseError> {
-    const KEYWORD: &[u8] = b"LOOKUP_TABLE";
-    let ahead = cursor.rest().trim_ascii_start();
-    let is_keyword = ahead
-        .split_at_checked(KEYWORD.len())
-        .is_some_and(|(word, rest)| {
-            word.eq_ignore_ascii_case(KEYWORD) && rest.first().is_none_or(u8::is_ascii_whitespace)
-        });
-    if !is_keyword {
+fn skip_lookup_reference(cursor: &mut Cursor<'_, '_>) -> Result<(), ParseError> {
+    if !cursor.goes_on_with(b"LOOKUP_TABLE") {
         return Ok(());
     }
-    let mut after = cursor.clone();
-    let line = after.keyword_line()?;
-    let is_table = line.is_some_and(
-        |line| matches!(line.words().as_slice(), [_, _, size] if parse_count(size).is_some()),
-    );
-    if !is_table {
-        *cursor = after;
+    let behind = cursor.ahead(|cursor| {
+        let line = cursor.keyword_line()?;
+        let is_table = line.is_some_and(
+            |line| matches!(line.words().as_slice(), [_, _, size] if parse_count(size).is_some()),
+        );
+        Ok((!is_table).then(|| cursor.at()))
+    })?;
+    if let Some(behind) = behind {
+        cursor.go_to(behind);
     }
     Ok(())
 }
 
-fn incomplete(line: &Line<'_>) -> ParseError {
+fn incomplete(line: &Line) -> ParseError {
     ParseError::malformed(line.at, format!("`{}` is incomplete", line.shown()))
 }
 
@@ -183,10 +178,10 @@ fn decode_name(words: &[&[u8]]) -> String {
 mod tests {
     use super::*;
 
-    fn line(text: &str) -> Line<'_> {
+    fn line(text: &str) -> Line {
         Line {
             at: 0,
-            text: text.as_bytes(),
+            text: text.as_bytes().to_vec(),
         }
     }
 

@@ -2,73 +2,89 @@
 //! searches inside a payload.
 
 use crate::ParseError;
+use crate::read::input::TextInput;
 
 /// A keyword line of a sane file is shorter; a longer one means that we look at binary data.
 const LONGEST_LINE: usize = 1 << 16;
 
 /// Reading position in the file.
-#[derive(Debug, Clone)]
-pub(super) struct Cursor<'a> {
-    bytes: &'a [u8],
-    at: usize,
+pub(super) struct Cursor<'c, 'a> {
+    text: &'c mut TextInput<'a>,
 }
 
 /// One text line without its end, and where it started.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Line<'a> {
+#[derive(Debug, Clone)]
+pub(super) struct Line {
     pub(super) at: usize,
-    pub(super) text: &'a [u8],
+    pub(super) text: Vec<u8>,
 }
 
-impl<'a> Cursor<'a> {
-    pub(super) const fn new(bytes: &'a [u8]) -> Self {
-        Self { bytes, at: 0 }
+impl<'c, 'a> Cursor<'c, 'a> {
+    pub(super) const fn new(text: &'c mut TextInput<'a>) -> Self {
+        Self { text }
     }
 
     pub(super) const fn at(&self) -> usize {
-        self.at
+        self.text.at()
     }
 
-    /// The whole file.
-    pub(super) const fn bytes(&self) -> &'a [u8] {
-        self.bytes
+    /// Where numbers written as text are read from.
+    pub(super) const fn text(&mut self) -> &mut TextInput<'a> {
+        self.text
     }
 
-    /// What is left of the file.
-    pub(super) fn rest(&self) -> &'a [u8] {
-        self.bytes.get(self.at..).unwrap_or_default()
+    /// The whole file, if it is in memory, as all binary ones are.
+    pub(super) fn bytes(&self) -> &'a [u8] {
+        self.text.as_whole().unwrap_or_default()
     }
 
-    /// Moves to byte `at`, or to the end of the file if that is nearer.
+    /// What is left of the file, as far as it is in memory.
+    pub(super) fn rest(&self) -> &[u8] {
+        self.text.rest()
+    }
+
+    /// Passes over the next `count` bytes, or over none if the file is shorter.
+    pub(super) fn take(&mut self, count: usize) -> Option<()> {
+        self.text.take(count).then_some(())
+    }
+
+    /// Does `look`, and goes back to where it began.
+    pub(super) fn ahead<T>(&mut self, look: impl FnOnce(&mut Cursor<'_, 'a>) -> T) -> T {
+        self.text.ahead(|text| look(&mut Cursor { text }))
+    }
+
+    /// Goes on to byte `at`.
     pub(super) fn go_to(&mut self, at: usize) {
-        self.at = at.min(self.bytes.len());
+        self.text.go_to(at);
     }
 
-    /// The next `count` bytes, or `None` (and no move) if the file is shorter.
-    pub(super) fn take(&mut self, count: usize) -> Option<&'a [u8]> {
-        let taken = self.rest().get(..count)?;
-        self.at += count;
-        Some(taken)
-    }
-
-    pub(super) fn skip_whitespace(&mut self) {
-        let rest = self.rest();
-        self.at += rest.len() - rest.trim_ascii_start().len();
+    /// Whether `keyword` follows, behind white space.
+    pub(super) fn goes_on_with(&mut self, keyword: &[u8]) -> bool {
+        self.ahead(|cursor| {
+            cursor.text.pass_blanks();
+            cursor.text.want(keyword.len() + 1);
+            let ahead = cursor.rest().split_at_checked(keyword.len());
+            ahead.is_some_and(|(word, rest)| {
+                word.eq_ignore_ascii_case(keyword)
+                    && rest.first().is_none_or(u8::is_ascii_whitespace)
+            })
+        })
     }
 
     /// The next line, blank or not; `None` at the end of the file.
-    pub(super) fn line(&mut self) -> Result<Option<Line<'a>>, ParseError> {
-        let rest = self.rest();
-        if rest.is_empty() {
+    pub(super) fn line(&mut self) -> Result<Option<Line>, ParseError> {
+        let there = self.text.want(LONGEST_LINE + 1);
+        if there == 0 {
             return Ok(None);
         }
+        let (at, rest) = (self.at(), self.rest());
         let near = rest.get(..LONGEST_LINE).unwrap_or(rest);
         let (text, used) = match memchr::memchr(b'\n', near) {
             Some(end) => (near.get(..end).unwrap_or_default(), end + 1),
-            None if near.len() == rest.len() => (near, near.len()),
+            None if near.len() == there => (near, near.len()),
             None => {
                 return Err(ParseError::malformed(
-                    self.at,
+                    at,
                     format!(
                         "no line end within {LONGEST_LINE} bytes where a text line should be; an \
                          earlier count may be wrong"
@@ -76,21 +92,21 @@ impl<'a> Cursor<'a> {
                 ));
             }
         };
-        let line = Line { at: self.at, text };
-        self.at += used;
-        Ok(Some(line))
+        let text = text.to_vec();
+        self.text.advance(used);
+        Ok(Some(Line { at, text }))
     }
 
     /// The next line that is not blank.
-    pub(super) fn keyword_line(&mut self) -> Result<Option<Line<'a>>, ParseError> {
-        self.skip_whitespace();
+    pub(super) fn keyword_line(&mut self) -> Result<Option<Line>, ParseError> {
+        self.text.pass_blanks();
         self.line()
     }
 }
 
-impl<'a> Line<'a> {
+impl Line {
     /// The words of the line.
-    pub(super) fn words(&self) -> Vec<&'a [u8]> {
+    pub(super) fn words(&self) -> Vec<&[u8]> {
         self.text
             .split(u8::is_ascii_whitespace)
             .filter(|w| !w.is_empty())
@@ -102,7 +118,7 @@ impl<'a> Line<'a> {
         self.first_word().eq_ignore_ascii_case(keyword.as_bytes())
     }
 
-    pub(super) fn first_word(&self) -> &'a [u8] {
+    pub(super) fn first_word(&self) -> &[u8] {
         self.text
             .trim_ascii_start()
             .split(u8::is_ascii_whitespace)
@@ -112,7 +128,7 @@ impl<'a> Line<'a> {
 
     /// The beginning of the line, fit for an error message.
     pub(super) fn shown(&self) -> String {
-        shown(self.text)
+        shown(&self.text)
     }
 }
 

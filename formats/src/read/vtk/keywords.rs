@@ -5,7 +5,7 @@ use super::cursor::Line;
 use crate::ParseError;
 
 /// Major version from `# vtk DataFile Version 4.1`.
-pub(super) fn parse_version(line: &Line<'_>) -> Result<u32, ParseError> {
+pub(super) fn parse_version(line: &Line) -> Result<u32, ParseError> {
     const MAGIC: &[u8] = b"# vtk DataFile Version";
     let version = line
         .text
@@ -27,7 +27,7 @@ pub(super) fn parse_version(line: &Line<'_>) -> Result<u32, ParseError> {
 }
 
 /// True where a new part of the file may begin: a keyword, or an array of a FIELD.
-pub(super) fn is_section_start(line: &Line<'_>) -> bool {
+pub(super) fn is_section_start(line: &Line) -> bool {
     is_keyword(line.first_word()) || field_array(line).is_some()
 }
 

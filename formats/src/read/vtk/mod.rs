@@ -22,7 +22,8 @@ pub(in crate::read) use positions::positions;
 
 use super::Step;
 use super::columns::{Column, ParticleLayout};
-use crate::{Attribute, ParseError, RawParticles};
+use super::input::TextInput;
+use crate::{Attribute, MemoryBudget, ParseError, RawParticles};
 use walk::{PointArray, Until, Walker};
 
 /// More than any tensor or spectrum has. With no particles nothing else bounds the number, and
@@ -32,30 +33,34 @@ pub(in crate::read) const MOST_COMPONENTS: usize = 1 << 16;
 /// So many numbers of a particle can be listed however few the particles are.
 const FEW_COMPONENTS: usize = 4096;
 
-/// The one time step that `bytes` hold, with the time if a dataset-level FIELD before the points
+/// The one time step that `text` holds, with the time if a dataset-level FIELD before the points
 /// tells it. A damaged file is reported by [`read`], not here.
-///
-/// # Errors
-/// None at present.
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    let mut step = Step::whole(bytes.len());
-    step.time = Walker::begin(bytes).ok().and_then(|mut walker| {
+pub(crate) fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Vec<Step> {
+    let mut step = Step::whole(text.left_about());
+    step.time = Walker::begin(text, budget).ok().and_then(|mut walker| {
         // What went wrong on the way matters to `read`; the time found until then is good.
         let _ = walker.walk(Until::Points);
         walker.time
     });
-    Ok(vec![step])
+    vec![step]
 }
 
 /// Reads the particles of a legacy VTK file.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
-/// [`ParseError::Unsupported`] if it holds a grid or is of a later version.
-pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
-    let mut walker = Walker::begin(bytes)?;
+/// [`ParseError::Unsupported`] if it holds a grid or is of a later version,
+/// [`ParseError::TooLarge`] beyond `budget`.
+pub(crate) fn read(
+    text: &mut TextInput<'_>,
+    budget: MemoryBudget,
+) -> Result<RawParticles, ParseError> {
+    let bytes = text.as_whole().unwrap_or_default();
+    let mut walker = Walker::begin(text, budget)?;
     walker.walk(Until::End)?;
-    let points = walker.points.ok_or_else(|| no_points(bytes))?;
+    let points = walker.points.take();
+    let (arrays, time) = (std::mem::take(&mut walker.arrays), walker.time);
+    let points = points.ok_or_else(|| no_points(text.at()))?;
     let attribute = |array: PointArray| {
         Ok(Attribute {
             name: array.name,
@@ -63,13 +68,19 @@ pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
             data: array.numbers.decode(bytes)?,
         })
     };
-    let attributes: Result<_, ParseError> = walker.arrays.into_iter().map(attribute).collect();
+    let attributes: Result<_, ParseError> = arrays.into_iter().map(attribute).collect();
     Ok(RawParticles {
         positions: positions(points.numbers.decode(bytes)?),
         attributes: attributes?,
-        time: walker.time,
+        time,
         step: None,
     })
+}
+
+/// True if numbers are text in the file that begins with `head`.
+pub(crate) fn is_text(head: &[u8]) -> bool {
+    let mut text = TextInput::whole(head);
+    Walker::begin(&mut text, MemoryBudget::UNLIMITED).is_ok_and(|walker| walker.is_text())
 }
 
 /// Where the particles of a binary file are; none if some of it is text or bits, or if a particle has more
@@ -78,12 +89,13 @@ pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
 /// # Errors
 /// As [`read`].
 pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-    let mut walker = Walker::begin(bytes)?;
+    let mut text = TextInput::whole(bytes);
+    let mut walker = Walker::begin(&mut text, MemoryBudget::UNLIMITED)?;
     if walker.is_text() {
         return Ok(None);
     }
     walker.walk(Until::End)?;
-    let points = walker.points.ok_or_else(|| no_points(bytes))?;
+    let points = walker.points.ok_or_else(|| no_points(bytes.len()))?;
     let components = walker.arrays.iter().map(|array| array.components);
     if components.fold(0, usize::saturating_add) > FEW_COMPONENTS.max(points.count) {
         return Ok(None);
@@ -99,6 +111,6 @@ pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError>
         }))
 }
 
-fn no_points(bytes: &[u8]) -> ParseError {
-    ParseError::malformed(bytes.len(), "the file ends before POINTS")
+fn no_points(end: usize) -> ParseError {
+    ParseError::malformed(end, "the file ends before POINTS")
 }

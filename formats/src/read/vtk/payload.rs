@@ -1,11 +1,11 @@
 //! The numbers behind a keyword line: what the type names mean and how many bytes they take, in
 //! ASCII and in (always big-endian) binary.
 
-use super::ascii::{parse_values, skip_words};
+use super::ascii::{read_values, skip_words};
 use super::cursor::{Cursor, shown};
 use super::keywords::is_section_start;
 use crate::read::columns::{Column, Lane};
-use crate::{AttributeData, Endian, ParseError, ScalarType};
+use crate::{AttributeData, Endian, MemoryBudget, ParseError, ScalarType};
 
 /// How the file stores numbers; line 3 of it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -147,13 +147,13 @@ impl Numbers {
     }
 }
 
-/// Finds `count` numbers at the cursor, and reads them if they are text. `what` names them in errors.
+/// Finds `count` numbers at the cursor, and reads them if they are text, within `budget`. `what` names them in errors.
 ///
 /// # Errors
-/// Malformed if the file is too short for them or a text is no number; Unsupported for text.
+/// Malformed if the file is too short for them or a text is no number; Unsupported for text; too large.
 pub(super) fn take_values(
-    cursor: &mut Cursor<'_>,
-    encoding: Encoding,
+    cursor: &mut Cursor<'_, '_>,
+    (encoding, budget): (Encoding, MemoryBudget),
     stored: Stored,
     count: usize,
     what: &str,
@@ -166,8 +166,7 @@ pub(super) fn take_values(
             Stored::Bit => ScalarType::U8,
             Stored::Text => return Err(text_is_no_number(what)),
         };
-        let (data, end) = parse_values(cursor.bytes(), cursor.at(), count, scalar)?;
-        cursor.go_to(end);
+        let data = read_values(cursor.text(), count, scalar, budget)?;
         return Ok(Numbers::Decoded(data));
     }
     let at = cursor.at();
@@ -189,7 +188,7 @@ pub(super) fn take_values(
 /// # Errors
 /// Malformed if the file is too short for them.
 pub(super) fn skip_values(
-    cursor: &mut Cursor<'_>,
+    cursor: &mut Cursor<'_, '_>,
     encoding: Encoding,
     stored: Stored,
     count: usize,
@@ -199,31 +198,35 @@ pub(super) fn skip_values(
         return skip_texts(cursor, encoding, count, what);
     }
     if encoding == Encoding::Ascii {
-        let end = skip_words(cursor.bytes(), cursor.at(), count)?;
-        cursor.go_to(end);
-        return Ok(());
+        return skip_words(cursor.text(), count);
     }
     let scalar = match stored {
         Stored::Scalar(scalar) => scalar,
         Stored::Either(usual, other) => likelier(cursor, usual, other, count),
         Stored::Bit | Stored::Text => {
-            return read_bit_bytes(cursor, count, what).map(|_| ());
+            return read_bit_bytes(cursor, count, what);
         }
     };
-    take_numbers(cursor, scalar, count, what).map(|_| ())
+    take_numbers(cursor, scalar, count, what)
 }
 
 /// The type of the two after whose payload the file goes on sensibly; the usual one in doubt.
-fn likelier(cursor: &Cursor<'_>, usual: ScalarType, other: ScalarType, count: usize) -> ScalarType {
-    let goes_on = |scalar: ScalarType| {
-        let mut ahead = cursor.clone();
-        let skipped = count.checked_mul(scalar.size()).and_then(|n| ahead.take(n));
-        skipped.is_some()
-            && match ahead.keyword_line() {
-                Ok(Some(line)) => is_section_start(&line),
-                Ok(None) => true,
-                Err(_) => false,
-            }
+fn likelier(
+    cursor: &mut Cursor<'_, '_>,
+    usual: ScalarType,
+    other: ScalarType,
+    count: usize,
+) -> ScalarType {
+    let mut goes_on = |scalar: ScalarType| {
+        cursor.ahead(|ahead| {
+            let skipped = count.checked_mul(scalar.size()).and_then(|n| ahead.take(n));
+            skipped.is_some()
+                && match ahead.keyword_line() {
+                    Ok(Some(line)) => is_section_start(&line),
+                    Ok(None) => true,
+                    Err(_) => false,
+                }
+        })
     };
     if !goes_on(usual) && goes_on(other) {
         other
@@ -232,12 +235,12 @@ fn likelier(cursor: &Cursor<'_>, usual: ScalarType, other: ScalarType, count: us
     }
 }
 
-fn take_numbers<'a>(
-    cursor: &mut Cursor<'a>,
+fn take_numbers(
+    cursor: &mut Cursor<'_, '_>,
     scalar: ScalarType,
     count: usize,
     what: &str,
-) -> Result<&'a [u8], ParseError> {
+) -> Result<(), ParseError> {
     let bytes = count.checked_mul(scalar.size());
     bytes.and_then(|bytes| cursor.take(bytes)).ok_or_else(|| {
         ParseError::malformed(
@@ -252,11 +255,7 @@ fn take_numbers<'a>(
     })
 }
 
-fn read_bit_bytes<'a>(
-    cursor: &mut Cursor<'a>,
-    count: usize,
-    what: &str,
-) -> Result<&'a [u8], ParseError> {
+fn read_bit_bytes(cursor: &mut Cursor<'_, '_>, count: usize, what: &str) -> Result<(), ParseError> {
     let bytes = count.div_ceil(8);
     cursor.take(bytes).ok_or_else(|| {
         ParseError::malformed(
@@ -282,7 +281,7 @@ fn unpack_bits(packed: &[u8], count: usize) -> AttributeData {
 /// Strings: a line each, or in binary a length of 1, 2, 4 or 8 bytes (told by the two highest bits)
 /// and the text.
 fn skip_texts(
-    cursor: &mut Cursor<'_>,
+    cursor: &mut Cursor<'_, '_>,
     encoding: Encoding,
     count: usize,
     what: &str,
@@ -302,7 +301,7 @@ fn skip_texts(
     Ok(())
 }
 
-fn skip_binary_text(cursor: &mut Cursor<'_>) -> Option<()> {
+fn skip_binary_text(cursor: &mut Cursor<'_, '_>) -> Option<()> {
     let first = *cursor.rest().first()?;
     let width = match first >> 6 {
         3 => 1,
@@ -311,11 +310,12 @@ fn skip_binary_text(cursor: &mut Cursor<'_>) -> Option<()> {
         _ => 8,
     };
     let mut length = 0_u64;
-    for (index, byte) in cursor.take(width)?.iter().enumerate() {
+    for (index, byte) in cursor.rest().get(..width)?.iter().enumerate() {
         let byte = if index == 0 { byte & 0x3f } else { *byte };
         length = length << 8 | u64::from(byte);
     }
-    cursor.take(usize::try_from(length).ok()?).map(|_| ())
+    cursor.take(width)?;
+    cursor.take(usize::try_from(length).ok()?)
 }
 
 fn text_is_no_number(what: &str) -> ParseError {

@@ -7,7 +7,8 @@ use super::keywords::{is_keyword, is_section_start, is_time_name, parse_version}
 use super::payload::{
     Encoding, Numbers, Stored, skip_values, stored_type, take_values, value_count,
 };
-use crate::ParseError;
+use crate::read::input::TextInput;
+use crate::{MemoryBudget, ParseError};
 
 /// How far to walk.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -42,8 +43,10 @@ pub(super) struct PointArray {
 }
 
 /// The walk through the file and what it has found so far.
-pub(super) struct Walker<'a> {
-    cursor: Cursor<'a>,
+pub(super) struct Walker<'c, 'a> {
+    cursor: Cursor<'c, 'a>,
+    /// What numbers that are text may still take.
+    budget: MemoryBudget,
     encoding: Encoding,
     major: u32,
     section: Section,
@@ -55,15 +58,20 @@ pub(super) struct Walker<'a> {
     pub(super) time: Option<f64>,
 }
 
-impl<'a> Walker<'a> {
-    /// Reads the first three lines.
-    pub(super) fn begin(bytes: &'a [u8]) -> Result<Self, ParseError> {
-        let mut cursor = Cursor::new(bytes);
-        let ended = || ParseError::malformed(bytes.len(), "the file ends inside its header");
-        let first = cursor.line()?.ok_or_else(ended)?;
+impl<'c, 'a> Walker<'c, 'a> {
+    /// Reads the first three lines of `text`, whose numbers may take as much as `budget`.
+    pub(super) fn begin(
+        text: &'c mut TextInput<'a>,
+        budget: MemoryBudget,
+    ) -> Result<Self, ParseError> {
+        let mut cursor = Cursor::new(text);
+        let ended =
+            |at: usize| move || ParseError::malformed(at, "the file ends inside its header");
+        let first = cursor.line()?.ok_or_else(ended(cursor.at()))?;
         let major = parse_version(&first)?;
-        let _title = cursor.line()?.ok_or_else(ended)?;
-        let kind = cursor.keyword_line()?.ok_or_else(ended)?;
+        let _title = cursor.line()?.ok_or_else(ended(cursor.at()))?;
+        let kind = cursor.keyword_line()?;
+        let kind = kind.ok_or_else(ended(cursor.at()))?;
         let encoding = if kind.starts_with("BINARY") {
             Encoding::Binary
         } else if kind.starts_with("ASCII") {
@@ -76,6 +84,7 @@ impl<'a> Walker<'a> {
         };
         Ok(Self {
             cursor,
+            budget,
             encoding,
             major,
             section: Section::Dataset,
@@ -119,7 +128,7 @@ impl<'a> Walker<'a> {
         Ok(())
     }
 
-    fn dataset(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn dataset(&mut self, line: &Line) -> Result<(), ParseError> {
         let words = line.words();
         let kind = words
             .get(1)
@@ -145,7 +154,7 @@ impl<'a> Walker<'a> {
         }
     }
 
-    fn points(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn points(&mut self, line: &Line) -> Result<(), ParseError> {
         if !self.dataset_named {
             return Err(ParseError::malformed(line.at, "POINTS before DATASET"));
         }
@@ -157,13 +166,13 @@ impl<'a> Walker<'a> {
         let name = words.get(2).copied().unwrap_or_default();
         let stored = stored_type(line.at, name)?;
         let values = value_count(line.at, count, 3)?;
-        let numbers = take_values(&mut self.cursor, self.encoding, stored, values, "POINTS")?;
+        let numbers = self.take(stored, values, "POINTS")?;
         self.points = Some(Points { count, numbers });
         self.components = 3;
         Ok(())
     }
 
-    fn point_data(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn point_data(&mut self, line: &Line) -> Result<(), ParseError> {
         let stated = count(line, line.words().get(1))?;
         match self.points.as_ref().map(|points| points.count) {
             Some(particles) if particles == stated => {
@@ -180,7 +189,7 @@ impl<'a> Walker<'a> {
 
     /// Cells of any kind. Up to version 4.2 the second number counts integers; from 5.0 on the two
     /// numbers are the lengths of an OFFSETS and a CONNECTIVITY array.
-    fn cells(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn cells(&mut self, line: &Line) -> Result<(), ParseError> {
         let words = line.words();
         let first = count(line, words.get(1))?;
         let second = count(line, words.get(2))?;
@@ -208,15 +217,25 @@ impl<'a> Walker<'a> {
         Ok(())
     }
 
-    fn skip(&mut self, line: &Line<'_>, name: &str, values: usize) -> Result<(), ParseError> {
+    fn skip(&mut self, line: &Line, name: &str, values: usize) -> Result<(), ParseError> {
         let stored = stored_type(line.at, name.as_bytes())?;
         let what = line.shown();
         self.components = 1;
         skip_values(&mut self.cursor, self.encoding, stored, values, &what)
     }
 
+    /// Finds `values` numbers; those that were read are no longer in the budget.
+    fn take(&mut self, stored: Stored, values: usize, what: &str) -> Result<Numbers, ParseError> {
+        let how = (self.encoding, self.budget);
+        let numbers = take_values(&mut self.cursor, how, stored, values, what)?;
+        if let Numbers::Decoded(data) = &numbers {
+            self.budget = self.budget.less(data.byte_len());
+        }
+        Ok(numbers)
+    }
+
     /// `LOOKUP_TABLE name size`: RGBA, bytes in binary.
-    fn lookup_table(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn lookup_table(&mut self, line: &Line) -> Result<(), ParseError> {
         let words = line.words();
         let colors = count(line, words.last())?;
         let values = value_count(line.at, colors, 4)?;
@@ -225,22 +244,26 @@ impl<'a> Walker<'a> {
 
     /// `FIELD name k` and its arrays. Fewer than `k` may follow: SPlisHSPlasH counts arrays that
     /// it does not write.
-    fn field(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn field(&mut self, line: &Line) -> Result<(), ParseError> {
         let arrays = count(line, line.words().last())?;
         let mut done = 0;
         while done < arrays {
-            let before = self.cursor.clone();
-            let Some(next) = self.cursor.keyword_line()? else {
+            self.cursor.text().pass_blanks();
+            let Some(next) = self.cursor.ahead(|cursor| cursor.line())? else {
                 return Ok(());
             };
+            if is_keyword(next.first_word())
+                && field_array(&next).is_none()
+                && !next.starts_with("METADATA")
+            {
+                return Ok(());
+            }
+            self.cursor.line()?;
             if let Some(header) = field_array(&next) {
                 self.array(&next, header)?;
             } else if next.starts_with("METADATA") {
                 self.metadata()?;
                 continue;
-            } else if is_keyword(next.first_word()) {
-                self.cursor = before;
-                return Ok(());
             } else if !next.starts_with("NULL_ARRAY") {
                 return Err(ParseError::malformed(
                     next.at,
@@ -252,7 +275,7 @@ impl<'a> Walker<'a> {
         Ok(())
     }
 
-    fn attribute(&mut self, line: &Line<'_>) -> Result<(), ParseError> {
+    fn attribute(&mut self, line: &Line) -> Result<(), ParseError> {
         match keyword_array(line, &mut self.cursor, self.encoding)? {
             Some(header) => self.array(line, header),
             None => Err(ParseError::malformed(
@@ -263,7 +286,7 @@ impl<'a> Walker<'a> {
     }
 
     /// Takes the payload of one array and keeps it if it is numeric and per particle.
-    fn array(&mut self, line: &Line<'_>, header: Header) -> Result<(), ParseError> {
+    fn array(&mut self, line: &Line, header: Header) -> Result<(), ParseError> {
         let Header {
             name,
             components,
@@ -300,7 +323,7 @@ impl<'a> Walker<'a> {
         if stored == Stored::Text || components == 0 || !(is_ours || is_time) {
             return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
         }
-        let numbers = take_values(&mut self.cursor, self.encoding, stored, values, &what)?;
+        let numbers = self.take(stored, values, &what)?;
         let numbers = match line.first_word().eq_ignore_ascii_case(b"COLOR_SCALARS") {
             true => numbers.into_color_codes(),
             false => numbers,
@@ -322,25 +345,26 @@ impl<'a> Walker<'a> {
     /// array of the FIELD.
     fn metadata(&mut self) -> Result<(), ParseError> {
         loop {
-            let before = self.cursor.clone();
-            let Some(line) = self.cursor.line()? else {
+            let Some(line) = self.cursor.ahead(|cursor| cursor.line())? else {
                 return Ok(());
             };
-            if line.starts_with("COMPONENT_NAMES") {
+            let is_names = line.starts_with("COMPONENT_NAMES");
+            if !is_names && is_section_start(&line) {
+                return Ok(());
+            }
+            self.cursor.line()?;
+            if is_names {
                 for _ in 0..self.components {
                     if self.cursor.line()?.is_none() {
                         return Ok(());
                     }
                 }
-            } else if is_section_start(&line) {
-                self.cursor = before;
-                return Ok(());
             }
         }
     }
 
-    fn next_is(&self, keyword: &str) -> bool {
-        let next = self.cursor.clone().keyword_line();
+    fn next_is(&mut self, keyword: &str) -> bool {
+        let next = self.cursor.ahead(|cursor| cursor.keyword_line());
         matches!(next, Ok(Some(line)) if line.starts_with(keyword))
     }
 }

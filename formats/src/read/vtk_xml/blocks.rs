@@ -13,7 +13,7 @@ use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use rayon::prelude::*;
 
 use super::compressor::Compressor;
-use crate::Endian;
+use crate::{Endian, MemoryBudget, ParseError};
 
 /// Padding may be missing at the end of a run; bits beyond the last byte do not matter.
 const BASE64: GeneralPurpose = GeneralPurpose::new(
@@ -29,6 +29,29 @@ pub(super) struct Encoding {
     pub(super) endian: Endian,
     pub(super) header: HeaderType,
     pub(super) compressor: Option<Compressor>,
+    /// What decoders may take beside their output.
+    pub(super) decoders: MemoryBudget,
+}
+
+/// Why an array cannot be had.
+#[derive(Debug)]
+pub(super) enum Fault {
+    /// What is wrong with its bytes.
+    Damaged(String),
+    /// It needs too much memory.
+    TooLarge(ParseError),
+}
+
+impl From<String> for Fault {
+    fn from(what: String) -> Self {
+        Self::Damaged(what)
+    }
+}
+
+impl From<&str> for Fault {
+    fn from(what: &str) -> Self {
+        Self::Damaged(what.to_owned())
+    }
 }
 
 /// The integers in headers.
@@ -150,16 +173,16 @@ fn take_chars(chars: &[u8], count: usize) -> (Cow<'_, [u8]>, &[u8]) {
 ///
 /// # Errors
 /// What is wrong: the header states another length, the source is too short, or a block is damaged.
-/// Nothing is allocated that the bytes at hand could not fill.
+/// Nothing is allocated that the bytes at hand could not fill, or that decoders may not take.
 pub(super) fn payload<'a>(
     source: Source<'a>,
     encoding: Encoding,
     need: usize,
-) -> Result<(Cow<'a, [u8]>, usize), String> {
+) -> Result<(Cow<'a, [u8]>, usize), Fault> {
     let (bytes, rest) = match encoding.compressor {
-        None => plain(source, encoding, need),
-        Some(compressor) => compressed(source, encoding, compressor, need),
-    }?;
+        None => plain(source, encoding, need)?,
+        Some(compressor) => compressed(source, encoding, compressor, need)?,
+    };
     Ok((bytes, source.len() - rest.len()))
 }
 
@@ -191,7 +214,7 @@ fn compressed<'a>(
     encoding: Encoding,
     compressor: Compressor,
     need: usize,
-) -> Result<Payload<'a>, String> {
+) -> Result<Payload<'a>, Fault> {
     let size = encoding.header.size();
     let (first, rest) = source.run(size)?;
     let blocks = integers(&first, encoding).next().unwrap_or(0);
@@ -199,7 +222,7 @@ fn compressed<'a>(
         // Some writers leave out the other two integers then.
         return match need {
             0 => Ok((Cow::Borrowed(&[]), rest)),
-            _ => Err(format!("{need} bytes needed, there are no blocks")),
+            _ => Err(format!("{need} bytes needed, there are no blocks").into()),
         };
     }
     let header = usize::try_from(blocks)
@@ -217,7 +240,7 @@ fn inflate<'a>(
     encoding: Encoding,
     compressor: Compressor,
     need: usize,
-) -> Result<Payload<'a>, String> {
+) -> Result<Payload<'a>, Fault> {
     let mut header = integers(header, encoding);
     let (_, block_size, last) = (header.next(), header.next(), header.next());
     let block_size = block_size.unwrap_or(0);
@@ -234,7 +257,8 @@ fn inflate<'a>(
         return Err(format!(
             "{need} bytes needed, the header says {full_blocks} blocks of {block_size} and one of \
              {last}"
-        ));
+        )
+        .into());
     }
     let block_size = usize::try_from(block_size).unwrap_or(usize::MAX).min(need);
     let compressed_total = compressed_sizes
@@ -249,18 +273,51 @@ fn inflate<'a>(
         let (block, behind) = rest.split_at_checked(size).ok_or("a block is cut short")?;
         let output = block_size.min(left);
         if output > compressor.most_output(size) {
-            return Err(format!("{size} compressed bytes cannot hold {output}"));
+            return Err(format!("{size} compressed bytes cannot hold {output}").into());
         }
         blocks.push(block);
         rest = behind;
         left -= output;
     }
+    let each = decoder_bytes(&blocks, compressor, encoding.decoders)?;
+    // As many at a time as may take that much.
+    let at_once = encoding.decoders.bytes().checked_div(each);
+    let at_once = at_once.map_or(usize::MAX, |n| usize::try_from(n).unwrap_or(usize::MAX));
+    let at_once = at_once.clamp(1, blocks.len());
     let mut output = vec![0; need];
-    output
-        .par_chunks_mut(block_size)
-        .zip(blocks)
-        .try_for_each(|(chunk, block)| compressor.decompress(block, chunk))?;
+    let groups = output.chunks_mut(block_size.saturating_mul(at_once));
+    for (chunks, blocks) in groups.zip(blocks.chunks(at_once)) {
+        let memory = encoding.decoders.bytes();
+        chunks
+            .par_chunks_mut(block_size)
+            .zip(blocks)
+            .try_for_each(|(chunk, block)| compressor.decompress(block, chunk, memory))?;
+    }
     Ok((Cow::Owned(output), behind_data))
+}
+
+/// The most that decompressing one of `blocks` takes beside its output.
+///
+/// # Errors
+/// [`Fault::TooLarge`] if that is more than `budget`.
+fn decoder_bytes(
+    blocks: &[&[u8]],
+    compressor: Compressor,
+    budget: MemoryBudget,
+) -> Result<u64, Fault> {
+    let each = blocks.iter().map(|block| compressor.memory(block));
+    let each = each.max().unwrap_or(0);
+    let what = format!("a compressed block needs {} MiB", each.div_ceil(1 << 20));
+    let most = Compressor::MOST_MEMORY;
+    if each > most {
+        return Err(Fault::Damaged(format!(
+            "{what} for its dictionary, presets of xz no more than {} MiB; write it with a preset",
+            most >> 20
+        )));
+    }
+    let what = format!("{what} for its dictionary, which is");
+    budget.check(each, &what).map_err(Fault::TooLarge)?;
+    Ok(each)
 }
 
 /// The integers of a header.

@@ -8,9 +8,8 @@ use lzma_rust2::XzReader;
 use super::document::short;
 use crate::ParseError;
 
-/// LZMA decoders allocate the dictionary that the block asks for; the largest preset of xz (64 MiB)
-/// stays below this.
-const XZ_MEMORY_KIB: u32 = 80 * 1024;
+/// Bytes that an LZMA decoder takes beside its dictionary: probabilities and a buffer.
+const XZ_DECODER: u64 = 128 << 10;
 
 /// How blocks are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -24,6 +23,10 @@ pub(super) enum Compressor {
 }
 
 impl Compressor {
+    /// Bytes that no block may take beside its output: LZMA decoders allocate the dictionary that the block asks for;
+    /// the largest preset of xz (64 MiB) stays below this.
+    pub(super) const MOST_MEMORY: u64 = 80 << 20;
+
     /// The compressor that VTK calls `name`.
     ///
     /// # Errors
@@ -52,8 +55,21 @@ impl Compressor {
         compressed.saturating_mul(ratio)
     }
 
-    /// Decompresses one block that must fill `output` exactly.
-    pub(super) fn decompress(self, block: &[u8], output: &mut [u8]) -> Result<(), String> {
+    /// Bytes that decompressing `block` takes beside its output.
+    pub(super) fn memory(self, block: &[u8]) -> u64 {
+        match self {
+            Self::Zlib | Self::Lz4 => 0,
+            Self::Xz => xz_dictionary(block).map_or(0, |dictionary| dictionary + XZ_DECODER),
+        }
+    }
+
+    /// Decompresses one block that must fill `output` exactly, in no more than `memory` bytes beside it.
+    pub(super) fn decompress(
+        self,
+        block: &[u8],
+        output: &mut [u8],
+        memory: u64,
+    ) -> Result<(), String> {
         let wanted = output.len();
         let written = match self {
             Self::Zlib => {
@@ -71,7 +87,9 @@ impl Compressor {
             Self::Lz4 => lz4_flex::block::decompress_into(block, output)
                 .map_err(|error| format!("lz4: {error}"))?,
             Self::Xz => {
-                let mut xz = XzReader::new_mem_limit(block, false, XZ_MEMORY_KIB);
+                let kib = memory.min(Self::MOST_MEMORY) >> 10;
+                let kib = u32::try_from(kib).unwrap_or(u32::MAX);
+                let mut xz = XzReader::new_mem_limit(block, false, kib);
                 xz.read_exact(output)
                     .map_err(|error| format!("xz: {error}"))?;
                 // Reading on to the end also verifies the checksum.
@@ -87,4 +105,50 @@ impl Compressor {
             ))
         }
     }
+}
+
+/// The dictionary, in bytes, that the first block of the xz stream `stream` asks for; none if its header is damaged,
+/// which the decoder finds out. ("The .xz File Format", sections 2.1.1, 3.1 and 5.3.1.)
+fn xz_dictionary(stream: &[u8]) -> Option<u64> {
+    const STREAM_HEADER: usize = 12;
+    const LZMA2: u64 = 0x21;
+    let (size, mut header) = stream.get(STREAM_HEADER..)?.split_first()?;
+    header = header.get(..4 * usize::from(*size))?;
+    let flags = take(&mut header, 1)?[0];
+    // Compressed and uncompressed size, where they are stated.
+    for stated in [0x40, 0x80] {
+        if flags & stated != 0 {
+            xz_integer(&mut header)?;
+        }
+    }
+    for _ in 0..=flags & 3 {
+        let filter = xz_integer(&mut header)?;
+        let len = usize::try_from(xz_integer(&mut header)?).ok()?;
+        let properties = take(&mut header, len)?;
+        if filter == LZMA2 {
+            // Two and three times powers of two, from 4 KiB to 4 GiB.
+            let bits = u64::from(*properties.first()? & 0x3f).min(40);
+            return Some((2 + bits % 2) << (bits / 2 + 11));
+        }
+    }
+    None
+}
+
+/// Seven bits a byte, the lowest first.
+fn xz_integer(bytes: &mut &[u8]) -> Option<u64> {
+    let mut value = 0;
+    for shift in (0..63).step_by(7) {
+        let byte = take(bytes, 1)?[0];
+        value |= u64::from(byte & 0x7f) << shift;
+        if byte & 0x80 == 0 {
+            return Some(value);
+        }
+    }
+    None
+}
+
+fn take<'a>(bytes: &mut &'a [u8], count: usize) -> Option<&'a [u8]> {
+    let (taken, rest) = bytes.split_at_checked(count)?;
+    *bytes = rest;
+    Some(taken)
 }

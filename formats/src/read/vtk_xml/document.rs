@@ -12,7 +12,7 @@ use quick_xml::reader::Reader;
 
 use super::blocks::{Encoding, HeaderType};
 use super::compressor::Compressor;
-use crate::{Endian, ParseError};
+use crate::{Endian, MemoryBudget, ParseError};
 
 /// What the XML says.
 #[derive(Debug)]
@@ -263,6 +263,7 @@ fn root(start: &BytesStart<'_>, at: usize) -> Result<Encoding, ParseError> {
         endian,
         header,
         compressor,
+        decoders: MemoryBudget::UNLIMITED,
     })
 }
 

@@ -21,7 +21,7 @@ use super::text::same_length;
 use super::vtk::{MOST_COMPONENTS, parse_values};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
-use blocks::{Encoding, Source, payload};
+use blocks::{Encoding, Fault, Source, payload};
 use document::{Array, Document, Place, Until, short};
 
 /// The one time step that `bytes` hold, with the time if a `TimeValue` before the pieces tells it.
@@ -29,9 +29,10 @@ use document::{Array, Document, Place, Until, short};
 ///
 /// # Errors
 /// None at present.
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+pub fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut step = Step::whole(bytes.len());
-    step.time = parse(bytes, Until::FirstPiece, |document, appended| {
+    step.time = parse(bytes, Until::FirstPiece, |mut document, appended| {
+        document.encoding.decoders = budget;
         Ok(time(&document, appended))
     })
     .unwrap_or_default();
@@ -43,20 +44,12 @@ pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
-/// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
-pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    read_within(bytes, step, MemoryBudget::UNLIMITED)
-}
-
-/// [`read`] within a budget.
-pub(crate) fn read_within(
-    bytes: &[u8],
-    _step: &Step,
-    budget: MemoryBudget,
-) -> Result<RawParticles, ParseError> {
-    parse(bytes, Until::End, |document, appended| {
+/// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor,
+/// [`ParseError::TooLarge`] if that needs more than `budget`.
+pub fn read(bytes: &[u8], _step: &Step, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
+    parse(bytes, Until::End, |mut document, appended| {
         check_shares(&document, appended)?;
-        check_memory(&document, budget)?;
+        document.encoding.decoders = check_memory(&document, budget)?;
         Ok(RawParticles {
             positions: merge::positions(&document, appended)?,
             attributes: merge::attributes(&document, appended)?,
@@ -136,14 +129,15 @@ fn check_shares(document: &Document<'_>, appended: Option<Appended<'_>>) -> Resu
     Ok(())
 }
 
-/// Refuses arrays that together take more memory than is allowed, before any is unpacked.
-fn check_memory(document: &Document<'_>, budget: MemoryBudget) -> Result<(), ParseError> {
+/// Refuses arrays that together take more memory than is allowed, before any is unpacked. Returns what is left.
+fn check_memory(document: &Document<'_>, budget: MemoryBudget) -> Result<MemoryBudget, ParseError> {
     let sizes = array_sizes(document).map(|(_, bytes)| bytes as u64);
     let need = sizes.fold(0, u64::saturating_add);
     // The largest is there twice: as bytes, and as numbers.
     let largest = array_sizes(document).map(|(_, bytes)| bytes as u64).max();
     let need = need.saturating_add(largest.unwrap_or(0));
-    budget.check(need, "decompressed its arrays are")
+    budget.check(need, "decompressed its arrays are")?;
+    Ok(budget.less(need))
 }
 
 /// The numeric arrays and the bytes that their numbers take.
@@ -160,6 +154,9 @@ fn array_sizes<'d, 'a>(document: &'d Document<'a>) -> impl Iterator<Item = (&'d 
     })
 }
 
+/// A field of times has no more numbers: it is read before anything is known of the rest.
+const MOST_TIMES: usize = 1 << 16;
+
 /// The simulation time, if a field tells one. It is extra: a damaged field costs only the time.
 fn time(document: &Document<'_>, appended: Option<Appended<'_>>) -> Option<f64> {
     let is_time = |array: &&Array<'_>| {
@@ -171,7 +168,8 @@ fn time(document: &Document<'_>, appended: Option<Appended<'_>>) -> Option<f64> 
     let count = array
         .tuples
         .unwrap_or(1)
-        .checked_mul(array.components.unwrap_or(1))?;
+        .checked_mul(array.components.unwrap_or(1))
+        .filter(|count| *count <= MOST_TIMES)?;
     let data = values(array, document.encoding, appended, count).ok()??;
     (!data.is_empty()).then(|| data.get_f64(0))
 }
@@ -251,7 +249,12 @@ fn values(
             (appended.at + offset, source)
         }
     };
-    let (bytes, used) = payload(source, encoding, need).map_err(|what| fault(at, what))?;
+    let (bytes, used) = payload(source, encoding, need).map_err(|why| match why {
+        Fault::Damaged(what) => fault(at, what),
+        Fault::TooLarge(error) => {
+            error.retold(|what| format!("array `{}`: {what}", short(&array.name)))
+        }
+    })?;
     let is_appended = matches!(array.place, Place::Appended(_));
     if is_appended && !appended.is_none_or(|appended| appended.spend(used)) {
         let what = "it shares its bytes with too many others; each array needs bytes of its own";

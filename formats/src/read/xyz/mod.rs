@@ -5,7 +5,7 @@
 //! table ([`super::csv`]).
 
 use super::columns::{Column, Lane, ParticleLayout};
-use super::table::CUT_SHORT;
+use super::input::TextInput;
 use super::text::{self, Lines};
 use super::{Step, csv};
 use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
@@ -77,41 +77,40 @@ pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
     Err(ParseError::malformed(start, what))
 }
 
-/// The time steps that `bytes` hold: one for each frame of molecular text. A last one that is cut
+/// The time steps that `text` holds: one for each frame of molecular text. A last one that is cut
 /// short is listed, so that reading it can say so.
 ///
 /// # Errors
-/// As [`kind`].
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    Ok(match kind(bytes)? {
-        Kind::Raw => vec![Step::whole(bytes.len())],
-        Kind::Molecular => molecular::steps(bytes, text_start(bytes)),
-        Kind::Bare => csv::steps(bytes)?,
-    })
+/// As [`kind`]; [`ParseError::TooLarge`] if the list of steps needs more than `budget`.
+pub(crate) fn steps(
+    text: &mut TextInput<'_>,
+    budget: MemoryBudget,
+) -> Result<Vec<Step>, ParseError> {
+    let head = text.head();
+    match kind(head)? {
+        Kind::Raw => Ok(vec![Step::whole(head.len())]),
+        Kind::Molecular => {
+            text.go_to(text_start(head));
+            molecular::steps(text, budget)
+        }
+        Kind::Bare => csv::steps(text),
+    }
 }
 
 /// Reads one of the [`steps`].
 ///
 /// # Errors
-/// [`ParseError::Malformed`] if the step is cut short or breaks its format.
-pub fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    read_within(bytes, step, MemoryBudget::UNLIMITED)
-}
-
-/// [`read`] within a budget.
-pub(crate) fn read_within(
-    bytes: &[u8],
+/// [`ParseError::Malformed`] if the step is cut short or breaks its format, [`ParseError::TooLarge`] beyond `budget`.
+pub(crate) fn read(
+    text: &mut TextInput<'_>,
     step: &Step,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
-    if bytes.len() < step.span.end {
-        let what = format!("the step ends at {}: {CUT_SHORT}", step.span.end);
-        return Err(ParseError::malformed(bytes.len(), what));
-    }
-    match kind(bytes)? {
-        Kind::Raw => raw_layout(bytes).particles(bytes),
-        Kind::Molecular => molecular::read(bytes, step.span.clone(), budget),
-        Kind::Bare => csv::read_within(bytes, step, budget),
+    let head = text.head();
+    match kind(head)? {
+        Kind::Raw => raw_layout(head).particles(head),
+        Kind::Molecular => molecular::read(text, step.span.clone(), budget),
+        Kind::Bare => csv::read(text, budget),
     }
 }
 

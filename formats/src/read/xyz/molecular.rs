@@ -4,96 +4,106 @@ use std::ops::Range;
 
 use super::comment;
 use crate::read::Step;
+use crate::read::input::TextInput;
 use crate::read::table::{
-    CUT_SHORT, Comments, Decimal, Dialect, Numbers, OnText, Place, Separator, Surplus, Table,
-    Target,
+    CUT_SHORT, Comments, Decimal, Dialect, Numbers, OnText, Place, RowsRead, Separator, Surplus,
+    Table, Target, most_rows,
 };
-use crate::read::text::{self, Line, Lines};
+use crate::read::text::{self, Line};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
-/// The frames from byte `start` on. Where a count should be and is not, the rest of the file is
+/// The frames of `text`. Where a count should be and is not, the rest of the file is
 /// one last step, so that reading it can say so.
-pub(super) fn steps(bytes: &[u8], start: usize) -> Vec<Step> {
+pub(super) fn steps(
+    text: &mut TextInput<'_>,
+    budget: MemoryBudget,
+) -> Result<Vec<Step>, ParseError> {
     let mut steps = Vec::new();
-    let mut lines = Lines::new(bytes, start..bytes.len());
-    while let Some(line) = lines.next() {
+    while let Some(line) = text.line() {
         if line.is_blank() {
             continue;
         }
-        let mut step = Step {
-            index: steps.len(),
-            span: line.at..bytes.len(),
-            number: None,
-            time: None,
+        let (at, count) = (line.at, count(line));
+        let comment = match count {
+            Ok(_) => text.line().map(|comment| (number(comment), time(comment))),
+            Err(_) => None,
         };
-        if let Ok(count) = count(line) {
-            if let Some(comment) = lines.next() {
-                step.number = number(comment);
-                step.time = time(comment);
-            }
-            lines.pass(count);
-            step.span.end = lines.at();
-            steps.push(step);
-        } else {
-            steps.push(step);
-            break;
+        text.pass_lines(count.as_ref().map_or(usize::MAX, |count| *count));
+        Step::push(&mut steps, at..text.at(), budget)?;
+        if let (Some(step), Some(comment)) = (steps.last_mut(), comment) {
+            (step.number, step.time) = comment;
         }
     }
-    steps
+    Ok(steps)
 }
 
 /// Reads the frame in `span`.
 pub(super) fn read(
-    bytes: &[u8],
+    text: &mut TextInput<'_>,
     span: Range<usize>,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
-    let mut lines = Lines::new(bytes, span);
+    text.go_to(span.start);
+    text.end_at(span.end);
     let too_short = |at, what: String| ParseError::malformed(at, format!("{what}: {CUT_SHORT}"));
-    let Some(first) = lines.find(|line| !line.is_blank()) else {
-        return Err(too_short(lines.at(), "no particle count".into()));
+    text.pass_blank_lines(usize::MAX);
+    let Some(first) = text.line() else {
+        return Err(too_short(text.at(), "no particle count".into()));
     };
-    let count = count(first)?;
-    let Some(comment) = lines.next() else {
-        return Err(too_short(lines.at(), "no comment after the count".into()));
+    let (count_at, count) = (first.at, count(first)?);
+    let Some(comment) = text.line() else {
+        return Err(too_short(text.at(), "no comment after the count".into()));
     };
-    let start = lines.at();
-    let found = lines.pass(count);
+    let (number, time) = (number(comment), time(comment));
+    let comment_at = comment.at;
+    let properties = comment::value(comment.text, "Properties").map(<[u8]>::to_vec);
+    let size = text.left_about();
+    let blank = text.pass_blank_lines(count);
+    let most = count - blank;
+    let first = if most > 0 { text.peek_line() } else { None };
+    let columns = match properties {
+        Some(properties) => {
+            let size = if count > 0 { size } else { 0 };
+            let first = first.map(|line| line.text);
+            extended_columns(&properties, comment_at, (size, budget), first)
+        }
+        None => plain_columns(first, budget),
+    };
+    let rows = match columns {
+        Ok((fields, targets)) => {
+            let table = Table {
+                dialect: DIALECT,
+                rows: most_rows(text.left_about(), fields.len()).min(count),
+                fields,
+                targets,
+            };
+            table.particles(text, most, budget)
+        }
+        Err(error) => RowsRead::without(error, text, most),
+    };
+    let found = blank + rows.lines;
     if found < count {
         let what = format!("{count} particles announced, {found} lines follow");
-        return Err(too_short(first.at, what));
+        return Err(too_short(count_at, what));
     }
-    let rows = start..lines.at();
-    let (fields, targets) = match comment::value(comment.text, "Properties") {
-        Some(properties) => {
-            let first = Lines::new(bytes, rows.clone()).find(|line| !line.is_blank());
-            let first = first.map(|line| line.text);
-            extended_columns(properties, comment.at, rows.len(), first)?
-        }
-        None => plain_columns(bytes, &rows)?,
-    };
-    let table = Table {
-        bytes,
-        span: rows,
-        dialect: DIALECT,
-        fields,
-        targets,
-    };
-    let (positions, attributes) = table.particles(budget)?;
+    let (positions, attributes) = rows.content?;
     if positions.len() != count {
         let what = format!(
             "{count} particles announced, {} found: blank lines between them",
             positions.len()
         );
-        return Err(ParseError::malformed(first.at, what));
+        return Err(ParseError::malformed(count_at, what));
     }
     Ok(RawParticles {
         positions,
         attributes,
-        time: time(comment),
-        step: number(comment),
+        time,
+        step: number,
     })
 }
+
+/// Bytes that a column takes on the way to its array, with its name.
+const COLUMN: usize = 256;
 
 /// People append remarks to atoms, so more columns than the first atom has are no fault.
 const DIALECT: Dialect = Dialect {
@@ -150,14 +160,14 @@ pub(super) fn name_column(comment: &[u8], first: &[u8]) -> Option<usize> {
 
 /// The columns of plain text by the first atom: element (an attribute `type` if it is a number in
 /// every line, numbers for the names if it is one there), x, y, z, and `column_5`... for what follows.
-fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseError> {
+fn plain_columns(first: Option<Line<'_>>, budget: MemoryBudget) -> Result<Columns, ParseError> {
     let mut targets = vec![
         Target::positions(),
         Target::attribute("type", 1, Numbers::WholeIfAll, OnText::LeaveOut),
     ];
     let place = |target, component| Some(Place { target, component });
     let mut fields = vec![place(1, 0), place(0, 0), place(0, 1), place(0, 2)];
-    let Some(first) = Lines::new(bytes, rows.clone()).find(|line| !line.is_blank()) else {
+    let Some(first) = first else {
         return Ok((fields, targets));
     };
     let columns = text::words(first.text).count();
@@ -168,6 +178,7 @@ fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseErro
         );
         return Err(ParseError::malformed(first.at, what));
     }
+    budget.check((columns * COLUMN) as u64, "what its columns take is")?;
     if name_column(b"", first.text).is_some() {
         targets[1] = Target::category(NAME);
     }
@@ -184,11 +195,12 @@ fn plain_columns(bytes: &[u8], rows: &Range<usize>) -> Result<Columns, ParseErro
     Ok((fields, targets))
 }
 
-/// The columns by `name:type:count` triples, for atoms in `size` bytes that begin with the line `first`.
+/// The columns by `name:type:count` triples, for atoms in `size` bytes that begin with the line `first`. They may take
+/// as much as `budget` allows.
 fn extended_columns(
     properties: &[u8],
     at: usize,
-    size: usize,
+    (size, budget): (usize, MemoryBudget),
     first: Option<&[u8]>,
 ) -> Result<Columns, ParseError> {
     let malformed = |what: String| ParseError::malformed(at, what);
@@ -197,6 +209,7 @@ fn extended_columns(
     let mut positioned = false;
     let parts: Vec<&[u8]> = properties.split(|b| *b == b':').collect();
     let (triples, rest) = parts.as_chunks::<3>();
+    budget.check((triples.len() * COLUMN) as u64, "what its columns take is")?;
     if !rest.is_empty() {
         return Err(malformed(
             "Properties are no name:type:count triples".into(),
@@ -215,6 +228,9 @@ fn extended_columns(
             return Err(malformed(what));
         }
         let columns = if size > 0 { components } else { 0 };
+        let need =
+            (fields.len().saturating_add(columns)).saturating_mul(size_of::<Option<Place>>());
+        budget.check(need as u64, "what its columns take is")?;
         let target = if is_position(name) && !positioned {
             if !matches!(components, 2 | 3) || !kind.eq_ignore_ascii_case(b"R") {
                 return Err(malformed(format!("property {shown} is no position")));

@@ -1,8 +1,18 @@
 use super::*;
 use crate::Positions;
+use crate::detect::Format;
+use crate::read::pieces;
 use crate::read::text_samples::*;
 use glam::DVec3;
 use proptest::prelude::*;
+
+fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    pieces::steps(Format::Xyz, bytes)
+}
+
+fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    pieces::read(Format::Xyz, bytes, step)
+}
 
 #[track_caller]
 fn only(bytes: &[u8]) -> RawParticles {

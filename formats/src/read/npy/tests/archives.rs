@@ -4,7 +4,9 @@ use super::*;
 
 #[test]
 fn archives_hold_the_same_particles() {
-    let ply = crate::read::ply::read(&single("le.ply"), &Step::whole(0)).unwrap();
+    let ply = crate::detect::Format::Ply
+        .read(&single("le.ply"), &Step::whole(0))
+        .unwrap();
     let plain = READER.one(&single("plain.npz"));
     assert_eq!(plain.positions, ply.positions);
     assert_eq!(names(&plain), ["velocities", "ids", "density"]);

@@ -7,7 +7,9 @@ fn all_single_arrays_hold_the_same_particles() {
     let expected = READER.one(&single("pos.npy"));
     assert_eq!(expected.positions.len(), 1200);
     assert!(expected.attributes.is_empty());
-    let ply = crate::read::ply::read(&single("le.ply"), &Step::whole(0)).unwrap();
+    let ply = crate::detect::Format::Ply
+        .read(&single("le.ply"), &Step::whole(0))
+        .unwrap();
     assert_eq!(expected.positions, ply.positions);
     assert_eq!(READER.one(&single("fortran.npy")), expected);
 

@@ -11,8 +11,18 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::*;
+use crate::detect::Format;
 use crate::read::damage::{Reader, attribute, coordinates, mutate, names, numbers, sample};
+use crate::read::pieces;
 use crate::{AttributeData, Positions};
+
+fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    pieces::steps(Format::Npy, bytes)
+}
+
+fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    pieces::read(Format::Npy, bytes, step)
+}
 
 const READER: Reader = Reader { steps, read };
 

@@ -5,8 +5,18 @@ mod damage;
 use proptest::prelude::*;
 
 use super::*;
+use crate::detect::Format;
 use crate::read::damage::{Reader, attribute, coordinates, mutate, names, numbers, sample};
+use crate::read::pieces;
 use crate::{AttributeData, Positions};
+
+fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    pieces::steps(Format::Ply, bytes)
+}
+
+fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    pieces::read(Format::Ply, bytes, step)
+}
 
 const READER: Reader = Reader { steps, read };
 

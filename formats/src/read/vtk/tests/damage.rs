@@ -3,9 +3,8 @@
 use proptest::prelude::*;
 
 use super::made::{Made, NASTY, modern, splish};
-use super::{attribute, good, malformed, parse, sample};
+use super::{attribute, good, malformed, parse, read, sample, steps};
 use crate::read::Step;
-use crate::read::vtk::{read, steps};
 use crate::{AttributeData, ParseError, Positions};
 
 #[test]

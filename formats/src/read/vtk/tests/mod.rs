@@ -6,8 +6,18 @@ mod made;
 
 use glam::{DVec3, Vec3};
 
-use super::{read, steps};
+use crate::detect::Format;
+use crate::read::Step;
+use crate::read::pieces;
 use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
+
+fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    pieces::steps(Format::VtkLegacy, bytes)
+}
+
+fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    pieces::read(Format::VtkLegacy, bytes, step)
+}
 
 fn sample(name: &str) -> Vec<u8> {
     let path = format!("{}/../tests/data/{name}", env!("CARGO_MANIFEST_DIR"));

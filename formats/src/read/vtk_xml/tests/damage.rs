@@ -3,10 +3,9 @@
 use proptest::prelude::*;
 
 use super::made::{Made, Pack, Style, Where, all_styles, made};
-use super::{good, malformed, parse_file, sample};
+use super::{good, malformed, parse_file, read, sample, steps};
 use crate::read::Step;
 use crate::read::vtk_xml::appended::{self, Appended};
-use crate::read::vtk_xml::{read, steps};
 use crate::{AttributeData, ParseError};
 
 #[test]

@@ -4,9 +4,18 @@ mod content;
 mod damage;
 mod made;
 
-use super::{read, steps};
+use crate::detect::Format;
 use crate::read::Step;
+use crate::read::pieces;
 use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
+
+fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
+    pieces::steps(Format::VtkXml, bytes)
+}
+
+fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
+    pieces::read(Format::VtkXml, bytes, step)
+}
 
 fn sample(name: &str) -> Vec<u8> {
     let path = format!("{}/../tests/data/{name}", env!("CARGO_MANIFEST_DIR"));
@@ -61,7 +70,9 @@ fn names(found: &RawParticles) -> Vec<&str> {
 #[test]
 fn every_variant_holds_the_same_particles() {
     let legacy = sample("single_frames/legacy_polydata-4.2.vtk");
-    let truth = crate::read::vtk::read(&legacy, &Step::whole(legacy.len())).unwrap();
+    let truth = Format::VtkLegacy
+        .read(&legacy, &Step::whole(legacy.len()))
+        .unwrap();
     let folder = format!("{}/../tests/data/single_frames", env!("CARGO_MANIFEST_DIR"));
     let mut seen = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
