@@ -459,6 +459,22 @@ fn pixel_sum(radiance: &[Lanes3], coverage: &[Lanes], range: std::ops::Range<usi
 
 #[cfg(test)]
 impl WhittedIntegrator<'_> {
+    /// What the segments of a packet see at depth 1, and the rays that they leave.
+    pub(super) fn shaded(&self, segments: &SegmentPacket) -> (Lanes3, NextRays) {
+        let depth = Depth {
+            number: 1,
+            coherence: Coherence::Incoherent,
+            sees_background: true,
+        };
+        let mut packet = PacketScratch::default();
+        let mut segments = segments.clone();
+        let inside = segments.inside;
+        self.intersect(&mut segments.rays, depth, inside, &mut packet.hits);
+        let (mut next, mut counts) = (NextRays::default(), RayCounts::default());
+        self.shade(&segments, depth, &mut packet, &mut next, &mut counts);
+        (packet.radiance, next)
+    }
+
     /// The radiance at places on the film, 0 to 1 on both axes.
     pub(super) fn radiance_at(&self, films: &[Vec2]) -> (Vec<Vec3>, RayCounts) {
         let mut scratch = Scratch::default();

@@ -40,6 +40,8 @@ mod branch_tests;
 #[cfg(test)]
 mod image_tests;
 #[cfg(test)]
+mod poison_tests;
+#[cfg(test)]
 pub(crate) mod solid;
 #[cfg(test)]
 mod whitted_tests;
