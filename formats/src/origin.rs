@@ -25,7 +25,7 @@ pub fn choose_origin(min: DVec3, max: DVec3) -> DVec3 {
         if centre.abs() <= NEAR * diagonal {
             return 0.0;
         }
-        let grid = power_below(diagonal).max(power_below(centre.abs()) * 2f64.powi(-23));
+        let grid = power_below(diagonal).max(power_below(centre.abs()) * f64::from(f32::EPSILON));
         (centre / grid).round() * grid
     };
     DVec3::new(axis(centre.x), axis(centre.y), axis(centre.z))
@@ -34,7 +34,8 @@ pub fn choose_origin(min: DVec3, max: DVec3) -> DVec3 {
 /// The largest power of two up to `value`; 0 for 0.
 fn power_below(value: f64) -> f64 {
     if value > 0.0 && value.is_finite() {
-        2f64.powf(value.log2().floor())
+        // Without the fraction. The least numbers have no exponent, and count as nothing.
+        f64::from_bits(value.to_bits() & f64::INFINITY.to_bits())
     } else {
         0.0
     }

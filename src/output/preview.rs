@@ -7,6 +7,7 @@ use super::{
     OutputError,
     view::{byte_from_linear, dither_threshold, view_transform},
 };
+use crate::math::functions::exp2;
 use crate::render::Film;
 
 /// How to show a film.
@@ -24,7 +25,7 @@ pub struct PreviewOptions {
 /// # Errors
 /// If the encoder refuses the image.
 pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, OutputError> {
-    let gain = options.exposure.exp2();
+    let gain = exp2(options.exposure);
     let mut pixels = Vec::with_capacity(film.color.len() * 3);
     let places = (0..film.height).flat_map(|y| (0..film.width).map(move |x| (x, y)));
     for (&[r, g, b, a], (x, y)) in film.color.iter().zip(places) {

@@ -9,6 +9,8 @@
 
 use glam::Vec3;
 
+use crate::math::functions::pow;
+
 /// How fast highlights go to white with the light that is taken away.
 const DESATURATION: f32 = 0.15;
 
@@ -30,7 +32,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 {
         12.92 * linear
     } else {
-        1.055 * linear.powf(1.0 / 2.4) - 0.055
+        1.055 * pow(linear, 1.0 / 2.4) - 0.055
     }
 }
 

@@ -95,13 +95,18 @@ pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
     }
 }
 
+/// The larger over the smaller.
+fn ratio(a: f64, b: f64) -> f64 {
+    (a / b).max(b / a)
+}
+
 /// About `length`: the nearest of 1, 2 and 5 times a power of ten; 1 of what has no extent.
 pub(super) fn round(length: f64) -> f32 {
-    let power = 10_f64.powf(length.log10().floor());
+    let power = libm::exp10(libm::log10(length).floor());
     let nearest = [1.0, 2.0, 5.0, 10.0]
         .map(|digit| digit * power)
         .into_iter()
-        .min_by(|a, b| (a / length).ln().abs().total_cmp(&(b / length).ln().abs()));
+        .min_by(|a, b| ratio(*a, length).total_cmp(&ratio(*b, length)));
     match nearest.map(narrow) {
         Some(length) if length > 0.0 && length.is_finite() => length,
         _ => 1.0,

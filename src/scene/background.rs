@@ -4,6 +4,8 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
+use crate::math::functions::asin;
+
 /// Bottom of the default gradient (linear RGB): a light grey as in a studio. The dark ends of
 /// colour maps stand out against it, it prints, and mirrored in particles it rounds them.
 pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.45, 0.47, 0.50);
@@ -42,7 +44,7 @@ impl Background {
         match *self {
             Self::Constant(color) => color,
             Self::Gradient { bottom, top, up } => {
-                let height = direction.dot(up).clamp(-1.0, 1.0).asin();
+                let height = asin(direction.dot(up).clamp(-1.0, 1.0));
                 bottom.lerp(top, 0.5 + height * FRAC_1_PI)
             }
         }

@@ -133,7 +133,7 @@ impl Camera {
         }
         let right = right.normalize();
         let up = right.cross(forward);
-        let half_height = (0.5 * view.fov.to_radians()).tan();
+        let half_height = libm::tan(0.5 * view.fov.to_radians());
         Ok(Self {
             eye: (view.eye - origin).as_vec3(),
             right: right.as_vec3(),
@@ -226,7 +226,7 @@ fn camera_from_world(eye: DVec3, right: DVec3, up: DVec3, forward: DVec3) -> DMa
 /// What a framed box may fill of the picture, horizontally and vertically: its extent at distance 1 from
 /// the middle to the rim, without the margin.
 pub(super) fn half_extent(framing: &Framing) -> DVec2 {
-    let half_height = (0.5 * framing.fov.to_radians()).tan() * (1.0 - FRAMING_MARGIN);
+    let half_height = libm::tan(0.5 * framing.fov.to_radians()) * (1.0 - FRAMING_MARGIN);
     DVec2::new(half_height * framing.aspect, half_height)
 }
 
@@ -248,8 +248,8 @@ pub(super) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
     let hint = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
     let right = (hint - hint.dot(up) * up).normalize();
     let front = right.cross(up);
-    let level = azimuth.cos() * front + azimuth.sin() * right;
-    -(elevation.cos() * level + elevation.sin() * up)
+    let level = libm::cos(azimuth) * front + libm::sin(azimuth) * right;
+    -(libm::cos(elevation) * level + libm::sin(elevation) * up)
 }
 
 /// Shift along `axis` and distance along `direction` at which all `corners` lie within

@@ -222,7 +222,7 @@ pub(super) fn linear_from_srgb(v: f32) -> f32 {
     if v <= 0.040_45 {
         v / 12.92
     } else {
-        ((v + 0.055) / 1.055).powf(2.4)
+        libm::powf((v + 0.055) / 1.055, 2.4)
     }
 }
 

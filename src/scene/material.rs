@@ -122,7 +122,7 @@ impl Material {
 /// The extinction of a medium that leaves `color` of white light after `length`. Of black, a millionth
 /// is left.
 pub fn extinction(color: Vec3, length: f32) -> Vec3 {
-    let loss = |part: f32| (-part.clamp(1e-6, 1.0).ln() / length).clamp(0.0, f32::MAX);
+    let loss = |part: f32| (-libm::logf(part.clamp(1e-6, 1.0)) / length).clamp(0.0, f32::MAX);
     Vec3::from_array(color.to_array().map(loss))
 }
 

@@ -46,7 +46,7 @@ pub(super) fn packed_radius(touching: f32, mut counts: Vec<u32>) -> Option<f32> 
     let count = *counts.get(place)?;
     let reach = f64::from(reach(touching));
     let volume = 4.0 / 3.0 * std::f64::consts::PI * reach.powi(3);
-    let spacing = (volume / f64::from(count)).cbrt();
+    let spacing = libm::cbrt(volume / f64::from(count));
     let most = MOST * f64::from(touching);
     Some(narrow((0.5 * RATHER_LARGE * spacing).min(most)))
 }

@@ -73,7 +73,7 @@ fn fit(bounds: &Bounds, framing: &Framing) -> (f64, f64) {
     for corner in bounds.corners().map(|corner| corner - center) {
         let height = corner.dot(framing.up);
         let radius = corner.cross(framing.up).length();
-        distance = distance.max(height * sin + radius * cos.hypot(1.0 / half.x));
+        distance = distance.max(height * sin + radius * libm::hypot(cos, 1.0 / half.x));
         for front in [radius, -radius] {
             let (y, d) = (height * cos - front * sin, -(height * sin + front * cos));
             high = high.max(y - half.y * d);

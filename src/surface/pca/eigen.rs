@@ -45,10 +45,10 @@ pub(super) fn least_component(matrix: &SymmetricMatrix) -> Option<Least> {
     }
     let determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
     let cosine = (determinant / (2.0 * scale * scale * scale)).clamp(-1.0, 1.0);
-    let angle = cosine.acos() / 3.0;
+    let angle = libm::acos(cosine) / 3.0;
     let third = std::f64::consts::TAU / 3.0;
-    let most = mean + 2.0 * scale * angle.cos();
-    let least = mean + 2.0 * scale * (angle + third).cos();
+    let most = mean + 2.0 * scale * libm::cos(angle);
+    let least = mean + 2.0 * scale * libm::cos(angle + third);
     let second = 3.0 * mean - most - least;
     // What is across two rows of the matrix less the eigenvalue; the longest is the surest.
     let rows = [

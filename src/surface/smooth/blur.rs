@@ -12,7 +12,7 @@ const LANES: usize = 8;
 pub(super) fn taps(layout: &Layout) -> Vec<f32> {
     let weight = |distance: i32| {
         let x = f64::from(distance) / f64::from(layout.sigma.max(f32::MIN_POSITIVE));
-        (-0.5 * x * x).exp()
+        libm::exp(-0.5 * x * x)
     };
     let total: f64 = (-layout.blur..=layout.blur).map(weight).sum();
     #[expect(clippy::cast_possible_truncation, reason = "the field is f32")]
