@@ -9,7 +9,7 @@ use super::hits::{LanesOf, TreeHits};
 use super::leaves::Leaves;
 use super::simd::{EnteredChildren, LaneSlabs, PacketKernel, lanes_near};
 use super::topology::{Place, Topology};
-use super::traverse::{AnyOfRay, NearestOfRay, TreeHit};
+use super::traverse::{AnyOfRay, ChordsOfRay, NearestOfRay, TreeChord, TreeHit};
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::{Below, STACK_SIZE, WalkStack, sort_descending, walk_from};
 use crate::ray::{PACKET_SIZE, RayPacket};
@@ -50,6 +50,42 @@ impl TreeView<'_> {
     }
 }
 
+impl TreeView<'_> {
+    /// Gives `visit` every sphere on the lines of the rays in `lanes` that may lie before their ends, in the order of
+    /// the walk, until it returns false for a ray. Rays count from their origin on.
+    pub(crate) fn visit_chords(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        visit: impl FnMut(usize, TreeChord) -> bool,
+    ) {
+        self.run(ChordsByLanes { rays, lanes, visit });
+    }
+}
+
+struct ChordsByLanes<'r, F> {
+    rays: &'r RayPacket,
+    lanes: u32,
+    visit: F,
+}
+
+impl<F: FnMut(usize, TreeChord) -> bool> TreeTask for ChordsByLanes<'_, F> {
+    type Output = ();
+
+    #[inline(always)]
+    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        self,
+        kernel: K,
+        tree: Resolved<'a, T, L>,
+    ) {
+        let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
+        let mut limits = TreeHits::default();
+        limits.start(self.rays, lanes);
+        let mut query = Chords { visit: self.visit };
+        walk_lanes(kernel, tree, self.rays, lanes, &mut query, &mut limits);
+    }
+}
+
 /// The rays that count from behind their origin on. Distances on the stack are not negative, so they are
 /// traced alone.
 #[inline]
@@ -78,7 +114,7 @@ impl TreeTask for NearestByLanes<'_, '_> {
     ) {
         let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
         self.hits.start(self.rays, lanes);
-        walk_lanes::<K, T, L, Nearest>(kernel, tree, self.rays, lanes, self.hits);
+        walk_lanes(kernel, tree, self.rays, lanes, &mut Nearest, self.hits);
     }
 }
 
@@ -99,7 +135,7 @@ impl TreeTask for AnyByLanes<'_> {
         let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
         let mut hits = TreeHits::default();
         hits.start(self.rays, lanes);
-        walk_lanes::<K, T, L, Any>(kernel, tree, self.rays, lanes, &mut hits);
+        walk_lanes(kernel, tree, self.rays, lanes, &mut Any, &mut hits);
         hits.mask()
     }
 }
@@ -108,7 +144,9 @@ impl TreeTask for AnyByLanes<'_> {
 /// kernel's instructions.
 trait Query {
     /// Looks for it in the subtree with `code`, and keeps what `ray` finds in its `lane`.
+    #[expect(clippy::too_many_arguments, reason = "all are parts of the walk")]
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        &mut self,
         kernel: K,
         tree: Resolved<'a, T, L>,
         ray: &K::Ray,
@@ -125,6 +163,7 @@ struct Nearest;
 impl Query for Nearest {
     #[inline(always)]
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        &mut self,
         kernel: K,
         tree: Resolved<'a, T, L>,
         ray: &K::Ray,
@@ -149,6 +188,7 @@ struct Any;
 impl Query for Any {
     #[inline(always)]
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        &mut self,
         kernel: K,
         tree: Resolved<'a, T, L>,
         ray: &K::Ray,
@@ -166,6 +206,37 @@ impl Query for Any {
     }
 }
 
+/// All spheres on the lines of the rays.
+struct Chords<F> {
+    /// Gets a lane and a chord; false finishes the ray.
+    visit: F,
+}
+
+impl<F: FnMut(usize, TreeChord) -> bool> Query for Chords<F> {
+    #[inline(always)]
+    fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
+        &mut self,
+        kernel: K,
+        tree: Resolved<'a, T, L>,
+        ray: &K::Ray,
+        code: u32,
+        stack: &mut WalkStack,
+        hits: &mut TreeHits,
+        lane: usize,
+    ) {
+        let mut is_finished = false;
+        let visit = |chord| {
+            is_finished = !(self.visit)(lane, chord);
+            !is_finished
+        };
+        let mut search = ChordsOfRay { tree, ray, visit };
+        walk_from(kernel, tree, code, stack, &mut search, hits.t[lane]);
+        if is_finished {
+            hits.t[lane] = -1.0;
+        }
+    }
+}
+
 /// Nodes and blocks still to visit, and where each ray enters them.
 struct LaneStack {
     near: [[f32; PACKET_SIZE]; STACK_SIZE],
@@ -175,11 +246,12 @@ struct LaneStack {
 
 /// Brings the rays in `lanes` to what they look for; `hits` has their limits.
 #[inline(always)]
-fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves, Q: Query>(
+fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
     tree: Resolved<'a, T, L>,
     rays: &RayPacket,
     lanes: u32,
+    query: &mut impl Query,
     hits: &mut TreeHits,
 ) {
     let view = tree.view;
@@ -218,7 +290,7 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves, Q: Query>(
             _ => {
                 for lane in LanesOf(alive) {
                     let ray = kernel.prepare(&rays.ray(lane), view.radius, view.padding);
-                    Q::search(kernel, tree, &ray, code, &mut single_stack, hits, lane);
+                    query.search(kernel, tree, &ray, code, &mut single_stack, hits, lane);
                 }
             }
         }

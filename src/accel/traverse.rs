@@ -7,7 +7,7 @@ use super::leaves::{Leaves, LoadedRadii};
 use super::simd::{PacketKernel, SLAB_SLACK, finite_inverse};
 use super::topology::Topology;
 use super::view::{Resolved, TreeTask, TreeView};
-use super::walk::{Walker, walk, walk_with};
+use super::walk::{Walker, walk_with};
 use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Node};
 
@@ -27,6 +27,8 @@ pub struct TreeCrossing {
     pub t: f32,
     /// Place of the particle in tree order.
     pub slot: u32,
+    /// Half the way through the sphere: the radius times the absolute cosine between ray and normal.
+    pub half_chord: f32,
 }
 
 impl TreeView<'_> {
@@ -231,6 +233,23 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfRay<'_,
     }
 }
 
+/// The way of a ray's line through a sphere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) struct TreeChord {
+    /// Place of the particle in tree order.
+    pub(crate) slot: u32,
+    /// Distances along the ray at which it enters and leaves.
+    pub(crate) ends: [f32; 2],
+}
+
+impl TreeChord {
+    /// Half of its length.
+    #[inline(always)]
+    pub(crate) fn half(&self) -> f32 {
+        0.5 * (self.ends[1] - self.ends[0])
+    }
+}
+
 struct Crossings<'r, F> {
     ray: &'r Ray,
     /// Gets every crossing; false ends the walk.
@@ -247,40 +266,69 @@ impl<F: FnMut(TreeCrossing) -> bool> TreeTask for Crossings<'_, F> {
         tree: Resolved<'a, T, L>,
     ) {
         let Self { ray, mut visit } = self;
-        let view = tree.view;
-        let prepared = kernel.prepare(ray, view.radius, view.padding);
-        let slots = view.slot_count();
-        walk(
-            kernel,
+        let mut search = ChordsOfRay {
             tree,
-            |node, limit| kernel.test_node(&prepared, node, limit),
-            ray.t_max.next_down(),
-            |block, limit| {
-                let centers = tree.leaves.load(kernel, block);
-                let radii = LoadedRadii::of(&view.radii, block);
-                let found = kernel.all_in_block(&prepared, centers.borrow(), radii.as_ref());
-                let mut lanes = found.lanes;
-                while lanes != 0 {
-                    let lane = lanes.trailing_zeros() as usize;
-                    lanes &= lanes - 1;
-                    let slot = block * BLOCK_SIZE + lane;
-                    if slot >= slots {
-                        break;
-                    }
-                    #[expect(
-                        clippy::cast_possible_truncation,
-                        reason = "slots are counted in 32 bits"
-                    )]
-                    let slot = slot as u32;
-                    for t in [found.near[lane], found.far[lane]] {
-                        let is_within = t >= ray.t_min && t < ray.t_max;
-                        if is_within && !visit(TreeCrossing { t, slot }) {
-                            return -1.0;
-                        }
-                    }
-                }
-                limit
+            ray: &kernel.prepare(ray, tree.view.radius, tree.view.padding),
+            visit: |chord: TreeChord| {
+                chord.ends.into_iter().all(|t| {
+                    let is_within = t >= ray.t_min && t < ray.t_max;
+                    !is_within
+                        || visit(TreeCrossing {
+                            t,
+                            slot: chord.slot,
+                            half_chord: chord.half(),
+                        })
+                })
             },
-        );
+        };
+        walk_with(kernel, tree, &mut search, ray.t_max.next_down());
+    }
+}
+
+/// A ray that looks for all spheres on its line, as far as boxes before its end hold them.
+pub(super) struct ChordsOfRay<'r, 'a, R, T, L, F> {
+    pub(super) tree: Resolved<'a, T, L>,
+    pub(super) ray: &'r R,
+    /// Gets every chord; false ends the walk.
+    pub(super) visit: F,
+}
+
+impl<'a, K, T, L, F> Walker<K> for ChordsOfRay<'_, 'a, K::Ray, T, L, F>
+where
+    K: PacketKernel,
+    T: Topology<'a>,
+    L: Leaves,
+    F: FnMut(TreeChord) -> bool,
+{
+    #[inline(always)]
+    fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys) {
+        kernel.test_node(self.ray, node, limit)
+    }
+
+    #[inline(always)]
+    fn visit(&mut self, kernel: K, block: usize, limit: f32) -> f32 {
+        let view = self.tree.view;
+        let centers = self.tree.leaves.load(kernel, block);
+        let radii = LoadedRadii::of(&view.radii, block);
+        let found = kernel.all_in_block(self.ray, centers.borrow(), radii.as_ref());
+        let mut lanes = found.lanes;
+        while lanes != 0 {
+            let lane = lanes.trailing_zeros() as usize;
+            lanes &= lanes - 1;
+            let slot = block * BLOCK_SIZE + lane;
+            if slot >= view.slot_count() {
+                break;
+            }
+            #[expect(
+                clippy::cast_possible_truncation,
+                reason = "slots are counted in 32 bits"
+            )]
+            let slot = slot as u32;
+            let ends = [found.near[lane], found.far[lane]];
+            if !(self.visit)(TreeChord { slot, ends }) {
+                return -1.0;
+            }
+        }
+        limit
     }
 }

@@ -3,7 +3,8 @@
 use glam::{DVec3, Vec3};
 
 use crate::{
-    ray::Ray,
+    math::{Lanes, lanes_in},
+    ray::{Ray, RayPacket},
     surface::{Intersection, MaterialId, Shape, Side},
 };
 
@@ -74,8 +75,17 @@ impl Shape for Balls {
             .reduce(|best, hit| if hit.t < best.t { hit } else { best })
     }
 
-    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
-        let cosine = |hit: Intersection| hit.normal.dot(ray.direction).abs();
-        self.all(ray).map(|hit| passed(cosine(hit))).product()
+    fn transmittance(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        passed: &dyn Fn(f32) -> f32,
+        kept: &mut Lanes,
+    ) {
+        for lane in lanes_in(lanes) {
+            let ray = rays.ray(lane);
+            let cosine = |hit: Intersection| hit.normal.dot(ray.direction).abs();
+            kept[lane] = self.all(&ray).map(|hit| passed(cosine(hit))).product();
+        }
     }
 }

@@ -9,7 +9,8 @@ use super::{
     *,
 };
 use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
-use crate::ray::Ray;
+use crate::math::{Lanes, lanes_in};
+use crate::ray::{Ray, RayPacket};
 use crate::scene::{
     Background, Bounds, Camera, CameraView, Framing, Ground, Material, default_lights,
 };
@@ -209,8 +210,16 @@ impl Shape for OneByOne<'_> {
         self.0.crossing(ray, side)
     }
 
-    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
-        self.0.transmittance(ray, passed)
+    fn transmittance(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        passed: &dyn Fn(f32) -> f32,
+        kept: &mut Lanes,
+    ) {
+        for lane in lanes_in(lanes) {
+            self.0.transmittance(rays, 1 << lane, passed, kept);
+        }
     }
 }
 

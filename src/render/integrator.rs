@@ -20,7 +20,7 @@ use super::{
     sampler::{FilmSampler, PathSeed},
     shading::{BackgroundLanes, CameraLanes, camera_rays},
     stream::{RayStream, SegmentPacket, sum_of_lanes},
-    tile::pixels_of,
+    tile::{SIDE, pixels_of},
 };
 use crate::accel::Coherence;
 use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lanes_in, splat};
@@ -163,11 +163,15 @@ pub(super) fn scratch_bytes(
 ) -> u64 {
     let rule = split_rule(settings, is_body);
     let paths = most_paths(&rule, settings, is_transmissive);
-    let samples = u64::from(GROUP.max(settings.samples)) / LANES as u64 + 1;
-    let rays = (batch(paths) * paths / LANES) as u64 + 4;
-    samples * (6 * size_of::<Lanes>()) as u64
-        + rays * 2 * size_of::<SegmentPacket>() as u64
-        + 65_536
+    let tile = (SIDE * SIDE) as usize * settings.samples as usize;
+    let held = tile.min(GROUP.max(settings.samples) as usize);
+    let rays = match settings.max_depth {
+        1 => 0,
+        _ => batch(paths).min(held) * paths,
+    };
+    let samples = held.div_ceil(LANES) * 6 * size_of::<Lanes>();
+    let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
+    (samples + segments + size_of::<PacketScratch>()) as u64 + 32_768
 }
 
 fn split_rule(settings: &RenderSettings, is_body: bool) -> SplitRule {

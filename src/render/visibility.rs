@@ -12,7 +12,7 @@ use super::{
     shading::product,
 };
 use crate::accel::Coherence;
-use crate::math::{Lanes3, first_lanes, lane3, lanes_in, set_lane3, splat};
+use crate::math::{Lanes3, first_lanes, lane3, lanes_in, splat};
 use crate::ray::RayPacket;
 use crate::surface::{Intersections, MaterialId, Shape};
 
@@ -70,11 +70,11 @@ impl WhittedIntegrator<'_> {
     ) -> u32 {
         let material = self.particle_constants();
         let passed = |cosine: f32| material.passed_straight(cosine);
-        lanes_in(lanes).fold(0, |reached, lane| {
-            let part = spheres.transmittance(&rays.ray(lane), &passed);
-            set_lane3(kept, lane, glam::Vec3::splat(part));
-            reached | u32::from(part > 0.0) << lane
-        })
+        spheres.transmittance(rays, lanes, &passed, &mut kept[0]);
+        kept[1] = kept[0];
+        kept[2] = kept[0];
+        let is_lit = |lane: usize| u32::from(kept[0][lane] > 0.0) << lane;
+        lanes_in(lanes).fold(0, |reached, lane| reached | is_lit(lane))
     }
 
     /// What rays keep on their way through one connected body, crossing after crossing of all rays at once. The lanes

@@ -2,7 +2,7 @@
 
 use super::{Dimming, Intersection, Intersections, MaterialId};
 use crate::accel::Coherence;
-use crate::math::lanes_in;
+use crate::math::{Lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
 
 /// Where a ray is that meets one connected body.
@@ -94,18 +94,27 @@ pub trait Shape: Sync {
         })
     }
 
-    /// What is left of light along `ray` through bodies that are not connected: the product over all crossings between
-    /// its ends, entering and leaving, of what `passed` makes of the absolute cosine between ray and normal.
-    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
-        let mut dimming = Dimming::default();
-        let mut rest = *ray;
-        while let Some(hit) = self.crossing(&rest, Side::Outside) {
-            if !dimming.by(passed(hit.normal.dot(ray.direction).abs())) {
-                break;
+    /// What is left of light along the rays of `lanes` through bodies that are not connected: the product over all
+    /// crossings between their ends, entering and leaving, of what `passed` makes of the absolute cosine between ray and
+    /// normal.
+    fn transmittance(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        passed: &dyn Fn(f32) -> f32,
+        kept: &mut Lanes,
+    ) {
+        for lane in lanes_in(lanes) {
+            let mut dimming = Dimming::default();
+            let mut rest = rays.ray(lane);
+            while let Some(hit) = self.crossing(&rest, Side::Outside) {
+                if !dimming.by(passed(hit.normal.dot(rest.direction).abs())) {
+                    break;
+                }
+                rest.t_min = hit.t + hit.offset;
             }
-            rest.t_min = hit.t + hit.offset;
+            kept[lane] = dimming.product();
         }
-        dimming.product()
     }
 
     /// The particle of an intersection, where finding it takes more than finding the intersection.

@@ -154,18 +154,36 @@ impl Shape for SphereSurface<'_> {
         self.tree.occluded_lanes(&rest, coherence)
     }
 
-    fn transmittance(&self, ray: &Ray, passed: &dyn Fn(f32) -> f32) -> f32 {
-        let mut dimming = Dimming::default();
+    fn transmittance(
+        &self,
+        rays: &RayPacket,
+        lanes: u32,
+        passed: &dyn Fn(f32) -> f32,
+        kept: &mut Lanes,
+    ) {
+        let mut dimming = [Dimming::default(); LANES];
         if self.tree.has_copies() {
-            self.each_crossing_once(ray, |crossing| {
-                dimming.by(passed(self.cosine(ray, &crossing)))
-            });
+            for lane in lanes_in(lanes) {
+                self.each_crossing_once(&rays.ray(lane), |crossing| {
+                    let radius = self.tree.sphere(crossing.slot).1;
+                    dimming[lane].by(passed(crossing.half_chord / radius))
+                });
+            }
         } else {
-            self.tree.visit_crossings(ray, |crossing| {
-                dimming.by(passed(self.cosine(ray, &crossing)))
+            self.tree.visit_chords(rays, lanes, |lane, chord| {
+                let radius = self.tree.sphere(chord.slot).1;
+                let part = passed(chord.half() / radius);
+                let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
+                chord
+                    .ends
+                    .iter()
+                    .filter(|t| is_within(t))
+                    .all(|_| dimming[lane].by(part))
             });
         }
-        dimming.product()
+        for lane in lanes_in(lanes) {
+            kept[lane] = dimming[lane].product();
+        }
     }
 }
 
@@ -238,13 +256,6 @@ lane_kernel! {
 }
 
 impl SphereSurface<'_> {
-    /// Absolute cosine between the ray and the normal where it passes through a sphere.
-    fn cosine(&self, ray: &Ray, crossing: &TreeCrossing) -> f32 {
-        let (center, radius) = self.tree.sphere(crossing.slot);
-        let normal = outward(ray.at(crossing.t) - center, radius, ray.direction);
-        normal.dot(ray.direction).abs()
-    }
-
     /// Crossings where one may be found several times: all of them must be there first.
     fn each_crossing_once(&self, ray: &Ray, mut visit: impl FnMut(TreeCrossing) -> bool) {
         thread_local! {
