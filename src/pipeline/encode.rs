@@ -117,11 +117,12 @@ pub(super) fn write_frame(
         looks: 0,
     };
     let options = exr_options(setup, &frame);
-    report.clamped_pixels =
+    let (_, clamped) =
         write_exr(frame.film, &options, &mut looking).map_err(|e| match e.into_io() {
             Ok(source) => at(&task.image)(source),
             Err(error) => error.into(),
         })?;
+    report.clamped_pixels = clamped;
     file.commit().map_err(at(&task.image))?;
     report.seconds.encode = start.elapsed().as_secs_f64();
     let now = MemoryUse::now();

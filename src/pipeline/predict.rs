@@ -394,18 +394,18 @@ impl<'a> MemoryModel<'a> {
         scratch_bytes(&self.setup.render, &self.setup.scene.material, is_body)
     }
 
-    /// What encoding an image takes beside its planes: one of them turned into what the file has, and the
-    /// blocks that are compressed just then; or, before, the bytes of the preview plain, filtered and
-    /// compressed.
+    /// What encoding an image takes beside its planes: the bands that are packed just then, or wait to be
+    /// written; or, before, the bytes of the preview plain, filtered and compressed.
     fn encoding(&self) -> u64 {
         let render = &self.setup.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
-        // Blocks have 16 rows at most; each is there plain and compressed.
+        // Bands have 32 rows at most, blocks that pack well 16. Colours are kept in half precision.
         let rows = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
-        let in_hand = rayon::current_num_threads() as u64 + 2;
-        // Vectors have three floats; colours are kept in half precision.
-        (12 * pixels).max(2 * rows * in_hand)
+        let threads = rayon::current_num_threads() as u64;
+        // Each thread has a block twice, and some are packed, at worst as large as they were.
+        let bands = rows * (2 * (threads + 1) + threads + 2);
+        (9 * pixels).max(bands)
     }
 }
 

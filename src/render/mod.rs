@@ -20,6 +20,7 @@ mod attributes;
 #[cfg(test)]
 pub(crate) mod brute;
 mod film;
+mod film_rows;
 mod integrator;
 mod roulette;
 mod sampler;
@@ -44,6 +45,7 @@ mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
+pub use film_rows::FilmRows;
 pub use sampler::{FilmSampler, MultiJitter, PathSeed};
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
