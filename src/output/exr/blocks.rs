@@ -109,6 +109,8 @@ struct Queue {
     wanted: usize,
     /// Packed, not yet written; or what a helper panicked with.
     packed: BTreeMap<usize, Result<PackedBand, Box<dyn Any + Send>>>,
+    /// Those of helpers, as many as there were at once.
+    buffers: Vec<PackBuffers>,
     /// Helpers called that have not gone again; of a busy pool, those that have not come yet too.
     helpers: usize,
 }
@@ -155,14 +157,16 @@ impl PackJob {
         )
     }
 
-    /// Packs bands until there are none to take.
+    /// Packs a band, if there is one to take. One only: a thread that waits for others that trace gets here too,
+    /// and is soon wanted again.
     fn help(&self) {
-        let mut buffers = PackBuffers::default();
         let mut queue = self.queue();
-        while let Some(band) = self.take(&mut queue) {
+        if let Some(band) = self.take(&mut queue) {
+            let mut buffers = queue.buffers.pop().unwrap_or_default();
             drop(queue);
             let packed = catch_unwind(AssertUnwindSafe(|| self.pack(band, &mut buffers)));
             queue = self.queue();
+            queue.buffers.push(buffers);
             if let Some(packed) = packed.transpose() {
                 queue.packed.insert(band, packed);
                 self.is_packed.notify_all();
