@@ -20,6 +20,7 @@ mod resume;
 mod samples;
 mod scale;
 mod schema;
+mod sequence;
 mod status;
 mod still;
 mod structures;
