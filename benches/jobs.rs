@@ -1,4 +1,5 @@
-//! What a job costs beside its images: 2,000 frames of 1,000 particles at 64x64, and `status` on 10,000 frames.
+//! What a job costs beside its images: 2,000 frames of 1,000 particles at 64x64, and `status` on 10,000 frames; and how
+//! much longer 200 frames of 10,000 particles at 640x360 take than the slowest of the stages that overlap.
 //!
 //! Stages overlap, so that the sum of their times says nothing of the rest. Writing images, with what syncing
 //! them takes, is by far the longest here: what the run took beyond it is an upper bound of claims, ledger and
@@ -20,18 +21,18 @@ const PARTICLES: usize = 1000;
 /// The job that `status` is asked about has so many times the frames.
 const TIMES: usize = 5;
 const TURNS: usize = 5;
+/// Frames of the sequence, and their particles.
+const SEQUENCE: (usize, usize) = (200, 10_000);
 
 fn main() {
     let place = tempfile::tempdir().expect("a temporary directory");
     let input = place.path().join("in");
     fs::create_dir(&input).expect("a directory");
-    for frame in 0..FRAMES {
-        let centers = fill_box(&BoxSettings::thesis(PARTICLES, frame as u64));
-        write::npy::write(&input.join(format!("f_{frame}.npy")), &centers).expect("a file");
-    }
+    boxes(&input, FRAMES, PARTICLES);
     for options in [&[][..], &["--set", "output.preview=false"]] {
         render(place.path(), options);
     }
+    sequence(place.path());
     enlarge(place.path());
     let times: Vec<Duration> = (0..TURNS).map(|_| status(place.path(), "large")).collect();
     println!(
@@ -44,6 +45,50 @@ fn main() {
 
 fn milliseconds(time: Duration) -> f64 {
     1000.0 * time.as_secs_f64()
+}
+
+fn boxes(input: &Path, frames: usize, particles: usize) {
+    for frame in 0..frames {
+        let centers = fill_box(&BoxSettings::thesis(particles, frame as u64));
+        write::npy::write(&input.join(format!("f_{frame}.npy")), &centers).expect("a file");
+    }
+}
+
+/// Renders small frames and compares what they took with the stage that took most.
+fn sequence(place: &Path) {
+    let (count, particles) = SEQUENCE;
+    let input = place.join("sequence");
+    fs::create_dir(&input).expect("a directory");
+    boxes(&input, count, particles);
+    let size = ["--width", "640", "--height", "360", "--samples", "1"];
+    println!("{count} frames of {particles} particles at 640x360, seconds:");
+    for _ in 0..TURNS {
+        let _ = fs::remove_dir_all(place.join("sequence-out"));
+        let what = ["render", "sequence", "-o", "sequence-out/f.####.exr"];
+        let start = Instant::now();
+        run(place, &[&what[..], &size, &["--progress", "none"]].concat());
+        let process = start.elapsed().as_secs_f64();
+        let text = fs::read_to_string(place.join("sequence-out/report.json")).expect("a report");
+        let report = json(&text);
+        let frames = report["frames"].as_array().expect("frames");
+        let sum = |names: &[&str]| -> f64 {
+            let of = |f: &Value| {
+                names
+                    .iter()
+                    .filter_map(|n| f["seconds"][n].as_f64())
+                    .sum::<f64>()
+            };
+            frames.iter().map(of).sum()
+        };
+        let stages = [&["read"][..], &["build", "surface", "trace"], &["encode"]].map(sum);
+        let [read, trace, encode] = stages;
+        let slowest = stages.into_iter().fold(0.0, f64::max);
+        println!(
+            "  read {read:.2}, build and trace {trace:.2}, encode and write {encode:.2}; all {process:.2}, {:.2} times \
+             the slowest",
+            process / slowest
+        );
+    }
 }
 
 /// Renders all frames and tells what that took beyond writing images.

@@ -191,9 +191,6 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
             custom: None,
-            // The encoder's own threads are as many as the machine has; a run that was given fewer
-            // must not take them.
-            single_thread: rayon::current_num_threads() < machine_threads(),
         },
         preview: PreviewOptions {
             exposure: output.preview_exposure,
@@ -212,10 +209,6 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     };
     check_image_size(&setup)?;
     Ok(setup)
-}
-
-fn machine_threads() -> usize {
-    std::thread::available_parallelism().map_or(1, usize::from)
 }
 
 /// Refuses images that cannot fit, whatever the particles.

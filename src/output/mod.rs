@@ -7,7 +7,8 @@ mod verify;
 pub mod view;
 
 pub use exr::{
-    Compression, CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, write_exr,
+    Compression, CustomAttribute, EncodedExr, ExrLayout, ExrOptions, OutputError, PackBuffers,
+    PackedBlock, encode_exr, pack_block, write_blocks, write_exr,
 };
 pub use preview::{PreviewOptions, encode_preview};
 pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

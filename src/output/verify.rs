@@ -12,7 +12,7 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use thiserror::Error;
 
-use super::exr::planes;
+use super::exr::planes::planes;
 use crate::render::Channels;
 
 /// What an image of a job must be.
@@ -103,7 +103,10 @@ fn check_header(header: &Header, wanted: &ImageShape) -> Result<(), ImageFault> 
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
-    let planes = planes(wanted.channels);
+    let planes = planes(wanted.channels).into_iter();
+    let planes: Vec<_> = planes
+        .map(|plane| (plane.name.to_owned(), plane.sample_type()))
+        .collect();
     let is_whole = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
     let are_whole = header.channels.list.iter().all(is_whole);
     if are_whole && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {

@@ -2,7 +2,7 @@
 
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, SyncSender};
+use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
 use serde_json::json;
@@ -15,6 +15,7 @@ use crate::mishap::is_place_at_fault;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
+use crate::render::Film;
 use crate::report::frame::RssSummary;
 use crate::report::{FrameReport, MemoryPeaks, MemoryUse};
 
@@ -34,10 +35,18 @@ pub(super) enum WriteError {
     },
 }
 
+/// Who is told when an image is written. They may have ended by then.
+pub(super) struct Written {
+    /// Whoever reads the next frame only then.
+    pub(super) is_written: Option<SyncSender<()>>,
+    /// Whoever traces into the same planes again.
+    pub(super) films: Option<Sender<Film>>,
+}
+
 pub(super) fn write_stage(
     setup: &Setup,
     traced: Receiver<InHand<TracedFrame>>,
-    is_written: Option<SyncSender<()>>,
+    next: &Written,
     job: &mut Job,
     watch: Watch,
 ) -> Result<(), JobError> {
@@ -53,7 +62,10 @@ pub(super) fn write_stage(
                 }
                 let task = frame.task.clone();
                 match write_frame(setup, frame, &mut peaks) {
-                    Ok(mut report) => {
+                    Ok((mut report, film)) => {
+                        if let Some(films) = &next.films {
+                            let _ = films.send(film);
+                        }
                         report.seconds.wall = image_before.elapsed().as_secs_f64();
                         image_before = Instant::now();
                         let outputs: Vec<_> = std::iter::once(&task.image)
@@ -80,20 +92,19 @@ pub(super) fn write_stage(
             }
         }
         claim.end();
-        if let Some(is_written) = &is_written {
-            // Who reads may have ended by now.
+        if let Some(is_written) = &next.is_written {
             let _ = is_written.send(());
         }
     }
     Ok(())
 }
 
-/// Encodes and publishes the images of `frame`; the report is complete then.
+/// Encodes and publishes the images of `frame`; the report is complete then, and the planes can serve another.
 pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
     peaks: &mut MemoryPeaks,
-) -> Result<FrameReport, WriteError> {
+) -> Result<(FrameReport, Film), WriteError> {
     let start = Instant::now();
     let task = &frame.task;
     let mut report = frame.report.clone();
@@ -117,11 +128,12 @@ pub(super) fn write_frame(
         looks: 0,
     };
     let options = exr_options(setup, &frame);
-    report.clamped_pixels =
+    let (film, clamped) =
         write_exr(frame.film, &options, &mut looking).map_err(|e| match e.into_io() {
             Ok(source) => at(&task.image)(source),
             Err(error) => error.into(),
         })?;
+    report.clamped_pixels = clamped;
     file.commit().map_err(at(&task.image))?;
     report.seconds.encode = start.elapsed().as_secs_f64();
     let now = MemoryUse::now();
@@ -132,7 +144,7 @@ pub(super) fn write_frame(
         total_peak: peaks.total,
         anonymous: now.anonymous,
     };
-    Ok(report)
+    Ok((report, film))
 }
 
 /// Looks at memory when the first bytes come through: then all that encoding takes is there.

@@ -1,16 +1,17 @@
 //! The three stages of a sequence: while frame i is traced, frame i+1 is read and frame i-1 is
 //! encoded and written.
 //!
-//! One frame is in flight in each stage, handed over without a queue, so memory is flat however
-//! long the sequence. Reading waits until the tree over the frame before is built: building is
-//! short, and only then are that frame's positions let go. The last stage records every frame in the job's ledger, image first. What
+//! One frame is in flight in each stage, handed over without a queue, so memory is flat however long the
+//! sequence. Reading waits until the tree over the frame before is built: building is short, and only then are
+//! that frame's positions let go. It has threads of its own, so that it waits for nothing else. The planes of a
+//! written image go back to the tracer. The last stage records every frame in the job's ledger, image first. What
 //! the picture looks like is settled before, in [`Setup`].
 
 use std::collections::HashSet;
 use std::panic;
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
 
 use spherule_formats::sequence::Sequence;
@@ -23,6 +24,7 @@ mod load;
 mod predict;
 mod probe;
 mod rays;
+mod read_threads;
 mod schedule;
 mod setup;
 mod single;
@@ -41,8 +43,10 @@ pub use setup::{ColorRule, RadiusRule, Setup};
 pub use single::{PictureKind, SingleFault, make_image, make_picture};
 pub use trace::{BuiltFrame, FrameTracer, TraceError, TracedFrame};
 
+use read_threads::ReadThreads;
+
 use crate::mishap::guarded;
-use crate::render::Stop;
+use crate::render::{Film, Stop};
 use crate::report::FrameReport;
 
 /// One image to make.
@@ -118,80 +122,107 @@ pub fn run(
     watch: Watch,
 ) -> Result<(), JobError> {
     let is_over = AtomicBool::new(false);
-    thread::scope(|scope| {
-        // Capacity 0: a stage holds its result until the next one is free to take it.
-        let (to_trace, loaded) = sync_channel(0);
-        let (to_write, traced) = sync_channel(0);
-        let (go_on, room) = sync_channel(1);
-        // Whoever frees the memory that the next frame needs.
-        let (is_built, is_written) = match overlap {
-            Overlap::Stages => (Some(go_on), None),
-            Overlap::None => (None, Some(go_on)),
-        };
-        let (begins, has_begun) = sync_channel(0);
-        let frames = tasks.iter().map(|task| task.frame);
-        let queue = Queue::new(job.claims(), frames, interrupt);
-        let reader = scope.spawn(move || {
+    let threads = ReadThreads::new();
+    let mut read = Ok(());
+    // Capacity 0: a stage holds its result until the next one is free to take it.
+    let (to_trace, loaded) = sync_channel(0);
+    let (to_write, traced) = sync_channel(0);
+    let (go_on, room) = sync_channel(1);
+    let (films, spare) = channel();
+    // Whoever frees the memory that the next frame needs; without overlap no film is kept for it.
+    let (is_built, is_written, films) = match overlap {
+        Overlap::Stages => (Some(go_on), None, Some(films)),
+        Overlap::None => (None, Some(go_on), None),
+    };
+    let (begins, has_begun) = sync_channel(0);
+    let frames = tasks.iter().map(|task| task.frame);
+    let queue = Queue::new(job.claims(), frames, interrupt);
+    let reader = ReadStage {
+        setup,
+        sequence,
+        tasks,
+        threads: &threads,
+        next: Next { to_trace, room },
+        watch,
+    };
+    let outcome = &mut read;
+    let written = threads.scope(|first| {
+        first.spawn(move |_| {
             let _ = begins.send(());
-            let next = Next { to_trace, room };
-            read_stage(setup, sequence, tasks, queue, &next, watch)
+            *outcome = reader.run(queue);
         });
         // The first of the threads finds the memory that whoever looked at the frames has left.
         let _ = has_begun.recv();
-        let writer_ended = &is_over;
-        let writer = scope.spawn(move || {
-            let ended = encode::write_stage(setup, traced, is_written, job, watch);
-            writer_ended.store(ended.is_err(), Ordering::Relaxed);
-            ended
-        });
-        let stage = TraceStage {
-            setup,
-            stop: DropFrame {
-                is_over: &is_over,
+        thread::scope(|scope| {
+            let writer_ended = &is_over;
+            let next = encode::Written { is_written, films };
+            let writer = scope.spawn(move || {
+                let ended = encode::write_stage(setup, traced, &next, job, watch);
+                writer_ended.store(ended.is_err(), Ordering::Relaxed);
+                ended
+            });
+            let stage = TraceStage {
+                setup,
+                stop: DropFrame {
+                    is_over: &is_over,
+                    interrupt,
+                },
                 interrupt,
-            },
-            interrupt,
-            watch,
-        };
-        stage.run(loaded, is_built, to_write);
-        let read = joined(reader.join());
-        joined(writer.join()).and(read)
-    })
+                watch,
+            };
+            stage.run(loaded, spare, is_built, to_write);
+            joined(writer.join())
+        })
+    });
+    written.and(read)
 }
 
 fn joined<T>(result: thread::Result<T>) -> T {
     result.unwrap_or_else(|fault| panic::resume_unwind(fault))
 }
 
-fn read_stage(
-    setup: &Setup,
-    sequence: &Sequence,
-    tasks: &[ImageTask],
-    mut queue: Queue,
-    next: &Next,
-    watch: Watch,
-) -> Result<(), JobError> {
-    let mut told = Told::default();
-    let mut heard = |news: QueueNews| watch(Event::Others(news));
-    while let Some((place, claim)) = queue.take(&mut heard)? {
-        let task = &tasks[place];
-        watch(Event::Entered(task.frame, Stage::Read));
-        let loaded = match &task.refused {
-            Some(reason) => Err(reason.clone()),
-            None => guarded(|| load_frame(setup, sequence, task).map_err(|e| e.to_string())),
-        };
-        let passed = match loaded {
-            Ok(mut frame) => {
-                told.tell(std::mem::take(&mut frame.notes), watch);
-                Passed::Frame(frame)
+/// The first stage; see [`run`].
+struct ReadStage<'a> {
+    setup: &'a Setup,
+    sequence: &'a Sequence,
+    tasks: &'a [ImageTask],
+    threads: &'a ReadThreads,
+    next: Next,
+    watch: Watch<'a>,
+}
+
+impl ReadStage<'_> {
+    /// Runs on the thread of the first stage.
+    fn run(&self, mut queue: Queue) -> Result<(), JobError> {
+        let mut told = Told::default();
+        let mut heard = |news: QueueNews| (self.watch)(Event::Others(news));
+        while let Some((place, claim)) = queue.take(&mut heard)? {
+            let task = &self.tasks[place];
+            (self.watch)(Event::Entered(task.frame, Stage::Read));
+            let loaded = match &task.refused {
+                Some(reason) => Err(reason.clone()),
+                None => guarded(|| self.load(task)),
+            };
+            let passed = match loaded {
+                Ok(mut frame) => {
+                    told.tell(std::mem::take(&mut frame.notes), self.watch);
+                    Passed::Frame(frame)
+                }
+                Err(reason) => Passed::Failed(task.clone(), reason),
+            };
+            if !self.next.pass_on(InHand { claim, passed }) {
+                break;
             }
-            Err(reason) => Passed::Failed(task.clone(), reason),
-        };
-        if !next.pass_on(InHand { claim, passed }) {
-            break;
         }
+        Ok(())
     }
-    Ok(())
+
+    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, String> {
+        let size = FrameSize::of(self.sequence, task.index, self.setup.weight.as_ref());
+        let load = || load_frame(self.setup, self.sequence, task);
+        let loaded = self.threads.read(size.read_bytes(), load);
+        loaded.map_err(|e| e.to_string())
+    }
 }
 
 /// What a stage has told of its frames: what is so in every frame is said once.
@@ -223,6 +254,12 @@ impl Next {
     }
 }
 
+/// Runs `work` on a thread of the current pool: its time begins when it does, and what it does in parallel is
+/// not handed over from outside each time.
+fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| work())
+}
+
 /// When the frame that is traced is dropped: nothing further can be recorded, or there is no time for it.
 struct DropFrame<'a> {
     is_over: &'a AtomicBool,
@@ -247,6 +284,7 @@ impl TraceStage<'_> {
     fn run(
         &self,
         loaded: Receiver<InHand<LoadedFrame>>,
+        spare: Receiver<Film>,
         is_built: Option<SyncSender<()>>,
         next: SyncSender<InHand<TracedFrame>>,
     ) {
@@ -262,7 +300,7 @@ impl TraceStage<'_> {
                     let task = frame.task.clone();
                     (self.watch)(Event::Entered(task.frame, Stage::Trace));
                     let build = || tracer.build(self.setup, frame);
-                    (task, guarded(|| build().map_err(|e| e.to_string())))
+                    (task, guarded(|| in_pool(build).map_err(|e| e.to_string())))
                 }
                 Passed::Failed(task, reason) => (task, Err(reason)),
             };
@@ -272,8 +310,11 @@ impl TraceStage<'_> {
             }
             let traced = built.and_then(|mut frame| {
                 told.tell(std::mem::take(&mut frame.notes), self.watch);
+                if let Ok(film) = spare.try_recv() {
+                    tracer.recycle(film);
+                }
                 let trace = || tracer.trace(self.setup, frame, &self.stop);
-                guarded(|| trace().map_err(|e| e.to_string()))
+                guarded(|| in_pool(trace).map_err(|e| e.to_string()))
             });
             let passed = match traced {
                 Ok(traced) => Passed::Frame(traced),

@@ -2,10 +2,10 @@
 //! of frames and images that cannot fit.
 //!
 //! It adds up what the stages hold at once (see the module above): while the tree over frame i is
-//! built, frame i-1 is encoded; while frame i is traced, frame i+1 is read and frame i-1 may still be
-//! encoded. What is counted is anonymous memory, not the pages of mapped files. Particle counts of
-//! frames that nobody has looked at are estimated from the length of their files and the frame that
-//! the survey found heaviest. Native frames that are traced where they lie take next to nothing.
+//! built, frame i-1 is encoded and the planes of frame i-2 are there for frame i; while frame i is traced, frame
+//! i+1 is read and frame i-1 may still be encoded. What is counted is anonymous memory, not the pages of
+//! mapped files. Particle counts of frames that nobody has looked at are estimated from the length of
+//! their files and the frame that the survey found heaviest. Native frames that are traced where they lie take next to nothing.
 
 use std::fmt;
 
@@ -14,6 +14,7 @@ use spherule_formats::native::Access;
 use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
+use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::render::{Film, scratch_bytes};
@@ -46,6 +47,16 @@ impl FrameSize {
         let parts = sequence.frames().get(index).map(|f| f.parts.as_slice());
         let is_shared = parts.is_some_and(|parts| parts.iter().any(|p| p.step.is_some()));
         Self::estimate(stored, is_shared, known)
+    }
+
+    /// The bytes that reading it goes through: its file, or the numbers in it if they are more.
+    pub(super) fn read_bytes(&self) -> u64 {
+        self.content.max(self.raw)
+    }
+
+    /// Whether it is read by as many threads as trace.
+    fn needs_many(&self) -> bool {
+        needs_many(self.read_bytes())
     }
 
     /// Of a frame whose files have `stored` bytes once unpacked, in proportion to a known one. Nothing is
@@ -197,8 +208,7 @@ impl<'a> MemoryModel<'a> {
         for (i, frame) in frames.iter().enumerate() {
             // Its memory lives on from frame to frame.
             tree = self.tree(frame).max(tree);
-            let before = i > 0;
-            need = need.larger(self.around(before, frame, frames.get(i + 1), tree));
+            need = need.larger(self.around(i, frame, frames.get(i + 1), tree));
         }
         need
     }
@@ -332,11 +342,12 @@ impl<'a> MemoryModel<'a> {
         self.build(frame).tree
     }
 
-    /// The peak of the time that `frame` is built and traced in memory for a tree of `tree` bytes:
-    /// the image of the frame `before` is encoded then, and the frame `after` is read.
+    /// The peak of the time that `frame` is built and traced in memory for a tree of `tree` bytes, with so many
+    /// frames `before`: the image of the last of them is encoded then, that of the one before it is kept for
+    /// this frame's, and the frame `after` is read.
     fn around(
         &self,
-        before: bool,
+        before: usize,
         frame: &FrameSize,
         after: Option<&FrameSize>,
         tree: u64,
@@ -344,14 +355,17 @@ impl<'a> MemoryModel<'a> {
         let render = &self.setup.render;
         let film = Film::bytes_for(render.width, render.height, render.channels);
         let threads = rayon::current_num_threads() as u64;
-        let (film_before, encoding_before) = if before {
-            (film, self.encoding())
-        } else {
-            (0, 0)
-        };
+        let film_before = if before > 0 { film } else { 0 };
+        let film_kept = if before > 1 { film } else { 0 };
+        let encoding_before = if before > 0 { self.encoding() } else { 0 };
         let shared = if frame.is_shared { frame.content } else { 0 };
+        // Those that read, too.
+        let are_twice = [Some(frame), after]
+            .into_iter()
+            .flatten()
+            .any(FrameSize::needs_many);
         let idle = MemoryNeed {
-            program: PROGRAM + THREAD * threads,
+            program: PROGRAM + THREAD * threads * if are_twice { 2 } else { 1 },
             reading: shared.max(self.retained(frame)),
             ..MemoryNeed::default()
         };
@@ -367,7 +381,7 @@ impl<'a> MemoryModel<'a> {
             reading: shared.max(self.retained(frame).saturating_sub(kept)),
             tree: tree + self.build(frame).scratch,
             surface: surface.building,
-            images: film_before,
+            images: film_before + film_kept,
             encoding: encoding_before,
             ..idle
         };
@@ -394,18 +408,18 @@ impl<'a> MemoryModel<'a> {
         scratch_bytes(&self.setup.render, &self.setup.scene.material, is_body)
     }
 
-    /// What encoding an image takes beside its planes: one of them turned into what the file has, and the
-    /// blocks that are compressed just then; or, before, the bytes of the preview plain, filtered and
-    /// compressed.
+    /// What encoding an image takes beside its planes: the bands that are packed just then, or wait to be
+    /// written; or, before, the bytes of the preview plain, filtered and compressed.
     fn encoding(&self) -> u64 {
         let render = &self.setup.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
-        // Blocks have 16 rows at most; each is there plain and compressed.
+        // Bands have 32 rows at most, blocks that pack well 16. Colours are kept in half precision.
         let rows = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
-        let in_hand = rayon::current_num_threads() as u64 + 2;
-        // Vectors have three floats; colours are kept in half precision.
-        (12 * pixels).max(2 * rows * in_hand)
+        let threads = rayon::current_num_threads() as u64;
+        // Each thread has a block twice, and some are packed, at worst as large as they were.
+        let bands = rows * (2 * (threads + 1) + threads + 2);
+        (9 * pixels).max(bands)
     }
 }
 

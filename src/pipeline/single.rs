@@ -46,7 +46,7 @@ pub fn make_image(
     note: impl FnMut(&str),
 ) -> Result<FrameReport, SingleFault> {
     let traced = trace_single(setup, sequence, task, note)?;
-    write_guarded(|| write_frame(setup, traced, &mut MemoryPeaks::default()))
+    write_guarded(|| write_exr(setup, traced))
 }
 
 /// Makes the image of `task` alone, in a file of this `kind`; what the user should know goes to `note`.
@@ -62,7 +62,7 @@ pub fn make_picture(
 ) -> Result<FrameReport, SingleFault> {
     let traced = trace_single(setup, sequence, task, note)?;
     write_guarded(|| match kind {
-        PictureKind::Exr => write_frame(setup, traced, &mut MemoryPeaks::default()),
+        PictureKind::Exr => write_exr(setup, traced),
         PictureKind::Png => write_png(setup, &traced),
     })
 }
@@ -87,6 +87,10 @@ fn trace_single(
         tracer.trace(setup, built, &stop).map_err(|e| e.to_string())
     });
     traced.map_err(SingleFault::Frame)
+}
+
+fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, WriteError> {
+    write_frame(setup, frame, &mut MemoryPeaks::default()).map(|(report, _)| report)
 }
 
 /// The preview of `frame` in the place of its image.

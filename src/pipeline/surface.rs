@@ -9,7 +9,7 @@ use super::decoded::DecodedFrame;
 use super::setup::Setup;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
-use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render};
+use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into};
 use crate::report::memory::available;
 use crate::report::{FrameReport, MemoryUse};
 use crate::scene::Scene;
@@ -141,18 +141,19 @@ impl SurfaceBuilder {
         built
     }
 
-    /// The image of the surface that `setup` asks for over the spheres of `tree`.
+    /// Draws the surface that `setup` asks for over the spheres of `tree` into `film`.
     ///
     /// # Errors
-    /// As [`render`].
+    /// As [`render_into`].
     pub(super) fn draw(
         &self,
         setup: &Setup,
         tree: TreeView<'_>,
         scene: &Scene,
         source: &dyn ShadeSource,
+        film: &mut Film,
         stop: &dyn Stop,
-    ) -> Result<(Film, RayCounts), RenderError> {
+    ) -> Result<RayCounts, RenderError> {
         let normals = shading_normals(&setup.surface);
         let body: Box<dyn Shape + '_> = match setup.surface.kind {
             SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
@@ -164,7 +165,7 @@ impl SurfaceBuilder {
         if !self.spray.tree().view().is_empty() {
             shapes.push(&spray);
         }
-        render(&shapes, scene, source, &setup.render, stop)
+        render_into(film, &shapes, scene, source, &setup.render, stop)
     }
 }
 

@@ -88,6 +88,8 @@ pub struct FrameTracer {
     builder: TreeBuilder,
     stored: StoredTree,
     surface: SurfaceBuilder,
+    /// For the next image.
+    film: Film,
 }
 
 impl FrameTracer {
@@ -163,19 +165,26 @@ impl FrameTracer {
         })
     }
 
+    /// Takes the planes of an image that nobody needs any more for the next: new ones cost a page fault for
+    /// each 4 KiB.
+    pub fn recycle(&mut self, film: Film) {
+        self.film = film;
+    }
+
     /// Renders `frame`, the one that was built last.
     ///
     /// # Errors
     /// [`RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
     /// meanwhile; the others are settings that were checked before.
     pub fn trace(
-        &self,
+        &mut self,
         setup: &Setup,
         frame: BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError> {
         let start = Instant::now();
-        let (film, rays) = self.image(setup, &frame, stop)?;
+        let mut film = std::mem::take(&mut self.film);
+        let rays = self.draw(setup, &frame, &mut film, stop)?;
         let memory = MemoryUse::now();
         let BuiltFrame {
             task,
@@ -205,22 +214,34 @@ impl FrameTracer {
         frame: &BuiltFrame,
         stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), TraceError> {
+        let mut film = Film::default();
+        let rays = self.draw(setup, frame, &mut film, stop)?;
+        Ok((film, rays))
+    }
+
+    fn draw(
+        &self,
+        setup: &Setup,
+        frame: &BuiltFrame,
+        film: &mut Film,
+        stop: &dyn Stop,
+    ) -> Result<RayCounts, TraceError> {
         let scene = setup.scene_at(frame.task.frame)?;
         let surface = &self.surface;
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.color, shading);
                 let tree = self.builder.tree().view();
-                Ok(surface.draw(setup, tree, &scene, &source, stop)?)
+                Ok(surface.draw(setup, tree, &scene, &source, film, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
                 let source = stored.shading(&setup.color, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
-                let drawn = surface.draw(setup, tree, &scene, &source, stop)?;
+                let rays = surface.draw(setup, tree, &scene, &source, film, stop)?;
                 // Before anyone believes what was seen.
                 stored.check()?;
-                Ok(drawn)
+                Ok(rays)
             }
         }
     }

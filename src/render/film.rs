@@ -80,7 +80,7 @@ impl Channels {
 }
 
 /// An image. Every plane holds `width * height` values, or is `None` if it was not asked for.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Default)]
 pub struct Film {
     /// Pixels across.
     pub width: u32,
@@ -118,6 +118,17 @@ impl Film {
             velocity: vectors(channels.velocity),
             albedo: vectors(channels.albedo),
             id: channels.id.then(|| vec![NO_ID; count]),
+        }
+    }
+
+    /// Makes this a film of that size with these planes. Where it is one, its memory stays, and what is in it: who
+    /// renders sets every pixel.
+    pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels) {
+        let is_fit = (self.width, self.height) == (width, height) && self.channels() == channels;
+        if !is_fit {
+            // Not both at once.
+            *self = Self::default();
+            *self = Self::new(width, height, channels);
         }
     }
 

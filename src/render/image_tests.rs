@@ -83,6 +83,60 @@ fn the_same_film_on_any_number_of_threads() {
 }
 
 #[test]
+fn nothing_is_left_of_what_was_in_a_film() {
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    let never = AtomicBool::new(false);
+    let scene = heap_scene(0.0);
+    let mut bare = heap_scene(0.0);
+    bare.ground = None;
+    for channels in [Channels::ALL, Channels::COLOR] {
+        let settings = RenderSettings {
+            channels,
+            ..settings()
+        };
+        // Rays that meet something, and rays that meet nothing.
+        for (balls, scene) in [(heap(60), &scene), (Balls(Vec::new()), &bare)] {
+            let into = |film: &mut Film| {
+                render_into(film, &[&balls], scene, &source, &settings, &never).unwrap()
+            };
+            let mut fresh = Film::default();
+            let counts = into(&mut fresh);
+            let mut used = filled(settings.width, settings.height, channels);
+            let memory = used.color.as_ptr();
+            assert_eq!(into(&mut used), counts);
+            assert_eq!(used, fresh);
+            assert_eq!(used.color.as_ptr(), memory);
+            // Those of other sizes or channels are made anew.
+            for mut other in [
+                filled(settings.height, settings.width, channels),
+                filled(settings.width, settings.height, Channels::ALL),
+            ] {
+                assert_eq!(into(&mut other), counts);
+                assert_eq!(other, fresh);
+            }
+        }
+    }
+}
+
+/// A film with something in every plane.
+fn filled(width: u32, height: u32, channels: Channels) -> Film {
+    let mut film = Film::new(width, height, channels);
+    film.color.fill([7.0; 4]);
+    film.depth.iter_mut().flatten().for_each(|z| *z = 7.0);
+    film.id.iter_mut().flatten().for_each(|id| *id = 7);
+    let vectors = [
+        &mut film.normal,
+        &mut film.position,
+        &mut film.velocity,
+        &mut film.albedo,
+    ];
+    for plane in vectors.into_iter().flatten() {
+        plane.fill(Vec3::splat(7.0));
+    }
+    film
+}
+
+#[test]
 fn data_planes_hold_the_nearest_sample() {
     let view = CameraView {
         eye: DVec3::new(100.0, 200.0, -5.0),

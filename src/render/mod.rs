@@ -20,6 +20,7 @@ mod attributes;
 #[cfg(test)]
 pub(crate) mod brute;
 mod film;
+mod film_rows;
 mod integrator;
 mod lights;
 mod materials;
@@ -48,6 +49,7 @@ mod whitted_tests;
 
 pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
+pub use film_rows::FilmRows;
 pub use sampler::{FilmSampler, MultiJitter, PathSeed};
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
@@ -225,12 +227,30 @@ pub fn render(
     settings: &RenderSettings,
     stop: &dyn Stop,
 ) -> Result<(Film, RayCounts), RenderError> {
+    let mut film = Film::default();
+    let counts = render_into(&mut film, shapes, scene, source, settings, stop)?;
+    Ok((film, counts))
+}
+
+/// As [`render`], into `film`, whatever is in it: in the memory of its planes if it is of the same size and
+/// channels.
+///
+/// # Errors
+/// As [`render`]; what is in the film then is no image.
+pub fn render_into(
+    film: &mut Film,
+    shapes: &[&dyn Shape],
+    scene: &Scene,
+    source: &dyn ShadeSource,
+    settings: &RenderSettings,
+    stop: &dyn Stop,
+) -> Result<RayCounts, RenderError> {
     settings.validate()?;
     scene.material.validate()?;
     if !shapes.iter().any(|shape| shape.is_connected()) {
         settings.validate_branches(&scene.material)?;
     }
-    let mut film = Film::new(settings.width, settings.height, settings.channels);
+    film.fit(settings.width, settings.height, settings.channels);
     let plane = scene.ground.as_ref().map(Plane::new);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();
@@ -244,8 +264,7 @@ pub fn render(
         counts.ok_or(RenderError::Interrupted)
     };
     // Bands run at once and their tiles do too, so that a slow corner of the image keeps all threads busy.
-    let counts = film
-        .bands_mut(tile::SIDE)
+    film.bands_mut(tile::SIDE)
         .into_par_iter()
         .map(|mut band| {
             let tiles = band.tiles(tile::SIDE).into_par_iter();
@@ -253,8 +272,7 @@ pub fn render(
                 .map(|mut tile| render_tile(&mut tile))
                 .try_reduce(RayCounts::default, |a, b| Ok(a + b))
         })
-        .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
-    Ok((film, counts))
+        .try_reduce(RayCounts::default, |a, b| Ok(a + b))
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -31,7 +31,7 @@ pub struct FrameReport {
     pub rss: RssSummary,
 }
 
-/// Wall-clock seconds of the stages; neighbouring frames overlap.
+/// Wall-clock seconds of the stages, from when they have a thread to work on; neighbouring frames overlap.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(missing_docs, reason = "the names say all")]

@@ -21,6 +21,7 @@ mod resume;
 mod samples;
 mod scale;
 mod schema;
+mod sequence;
 mod status;
 mod still;
 mod structures;

@@ -1,7 +1,17 @@
-use ::exr::prelude::{ReadChannels, ReadLayers, read};
+use exr::prelude::{Blocks, Encoding, FlatSamples, LineOrder, ReadChannels, ReadLayers, f16, read};
+use glam::Vec3;
 
 use super::*;
 use crate::render::Channels;
+
+/// All there are.
+pub(super) const COMPRESSIONS: [Compression; 5] = [
+    Compression::None,
+    Compression::Rle,
+    Compression::Zip,
+    Compression::Zips,
+    Compression::Piz,
+];
 
 /// A film whose every value tells where it belongs.
 fn film(width: u32, height: u32, channels: Channels) -> Film {
@@ -66,13 +76,7 @@ fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encodin
 #[test]
 fn reads_back_with_types_and_values() {
     let film = film(37, 21, Channels::ALL);
-    for compression in [
-        Compression::None,
-        Compression::Rle,
-        Compression::Zip,
-        Compression::Zips,
-        Compression::Piz,
-    ] {
+    for compression in COMPRESSIONS {
         let options = ExrOptions {
             compression,
             ..options()
@@ -152,13 +156,18 @@ fn colour_alone_needs_no_options() {
 #[test]
 fn the_same_bytes_every_time_and_on_any_threads() {
     let film = film(200, 300, Channels::ALL);
-    let first = encode_exr(&film, &options()).unwrap();
-    for single_thread in [false, true, false] {
+    for compression in COMPRESSIONS {
         let options = ExrOptions {
-            single_thread,
+            compression,
             ..options()
         };
-        assert!(encode_exr(&film, &options).unwrap() == first);
+        let first = encode_exr(&film, &options).unwrap();
+        for threads in [1, 2, 7] {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
+            let again = pool.build().unwrap();
+            let again = again.install(|| encode_exr(&film, &options).unwrap());
+            assert!(again == first, "{compression:?} on {threads} threads");
+        }
     }
 }
 

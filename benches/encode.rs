@@ -1,0 +1,273 @@
+//! What an image takes to encode: the blocks packed here against the codec of the crate `exr`, in turns, by CPU
+//! seconds of one thread and bytes.
+//!
+//! ```text
+//! cargo bench --bench encode                 the thesis's box of 1e5 particles, frame 9 of the dam break
+//! cargo bench --bench encode -- FILE FILE    images with any channels, as this program writes them
+//! ```
+
+#![expect(clippy::print_stdout, reason = "the table is what it is for")]
+
+use std::env;
+use std::fs;
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Stdio};
+use std::thread;
+use std::time::Instant;
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, Image,
+    ImageAttributes, IntegerBounds, Layer, LayerAttributes, LineOrder, ReadChannels, ReadLayers,
+    WritableImage, f16, read,
+};
+use glam::Vec3;
+use spherule::output::{ExrLayout, ExrOptions, PackBuffers, pack_block, write_blocks};
+use spherule::render::{Channels, Film};
+
+/// Turns of each; the best counts.
+const TURNS: usize = 7;
+/// Name to filter by on the command line.
+const NAME: &str = "encode";
+const ALL: &str = "RGBA,Z,N,id,P,V,albedo";
+
+fn main() {
+    let given: Vec<String> = env::args()
+        .skip(1)
+        .filter(|a| !a.starts_with('-'))
+        .collect();
+    let has = |flag: &str| env::args().any(|argument| argument == flag);
+    let files: Vec<PathBuf> = given.iter().map(PathBuf::from).collect();
+    let are_files = files.iter().all(|file| file.is_file());
+    // One word is the name of a benchmark, as other benchmarks take it.
+    if has("--list") || (!are_files && !given.iter().any(|name| NAME.contains(&name[..]))) {
+        return;
+    }
+    let is_quick = has("--test") || !has("--bench");
+    let turns = if is_quick { 1 } else { TURNS };
+    println!("CPU seconds of one thread, best of {turns} turns, and bytes; ratio: crate / here");
+    println!(
+        "{:<34} {:>8} {:>8} {:>6} {:>11} {:>11} {:>7}",
+        "", "crate", "here", "ratio", "crate", "here", "bytes"
+    );
+    if are_files && !files.is_empty() {
+        files.iter().for_each(|file| print_rows(file, turns));
+        return;
+    }
+    let place = tempfile::tempdir().expect("a temporary directory");
+    for image in rendered(place.path(), is_quick) {
+        print_rows(&image, turns);
+    }
+}
+
+/// Images with all channels.
+fn rendered(place: &Path, is_quick: bool) -> Vec<PathBuf> {
+    let path = |path: PathBuf| path.to_str().expect("a plain path").to_owned();
+    let dam = Path::new(env!("CARGO_MANIFEST_DIR")).join("examples/dam-break");
+    let cubes = path(place.join("box.npy"));
+    run(&["generate", "box", "--particles", "1e5", "-o", &cubes]);
+    let size: &[&str] = match is_quick {
+        true => &["--width", "96", "--height", "54", "--samples", "1"],
+        false => &["--width", "1920", "--height", "1080", "--samples", "16"],
+    };
+    let inputs = [("box", cubes, "0"), ("dam", path(dam), "9")];
+    let image = |(name, input, frame): (&str, String, &str)| {
+        let output = path(place.join(format!("{name}.####.exr")));
+        let what = ["render", &input, "-o", &output, "--frames", frame];
+        run(&[&what[..], &["--channels", ALL], size].concat());
+        place.join(format!("{name}.{frame:0>4}.exr"))
+    };
+    inputs.into_iter().map(image).collect()
+}
+
+/// The program itself.
+fn run(arguments: &[&str]) {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_spherule"));
+    command.args(arguments).stdout(Stdio::null());
+    let output = command.stderr(Stdio::piped()).output().expect("started");
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {error}");
+}
+
+fn print_rows(file: &Path, turns: usize) {
+    let film = film(file);
+    let has = film.channels();
+    let data = Channels {
+        depth: has.depth,
+        normal: has.normal,
+        id: has.id,
+        ..Channels::COLOR
+    };
+    let name = file.file_stem().unwrap_or_default().to_string_lossy();
+    let mut done = Vec::new();
+    for (set, channels) in [("RGBA", Channels::COLOR), ("Z N id", data), ("all", has)] {
+        if !done.contains(&channels) {
+            print_row(&format!("{name}: {set}"), &with(&film, channels), turns);
+            done.push(channels);
+        }
+    }
+}
+
+fn print_row(name: &str, film: &Film, turns: usize) {
+    let mut best = [f64::INFINITY; 2];
+    let mut bytes = [0; 2];
+    for _ in 0..turns {
+        for (way, encode) in [by_the_crate, packed_here].into_iter().enumerate() {
+            let start = CpuTime::now();
+            bytes[way] = encode(film);
+            best[way] = best[way].min(start.seconds());
+        }
+    }
+    println!(
+        "{name:<34} {:>8.3} {:>8.3} {:>6.2} {:>11} {:>11} {:>+6.1}%",
+        best[0],
+        best[1],
+        best[0] / best[1],
+        bytes[0],
+        bytes[1],
+        100.0 * (bytes[1] as f64 / bytes[0] as f64 - 1.0),
+    );
+}
+
+fn packed_here(film: &Film) -> usize {
+    let layout = ExrLayout::of(film, &ExrOptions::default()).expect("a layout");
+    let mut buffers = PackBuffers::default();
+    let blocks = layout.blocks(film.rows());
+    let blocks = blocks.map(|rows| pack_block(&rows, &layout, &mut buffers));
+    let mut file = Cursor::new(Vec::new());
+    write_blocks(&mut file, &layout, blocks).expect("an image");
+    file.into_inner().len()
+}
+
+/// Planes turned into those of the crate one after the other, then written by it on one thread.
+fn by_the_crate(film: &Film) -> usize {
+    let mut list = Vec::new();
+    for (component, name) in ["R", "G", "B", "A"].into_iter().enumerate() {
+        let values = film.color.iter().map(|color| color[component]);
+        let halves = values.map(|v| f16::from_f32(v.clamp(-65_504.0, 65_504.0)));
+        list.push(AnyChannel::new(name, FlatSamples::F16(halves.collect())));
+    }
+    if let Some(depth) = &film.depth {
+        list.push(AnyChannel::new("Z", FlatSamples::F32(depth.clone())));
+    }
+    for (names, plane) in [
+        (["N.X", "N.Y", "N.Z"], &film.normal),
+        (["P.X", "P.Y", "P.Z"], &film.position),
+        (["V.X", "V.Y", "V.Z"], &film.velocity),
+        (["albedo.R", "albedo.G", "albedo.B"], &film.albedo),
+    ] {
+        for (axis, name) in names.into_iter().enumerate() {
+            if let Some(plane) = plane {
+                let values = plane.iter().map(|v| v[axis]).collect();
+                list.push(AnyChannel::new(name, FlatSamples::F32(values)));
+            }
+        }
+    }
+    if let Some(id) = &film.id {
+        list.push(AnyChannel::new("id.I", FlatSamples::U32(id.clone())));
+    }
+    let size = (film.width as usize, film.height as usize);
+    let encoding = Encoding {
+        compression: Codec::ZIP16,
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let channels = AnyChannels::sort(list.into());
+    let layer = Layer::new(size, LayerAttributes::default(), encoding, channels);
+    let window = IntegerBounds::from_dimensions(size);
+    let image = Image::empty(ImageAttributes::new(window)).with_layer(layer);
+    let mut file = Cursor::new(Vec::new());
+    let writer = image.write().non_parallel();
+    writer.to_buffered(&mut file).expect("an image");
+    file.into_inner().len()
+}
+
+/// The planes of `film` that are among `channels`.
+fn with(film: &Film, channels: Channels) -> Film {
+    let plane = |plane: &Option<Vec<Vec3>>, wanted: bool| plane.clone().filter(|_| wanted);
+    Film {
+        width: film.width,
+        height: film.height,
+        color: film.color.clone(),
+        depth: film.depth.clone().filter(|_| channels.depth),
+        normal: plane(&film.normal, channels.normal),
+        position: plane(&film.position, channels.position),
+        velocity: plane(&film.velocity, channels.velocity),
+        albedo: plane(&film.albedo, channels.albedo),
+        id: film.id.clone().filter(|_| channels.id),
+    }
+}
+
+/// The film that `file` was made of, its colours as halves.
+fn film(file: &Path) -> Film {
+    let bytes = fs::read(file).unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(bytes))
+        .unwrap_or_else(|e| panic!("{}: {e}", file.display()));
+    let layer = image.layer_data;
+    let plane = |name: &str| {
+        let mut list = layer.channel_data.list.iter();
+        let channel = list.find(|c| c.name.eq(name));
+        channel.map(|c| &c.sample_data)
+    };
+    let floats = |name: &str| {
+        let samples = plane(name)?;
+        Some(samples.values_as_f32().collect::<Vec<f32>>())
+    };
+    let vectors = |layer: &str, axes: [&str; 3]| {
+        let [x, y, z] = axes.map(|axis| floats(&format!("{layer}.{axis}")));
+        let (x, y, z) = (x?, y?, z?);
+        let all = x.into_iter().zip(y).zip(z);
+        Some(all.map(|((x, y), z)| Vec3::new(x, y, z)).collect())
+    };
+    let color = ["R", "G", "B", "A"].map(|name| floats(name).expect("colours"));
+    let side = |pixels: usize| u32::try_from(pixels).expect("a side");
+    Film {
+        width: side(layer.size.x()),
+        height: side(layer.size.y()),
+        color: (0..color[0].len())
+            .map(|at| std::array::from_fn(|c| color[c][at]))
+            .collect(),
+        depth: floats("Z"),
+        normal: vectors("N", ["X", "Y", "Z"]),
+        position: vectors("P", ["X", "Y", "Z"]),
+        velocity: vectors("V", ["X", "Y", "Z"]),
+        albedo: vectors("albedo", ["R", "G", "B"]),
+        id: plane("id.I").and_then(|samples| match samples {
+            FlatSamples::U32(ids) => Some(ids.clone()),
+            _ => None,
+        }),
+    }
+}
+
+/// What this thread has run so far; the time of day where the system does not tell.
+struct CpuTime {
+    nanoseconds: Option<u64>,
+    instant: Instant,
+}
+
+impl CpuTime {
+    fn now() -> Self {
+        // The kernel brings its books up to date when a thread gives way.
+        thread::yield_now();
+        let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
+        Self {
+            nanoseconds: text.split_whitespace().next().and_then(|n| n.parse().ok()),
+            instant: Instant::now(),
+        }
+    }
+
+    /// Seconds since.
+    fn seconds(&self) -> f64 {
+        let now = Self::now();
+        match (self.nanoseconds, now.nanoseconds) {
+            (Some(before), Some(after)) => 1e-9 * (after - before) as f64,
+            _ => self.instant.elapsed().as_secs_f64(),
+        }
+    }
+}

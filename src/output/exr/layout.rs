@@ -1,0 +1,106 @@
+//! How an image is laid out in its file: its header, its planes, and its blocks of rows.
+
+use exr::image::write::layers::WritableLayers;
+use exr::meta::header::Header;
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, ImageAttributes,
+    IntegerBounds, Layer, LineOrder, SampleType,
+};
+
+use super::planes::{Plane, planes_in_file};
+use super::{Compression, ExrOptions, OutputError, attributes};
+use crate::render::{Channels, Film, FilmRows};
+
+/// Rows of a band where blocks have no more: those of the renderer's tiles.
+const BAND_ROWS: u32 = 16;
+
+/// What all blocks of a file have in common.
+#[derive(Debug, Clone)]
+pub struct ExrLayout {
+    pub(super) header: Header,
+    pub(super) compression: Compression,
+    /// In the order of the file.
+    pub(super) planes: Vec<Plane>,
+}
+
+impl ExrLayout {
+    /// For images of `width` x `height` pixels with `channels`.
+    ///
+    /// # Errors
+    /// If an attribute cannot be stored.
+    pub fn new(
+        width: u32,
+        height: u32,
+        channels: Channels,
+        options: &ExrOptions,
+    ) -> Result<Self, OutputError> {
+        let planes = planes_in_file(channels);
+        // The header takes names and types alone, so the samples may stay away.
+        let described = planes.iter().map(|plane| {
+            let samples = match plane.sample_type() {
+                SampleType::F16 => FlatSamples::F16(Vec::new()),
+                SampleType::F32 => FlatSamples::F32(Vec::new()),
+                SampleType::U32 => FlatSamples::U32(Vec::new()),
+            };
+            AnyChannel::new(plane.name, samples)
+        });
+        let encoding = Encoding {
+            compression: options.compression.codec(),
+            blocks: Blocks::ScanLines,
+            line_order: LineOrder::Increasing,
+        };
+        let size = (width as usize, height as usize);
+        let described = AnyChannels::sort(described.collect());
+        let layer = Layer::new(size, attributes(options)?, encoding, described);
+        let window = IntegerBounds::from_dimensions(size);
+        let header = layer.infer_headers(&ImageAttributes::new(window)).remove(0);
+        Ok(Self {
+            header,
+            compression: options.compression,
+            planes,
+        })
+    }
+
+    /// For images like `film`.
+    ///
+    /// # Errors
+    /// If an attribute cannot be stored.
+    pub fn of(film: &Film, options: &ExrOptions) -> Result<Self, OutputError> {
+        Self::new(film.width, film.height, film.channels(), options)
+    }
+
+    /// Rows of a block: 1, 16 or 32. The last block of an image may have fewer.
+    pub fn rows_per_block(&self) -> u32 {
+        let rows = self.compression.codec().scan_lines_per_block();
+        u32::try_from(rows).expect("blocks have at most 256 rows")
+    }
+
+    /// Rows of a band: whole blocks, and enough of them to be worth a thread's while.
+    pub fn rows_per_band(&self) -> u32 {
+        self.rows_per_block().max(BAND_ROWS)
+    }
+
+    /// The blocks of `band`, which must begin where a block does and end where one does.
+    pub fn blocks<'a>(&self, band: FilmRows<'a>) -> impl Iterator<Item = FilmRows<'a>> + use<'a> {
+        let rows = self.rows_per_block();
+        let tops = (band.top..band.top + band.height).step_by(rows as usize);
+        tops.map(move |top| band.part(top, rows))
+    }
+
+    /// Bytes of all samples in `rows` rows.
+    pub(super) fn bytes(&self, rows: u32) -> usize {
+        self.header.layer_size.x() * rows as usize * self.header.channels.bytes_per_pixel
+    }
+}
+
+impl Compression {
+    pub(super) const fn codec(self) -> Codec {
+        match self {
+            Self::None => Codec::Uncompressed,
+            Self::Rle => Codec::RLE,
+            Self::Zip => Codec::ZIP16,
+            Self::Zips => Codec::ZIP1,
+            Self::Piz => Codec::PIZ,
+        }
+    }
+}

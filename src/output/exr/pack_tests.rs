@@ -1,0 +1,317 @@
+//! What is packed here against the codec and the writer of the crate `exr`, to the bit.
+
+use std::io::{self, Cursor, Seek, Write};
+use std::sync::mpsc;
+
+use exr::prelude::{
+    AnyChannel, AnyChannels, Blocks, Encoding, FlatSamples, Image, ImageAttributes, Layer,
+    LineOrder, ReadChannels, ReadLayers, WritableImage, f16, read,
+};
+use glam::Vec3;
+
+use super::super::planes::{Source, planes_in_file};
+use super::super::tests::COMPRESSIONS;
+use super::super::{ExrOptions, attributes, encode_exr, write_blocks, write_exr};
+use super::*;
+use crate::render::{Channels, Film};
+
+/// Numbers that follow one another without a pattern (splitmix64).
+struct Numbers(u64);
+
+impl Numbers {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    /// Any bits there are, infinite values and all kinds of NaN among them.
+    fn wild(&mut self) -> f32 {
+        match self.next() % 16 {
+            0 => f32::NAN,
+            1 => f32::INFINITY,
+            2 => f32::NEG_INFINITY,
+            3 => -0.0,
+            4 => f32::from_bits(0xffc1_2345),
+            _ => f32::from_bits((self.next() >> 32) as u32),
+        }
+    }
+
+    fn wild_vector(&mut self) -> Vec3 {
+        Vec3::new(self.wild(), self.wild(), self.wild())
+    }
+}
+
+/// A film without any pattern in its lower half, so that its blocks do not shrink.
+fn wild_film(width: u32, height: u32, channels: Channels) -> Film {
+    let mut numbers = Numbers(u64::from(width) << 32 | u64::from(height));
+    let mut film = Film::new(width, height, channels);
+    let half = film.color.len() / 2;
+    for color in &mut film.color[half..] {
+        *color = std::array::from_fn(|_| numbers.wild());
+    }
+    let vectors = [
+        &mut film.normal,
+        &mut film.position,
+        &mut film.velocity,
+        &mut film.albedo,
+    ];
+    for plane in vectors.into_iter().flatten() {
+        plane[half..].fill_with(|| numbers.wild_vector());
+    }
+    if let Some(plane) = &mut film.depth {
+        plane[half..].fill_with(|| numbers.wild());
+    }
+    if let Some(plane) = &mut film.id {
+        plane[half..].fill_with(|| (numbers.next() >> 32) as u32);
+    }
+    film
+}
+
+/// All samples of `film` from `source`; colours one by one, by the portable conversion.
+fn samples(film: &Film, source: Source) -> FlatSamples {
+    let floats = |plane: &Option<Vec<Vec3>>, axis| {
+        let vectors = plane.as_ref().unwrap().iter();
+        FlatSamples::F32(vectors.map(|v: &Vec3| v[axis]).collect())
+    };
+    let half = |value: f32| {
+        let value = if value.is_nan() { 0.0 } else { value };
+        f16::from_f32_const(value.clamp(-65_504.0, 65_504.0))
+    };
+    match source {
+        Source::Color(c) => FlatSamples::F16(film.color.iter().map(|v| half(v[c])).collect()),
+        Source::Depth => FlatSamples::F32(film.depth.clone().unwrap()),
+        Source::Normal(axis) => floats(&film.normal, axis),
+        Source::Position(axis) => floats(&film.position, axis),
+        Source::Velocity(axis) => floats(&film.velocity, axis),
+        Source::Albedo(axis) => floats(&film.albedo, axis),
+        Source::Id => FlatSamples::U32(film.id.clone().unwrap()),
+    }
+}
+
+fn bits(samples: &FlatSamples) -> Vec<u32> {
+    match samples {
+        FlatSamples::F16(values) => values.iter().map(|v| u32::from(v.to_bits())).collect(),
+        FlatSamples::F32(values) => values.iter().map(|v| v.to_bits()).collect(),
+        FlatSamples::U32(values) => values.clone(),
+    }
+}
+
+/// The file that the crate `exr` makes by itself.
+fn by_the_crate(film: &Film, options: &ExrOptions) -> Vec<u8> {
+    let size = (film.width as usize, film.height as usize);
+    let planes = planes_in_file(film.channels()).into_iter();
+    let list = planes.map(|plane| AnyChannel::new(plane.name, samples(film, plane.source)));
+    let encoding = Encoding {
+        compression: options.compression.codec(),
+        blocks: Blocks::ScanLines,
+        line_order: LineOrder::Increasing,
+    };
+    let channels = AnyChannels::sort(list.collect());
+    let layer = Layer::new(size, attributes(options).unwrap(), encoding, channels);
+    let window = IntegerBounds::from_dimensions(size);
+    let image = Image::empty(ImageAttributes::new(window)).with_layer(layer);
+    let mut file = Cursor::new(Vec::new());
+    image.write().to_buffered(&mut file).unwrap();
+    file.into_inner()
+}
+
+fn decoded(file: &[u8]) -> Vec<(String, Vec<u32>)> {
+    let image = read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .first_valid_layer()
+        .all_attributes()
+        .from_buffered(Cursor::new(file))
+        .unwrap();
+    let list = image.layer_data.channel_data.list.into_iter();
+    list.map(|c| (c.name.to_string(), bits(&c.sample_data)))
+        .collect()
+}
+
+#[track_caller]
+fn check(film: &Film, compression: Compression) {
+    let options = ExrOptions {
+        compression,
+        ..ExrOptions::default()
+    };
+    let file = encode_exr(film, &options).unwrap().bytes;
+    let theirs = by_the_crate(film, &options);
+    let size = (film.width, film.height);
+    if !matches!(compression, Compression::Zip | Compression::Zips) {
+        assert!(file == theirs, "{compression:?} {size:?}");
+    }
+    let wanted: Vec<_> = planes_in_file(film.channels())
+        .iter()
+        .map(|plane| (plane.name.to_owned(), bits(&samples(film, plane.source))))
+        .collect();
+    assert!(decoded(&file) == wanted, "{compression:?} {size:?}");
+}
+
+#[test]
+fn any_film_reads_back_to_the_bit_and_as_the_crate_writes_it() {
+    for (width, height) in [(1, 1), (17, 33), (1, 50), (50, 1), (40, 16), (31, 64)] {
+        for compression in COMPRESSIONS {
+            check(&wild_film(width, height, Channels::ALL), compression);
+            check(&wild_film(width, height, Channels::COLOR), compression);
+        }
+    }
+    for bits in 0..64_u32 {
+        let channels = Channels {
+            depth: bits & 1 != 0,
+            normal: bits & 2 != 0,
+            position: bits & 4 != 0,
+            velocity: bits & 8 != 0,
+            albedo: bits & 16 != 0,
+            id: bits & 32 != 0,
+        };
+        check(&wild_film(9, 20, channels), Compression::Zip);
+    }
+}
+
+#[test]
+fn rows_beyond_the_window_of_deflate_read_back() {
+    let film = wild_film(3000, 17, Channels::ALL);
+    let layout = ExrLayout::of(&film, &ExrOptions::default()).unwrap();
+    assert!(layout.bytes(1) / 2 > WINDOW);
+    check(&film, Compression::Zip);
+}
+
+#[test]
+fn blocks_that_do_not_shrink_are_stored_plain() {
+    let mut numbers = Numbers(7);
+    let mut film = Film::new(50, 32, Channels::COLOR);
+    for color in &mut film.color[50 * 16..] {
+        // All finite halves.
+        *color = std::array::from_fn(|_| {
+            let bits = (numbers.next() >> 48) as u16;
+            f16::from_bits((bits % 0x7c00) | (bits & 0x8000)).to_f32()
+        });
+    }
+    film.color[50 * 32 - 1] = [f32::NAN, f32::INFINITY, -1e9, 1.0];
+    let layout = ExrLayout::of(&film, &ExrOptions::default()).unwrap();
+    let mut buffers = PackBuffers::default();
+    let blocks: Vec<PackedBlock> = layout
+        .blocks(film.rows())
+        .map(|rows| pack_block(&rows, &layout, &mut buffers).unwrap())
+        .collect();
+    let tops: Vec<u32> = blocks.iter().map(|block| block.y).collect();
+    assert_eq!(tops, [0, 16]);
+    assert!(blocks[0].bytes.len() < layout.bytes(16) / 10);
+    assert_eq!(blocks[1].bytes.len(), layout.bytes(16));
+    assert_eq!((blocks[0].clamped, blocks[1].clamped), (0, 3));
+    check(&film, Compression::Zip);
+}
+
+/// FNV-1a, for a hash that no crate can change.
+fn fnv(bytes: &[u8]) -> u64 {
+    let start = 0xcbf2_9ce4_8422_2325_u64;
+    bytes.iter().fold(start, |hash, byte| {
+        (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3)
+    })
+}
+
+/// Blocks of a smooth picture. Whatever the machine can do, their bytes are these.
+#[test]
+fn the_bytes_are_those_of_any_machine() {
+    let hash = |channels| {
+        let mut film = Film::new(150, 40, channels);
+        for (at, color) in (0_u16..).zip(&mut film.color) {
+            let (x, y) = (f32::from(at % 150), f32::from(at / 150));
+            *color = [x * y / 256.0, x / 128.0, y / 64.0, 1.0];
+        }
+        for (at, id) in (0..).zip(film.id.iter_mut().flatten()) {
+            *id = at / 7 * 7;
+        }
+        let layout = ExrLayout::of(&film, &ExrOptions::default()).unwrap();
+        let mut buffers = PackBuffers::default();
+        let blocks = layout.blocks(film.rows());
+        let bytes: Vec<u8> = blocks
+            .flat_map(|rows| pack_block(&rows, &layout, &mut buffers).unwrap().bytes)
+            .collect();
+        fnv(&bytes)
+    };
+    // Another version of the crate `zlib-rs` may change them, nothing else.
+    assert_eq!(hash(Channels::COLOR), 0xf972_b290_850b_94e3);
+}
+
+#[test]
+fn the_film_comes_back_and_a_busy_pool_is_not_waited_for() {
+    let film = wild_film(40, 200, Channels::ALL);
+    let wanted = encode_exr(&film, &ExrOptions::default()).unwrap().bytes;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(2);
+    let (file, returned) = pool.build().unwrap().install(|| {
+        let (free, busy) = mpsc::channel::<()>();
+        let (begins, has_begun) = mpsc::channel();
+        rayon::spawn(move || {
+            begins.send(()).unwrap();
+            let _ = busy.recv();
+        });
+        has_begun.recv().unwrap();
+        let mut file = Cursor::new(Vec::new());
+        let (returned, _) = write_exr(film.clone(), &ExrOptions::default(), &mut file).unwrap();
+        drop(free);
+        (file.into_inner(), returned)
+    });
+    assert!(file == wanted);
+    assert_eq!(returned.id, film.id);
+}
+
+/// A file that takes so many bytes and no more.
+struct Full {
+    file: Cursor<Vec<u8>>,
+    room: u64,
+    kind: io::ErrorKind,
+}
+
+impl Write for Full {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if self.file.position() + bytes.len() as u64 > self.room {
+            return Err(self.kind.into());
+        }
+        self.file.write(bytes)
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        self.file.flush()
+    }
+}
+
+impl Seek for Full {
+    fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
+        self.file.seek(to)
+    }
+}
+
+#[test]
+fn a_file_that_takes_no_more_is_an_error_of_the_system() {
+    let film = wild_film(64, 100, Channels::COLOR);
+    let length = encode_exr(&film, &ExrOptions::default())
+        .unwrap()
+        .bytes
+        .len() as u64;
+    for kind in [io::ErrorKind::StorageFull, io::ErrorKind::BrokenPipe] {
+        for room in [0, 100, 500, length / 2, length - 1] {
+            let mut file = Full {
+                file: Cursor::new(Vec::new()),
+                room,
+                kind,
+            };
+            let error = write_exr(film.clone(), &ExrOptions::default(), &mut file).unwrap_err();
+            assert_eq!(error.into_io().unwrap().kind(), kind, "{room} of {length}");
+        }
+    }
+}
+
+#[test]
+fn a_missing_block_is_an_error() {
+    let film = wild_film(8, 40, Channels::COLOR);
+    let layout = ExrLayout::of(&film, &ExrOptions::default()).unwrap();
+    let mut buffers = PackBuffers::default();
+    let blocks = layout.blocks(film.rows());
+    let blocks = blocks.map(|rows| pack_block(&rows, &layout, &mut buffers));
+    let mut file = Cursor::new(Vec::new());
+    assert!(write_blocks(&mut file, &layout, blocks.take(2)).is_err());
+}
