@@ -9,7 +9,9 @@ use crate::manifest::{
     GroundHeight, GroundPattern, LightKind, Manifest, RadiusSetting,
 };
 use crate::output::{Compression, ExrOptions, PreviewOptions};
-use crate::pipeline::{ColorRule, FrameSize, MemoryModel, RadiusRule, Setup, attribute_list};
+use crate::pipeline::{
+    ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
+};
 use crate::render::{Channels, RenderSettings};
 use crate::report::memory::available;
 use crate::scene::{
@@ -172,19 +174,17 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     render.min_weight = manifest.render.min_weight;
     render.channels = channels;
     render.transparent_background = output.transparent;
-    let setup = Setup {
+    let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
         color,
+        path,
+        aspect,
+        scene,
+        renderer: crate::render::RendererKind::default(),
+        render,
         surface,
-        memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
-        accelerator: manifest.render.accelerator.structure(),
-        bvh: BvhSettings {
-            preset: manifest.render.bvh_preset,
-            leaves: manifest.render.bvh_leaves,
-        },
-        sbvh: manifest.render.sbvh,
         exr: ExrOptions {
             compression: compression(manifest),
             frames_per_second: output.fps.map(fps),
@@ -196,17 +196,23 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             exposure: output.preview_exposure,
             backdrop: None,
         },
+    };
+    let run = RunSettings {
+        memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
+        accelerator: manifest.render.accelerator.structure(),
+        bvh: BvhSettings {
+            preset: manifest.render.bvh_preset,
+            leaves: manifest.render.bvh_leaves,
+        },
+        sbvh: manifest.render.sbvh,
         access: match manifest.input.mmap {
             true => Access::Map,
             false => Access::Read,
         },
         verify: manifest.input.verify,
         weight: survey.weight,
-        path,
-        aspect,
-        scene,
-        render,
     };
+    let setup = Setup { picture, run };
     check_image_size(&setup)?;
     Ok(setup)
 }
@@ -216,8 +222,8 @@ fn check_image_size(setup: &Setup) -> Result<(), ResolveError> {
     let need = MemoryModel::new(setup).alone(&FrameSize::default()).total();
     match available() {
         Some(available) if need > available => Err(ResolveError::ImageTooLarge {
-            width: setup.render.width,
-            height: setup.render.height,
+            width: setup.picture.render.width,
+            height: setup.picture.render.height,
             need: need >> 20,
             available: available >> 20,
         }),

@@ -184,7 +184,7 @@ impl<'a> Check<'a> {
     }
 
     fn size(&self, setup: &Setup, task: &ImageTask) -> FrameSize {
-        FrameSize::of(self.sequence, task.index, setup.weight.as_ref())
+        FrameSize::of(self.sequence, task.index, setup.run.weight.as_ref())
     }
 
     fn to_do(&self) -> impl Iterator<Item = &ImageTask> {

@@ -263,7 +263,7 @@ impl Plan {
     ) -> Schedule {
         let sizes: Vec<FrameSize> = tasks
             .iter()
-            .map(|task| FrameSize::of(sequence, task.index, setup.weight.as_ref()))
+            .map(|task| FrameSize::of(sequence, task.index, setup.run.weight.as_ref()))
             .collect();
         let limit = self.manifest.render.memory_limit;
         let model = MemoryModel::new(setup);
@@ -365,11 +365,11 @@ pub(super) fn one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
 
 /// What the grid of a smooth surface depends on, the usual reason for its size being a wrong radius.
 fn surface_text(setup: &Setup) -> String {
-    if setup.surface.kind != SurfaceKind::Smooth {
+    if setup.picture.surface.kind != SurfaceKind::Smooth {
         return String::new();
     }
-    let voxel = setup.surface.voxel;
-    match setup.radius {
+    let voxel = setup.picture.surface.voxel;
+    match setup.picture.radius {
         RadiusRule::Common(radius) | RadiusRule::FileOr(radius) if radius > 0.0 => format!(
             " for a smooth surface of particles of radius {radius} in voxels of {}",
             voxel * radius
@@ -384,10 +384,8 @@ fn surface_text(setup: &Setup) -> String {
 fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
     let mut ways = Vec::new();
     let others = Structure::ALL.into_iter().filter(|structure| {
-        let setup = Setup {
-            accelerator: Some(*structure),
-            ..setup.clone()
-        };
+        let mut setup = setup.clone();
+        setup.run.accelerator = Some(*structure);
         MemoryModel::new(&setup).alone(frame).total() <= limit.0
     });
     ways.extend(others.map(|other| format!("choose --accelerator {other}")));
@@ -396,7 +394,7 @@ fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
     if 4 * (empty.images + empty.encoding) > limit.0 {
         ways.push("make the image smaller or ask for fewer channels".to_owned());
     }
-    if setup.surface.kind == SurfaceKind::Smooth && 4 * alone.surface > limit.0 {
+    if setup.picture.surface.kind == SurfaceKind::Smooth && 4 * alone.surface > limit.0 {
         ways.push("give larger voxels (surface.voxel)".to_owned());
     }
     ways.push("raise the limit".to_owned());

@@ -83,7 +83,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let plan = Plan::new(asked, &sequence, None)?;
     let (survey, mut setup) = plan.survey(&sequence)?;
     if kind == PictureKind::Png {
-        setup.render.channels = Channels::COLOR;
+        setup.picture.render.channels = Channels::COLOR;
     }
     tell(&sequence, &survey, &setup);
     let mut tasks = plan.tasks(&sequence, &[frame]);

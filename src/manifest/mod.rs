@@ -9,7 +9,7 @@ use std::path::Path;
 
 use spherule_jobs::FrameRange;
 
-use crate::render::MAX_LITERAL_DEPTH;
+use crate::render::{MAX_LITERAL_DEPTH, RendererKind};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
 use reader::{Problem, Problems, Section};
@@ -266,7 +266,10 @@ impl Manifest {
     /// accelerator, what no ray of these pictures meets (`render.min_weight` for opaque spheres), the
     /// directory of the images, and all of `[job]`.
     pub fn settings(&self) -> Vec<(String, String)> {
-        self.entries().settings()
+        let mut settings = self.entries().settings();
+        let renderer = format!("{:?}", RendererKind::default().name());
+        settings.push((same::RENDERER.to_owned(), renderer));
+        settings
     }
 
     /// A complete manifest with every key, commented, that reads back equal.

@@ -8,6 +8,8 @@ use super::{ColorMap, ColorSetting, Manifest};
 
 const MIN_WEIGHT: &str = "render.min_weight";
 const COLOR: &str = "material.color";
+/// Who renders; not in a manifest as long as there is one.
+pub(super) const RENDERER: &str = "renderer";
 
 impl Manifest {
     /// The [`Manifest::settings`], each in the words of the `planned` settings of a job where those make the same
@@ -25,6 +27,10 @@ impl Manifest {
             // Versions without the key followed both branches always.
             (Some(0.0), None) => settings.retain(|(key, _)| key != MIN_WEIGHT),
             _ => {}
+        }
+        // Versions without the key had one renderer.
+        if value(RENDERER).is_none() {
+            settings.retain(|(key, _)| key != RENDERER);
         }
         if let Some(old) = value(COLOR)
             && self.has_color_written(old, has_rgb)

@@ -45,7 +45,7 @@ impl DecodedFrame {
         file: &str,
     ) -> Result<(Self, u64), LoadError> {
         let (radius, clamped) = radii(setup, &frame, file)?;
-        let colored_by = match &setup.color {
+        let colored_by = match &setup.picture.color {
             ColorRule::Constant(_) => None,
             ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
                 match *required {
@@ -54,12 +54,12 @@ impl DecodedFrame {
                 }
             }
         };
-        let (values, colors) = match (&setup.color, colored_by) {
+        let (values, colors) = match (&setup.picture.color, colored_by) {
             (ColorRule::Attribute { .. }, Some(by)) => (magnitudes(by, 1.0), Vec::new()),
             (ColorRule::Rgb { .. }, Some(by)) => (Vec::new(), colors(by)),
             _ => (Vec::new(), Vec::new()),
         };
-        let channels = setup.render.channels;
+        let channels = setup.picture.render.channels;
         let ids = if channels.id { ids(&frame) } else { None };
         let velocities = if channels.velocity {
             velocity_of(&frame.attributes).map(vectors)
@@ -155,20 +155,20 @@ fn attribute<'a>(
 
 /// The radii of a frame and how many had to be raised.
 fn radii(setup: &Setup, frame: &ParticleFrame, file: &str) -> Result<(Radius, u64), LoadError> {
-    let mut radius = match &setup.radius {
+    let mut radius = match &setup.picture.radius {
         RadiusRule::Common(radius) => Radius::Common(*radius),
         RadiusRule::FileOr(radius) => frame.radius.clone().unwrap_or(Radius::Common(*radius)),
         RadiusRule::Attribute { name, scale } => {
             match attribute(frame, name, "the radius", file)? {
                 Some(attribute) => Radius::PerParticle(magnitudes(attribute, f64::from(*scale))),
-                None => Radius::Common(setup.least_radius),
+                None => Radius::Common(setup.picture.least_radius),
             }
         }
     };
     if frame.is_empty() {
         return Ok((radius, 0));
     }
-    let least = setup.least_radius;
+    let least = setup.picture.least_radius;
     let mut clamped = 0;
     let mut raise = |radius: &mut f32| {
         // Also true for NaN.

@@ -190,7 +190,7 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,
         "time": frame.time,
-        "origin": setup.origin.to_array(),
+        "origin": setup.picture.origin.to_array(),
         "particles": frame.report.particles,
     });
     ExrOptions {
@@ -199,6 +199,6 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
             json: facts.to_string(),
         }),
         world_to_camera: Some(frame.camera.world_to_camera()),
-        ..setup.exr.clone()
+        ..setup.picture.exr.clone()
     }
 }

@@ -57,7 +57,7 @@ impl StoredFrame {
         let Some(path) = sequence.native_file(index) else {
             return Ok(Opened::Decode(None));
         };
-        let file = NativeFile::open(path, setup.access).map_err(LoadError::Frame)?;
+        let file = NativeFile::open(path, setup.run.access).map_err(LoadError::Frame)?;
         let structure = setup.stored_structure();
         let radius = match particles_in_place(setup, file.index()) {
             Ok(radius) => radius,
@@ -73,7 +73,7 @@ impl StoredFrame {
             radius: radius.common,
             names,
         };
-        frame.verify(setup.verify).map_err(LoadError::Frame)?;
+        frame.verify(setup.run.verify).map_err(LoadError::Frame)?;
         Ok(Opened::InPlace(frame, radius.raised))
     }
 
@@ -104,7 +104,7 @@ impl StoredFrame {
 
     /// Whether anything is looked up by particle.
     pub fn needs_indices(&self, setup: &Setup) -> bool {
-        let channels = setup.render.channels;
+        let channels = setup.picture.render.channels;
         channels.id || channels.velocity || self.names.values.is_some()
     }
 
@@ -188,7 +188,7 @@ impl Names {
     fn of(setup: &Setup, file: &NativeFile) -> Result<Self, LoadError> {
         let frame = file.frame_unchecked();
         let attributes = frame.attributes();
-        let values = match &setup.color {
+        let values = match &setup.picture.color {
             ColorRule::Constant(_) => None,
             ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
                 let found = frame.attribute(name).map(|a| a.name().to_owned());
@@ -200,7 +200,7 @@ impl Names {
                 found
             }
         };
-        let channels = setup.render.channels;
+        let channels = setup.picture.render.channels;
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {
             values,
@@ -224,14 +224,14 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     if let Some(why) = setup.needs_copy() {
         return Err(why);
     }
-    if DVec3::from_array(index.origin) != setup.origin {
+    if DVec3::from_array(index.origin) != setup.picture.origin {
         return Err(
             "they are relative to another origin than the sequence, for 12 bytes a particle \
                     and more; convert the sequence as a whole to save that"
                 .to_owned(),
         );
     }
-    let common = match (&setup.radius, &index.radius) {
+    let common = match (&setup.picture.radius, &index.radius) {
         (RadiusRule::Attribute { .. }, _) => {
             return Err("the radius is an attribute, for 12 bytes a particle and more".to_owned());
         }
@@ -240,7 +240,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         }
         (RadiusRule::FileOr(_), RadiusIndex::Common(radius)) => *radius,
         (RadiusRule::FileOr(_), RadiusIndex::PerParticle(radii))
-            if radii.low >= setup.least_radius =>
+            if radii.low >= setup.picture.least_radius =>
         {
             return Ok(PlacedRadius {
                 common: None,
@@ -252,9 +252,13 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
         }
     };
     // Also of what is no number.
-    let is_seen = common >= setup.least_radius && is_radius(common);
+    let is_seen = common >= setup.picture.least_radius && is_radius(common);
     Ok(PlacedRadius {
-        common: Some(if is_seen { common } else { setup.least_radius }),
+        common: Some(if is_seen {
+            common
+        } else {
+            setup.picture.least_radius
+        }),
         raised: if is_seen { 0 } else { index.count },
     })
 }

@@ -134,7 +134,7 @@ fn decode(
     let loaded = sequence.load_measured(task.index);
     let loaded = loaded.map_err(|e| newest(LoadError::Frame(e), sequence, task))?;
     notes.extend(loaded.notes);
-    let frame = ParticleFrame::from_raw(loaded.particles, setup.origin);
+    let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
     let (time, dropped) = (frame.time, frame.dropped);
     let file = first_file(sequence, task);
     let (decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
@@ -177,7 +177,7 @@ fn first_file(sequence: &Sequence, task: &ImageTask) -> String {
 
 /// Refuses a frame that cannot fit, before the system ends the whole job for it.
 fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
-    let size = FrameSize::of(sequence, task.index, setup.weight.as_ref());
+    let size = FrameSize::of(sequence, task.index, setup.run.weight.as_ref());
     let need = MemoryModel::new(setup).decoding(&size);
     match available().into_iter().chain(process_room()).min() {
         Some(available) if need > available => Err(LoadError::TooLarge {

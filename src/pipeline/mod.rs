@@ -25,6 +25,7 @@ mod predict;
 mod probe;
 mod rays;
 mod read_threads;
+mod renderer;
 mod schedule;
 mod setup;
 mod single;
@@ -38,10 +39,11 @@ pub(crate) use load::attribute_list;
 pub use load::{LoadError, LoadedFrame, LoadedParticles, load_frame};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, probe};
+pub use renderer::{FrameRenderer, renderer_of};
 pub use schedule::{Overlap, Schedule};
-pub use setup::{ColorRule, RadiusRule, Setup};
+pub use setup::{ColorRule, Picture, RadiusRule, RunSettings, Setup};
 pub use single::{PictureKind, SingleFault, make_image, make_picture};
-pub use trace::{BuiltFrame, FrameTracer, TraceError, TracedFrame};
+pub use trace::{BuiltFrame, CpuRenderer, TraceError, TracedFrame};
 
 use read_threads::ReadThreads;
 
@@ -218,7 +220,7 @@ impl ReadStage<'_> {
     }
 
     fn load(&self, task: &ImageTask) -> Result<LoadedFrame, String> {
-        let size = FrameSize::of(self.sequence, task.index, self.setup.weight.as_ref());
+        let size = FrameSize::of(self.sequence, task.index, self.setup.run.weight.as_ref());
         let load = || load_frame(self.setup, self.sequence, task);
         let loaded = self.threads.read(size.read_bytes(), load);
         loaded.map_err(|e| e.to_string())
@@ -288,7 +290,7 @@ impl TraceStage<'_> {
         is_built: Option<SyncSender<()>>,
         next: SyncSender<InHand<TracedFrame>>,
     ) {
-        let mut tracer = FrameTracer::new();
+        let mut tracer = renderer_of(self.setup.picture.renderer);
         let mut told = Told::default();
         for InHand { claim, passed } in loaded {
             // A frame that was only read when the interrupt came is dropped, not begun.
@@ -299,7 +301,7 @@ impl TraceStage<'_> {
                 Passed::Frame(frame) => {
                     let task = frame.task.clone();
                     (self.watch)(Event::Entered(task.frame, Stage::Trace));
-                    let build = || tracer.build(self.setup, frame);
+                    let build = || tracer.prepare(self.setup, frame);
                     (task, guarded(|| in_pool(build).map_err(|e| e.to_string())))
                 }
                 Passed::Failed(task, reason) => (task, Err(reason)),
@@ -313,7 +315,7 @@ impl TraceStage<'_> {
                 if let Ok(film) = spare.try_recv() {
                     tracer.recycle(film);
                 }
-                let trace = || tracer.trace(self.setup, frame, &self.stop);
+                let trace = || tracer.render(self.setup, frame, &self.stop);
                 guarded(|| in_pool(trace).map_err(|e| e.to_string()))
             });
             let passed = match traced {
@@ -321,12 +323,12 @@ impl TraceStage<'_> {
                 Err(_) if self.stop.is_raised() => return,
                 Err(reason) => {
                     // Whatever happened may have left the buffers half filled.
-                    tracer = FrameTracer::new();
+                    tracer = renderer_of(self.setup.picture.renderer);
                     Passed::Failed(task, reason)
                 }
             };
             if is_built.is_none() {
-                tracer = FrameTracer::new();
+                tracer = renderer_of(self.setup.picture.renderer);
             }
             if next.send(InHand { claim, passed }).is_err() {
                 return;

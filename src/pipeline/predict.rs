@@ -187,10 +187,10 @@ struct SurfaceBytes {
 impl<'a> MemoryModel<'a> {
     /// For the pictures of `setup`.
     pub fn new(setup: &'a Setup) -> Self {
-        let known = setup.weight.unwrap_or_default();
+        let known = setup.run.weight.unwrap_or_default();
         Self {
             setup,
-            own_radii: match setup.radius {
+            own_radii: match setup.picture.radius {
                 RadiusRule::Common(_) => false,
                 RadiusRule::FileOr(_) => known.own_radii,
                 RadiusRule::Attribute { .. } => true,
@@ -229,7 +229,7 @@ impl<'a> MemoryModel<'a> {
 
     /// The bytes of a native frame where they are not those of a map.
     fn held_file(&self, frame: &FrameSize) -> u64 {
-        match self.setup.access {
+        match self.setup.run.access {
             Access::Map => 0,
             Access::Read => frame.content,
         }
@@ -278,10 +278,10 @@ impl<'a> MemoryModel<'a> {
         if self.in_place {
             return self.held_file(frame);
         }
-        let channels = self.setup.render.channels;
-        let color = self.setup.color.bytes();
+        let channels = self.setup.picture.render.channels;
+        let color = self.setup.picture.color.bytes();
         // Particles that are put elsewhere need a number.
-        let ids = channels.id && (self.has_ids || self.setup.surface.spray);
+        let ids = channels.id && (self.has_ids || self.setup.picture.surface.spray);
         let each = [
             (true, color),
             (ids, 4),
@@ -295,16 +295,16 @@ impl<'a> MemoryModel<'a> {
         if self.in_place {
             return predicted_stored_bytes(frame.particles);
         }
-        let values = self.setup.color.is_by_particle();
+        let values = self.setup.picture.color.is_by_particle();
         // A smooth surface has no tree over particles.
-        let particles = match self.setup.surface.kind {
+        let particles = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => 0,
             SurfaceKind::Spheres | SurfaceKind::Medium => frame.particles,
         };
         let count = usize::try_from(particles).unwrap_or(usize::MAX);
         let settings = self.setup.build_settings(count, values);
         let build = predicted_bytes(&settings, particles, self.own_radii);
-        if !self.setup.surface.spray {
+        if !self.setup.picture.surface.spray {
             return build;
         }
         // Spray is looked for in a tree of its own, in the same memory.
@@ -323,12 +323,12 @@ impl<'a> MemoryModel<'a> {
 
     /// The surface over a frame: normals are found hit by hit; spray has a tree, and a smooth surface its grid.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
-        let spray = if self.setup.surface.spray {
+        let spray = if self.setup.picture.surface.spray {
             self.plain_tree(frame.particles / SPRAY_PART).tree
         } else {
             0
         };
-        let smooth = match self.setup.surface.kind {
+        let smooth = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => smooth_bytes(self.setup, frame.particles),
             SurfaceKind::Spheres | SurfaceKind::Medium => SurfaceBytes::default(),
         };
@@ -352,7 +352,7 @@ impl<'a> MemoryModel<'a> {
         after: Option<&FrameSize>,
         tree: u64,
     ) -> MemoryNeed {
-        let render = &self.setup.render;
+        let render = &self.setup.picture.render;
         let film = Film::bytes_for(render.width, render.height, render.channels);
         let threads = rayon::current_num_threads() as u64;
         let film_before = if before > 0 { film } else { 0 };
@@ -404,14 +404,18 @@ impl<'a> MemoryModel<'a> {
 
     /// What a thread takes while it traces.
     fn tracing_scratch(&self) -> u64 {
-        let is_body = self.setup.surface.kind != SurfaceKind::Spheres;
-        scratch_bytes(&self.setup.render, &self.setup.scene.material, is_body)
+        let is_body = self.setup.picture.surface.kind != SurfaceKind::Spheres;
+        scratch_bytes(
+            &self.setup.picture.render,
+            &self.setup.picture.scene.material,
+            is_body,
+        )
     }
 
     /// What encoding an image takes beside its planes: the bands that are packed just then, or wait to be
     /// written; or, before, the bytes of the preview plain, filtered and compressed.
     fn encoding(&self) -> u64 {
-        let render = &self.setup.render;
+        let render = &self.setup.picture.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
         // Bands have 32 rows at most, blocks that pack well 16. Colours are kept in half precision.
@@ -439,9 +443,9 @@ const MOST_GRID: f64 = 22_000.0;
 /// part lies at its surface that goes down with their cubic root. Too small a radius makes all of them lie at a
 /// surface of their own: that is found out, and refused, when the grid is planned.
 fn smooth_bytes(setup: &Setup, particles: u64) -> SurfaceBytes {
-    let surface = &setup.surface;
-    let channels = setup.render.channels;
-    let is_colored = setup.color.is_by_particle();
+    let surface = &setup.picture.surface;
+    let channels = setup.picture.render.channels;
+    let is_colored = setup.picture.color.is_by_particle();
     let keeps = surface.exact || channels.id || channels.velocity || is_colored;
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]
     let count = particles as f64;

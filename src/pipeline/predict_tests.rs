@@ -41,7 +41,7 @@ fn more_of_anything_needs_more() {
         total(&[plain(8_000_000); 30])
     );
     let mut larger = setup.clone();
-    larger.render.width *= 2;
+    larger.picture.render.width *= 2;
     let more = MemoryModel::new(&larger).alone(&plain(1000)).images;
     assert_eq!(more, 2 * model.alone(&plain(1000)).images);
 }
@@ -49,22 +49,22 @@ fn more_of_anything_needs_more() {
 #[test]
 fn a_smooth_surface_has_a_grid_and_no_tree() {
     let mut smooth = setup();
-    smooth.surface.kind = SurfaceKind::Smooth;
+    smooth.picture.surface.kind = SurfaceKind::Smooth;
     let need = |setup: &Setup, particles| MemoryModel::new(setup).alone(&plain(particles));
     let (some, more) = (need(&smooth, 1_000_000), need(&smooth, 8_000_000));
     assert!(some.tree < 1 << 20, "{some}");
     // Most of the particles lie inside.
     assert!(more.surface > 4 * some.surface && more.surface < 8 * some.surface);
     let mut finer = smooth.clone();
-    finer.surface.voxel = 0.5;
+    finer.picture.surface.voxel = 0.5;
     assert!(need(&finer, 1_000_000).surface > 2 * some.surface);
-    finer.surface.voxel = 0.25;
+    finer.picture.surface.voxel = 0.25;
     // Too little to be of the moment at which the job takes most.
     let few = smooth_bytes(&finer, 1).building;
     assert!((1 << 10..1 << 16).contains(&few), "{few}");
     assert_eq!(need(&smooth, 0).surface, 0);
     let mut medium = setup();
-    medium.surface.kind = SurfaceKind::Medium;
+    medium.picture.surface.kind = SurfaceKind::Medium;
     assert_eq!(need(&medium, 1_000_000), need(&setup(), 1_000_000));
 }
 

@@ -10,7 +10,7 @@ use std::time::{Duration, Instant};
 use serde::Serialize;
 use spherule_formats::sequence::Sequence;
 
-use super::{FrameSize, FrameTracer, ImageTask, Overlap, Setup, TraceError, load_frame};
+use super::{FrameSize, ImageTask, Overlap, Setup, TraceError, load_frame, renderer_of};
 use crate::output::{encode_exr, encode_preview};
 use crate::render::{Deadline, Film, RenderError};
 
@@ -68,18 +68,18 @@ pub(super) fn probe_for(
 ) -> Result<Probe, String> {
     let loaded = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
     let read = loaded.read_time.as_secs_f64();
-    let mut tracer = FrameTracer::new();
-    let frame = tracer.build(setup, loaded).map_err(|e| e.to_string())?;
+    let mut tracer = renderer_of(setup.picture.renderer);
+    let frame = tracer.prepare(setup, loaded).map_err(|e| e.to_string())?;
     let deadline = Deadline(Instant::now() + time_box);
-    let full = &setup.render;
+    let full = &setup.picture.render;
     let rays = |width: u32, height: u32| f64::from(width) * f64::from(height);
     let mut last: Option<Trial> = None;
     let mut width = FIRST_WIDTH.min(full.width);
     loop {
         let mut small = setup.clone();
-        small.render.width = width;
-        small.render.height = (full.height / (full.width / width)).max(1);
-        small.render.samples = 1;
+        small.picture.render.width = width;
+        small.picture.render.height = (full.height / (full.width / width)).max(1);
+        small.picture.render.samples = 1;
         let start = Instant::now();
         let traced = tracer.image(&small, &frame, &deadline);
         let seconds = start.elapsed().as_secs_f64();
@@ -93,9 +93,9 @@ pub(super) fn probe_for(
             (Err(TraceError::Render(RenderError::Interrupted)), Some(whole)) => whole,
             (Err(TraceError::Render(RenderError::Interrupted)), None) => Trial {
                 film: Film::new(
-                    small.render.width,
-                    small.render.height,
-                    small.render.channels,
+                    small.picture.render.width,
+                    small.picture.render.height,
+                    small.picture.render.channels,
                 ),
                 seconds,
                 is_cut_off: true,
@@ -114,7 +114,7 @@ pub(super) fn probe_for(
             is_cut_off,
         } = trial;
         let start = Instant::now();
-        let exr = encode_exr(&film, &small.exr).map_err(|e| e.to_string())?;
+        let exr = encode_exr(&film, &small.picture.exr).map_err(|e| e.to_string())?;
         let mut bytes = exr.bytes.len();
         if task.preview.is_some() {
             let camera = small.camera_at(task.frame).map_err(|e| e.to_string())?;

@@ -8,7 +8,7 @@ const HIT_PART: f64 = 0.4;
 
 /// Rays of one image.
 pub(super) fn expected_rays(setup: &Setup) -> f64 {
-    let (image, scene) = (&setup.render, &setup.scene);
+    let (image, scene) = (&setup.picture.render, &setup.picture.scene);
     let paths = f64::from(image.width) * f64::from(image.height) * f64::from(image.samples);
     let material = &scene.material;
     let branches = [material.reflection, material.transmission]

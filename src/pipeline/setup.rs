@@ -6,7 +6,7 @@ use spherule_formats::native::Access;
 use super::rays::expected_rays;
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::output::{ExrOptions, PreviewOptions};
-use crate::render::RenderSettings;
+use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
@@ -67,9 +67,18 @@ impl ColorRule {
     }
 }
 
-/// The pictures of a job.
+/// A job: what is drawn, and how the run goes.
 #[derive(Debug, Clone)]
 pub struct Setup {
+    /// What every image depends on.
+    pub picture: Picture,
+    /// What images do not depend on.
+    pub run: RunSettings,
+}
+
+/// The pictures of a job.
+#[derive(Debug, Clone)]
+pub struct Picture {
     /// World position that all coordinates are relative to.
     pub origin: DVec3,
     /// Radii under this cannot be told from nothing and are raised to it.
@@ -83,12 +92,23 @@ pub struct Setup {
     /// Width over height of the images, also where fewer pixels are traced on trial.
     pub aspect: f64,
     /// Lights, material, background, ground; its camera is that of the path's start. What a frame is traced
-    /// in is [`Self::scene_at`].
+    /// in is [`Setup::scene_at`].
     pub scene: Scene,
+    /// Who renders.
+    pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
     /// What rays meet.
     pub surface: SurfaceSettings,
+    /// How the EXR is written; the camera comes with the frame.
+    pub exr: ExrOptions,
+    /// How the PNG is made; [`Setup::preview_from`] adds what lies behind.
+    pub preview: PreviewOptions,
+}
+
+/// How a run goes about its pictures.
+#[derive(Debug, Clone)]
+pub struct RunSettings {
     /// Most memory that the job may take, bytes; None is what is free.
     pub memory_limit: Option<u64>,
     /// Who builds the tree; None chooses by the frame.
@@ -97,10 +117,6 @@ pub struct Setup {
     pub bvh: BvhSettings,
     /// What `sbvh` is told.
     pub sbvh: SbvhSettings,
-    /// How the EXR is written; the camera comes with the frame.
-    pub exr: ExrOptions,
-    /// How the PNG is made; [`Self::preview_from`] adds what lies behind.
-    pub preview: PreviewOptions,
     /// How the bytes of native frames come into memory.
     pub access: Access,
     /// Whether all that is used of native frames is compared with its checksums, or no more than nodes;
@@ -116,7 +132,11 @@ impl Setup {
     /// # Errors
     /// There is no picture from there; [`crate::resolve::check_views`] finds out before.
     pub fn camera_at(&self, frame: i64) -> Result<Camera, CameraError> {
-        Camera::new(&self.path.view(frame), self.aspect, self.origin)
+        Camera::new(
+            &self.picture.path.view(frame),
+            self.picture.aspect,
+            self.picture.origin,
+        )
     }
 
     /// What `frame` is traced in: lights and everything else stay where they are when the camera moves.
@@ -126,35 +146,35 @@ impl Setup {
     pub fn scene_at(&self, frame: i64) -> Result<Scene, CameraError> {
         Ok(Scene {
             camera: self.camera_at(frame)?,
-            ..self.scene.clone()
+            ..self.picture.scene.clone()
         })
     }
 
     /// How the PNG of an image from `camera` is made: a film without background gets one behind it.
     pub fn preview_from(&self, camera: &Camera) -> PreviewOptions {
-        let behind = || self.scene.background.color(camera.forward());
+        let behind = || self.picture.scene.background.color(camera.forward());
         PreviewOptions {
-            backdrop: self.render.transparent_background.then(behind),
-            ..self.preview
+            backdrop: self.picture.render.transparent_background.then(behind),
+            ..self.picture.preview
         }
     }
 
     /// How the tree over a frame of so many particles is built, with or without values to colour
     /// them by.
     pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {
-        let channels = self.render.channels;
+        let channels = self.picture.render.channels;
         let structure = self.structure_for(particles);
         BuildSettings {
             keep_indices: channels.id || channels.velocity || has_values,
-            bvh: self.bvh,
-            sbvh: self.sbvh,
+            bvh: self.run.bvh,
+            sbvh: self.run.sbvh,
             ..BuildSettings::new(structure)
         }
     }
 
-    /// Whether native frames relative to [`Self::origin`] are traced where they lie.
+    /// Whether native frames relative to [`Picture::origin`] are traced where they lie.
     pub fn traces_in_place(&self) -> bool {
-        self.needs_copy().is_none() && !matches!(self.radius, RadiusRule::Attribute { .. })
+        self.needs_copy().is_none() && !matches!(self.picture.radius, RadiusRule::Attribute { .. })
     }
 
     /// Why the particles of a native frame are copied whatever radii they have, if they are.
@@ -165,7 +185,7 @@ impl Setup {
                 "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
             ));
         }
-        let why = match self.surface {
+        let why = match self.picture.surface {
             SurfaceSettings {
                 kind: SurfaceKind::Smooth,
                 ..
@@ -180,11 +200,11 @@ impl Setup {
 
     /// Whose tree a native frame in place is said to be: its order is that of k-d cells.
     pub fn stored_structure(&self) -> Structure {
-        self.accelerator.unwrap_or(Structure::Kdtree)
+        self.run.accelerator.unwrap_or(Structure::Kdtree)
     }
 
     fn structure_for(&self, particles: usize) -> Structure {
-        self.accelerator.unwrap_or_else(|| {
+        self.run.accelerator.unwrap_or_else(|| {
             let threads = rayon::current_num_threads();
             choose(particles, expected_rays(self), threads)
         })

@@ -11,8 +11,9 @@ use spherule_jobs::publish;
 use super::ImageTask;
 use super::encode::{WriteError, write_frame};
 use super::load::load_frame;
+use super::renderer::renderer_of;
 use super::setup::Setup;
-use super::trace::{FrameTracer, TracedFrame};
+use super::trace::TracedFrame;
 use crate::mishap::{guarded, is_place_at_fault};
 use crate::output::encode_preview;
 use crate::report::{FrameReport, MemoryPeaks};
@@ -78,13 +79,15 @@ fn trace_single(
         std::mem::take(&mut frame.notes)
             .iter()
             .for_each(|n| note(n));
-        let mut tracer = FrameTracer::new();
-        let mut built = tracer.build(setup, frame).map_err(|e| e.to_string())?;
+        let mut tracer = renderer_of(setup.picture.renderer);
+        let mut built = tracer.prepare(setup, frame).map_err(|e| e.to_string())?;
         std::mem::take(&mut built.notes)
             .iter()
             .for_each(|n| note(n));
         let stop = AtomicBool::new(false);
-        tracer.trace(setup, built, &stop).map_err(|e| e.to_string())
+        tracer
+            .render(setup, built, &stop)
+            .map_err(|e| e.to_string())
     });
     traced.map_err(SingleFault::Frame)
 }

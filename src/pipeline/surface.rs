@@ -51,17 +51,17 @@ impl SurfaceBuilder {
     ) -> Result<Vec<String>, SmoothError> {
         let start = Instant::now();
         self.forget();
-        if setup.surface.spray {
+        if setup.picture.surface.spray {
             let built = self.part_spray(setup, frame, trees);
             report.bytes.surface = built.position_bytes + built.structure_bytes;
         }
         let mut notes = Vec::new();
-        if setup.surface.kind == SurfaceKind::Smooth {
+        if setup.picture.surface.kind == SurfaceKind::Smooth {
             let made = self.build_smooth(setup, frame, &mut notes)?;
             report.bytes.surface += made.bytes;
             report.bytes.surface_peak = report.bytes.surface + made.peak_bytes - made.bytes;
             frame.centers = Vec::new();
-            frame.radius = Radius::Common(setup.least_radius);
+            frame.radius = Radius::Common(setup.picture.least_radius);
         }
         report.seconds.surface = start.elapsed().as_secs_f64();
         Ok(notes)
@@ -77,14 +77,14 @@ impl SurfaceBuilder {
             Radius::Common(radius) => *radius,
             Radius::PerParticle(radii) => usual_radius(radii, notes),
         };
-        let channels = setup.render.channels;
-        let is_colored = setup.color.is_by_particle();
+        let channels = setup.picture.render.channels;
+        let is_colored = setup.picture.color.is_by_particle();
         // Whoever is asked for by a place on the surface.
         let keep = channels.id || channels.velocity || is_colored;
-        let left = memory_left(setup.memory_limit);
+        let left = memory_left(setup.run.memory_limit);
         let made = self
             .smooth
-            .build(&frame.centers, radius, &setup.surface, keep, left)?;
+            .build(&frame.centers, radius, &setup.picture.surface, keep, left)?;
         if made.left_out > 0 {
             notes.push(format!(
                 "{} particles are too far from all others for the smooth surface and left out",
@@ -95,7 +95,7 @@ impl SurfaceBuilder {
             notes.push(format!(
                 "the smooth surface is empty: with radius {radius} the field of the particles nowhere gets to \
                  surface.threshold = {}",
-                setup.surface.threshold
+                setup.picture.surface.threshold
             ));
         }
         Ok(made)
@@ -120,8 +120,8 @@ impl SurfaceBuilder {
     ) -> BuildReport {
         // Whatever is asked for: this one is the soonest built, and lonely particles are the same in all.
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
-        let spray = spray_of(&trees.tree().view(), support(&setup.surface));
-        let body = frame.put_last(&spray, setup.render.channels.id);
+        let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
+        let body = frame.put_last(&spray, setup.picture.render.channels.id);
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
         let drops = match &frame.radius {
             Radius::Common(radius) => Radius::Common(DROP_RADIUS * radius),
@@ -154,8 +154,8 @@ impl SurfaceBuilder {
         film: &mut Film,
         stop: &dyn Stop,
     ) -> Result<RayCounts, RenderError> {
-        let normals = shading_normals(&setup.surface);
-        let body: Box<dyn Shape + '_> = match setup.surface.kind {
+        let normals = shading_normals(&setup.picture.surface);
+        let body: Box<dyn Shape + '_> = match setup.picture.surface.kind {
             SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
             SurfaceKind::Medium => Box::new(MediumSurface::new(tree).shaded_by(normals)),
             SurfaceKind::Smooth => Box::new(self.smooth.surface()),
@@ -165,7 +165,7 @@ impl SurfaceBuilder {
         if !self.spray.tree().view().is_empty() {
             shapes.push(&spray);
         }
-        render_into(film, &shapes, scene, source, &setup.render, stop)
+        render_into(film, &shapes, scene, source, &setup.picture.render, stop)
     }
 }
 

@@ -9,7 +9,7 @@ use spherule_formats::{ParticleFrame, SequenceInput, sequence::Sequence};
 
 use super::*;
 use crate::manifest::{Manifest, RadiusSetting};
-use crate::pipeline::{FrameTracer, ImageTask, LoadedParticles, load_frame};
+use crate::pipeline::{CpuRenderer, FrameRenderer, ImageTask, LoadedParticles, load_frame};
 use crate::render::Channels;
 
 /// A wavy block with drops above it.
@@ -35,13 +35,13 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     let question = crate::resolve::question(&manifest);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
     let mut setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
-    setup.render.width = 48;
-    setup.render.height = 27;
-    setup.render.samples = 1;
-    setup.render.max_depth = 4;
-    setup.render.channels = Channels::ALL;
-    setup.scene.material.transmission = 1.0;
-    setup.scene.material.reflection = 1.0;
+    setup.picture.render.width = 48;
+    setup.picture.render.height = 27;
+    setup.picture.render.samples = 1;
+    setup.picture.render.max_depth = 4;
+    setup.picture.render.channels = Channels::ALL;
+    setup.picture.scene.material.transmission = 1.0;
+    setup.picture.scene.material.reflection = 1.0;
     (setup, sequence)
 }
 
@@ -51,7 +51,7 @@ struct Drawn {
     in_place: bool,
 }
 
-fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut FrameTracer) -> Drawn {
+fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn {
     let task = ImageTask {
         frame: 0,
         index: 0,
@@ -61,7 +61,7 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut FrameTracer) -> Drawn 
     };
     let loaded = load_frame(setup, sequence, &task).expect("readable");
     let in_place = matches!(loaded.particles, LoadedParticles::Stored(_));
-    let built = tracer.build(setup, loaded).expect("a tree");
+    let built = tracer.prepare(setup, loaded).expect("a tree");
     let report = built.report.clone();
     let (film, _) = tracer
         .image(setup, &built, &AtomicBool::new(false))
@@ -100,15 +100,13 @@ fn every_structure_draws_every_surface_alike() {
     let file = directory.path().join("f_1.npy");
     spherule_formats::write::npy::write(&file, &particles()).expect("a file");
     let (setup, sequence) = opened(&file);
-    let mut tracer = FrameTracer::new();
+    let mut tracer = CpuRenderer::default();
     let mut films = Vec::new();
     for surface in surfaces() {
         let alike = Structure::ALL.map(|structure| {
-            let setup = Setup {
-                surface,
-                accelerator: Some(structure),
-                ..setup.clone()
-            };
+            let mut setup = setup.clone();
+            setup.picture.surface = surface;
+            setup.run.accelerator = Some(structure);
             let drawn = drawn(&setup, &sequence, &mut tracer);
             assert_eq!(drawn.report.particles, 1208);
             assert_eq!(drawn.report.bytes.surface > 0, surface.spray);
@@ -149,12 +147,10 @@ fn compact_frames_in_place_have_every_surface() {
     for surface in surfaces() {
         // Who decodes has the same particles.
         let [placed, decoded] = [Structure::Lbvh, Structure::Bvh].map(|structure| {
-            let setup = Setup {
-                surface,
-                accelerator: Some(structure),
-                ..setup.clone()
-            };
-            drawn(&setup, &sequence, &mut FrameTracer::new())
+            let mut setup = setup.clone();
+            setup.picture.surface = surface;
+            setup.run.accelerator = Some(structure);
+            drawn(&setup, &sequence, &mut CpuRenderer::default())
         });
         assert_eq!(placed.in_place, !surface.spray);
         assert!(!decoded.in_place);

@@ -9,6 +9,7 @@ use super::ImageTask;
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
+use super::renderer::FrameRenderer;
 use super::setup::{ColorRule, Setup};
 use super::surface::{SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
@@ -82,9 +83,9 @@ enum BuiltParticles {
     Stored(StoredFrame),
 }
 
-/// Traces frame after frame in the same buffers.
+/// Traces frame after frame in the same buffers, on the threads of the current pool.
 #[derive(Debug, Default)]
-pub struct FrameTracer {
+pub struct CpuRenderer {
     builder: TreeBuilder,
     stored: StoredTree,
     surface: SurfaceBuilder,
@@ -92,19 +93,14 @@ pub struct FrameTracer {
     film: Film,
 }
 
-impl FrameTracer {
-    /// A tracer without memory yet.
-    pub fn new() -> Self {
-        Self::default()
-    }
-
+impl FrameRenderer for CpuRenderer {
     /// Builds the tree over `frame`. Positions in memory are let go, as the tree has its own copy; over a
     /// native frame only the levels above what it stores are built.
     ///
     /// # Errors
     /// [`TraceError::Stored`] if the nodes of a native frame are damaged, [`TraceError::File`] if it cannot be
     /// used.
-    pub fn build(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError> {
+    fn prepare(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError> {
         let mut report = FrameReport {
             particles: frame.particles.count(),
             dropped: frame.dropped,
@@ -142,32 +138,9 @@ impl FrameTracer {
         })
     }
 
-    fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame) -> BuildReport {
-        let has_values = frame.shading.has_colors();
-        let settings = setup.build_settings(frame.centers.len(), has_values);
-        self.builder.build(&spheres(frame), &settings)
-    }
-
-    fn build_above(
-        &mut self,
-        setup: &Setup,
-        frame: &StoredFrame,
-    ) -> Result<BuildReport, TraceError> {
-        let settings = StoredSettings {
-            structure: frame.structure(),
-            radius: frame.radius(),
-            keep_indices: frame.needs_indices(setup),
-        };
-        let built = self.stored.build(&frame.leaves()?, settings);
-        built.map_err(|fault| TraceError::Stored {
-            path: frame.path().to_owned(),
-            fault,
-        })
-    }
-
     /// Takes the planes of an image that nobody needs any more for the next: new ones cost a page fault for
     /// each 4 KiB.
-    pub fn recycle(&mut self, film: Film) {
+    fn recycle(&mut self, film: Film) {
         self.film = film;
     }
 
@@ -176,7 +149,7 @@ impl FrameTracer {
     /// # Errors
     /// [`RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
     /// meanwhile; the others are settings that were checked before.
-    pub fn trace(
+    fn render(
         &mut self,
         setup: &Setup,
         frame: BuiltFrame,
@@ -207,8 +180,8 @@ impl FrameTracer {
     /// Only the planes of `frame`, the one that was built last.
     ///
     /// # Errors
-    /// As [`Self::trace`].
-    pub fn image(
+    /// As [`Self::render`].
+    fn image(
         &self,
         setup: &Setup,
         frame: &BuiltFrame,
@@ -217,6 +190,31 @@ impl FrameTracer {
         let mut film = Film::default();
         let rays = self.draw(setup, frame, &mut film, stop)?;
         Ok((film, rays))
+    }
+}
+
+impl CpuRenderer {
+    fn build_copy(&mut self, setup: &Setup, frame: &DecodedFrame) -> BuildReport {
+        let has_values = frame.shading.has_colors();
+        let settings = setup.build_settings(frame.centers.len(), has_values);
+        self.builder.build(&spheres(frame), &settings)
+    }
+
+    fn build_above(
+        &mut self,
+        setup: &Setup,
+        frame: &StoredFrame,
+    ) -> Result<BuildReport, TraceError> {
+        let settings = StoredSettings {
+            structure: frame.structure(),
+            radius: frame.radius(),
+            keep_indices: frame.needs_indices(setup),
+        };
+        let built = self.stored.build(&frame.leaves()?, settings);
+        built.map_err(|fault| TraceError::Stored {
+            path: frame.path().to_owned(),
+            fault,
+        })
     }
 
     fn draw(
@@ -230,13 +228,13 @@ impl FrameTracer {
         let surface = &self.surface;
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
-                let source = particle_shading(&setup.color, shading);
+                let source = particle_shading(&setup.picture.color, shading);
                 let tree = self.builder.tree().view();
                 Ok(surface.draw(setup, tree, &scene, &source, film, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
-                let source = stored.shading(&setup.color, DEFAULT_COLOR);
+                let source = stored.shading(&setup.picture.color, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
                 let rays = surface.draw(setup, tree, &scene, &source, film, stop)?;
                 // Before anyone believes what was seen.

@@ -140,6 +140,23 @@ impl RenderSettings {
     }
 }
 
+/// The renderers that there are. Images depend on which one made them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub enum RendererKind {
+    /// Rays on the processor's threads.
+    #[default]
+    Cpu,
+}
+
+impl RendererKind {
+    /// Its name in the settings of a job.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Cpu => "cpu",
+        }
+    }
+}
+
 /// Rays traced, by what they were for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RayCounts {

@@ -81,14 +81,14 @@ pub fn check_views(
     setup: &Setup,
     frames: impl IntoIterator<Item = i64>,
 ) -> Result<(), ResolveError> {
-    if setup.path.moving().is_empty() {
+    if setup.picture.path.moving().is_empty() {
         return Ok(());
     }
     for frame in frames {
         setup
             .camera_at(frame)
             .map_err(|source| ResolveError::View {
-                place: place(&setup.path, frame),
+                place: place(&setup.picture.path, frame),
                 source,
             })?;
     }

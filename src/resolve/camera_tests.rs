@@ -58,7 +58,7 @@ fn keys_take_from_the_camera_what_they_leave_out() {
         camera.keys[1].up = Some([0.0, 0.0, 1.0]);
         camera.keys[1].fov = Some(50.0);
     });
-    let path = setup.unwrap().path;
+    let path = setup.unwrap().picture.path;
     assert_eq!((path.view(1).up, path.view(1).fov), (DVec3::Y, 33.0));
     assert_eq!((path.view(2).up, path.view(2).fov), (DVec3::Z, 50.0));
 }
@@ -72,8 +72,8 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     let setup = setup.unwrap();
     check_views(&setup, [0, 1, 2, i64::MAX]).unwrap();
     let scenes = [0, 1].map(|frame| setup.scene_at(frame).unwrap());
-    assert_eq!(scenes[0].camera, setup.scene.camera);
-    assert_ne!(scenes[1].camera, setup.scene.camera);
+    assert_eq!(scenes[0].camera, setup.picture.scene.camera);
+    assert_ne!(scenes[1].camera, setup.picture.scene.camera);
     assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());
     assert_eq!(scenes[0].lights, scenes[1].lights);
     // The default lights come from where frame 0 is seen from.
@@ -89,7 +89,10 @@ fn what_lies_behind_a_preview_is_what_its_camera_looks_at() {
     let behind = |frame| {
         let camera = setup.camera_at(frame).unwrap();
         let shown = setup.preview_from(&camera).backdrop;
-        assert_eq!(shown, Some(setup.scene.background.color(camera.forward())));
+        assert_eq!(
+            shown,
+            Some(setup.picture.scene.background.color(camera.forward()))
+        );
         shown
     };
     assert_ne!(behind(1), behind(2));

@@ -18,7 +18,7 @@ pub(super) struct Seen<'a> {
 impl<'a> Seen<'a> {
     pub(super) fn new(setup: &'a Setup, mode: CameraMode, frames: &[i64]) -> Self {
         Self {
-            path: &setup.path,
+            path: &setup.picture.path,
             mode,
             first: frames.first().copied(),
             last: frames.last().copied(),

@@ -183,14 +183,14 @@ impl Check<'_> {
 
 /// For the largest frame that was looked at; the others may have another.
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
-    let has_values = setup.color.is_by_particle();
+    let has_values = setup.picture.color.is_by_particle();
     setup
         .build_settings(survey.most_particles, has_values)
         .structure
 }
 
 fn radius_json(setup: &Setup, survey: &Survey) -> Value {
-    match &setup.radius {
+    match &setup.picture.radius {
         RadiusRule::Common(radius) => json!(radius),
         RadiusRule::FileOr(_) if survey.has_radii => json!("file"),
         RadiusRule::FileOr(radius) => json!(radius),

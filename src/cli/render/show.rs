@@ -60,7 +60,7 @@ pub(in crate::cli) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) 
         return;
     }
     say!("{}", radius_text(setup, survey));
-    if let pipeline::ColorRule::Attribute { name, .. } = &setup.color
+    if let pipeline::ColorRule::Attribute { name, .. } = &setup.picture.color
         && let Some(color) = &survey.color
     {
         say!(
@@ -69,7 +69,8 @@ pub(in crate::cli) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) 
             short(color.high)
         );
     }
-    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.color, &survey.rgb) {
+    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.picture.color, &survey.rgb)
+    {
         say!(
             "colour by the RGB attribute `{name}` ({})",
             rgb.encoding.name()
@@ -95,12 +96,12 @@ pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
 
 /// The radius in words.
 pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
-    match &setup.radius {
+    match &setup.picture.radius {
         RadiusRule::Common(radius) => format!("radius {radius}"),
         RadiusRule::FileOr(_) if survey.has_radii => "radius from the files".to_owned(),
         RadiusRule::FileOr(radius) => {
             let radius = short(f64::from(*radius));
-            let why = match (setup.surface.kind, survey.packed_radius) {
+            let why = match (setup.picture.surface.kind, survey.packed_radius) {
                 (SurfaceKind::Spheres, _) | (_, None) => "half the usual distance of neighbours",
                 (SurfaceKind::Medium, _) => {
                     "by how densely particles lie, enlarged so that spheres overlap"
