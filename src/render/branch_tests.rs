@@ -2,10 +2,12 @@
 
 use std::sync::atomic::AtomicBool;
 
-use glam::{DVec3, Vec3};
+use glam::{DVec3, Vec2, Vec3};
 
 use super::{
     brute::{Ball, Balls},
+    integrator::WhittedIntegrator,
+    solid::Solid,
     *,
 };
 use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
@@ -106,7 +108,7 @@ fn min_weight_0_is_equation_4_1_to_the_letter() {
     let (film, _) = trace(&balls, &scene, &settings);
     for (pixel, color) in film.color.iter().enumerate() {
         let (x, y) = (pixel % 12, pixel / 12);
-        let place = glam::Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / 12.0;
+        let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / 12.0;
         let wanted = equation_4_1(&balls, &scene, &scene.camera.ray(place), 6);
         let error = (Vec3::from_slice(&color[..3]) - wanted).abs().max_element();
         assert!(error < 1e-5, "{pixel}: {color:?} {wanted}");
@@ -221,4 +223,38 @@ fn what_would_never_end_is_refused() {
     assert!(refused(&scene, 3, f32::NAN).is_some());
     scene.material.transmission = 0.0;
     assert_eq!(refused(&scene, 9, 0.0), None);
+}
+
+#[test]
+fn radiance_does_not_depend_on_what_shares_a_packet() {
+    let balls = Balls(heap(60));
+    let solid = Solid::ball(1.0);
+    let shapes: [&dyn Shape; 2] = [&balls, &solid];
+    let films: Vec<Vec2> = (0..400)
+        .map(|i| Vec2::new((i % 20) as f32, (i / 20) as f32) / 20.0)
+        .collect();
+    let scene = glass_scene();
+    let source = ParticleShading::constant(Vec3::ONE);
+    let settings = RenderSettings {
+        max_depth: 7,
+        min_weight: 0.01,
+        ..RenderSettings::new(20, 20)
+    };
+    for shape in shapes {
+        let of = |films: &[Vec2], segments: usize| {
+            let mut integrator = WhittedIntegrator::new(vec![shape], &scene, &source, &settings);
+            integrator.segments = segments;
+            let (colors, counts) = integrator.radiance_at(films);
+            let bits = |color: Vec3| color.to_array().map(f32::to_bits);
+            (colors.into_iter().map(bits).collect::<Vec<_>>(), counts)
+        };
+        let (whole, counts) = of(&films, 1 << 16);
+        assert!(counts.refraction > 1000);
+        for segments in [1, 300, 5000] {
+            assert_eq!(of(&films, segments), (whole.clone(), counts));
+        }
+        for first in [1, 7, 15] {
+            assert_eq!(of(&films[first..], 5000).0, whole[first..]);
+        }
+    }
 }

@@ -57,6 +57,8 @@ pub(super) struct WhittedIntegrator<'a> {
     /// Whether the camera is inside of a connected body.
     is_eye_inside: bool,
     sampler: FilmSampler,
+    /// Path segments of one depth, at most, as far as batches of a packet of samples allow.
+    pub(super) segments: usize,
 }
 
 /// What lies behind the surface of the particles.
@@ -167,7 +169,7 @@ pub(super) fn scratch_bytes(
     let held = tile.min(GROUP.max(settings.samples) as usize);
     let rays = match settings.max_depth {
         1 => 0,
-        _ => batch(paths).min(held) * paths,
+        _ => batch(SEGMENTS, paths).min(held) * paths,
     };
     let samples = held.div_ceil(LANES) * 6 * size_of::<Lanes>();
     let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
@@ -188,9 +190,9 @@ fn most_paths(rule: &SplitRule, settings: &RenderSettings, is_transmissive: bool
     }
 }
 
-/// Samples that are traced together where each may have so many paths: whole packets.
-fn batch(paths: usize) -> usize {
-    (SEGMENTS / paths).min(GROUP as usize).max(LANES) / LANES * LANES
+/// Samples that are traced together where each may have so many paths, and all so many segments: whole packets.
+fn batch(segments: usize, paths: usize) -> usize {
+    (segments / paths).min(GROUP as usize).max(LANES) / LANES * LANES
 }
 
 impl<'a> WhittedIntegrator<'a> {
@@ -223,6 +225,7 @@ impl<'a> WhittedIntegrator<'a> {
             interior,
             split: split_rule(settings, is_body),
             sampler: FilmSampler::new(settings.samples),
+            segments: SEGMENTS,
         }
     }
 
@@ -281,8 +284,9 @@ impl<'a> WhittedIntegrator<'a> {
         scratch.counts.primary += scratch.samples as u64;
         let is_transmissive = self.interior != Interior::Opaque;
         let paths = most_paths(&self.split, self.settings, is_transmissive);
-        for first in (0..packets).step_by(batch(paths) / LANES) {
-            let end = packets.min(first + batch(paths) / LANES);
+        let step = batch(self.segments, paths) / LANES;
+        for first in (0..packets).step_by(step) {
+            let end = packets.min(first + step);
             scratch.next.clear();
             self.trace_camera_rays(first..end, stop, scratch)?;
             for number in 2..=self.settings.max_depth {
