@@ -4,6 +4,9 @@ use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
 
+/// Packets that a stream grows by.
+const PIECE: usize = 32;
+
 /// The path segments that are traced together.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
@@ -99,7 +102,10 @@ impl RayStream {
         // There is always room for a whole packet more.
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
         if self.packets.len() < needed {
-            self.packets.resize_with(needed, SegmentPacket::default);
+            // By the piece, not by doubling: streams are the larger part of what a thread holds.
+            let room = needed.next_multiple_of(PIECE);
+            self.packets.reserve_exact(room - self.packets.len());
+            self.packets.resize_with(room, SegmentPacket::default);
         }
         for lane in lanes_in(lanes) {
             let (packet, to) = (self.len / LANES, self.len % LANES);

@@ -48,11 +48,12 @@ impl Node {
             let exponent = step_exponent(own.min[axis], own.max[axis]);
             node.exponent[axis] = exponent;
             // A power of two: its inverse is exact.
-            let inverse = 1.0 / decode_step(exponent);
+            let step = decode_step(exponent);
+            let inverse = 1.0 / step;
             for (slot, child) in children.iter().enumerate() {
                 let [lower, upper] = &mut node.planes[axis];
-                lower[slot] = plane_below(own.min[axis], inverse, child.min[axis]);
-                upper[slot] = plane_above(own.min[axis], inverse, child.max[axis]);
+                lower[slot] = plane_below(own.min[axis], step, inverse, child.min[axis]);
+                upper[slot] = plane_above(own.min[axis], step, inverse, child.max[axis]);
             }
         }
         node
@@ -105,15 +106,18 @@ fn step_exponent(min: f32, max: f32) -> u8 {
     clippy::cast_possible_truncation,
     reason = "truncation is the floor of a number that is not negative; saturates at 255"
 )]
-fn plane_below(origin: f32, inverse_step: f64, value: f32) -> u8 {
-    ((f64::from(value) - f64::from(origin)) * inverse_step) as u8
+fn plane_below(origin: f32, step: f64, inverse_step: f64, value: f32) -> u8 {
+    let plane = ((f64::from(value) - f64::from(origin)) * inverse_step) as u8;
+    // Of absurd spreads the difference is rounded.
+    let is_above = plane_at(origin, step, plane) > f64::from(value);
+    plane.saturating_sub(u8::from(is_above))
 }
 
 /// The lowest plane at or above `value`, which is at or above `origin`.
-fn plane_above(origin: f32, inverse_step: f64, value: f32) -> u8 {
-    let exact = (f64::from(value) - f64::from(origin)) * inverse_step;
-    let below = plane_below(origin, inverse_step, value);
-    below.saturating_add(u8::from(f64::from(below) < exact))
+fn plane_above(origin: f32, step: f64, inverse_step: f64, value: f32) -> u8 {
+    let below = plane_below(origin, step, inverse_step, value);
+    let is_below = plane_at(origin, step, below) < f64::from(value);
+    below.saturating_add(u8::from(is_below))
 }
 
 #[cfg(test)]
@@ -140,6 +144,33 @@ mod tests {
         assert!(node.child_holds(7, &point));
         let [lower, upper] = node.interval(7, 0);
         assert!(upper - lower < 1e-30, "{lower} {upper}");
+    }
+
+    #[test]
+    fn boxes_of_absurd_spread_hold_their_children() {
+        // Differences of these are rounded in f64.
+        let values = [
+            -147_573_952_589_676_412_928.0,
+            -8.27,
+            -1e-38,
+            0.0,
+            8.27,
+            3.0e19,
+        ];
+        for low in 0..values.len() {
+            for high in low..values.len() {
+                let child = Aabb {
+                    min: Vec3::splat(values[low]),
+                    max: Vec3::splat(values[high]),
+                };
+                let all = Aabb {
+                    min: Vec3::splat(values[0]),
+                    max: Vec3::splat(values[values.len() - 1]),
+                };
+                let node = Node::enclosing(&[child, all]);
+                assert!(node.child_holds(0, &child), "{child:?}");
+            }
+        }
     }
 
     proptest! {
