@@ -249,7 +249,7 @@ fn radiance_does_not_depend_on_what_shares_a_packet() {
             (colors.into_iter().map(bits).collect::<Vec<_>>(), counts)
         };
         let (whole, counts) = of(&films, 1 << 16);
-        assert!(counts.refraction > 1000);
+        assert!(counts.refraction > 100);
         for segments in [1, 300, 5000] {
             assert_eq!(of(&films, segments), (whole.clone(), counts));
         }
