@@ -327,6 +327,9 @@ fn known_keys() -> Vec<String> {
     Manifest::new("").entries().keys()
 }
 
+/// Problems that are told at once.
+const MOST_TOLD: usize = 50;
+
 /// In the order of the file; options come first, as what is asked for last.
 fn told(mut problems: Vec<Problem>, text: &str, path: &Path) -> ManifestError {
     problems.sort_by_key(|p| match p.place {
@@ -351,7 +354,10 @@ fn told(mut problems: Vec<Problem>, text: &str, path: &Path) -> ManifestError {
             format!("{place}: {}: {}", problem.key, problem.what)
         }
     };
-    ManifestError {
-        lines: problems.iter().map(told).collect(),
+    // Work grows with the text alone, however much is wrong with it.
+    let mut lines: Vec<String> = problems.iter().take(MOST_TOLD).map(told).collect();
+    if problems.len() > MOST_TOLD {
+        lines.push(format!("{}: and more like these", path.display()));
     }
+    ManifestError { lines }
 }

@@ -148,6 +148,9 @@ impl<'a> Section<'a> {
             if self.asked.contains(&key.as_str()) {
                 continue;
             }
+            if self.problems.borrow().len() > super::MOST_TOLD {
+                break;
+            }
             let what = match nearest(key, &self.asked) {
                 Some(known) => format!("unknown key; did you mean `{}`?", self.full_key(known)),
                 None => match elsewhere(key, &self.path) {

@@ -616,3 +616,17 @@ proptest! {
         let _ = Manifest::parse(&text, path());
     }
 }
+
+#[test]
+fn many_problems_are_told_in_part() {
+    let keys: String = (0..100_000).map(|i| format!("widt{i} = 1\n")).collect();
+    let text = format!("input.path = \"a\"\n[image]\n{keys}");
+    let error = Manifest::parse(&text, Path::new("job.toml")).expect_err("unknown keys");
+    let told = error.to_string();
+    assert!(
+        told.contains("line 3, column 1: image.widt0: unknown key; did you mean"),
+        "{told}"
+    );
+    assert!(told.ends_with("job.toml: and more like these"), "{told}");
+    assert_eq!(told.lines().count(), 51);
+}
