@@ -76,28 +76,10 @@ impl TreeHits {
     }
 }
 
-/// The lanes of a mask, lowest first. A type instead of a closure, because all of a kernel's code must
-/// be inlined to get the kernel's instructions.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct LanesOf(pub(super) u32);
-
-impl Iterator for LanesOf {
-    type Item = usize;
-
-    #[inline(always)]
-    fn next(&mut self) -> Option<usize> {
-        if self.0 == 0 {
-            return None;
-        }
-        let lane = self.0.trailing_zeros() as usize & (PACKET_SIZE - 1);
-        self.0 &= self.0 - 1;
-        Some(lane)
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::lanes_in;
 
     #[test]
     fn the_mask_has_a_bit_for_each_lane_that_hit() {
@@ -106,6 +88,6 @@ mod tests {
         hits.slot[3] = 0;
         hits.slot[15] = 7;
         assert_eq!(hits.mask(), 1 << 3 | 1 << 15);
-        assert_eq!(LanesOf(hits.mask()).collect::<Vec<_>>(), [3, 15]);
+        assert_eq!(lanes_in(hits.mask()).collect::<Vec<_>>(), [3, 15]);
     }
 }

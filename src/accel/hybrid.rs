@@ -5,13 +5,14 @@
 //! tracing", section 4.2). Boxes are tested conservatively and rays meet spheres by the tests of single
 //! rays, so that each finds what it finds alone, to the bit.
 
-use super::hits::{LanesOf, TreeHits};
+use super::hits::TreeHits;
 use super::leaves::Leaves;
 use super::simd::{EnteredChildren, LaneSlabs, PacketKernel, lanes_near};
 use super::topology::{Place, Topology};
 use super::traverse::{AnyOfRay, ChordsOfRay, NearestOfRay, TreeChord, TreeHit};
 use super::view::{Resolved, TreeTask, TreeView};
-use super::walk::{Below, STACK_SIZE, WalkStack, sort_descending, walk_from};
+use super::walk::{Below, STACK_SIZE, WalkStack, Walker, sort_descending, walk_from};
+use crate::math::{first_lanes, lanes_in};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
 /// Rays that go on alone from a node when no more than these are alive there. Reflections and shadow rays
@@ -24,12 +25,13 @@ impl TreeView<'_> {
     /// [`TreeView::nearest`] of the rays in `lanes`; the others hit nothing.
     pub(super) fn nearest_by_lanes(&self, rays: &RayPacket, lanes: u32, hits: &mut TreeHits) {
         let backward = backward_lanes(rays) & lanes;
-        self.run(NearestByLanes {
+        self.run(ByLanes {
             rays,
             lanes: lanes & !backward,
+            query: Nearest,
             hits,
         });
-        for lane in LanesOf(backward) {
+        for lane in lanes_in(backward) {
             if let Some(hit) = self.nearest(&rays.ray(lane)) {
                 (hits.t[lane], hits.slot[lane]) = (hit.t, hit.slot);
             }
@@ -39,11 +41,15 @@ impl TreeView<'_> {
     /// [`TreeView::any_hit`] of the rays in `lanes`.
     pub(super) fn occluded_by_lanes(&self, rays: &RayPacket, lanes: u32) -> u32 {
         let backward = backward_lanes(rays) & lanes;
-        let mut occluded = self.run(AnyByLanes {
+        let mut hits = TreeHits::default();
+        self.run(ByLanes {
             rays,
             lanes: lanes & !backward,
+            query: Any,
+            hits: &mut hits,
         });
-        for lane in LanesOf(backward) {
+        let mut occluded = hits.mask();
+        for lane in lanes_in(backward) {
             occluded |= u32::from(self.any_hit(&rays.ray(lane))) << lane;
         }
         occluded
@@ -59,30 +65,12 @@ impl TreeView<'_> {
         lanes: u32,
         visit: impl FnMut(usize, TreeChord) -> bool,
     ) {
-        self.run(ChordsByLanes { rays, lanes, visit });
-    }
-}
-
-struct ChordsByLanes<'r, F> {
-    rays: &'r RayPacket,
-    lanes: u32,
-    visit: F,
-}
-
-impl<F: FnMut(usize, TreeChord) -> bool> TreeTask for ChordsByLanes<'_, F> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
-        self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
-    ) {
-        let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
-        let mut limits = TreeHits::default();
-        limits.start(self.rays, lanes);
-        let mut query = Chords { visit: self.visit };
-        walk_lanes(kernel, tree, self.rays, lanes, &mut query, &mut limits);
+        self.run(ByLanes {
+            rays,
+            lanes,
+            query: Chords { visit },
+            hits: &mut TreeHits::default(),
+        });
     }
 }
 
@@ -94,64 +82,56 @@ fn backward_lanes(rays: &RayPacket) -> u32 {
     for (lane, t_min) in rays.t_min.iter().enumerate() {
         lanes |= u32::from(*t_min < 0.0) << lane;
     }
-    lanes & ((1 << rays.len()) - 1)
+    lanes & first_lanes(rays.len())
 }
 
-struct NearestByLanes<'r, 'h> {
+/// Brings the rays in `lanes` to what they look for.
+struct ByLanes<'r, 'h, Q> {
     rays: &'r RayPacket,
     lanes: u32,
+    query: Q,
     hits: &'h mut TreeHits,
 }
 
-impl TreeTask for NearestByLanes<'_, '_> {
+impl<Q: Query> TreeTask for ByLanes<'_, '_, Q> {
     type Output = ();
 
     #[inline(always)]
     fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
-        self,
+        mut self,
         kernel: K,
         tree: Resolved<'a, T, L>,
     ) {
         let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
         self.hits.start(self.rays, lanes);
-        walk_lanes(kernel, tree, self.rays, lanes, &mut Nearest, self.hits);
+        walk_lanes(kernel, tree, self.rays, lanes, &mut self.query, self.hits);
     }
 }
 
-struct AnyByLanes<'r> {
-    rays: &'r RayPacket,
-    lanes: u32,
+/// A part of a tree that a ray goes through alone.
+struct Subtree<'s, 'a, K, T, L> {
+    kernel: K,
+    tree: Resolved<'a, T, L>,
+    code: u32,
+    stack: &'s mut WalkStack,
 }
 
-impl TreeTask for AnyByLanes<'_> {
-    type Output = u32;
-
+impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Subtree<'_, 'a, K, T, L> {
+    /// Visits its blocks up to `limit`.
     #[inline(always)]
-    fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
-        self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
-    ) -> u32 {
-        let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
-        let mut hits = TreeHits::default();
-        hits.start(self.rays, lanes);
-        walk_lanes(kernel, tree, self.rays, lanes, &mut Any, &mut hits);
-        hits.mask()
+    fn walk(self, walker: &mut impl Walker<K>, limit: f32) {
+        walk_from(self.kernel, self.tree, self.code, self.stack, walker, limit);
     }
 }
 
 /// What rays look for. A trait instead of a closure, because all of it must be inlined to get the
 /// kernel's instructions.
 trait Query {
-    /// Looks for it in the subtree with `code`, and keeps what `ray` finds in its `lane`.
-    #[expect(clippy::too_many_arguments, reason = "all are parts of the walk")]
+    /// Looks for it in a subtree, and keeps what `ray` finds in its `lane`.
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
         &mut self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
+        subtree: Subtree<'_, 'a, K, T, L>,
         ray: &K::Ray,
-        code: u32,
-        stack: &mut WalkStack,
         hits: &mut TreeHits,
         lane: usize,
     );
@@ -164,11 +144,8 @@ impl Query for Nearest {
     #[inline(always)]
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
         &mut self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
+        subtree: Subtree<'_, 'a, K, T, L>,
         ray: &K::Ray,
-        code: u32,
-        stack: &mut WalkStack,
         hits: &mut TreeHits,
         lane: usize,
     ) {
@@ -176,8 +153,9 @@ impl Query for Nearest {
             t: hits.t[lane],
             slot: hits.slot[lane],
         };
+        let tree = subtree.tree;
         let mut search = NearestOfRay { tree, ray, best };
-        walk_from(kernel, tree, code, stack, &mut search, best.t);
+        subtree.walk(&mut search, best.t);
         (hits.t[lane], hits.slot[lane]) = (search.best.t, search.best.slot);
     }
 }
@@ -189,17 +167,14 @@ impl Query for Any {
     #[inline(always)]
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
         &mut self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
+        subtree: Subtree<'_, 'a, K, T, L>,
         ray: &K::Ray,
-        code: u32,
-        stack: &mut WalkStack,
         hits: &mut TreeHits,
         lane: usize,
     ) {
-        let found = false;
+        let (tree, found) = (subtree.tree, false);
         let mut search = AnyOfRay { tree, ray, found };
-        walk_from(kernel, tree, code, stack, &mut search, hits.t[lane]);
+        subtree.walk(&mut search, hits.t[lane]);
         if search.found {
             (hits.t[lane], hits.slot[lane]) = (-1.0, 0);
         }
@@ -216,11 +191,8 @@ impl<F: FnMut(usize, TreeChord) -> bool> Query for Chords<F> {
     #[inline(always)]
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
         &mut self,
-        kernel: K,
-        tree: Resolved<'a, T, L>,
+        subtree: Subtree<'_, 'a, K, T, L>,
         ray: &K::Ray,
-        code: u32,
-        stack: &mut WalkStack,
         hits: &mut TreeHits,
         lane: usize,
     ) {
@@ -229,8 +201,9 @@ impl<F: FnMut(usize, TreeChord) -> bool> Query for Chords<F> {
             is_finished = !(self.visit)(lane, chord);
             !is_finished
         };
+        let tree = subtree.tree;
         let mut search = ChordsOfRay { tree, ray, visit };
-        walk_from(kernel, tree, code, stack, &mut search, hits.t[lane]);
+        subtree.walk(&mut search, hits.t[lane]);
         if is_finished {
             hits.t[lane] = -1.0;
         }
@@ -288,9 +261,15 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
             }
             // Few rays, or a block: each goes on alone
             _ => {
-                for lane in LanesOf(alive) {
+                for lane in lanes_in(alive) {
                     let ray = kernel.prepare(&rays.ray(lane), view.radius, view.padding);
-                    query.search(kernel, tree, &ray, code, &mut single_stack, hits, lane);
+                    let subtree = Subtree {
+                        kernel,
+                        tree,
+                        code,
+                        stack: &mut single_stack,
+                    };
+                    query.search(subtree, &ray, hits, lane);
                 }
             }
         }

@@ -6,13 +6,14 @@
 
 use std::borrow::Borrow;
 
-use super::hits::{Coherence, LanesOf, TreeHits};
+use super::hits::{Coherence, TreeHits};
 use super::leaves::{Leaves, LoadedRadii};
 use super::simd::{Beam, PacketKernel, PacketSphere, lanes_near};
 use super::topology::Topology;
 use super::traverse::TreeHit;
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::{Walker, walk_with};
+use crate::math::{first_lanes, lanes_in};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii, Node};
 
@@ -58,7 +59,7 @@ impl TreeView<'_> {
 }
 
 /// Every ray of a packet.
-const ALL_LANES: u32 = (1 << PACKET_SIZE) - 1;
+const ALL_LANES: u32 = first_lanes(PACKET_SIZE);
 
 /// Blocks after which the rays of a beam are traced anew without it: such a beam is too wide for the spheres (its
 /// rays start far apart), and tests many that few of its rays meet. Measured on the thesis's box: beams
@@ -162,7 +163,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBea
             radii,
             radius: view.radius,
         };
-        for lane in LanesOf(found) {
+        for lane in lanes_in(found) {
             let sphere = block.sphere(lane);
             let tied = kernel.nearest_of_packet(self.rays, &sphere, self.hits);
             if tied != 0 {
@@ -180,7 +181,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBea
 /// Gives `slot` to those of the `tied` lanes in which it comes before what they have.
 #[cold]
 fn settle_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut TreeHits) {
-    for lane in LanesOf(tied) {
+    for lane in lanes_in(tied) {
         let held = &mut hits.slot[lane];
         if tree.tie_order(slot, *held).is_lt() {
             *held = slot;
@@ -259,7 +260,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfBeam<'_
             radius: view.radius,
         };
         let mut found = 0;
-        for lane in LanesOf(inside) {
+        for lane in lanes_in(inside) {
             found |= kernel.any_of_packet(self.rays, &block.sphere(lane), &self.hits);
         }
         if found != 0 {

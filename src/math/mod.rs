@@ -52,14 +52,27 @@ pub fn set_lane3(lanes: &mut Lanes3, lane: usize, value: glam::Vec3) {
 
 /// The numbers of the lanes whose bits are set in `mask`, ascending.
 #[inline(always)]
-pub fn lanes_in(mut mask: u32) -> impl Iterator<Item = usize> {
-    std::iter::from_fn(move || {
-        (mask != 0).then(|| {
-            let lane = mask.trailing_zeros() as usize & (LANES - 1);
-            mask &= mask - 1;
-            lane
-        })
-    })
+pub const fn lanes_in(mask: u32) -> LanesIn {
+    LanesIn(mask)
+}
+
+/// See [`lanes_in`]. A type instead of a closure, because all of a kernel's code must be inlined to get the kernel's
+/// instructions.
+#[derive(Debug, Clone, Copy)]
+pub struct LanesIn(u32);
+
+impl Iterator for LanesIn {
+    type Item = usize;
+
+    #[inline(always)]
+    fn next(&mut self) -> Option<usize> {
+        if self.0 == 0 {
+            return None;
+        }
+        let lane = self.0.trailing_zeros() as usize & (LANES - 1);
+        self.0 &= self.0 - 1;
+        Some(lane)
+    }
 }
 
 /// A bit for each of the first `count` lanes.

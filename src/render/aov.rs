@@ -36,10 +36,10 @@ impl DataSample {
         id: NO_ID,
     };
 
-    /// Takes `other` if it is nearer.
-    pub fn keep_nearest(&mut self, other: &Self) {
-        if other.z < self.z {
-            *self = *other;
+    /// Takes what `other` makes, at distance `z` along the view axis, if that is nearer.
+    pub fn keep_nearest(&mut self, z: f32, other: impl FnOnce() -> Self) {
+        if z < self.z {
+            *self = other();
         }
     }
 }
@@ -57,7 +57,7 @@ mod tests {
         };
         let mut pixel = DataSample::MISS;
         for sample in [at(f32::INFINITY, 9), at(3.0, 1), at(2.0, 2), at(2.0, 3)] {
-            pixel.keep_nearest(&sample);
+            pixel.keep_nearest(sample.z, || sample);
         }
         assert_eq!((pixel.z, pixel.id), (2.0, 2));
     }

@@ -92,9 +92,8 @@ impl WhittedIntegrator<'_> {
             let pixel = (first + lane) / samples;
             let end = rays.len().min((pixel + 1) * samples - first);
             let nearest = (lane..end).fold(lane, |best, l| if z[l] < z[best] { l } else { best });
-            if z[nearest] < pixels[pixel].data.z {
-                pixels[pixel].data = self.data(rays, z[nearest], nearest, packet);
-            }
+            let data = || self.data(rays, z[nearest], nearest, packet);
+            pixels[pixel].data.keep_nearest(z[nearest], data);
             lane = end;
         }
     }

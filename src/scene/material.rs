@@ -143,6 +143,7 @@ pub struct MaterialError {
 }
 
 /// Reflected part by Schlick (eq. 4.3) from `r0` and the absolute cosine between normal and ray.
+#[inline(always)]
 pub fn schlick(r0: f32, cosine: f32) -> f32 {
     let x = (1.0 - cosine).clamp(0.0, 1.0);
     let x2 = x * x;
@@ -151,16 +152,17 @@ pub fn schlick(r0: f32, cosine: f32) -> f32 {
 
 /// Reflected part by Fresnel's equations, the mean of both polarisations, from the absolute cosine between
 /// normal and ray and the `ratio` of the indices of refraction, on the ray's side over beyond. 1 under total reflection.
+#[inline(always)]
 pub fn dielectric(cosine: f32, ratio: f32) -> f32 {
+    // Without a branch, for loops over lanes.
     let cos_in = cosine.clamp(0.0, 1.0);
     let sin2_out = ratio * ratio * (1.0 - cos_in * cos_in);
-    if sin2_out >= 1.0 {
-        return 1.0;
-    }
-    let cos_out = (1.0 - sin2_out).sqrt();
+    let is_total = sin2_out >= 1.0;
+    let cos_out = (1.0 - if is_total { 1.0 } else { sin2_out }).sqrt();
     let across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out);
     let along = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out);
-    0.5 * (across * across + along * along)
+    let mean = 0.5 * (across * across + along * along);
+    if is_total { 1.0 } else { mean }
 }
 
 /// Direction after passing a surface by Snell's law; `None` if all is reflected.

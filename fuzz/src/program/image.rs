@@ -5,22 +5,12 @@ use std::io::Cursor;
 use spherule::output::{ImageFault, ImageShape, verify_exr, verify_preview};
 use spherule::render::Channels;
 
-/// Every channel.
-const ALL: Channels = Channels {
-    depth: true,
-    normal: true,
-    position: true,
-    velocity: true,
-    albedo: true,
-    id: true,
-};
-
 /// What the seeds are, and what no file of theirs can be. The first byte picks one.
 const SHAPES: [ImageShape; 4] = [
     shape(5, 3, Channels::COLOR),
-    shape(5, 3, ALL),
+    shape(5, 3, Channels::ALL),
     shape(40, 37, Channels::COLOR),
-    shape(1 << 15, 1 << 15, ALL),
+    shape(1 << 15, 1 << 15, Channels::ALL),
 ];
 
 const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {

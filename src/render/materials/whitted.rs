@@ -8,6 +8,7 @@ use glam::Vec3;
 use super::{Material, ShadingPoints};
 use crate::math::{LANES, Supported, lane_kernel};
 use crate::ray::RayPacket;
+use crate::scene::material::{dielectric, schlick};
 use crate::scene::{self, Fresnel};
 use crate::surface::Intersections;
 
@@ -79,15 +80,10 @@ impl WhittedMaterial {
 
     #[inline(always)]
     fn reflected_part(&self, cosine: f32, ratio: f32) -> f32 {
-        let x = 1.0 - cosine;
-        let x = if x < 0.0 { 0.0 } else { x };
-        let x = if x > 1.0 { 1.0 } else { x };
-        let x2 = x * x;
-        let schlick = self.r0 + (1.0 - self.r0) * (x2 * x2 * x);
         if self.is_exact {
             dielectric(cosine, ratio)
         } else {
-            schlick
+            schlick(self.r0, cosine)
         }
     }
 
@@ -122,19 +118,6 @@ impl Material for WhittedMaterial {
             refracted_rays(simd, self, rays, hits, points);
         }
     }
-}
-
-/// Fresnel's equations (see [`crate::scene::material::dielectric`]).
-#[inline(always)]
-fn dielectric(cosine: f32, ratio: f32) -> f32 {
-    let c = if cosine > 1.0 { 1.0 } else { cosine };
-    let sin2_out = ratio * ratio * (1.0 - c * c);
-    let is_total = sin2_out >= 1.0;
-    let cos_out = (1.0 - if is_total { 1.0 } else { sin2_out }).sqrt();
-    let across = (ratio * c - cos_out) / (ratio * c + cos_out);
-    let along = (c - ratio * cos_out) / (c + ratio * cos_out);
-    let mean = 0.5 * (across * across + along * along);
-    if is_total { 1.0 } else { mean }
 }
 
 /// From intersections to shading points with reflected rays.
