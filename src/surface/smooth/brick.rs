@@ -118,25 +118,24 @@ impl Brick {
         }
     }
 
-    /// The box around those.
+    /// The box around those: the first, and the one beyond the last, along each axis.
     #[inline(always)]
-    pub(super) fn marked(&self, side: Side) -> [Vec3A; 2] {
-        let corners = match side {
+    pub(super) fn marked(&self, side: Side) -> &[[u8; 4]; 2] {
+        match side {
             Side::Outside => &self.inside_box,
             Side::Inside => &self.outside_box,
-        };
-        corners.map(|[x, y, z, _]| Vec3A::new(f32::from(x), f32::from(y), f32::from(z)))
+        }
     }
 
     /// The field at the corners of a voxel, in codes: x fastest, then y, then z. Voxels beyond the brick by
     /// one have their corners, too.
     #[inline(always)]
-    pub(super) fn corners(&self, x: i32, y: i32, z: i32) -> [f32; 8] {
+    pub(super) fn corners(&self, x: i32, y: i32, z: i32) -> [i32; 8] {
         #[expect(clippy::cast_sign_loss, reason = "voxels from -1 on")]
         let part = |c: i32| (c + 1) as usize;
         let at = &self.samples[part(z) * LAYER + part(y) * ROW + part(x)..];
         let at = &at[..LAYER + ROW + 2];
-        let code = |i: usize| f32::from(at[i]);
+        let code = |i: usize| i32::from(at[i]);
         [
             code(0),
             code(1),
@@ -154,7 +153,10 @@ impl Brick {
     pub(super) fn value(&self, place: Vec3) -> f32 {
         let voxel = voxel_of(place);
         let [x, y, z] = voxel;
-        trilinear(&self.corners(x, y, z), place - Vec3::from(corner(voxel)))
+        trilinear(
+            &self.corners(x, y, z).map(|code| code as f32),
+            place - Vec3::from(corner(voxel)),
+        )
     }
 
     /// The gradient at a place in voxels from the brick's corner: central differences at the corners,

@@ -11,7 +11,6 @@ use super::blocks::{self, BlockPlan, Plan};
 use super::blur::{Around, Blur, BrickField, Part, taps};
 use super::brick::{Brick, CODES, Made, SAMPLES};
 use super::layout::Layout;
-use super::near::NearSpace;
 use super::raw::{Codes, Gather, RawBrick};
 use super::tree::{Block, BrickTree, Node};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
@@ -69,7 +68,6 @@ pub struct SmoothReport {
 #[derive(Debug, Default)]
 pub(super) struct Built {
     pub(super) tree: BrickTree,
-    pub(super) near: NearSpace,
     pub(super) field: Option<FieldParticles>,
     /// Lengths, where places and normals are to be the field's.
     pub(super) exact: Option<Layout>,
@@ -127,7 +125,6 @@ pub(super) fn build(
     let (blocks, bricks) = work.bricks(&raw);
     let raw_bytes = raw.byte_len();
     drop(raw);
-    let near = NearSpace::around(&blocks, layout.voxel);
     let tree = BrickTree::new(&blocks, bricks, layout.voxel, layout.threshold * CODES);
     clock.lap("bricks");
     let phases = clock.finish();
@@ -135,7 +132,7 @@ pub(super) fn build(
         total: phases.iter().map(|phase| phase.time).sum(),
         phases,
         bricks: tree.bricks.len() as u64,
-        bytes: tree.byte_len() + near.byte_len() + if keep { field.byte_len() } else { 0 },
+        bytes: tree.byte_len() + if keep { field.byte_len() } else { 0 },
         peak_bytes: sorted_bytes
             .max(field.byte_len() + plan.byte_len() + raw_bytes + tree.byte_len()),
         left_out: field.bins().left_out(),
@@ -143,7 +140,6 @@ pub(super) fn build(
     };
     let built = Built {
         tree,
-        near,
         field: keep.then_some(field),
         exact: settings.exact.then_some(layout),
     };

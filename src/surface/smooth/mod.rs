@@ -10,8 +10,7 @@ use glam::Vec3;
 use super::field::FieldParticles;
 use super::{Intersection, Intersections, MaterialId, Shape, Side, SurfaceSettings};
 use crate::accel::Coherence;
-use crate::accel::simd::{ArrayLanes, ArrayTask};
-use crate::math::lanes_in;
+use crate::math::{Supported, first_lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
 
 mod blocks;
@@ -20,14 +19,15 @@ mod brick;
 mod build;
 mod exact;
 mod layout;
-mod near;
 mod raw;
 mod root;
+mod steps;
+mod traversal;
 mod tree;
 
 use build::Built;
 pub use build::{SmoothError, SmoothReport};
-use tree::Meeting;
+use traversal::Crossings;
 
 /// Step off the surface in voxels: beyond the rounding of places in it.
 const OFFSET: f32 = 0.01;
@@ -65,7 +65,7 @@ impl SmoothGrid {
     pub fn surface(&self) -> SmoothSurface<'_> {
         SmoothSurface {
             built: &self.built,
-            lanes: ArrayLanes::default(),
+            simd: Supported::default(),
         }
     }
 }
@@ -74,106 +74,28 @@ impl SmoothGrid {
 #[derive(Debug, Clone, Copy)]
 pub struct SmoothSurface<'a> {
     built: &'a Built,
-    lanes: ArrayLanes,
-}
-
-/// A crossing, compiled for the machine.
-struct Cross<'a> {
-    surface: &'a SmoothSurface<'a>,
-    ray: &'a Ray,
-    from: Side,
-}
-
-impl ArrayTask for Cross<'_> {
-    type Output = Option<Intersection>;
-
-    #[inline(always)]
-    fn run(self) -> Option<Intersection> {
-        let tree = &self.surface.built.tree;
-        let meeting = tree.first_crossing(self.ray, self.from)?;
-        Some(self.surface.hit(self.ray, &meeting, self.from))
-    }
-}
-
-/// The first crossing of each ray of a packet.
-struct CrossPacket<'a> {
-    surface: &'a SmoothSurface<'a>,
-    rays: &'a mut RayPacket,
-    inside: u32,
-    coherence: Coherence,
-    hits: &'a mut Intersections,
-}
-
-impl ArrayTask for CrossPacket<'_> {
-    type Output = ();
-
-    #[inline(always)]
-    fn run(self) {
-        let built = self.surface.built;
-        let is_together = self.coherence == Coherence::Coherent && self.inside == 0;
-        let free = if is_together {
-            built.near.free_way(self.rays)
-        } else {
-            f32::NEG_INFINITY
-        };
-        for lane in 0..self.rays.len() {
-            let Some(ray) = near::rest_of(&self.rays.ray(lane), free) else {
-                continue;
-            };
-            let from = Side::of_lane(self.inside, lane);
-            if let Some(meeting) = built.tree.first_crossing(&ray, from) {
-                let hit = self.surface.hit(&ray, &meeting, from);
-                self.hits.set(lane, &hit);
-                self.rays.t_max[lane] = hit.t;
-            }
-        }
-    }
-}
-
-/// Which rays of a packet meet anything.
-struct OccludePacket<'a> {
-    surface: &'a SmoothSurface<'a>,
-    rays: &'a RayPacket,
-    coherence: Coherence,
-    lanes: u32,
-}
-
-impl ArrayTask for OccludePacket<'_> {
-    type Output = u32;
-
-    #[inline(always)]
-    fn run(self) -> u32 {
-        let built = self.surface.built;
-        let free = match self.coherence {
-            Coherence::Coherent => built.near.free_way(self.rays),
-            Coherence::Incoherent => f32::NEG_INFINITY,
-        };
-        lanes_in(self.lanes).fold(0, |occluded, lane| {
-            let rest = near::rest_of(&self.rays.ray(lane), free);
-            let met = rest.and_then(|ray| built.tree.first_crossing(&ray, Side::Outside));
-            occluded | u32::from(met.is_some()) << lane
-        })
-    }
+    simd: Supported,
 }
 
 impl SmoothSurface<'_> {
     #[inline(always)]
-    fn hit(&self, ray: &Ray, meeting: &Meeting, from: Side) -> Intersection {
+    fn hit(&self, ray: &Ray, crossings: &Crossings, lane: usize, from: Side) -> Intersection {
         let tree = &self.built.tree;
-        let point = ray.at(meeting.t);
+        let t = crossings.t[lane];
+        let point = ray.at(t);
         let against = match from {
             Side::Outside => -ray.direction,
             Side::Inside => ray.direction,
         };
-        let gradient = meeting
-            .brick
-            .map(|(brick, place)| tree.bricks[brick as usize].gradient(place));
+        let brick = crossings.brick(lane);
+        let gradient =
+            brick.map(|(brick, position)| tree.bricks[brick as usize].gradient(position));
         let normal = gradient
             .and_then(|gradient| (-gradient).try_normalize())
             .unwrap_or(against);
         let largest = point.abs().max(ray.origin.abs()).max_element();
         let hit = Intersection {
-            t: meeting.t,
+            t,
             point,
             normal,
             shading: normal,
@@ -196,11 +118,12 @@ impl SmoothSurface<'_> {
 
 impl Shape for SmoothSurface<'_> {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
-        self.lanes.run(Cross {
-            surface: self,
-            ray,
-            from: side,
-        })
+        let mut packet = RayPacket::default();
+        packet.push(ray);
+        let mut hits = Intersections::default();
+        let inside = u32::from(side == Side::Inside);
+        self.intersect(&mut packet, Coherence::Incoherent, inside, &mut hits);
+        (hits.mask == 1).then(|| hits.get(0))
     }
 
     fn is_connected(&self) -> bool {
@@ -214,31 +137,30 @@ impl Shape for SmoothSurface<'_> {
     fn intersect(
         &self,
         rays: &mut RayPacket,
-        coherence: Coherence,
+        _coherence: Coherence,
         inside: u32,
         hits: &mut Intersections,
     ) {
-        if !rays.is_empty() {
-            self.lanes.run(CrossPacket {
-                surface: self,
-                rays,
-                inside,
-                coherence,
-                hits,
-            });
+        let lanes = first_lanes(rays.len());
+        let tree = &self.built.tree;
+        let mut crossings = Crossings::default();
+        tree.first_crossings(self.simd, rays, lanes, inside, &mut crossings);
+        for lane in lanes_in(crossings.mask) {
+            let from = Side::of_lane(inside, lane);
+            let hit = self.hit(&rays.ray(lane), &crossings, lane, from);
+            hits.set(lane, &hit);
+            rays.t_max[lane] = hit.t;
         }
     }
 
-    fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
+    fn occluded(&self, rays: &RayPacket, _coherence: Coherence, lanes: u32) -> u32 {
         if lanes == 0 {
             return 0;
         }
-        self.lanes.run(OccludePacket {
-            surface: self,
-            rays,
-            coherence,
-            lanes,
-        })
+        let tree = &self.built.tree;
+        let mut crossings = Crossings::default();
+        tree.first_crossings(self.simd, rays, lanes, 0, &mut crossings);
+        crossings.mask
     }
 
     fn particle_at(&self, hit: &Intersection) -> u32 {

@@ -1,136 +1,223 @@
-//! Where a ray crosses the surface within one voxel.
+//! Where rays cross the surface within a voxel.
 //!
 //! Along a ray a trilinear field is a cubic polynomial (Parker et al. 1998; Marmitt et al. 2004).
 
-use glam::Vec3;
+#![expect(
+    clippy::needless_range_loop,
+    reason = "loops over lanes, each of many arrays"
+)]
+
+use super::steps::Integers;
+use crate::math::{LANES, Lanes, Lanes3, splat};
 
 /// Rounds of the search in a bracket; false position with Illinois steps gains more than a digit each.
 const ROUNDS: usize = 6;
 /// Values this close to the surface end the search, in codes.
 const CLOSE: f32 = 0.5;
 
-/// The part of the way from `from` to `to`, places in a voxel with these corner values, at which the field
-/// first gets to `threshold`; `sign` is 1 for a ray that comes from smaller values, -1 from larger ones. A
-/// ray that begins beyond crosses at 0.
-#[inline(always)]
-pub(super) fn first_crossing(
-    corners: &[f32; 8],
-    from: Vec3,
-    to: Vec3,
-    threshold: f32,
-    sign: f32,
-) -> Option<f32> {
-    let cubic = Cubic::along(corners, from, to - from, threshold, sign);
-    let g = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| cubic.value(s));
-    if g[0] >= 0.0 {
-        return Some(0.0);
-    }
-    let (low, high, at_low, at_high) = if g[1] >= 0.0 {
-        (0.0, 1.0 / 3.0, g[0], g[1])
-    } else if g[2] >= 0.0 {
-        (1.0 / 3.0, 2.0 / 3.0, g[1], g[2])
-    } else if g[3] >= 0.0 {
-        (2.0 / 3.0, 1.0, g[2], g[3])
-    } else {
-        // Thinner than the steps.
-        let peak = cubic.maximum()?;
-        let at_peak = cubic.value(peak);
-        if at_peak < 0.0 {
-            return None;
-        }
-        (0.0, peak, g[0], at_peak)
-    };
-    Some(cubic.root_between(low, high, at_low, at_high))
+/// The part of each ray that lies in a voxel, in voxels from its corner.
+#[derive(Default)]
+#[repr(C, align(64))]
+pub(super) struct Segments {
+    pub(super) from: Lanes3,
+    /// From there to the end.
+    pub(super) along: Lanes3,
+    /// 1 for a ray that comes from smaller values, -1 from larger ones.
+    pub(super) sign: Lanes,
 }
 
-/// `c[0] + c[1] s + c[2] s^2 + c[3] s^3`.
-struct Cubic([f32; 4]);
-
-impl Cubic {
-    /// `sign` times the field over `threshold` along `from + s way`: the trilinear form multiplied out.
-    #[inline(always)]
-    fn along(c: &[f32; 8], from: Vec3, way: Vec3, threshold: f32, sign: f32) -> Self {
-        // Of 1, x, y, z, xy, xz, yz and xyz.
-        let x = c[1] - c[0];
-        let (y, xy) = (c[2] - c[0], c[3] - c[2] - x);
-        let (z, xz) = (c[4] - c[0], c[5] - c[4] - x);
-        let yz = c[6] - c[4] - y;
-        let xyz = c[7] - c[6] - (c[5] - c[4]) - xy;
-        let (a, b) = (from, way);
-        // Each product of two or three coordinates, as a polynomial of s.
-        let of_xy = [a.x * a.y, a.x * b.y + b.x * a.y, b.x * b.y];
-        let of_xz = [a.x * a.z, a.x * b.z + b.x * a.z, b.x * b.z];
-        let of_yz = [a.y * a.z, a.y * b.z + b.y * a.z, b.y * b.z];
-        let of_xyz = [
-            of_xy[0] * a.z,
-            of_xy[1] * a.z + of_xy[0] * b.z,
-            of_xy[2] * a.z + of_xy[1] * b.z,
-            of_xy[2] * b.z,
-        ];
-        let even = |i: usize| xy * of_xy[i] + xz * of_xz[i] + yz * of_yz[i] + xyz * of_xyz[i];
-        Self([
-            sign * (c[0] - threshold + x * a.x + y * a.y + z * a.z + even(0)),
-            sign * (x * b.x + y * b.y + z * b.z + even(1)),
-            sign * even(2),
-            sign * xyz * of_xyz[3],
-        ])
-    }
-
-    #[inline(always)]
-    fn value(&self, s: f32) -> f32 {
-        let c = &self.0;
-        c[0] + s * (c[1] + s * (c[2] + s * c[3]))
-    }
-
-    /// Where in 0..1 it has a maximum.
-    #[inline(always)]
-    fn maximum(&self) -> Option<f32> {
-        // c1 + 2 c2 s + 3 c3 s^2 = 0 with a falling slope; written so that c3 may vanish.
-        let [_, a, b, c] = self.0;
-        let discriminant = b * b - 3.0 * a * c;
-        if discriminant < 0.0 {
-            return None;
-        }
-        let root = discriminant.sqrt();
-        let s = if b <= 0.0 {
-            a / (root - b)
+/// The part of the way along each segment at which the field, of which these are the values at the corners of the
+/// voxel, first gets to `threshold`. A ray that starts beyond crosses at 0. The first result has a bit for each ray of `lanes` that crosses.
+#[inline(always)]
+pub(super) fn first_roots(
+    corners: &[Integers; 8],
+    segments: &Segments,
+    threshold: f32,
+    lanes: u32,
+) -> (u32, Lanes) {
+    let mut cubic = Cubic([splat(0.0); 4]);
+    let mut bracket = Bracket::default();
+    let mut crossed = 0;
+    for l in 0..LANES {
+        let c = cubic_along(corners, segments, threshold, l);
+        // Bracket the first root
+        let g = [0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0].map(|s| value(&c, s));
+        let peak = maximum(&c);
+        let at_peak = value(&c, peak);
+        let (low, high, at_low, at_high) = if g[0] >= 0.0 {
+            (0.0, 0.0, 0.0, 0.0)
+        } else if g[1] >= 0.0 {
+            (0.0, 1.0 / 3.0, g[0], g[1])
+        } else if g[2] >= 0.0 {
+            (1.0 / 3.0, 2.0 / 3.0, g[1], g[2])
+        } else if g[3] >= 0.0 {
+            (2.0 / 3.0, 1.0, g[2], g[3])
         } else {
-            -(b + root) / (3.0 * c)
+            // Thinner than the steps
+            (0.0, peak, g[0], at_peak)
         };
-        (s > 0.0 && s < 1.0).then_some(s)
+        crossed |= u32::from(at_high >= 0.0) << l;
+        for (of_all, of_this) in cubic.0.iter_mut().zip(c) {
+            of_all[l] = of_this;
+        }
+        bracket.low[l] = low;
+        bracket.high[l] = high;
+        bracket.at_low[l] = at_low;
+        bracket.at_high[l] = at_high;
     }
+    crossed &= lanes;
+    if crossed == 0 {
+        return (0, splat(0.0));
+    }
+    (crossed, bracket.root(&cubic, crossed))
+}
 
-    /// Where it is 0 between `low` and `high`, where it has values of either sign.
+/// The polynomial of lane `l`: `sign` times the field over `threshold` along the segment, the trilinear form multiplied
+/// out.
+#[inline(always)]
+fn cubic_along(corners: &[Integers; 8], segments: &Segments, threshold: f32, l: usize) -> [f32; 4] {
+    let c = |corner: usize| corners[corner][l] as f32;
+    // Coefficients of 1, x, y, z, xy, xz, yz and xyz
+    let x = c(1) - c(0);
+    let (y, xy) = (c(2) - c(0), c(3) - c(2) - x);
+    let (z, xz) = (c(4) - c(0), c(5) - c(4) - x);
+    let yz = c(6) - c(4) - y;
+    let xyz = c(7) - c(6) - (c(5) - c(4)) - xy;
+    // Each product of two or three coordinates, as a polynomial of s
+    let [ax, ay, az] = [
+        segments.from[0][l],
+        segments.from[1][l],
+        segments.from[2][l],
+    ];
+    let [bx, by, bz] = [
+        segments.along[0][l],
+        segments.along[1][l],
+        segments.along[2][l],
+    ];
+    let of_xy = [ax * ay, ax * by + bx * ay, bx * by];
+    let of_xz = [ax * az, ax * bz + bx * az, bx * bz];
+    let of_yz = [ay * az, ay * bz + by * az, by * bz];
+    let of_xyz = [
+        of_xy[0] * az,
+        of_xy[1] * az + of_xy[0] * bz,
+        of_xy[2] * az + of_xy[1] * bz,
+        of_xy[2] * bz,
+    ];
+    let sign = segments.sign[l];
+    let even = |i: usize| xy * of_xy[i] + xz * of_xz[i] + yz * of_yz[i] + xyz * of_xyz[i];
+    [
+        sign * (c(0) - threshold + x * ax + y * ay + z * az + even(0)),
+        sign * (x * bx + y * by + z * bz + even(1)),
+        sign * even(2),
+        sign * xyz * of_xyz[3],
+    ]
+}
+
+#[inline(always)]
+fn value(c: &[f32; 4], s: f32) -> f32 {
+    c[0] + s * (c[1] + s * (c[2] + s * c[3]))
+}
+
+/// Where in 0..1 the polynomial has a maximum, else 0.
+#[inline(always)]
+fn maximum(c: &[f32; 4]) -> f32 {
+    // c1 + 2 c2 s + 3 c3 s^2 = 0 with a falling slope; written so that c3 may vanish
+    let [_, a, b, c] = *c;
+    let discriminant = b * b - 3.0 * a * c;
+    let root = if discriminant > 0.0 {
+        discriminant
+    } else {
+        0.0
+    }
+    .sqrt();
+    let (over, under) = if b <= 0.0 {
+        (a, root - b)
+    } else {
+        (-(b + root), 3.0 * c)
+    };
+    let s = over / under;
+    if (discriminant >= 0.0) & (s > 0.0) & (s < 1.0) {
+        s
+    } else {
+        0.0
+    }
+}
+
+/// `c[0] + c[1] s + c[2] s^2 + c[3] s^3` for each lane.
+#[repr(C, align(64))]
+struct Cubic([Lanes; 4]);
+
+/// Intervals at whose ends polynomials have values of either sign.
+#[derive(Default)]
+#[repr(C, align(64))]
+struct Bracket {
+    low: Lanes,
+    high: Lanes,
+    at_low: Lanes,
+    at_high: Lanes,
+}
+
+impl Bracket {
+    /// Where the polynomials of `lanes` are 0.
     #[inline(always)]
-    fn root_between(&self, mut low: f32, mut high: f32, mut at_low: f32, mut at_high: f32) -> f32 {
-        let mut s = high;
+    fn root(&mut self, cubic: &Cubic, lanes: u32) -> Lanes {
+        let mut roots = self.high;
+        let mut searching = lanes;
         for _ in 0..ROUNDS {
-            let span = at_high - at_low;
-            if span <= 0.0 {
-                break;
+            let mut goes_on = 0;
+            for l in 0..LANES {
+                let span = self.at_high[l] - self.at_low[l];
+                let is_searched = (searching >> l & 1 == 1) & (span > 0.0);
+                let s = self.low[l] - self.at_low[l] * (self.high[l] - self.low[l]) / span;
+                let c = [cubic.0[0][l], cubic.0[1][l], cubic.0[2][l], cubic.0[3][l]];
+                let g = value(&c, s);
+                roots[l] = if is_searched { s } else { roots[l] };
+                goes_on |= u32::from(is_searched & (g.abs() >= CLOSE)) << l;
+                let is_beyond = g >= 0.0;
+                let (low, high) = (self.low[l], self.high[l]);
+                let (at_low, at_high) = (self.at_low[l], self.at_high[l]);
+                self.low[l] = if is_beyond { low } else { s };
+                self.high[l] = if is_beyond { s } else { high };
+                self.at_low[l] = if is_beyond { 0.5 * at_low } else { g };
+                self.at_high[l] = if is_beyond { g } else { 0.5 * at_high };
             }
-            s = low - at_low * (high - low) / span;
-            let g = self.value(s);
-            if g.abs() < CLOSE {
+            searching = goes_on;
+            if searching == 0 {
                 break;
-            }
-            if g >= 0.0 {
-                high = s;
-                at_high = g;
-                at_low *= 0.5;
-            } else {
-                low = s;
-                at_low = g;
-                at_high *= 0.5;
             }
         }
-        s
+        roots
     }
 }
 
 #[cfg(test)]
 mod tests {
+    use glam::Vec3;
+
     use super::*;
+    use crate::math::set_lane3;
+
+    /// Of one ray, in a lane of its own among others that are no numbers.
+    #[expect(clippy::cast_possible_truncation, reason = "codes are integers")]
+    fn first_crossing(
+        corners: &[f32; 8],
+        from: Vec3,
+        to: Vec3,
+        threshold: f32,
+        sign: f32,
+    ) -> Option<f32> {
+        let lane = 5;
+        let mut segments = Segments {
+            from: [splat(f32::NAN); 3],
+            along: [splat(f32::NAN); 3],
+            sign: splat(sign),
+        };
+        set_lane3(&mut segments.from, lane, from);
+        set_lane3(&mut segments.along, lane, to - from);
+        let corners = corners.map(|code| [code as i32; LANES]);
+        let all = first_roots(&corners, &segments, threshold, 1 << lane);
+        (all.0 == 1 << lane).then_some(all.1[lane])
+    }
 
     /// Corner values of `a + b.x + c x y z`.
     fn corners(of: impl Fn(Vec3) -> f32) -> [f32; 8] {

@@ -1,6 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
+use crate::math::SimdLevel;
 use crate::surface::SurfaceKind;
 
 const RADIUS: f32 = 0.5;
@@ -352,40 +353,6 @@ fn smoothing_takes_bumps_away() {
     assert!(smooth < 0.6 * raw, "{raw} {smooth}");
 }
 
-#[test]
-fn packets_find_what_single_rays_find() {
-    let mut centers = filled(7, |p| p.length() < 6.0);
-    centers.extend(filled(9, |p| p.x > 8.5 && p.y > 8.5));
-    let grid = grid(&centers, &settings(0.75, false));
-    let surface = grid.surface();
-    let mut random = Random(8);
-    let mut met = 0;
-    for spread in [0.0, 0.003, 0.05, 0.5] {
-        for ray in rays(300, 21, 12.0) {
-            let mut packet = RayPacket::default();
-            for lane in 0..16 {
-                let far = Ray {
-                    t_max: if lane == 3 { 25.0 } else { ray.t_max },
-                    ..Ray::new(
-                        ray.origin + spread * random.in_cube(),
-                        (ray.direction + 0.1 * spread * random.in_cube()).normalize(),
-                    )
-                };
-                packet.push(&far);
-            }
-            let mut hits = Intersections::default();
-            surface.intersect(&mut packet.clone(), Coherence::Coherent, 0, &mut hits);
-            let single: Vec<_> = packet.rays().map(|ray| surface.nearest(&ray)).collect();
-            assert_eq!(hits.all(packet.len()), single);
-            for coherence in [Coherence::Coherent, Coherence::Incoherent] {
-                assert_eq!(surface.occluded(&packet, coherence, 0xffff), hits.mask);
-            }
-            met += hits.mask.count_ones();
-        }
-    }
-    assert!(met > 3000, "{met}");
-}
-
 /// Where a ray goes that is bent by a ball of glass around the origin, in f64, by Snell's law twice.
 fn bent_by_ball(ray: &Ray, radius: f64, ior: f64) -> Option<DVec3> {
     let bend = |direction: DVec3, normal: DVec3, ratio: f64| {
@@ -464,4 +431,110 @@ fn a_ball_of_particles_bends_light_as_a_ball_of_glass() {
     assert!(degrees.len() > 380);
     assert!(mean(&straight) > 5.0, "{}", mean(&straight));
     assert!(mean(&degrees) < 2.5, "{}", mean(&degrees));
+}
+
+/// Packets of rays from all sides and in no order; every third ray starts within the body.
+fn packets(count: usize) -> Vec<(RayPacket, u32)> {
+    let rays: Vec<Ray> = rays(16 * count, 13, 7.0).collect();
+    let packet = |rays: &[Ray]| {
+        let mut packet = RayPacket::default();
+        let mut inside = 0;
+        for (lane, ray) in rays.iter().enumerate() {
+            let is_inside = lane % 3 == 1;
+            let t_min = if is_inside { 28.0 } else { 0.0 };
+            packet.push(&Ray { t_min, ..*ray });
+            inside |= u32::from(is_inside) << lane;
+        }
+        (packet, inside)
+    };
+    rays.chunks(16).map(packet).collect()
+}
+
+#[test]
+fn packets_find_what_single_rays_find() {
+    let (_, centers) = bodies().remove(3);
+    let grid = grid(&centers, &settings(0.75, false));
+    for level in SimdLevel::ALL {
+        let surface = SmoothSurface {
+            built: &grid.built,
+            simd: Supported::or_best(level),
+        };
+        let mut found = 0;
+        for (mut packet, inside) in packets(500) {
+            let rays: Vec<Ray> = packet.rays().collect();
+            let all = first_lanes(16);
+            let occluded = surface.occluded(&packet, Coherence::Incoherent, all & !inside);
+            let mut hits = Intersections::default();
+            surface.intersect(&mut packet, Coherence::Incoherent, inside, &mut hits);
+            assert_eq!(occluded, hits.mask & !inside, "{level:?}");
+            for (lane, ray) in rays.iter().enumerate() {
+                let side = Side::of_lane(inside, lane);
+                let hit = grid.surface().crossing(ray, side);
+                assert_eq!(hits.all(16)[lane], hit, "{level:?} {ray:?}");
+                let t_max = hit.map_or(ray.t_max, |hit| hit.t);
+                assert_eq!(packet.t_max[lane], t_max, "{level:?} {ray:?}");
+                found += usize::from(hit.is_some());
+            }
+        }
+        assert!(found > 2000, "{level:?}: {found}");
+    }
+}
+
+#[test]
+fn crossings_are_where_the_side_changes() {
+    let mut centers = filled(7, |p| p.length() < 6.0);
+    centers.extend(filled(9, |p| p.x > 8.5 && p.y > 8.5));
+    let grid = grid(&centers, &settings(0.75, false));
+    let tree = &grid.built.tree;
+    let mut found = 0;
+    for (mut packet, _) in packets(40) {
+        packet.t_min = [0.0; 16];
+        let mut hits = Intersections::default();
+        let rays: Vec<Ray> = packet.rays().collect();
+        grid.surface()
+            .intersect(&mut packet, Coherence::Incoherent, 0, &mut hits);
+        for (ray, hit) in rays.iter().zip(hits.all(16)) {
+            let close = 0.05 * tree.voxel();
+            let end = hit.map_or(60.0, |hit| hit.t - close);
+            for step in 0..4000 {
+                let at = ray.at(end * step as f32 / 4000.0);
+                assert_eq!(tree.side_of(at), Side::Outside, "{ray:?} {hit:?} {at}");
+            }
+            if let Some(hit) = hit {
+                let is_grazing = hit.normal.dot(ray.direction).abs() < 0.2;
+                let behind = tree.side_of(ray.at(hit.t + close));
+                assert!(is_grazing || behind == Side::Inside, "{ray:?} {hit:?}");
+                found += 1;
+            }
+        }
+    }
+    assert!(found > 200, "{found}");
+}
+
+#[test]
+fn rays_that_are_no_numbers_meet_nothing_and_change_no_others() {
+    let (_, centers) = bodies().remove(3);
+    let grid = grid(&centers, &settings(0.75, false));
+    let surface = grid.surface();
+    for (packet, inside) in packets(50) {
+        for poison in [f32::NAN, f32::INFINITY, f32::NEG_INFINITY, f32::MAX] {
+            for axis in 0..3 {
+                let mut poisoned = packet;
+                poisoned.origin[axis][2] = poison;
+                poisoned.direction[(axis + 1) % 3][6] = poison;
+                poisoned.t_min[11] = poison.abs();
+                poisoned.t_max[15] = f32::NAN;
+                let lanes = [2, 6, 11, 15];
+                let (mut of_all, mut of_sound) =
+                    (Intersections::default(), Intersections::default());
+                surface.intersect(&mut poisoned, Coherence::Coherent, inside, &mut of_all);
+                let mut sound = packet;
+                surface.intersect(&mut sound, Coherence::Coherent, inside, &mut of_sound);
+                for (lane, (a, b)) in of_all.all(16).iter().zip(of_sound.all(16)).enumerate() {
+                    let wanted = if lanes.contains(&lane) { None } else { b };
+                    assert_eq!(*a, wanted, "{poison} {axis} {lane}");
+                }
+            }
+        }
+    }
 }
