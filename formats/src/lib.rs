@@ -8,12 +8,18 @@
 
 mod attribute;
 mod budget;
+mod decompress;
 mod error;
+mod format;
 mod frame;
+mod gzip;
 mod message;
 mod origin;
+mod reader;
+mod registry;
+mod regular;
 mod scalar;
-mod unpack;
+mod step;
 
 pub mod blocks;
 pub mod convert;

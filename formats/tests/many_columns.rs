@@ -5,6 +5,7 @@
 use std::io::{Cursor, Write};
 
 use spherule_formats::detect::Format;
+use spherule_formats::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
 use spherule_formats::sequence::merge;
 use spherule_formats::{Attribute, AttributeData, ParseError, Positions, RawParticles};
 use zip::ZipWriter;
@@ -48,14 +49,14 @@ fn numbered(count: usize) -> impl Iterator<Item = String> {
 
 #[test]
 fn vtk_xml_of_one_piece() {
-    has(Format::VtkXml, &vtu(&[piece(numbered(MANY))]), MANY);
+    has(vtk_xml::FORMAT, &vtu(&[piece(numbered(MANY))]), MANY);
 }
 
 #[test]
 fn vtk_xml_of_two_pieces() {
     let backwards = (0..MANY).rev().map(|i| format!("a{i}"));
     let file = vtu(&[piece(numbered(MANY)), piece(backwards)]);
-    let particles = read(Format::VtkXml, &file).expect("a good file");
+    let particles = read(vtk_xml::FORMAT, &file).expect("a good file");
     assert_eq!(particles.attributes.len(), MANY);
     assert_eq!(particles.attributes[1].name, "a1");
     assert_eq!(particles.attributes[1].data, AttributeData::U8(vec![7, 7]));
@@ -67,7 +68,7 @@ fn vtk_xml_of_repeated_names_that_the_last_piece_lacks() {
     let mut pieces = vec![piece(repeated())];
     pieces.extend((0..20_000).map(|_| piece(std::iter::once("a".to_owned()))));
     pieces.push(piece(std::iter::empty()));
-    let particles = read(Format::VtkXml, &vtu(&pieces)).expect("a good file");
+    let particles = read(vtk_xml::FORMAT, &vtu(&pieces)).expect("a good file");
     assert_eq!(particles.attributes.len(), 0);
 }
 
@@ -88,7 +89,7 @@ fn vtk_xml_of_arrays_that_share_their_bytes() {
     let file = format!(
         "{head}<AppendedData encoding=\"base64\">_{blanks}AQAAAAc=</AppendedData></VTKFile>"
     );
-    let error = read(Format::VtkXml, file.as_bytes()).expect_err("shared bytes");
+    let error = read(vtk_xml::FORMAT, file.as_bytes()).expect_err("shared bytes");
     assert!(
         error.to_string().contains("needs bytes of its own"),
         "{error}"
@@ -103,7 +104,7 @@ fn vtk_legacy() {
     for name in numbered(MANY) {
         file += &format!("SCALARS {name} float\nLOOKUP_TABLE default\n7\n");
     }
-    has(Format::VtkLegacy, file.as_bytes(), MANY);
+    has(vtk::FORMAT, file.as_bytes(), MANY);
 }
 
 #[test]
@@ -118,7 +119,7 @@ fn vtk_legacy_in_binary() {
         file.extend([0; 8]);
         file.push(b'\n');
     }
-    has(Format::VtkLegacy, &file, MANY);
+    has(vtk::FORMAT, &file, MANY);
 }
 
 #[test]
@@ -134,7 +135,7 @@ fn ply() {
             "ascii" => file.extend(format!("1 2 3{}\n", " 7".repeat(MANY)).bytes()),
             _ => file.extend(vec![0; 12 + MANY]),
         }
-        has(Format::Ply, &file, MANY);
+        has(ply::FORMAT, &file, MANY);
     }
 }
 
@@ -148,7 +149,7 @@ fn csv() {
             .join(","),
     ] {
         let file = format!("x,y,z,{names}\n1,2,3{}\n", ",7".repeat(MANY));
-        has(Format::Csv, file.as_bytes(), MANY);
+        has(csv::FORMAT, file.as_bytes(), MANY);
     }
 }
 
@@ -157,13 +158,13 @@ fn xyz() {
     let numbers = " 7".repeat(MANY);
     // The element is one more.
     has(
-        Format::Xyz,
+        xyz::FORMAT,
         format!("1\n\nH 1 2 3{numbers}\n").as_bytes(),
         MANY + 1,
     );
     let properties: String = numbered(MANY).map(|n| format!(":{n}:I:1")).collect();
     let file = format!("1\nProperties=pos:R:3{properties}\n1 2 3{numbers}\n");
-    has(Format::Xyz, file.as_bytes(), MANY);
+    has(xyz::FORMAT, file.as_bytes(), MANY);
 }
 
 #[test]
@@ -174,10 +175,10 @@ fn lammps() {
     };
     let names: String = numbered(MANY).map(|n| format!(" {n}")).collect();
     let values = " 7".repeat(MANY);
-    has(Format::Lammps, dump(&names, &values).as_bytes(), MANY);
+    has(lammps::FORMAT, dump(&names, &values).as_bytes(), MANY);
     // One component of a vector, whose others are looked for.
     let file = dump(&" vx".repeat(MANY), &values);
-    has(Format::Lammps, file.as_bytes(), MANY);
+    has(lammps::FORMAT, file.as_bytes(), MANY);
 }
 
 #[test]
@@ -187,7 +188,7 @@ fn lammps_headers_in_one_line() {
         "ITEM: TIMESTEP ".repeat(1 << 18),
         "0".repeat(1 << 22)
     );
-    let steps = Format::Lammps.steps(file.as_bytes()).expect("steps");
+    let steps = lammps::FORMAT.steps(file.as_bytes()).expect("steps");
     assert_eq!(steps.len(), 1);
 }
 
@@ -208,7 +209,7 @@ fn bgeo() {
     }
     let record = 16 + 4 * usize::try_from(count).expect("not negative");
     file.resize(file.len() + record, 0);
-    has(Format::Bgeo, &file, 50_000);
+    has(bgeo::FORMAT, &file, 50_000);
 }
 
 /// An array of f32 as numpy saves it.
@@ -230,7 +231,7 @@ fn npy_of_many_fields() {
         .collect();
     let descr = format!("[('pos', '<f4', (3,)), {fields}]");
     let file = npy(&descr, "(1,)", &vec![0; 12 + 4 * count]);
-    has(Format::Npy, &file, count);
+    has(npy::NPY, &file, count);
 }
 
 #[test]
@@ -249,7 +250,7 @@ fn npz_of_many_members() {
         add(&name, &one);
     }
     let file = zip.finish().expect("memory takes all").into_inner();
-    has(Format::Npz, &file, count);
+    has(npy::NPZ, &file, count);
 }
 
 #[test]

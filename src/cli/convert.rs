@@ -8,7 +8,7 @@ use clap::Args;
 use serde_json::{Value, json};
 use spherule_formats::SequenceInput;
 use spherule_formats::detect::Format;
-use spherule_formats::native::{Bound, Encoding};
+use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
@@ -165,7 +165,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
 /// Refuses the name of a file of another format where a directory or a native frame is wanted.
 fn guard_name(output: &Path) -> Result<(), CliError> {
     let why = match Format::by_name(output) {
-        None | Some(Format::Spf) => return Ok(()),
+        None => return Ok(()),
+        Some(format) if format == FORMAT => return Ok(()),
         Some(_) if output.is_dir() => return Ok(()),
         Some(_) => "convert writes native frames (.spf) alone, and a directory of them",
     };

@@ -2,7 +2,10 @@
 
 use std::path::Path;
 
+use memchr::memmem;
+
 use crate::ParseError;
+use crate::read::npy::is_usdz;
 
 /// Magic bytes at the start, and the message.
 const MAGICS: &[(&[u8], &str)] = &[
@@ -138,6 +141,7 @@ const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
 const LAMMPS_BINARY: &str =
     "a LAMMPS binary dump, which is not read; run `binary2txt` on it, or dump to a text file";
+const XDMF: &str = "an XDMF index, whose numbers are in other files; save as .vtu with ParaView";
 const HOUDINI_JSON: &str = "the newer Houdini bgeo in JSON, which is not read; save as .bhclassic";
 
 /// Refuses what is known by its first bytes (magics of `shortest` bytes and more), or failing
@@ -150,24 +154,9 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
         .or_else(|| by_structure(head))
         .or_else(|| is_lammps_binary(head, path).then_some(LAMMPS_BINARY))
         .or_else(|| is_dualsphysics(head, path).then_some(DUALSPHYSICS))
-        .or_else(|| is_houdini_json(head).then_some(HOUDINI_JSON));
+        .or_else(|| is_houdini_json(head).then_some(HOUDINI_JSON))
+        .or_else(|| is_xdmf(head).then_some(XDMF));
     what.map_or(Ok(()), |what| Err(ParseError::unsupported(what)))
-}
-
-/// A ZIP of USD files; other ones are taken for numpy's.
-pub(super) fn refuse_usdz(head: &[u8]) -> Result<(), ParseError> {
-    // Local file header: name at 30, its length at 26.
-    let length = head
-        .get(26..28)
-        .map_or(0, |len| usize::from(len[0]) | usize::from(len[1]) << 8);
-    let name = head.get(30..30 + length).unwrap_or_default();
-    let is_usd = [&b".usd"[..], b".usda", b".usdc"]
-        .iter()
-        .any(|end| name.to_ascii_lowercase().ends_with(end));
-    match head.starts_with(b"PK\x03\x04") && is_usd {
-        true => Err(ParseError::unsupported(USD)),
-        false => Ok(()),
-    }
 }
 
 /// What is known by bytes behind the first.
@@ -178,6 +167,7 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
         .iter()
         .any(|length| at(0, length) && at(260, length));
     [
+        (is_usdz(head), USD),
         (at(257, b"ustar"), ARCHIVE),
         (at(0, b"RIFF") && at(8, b"WEBP"), IMAGE),
         (at(4, b"ftyp"), "a video or image, no particle file"),
@@ -214,4 +204,9 @@ fn is_houdini_json(head: &[u8]) -> bool {
     head.trim_start()
         .strip_prefix('[')
         .is_some_and(|rest| rest.trim_start().starts_with("\"fileversion\""))
+}
+
+fn is_xdmf(head: &[u8]) -> bool {
+    let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+    text.trim_ascii_start().starts_with(b"<") && memmem::find(text, b"<Xdmf").is_some()
 }

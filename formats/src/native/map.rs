@@ -18,7 +18,7 @@ use rkyv::util::AlignedVec;
 
 use super::NativeFrame;
 use super::layout::{FrameIndex, parse};
-use crate::open::regular_len;
+use crate::regular::regular_len;
 use crate::{FrameError, ParseError};
 
 /// How the bytes of a native frame come into memory.

@@ -5,8 +5,11 @@
 
 use rkyv::util::AlignedVec;
 
-use crate::ParseError;
-use crate::read::Step;
+use crate::format::Format;
+use crate::read::ByteSource;
+use crate::reader::{Confidence, Reader};
+use crate::step::Step;
+use crate::{MemoryBudget, ParseError, RawParticles};
 
 mod attribute;
 mod bound;
@@ -37,29 +40,47 @@ pub use write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run, wide_blo
 
 use layout::Section;
 
-/// The only step of a native frame.
-///
-/// # Errors
-/// As [`layout::parse`].
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    let index = layout::parse(bytes)?;
-    let step = Step {
-        number: index.step,
-        time: index.time,
-        ..Step::whole(bytes.len())
-    };
-    Ok(vec![step])
-}
+/// The native frame file.
+pub const FORMAT: Format = Format::new(&Spf);
 
-/// Reads a native frame like any other format, every section verified.
-///
-/// # Errors
-/// As [`layout::parse`] and [`NativeFrame::verify`].
-pub fn read(bytes: &[u8], _step: &Step) -> Result<crate::RawParticles, ParseError> {
-    with_frame(bytes, |frame| {
-        frame.verify()?;
-        frame.to_raw()
-    })
+struct Spf;
+
+impl Reader for Spf {
+    fn name(&self) -> &'static str {
+        "spf"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["spf"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        Ok(Confidence::signature_if(head.starts_with(MAGIC)))
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        _budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        let index = layout::parse(source.bytes())?;
+        let mut step = Step::whole(source.bytes().len());
+        (step.number, step.time) = (index.step, index.time);
+        Ok(vec![step])
+    }
+
+    /// Verifies every section.
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        _step: &Step,
+        _budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        with_frame(source.bytes(), |frame| {
+            frame.verify()?;
+            frame.to_raw()
+        })
+    }
 }
 
 /// Checks everything in the native frame `bytes`.

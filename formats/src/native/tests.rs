@@ -57,8 +57,8 @@ fn bytes(frame: &ParticleFrame) -> Vec<u8> {
 }
 
 fn read_back(bytes: &[u8]) -> Result<RawParticles, ParseError> {
-    let steps = steps(bytes)?;
-    read(bytes, &steps[0])
+    let steps = FORMAT.steps(bytes)?;
+    FORMAT.read(bytes, &steps[0])
 }
 
 /// Positions and velocities of the particles by their ids, which count down from the largest.

@@ -5,13 +5,17 @@
 //! writers disagree about them. Newer Houdini containers share the extension only and are refused by
 //! name. Gzip around the file is undone by the caller. Layout after partio's `BGEO.cpp`.
 
-use super::Step;
 use super::columns::{self, Column, Lane, ParticleLayout};
-use crate::{Endian, ParseError, RawParticles, ScalarType};
+use super::{ByteSource, Step};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader};
+use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 
 #[cfg(test)]
 mod tests;
 
+/// The first bytes of the file, before the version.
+const MAGIC: &[u8] = b"BgeoV";
 /// Bytes before the attribute definitions.
 const HEADER: usize = 41;
 /// The only version with this layout that writers still produce.
@@ -21,33 +25,65 @@ const POSITION_BYTES: usize = 16;
 /// Widest attribute listed for a file without points.
 const MAX_EMPTY_COMPONENTS: usize = 16;
 
-/// The time steps that `bytes` hold: one.
-///
-/// # Errors
-/// [`ParseError::Unsupported`] for other kinds of geometry files, [`ParseError::Malformed`] for
-/// anything else that is not classic BGEO.
-pub fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    check_kind(bytes)?;
-    Ok(vec![Step::whole(bytes.len())])
-}
+/// Classic BGEO version 5.
+pub const FORMAT: Format = Format::new(&Bgeo);
 
-/// Reads all points with all their attributes, under the names of the file.
-///
-/// Floats and vectors become f32, integers and indices of indexed strings i32. Positions are divided
-/// by their homogeneous coordinate unless it is 0 or 1.
-///
-/// # Errors
-/// As [`steps`]; [`ParseError::Malformed`] if the definitions or points do not fit the file, and
-/// [`ParseError::Unsupported`] for point attributes of type string.
-pub fn read(bytes: &[u8], _step: &Step) -> Result<RawParticles, ParseError> {
-    layout(bytes)?.particles(bytes)
+struct Bgeo;
+
+impl Reader for Bgeo {
+    fn name(&self) -> &'static str {
+        "bgeo"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["bgeo", "bhclassic"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        Ok(Confidence::signature_if(head.starts_with(MAGIC)))
+    }
+
+    /// [`ParseError::Unsupported`] for other geometry files, [`ParseError::Malformed`] for
+    /// anything else that is not classic BGEO.
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        _budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        check_kind(source.bytes())?;
+        Ok(vec![Step::whole(source.bytes().len())])
+    }
+
+    /// Reads all points with all their attributes, under the names of the file.
+    ///
+    /// Floats and vectors become f32, integers and indices of indexed strings i32. Positions are divided
+    /// by their homogeneous coordinate unless it is 0 or 1.
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        _step: &Step,
+        _budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        let bytes = source.bytes();
+        point_layout(bytes)?.particles(bytes)
+    }
+
+    fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+        point_layout(bytes).map(Some)
+    }
+
+    /// Houdini's axes.
+    fn is_y_up(&self, _head: &[u8]) -> bool {
+        true
+    }
 }
 
 /// Where the points are.
 ///
 /// # Errors
-/// As [`read`].
-pub(crate) fn layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
+/// [`ParseError::Malformed`] if the definitions or points do not fit the file, [`ParseError::Unsupported`] for other
+/// geometry files and for point attributes of type string.
+fn point_layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
     check_kind(bytes)?;
     let mut cursor = Cursor { bytes, at: 9 };
     let count = cursor.count("points")?;
@@ -100,7 +136,7 @@ fn check_kind(bytes: &[u8]) -> Result<(), ParseError> {
             return Err(ParseError::unsupported(format!("{what}: {CLASSIC}")));
         }
     }
-    if !bytes.starts_with(b"BgeoV") {
+    if !bytes.starts_with(MAGIC) {
         return Err(ParseError::malformed(
             0,
             "no bgeo file: it does not begin with BgeoV",

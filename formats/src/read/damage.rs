@@ -10,12 +10,12 @@ use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
 
 /// The functions of a reader module.
 #[derive(Clone, Copy)]
-pub(super) struct Reader {
+pub(super) struct TestedReader {
     pub(super) steps: fn(&[u8]) -> Result<Vec<Step>, ParseError>,
     pub(super) read: fn(&[u8], &Step) -> Result<RawParticles, ParseError>,
 }
 
-impl Reader {
+impl TestedReader {
     /// All steps, or the first error. Checks what holds for whatever a reader returns.
     pub(super) fn all(self, bytes: &[u8]) -> Result<Vec<RawParticles>, ParseError> {
         let steps = (self.steps)(bytes).map_err(fit_to_show)?;

@@ -13,7 +13,7 @@ use memchr::{memchr, memchr_iter, memchr2, memrchr};
 use super::table::pieces_at_once;
 use super::text::Line;
 use crate::MemoryBudget;
-use crate::unpack::{ByteSource, SourceError};
+use crate::decompress::{ByteStream, StreamError};
 
 /// Bytes of a piece of text in memory: large enough to hide the cost of a task.
 const WHOLE_PIECE: usize = 1 << 20;
@@ -39,7 +39,7 @@ pub(crate) struct TextInput<'a> {
     end: usize,
     /// Offset that can be gone back to.
     pin: Option<usize>,
-    fault: Option<SourceError>,
+    fault: Option<StreamError>,
 }
 
 enum Bytes<'a> {
@@ -50,7 +50,7 @@ enum Bytes<'a> {
 struct Stream<'a> {
     /// The beginning of the file, enough to tell what it is.
     head: Arc<[u8]>,
-    source: Box<dyn ByteSource + Send + 'a>,
+    source: Box<dyn ByteStream + Send + 'a>,
     window: Vec<u8>,
     /// Whether the source has no more.
     ended: bool,
@@ -95,7 +95,7 @@ impl<'a> TextInput<'a> {
     /// What `source` gives from the start of a file on, which begins with `head` and has `len` bytes if that is known,
     /// else about `len_guess`. A line or word may be as long as `budget` allows.
     pub(crate) fn stream(
-        source: Box<dyn ByteSource + Send + 'a>,
+        source: Box<dyn ByteStream + Send + 'a>,
         head: Arc<[u8]>,
         (len, len_guess): (Option<usize>, usize),
         budget: MemoryBudget,
@@ -141,7 +141,7 @@ impl<'a> TextInput<'a> {
     ///
     /// # Errors
     /// That.
-    pub(crate) fn check_source(&mut self) -> Result<(), SourceError> {
+    pub(crate) fn check_source(&mut self) -> Result<(), StreamError> {
         self.fault.take().map_or(Ok(()), Err)
     }
 
@@ -162,7 +162,7 @@ impl<'a> TextInput<'a> {
     }
 
     /// The beginning of the file: all of it if that is in memory.
-    pub(super) fn head(&self) -> &[u8] {
+    pub(crate) fn head(&self) -> &[u8] {
         match &self.bytes {
             Bytes::Whole(bytes) => bytes,
             Bytes::Stream(stream) => &stream.head,
@@ -570,8 +570,8 @@ struct Drip<'a> {
 }
 
 #[cfg(test)]
-impl ByteSource for Drip<'_> {
-    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError> {
+impl ByteStream for Drip<'_> {
+    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, StreamError> {
         let (some, rest) = self.bytes.split_at(most.min(self.bytes.len()));
         to.extend_from_slice(some);
         self.bytes = rest;

@@ -1,7 +1,9 @@
 //! Readers as their tests call them: what is read of a whole text must come of it in pieces, too, errors included.
 
+use std::ops::Range;
+
 use super::input::TextInput;
-use super::{Step, xyz};
+use super::{ByteSource, Step, csv, xyz};
 use crate::detect::Format;
 use crate::{MemoryBudget, ParseError, RawParticles};
 
@@ -15,10 +17,12 @@ fn pieces(bytes: &[u8]) -> &'static [usize] {
 
 /// Whether `bytes` would be read in pieces if there were more of them.
 fn is_text(format: Format, bytes: &[u8]) -> bool {
-    match format {
-        Format::Csv => true,
-        Format::Xyz => matches!(xyz::kind(bytes), Ok(xyz::Kind::Molecular | xyz::Kind::Bare)),
-        other => other.is_streamed(bytes),
+    if format == csv::FORMAT {
+        true
+    } else if format == xyz::FORMAT {
+        matches!(xyz::kind(bytes), Ok(xyz::Kind::Molecular | xyz::Kind::Bare))
+    } else {
+        format.is_streamed(bytes)
     }
 }
 
@@ -27,8 +31,9 @@ pub(super) fn steps(format: Format, bytes: &[u8]) -> Result<Vec<Step>, ParseErro
     let expected = format.steps(bytes);
     if is_text(format, bytes) {
         for &piece in pieces(bytes) {
-            let mut text = TextInput::in_pieces(bytes, true, piece);
-            let found = format.steps_within(&mut text, MemoryBudget::UNLIMITED);
+            let text = TextInput::in_pieces(bytes, true, piece);
+            let mut source = ByteSource::from_text(text);
+            let found = format.steps_within(&mut source, MemoryBudget::UNLIMITED);
             assert_eq!(found, expected, "pieces of {piece} bytes");
         }
     }
@@ -38,14 +43,16 @@ pub(super) fn steps(format: Format, bytes: &[u8]) -> Result<Vec<Step>, ParseErro
 #[track_caller]
 pub(super) fn read(format: Format, bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
     let expected = format.read(bytes, step);
-    if is_text(format, bytes) && step.span.end <= bytes.len() && step.span.start <= step.span.end {
+    let is_inside = |range: &Range<usize>| range.start <= range.end && range.end <= bytes.len();
+    if is_text(format, bytes) && step.byte_range().is_some_and(is_inside) {
         for &piece in pieces(bytes) {
             // With NaN among the numbers they differ from themselves.
             let shown = |read: &Result<RawParticles, ParseError>| format!("{read:?}");
             let read = |is_known| {
-                let mut text = TextInput::in_pieces(bytes, is_known, piece);
-                let read = format.read_within(&mut text, step, MemoryBudget::UNLIMITED);
-                assert!(text.check_source().is_ok());
+                let text = TextInput::in_pieces(bytes, is_known, piece);
+                let mut source = ByteSource::from_text(text);
+                let read = format.read_within(&mut source, step, MemoryBudget::UNLIMITED);
+                assert!(source.text().check_source().is_ok());
                 read
             };
             let found = read(true);

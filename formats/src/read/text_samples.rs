@@ -103,7 +103,8 @@ pub(super) fn read_all(bytes: &[u8], steps: Steps, read: Read) {
         Err(error) => return inside(error),
     };
     for (index, step) in steps.iter().enumerate() {
-        assert!(step.index == index && step.span.end <= bytes.len());
+        let end = step.byte_range().map_or(0, |range| range.end);
+        assert!(step.index == index && end <= bytes.len());
         match read(bytes, step) {
             Ok(particles) => {
                 let count = particles.positions.len();

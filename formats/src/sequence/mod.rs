@@ -15,7 +15,7 @@ use glam::DVec3;
 
 use crate::detect::Format;
 use crate::native::layout::UP_Y;
-use crate::native::{Access, NativeFile};
+use crate::native::{self, Access, NativeFile};
 use crate::open::FrameFile;
 use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles};
 
@@ -343,7 +343,7 @@ impl Sequence {
                         "{} time steps where one was expected; give such files one at a time",
                         file.steps().len()
                     );
-                    Err(ParseError::malformed(second.span.start, what).in_file(&part.path))
+                    Err(ParseError::malformed(second.start(), what).in_file(&part.path))
                 }
                 _ => Ok((Arc::new(file), 0)),
             };
@@ -392,19 +392,15 @@ fn y_is_up(path: &Path) -> bool {
     let Ok(head) = crate::open::head(path) else {
         return false;
     };
-    match Format::detect(&head, path) {
-        Ok(Format::Bgeo) => true,
-        Ok(Format::Spf) => {
-            let file = NativeFile::open(path, Access::Map);
-            file.is_ok_and(|file| file.index().up == UP_Y)
-        }
-        Ok(Format::VtkLegacy) => {
-            let mut lines = head.split(|b| *b == b'\n');
-            let title = lines.nth(1).unwrap_or_default();
-            title.starts_with(b"SPlisHSPlasH")
-        }
-        _ => false,
+    let Ok(format) = Format::detect(&head, path) else {
+        return false;
+    };
+    if format == native::FORMAT {
+        // The index of a native frame is at its end.
+        let file = NativeFile::open(path, Access::Map);
+        return file.is_ok_and(|file| file.index().up == UP_Y);
     }
+    format.reader().is_y_up(&head)
 }
 
 /// The frame number that the name of a file tells when there are no others to compare with: what

@@ -6,7 +6,8 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use crate::detect::{is_digits, strip_gz};
+use crate::read::sniff::is_digits;
+use crate::registry::strip_gz;
 
 /// A file name, split so that names of one sequence differ in `numbers` only.
 #[derive(Debug, Clone, PartialEq, Eq)]

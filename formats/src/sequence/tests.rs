@@ -302,7 +302,7 @@ fn steps_of_one_file_are_frames() {
     write_steps(&path, 1, 0);
     let error = sequence.load_raw(2).expect_err("gone").to_string();
     assert!(
-        error.contains("step 2 was asked for, the file holds 1"),
+        error.contains("step 2 does not exist, the file has 1"),
         "{error}"
     );
 }

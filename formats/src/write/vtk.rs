@@ -174,7 +174,7 @@ const fn type_name(kind: ScalarType) -> &'static str {
 mod tests {
     use super::*;
     use crate::convert::{BlockSettings, BlockSource};
-    use crate::detect::Format;
+    use crate::read::vtk::FORMAT;
     use crate::{AttributeData, Positions};
 
     fn attribute(values: Vec<u16>) -> Attribute {
@@ -224,8 +224,8 @@ mod tests {
         let read = |cells: Cells| {
             let mut bytes = Vec::new();
             assert!(fill_from(&mut bytes, &source, &(), cells).is_ok());
-            let steps = Format::VtkLegacy.steps(&bytes).expect("whole");
-            Format::VtkLegacy.read(&bytes, &steps[0]).expect("whole")
+            let steps = FORMAT.steps(&bytes).expect("whole");
+            FORMAT.read(&bytes, &steps[0]).expect("whole")
         };
         let (short, long) = (read(Cells::Short), read(Cells::Long));
         assert_eq!(short, long);

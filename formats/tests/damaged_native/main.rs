@@ -4,8 +4,8 @@ use std::fs;
 use std::hint::black_box;
 use std::path::Path;
 
-use spherule_formats::native::{Access, FrameIndex, NativeFile, NativeFrame, layout};
-use spherule_formats::{FrameError, FrameFile, ParseError, RawParticles, native};
+use spherule_formats::native::{Access, FORMAT, FrameIndex, NativeFile, NativeFrame, layout};
+use spherule_formats::{FrameError, FrameFile, ParseError, RawParticles};
 
 mod frames;
 mod lies;
@@ -70,15 +70,17 @@ fn every_byte_of_header_and_index_is_covered() {
 /// Reads `damaged`, which differs from `stored` at `places` of its sections.
 #[track_caller]
 fn named_or_same(stored: &Stored, damaged: &[u8], places: &[usize]) {
-    let whole = native::steps(&stored.bytes).and_then(|s| native::read(&stored.bytes, &s[0]));
+    let whole = FORMAT
+        .steps(&stored.bytes)
+        .and_then(|s| FORMAT.read(&stored.bytes, &s[0]));
     let hit: Vec<_> = places
         .iter()
         .filter_map(|at| stored.section_at(*at))
         .collect();
     let index = layout::parse(damaged).expect("header and index are whole");
     assert_eq!(index, stored.index);
-    let step = &native::steps(damaged).expect("whole")[0];
-    match native::read(damaged, step) {
+    let step = &FORMAT.steps(damaged).expect("whole")[0];
+    match FORMAT.read(damaged, step) {
         Ok(raw) => assert!(hit.is_empty() && Ok(raw) == whole, "{places:?}"),
         Err(ParseError::Malformed { at, what }) => {
             let is_named = |(name, offset): &(String, u64)| *offset == at && what.starts_with(name);

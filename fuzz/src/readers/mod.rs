@@ -1,6 +1,7 @@
 //! Targets of `spherule-formats`. Each returns how many steps gave particles, or how many frames there are.
 
 use spherule_formats::detect::Format;
+use spherule_formats::read;
 use spherule_formats::stats::FrameStats;
 use spherule_formats::{ParseError, ParticleFrame, RawParticles, choose_origin};
 
@@ -46,7 +47,7 @@ const SLACK: u64 = 4096;
 
 /// Legacy VTK.
 pub fn vtk(bytes: &[u8]) -> usize {
-    read_all(Format::VtkLegacy, bytes, 1)
+    read_all(read::vtk::FORMAT, bytes, 1)
 }
 
 /// XML VTK.
@@ -57,27 +58,27 @@ pub fn vtk_xml(bytes: &[u8]) -> usize {
         () if !packs("LZMA") => DEFLATE_RATIO,
         () => XZ_RATIO,
     };
-    read_all(Format::VtkXml, bytes, ratio)
+    read_all(read::vtk_xml::FORMAT, bytes, ratio)
 }
 
 /// Classic BGEO.
 pub fn bgeo(bytes: &[u8]) -> usize {
-    read_all(Format::Bgeo, bytes, 1)
+    read_all(read::bgeo::FORMAT, bytes, 1)
 }
 
 /// PLY.
 pub fn ply(bytes: &[u8]) -> usize {
-    read_all(Format::Ply, bytes, 1)
+    read_all(read::ply::FORMAT, bytes, 1)
 }
 
 /// Raw, bare and molecular XYZ.
 pub fn xyz(bytes: &[u8]) -> usize {
-    read_all(Format::Xyz, bytes, 1)
+    read_all(read::xyz::FORMAT, bytes, 1)
 }
 
 /// LAMMPS text dumps.
 pub fn lammps(bytes: &[u8]) -> usize {
-    read_all(Format::Lammps, bytes, 1)
+    read_all(read::lammps::FORMAT, bytes, 1)
 }
 
 /// One NPY array.
@@ -87,12 +88,12 @@ pub fn npy(bytes: &[u8]) -> usize {
     } else {
         1
     };
-    read_all(Format::Npy, bytes, packing)
+    read_all(read::npy::NPY, bytes, packing)
 }
 
 /// CSV.
 pub fn csv(bytes: &[u8]) -> usize {
-    read_all(Format::Csv, bytes, 1)
+    read_all(read::csv::FORMAT, bytes, 1)
 }
 
 /// Reads `bytes` as `format`, the first steps and the last. `packing` is the ratio that
@@ -106,10 +107,12 @@ fn read_all(format: Format, bytes: &[u8], packing: u64) -> usize {
             return 0;
         }
     };
-    let mut read = 0;
+    let mut read_count = 0;
     for (place, step) in steps.iter().enumerate() {
         assert_eq!(step.index, place);
-        assert!(step.span.start <= step.span.end && step.span.end <= bytes.len());
+        if let Some(range) = step.byte_range() {
+            assert!(range.start <= range.end && range.end <= bytes.len());
+        }
         if place >= MOST_STEPS && place + 1 != steps.len() {
             continue;
         }
@@ -117,12 +120,12 @@ fn read_all(format: Format, bytes: &[u8], packing: u64) -> usize {
             Ok(particles) => {
                 check_particles(&particles, len);
                 prepare(particles);
-                read += 1;
+                read_count += 1;
             }
             Err(error) => check_error(&error, len),
         }
     }
-    read
+    read_count
 }
 
 /// The place is inside the file, and the message is one line that a terminal can show.

@@ -4,8 +4,7 @@ use std::fs;
 use std::hint::black_box;
 
 use spherule_formats::blocks::{BLOCK_SIZE, WIDTH};
-use spherule_formats::detect::Format;
-use spherule_formats::native::{Access, MAGIC, NativeFile, NativeFrame, layout};
+use spherule_formats::native::{Access, FORMAT, MAGIC, NativeFile, NativeFrame, layout};
 
 use super::{check_error, check_particles, prepare, read_all};
 
@@ -15,7 +14,7 @@ const SAMPLE: usize = 100;
 /// A native frame: the bytes as they are, and with the checksums of header and index put right,
 /// which mutation would never hit.
 pub fn native(bytes: &[u8]) -> usize {
-    let read = read_all(Format::Spf, bytes, 1);
+    let read = read_all(FORMAT, bytes, 1);
     read + repaired(bytes).map_or(0, |bytes| usize::from(in_place(&bytes)))
 }
 

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use flate2::Compression;
 use flate2::write::GzEncoder;
-use spherule_formats::detect::Format;
+use spherule_formats::read;
 use spherule_formats::{FrameError, FrameFile};
 use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
@@ -23,9 +23,9 @@ const NUMPY: &[u8] = b"\x93NUMPY";
 /// each with a byte before it that tells name and compression.
 pub fn npz(bytes: &[u8]) -> usize {
     if bytes.starts_with(b"PK") {
-        return read_all(Format::Npz, bytes, DEFLATE_RATIO);
+        return read_all(read::npy::NPZ, bytes, DEFLATE_RATIO);
     }
-    read_all(Format::Npz, &archive(bytes), DEFLATE_RATIO)
+    read_all(read::npy::NPZ, &archive(bytes), DEFLATE_RATIO)
 }
 
 fn archive(bytes: &[u8]) -> Vec<u8> {

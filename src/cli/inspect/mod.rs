@@ -5,8 +5,7 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::json;
-use spherule_formats::detect::Format;
-use spherule_formats::native::{layout, verify};
+use spherule_formats::native::{FORMAT, layout, verify};
 use spherule_formats::open::{is_native, remarks};
 use spherule_formats::sequence::lone_frame_number;
 use spherule_formats::stats::FrameStats;
@@ -175,14 +174,16 @@ fn read(file: &FrameFile, index: usize, number: Option<i64>) -> Result<Inspected
         number
     };
     // A native frame comes here packed by gzip.
-    let native = (file.format() == Format::Spf)
+    let native = (file.format() == FORMAT)
         .then(|| layout::parse(file.bytes()).ok())
         .flatten();
     let all = stats.count + stats.dropped;
     stats.dropped += native.as_ref().map_or(0, |index| index.dropped);
     let share = match file.steps().len() {
         1 => 1.0,
-        _ => step.span.len() as f64 / file.unpacked_len().max(1) as f64,
+        _ => step.byte_range().map_or(1.0, |range| {
+            range.len() as f64 / file.unpacked_len().max(1) as f64
+        }),
     };
     let stored = file.stored_len() as f64 * share;
     Ok(Inspected {

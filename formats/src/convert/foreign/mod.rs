@@ -7,10 +7,10 @@ use std::path::Path;
 
 use super::ParticleSource;
 use crate::detect::Format;
+use crate::gzip::is_gzip;
 use crate::native::MappedFile;
-use crate::open::{is_gzip, regular_len};
 use crate::read::columns::ParticleLayout;
-use crate::read::{bgeo, npy, ply, vtk, xyz};
+use crate::regular::regular_len;
 use crate::{FrameError, ParseError};
 
 mod columns;
@@ -37,14 +37,7 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
 
 /// Where the particles of the file `bytes`, called `path`, are, if all are at fixed steps in it.
 fn layout_of(bytes: &[u8], path: &Path) -> Result<Option<ParticleLayout>, ParseError> {
-    let layout = match Format::detect(bytes, path)? {
-        Format::VtkLegacy => vtk::layout(bytes)?,
-        Format::Bgeo => Some(bgeo::layout(bytes)?),
-        Format::Ply => ply::layout(bytes)?,
-        Format::Xyz => xyz::layout(bytes)?,
-        Format::Npy => npy::layout(bytes)?,
-        Format::Spf | Format::VtkXml | Format::Lammps | Format::Npz | Format::Csv => None,
-    };
+    let layout = Format::detect(bytes, path)?.reader().layout(bytes)?;
     if let Some(layout) = &layout {
         layout.check(bytes.len())?;
     }

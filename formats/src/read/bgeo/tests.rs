@@ -4,9 +4,12 @@ use proptest::prelude::*;
 
 use super::*;
 use crate::AttributeData;
-use crate::read::damage::{Reader, attribute, coordinates, mutate, names, numbers, sample};
+use crate::read::damage::{TestedReader, attribute, coordinates, mutate, names, numbers, sample};
 
-const READER: Reader = Reader { steps, read };
+const READER: TestedReader = TestedReader {
+    steps: |bytes| FORMAT.steps(bytes),
+    read: |bytes, step| FORMAT.read(bytes, step),
+};
 
 /// A file with `count` points in its header, `definitions` and `points` as they are.
 fn file(count: i32, attributes: i32, definitions: &[u8], points: &[u8]) -> Vec<u8> {
@@ -160,7 +163,7 @@ fn relatives_are_refused_by_name() {
         assert!(matches!(error, ParseError::Unsupported { .. }), "{error}");
         let text = error.to_string();
         assert!(text.contains(words) && text.contains("bhclassic"), "{text}");
-        assert_eq!(steps(bytes), Err(error));
+        assert_eq!(FORMAT.steps(bytes), Err(error));
     }
     assert!(matches!(
         READER.error(&sample("public_partio/test.pdb")),

@@ -4,9 +4,12 @@
 //! `layout` finds separator, names and first row; `names` finds positions and vectors among the
 //! names; `read::table` parses the rows.
 
-use super::Step;
 use super::input::TextInput;
+use super::sniff::{TextShape, is_text, text_shape};
 use super::table::{Numbers, OnText, Place, Table, Target};
+use super::{ByteSource, Step};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
 mod layout;
@@ -17,20 +20,63 @@ use layout::Layout;
 /// What some editors put before UTF-8 text.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
 
-/// The one time step that `bytes` hold, with the time if a line before the names tells it.
+/// Separated columns with a line of names.
+pub const FORMAT: Format = Format::new(&Csv);
+
+struct Csv;
+
+impl Reader for Csv {
+    fn name(&self) -> &'static str {
+        "csv"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["csv", "tsv"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        Ok(match text_shape(head) {
+            Some(TextShape::SeparatedNumbers | TextShape::TitledNumbers) => Confidence::Likely,
+            _ if !head.is_empty() && is_text(head) => Confidence::IfNamed,
+            _ => Confidence::No,
+        })
+    }
+
+    fn stream_unit(&self, head: &[u8]) -> Option<StreamUnit> {
+        stream_unit(head)
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        _budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        steps(source.text())
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        _step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        read(source.text(), budget)
+    }
+}
+
+/// The only time step of `text`, with the time if a line before the names has it.
 ///
 /// # Errors
-/// [`ParseError::Unsupported`] for UTF-16; other faults are left to [`read`].
-pub(crate) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
+/// [`ParseError::Unsupported`] for UTF-16; [`read`] reports other faults.
+pub(super) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
     let time = match Layout::find(text.head()) {
         Ok(layout) => layout.time,
         Err(error @ ParseError::Unsupported { .. }) => return Err(error),
         Err(_) => None,
     };
-    Ok(vec![Step {
-        time,
-        ..Step::whole(text.left_about())
-    }])
+    let mut step = Step::whole(text.left_about());
+    step.time = time;
+    Ok(vec![step])
 }
 
 /// Reads the table. Columns of integers become i64, of other numbers f64; columns with text are
@@ -42,7 +88,7 @@ pub(crate) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
 /// [`ParseError::Malformed`] if there are no positions among the columns, a row has another
 /// number of cells, or a position is no number; [`ParseError::Unsupported`] for UTF-16;
 /// [`ParseError::TooLarge`] beyond `budget`.
-pub(crate) fn read(
+pub(super) fn read(
     text: &mut TextInput<'_>,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
@@ -74,17 +120,15 @@ pub(crate) fn read(
     })
 }
 
-/// Lines that decide what a table is like: more than are looked at from the first row on, and for separators.
-const TELLING_LINES: usize = 300;
+/// Lines that decide the layout of a table: more than are searched for the first row, and for separators.
+const LAYOUT_LINES: usize = 300;
 
-/// True if `head`, the beginning of a file, tells all about the table but its rows.
-pub(crate) fn is_told_by(head: &[u8]) -> bool {
-    let Ok(layout) = Layout::find(head) else {
-        return false;
-    };
+/// Rows, if `head`, the beginning of a file, holds all that decides the layout of the table.
+pub(super) fn stream_unit(head: &[u8]) -> Option<StreamUnit> {
+    let layout = Layout::find(head).ok()?;
     let rows = head.get(layout.rows).unwrap_or_default();
-    let lines = memchr::memchr_iter(b'\n', rows).take(TELLING_LINES);
-    lines.count() == TELLING_LINES
+    let lines = memchr::memchr_iter(b'\n', rows).take(LAYOUT_LINES);
+    (lines.count() == LAYOUT_LINES).then_some(StreamUnit::Rows)
 }
 
 fn layout_columns(layout: &Layout) -> Result<Columns, ParseError> {

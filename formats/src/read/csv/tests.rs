@@ -1,16 +1,15 @@
 use super::*;
-use crate::detect::Format;
 use crate::read::pieces;
 use crate::read::text_samples::*;
 use glam::DVec3;
 use proptest::prelude::*;
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::Csv, bytes)
+    pieces::steps(FORMAT, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::Csv, bytes, step)
+    pieces::read(FORMAT, bytes, step)
 }
 
 #[track_caller]

@@ -113,7 +113,7 @@ pub(super) fn cut_short(
     let why = if text.is_file_end() {
         CUT_SHORT.to_owned()
     } else {
-        let end = step.span.end;
+        let end = step.byte_range().map_or(usize::MAX, |range| range.end);
         format!("the step is broken off at byte {end}, where the next one begins")
     };
     ParseError::malformed(at, format!("{what}: {why}"))

@@ -8,12 +8,14 @@ use std::collections::HashSet;
 use memchr::memmem;
 use rayon::prelude::*;
 
-use super::Step;
 use super::input::TextInput;
+use super::sniff::is_digits;
 use super::table::{
     CUT_SHORT, Comments, Decimal, Dialect, RowsRead, Separator, Surplus, Table, most_rows,
 };
-use super::text;
+use super::{ByteSource, Step, text};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{MemoryBudget, ParseError, Positions, RawParticles};
 
 mod bounds;
@@ -23,10 +25,66 @@ mod remarks;
 
 use columns::Columns;
 use header::{Header, Item};
-pub(super) use remarks::remarks;
 
 /// What every header line begins with.
 const ITEM: &[u8] = b"ITEM:";
+
+/// LAMMPS text dumps.
+pub const FORMAT: Format = Format::new(&Lammps);
+
+struct Lammps;
+
+impl Reader for Lammps {
+    fn name(&self) -> &'static str {
+        "lammps"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["lammps", "lammpstrj", "dump"]
+    }
+
+    /// Also `dump.250` and `dump.drop.250`, names without an extension.
+    fn matches_name(&self, stem: &str, extension: &str) -> bool {
+        let is_numbered_dump =
+            is_digits(extension) && (stem == "dump" || stem.starts_with("dump."));
+        is_numbered_dump || self.extensions().contains(&extension)
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        let text = head.strip_prefix(b"\xef\xbb\xbf").unwrap_or(head);
+        let is_dump = text.trim_ascii_start().starts_with(ITEM);
+        Ok(Confidence::signature_if(is_dump))
+    }
+
+    fn may_hold_many_steps(&self) -> bool {
+        true
+    }
+
+    fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
+        Some(StreamUnit::Rows)
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        steps(source.text(), budget)
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        read(source.text(), step, budget)
+    }
+
+    fn remarks(&self, head: &[u8]) -> Vec<String> {
+        remarks::remarks(head)
+    }
+}
 
 /// The time steps that `text` holds, in file order. Of a step that occurs twice (after a restart)
 /// the last stays. One that is cut short is listed, so that reading it can say so.
@@ -35,10 +93,7 @@ const ITEM: &[u8] = b"ITEM:";
 /// [`ParseError::Malformed`] if there are no `ITEM:` lines or something else comes first,
 /// [`ParseError::Unsupported`] for a binary dump,
 /// [`ParseError::TooLarge`] if the list of steps needs more than `budget`.
-pub(crate) fn steps(
-    text: &mut TextInput<'_>,
-    budget: MemoryBudget,
-) -> Result<Vec<Step>, ParseError> {
+fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps: Vec<Step> = Vec::new();
     let mut seen = Seen::default();
     let mut pair = LinePair::default();
@@ -51,7 +106,7 @@ pub(crate) fn steps(
         let item = Item::of(line.get(..pair.end - at).unwrap_or(line));
         if steps.is_empty() || seen.ends_before(item) {
             if let Some(last) = steps.last_mut() {
-                last.span.end = at;
+                last.end_at(at);
             }
             Step::push(&mut steps, at..at, budget)?;
             seen = Seen::default();
@@ -67,7 +122,7 @@ pub(crate) fn steps(
         text.advance(ITEM.len());
     }
     match steps.last_mut() {
-        Some(last) => last.span.end = text.at(),
+        Some(last) => last.end_at(text.at()),
         None => return Err(not_a_dump(text.head())),
     }
     keep_last(&mut steps);
@@ -95,13 +150,14 @@ fn go_to_item(text: &mut TextInput<'_>, finder: &memmem::Finder<'_>) -> bool {
 /// [`ParseError::Malformed`] if the step is cut short or breaks the format,
 /// [`ParseError::Unsupported`] for dumps of other things than atoms,
 /// [`ParseError::TooLarge`] beyond `budget`.
-pub(crate) fn read(
+fn read(
     text: &mut TextInput<'_>,
     step: &Step,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
-    text.go_to(step.span.start);
-    text.end_at(step.span.end);
+    let range = step.byte_range().cloned().unwrap_or_default();
+    text.go_to(range.start);
+    text.end_at(range.end);
     let header = match Header::parse(text, budget) {
         Ok(header) => header,
         Err(fault) => return Err(fault.explain(text, step)),

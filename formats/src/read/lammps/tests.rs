@@ -1,16 +1,15 @@
 use super::*;
-use crate::detect::Format;
 use crate::read::pieces;
 use crate::read::text_samples::*;
 use glam::DVec3;
 use proptest::prelude::*;
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::Lammps, bytes)
+    pieces::steps(FORMAT, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::Lammps, bytes, step)
+    pieces::read(FORMAT, bytes, step)
 }
 
 /// The only step of `text`.
@@ -60,8 +59,9 @@ fn steps_of_one_file() {
     let steps = steps(&bytes).unwrap();
     let numbers: Vec<_> = steps.iter().map(|step| step.number).collect();
     assert_eq!(numbers, [Some(0), Some(400)]);
-    assert_eq!(steps[0].span.end, steps[1].span.start);
-    assert_eq!(steps[1].span.end, bytes.len());
+    let range = |step: &Step| step.byte_range().expect("text").clone();
+    assert_eq!(range(&steps[0]).end, range(&steps[1]).start);
+    assert_eq!(range(&steps[1]).end, bytes.len());
     let second = read(&bytes, &steps[1]).unwrap();
     assert_eq!(second.positions.len(), 200);
     assert_eq!(
@@ -206,17 +206,17 @@ fn elements_are_the_same_numbers_in_every_frame() {
 fn remarks_name_the_cell_and_the_elements() {
     let text = "ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n2\nITEM: BOX BOUNDS xy xz yz pp pp ff\n0 1 0\n\
         0 1 0\n0 1 0\nITEM: ATOMS id element x y z\n1 O 0 0 0\n2 H 0 0 0\nITEM: TIMESTEP\n1\n";
-    let remarks = remarks(text.as_bytes());
+    let remarks = remarks::remarks(text.as_bytes());
     assert_eq!(remarks.len(), 2, "{remarks:?}");
     assert!(remarks[0].contains("periodic boundaries (pp pp ff) is not used"));
     assert!(remarks[1].ends_with("\"H\" = 1, \"O\" = 8"), "{remarks:?}");
     for end in 0..text.len() {
-        super::remarks(&text.as_bytes()[..end]);
+        remarks::remarks(&text.as_bytes()[..end]);
     }
     let shrink = text
         .replace("xy xz yz pp pp ff", "ss ss ss")
         .replace("element", "c");
-    let remarks = super::remarks(shrink.as_bytes());
+    let remarks = remarks::remarks(shrink.as_bytes());
     assert!(
         remarks.len() == 1 && !remarks[0].contains("periodic"),
         "{remarks:?}"
@@ -279,7 +279,7 @@ fn of_a_step_written_twice_the_last_stays() {
 fn a_last_step_cut_short() {
     let bytes = sample("lammps_drop/drop_2frames.lammpstrj");
     let whole = steps(&bytes).unwrap();
-    let second = whole[1].span.start;
+    let second = whole[1].start();
     let expected = read(&bytes, &whole[0]).unwrap();
     for len in (second..bytes.len()).step_by(61).chain(second..second + 60) {
         let cut = &bytes[..len];
@@ -401,7 +401,8 @@ fn absurd_counts_allocate_nothing() {
 fn a_step_of_another_file_is_an_error() {
     let text = dump(BOX, "x y z", &["1 2 3"]);
     let mut step = steps(text.as_bytes()).unwrap().remove(0);
-    step.span.end += 1;
+    let end = step.byte_range().expect("text").end;
+    step.end_at(end + 1);
     assert!(read(text.as_bytes(), &step).is_err());
 }
 

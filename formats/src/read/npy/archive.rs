@@ -9,9 +9,9 @@ use std::io::Cursor;
 use zip::ZipArchive;
 
 use super::header::{Header, show};
-use super::layout::{Layout, POSITION_NAMES};
+use super::layout::{ArrayLayout, POSITION_NAMES};
 use super::member::{self, Member, in_member, zip_error};
-use super::{check_frame, layout_steps, read_array};
+use super::{check_frame, frame_steps, read_array};
 use crate::read::Step;
 use crate::read::columns::{self, Column};
 use crate::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles};
@@ -63,7 +63,7 @@ impl<'a> Archive<'a> {
     /// See [`super::steps`].
     pub(super) fn steps(mut self, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
         let (_, layout) = self.source()?;
-        let mut steps = layout_steps(&layout, self.bytes.len());
+        let mut steps = frame_steps(&layout);
         let times = self.times(&layout, budget)?;
         for step in &mut steps {
             step.time = time_of(times.as_ref(), step.index);
@@ -97,12 +97,13 @@ impl<'a> Archive<'a> {
     }
 
     /// Finds the positions by name, or takes the only array there is.
-    fn source(&self) -> Result<(Source, Layout), ParseError> {
+    fn source(&self) -> Result<(Source, ArrayLayout), ParseError> {
         let named = |name: &str| {
             let same = |m: &Member| m.name.eq_ignore_ascii_case(name);
             self.members.iter().position(same)
         };
-        let layout_of = |member: usize| self.members.get(member).map(|m| Layout::of(&m.header));
+        let layout_of =
+            |member: usize| self.members.get(member).map(|m| ArrayLayout::of(&m.header));
         let mut refused = None;
         let only = (self.members.len() == 1).then_some(0);
         for member in POSITION_NAMES.iter().filter_map(|n| named(n)).chain(only) {
@@ -128,7 +129,7 @@ impl<'a> Archive<'a> {
     }
 
     /// x, y and z must be lists of numbers of the same length.
-    fn axes_layout(&self, axes: &[usize]) -> Option<Layout> {
+    fn axes_layout(&self, axes: &[usize]) -> Option<ArrayLayout> {
         let shapes: Option<Vec<&[usize]>> = axes
             .iter()
             .map(|axis| self.members.get(*axis).map(|m| m.header.shape.as_slice()))
@@ -137,7 +138,7 @@ impl<'a> Archive<'a> {
         let Some([count]) = shapes.first() else {
             return None;
         };
-        let layout = Layout {
+        let layout = ArrayLayout {
             frames: None,
             count: *count,
             planes: false,
@@ -193,7 +194,7 @@ impl<'a> Archive<'a> {
     fn read_axes(
         &mut self,
         members: &[usize],
-        layout: &Layout,
+        layout: &ArrayLayout,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
         let mut parts: Vec<AttributeData> = Vec::with_capacity(members.len());
@@ -215,7 +216,7 @@ impl<'a> Archive<'a> {
     fn attribute(
         &mut self,
         member: usize,
-        layout: &Layout,
+        layout: &ArrayLayout,
         frame: usize,
         budget: MemoryBudget,
     ) -> Result<Option<Attribute>, ParseError> {
@@ -231,7 +232,7 @@ impl<'a> Archive<'a> {
     }
 
     /// Whether a member tells the time: one number, or one a step.
-    fn is_time(&self, member: usize, layout: &Layout) -> bool {
+    fn is_time(&self, member: usize, layout: &ArrayLayout) -> bool {
         self.members.get(member).is_some_and(|m| {
             let named = ["time", "times", "t"].contains(&m.name.as_str());
             named
@@ -246,7 +247,7 @@ impl<'a> Archive<'a> {
     /// The member that tells the time.
     fn times(
         &mut self,
-        layout: &Layout,
+        layout: &ArrayLayout,
         budget: MemoryBudget,
     ) -> Result<Option<Attribute>, ParseError> {
         let times = (0..self.members.len()).find(|m| self.is_time(*m, layout));
@@ -258,7 +259,7 @@ impl<'a> Archive<'a> {
         };
         // Read as one "particle" a step.
         let count: usize = found.header.shape.iter().product();
-        let list = Layout {
+        let list = ArrayLayout {
             frames: None,
             count,
             planes: false,

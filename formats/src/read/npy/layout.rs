@@ -24,7 +24,7 @@ const MAX_EMPTY_FRAMES: usize = 1 << 16;
 
 /// How the particles of an array of positions are laid out.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Layout {
+pub(super) struct ArrayLayout {
     /// Time steps, if there is a dimension for them.
     pub(super) frames: Option<usize>,
     /// Particles in every step.
@@ -33,7 +33,7 @@ pub(super) struct Layout {
     pub(super) planes: bool,
 }
 
-impl Layout {
+impl ArrayLayout {
     /// The layout of an array of positions.
     ///
     /// A last dimension of 3 or 2 holds the coordinates; else a first one of 3 does (after the time

@@ -15,24 +15,135 @@ mod member;
 mod tests;
 
 use self::header::Header;
-use self::layout::Layout;
-use super::Step;
+use self::layout::ArrayLayout;
 use super::columns::ParticleLayout;
+use super::{ByteSource, Step};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
-/// The time steps that `bytes` hold: as many as the first dimension of (frames, N, 3), else one.
+/// One numpy array.
+pub const NPY: Format = Format::new(&Npy);
+
+/// A ZIP of numpy arrays.
+pub const NPZ: Format = Format::new(&Npz);
+
+struct Npy;
+
+struct Npz;
+
+impl Reader for Npy {
+    fn name(&self) -> &'static str {
+        "npy"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["npy"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        Ok(Confidence::signature_if(head.starts_with(b"\x93NUMPY")))
+    }
+
+    fn may_hold_many_steps(&self) -> bool {
+        true
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        steps(source.bytes(), budget)
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        read(source.bytes(), step, budget)
+    }
+
+    /// `None` for several steps.
+    fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+        let header = Header::parse(bytes)?;
+        header.check_items(bytes.len())?;
+        match ArrayLayout::of(&header)?.frames {
+            None | Some(1) => array_layout(bytes.len(), &header, 0).map(Some),
+            Some(_) => Ok(None),
+        }
+    }
+}
+
+impl Reader for Npz {
+    fn name(&self) -> &'static str {
+        "npz"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["npz"]
+    }
+
+    /// Any ZIP but one of USD files: the reader says what is missing in it.
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        let is_npz = archive::is_zip(head) && !is_usdz(head);
+        Ok(Confidence::signature_if(is_npz))
+    }
+
+    fn may_hold_many_steps(&self) -> bool {
+        true
+    }
+
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        steps(source.bytes(), budget)
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        read(source.bytes(), step, budget)
+    }
+
+    fn has_packed_arrays(&self, _head: &[u8], len: u64, particles: &RawParticles) -> bool {
+        len < particles.byte_len()
+    }
+}
+
+/// True if `head` begins a ZIP of USD files.
+pub(crate) fn is_usdz(head: &[u8]) -> bool {
+    // Local file header: name at 30, its length at 26.
+    let length = head
+        .get(26..28)
+        .map_or(0, |len| usize::from(len[0]) | usize::from(len[1]) << 8);
+    let name = head.get(30..30 + length).unwrap_or_default();
+    let is_usd = [&b".usd"[..], b".usda", b".usdc"]
+        .iter()
+        .any(|end| name.to_ascii_lowercase().ends_with(end));
+    head.starts_with(b"PK\x03\x04") && is_usd
+}
+
+/// The time steps in `bytes`: as many as the first dimension of (frames, N, 3), else one.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] for damaged files; [`ParseError::Unsupported`] for pickled objects and
-/// for arrays that are no positions, saying what to save instead.
+/// for arrays that are not positions, with what to save instead;
 /// [`ParseError::TooLarge`] if the times, a member of an archive, need more than `budget`.
-pub(crate) fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
+fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     if archive::is_zip(bytes) {
         return archive::Archive::open(bytes)?.steps(budget);
     }
     let header = Header::parse(bytes)?;
     header.check_items(bytes.len())?;
-    Ok(layout_steps(&Layout::of(&header)?, bytes.len()))
+    Ok(frame_steps(&ArrayLayout::of(&header)?))
 }
 
 /// Reads one of the [`steps`].
@@ -42,32 +153,13 @@ pub(crate) fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, Par
 ///
 /// # Errors
 /// As [`steps`]; [`ParseError::Malformed`] if there is no such step.
-pub(crate) fn read(
-    bytes: &[u8],
-    step: &Step,
-    budget: MemoryBudget,
-) -> Result<RawParticles, ParseError> {
+fn read(bytes: &[u8], step: &Step, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
+    let frame = usize::try_from(step.key()).unwrap_or(usize::MAX);
     if archive::is_zip(bytes) {
-        return archive::Archive::open(bytes)?.read(step.index, budget);
+        return archive::Archive::open(bytes)?.read(frame, budget);
     }
     let header = Header::parse(bytes)?;
-    read_array(bytes, &header, step.index)
-}
-
-/// Where the particles of an array of one step are; none for archives and for several steps.
-///
-/// # Errors
-/// As [`read`].
-pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-    if archive::is_zip(bytes) {
-        return Ok(None);
-    }
-    let header = Header::parse(bytes)?;
-    header.check_items(bytes.len())?;
-    match Layout::of(&header)?.frames {
-        None | Some(1) => array_layout(bytes.len(), &header, 0).map(Some),
-        Some(_) => Ok(None),
-    }
+    read_array(bytes, &header, frame)
 }
 
 /// The particles of one array in step `frame`.
@@ -78,12 +170,12 @@ fn read_array(bytes: &[u8], header: &Header, frame: usize) -> Result<RawParticle
 /// Where they are, in a file of `len` bytes.
 fn array_layout(len: usize, header: &Header, frame: usize) -> Result<ParticleLayout, ParseError> {
     header.check_items(len)?;
-    let layout = Layout::of(header)?;
+    let layout = ArrayLayout::of(header)?;
     check_frame(&layout, frame)?;
     layout.columns(header, frame)
 }
 
-fn check_frame(layout: &Layout, frame: usize) -> Result<(), ParseError> {
+fn check_frame(layout: &ArrayLayout, frame: usize) -> Result<(), ParseError> {
     let frames = layout.frames.unwrap_or(1);
     if frame < frames {
         return Ok(());
@@ -94,12 +186,10 @@ fn check_frame(layout: &Layout, frame: usize) -> Result<(), ParseError> {
     ))
 }
 
-/// All steps share one header, so each spans the whole file.
-fn layout_steps(layout: &Layout, len: usize) -> Vec<Step> {
-    (0..layout.frames.unwrap_or(1))
-        .map(|index| Step {
-            index,
-            ..Step::whole(len)
-        })
+/// One step for each index into the first dimension.
+fn frame_steps(layout: &ArrayLayout) -> Vec<Step> {
+    let frames = layout.frames.unwrap_or(1);
+    (0..frames)
+        .map(|index| Step::with_key(index, index as u64))
         .collect()
 }

@@ -12,63 +12,83 @@ mod tests;
 
 use self::body::Records;
 use self::header::{Element, Encoding, Header};
-use super::Step;
 use super::columns::{self, Column, Lane, ParticleLayout};
-use super::input::TextInput;
+use super::{ByteSource, Step};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{Endian, MemoryBudget, ParseError, RawParticles};
 
-/// The time steps that `text` holds: one.
-///
-/// # Errors
-/// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
-/// without vertices.
-pub(crate) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
-    let header = Header::parse(text.head())?;
-    vertices(&header)?;
-    Ok(vec![Step::whole(text.left_about())])
-}
+/// PLY, text or binary.
+pub const FORMAT: Format = Format::new(&Ply);
 
-/// Reads the vertices with all their scalar properties as attributes.
-///
-/// `vx vy vz` become `velocity`, `nx ny nz` `normal`, `red green blue [alpha]` `color`; a leading
-/// `scalar_` is dropped from names; list properties are skipped. Positions are f64 if a coordinate is
-/// `double` (or a 32-bit integer), else f32.
-///
-/// # Errors
-/// As [`steps`]; [`ParseError::Malformed`] if the data does not match the header, [`ParseError::TooLarge`] beyond
-/// `budget`.
-pub(crate) fn read(
-    text: &mut TextInput<'_>,
-    budget: MemoryBudget,
-) -> Result<RawParticles, ParseError> {
-    let bytes = text.head();
-    let header = Header::parse(bytes)?;
-    let vertices = vertices(&header)?;
-    if header.encoding == Encoding::Ascii {
-        let layout = vertices_layout(&header, vertices, 0, vertices.scalar_bytes())?;
-        return ascii::read(text, &header, vertices, layout, budget);
+struct Ply;
+
+impl Reader for Ply {
+    fn name(&self) -> &'static str {
+        "ply"
     }
-    let records = body::vertex_records(bytes, &header, vertices)?;
-    records_layout(&header, vertices, &records)?.particles(&records.bytes)
-}
 
-/// True if `head`, the beginning of a file, is all of its header, and text follows.
-pub(crate) fn is_text(head: &[u8]) -> bool {
-    Header::parse(head).is_ok_and(|header| header.encoding == Encoding::Ascii)
-}
-
-/// Where the vertices are; none if they are text, or have lists between their numbers.
-///
-/// # Errors
-/// As [`read`].
-pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-    let header = Header::parse(bytes)?;
-    let vertices = vertices(&header)?;
-    if header.encoding == Encoding::Ascii || vertices.has_lists() {
-        return Ok(None);
+    fn extensions(&self) -> &'static [&'static str] {
+        &["ply"]
     }
-    let records = body::vertex_records(bytes, &header, vertices)?;
-    records_layout(&header, vertices, &records).map(Some)
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        let is_ply = head.starts_with(b"ply\n") || head.starts_with(b"ply\r");
+        Ok(Confidence::signature_if(is_ply))
+    }
+
+    /// Words, if `head` is all of the header, and text follows.
+    fn stream_unit(&self, head: &[u8]) -> Option<StreamUnit> {
+        let header = Header::parse(head).ok()?;
+        (header.encoding == Encoding::Ascii).then_some(StreamUnit::Words)
+    }
+
+    /// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
+    /// without vertices.
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        _budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        let text = source.text();
+        let header = Header::parse(text.head())?;
+        vertices(&header)?;
+        Ok(vec![Step::whole(text.left_about())])
+    }
+
+    /// Reads the vertices with all their scalar properties as attributes.
+    ///
+    /// `vx vy vz` become `velocity`, `nx ny nz` `normal`, `red green blue [alpha]` `color`; a leading
+    /// `scalar_` is dropped from names; list properties are skipped. Positions are f64 if a coordinate is
+    /// `double` (or a 32-bit integer), else f32.
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        _step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        let text = source.text();
+        let bytes = text.head();
+        let header = Header::parse(bytes)?;
+        let vertices = vertices(&header)?;
+        if header.encoding == Encoding::Ascii {
+            let layout = vertices_layout(&header, vertices, 0, vertices.scalar_bytes())?;
+            return ascii::read(text, &header, vertices, layout, budget);
+        }
+        let records = body::vertex_records(bytes, &header, vertices)?;
+        records_layout(&header, vertices, &records)?.particles(&records.bytes)
+    }
+
+    /// `None` if the vertices are text, or have lists between their numbers.
+    fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+        let header = Header::parse(bytes)?;
+        let vertices = vertices(&header)?;
+        if header.encoding == Encoding::Ascii || vertices.has_lists() {
+            return Ok(None);
+        }
+        let records = body::vertex_records(bytes, &header, vertices)?;
+        records_layout(&header, vertices, &records).map(Some)
+    }
 }
 
 fn records_layout(

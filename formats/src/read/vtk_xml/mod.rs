@@ -11,52 +11,84 @@ mod blocks;
 mod compressor;
 mod document;
 mod merge;
+mod sniff;
 #[cfg(test)]
 mod tests;
 
 use std::cell::Cell;
 
-use super::Step;
+use memchr::memmem;
+
 use super::text::same_length;
 use super::vtk::{MOST_COMPONENTS, parse_values};
+use super::{ByteSource, Step};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
 use blocks::{Encoding, Fault, Source, payload};
 use document::{Array, Document, Place, Until, short};
 
-/// The one time step that `bytes` hold, with the time if a `TimeValue` before the pieces tells it.
-/// A damaged file is reported by [`read`], not here.
-///
-/// # Errors
-/// None at present.
-pub fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
-    let mut step = Step::whole(bytes.len());
-    step.time = parse(bytes, Until::FirstPiece, |mut document, appended| {
-        document.encoding.decoders = budget;
-        Ok(time(&document, appended))
-    })
-    .unwrap_or_default();
-    Ok(vec![step])
-}
+/// XML VTK: `.vtu` and `.vtp`.
+pub const FORMAT: Format = Format::new(&XmlVtk);
 
-/// Reads the particles of a `.vtu` or `.vtp` file. Attributes that not all pieces have, with one
-/// type, are left out.
-///
-/// # Errors
-/// [`ParseError::Malformed`] if the file is cut short or breaks the format,
-/// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor,
-/// [`ParseError::TooLarge`] if that needs more than `budget`.
-pub fn read(bytes: &[u8], _step: &Step, budget: MemoryBudget) -> Result<RawParticles, ParseError> {
-    parse(bytes, Until::End, |mut document, appended| {
-        check_shares(&document, appended)?;
-        document.encoding.decoders = check_memory(&document, budget)?;
-        Ok(RawParticles {
-            positions: merge::positions(&document, appended)?,
-            attributes: merge::attributes(&document, appended)?,
-            time: time(&document, appended),
-            step: None,
+struct XmlVtk;
+
+impl Reader for XmlVtk {
+    fn name(&self) -> &'static str {
+        "vtk-xml"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["vtu", "vtp"]
+    }
+
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        sniff::sniff(head)
+    }
+
+    /// One step, with the time if a `TimeValue` before the pieces has it. Faults are reported by `read`, not here.
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        let bytes = source.bytes();
+        let mut step = Step::whole(bytes.len());
+        step.time = parse(bytes, Until::FirstPiece, |mut document, appended| {
+            document.encoding.decoders = budget;
+            Ok(time(&document, appended))
         })
-    })
+        .unwrap_or_default();
+        Ok(vec![step])
+    }
+
+    /// Reads all pieces. Attributes that not all pieces have, with one type, are left out.
+    ///
+    /// [`ParseError::Malformed`] if the file is cut short or breaks the format,
+    /// [`ParseError::Unsupported`] if it is a grid, a list of files, or of an unknown compressor.
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        _step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        parse(source.bytes(), Until::End, |mut document, appended| {
+            check_shares(&document, appended)?;
+            document.encoding.decoders = check_memory(&document, budget)?;
+            Ok(RawParticles {
+                positions: merge::positions(&document, appended)?,
+                attributes: merge::attributes(&document, appended)?,
+                time: time(&document, appended),
+                step: None,
+            })
+        })
+    }
+
+    fn has_packed_arrays(&self, head: &[u8], _len: u64, _particles: &RawParticles) -> bool {
+        let has = |text: &[u8]| memmem::find(head, text).is_some();
+        has(b"compressor=") || !has(b"encoding=\"raw\"")
+    }
 }
 
 /// Cuts the file, parses the XML in front and hands both parts on.

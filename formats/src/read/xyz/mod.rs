@@ -5,16 +5,100 @@
 //! table ([`super::csv`]).
 
 use super::columns::{Column, Lane, ParticleLayout};
-use super::input::TextInput;
+use super::sniff::{TextShape, text_shape};
 use super::text::{self, Lines};
-use super::{Step, csv};
+use super::{ByteSource, Step, csv};
+use crate::format::Format;
+use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 
 mod comment;
 mod molecular;
 mod remarks;
 
-pub(super) use remarks::remarks;
+/// Raw f32 triples, molecular text, or bare text: the content decides.
+pub const FORMAT: Format = Format::new(&Xyz);
+
+struct Xyz;
+
+impl Reader for Xyz {
+    fn name(&self) -> &'static str {
+        "xyz"
+    }
+
+    fn extensions(&self) -> &'static [&'static str] {
+        &["xyz", "extxyz"]
+    }
+
+    /// Raw triples may be any bytes, so the name counts. An empty file has no raw triples.
+    fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
+        Ok(match text_shape(head) {
+            Some(TextShape::Counted | TextShape::Numbers) => Confidence::Likely,
+            _ => Confidence::IfNamed,
+        })
+    }
+
+    fn has_no_signature(&self) -> bool {
+        true
+    }
+
+    fn may_hold_many_steps(&self) -> bool {
+        true
+    }
+
+    fn stream_unit(&self, head: &[u8]) -> Option<StreamUnit> {
+        match kind(head).ok()? {
+            Kind::Molecular => Some(StreamUnit::Rows),
+            Kind::Bare => csv::stream_unit(head),
+            Kind::Raw => None,
+        }
+    }
+
+    /// One step for each frame of molecular text.
+    fn steps(
+        &self,
+        source: &mut ByteSource<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, ParseError> {
+        let text = source.text();
+        let head = text.head();
+        match kind(head)? {
+            Kind::Raw => Ok(vec![Step::whole(head.len())]),
+            Kind::Molecular => {
+                text.go_to(text_start(head));
+                molecular::steps(text, budget)
+            }
+            Kind::Bare => csv::steps(text),
+        }
+    }
+
+    fn read(
+        &self,
+        source: &mut ByteSource<'_>,
+        step: &Step,
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, ParseError> {
+        let text = source.text();
+        let head = text.head();
+        match kind(head)? {
+            Kind::Raw => raw_layout(head).particles(head),
+            Kind::Molecular => {
+                let range = step.byte_range().cloned().unwrap_or_default();
+                molecular::read(text, range, budget)
+            }
+            Kind::Bare => csv::read(text, budget),
+        }
+    }
+
+    /// `None` for text.
+    fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
+        Ok((kind(bytes)? == Kind::Raw).then(|| raw_layout(bytes)))
+    }
+
+    fn remarks(&self, head: &[u8]) -> Vec<String> {
+        remarks::remarks(head)
+    }
+}
 
 /// Which of the formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -75,51 +159,6 @@ pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
         text::shown(first.map_or(b"", |line| line.text))
     );
     Err(ParseError::malformed(start, what))
-}
-
-/// The time steps that `text` holds: one for each frame of molecular text. A last one that is cut
-/// short is listed, so that reading it can say so.
-///
-/// # Errors
-/// As [`kind`]; [`ParseError::TooLarge`] if the list of steps needs more than `budget`.
-pub(crate) fn steps(
-    text: &mut TextInput<'_>,
-    budget: MemoryBudget,
-) -> Result<Vec<Step>, ParseError> {
-    let head = text.head();
-    match kind(head)? {
-        Kind::Raw => Ok(vec![Step::whole(head.len())]),
-        Kind::Molecular => {
-            text.go_to(text_start(head));
-            molecular::steps(text, budget)
-        }
-        Kind::Bare => csv::steps(text),
-    }
-}
-
-/// Reads one of the [`steps`].
-///
-/// # Errors
-/// [`ParseError::Malformed`] if the step is cut short or breaks its format, [`ParseError::TooLarge`] beyond `budget`.
-pub(crate) fn read(
-    text: &mut TextInput<'_>,
-    step: &Step,
-    budget: MemoryBudget,
-) -> Result<RawParticles, ParseError> {
-    let head = text.head();
-    match kind(head)? {
-        Kind::Raw => raw_layout(head).particles(head),
-        Kind::Molecular => molecular::read(text, step.span.clone(), budget),
-        Kind::Bare => csv::read(text, budget),
-    }
-}
-
-/// Where the particles of a raw file are; none if it is text.
-///
-/// # Errors
-/// As [`kind`].
-pub(crate) fn layout(bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-    Ok((kind(bytes)? == Kind::Raw).then(|| raw_layout(bytes)))
 }
 
 fn raw_layout(bytes: &[u8]) -> ParticleLayout {

@@ -1,17 +1,16 @@
 use super::*;
 use crate::Positions;
-use crate::detect::Format;
 use crate::read::pieces;
 use crate::read::text_samples::*;
 use glam::DVec3;
 use proptest::prelude::*;
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::Xyz, bytes)
+    pieces::steps(FORMAT, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::Xyz, bytes, step)
+    pieces::read(FORMAT, bytes, step)
 }
 
 #[track_caller]
@@ -160,16 +159,16 @@ fn elements_and_species_are_numbers() {
     assert_eq!(whole(&extended, "element")[0], whole(&plain, "element")[2]);
     assert_eq!(whole(&extended, "element")[1], 1);
     assert_eq!(whole(&extended, "id"), [7, 8, 9]);
-    let notes = remarks(text.as_bytes());
+    let notes = remarks::remarks(text.as_bytes());
     assert!(
         notes[0].contains("periodic boundaries (T T F) is not used"),
         "{notes:?}"
     );
     assert!(notes[1].contains("\"H\" = 1"), "{notes:?}");
     for end in 0..text.len() {
-        remarks(&text.as_bytes()[..end]);
+        remarks::remarks(&text.as_bytes()[..end]);
     }
-    assert!(remarks(b"1\n\n1 0 0 0\n").is_empty());
+    assert!(remarks::remarks(b"1\n\n1 0 0 0\n").is_empty());
 }
 
 #[test]

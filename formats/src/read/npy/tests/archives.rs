@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 fn archives_hold_the_same_particles() {
-    let ply = crate::detect::Format::Ply
+    let ply = crate::read::ply::FORMAT
         .read(&single("le.ply"), &Step::whole(0))
         .unwrap();
     let plain = READER.one(&single("plain.npz"));

@@ -7,7 +7,7 @@ fn all_single_arrays_hold_the_same_particles() {
     let expected = READER.one(&single("pos.npy"));
     assert_eq!(expected.positions.len(), 1200);
     assert!(expected.attributes.is_empty());
-    let ply = crate::detect::Format::Ply
+    let ply = crate::read::ply::FORMAT
         .read(&single("le.ply"), &Step::whole(0))
         .unwrap();
     assert_eq!(expected.positions, ply.positions);
@@ -96,10 +96,7 @@ fn a_dimension_before_holds_time_steps() {
         let all = READER.all(bytes).unwrap();
         let found: Vec<_> = all.iter().map(|p| coordinates(&p.positions)).collect();
         assert_eq!(found, expected);
-        let late = Step {
-            index: 2,
-            ..Step::whole(bytes.len())
-        };
+        let late = Step::with_key(2, 2);
         assert!(matches!(
             read(bytes, &late),
             Err(ParseError::Malformed { .. })

@@ -11,20 +11,19 @@ use zip::write::SimpleFileOptions;
 use zip::{CompressionMethod, ZipWriter};
 
 use super::*;
-use crate::detect::Format;
-use crate::read::damage::{Reader, attribute, coordinates, mutate, names, numbers, sample};
+use crate::read::damage::{TestedReader, attribute, coordinates, mutate, names, numbers, sample};
 use crate::read::pieces;
 use crate::{AttributeData, Positions};
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::Npy, bytes)
+    pieces::steps(NPY, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::Npy, bytes, step)
+    pieces::read(NPY, bytes, step)
 }
 
-const READER: Reader = Reader { steps, read };
+const READER: TestedReader = TestedReader { steps, read };
 
 fn single(name: &str) -> Vec<u8> {
     sample(&format!("single_frames/{name}"))

@@ -5,20 +5,19 @@ mod damage;
 use proptest::prelude::*;
 
 use super::*;
-use crate::detect::Format;
-use crate::read::damage::{Reader, attribute, coordinates, mutate, names, numbers, sample};
+use crate::read::damage::{TestedReader, attribute, coordinates, mutate, names, numbers, sample};
 use crate::read::pieces;
 use crate::{AttributeData, Positions};
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::Ply, bytes)
+    pieces::steps(FORMAT, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::Ply, bytes, step)
+    pieces::read(FORMAT, bytes, step)
 }
 
-const READER: Reader = Reader { steps, read };
+const READER: TestedReader = TestedReader { steps, read };
 
 fn single(name: &str) -> Vec<u8> {
     sample(&format!("single_frames/{name}.ply"))

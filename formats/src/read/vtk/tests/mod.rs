@@ -6,17 +6,16 @@ mod made;
 
 use glam::{DVec3, Vec3};
 
-use crate::detect::Format;
 use crate::read::Step;
 use crate::read::pieces;
 use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::VtkLegacy, bytes)
+    pieces::steps(crate::read::vtk::FORMAT, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::VtkLegacy, bytes, step)
+    pieces::read(crate::read::vtk::FORMAT, bytes, step)
 }
 
 fn sample(name: &str) -> Vec<u8> {

@@ -4,17 +4,16 @@ mod content;
 mod damage;
 mod made;
 
-use crate::detect::Format;
 use crate::read::Step;
 use crate::read::pieces;
 use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
 
 fn steps(bytes: &[u8]) -> Result<Vec<Step>, ParseError> {
-    pieces::steps(Format::VtkXml, bytes)
+    pieces::steps(crate::read::vtk_xml::FORMAT, bytes)
 }
 
 fn read(bytes: &[u8], step: &Step) -> Result<RawParticles, ParseError> {
-    pieces::read(Format::VtkXml, bytes, step)
+    pieces::read(crate::read::vtk_xml::FORMAT, bytes, step)
 }
 
 fn sample(name: &str) -> Vec<u8> {
@@ -70,7 +69,7 @@ fn names(found: &RawParticles) -> Vec<&str> {
 #[test]
 fn every_variant_holds_the_same_particles() {
     let legacy = sample("single_frames/legacy_polydata-4.2.vtk");
-    let truth = Format::VtkLegacy
+    let truth = crate::read::vtk::FORMAT
         .read(&legacy, &Step::whole(legacy.len()))
         .unwrap();
     let folder = format!("{}/../tests/data/single_frames", env!("CARGO_MANIFEST_DIR"));

@@ -5,7 +5,7 @@ use std::io::{self, BufRead, Read, Seek};
 use flate2::bufread::GzDecoder;
 
 use crate::budget::MemoryBudget;
-use crate::open::is_gzip;
+use crate::gzip::is_gzip;
 use crate::{FrameError, ParseError};
 
 /// Bytes that are unpacked before it is looked again whether they are too many.
@@ -13,20 +13,20 @@ const STEP: usize = 1 << 20;
 
 /// Why the next bytes cannot be had.
 #[derive(Debug)]
-pub(crate) enum SourceError {
+pub(crate) enum StreamError {
     /// The system says so.
     Io(io::Error),
     /// They are damaged, or too many.
     Bytes(ParseError),
 }
 
-impl From<ParseError> for SourceError {
+impl From<ParseError> for StreamError {
     fn from(error: ParseError) -> Self {
         Self::Bytes(error)
     }
 }
 
-impl SourceError {
+impl StreamError {
     /// Adds the path of the file.
     pub(crate) fn in_file(self, path: &std::path::Path) -> FrameError {
         match self {
@@ -37,12 +37,12 @@ impl SourceError {
 }
 
 /// Uncompressed bytes that come in their order, a bounded number at a time.
-pub(crate) trait ByteSource {
+pub(crate) trait ByteStream {
     /// Appends up to `most` bytes to `to`; fewer only at the end.
     ///
     /// # Errors
-    /// [`SourceError`].
-    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError>;
+    /// [`StreamError`].
+    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, StreamError>;
 
     /// Passes over `count` bytes if that takes no reading; else nothing happens, and it is false.
     fn pass(&mut self, count: usize) -> bool;
@@ -52,9 +52,9 @@ pub(crate) trait ByteSource {
 }
 
 /// The content of a file, compressed by gzip or not.
-pub(crate) struct Unpacker<R> {
+pub(crate) struct Decompressor<R> {
     state: State<R>,
-    is_packed: bool,
+    is_compressed: bool,
     /// Uncompressed bytes so far.
     at: usize,
     notes: Vec<String>,
@@ -66,21 +66,21 @@ enum State<R> {
     Ended,
 }
 
-impl<R: BufRead + Seek> Unpacker<R> {
+impl<R: BufRead + Seek> Decompressor<R> {
     /// What `reader` gives, from its beginning.
     ///
     /// # Errors
     /// It cannot be read.
     pub(crate) fn new(mut reader: R) -> io::Result<Self> {
-        let is_packed = is_gzip(reader.fill_buf()?);
-        let state = if is_packed {
+        let is_compressed = is_gzip(reader.fill_buf()?);
+        let state = if is_compressed {
             State::Packed(GzDecoder::new(reader))
         } else {
             State::Plain(reader)
         };
         Ok(Self {
             state,
-            is_packed,
+            is_compressed,
             at: 0,
             notes: Vec::new(),
         })
@@ -89,12 +89,12 @@ impl<R: BufRead + Seek> Unpacker<R> {
     /// Appends all that is left to `bytes`, which begin the content, and returns the notes.
     ///
     /// # Errors
-    /// [`SourceError`]; [`ParseError::TooLarge`] if the content is more than `budget` allows.
+    /// [`StreamError`]; [`ParseError::TooLarge`] if the content is more than `budget` allows.
     pub(crate) fn finish(
         mut self,
         bytes: &mut Vec<u8>,
         budget: MemoryBudget,
-    ) -> Result<Vec<String>, SourceError> {
+    ) -> Result<Vec<String>, StreamError> {
         loop {
             budget.check(bytes.len() as u64, TOO_LARGE)?;
             // What was reserved is used up first.
@@ -114,8 +114,8 @@ impl<R: BufRead + Seek> Unpacker<R> {
     }
 
     /// Whether gzip was found.
-    pub(crate) const fn is_packed(&self) -> bool {
-        self.is_packed
+    pub(crate) const fn is_compressed(&self) -> bool {
+        self.is_compressed
     }
 
     /// Oddities so far.
@@ -152,7 +152,7 @@ impl<R: BufRead + Seek> Unpacker<R> {
 /// What the message about too large a content begins with.
 const TOO_LARGE: &str = "decompressed it is";
 
-impl<R: BufRead + Seek> ByteSource for Unpacker<R> {
+impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
     fn pass(&mut self, count: usize) -> bool {
         let State::Plain(reader) = &mut self.state else {
             return false;
@@ -168,7 +168,7 @@ impl<R: BufRead + Seek> ByteSource for Unpacker<R> {
         matches!(self.state, State::Ended).then_some((self.at, &self.notes))
     }
 
-    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, SourceError> {
+    fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, StreamError> {
         let start = to.len();
         while to.len() - start < most {
             let left = (most - (to.len() - start)) as u64;
@@ -176,7 +176,7 @@ impl<R: BufRead + Seek> ByteSource for Unpacker<R> {
             match std::mem::replace(&mut self.state, State::Ended) {
                 State::Plain(mut reader) => {
                     let read = reader.by_ref().take(left).read_to_end(to);
-                    if read.map_err(SourceError::Io)? as u64 == left {
+                    if read.map_err(StreamError::Io)? as u64 == left {
                         self.state = State::Plain(reader);
                     }
                 }
@@ -188,7 +188,7 @@ impl<R: BufRead + Seek> ByteSource for Unpacker<R> {
                         State::Packed(decoder)
                     } else {
                         let reader = decoder.into_inner();
-                        self.after_member(reader).map_err(SourceError::Io)?
+                        self.after_member(reader).map_err(StreamError::Io)?
                     };
                 }
                 State::Ended => break,
@@ -200,9 +200,9 @@ impl<R: BufRead + Seek> ByteSource for Unpacker<R> {
 }
 
 /// What is wrong with a stream of gzip after `at` good bytes.
-fn damaged(at: usize, error: io::Error) -> SourceError {
+fn damaged(at: usize, error: io::Error) -> StreamError {
     if error.raw_os_error().is_some() {
-        return SourceError::Io(error);
+        return StreamError::Io(error);
     }
     let what = match error.kind() {
         io::ErrorKind::UnexpectedEof => {
@@ -211,5 +211,5 @@ fn damaged(at: usize, error: io::Error) -> SourceError {
         io::ErrorKind::OutOfMemory => "no memory left to unpack the gzip stream".to_owned(),
         _ => format!("the gzip stream is damaged: {error}"),
     };
-    SourceError::Bytes(ParseError::malformed(at, what))
+    StreamError::Bytes(ParseError::malformed(at, what))
 }

@@ -1,0 +1,219 @@
+//! Which format a file is: by content first, by name second.
+//!
+//! Extensions lie (`.vtk` is text or binary, `.xyz` is three unrelated things, partio gzips
+//! `.bgeo`), so signatures decide and the name only breaks ties. Files that are known but not
+//! read get an error that says what to do instead (`foreign.rs`). [`crate::open`] decompresses
+//! gzip before; the readers themselves are in [`crate::read`].
+
+use std::path::Path;
+
+use crate::ParseError;
+pub use crate::format::Format;
+use crate::read::sniff::is_text;
+use crate::reader::{Confidence, HEAD_LEN};
+
+mod foreign;
+mod hdf5;
+mod molecules;
+
+impl Format {
+    /// The format of an uncompressed file that begins with `bytes` (all of it, or at least
+    /// 4096 bytes) and is called `path`.
+    ///
+    /// # Errors
+    /// [`ParseError::Unsupported`] for a known format that is not read, with what to do;
+    /// [`ParseError::Malformed`] for an empty file (but not `.xyz`: that is zero raw particles),
+    /// for content that does not match its name, and for unknown content.
+    pub fn detect(bytes: &[u8], path: &Path) -> Result<Self, ParseError> {
+        let named = Self::by_name(path);
+        let head = &bytes[..bytes.len().min(HEAD_LEN)];
+        let mut likely = None;
+        for format in Self::all() {
+            match format.reader().sniff(head)? {
+                Confidence::Signature => return Ok(*format),
+                Confidence::Likely => likely = likely.or(Some(*format)),
+                Confidence::IfNamed | Confidence::No => {}
+            }
+        }
+        if !bytes.is_empty() {
+            refuse_foreign(bytes, head, path, named)?;
+        }
+        match named {
+            Some(format) if format.reader().sniff(head)? >= Confidence::IfNamed => Ok(format),
+            _ if bytes.is_empty() => Err(ParseError::malformed(
+                0,
+                "the file is empty; perhaps it is still being written",
+            )),
+            Some(format) => {
+                let (name, opening) = (format.name(), opening(head));
+                let what =
+                    format!("named like a {name} file, but does not begin like one: {opening}");
+                Err(ParseError::malformed(0, what))
+            }
+            None => likely.ok_or_else(|| {
+                let (opening, names) = (opening(head), names());
+                let what = format!("no particle format begins with {opening}; read are {names}");
+                ParseError::malformed(0, what)
+            }),
+        }
+    }
+}
+
+/// Refuses files of known formats that are not read.
+fn refuse_foreign(
+    bytes: &[u8],
+    head: &[u8],
+    path: &Path,
+    named: Option<Format>,
+) -> Result<(), ParseError> {
+    let what = hdf5::what(bytes).or_else(|| is_text(head).then(|| molecules::what(head))?);
+    if let Some(what) = what {
+        return Err(ParseError::unsupported(what));
+    }
+    // Two or three bytes of raw floats may look like any short signature.
+    let has_no_signature = named.is_some_and(|format| format.reader().has_no_signature());
+    let shortest = if has_no_signature { 4 } else { 0 };
+    foreign::refuse(head, path, shortest)
+}
+
+/// The names of all formats, as a list.
+fn names() -> String {
+    let names: Vec<&str> = Format::all().iter().map(|format| format.name()).collect();
+    names.join(", ")
+}
+
+/// The first bytes for a message: as text where printable, else in hex.
+fn opening(head: &[u8]) -> String {
+    let start = &head[..head.len().min(8)];
+    if start.iter().all(|b| (32..127).contains(b)) {
+        format!("`{}`", String::from_utf8_lossy(start))
+    } else {
+        let hex: Vec<String> = start.iter().map(|b| format!("{b:02x}")).collect();
+        format!("bytes {}", hex.join(" "))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
+
+    #[track_caller]
+    fn detect(name: &str, bytes: &[u8]) -> Format {
+        Format::detect(bytes, Path::new(name)).expect("a known format")
+    }
+
+    #[track_caller]
+    fn refused(name: &str, bytes: &[u8], words: &str) {
+        let error = Format::detect(bytes, Path::new(name)).expect_err("not readable");
+        assert!(error.to_string().contains(words), "{error}");
+    }
+
+    /// The start of a ZIP whose first member is called `name`.
+    fn zip(name: &[u8]) -> Vec<u8> {
+        let length = u8::try_from(name.len()).expect("short");
+        let mut bytes = b"PK\x03\x04".to_vec();
+        bytes.resize(26, 0);
+        bytes.extend([length, 0, 0, 0]);
+        [&bytes, name].concat()
+    }
+
+    #[test]
+    fn content_goes_before_the_name() {
+        assert_eq!(
+            detect("a.ply", b"# vtk DataFile Version 4.2\nx\n"),
+            vtk::FORMAT
+        );
+        assert_eq!(detect("a.vtk", b"ply\nformat ascii 1.0\n"), ply::FORMAT);
+        assert_eq!(detect("a", b"BgeoV\0\0\0\x05"), bgeo::FORMAT);
+        assert_eq!(detect("a.txt", b"ITEM: TIMESTEP\n0\n"), lammps::FORMAT);
+        assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), npy::NPY);
+        assert_eq!(detect("a.zip", b"PK\x03\x04"), npy::NPZ);
+        let vtu = b"<?xml version=\"1.0\"?>\n<VTKFile header_type=\"UInt64\" type=\"PolyData\">";
+        assert_eq!(detect("a.vtk", vtu), vtk_xml::FORMAT);
+    }
+
+    #[test]
+    fn text_is_sniffed() {
+        assert_eq!(detect("a.xyz", b"3\n\nH 0 0 0\n"), xyz::FORMAT);
+        assert_eq!(detect("a.xyz", &[0, 1, 2, 3]), xyz::FORMAT);
+        assert_eq!(detect("a.xyz", b"\xff\xfe\x80\x3f"), xyz::FORMAT);
+        assert_eq!(detect("a.xyz", b""), xyz::FORMAT);
+        assert_eq!(detect("a.txt", b"3\n\nH 0 0 0\n"), xyz::FORMAT);
+        assert_eq!(detect("a.dat", b"# x y z\n0 1 2\n3 4 5\n"), xyz::FORMAT);
+        assert_eq!(detect("a.txt", b"0,1,2\n3,4,5\n"), csv::FORMAT);
+        assert_eq!(
+            detect("a.dat", b"Pos.x [m];Pos.y [m];Pos.z [m];\n0;1;2;\n"),
+            csv::FORMAT
+        );
+        assert_eq!(detect("a.csv", b"\xef\xbb\xbfx,y,z\n"), csv::FORMAT);
+        refused(
+            "README.txt",
+            b"these are\nsome words\n",
+            "no particle format",
+        );
+        refused("a.dat", &[0, 1, 2, 3], "bytes 00 01 02 03");
+    }
+
+    #[test]
+    fn a_name_that_lies_is_told() {
+        refused("a.bgeo", b"hello world", "named like a bgeo file");
+        refused("a.vtk", b"", "still being written");
+        refused("a.csv", &[0, 159, 146], "named like a csv file");
+    }
+
+    #[test]
+    fn known_foreign_files_say_what_to_do() {
+        let collection = b"<VTKFile type=\"Collection\" version=\"0.1\">";
+        refused("a.pvd", collection, "give those files");
+        refused(
+            "a.pvtu",
+            b"<VTKFile type='PUnstructuredGrid'>",
+            "give the pieces",
+        );
+        refused(
+            "a.vtm",
+            b"<VTKFile type=\"vtkMultiBlockDataSet\">",
+            "give the blocks",
+        );
+        refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
+        let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
+        refused("a.vti", odd, r"type a\n\u{1b}[2J holds");
+        refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
+        refused(
+            "a.csv",
+            b"a title\n\n2 atoms\n1 atom types\n",
+            "LAMMPS data file",
+        );
+        refused("a.usdz", &zip(b"scene.usdc"), "USD");
+        refused("a.usda", b"#usda 1.0\n", "USD");
+        refused("a.xtc", b"\0\0\x07\xcb\0\0\0\x03", "GROMACS");
+        refused("a.dcd", b"\x54\0\0\0CORD\0", "DCD");
+        refused("a.gsd", &[0xdf, 0x65].repeat(4), "GSD");
+        refused("Part_0001.bi4", &[1, 2, 3], "DualSPHysics");
+        refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");
+        let mut snapshot = vec![0; 400];
+        (snapshot[1], snapshot[261]) = (1, 1);
+        refused("snapshot_001", &snapshot, "Gadget");
+        let mut tar = vec![b'x'; 512];
+        tar[257..262].copy_from_slice(b"ustar");
+        refused("a.tar", &tar, "archive");
+        refused("a.7z", b"7z\xbc\xaf\x27\x1c", "archive");
+        refused("a.webp", b"RIFF\0\0\0\0WEBP", "image");
+        refused("a.xmf", b"<?xml version=\"1.0\"?>\n<Xdmf>", "XDMF");
+        refused("a.abc", b"Ogawa\0", "Alembic");
+        refused("a.bgeo", b"\x7fNSJ", "bhclassic");
+        refused("a.bgeo", b"[\n\t\"fileversion\",\"19.5\"", "bhclassic");
+        refused("a.bgeo.sc", b"scf1", "bhclassic");
+        refused("a.geo", b"PGEOMETRY V5\n", "bgeo");
+        refused("a.pdb", b"\x9e\x02\0\0\x01\0", "PDB");
+        refused("a.zst", b"\x28\xb5\x2f\xfd", "zstd");
+        refused("dump.bin", &[0; 64], "LAMMPS binary");
+        refused("other.bin", &[0; 64], "no particle format");
+        refused("a.vdb", b" BDV\0\0\0\0", "OpenVDB");
+        refused("a.nc", b"CDF\x01", "NetCDF");
+        refused("a.png", b"\x89PNG\r\n", "image");
+        refused("a.exr", b"\x76\x2f\x31\x01", "image");
+        refused("a.gz", b"\x1f\x8b\x08", "gzip inside gzip");
+    }
+}

@@ -1,0 +1,396 @@
+//! Opens one particle file: reads it, decompresses gzip, finds the format and the steps inside.
+//!
+//! The only place that reads foreign files; the readers see bytes. Text is read in pieces from the disk,
+//! files of several steps are mapped step by step, other files are read as a whole, all within a [`MemoryBudget`]. A
+//! file that changes while it is read is reported as such, because a simulation that is still running is the usual
+//! cause.
+
+use std::io::Cursor;
+use std::path::{Path, PathBuf};
+
+use rkyv::util::AlignedVec;
+
+use crate::decompress::{ByteStream, Decompressor, StreamError};
+use crate::detect::Format;
+use crate::gzip::is_gzip;
+use crate::native;
+use crate::read::{ByteSource, Step};
+use crate::regular::{FileStamp, regular_len};
+use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
+
+mod head;
+mod mapped;
+mod streamed;
+
+pub use crate::gzip::unpacked_len;
+pub(crate) use head::head;
+pub use head::{detect_file, is_native, remarks};
+
+use mapped::SteppedFile;
+use streamed::{StreamedFile, decompressor};
+
+/// Files up to this length, decompressed, are always read as a whole. Of longer files, this many bytes decide whether
+/// they must be. More than the reader of tables needs to find the columns.
+const PREFIX_LEN: usize = 2 << 20;
+
+/// A file ready to be read step by step.
+#[derive(Debug)]
+pub struct FrameFile {
+    path: PathBuf,
+    content: Content,
+    format: Format,
+    steps: Vec<Step>,
+    stored_len: u64,
+    notes: Vec<String>,
+    budget: MemoryBudget,
+}
+
+/// Where the bytes of a file are.
+#[derive(Debug)]
+enum Content {
+    /// In memory.
+    Whole(Vec<u8>),
+    /// In memory, aligned for native frames, whose sections are used in place.
+    Aligned(AlignedVec<64>),
+    /// On the disk, mapped for each step.
+    Stepped(SteppedFile),
+    /// On the disk, read in pieces for each step.
+    Streamed(Box<StreamedFile>),
+}
+
+impl Content {
+    /// All bytes, or the first ones if the file is on the disk.
+    fn head(&self) -> &[u8] {
+        match self {
+            Self::Whole(bytes) => bytes,
+            Self::Aligned(bytes) => bytes,
+            Self::Stepped(file) => file.head(),
+            Self::Streamed(file) => file.head(),
+        }
+    }
+
+    /// Bytes that are held beside the numbers while these are read.
+    fn held_len(&self, format: Format) -> u64 {
+        let held = self.head().len() as u64;
+        match self {
+            Self::Streamed(file) => held + format.stream_bytes(file.head()),
+            Self::Whole(_) | Self::Aligned(_) | Self::Stepped(_) => held,
+        }
+    }
+}
+
+impl FrameFile {
+    /// [`Self::open_within`] all memory that there is.
+    ///
+    /// # Errors
+    /// As [`Self::open_within`].
+    pub fn open(path: &Path) -> Result<Self, FrameError> {
+        Self::open_within(path, MemoryBudget::UNLIMITED)
+    }
+
+    /// Reads and understands the file at `path`, whatever its name.
+    ///
+    /// # Errors
+    /// [`FrameError::Io`] if it cannot be read or changed size meanwhile,
+    /// [`FrameError::Unsupported`] for a known format that is not read (or no regular file),
+    /// [`FrameError::TooLarge`] if it needs more memory than `budget` allows, and
+    /// [`FrameError::Malformed`] for everything that breaks its own format.
+    pub fn open_within(path: &Path, budget: MemoryBudget) -> Result<Self, FrameError> {
+        if is_native(path)? {
+            let len = regular_len(path)?;
+            let fits = budget.for_content().check(len, "the file is");
+            fits.map_err(|e| e.in_file(path))?;
+            let bytes = native::read_aligned(path)?;
+            let stored_len = bytes.len() as u64;
+            let content = Content::Aligned(bytes);
+            return Self::new(path, content, stored_len, Vec::new(), budget);
+        }
+        let (content, stamp, notes) = Self::read_content(path, budget)?;
+        stamp.check(path)?;
+        Self::new(path, content, stamp.len, notes, budget)
+    }
+
+    /// Reads as much of the file at `path` as has to be in memory. Also returns what the file was before, and notes.
+    fn read_content(
+        path: &Path,
+        budget: MemoryBudget,
+    ) -> Result<(Content, FileStamp, Vec<String>), FrameError> {
+        let in_file = |e: StreamError| e.in_file(path);
+        let stamp = FileStamp::of(path)?;
+        let mut stream = decompressor(path)?;
+        let is_compressed = stream.is_compressed();
+        let mut bytes = Vec::new();
+        if !is_compressed {
+            let len = usize::try_from(stamp.len).unwrap_or(usize::MAX);
+            bytes.reserve_exact(len.min(PREFIX_LEN));
+        }
+        let is_whole = stream.fill(&mut bytes, PREFIX_LEN).map_err(in_file)? < PREFIX_LEN;
+        // Fail before more is decompressed than is of use.
+        let format = Format::detect(&bytes, path).map_err(|e| e.in_file(path))?;
+        if is_whole {
+            return Ok((Content::Whole(bytes), stamp, stream.into_notes()));
+        }
+        if format.is_streamed(&bytes) {
+            let file = StreamedFile::new(bytes, is_compressed, stamp);
+            return Ok((Content::Streamed(Box::new(file)), stamp, Vec::new()));
+        }
+        if !is_compressed && format.may_hold_many_steps() {
+            let file = SteppedFile::new(bytes, stamp);
+            return Ok((Content::Stepped(file), stamp, Vec::new()));
+        }
+        let room = budget.for_content();
+        if !is_compressed {
+            let fits = room.check(stamp.len, "the file is");
+            fits.map_err(|e| e.in_file(path))?;
+        }
+        // An estimate for compressed files. Too much does no harm: pages that are not used cost nothing.
+        let len = unpacked_len(path).unwrap_or(stamp.len).min(room.bytes());
+        let more = usize::try_from(len).unwrap_or(usize::MAX);
+        let _ = bytes.try_reserve_exact(more.saturating_sub(bytes.len()).saturating_add(1));
+        let notes = stream.finish(&mut bytes, room).map_err(in_file)?;
+        Ok((Content::Whole(bytes), stamp, notes))
+    }
+
+    /// Understands `bytes` as the content of a file at `path`, which is not touched.
+    ///
+    /// # Errors
+    /// As [`Self::open`], less the reading.
+    pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, FrameError> {
+        Self::from_bytes_within(path, bytes, MemoryBudget::UNLIMITED)
+    }
+
+    /// [`Self::from_bytes`] if it can be unpacked and read within `budget`.
+    ///
+    /// # Errors
+    /// As [`Self::open_within`], less the reading.
+    pub fn from_bytes_within(
+        path: &Path,
+        bytes: Vec<u8>,
+        budget: MemoryBudget,
+    ) -> Result<Self, FrameError> {
+        let stored_len = bytes.len() as u64;
+        let in_file = |e: StreamError| e.in_file(path);
+        let mut notes = Vec::new();
+        let bytes = if is_gzip(&bytes) {
+            let mut unpacked = Vec::new();
+            let source = Decompressor::new(Cursor::new(bytes)).map_err(StreamError::Io);
+            let source = source.map_err(in_file)?;
+            let left = source.finish(&mut unpacked, budget.for_content());
+            notes.extend(left.map_err(in_file)?);
+            unpacked
+        } else {
+            bytes
+        };
+        Self::new(path, Content::Whole(bytes), stored_len, notes, budget)
+    }
+
+    fn new(
+        path: &Path,
+        content: Content,
+        stored_len: u64,
+        notes: Vec<String>,
+        budget: MemoryBudget,
+    ) -> Result<Self, FrameError> {
+        let in_file = |e: ParseError| e.in_file(path);
+        let format = Format::detect(content.head(), path).map_err(in_file)?;
+        let left = budget.less(content.held_len(format));
+        let steps = match &content {
+            Content::Streamed(file) => file.steps(path, format, left)?,
+            Content::Stepped(file) => file.steps(path, format, left)?,
+            Content::Whole(_) | Content::Aligned(_) => {
+                let mut source = ByteSource::whole(content.head());
+                format.steps_within(&mut source, left).map_err(in_file)?
+            }
+        };
+        Ok(Self {
+            path: path.to_owned(),
+            format,
+            steps,
+            content,
+            stored_len,
+            notes,
+            budget,
+        })
+    }
+
+    /// Where the file is.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// Which format it is.
+    pub const fn format(&self) -> Format {
+        self.format
+    }
+
+    /// The time steps inside; may be none.
+    pub fn steps(&self) -> &[Step] {
+        &self.steps
+    }
+
+    /// The uncompressed content; of a large text its beginning.
+    pub fn bytes(&self) -> &[u8] {
+        self.content.head()
+    }
+
+    /// Bytes on disk, compressed if it was.
+    pub const fn stored_len(&self) -> u64 {
+        self.stored_len
+    }
+
+    /// Bytes of the uncompressed content. Of a packed text a guess until it was read to its end.
+    pub fn unpacked_len(&self) -> u64 {
+        match &self.content {
+            Content::Streamed(file) => file.unpacked_len(&self.path),
+            Content::Stepped(file) => file.len(),
+            Content::Whole(_) | Content::Aligned(_) => self.bytes().len() as u64,
+        }
+    }
+
+    /// Bytes that are held beside the numbers while these are read.
+    pub fn held_len(&self) -> u64 {
+        self.content.held_len(self.format)
+    }
+
+    /// Bytes that are held on the way from the content to the numbers of `particles`: of arrays that are packed,
+    /// or text in XML, in the content.
+    pub fn unpacked_arrays_len(&self, particles: &RawParticles) -> u64 {
+        let (bytes, len) = (self.bytes(), self.unpacked_len());
+        let is_packed = self
+            .format
+            .reader()
+            .has_packed_arrays(bytes, len, particles);
+        let arrays = particles.attributes.iter().map(|a| a.data.byte_len());
+        let all = arrays.chain([particles.positions.byte_len()]);
+        all.max().filter(|_| is_packed).unwrap_or(0)
+    }
+
+    /// Oddities that did not stop the file from being understood; those at the end of a large text once it
+    /// was read.
+    pub fn notes(&self) -> &[String] {
+        match &self.content {
+            Content::Streamed(file) => file.notes(),
+            Content::Whole(_) | Content::Aligned(_) | Content::Stepped(_) => &self.notes,
+        }
+    }
+
+    /// Reads step `index` of [`Self::steps`].
+    ///
+    /// # Errors
+    /// [`FrameError::Malformed`] if there is no such step or its bytes are damaged,
+    /// [`FrameError::Unsupported`] for a variant of the format that is not read,
+    /// [`FrameError::TooLarge`] if its numbers need more memory than is allowed.
+    pub fn read(&self, index: usize) -> Result<RawParticles, FrameError> {
+        let step = self.steps.get(index).ok_or_else(|| {
+            let what = format!(
+                "step {index} does not exist, the file has {}",
+                self.steps.len()
+            );
+            ParseError::malformed(self.bytes().len(), what).in_file(&self.path)
+        })?;
+        let left = self.budget.less(self.held_len());
+        let in_file = |e: ParseError| e.in_file(&self.path);
+        let particles = match &self.content {
+            Content::Streamed(file) => {
+                return file.read(&self.path, self.format, (step, self.steps.len()), left);
+            }
+            Content::Stepped(file) => file.read(&self.path, self.format, step, left)?,
+            Content::Whole(_) | Content::Aligned(_) => {
+                let mut source = ByteSource::whole(self.bytes());
+                let particles = self.format.read_within(&mut source, step, left);
+                particles.map_err(in_file)?
+            }
+        };
+        let fits = left.check(particles.byte_len(), "in memory its numbers are");
+        fits.map_err(in_file)?;
+        Ok(particles)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::io::Write;
+
+    use flate2::Compression;
+    use flate2::write::GzEncoder;
+
+    use std::fs;
+
+    use super::*;
+    use crate::read::lammps;
+
+    const TEXT: &[u8] = b"ITEM: TIMESTEP\n0\n";
+
+    fn gz(bytes: &[u8]) -> Vec<u8> {
+        let mut encoder = GzEncoder::new(Vec::new(), Compression::fast());
+        encoder.write_all(bytes).expect("memory takes all");
+        encoder.finish().expect("memory takes all")
+    }
+
+    fn open(bytes: Vec<u8>) -> Result<FrameFile, FrameError> {
+        FrameFile::from_bytes(Path::new("a.bgeo"), bytes)
+    }
+
+    #[track_caller]
+    fn fails(bytes: Vec<u8>, words: &str) {
+        let error = open(bytes).expect_err("damaged").to_string();
+        assert!(
+            error.starts_with("a.bgeo: ") && error.contains(words),
+            "{error}"
+        );
+    }
+
+    #[test]
+    fn gzip_members_are_joined() {
+        let packed = [gz(&TEXT[..9]), gz(&TEXT[9..])].concat();
+        let file = open(packed.clone()).expect("two members");
+        assert_eq!(file.bytes(), TEXT);
+        assert_eq!(file.format(), lammps::FORMAT);
+        assert_eq!(file.stored_len(), packed.len() as u64);
+        assert!(file.notes().is_empty());
+    }
+
+    #[test]
+    fn bytes_after_the_stream_are_told() {
+        let zeros = open([gz(TEXT), vec![0; 512]].concat()).expect("padding");
+        assert!(zeros.bytes() == TEXT && zeros.notes().is_empty());
+        let other = open([gz(TEXT), b"junk".to_vec()].concat()).expect("ignored");
+        assert!(other.bytes() == TEXT && other.notes().len() == 1);
+    }
+
+    #[test]
+    #[cfg_attr(miri, ignore = "unpacks too often for an interpreter")]
+    fn every_truncation_of_gzip_is_noticed() {
+        let packed = [gz(&TEXT[..9]), gz(&TEXT[9..])].concat();
+        let first = gz(&TEXT[..9]).len();
+        for len in (3..packed.len()).filter(|l| *l != first) {
+            fails(packed[..len].to_vec(), "still being written");
+        }
+    }
+
+    #[test]
+    fn damaged_gzip_is_noticed() {
+        let mut packed = gz(TEXT);
+        let crc = packed.len() - 8;
+        packed[crc] ^= 1;
+        fails(packed, "damaged");
+        fails(gz(&gz(TEXT)), "gzip inside gzip");
+        fails(gz(b""), "empty");
+    }
+
+    #[test]
+    fn files_that_cannot_be_read_are_named() {
+        let dir = tempfile::tempdir().expect("a temporary directory");
+        let error = FrameFile::open(dir.path()).expect_err("a directory");
+        assert!(error.to_string().contains("a directory"), "{error}");
+        let missing = dir.path().join("none.vtk");
+        assert!(matches!(
+            FrameFile::open(&missing),
+            Err(FrameError::Io { .. })
+        ));
+        let path = dir.path().join("dump.7");
+        fs::write(&path, gz(TEXT)).expect("writable");
+        assert_eq!(detect_file(&path).expect("known"), lammps::FORMAT);
+        assert_eq!(FrameFile::open(&path).expect("known").bytes(), TEXT);
+    }
+}

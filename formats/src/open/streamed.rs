@@ -1,0 +1,152 @@
+//! Text that is read from the disk in pieces, once for each step.
+
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+use std::sync::{Arc, Mutex, OnceLock, PoisonError};
+
+use crate::decompress::Decompressor;
+use crate::detect::Format;
+use crate::gzip::unpacked_len;
+use crate::read::{ByteSource, Step, TextInput};
+use crate::regular::FileStamp;
+use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
+
+/// A text file that is not in memory.
+#[derive(Debug)]
+pub(super) struct StreamedFile {
+    /// Its beginning, decompressed.
+    head: Arc<[u8]>,
+    is_compressed: bool,
+    /// The file when it was opened.
+    stamp: FileStamp,
+    /// Known once the file has been read to its end.
+    end: OnceLock<StreamEnd>,
+    /// The stream at the end of the step that was read last: the next step often begins there, and a compressed
+    /// file can only be read from its beginning.
+    parked: Mutex<Option<ByteSource<'static>>>,
+}
+
+/// What only the end of a stream shows.
+#[derive(Debug)]
+struct StreamEnd {
+    /// Bytes of the file, decompressed.
+    len: u64,
+    notes: Vec<String>,
+}
+
+impl StreamedFile {
+    /// The file that had `stamp` and begins with `head`.
+    pub(super) fn new(head: Vec<u8>, is_compressed: bool, stamp: FileStamp) -> Self {
+        Self {
+            head: head.into(),
+            is_compressed,
+            stamp,
+            end: OnceLock::new(),
+            parked: Mutex::new(None),
+        }
+    }
+
+    pub(super) fn head(&self) -> &[u8] {
+        &self.head
+    }
+
+    /// Bytes of the file, decompressed. An estimate for a compressed file that has not been read to its end.
+    pub(super) fn unpacked_len(&self, path: &Path) -> u64 {
+        match self.end.get() {
+            Some(end) => end.len,
+            None if !self.is_compressed => self.stamp.len,
+            None => unpacked_len(path).unwrap_or(self.stamp.len),
+        }
+    }
+
+    /// Oddities of the compression; none before the file has been read to its end.
+    pub(super) fn notes(&self) -> &[String] {
+        self.end.get().map_or(&[], |end| &end.notes)
+    }
+
+    /// The time steps of the file at `path`.
+    pub(super) fn steps(
+        &self,
+        path: &Path,
+        format: Format,
+        budget: MemoryBudget,
+    ) -> Result<Vec<Step>, FrameError> {
+        let mut source = self.source(path, budget)?;
+        let steps = format.steps_within(&mut source, budget);
+        self.checked(path, &mut source, steps)
+    }
+
+    /// Reads `step`, one of `step_count`, of the file at `path`.
+    pub(super) fn read(
+        &self,
+        path: &Path,
+        format: Format,
+        (step, step_count): (&Step, usize),
+        budget: MemoryBudget,
+    ) -> Result<RawParticles, FrameError> {
+        self.stamp.check(path)?;
+        let parked = || self.parked.lock().unwrap_or_else(PoisonError::into_inner);
+        let last = parked().take();
+        let can_reach = |source: &mut ByteSource<'_>| source.text().can_reach(step.start());
+        let mut source = match last.and_then(|mut s| can_reach(&mut s).then_some(s)) {
+            Some(source) => source,
+            None => self.source(path, budget)?,
+        };
+        let particles = format.read_within(&mut source, step, budget);
+        // Only the end of a compressed file shows whether all of it is sound.
+        if self.is_compressed && self.end.get().is_none() && particles.is_ok() {
+            source.text().finish();
+        }
+        let particles = self.checked(path, &mut source, particles)?;
+        if step_count > 1 {
+            source.text().end_at(usize::MAX);
+            *parked() = Some(source);
+        }
+        Ok(particles)
+    }
+
+    /// The file at `path` from its beginning.
+    fn source(&self, path: &Path, budget: MemoryBudget) -> Result<ByteSource<'static>, FrameError> {
+        let stream = Box::new(decompressor(path)?);
+        let about = unpacked_len(path).unwrap_or(self.stamp.len);
+        let about = usize::try_from(about).unwrap_or(usize::MAX);
+        let len = match self.end.get() {
+            Some(end) => usize::try_from(end.len).ok(),
+            None => (!self.is_compressed).then_some(about),
+        };
+        let head = Arc::clone(&self.head);
+        let lens = (len, len.unwrap_or(about));
+        let text = TextInput::stream(stream, head, lens, budget);
+        Ok(ByteSource::from_text(text))
+    }
+
+    /// The result of reading `source`, unless a fault of the file itself explains it.
+    fn checked<T>(
+        &self,
+        path: &Path,
+        source: &mut ByteSource<'_>,
+        result: Result<T, ParseError>,
+    ) -> Result<T, FrameError> {
+        let text = source.text();
+        if let Some((len, notes)) = text.ended() {
+            let (len, notes) = (len as u64, notes.to_vec());
+            let _ = self.end.set(StreamEnd { len, notes });
+        }
+        let stream = text.check_source().map_err(|e| e.in_file(path));
+        // A file that changed explains any other fault.
+        self.stamp.check(path)?;
+        stream?;
+        result.map_err(|e| e.in_file(path))
+    }
+}
+
+/// The content of the file at `path`, decompressed, from its beginning.
+///
+/// # Errors
+/// [`FrameError::Io`].
+pub(super) fn decompressor(path: &Path) -> Result<Decompressor<BufReader<File>>, FrameError> {
+    let file = File::open(path).map(|file| BufReader::with_capacity(1 << 16, file));
+    let stream = file.and_then(Decompressor::new);
+    stream.map_err(|e| FrameError::io(path, e))
+}

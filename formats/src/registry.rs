@@ -1,0 +1,70 @@
+//! The formats that this crate reads: one line each.
+
+use std::path::Path;
+
+use crate::format::Format;
+use crate::native;
+use crate::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
+
+/// Every format. Of formats that match a file equally well, the first is taken; messages list them in this order.
+const FORMATS: &[Format] = &[
+    native::FORMAT,
+    vtk::FORMAT,
+    vtk_xml::FORMAT,
+    bgeo::FORMAT,
+    ply::FORMAT,
+    xyz::FORMAT,
+    lammps::FORMAT,
+    npy::NPY,
+    npy::NPZ,
+    csv::FORMAT,
+];
+
+impl Format {
+    /// Every format.
+    pub const fn all() -> &'static [Self] {
+        FORMATS
+    }
+
+    /// The format that the file's name suggests, without `.gz`; `None` for other names.
+    pub fn by_name(path: &Path) -> Option<Self> {
+        let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
+        let (stem, extension) = strip_gz(&name).rsplit_once('.')?;
+        let matches = |format: &&Self| format.reader().matches_name(stem, extension);
+        FORMATS.iter().find(matches).copied()
+    }
+}
+
+/// `name` without a final `.gz` (given in lower case).
+pub(crate) fn strip_gz(name: &str) -> &str {
+    name.strip_suffix(".gz").unwrap_or(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use std::collections::HashSet;
+
+    use super::*;
+
+    #[test]
+    fn names_and_extensions_are_unique() {
+        let mut names = HashSet::new();
+        let mut extensions = HashSet::new();
+        for format in Format::all() {
+            assert!(names.insert(format.name()), "{format:?}");
+            for extension in format.reader().extensions() {
+                assert!(extensions.insert(*extension), "{format:?} {extension}");
+            }
+        }
+    }
+
+    #[test]
+    fn names_suggest_formats() {
+        let by_name = |name: &str| Format::by_name(Path::new(name));
+        assert_eq!(by_name("x/dump.drop.1200.lammps.gz"), Some(lammps::FORMAT));
+        assert_eq!(by_name("dump.250"), Some(lammps::FORMAT));
+        assert_eq!(by_name("A_7.VTK"), Some(vtk::FORMAT));
+        assert_eq!(by_name("notes.12"), None);
+        assert_eq!(by_name("README"), None);
+    }
+}

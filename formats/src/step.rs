@@ -1,0 +1,96 @@
+//! The time steps of a file.
+
+use std::ops::Range;
+
+use crate::{MemoryBudget, ParseError};
+
+/// One time step of a file.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Step {
+    /// Index among the steps of the file, from 0.
+    pub index: usize,
+    /// Step number written in the file (LAMMPS `TIMESTEP`), if any.
+    pub number: Option<i64>,
+    /// Simulation time written in the file, if it is cheap to find.
+    pub time: Option<f64>,
+    handle: StepHandle,
+}
+
+/// How a reader finds a step again. Only the reader that made it knows what it means.
+#[derive(Debug, Clone, PartialEq)]
+enum StepHandle {
+    /// The step is one range of bytes.
+    Bytes(Range<usize>),
+    /// A number that the reader chose: an index into an array of frames, the address of a group.
+    Key(u64),
+}
+
+impl Step {
+    /// Step `index` in the bytes `range` of the file.
+    pub(crate) const fn at_bytes(index: usize, range: Range<usize>) -> Self {
+        Self::new(index, StepHandle::Bytes(range))
+    }
+
+    /// Step `index`, which its reader finds again by `key`.
+    pub(crate) const fn with_key(index: usize, key: u64) -> Self {
+        Self::new(index, StepHandle::Key(key))
+    }
+
+    /// The only step of a file of `len` bytes.
+    pub const fn whole(len: usize) -> Self {
+        Self::at_bytes(0, 0..len)
+    }
+
+    const fn new(index: usize, handle: StepHandle) -> Self {
+        Self {
+            index,
+            number: None,
+            time: None,
+            handle,
+        }
+    }
+
+    /// Adds a step in `range` to the steps of a file.
+    ///
+    /// # Errors
+    /// [`ParseError::TooLarge`] if the list needs more memory than `budget` allows.
+    pub(crate) fn push(
+        steps: &mut Vec<Self>,
+        range: Range<usize>,
+        budget: MemoryBudget,
+    ) -> Result<(), ParseError> {
+        // `Sequence` makes a list of its own.
+        let need = 4 * size_of::<Self>() * (steps.len() + 1);
+        budget.check(need as u64, "the list of its steps is")?;
+        steps.push(Self::at_bytes(steps.len(), range));
+        Ok(())
+    }
+
+    /// The bytes of the uncompressed file that hold the step, if they are one range.
+    pub const fn byte_range(&self) -> Option<&Range<usize>> {
+        match &self.handle {
+            StepHandle::Bytes(range) => Some(range),
+            StepHandle::Key(_) => None,
+        }
+    }
+
+    /// Offset of the first byte of the step; 0 if the step is not one range of bytes.
+    pub(crate) fn start(&self) -> usize {
+        self.byte_range().map_or(0, |range| range.start)
+    }
+
+    /// Ends the byte range of the step at `end`.
+    pub(crate) fn end_at(&mut self, end: usize) {
+        if let StepHandle::Bytes(range) = &mut self.handle {
+            range.end = end;
+        }
+    }
+
+    /// The key of [`Self::with_key`], else the index.
+    pub(crate) const fn key(&self) -> u64 {
+        match self.handle {
+            StepHandle::Bytes(_) => self.index as u64,
+            StepHandle::Key(key) => key,
+        }
+    }
+}
