@@ -2,10 +2,6 @@
 
 use crate::ScalarType;
 
-/// Names under which simulations write ids, the usual one first: also numpy's plural and
-/// DualSPHysics'.
-pub const ID_NAMES: [&str; 3] = ["id", "ids", "Idp"];
-
 /// One named array with `components` numbers a particle, interleaved (`x0 y0 z0 x1 ...`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {

@@ -4,6 +4,7 @@
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 
+use crate::names::RADII;
 use crate::{Attribute, AttributeData};
 
 /// Positions in the precision of the file, world units.
@@ -83,6 +84,12 @@ impl RawParticles {
     pub fn byte_len(&self) -> u64 {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
         self.positions.byte_len() + attributes.sum::<u64>()
+    }
+
+    /// Bytes of the largest of positions and attributes.
+    pub(crate) fn largest_array_len(&self) -> u64 {
+        let attributes = self.attributes.iter().map(|a| a.data.byte_len());
+        attributes.fold(self.positions.byte_len(), u64::max)
     }
 }
 
@@ -226,10 +233,8 @@ pub(crate) fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
                 && matches!(a.data, AttributeData::F32(_) | AttributeData::F64(_))
         })
     };
-    let (attribute, scale) = named("radius")
-        .map(|a| (a, 1.0))
-        .or_else(|| named("pscale").map(|a| (a, 1.0)))
-        .or_else(|| named("diameter").map(|a| (a, 0.5)))?;
+    let mut found = RADII.iter().map(|(name, scale)| (named(name), scale));
+    let (attribute, scale) = found.find_map(|(attribute, scale)| attribute.zip(Some(scale)))?;
     let radii: Vec<f32> = (0..attribute.count())
         .map(|i| (attribute.data.get_f64(i) * scale) as f32)
         .collect();

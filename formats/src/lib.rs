@@ -25,6 +25,7 @@ pub mod blocks;
 pub mod convert;
 pub mod detect;
 pub mod generate;
+pub mod names;
 pub mod native;
 pub mod open;
 pub mod order;
@@ -33,7 +34,7 @@ pub mod sequence;
 pub mod stats;
 pub mod write;
 
-pub use attribute::{Attribute, AttributeData, ID_NAMES};
+pub use attribute::{Attribute, AttributeData};
 pub use budget::MemoryBudget;
 pub use error::{FrameError, ParseError};
 pub use frame::{FARTHEST, ParticleFrame, Positions, Radius, RawParticles, is_near, is_radius};

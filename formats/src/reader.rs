@@ -44,6 +44,15 @@ pub(crate) enum StreamUnit {
     Words,
 }
 
+/// How large a file is.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct FileExtent {
+    /// Bytes, decompressed.
+    pub(crate) byte_len: u64,
+    /// Time steps.
+    pub(crate) step_count: u64,
+}
+
 /// Reads the files of one format. Readers trust nothing in a file: they check every count against the bytes that
 /// are there, or against a budget, before they allocate.
 pub(crate) trait Reader: Sync {
@@ -111,10 +120,15 @@ pub(crate) trait Reader: Sync {
         Ok(None)
     }
 
-    /// True if arrays of the file are compressed or encoded, so that one of them is in memory in both forms.
-    /// `head` is as much of the file as is in memory, `len` the length of the file in bytes.
-    fn has_packed_arrays(&self, _head: &[u8], _len: u64, _particles: &RawParticles) -> bool {
-        false
+    /// Bytes held beside the file and the numbers of `particles` while these are read: the largest array, if arrays of
+    /// the file are compressed or encoded. `head` is as much of the file as is in memory.
+    fn unpacked_arrays_len(
+        &self,
+        _head: &[u8],
+        _file: FileExtent,
+        _particles: &RawParticles,
+    ) -> u64 {
+        0
     }
 
     /// What a user should know about a file that begins with `head` and is not in its particles: a simulation

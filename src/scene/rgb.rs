@@ -5,14 +5,9 @@
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
-use spherule_formats::{Attribute, ScalarType};
+use spherule_formats::{Attribute, ScalarType, names};
 
 use super::colormap::linear_from_srgb;
-
-/// Names of attributes that hold colours, in lower case.
-const NAMES: [&str; 8] = [
-    "cd", "color", "colors", "colour", "colours", "rgb", "rgba", "rgbcolor",
-];
 
 /// What the numbers of a colour mean.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -73,7 +68,7 @@ impl RgbEncoding {
 /// Whether `attribute` holds colours: three or four numbers a particle, by the name or because they are bytes, which
 /// VTK takes for colours whatever their name.
 pub fn is_rgb(attribute: &Attribute) -> bool {
-    let is_named = || NAMES.contains(&attribute.name.to_ascii_lowercase().as_str());
+    let is_named = || names::is_one_of(&attribute.name, &names::COLOR);
     let is_bytes = attribute.data.scalar_type() == ScalarType::U8;
     matches!(attribute.components, 3 | 4) && (is_bytes || is_named())
 }

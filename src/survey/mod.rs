@@ -11,7 +11,7 @@ use glam::DVec3;
 use serde::{Deserialize, Serialize};
 use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{Attribute, FrameError, ID_NAMES, ParticleFrame, Radius, choose_origin};
+use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin, names};
 
 use crate::scene::{Bounds, RgbEncoding, is_rgb};
 
@@ -28,8 +28,6 @@ use robust::{
 
 /// Frames looked at; evenly spread, first and last among them. All of a shorter sequence.
 const FRAMES: usize = 24;
-/// Names under which simulations write velocities.
-const VELOCITY_NAMES: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];
 
 /// What was found.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -302,7 +300,7 @@ impl Named for AttributeView<'_> {
 
 /// The one of `attributes` that holds velocities, if any does.
 pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
-    VELOCITY_NAMES.iter().find_map(|name| {
+    names::VELOCITY.iter().find_map(|name| {
         attributes
             .iter()
             .find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
@@ -312,7 +310,7 @@ pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
 /// The attribute that holds ids, if any does: exactly by name, or failing that without regard to
 /// case.
 pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
-    ID_NAMES.iter().find_map(|name| {
+    names::ID.iter().find_map(|name| {
         let exact = attributes.iter().find(|a| a.name() == *name);
         let alike = || {
             attributes

@@ -6,8 +6,9 @@ use half::f16;
 
 use super::settings::{AttributeChoice, ConvertError, ConvertSettings, RadiusRule};
 use super::source::{ParticleSource, SourceAttribute};
+use crate::names::{self, RADII, RADIUS};
 use crate::native::{AttributeSpec, StoredType};
-use crate::{ID_NAMES, ScalarType, is_radius};
+use crate::{ScalarType, is_radius};
 
 /// The rows of a conversion: the radius in f32 first where particles have their own, then attributes as they
 /// will be stored.
@@ -166,7 +167,7 @@ impl Columns {
                 AttributeChoice::LeaveOut => continue,
             };
             // Radii are stored once.
-            if has_radius && is_float(attribute) && attribute.name.eq_ignore_ascii_case("radius") {
+            if has_radius && is_float(attribute) && attribute.name.eq_ignore_ascii_case(RADIUS) {
                 continue;
             }
             columns.push(Column {
@@ -242,9 +243,7 @@ fn radius_of(attributes: &[SourceAttribute]) -> Option<RadiusColumn> {
             scale,
         })
     };
-    [("radius", 1.0), ("pscale", 1.0), ("diameter", 0.5)]
-        .into_iter()
-        .find_map(named)
+    RADII.into_iter().find_map(named)
 }
 
 fn check(
@@ -269,8 +268,7 @@ fn check(
             settings.choice(&attribute.name),
             AttributeChoice::AsIs | AttributeChoice::LeaveOut
         );
-        let is_id = |name: &&str| attribute.name.eq_ignore_ascii_case(name);
-        if is_changed && ID_NAMES.iter().any(is_id) {
+        if is_changed && names::is_one_of(&attribute.name, &names::ID) {
             let what = format!(
                 "attribute {} holds ids, and another number is another particle; keep it as it is or leave it out",
                 attribute.name

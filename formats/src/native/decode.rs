@@ -6,6 +6,7 @@ use rayon::prelude::*;
 use super::layout::RadiusIndex;
 use super::view::NativeFrame;
 use crate::blocks::{BLOCK_SIZE, StoredLeaves};
+use crate::names::RADIUS;
 use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
 
 impl NativeFrame<'_> {
@@ -178,12 +179,12 @@ impl NativeFrame<'_> {
 fn wants_radius(attributes: &[Attribute]) -> bool {
     !attributes
         .iter()
-        .any(|a| a.name.eq_ignore_ascii_case("radius"))
+        .any(|a| a.name.eq_ignore_ascii_case(RADIUS))
 }
 
 fn radii(values: Vec<f32>) -> Attribute {
     Attribute {
-        name: "radius".to_owned(),
+        name: RADIUS.to_owned(),
         components: 1,
         data: AttributeData::F32(values),
     }

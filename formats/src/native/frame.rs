@@ -11,6 +11,7 @@ use super::write::{AttributeSpec, FrameSpec, FrameWriter, RadiusSpec, Run};
 use super::{Bound, Encoding, FrameIndex, RadiusRange, StoredType, arrange, wide_blocks};
 use crate::attribute::with_values;
 use crate::blocks::Block;
+use crate::names::RADIUS;
 use crate::order::kd;
 use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius, is_near, is_radius};
 
@@ -148,7 +149,7 @@ fn holds_radii(attribute: &Attribute) -> bool {
         attribute.data,
         AttributeData::F32(_) | AttributeData::F64(_)
     );
-    is_float && attribute.components == 1 && attribute.name.eq_ignore_ascii_case("radius")
+    is_float && attribute.components == 1 && attribute.name.eq_ignore_ascii_case(RADIUS)
 }
 
 fn spec_of(attribute: &Attribute) -> io::Result<AttributeSpec> {

@@ -15,6 +15,7 @@ use crate::detect::Format;
 use crate::gzip::is_gzip;
 use crate::native;
 use crate::read::{ByteSource, Step};
+use crate::reader::FileExtent;
 use crate::regular::{FileStamp, regular_len};
 use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 
@@ -255,14 +256,12 @@ impl FrameFile {
     /// Bytes that are held on the way from the content to the numbers of `particles`: of arrays that are packed,
     /// or text in XML, in the content.
     pub fn unpacked_arrays_len(&self, particles: &RawParticles) -> u64 {
-        let (bytes, len) = (self.bytes(), self.unpacked_len());
-        let is_packed = self
-            .format
-            .reader()
-            .has_packed_arrays(bytes, len, particles);
-        let arrays = particles.attributes.iter().map(|a| a.data.byte_len());
-        let all = arrays.chain([particles.positions.byte_len()]);
-        all.max().filter(|_| is_packed).unwrap_or(0)
+        let file = FileExtent {
+            byte_len: self.unpacked_len(),
+            step_count: self.steps.len() as u64,
+        };
+        let reader = self.format.reader();
+        reader.unpacked_arrays_len(self.bytes(), file, particles)
     }
 
     /// Oddities that did not stop the file from being understood; those at the end of a large text once it

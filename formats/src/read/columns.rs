@@ -9,6 +9,7 @@ mod fill;
 use glam::{DVec3, Vec3};
 
 use self::fill::fill;
+use crate::names::RECORD_VECTORS;
 use crate::{
     Attribute, AttributeData, Endian, MemoryBudget, ParseError, Positions, RawParticles, ScalarType,
 };
@@ -372,15 +373,7 @@ pub(super) fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
 /// `red green blue` with or without `alpha`, `r g b`) under the name of the vector. Parts that are missing or
 /// of different types stay as they are.
 pub(super) fn group_vectors(mut columns: Vec<Column>) -> Vec<Column> {
-    const VECTORS: [(&str, &[&str]); 6] = [
-        ("velocity", &["vx", "vy", "vz"]),
-        ("normal", &["nx", "ny", "nz"]),
-        ("color", &["red", "green", "blue", "alpha"]),
-        ("color", &["red", "green", "blue"]),
-        ("color", &["diffuse_red", "diffuse_green", "diffuse_blue"]),
-        ("color", &["r", "g", "b"]),
-    ];
-    for (name, parts) in VECTORS {
+    for (name, parts) in RECORD_VECTORS {
         let places: Option<Vec<usize>> = parts
             .iter()
             .map(|part| {

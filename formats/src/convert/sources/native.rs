@@ -5,6 +5,7 @@ use glam::DVec3;
 use super::places;
 use crate::blocks::{BLOCK_SIZE, StoredLeaves};
 use crate::convert::{ParticleSource, SourceAttribute};
+use crate::names::RADIUS;
 use crate::native::layout::RadiusIndex;
 use crate::native::{NativeFile, StoredType};
 use crate::{FrameError, ParseError, ScalarType};
@@ -35,10 +36,10 @@ impl<'a> NativeSource<'a> {
             },
         };
         let mut attributes: Vec<SourceAttribute> = index.attributes.iter().map(attribute).collect();
-        let is_named = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
+        let is_named = |a: &SourceAttribute| a.name.eq_ignore_ascii_case(RADIUS);
         if matches!(index.radius, RadiusIndex::PerParticle(_)) && !attributes.iter().any(is_named) {
             attributes.push(SourceAttribute {
-                name: "radius".to_owned(),
+                name: RADIUS.to_owned(),
                 components: 1,
                 scalar: ScalarType::F32,
             });

@@ -9,6 +9,7 @@ use super::sniff::{TextShape, is_text, text_shape};
 use super::table::{Numbers, OnText, Place, Table, Target};
 use super::{ByteSource, Step};
 use crate::format::Format;
+use crate::names::{COLOR_CODES, is_one_of, is_radius_name};
 use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
@@ -178,10 +179,8 @@ fn named_columns(names: &[String]) -> Option<Columns> {
 /// Vectors and radii are real, even if all of a file happen to be integers. Integers of a colour are codes and stay
 /// what they are.
 fn numbers_of(group: &names::Group) -> Numbers {
-    let is_one_of = |names: &[&str]| names.iter().any(|n| group.name.eq_ignore_ascii_case(n));
-    let is_length = is_one_of(&["radius", "diameter", "pscale"]);
-    let is_color = is_one_of(&["color", "colors", "rgb", "rgba"]);
-    if (group.columns.len() > 1 && !is_color) || is_length {
+    let is_color = is_one_of(&group.name, &COLOR_CODES);
+    if (group.columns.len() > 1 && !is_color) || is_radius_name(&group.name) {
         Numbers::Real
     } else {
         Numbers::WholeIfAll

@@ -2,6 +2,8 @@
 
 use std::collections::BTreeMap;
 
+use crate::names::{COLOR_COLUMNS, JOINED_STEMS, POSITION_STEMS};
+
 /// Columns that are one attribute.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Group {
@@ -10,41 +12,6 @@ pub(super) struct Group {
     /// The column of each component.
     pub(super) columns: Vec<usize>,
 }
-
-/// Names of position columns before the component, the wanted first; the empty one stands for
-/// plain `x`, `y`, `z`.
-const POSITIONS: [&str; 11] = [
-    "",
-    "pos",
-    "points",
-    "position",
-    "positions",
-    "point",
-    "coords",
-    "coord",
-    "coordinates",
-    "coordinate",
-    "p",
-];
-
-/// Names that take a component without anything between: `vx`, `PosX`.
-const SHORT: [(&str, &str); 12] = [
-    ("v", "velocity"),
-    ("f", "force"),
-    ("a", "acceleration"),
-    ("n", "normal"),
-    ("p", ""),
-    ("pos", ""),
-    ("position", ""),
-    ("coord", ""),
-    ("vel", ""),
-    ("velocity", ""),
-    ("acc", ""),
-    ("force", ""),
-];
-
-/// Names of columns that together are colours, in lower case.
-const COLORS: [[&str; 3]; 2] = [["red", "green", "blue"], ["r", "g", "b"]];
 
 /// Which number of a vector a column is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -73,13 +40,13 @@ pub(super) fn clean(raw: &[u8]) -> String {
 
 /// The columns of x, y and z among cleaned `names`. 2D runs may have no z.
 pub(super) fn position(names: &[String]) -> Option<[Option<usize>; 3]> {
-    let mut found = [[None; 3]; POSITIONS.len()];
+    let mut found = [[None; 3]; POSITION_STEMS.len()];
     for (column, name) in names.iter().enumerate() {
         let Some((stem, Part::Axis(part) | Part::Index(part))) = split(name) else {
             continue;
         };
         let stem = stem.to_ascii_lowercase();
-        let family = POSITIONS.iter().position(|known| *known == stem);
+        let family = POSITION_STEMS.iter().position(|known| *known == stem);
         if let Some(axis) = family.and_then(|family| found[family].get_mut(part)) {
             axis.get_or_insert(column);
         }
@@ -142,7 +109,7 @@ fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
             .all(|(index, (component, columns))| index == *component && columns.len() == 1);
         if complete && columns.len() > 1 && !stem.is_empty() {
             groups.push(Group {
-                name: long_name(stem).to_owned(),
+                name: vector_name(stem).to_owned(),
                 columns: columns.into_values().flatten().collect(),
             });
         }
@@ -153,7 +120,7 @@ fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
 
 /// The columns of red, green and blue.
 fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<Group> {
-    COLORS.iter().find_map(|parts| {
+    COLOR_COLUMNS.iter().find_map(|parts| {
         let column = |part: &&str| {
             let found = names
                 .iter()
@@ -167,11 +134,11 @@ fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<Group> {
     })
 }
 
-fn long_name(stem: &str) -> &str {
-    SHORT
+fn vector_name(stem: &str) -> &str {
+    let known = JOINED_STEMS
         .iter()
-        .find(|(short, long)| !long.is_empty() && short.eq_ignore_ascii_case(stem))
-        .map_or(stem, |(_, long)| long)
+        .find(|(joined, _)| joined.eq_ignore_ascii_case(stem));
+    known.and_then(|(_, name)| *name).unwrap_or(stem)
 }
 
 /// The stem and the component of a name: `velocity:0`, `velocity_0`, `velocity[0]`, `Vel.x`,
@@ -198,9 +165,9 @@ fn split(name: &str) -> Option<(&str, Part)> {
     let (stem, part) = name.split_at(last);
     let axis = axis(part)?;
     let known = stem.is_empty()
-        || SHORT
+        || JOINED_STEMS
             .iter()
-            .any(|(short, _)| short.eq_ignore_ascii_case(stem));
+            .any(|(joined, _)| joined.eq_ignore_ascii_case(stem));
     known.then_some((stem, Part::Axis(axis)))
 }
 

@@ -3,6 +3,7 @@
 use super::bounds::Bounds;
 use super::header::Header;
 use crate::ParseError;
+use crate::names::{LAMMPS_CATEGORIES, LAMMPS_INTEGERS, LAMMPS_VECTORS};
 use crate::read::table::{Numbers, OnText, Place, Target};
 use crate::read::text;
 
@@ -14,18 +15,6 @@ const POSITIONS: [([&str; 3], bool); 4] = [
     (["xs", "ys", "zs"], true),
     (["xsu", "ysu", "zsu"], true),
 ];
-
-/// Columns that together are a vector.
-const VECTORS: [([&str; 3], &str); 2] = [
-    (["vx", "vy", "vz"], "velocity"),
-    (["fx", "fy", "fz"], "force"),
-];
-
-/// Columns of integers that must stay exact.
-const WHOLE: [&str; 3] = ["id", "type", "mol"];
-
-/// Columns of names, even if all of them happen to look like numbers.
-pub(super) const NAMES: [&str; 2] = ["element", "typelabel"];
 
 /// The plan for the rows of a step.
 #[derive(Debug)]
@@ -81,12 +70,12 @@ impl Columns {
             cell.is_some_and(|cell| text::number(cell).is_none())
         };
         // Found once: a header may repeat a name as often as it has room for.
-        let vectors = VECTORS.map(|(names, vector)| (names, vector, names.map(&column)));
+        let vectors = LAMMPS_VECTORS.map(|(names, vector)| (names, vector, names.map(&column)));
         for (index, name) in header.names.iter().enumerate() {
             let name = String::from_utf8_lossy(name);
             let taken = self.fields.get(index).is_some_and(Option::is_some);
             let target = self.targets.len();
-            if !taken && NAMES.contains(&&*name) {
+            if !taken && LAMMPS_CATEGORIES.contains(&&*name) {
                 self.targets.push(Target::category(name));
                 self.assign(Some(index), target, 0);
                 continue;
@@ -105,7 +94,7 @@ impl Columns {
                 }
                 continue;
             }
-            self.targets.push(if WHOLE.contains(&&*name) {
+            self.targets.push(if LAMMPS_INTEGERS.contains(&&*name) {
                 Target::attribute(name, 1, Numbers::WholeIfAll, OnText::Fault)
             } else {
                 real(&name, 1)

@@ -1,9 +1,9 @@
 //! What a dump says that is not in the particles.
 
 use super::ITEM;
-use super::columns::NAMES;
 use super::header::{Header, Item};
 use crate::MemoryBudget;
+use crate::names::LAMMPS_CATEGORIES;
 use crate::read::category;
 use crate::read::input::TextInput;
 use crate::read::remarks::unused_cell;
@@ -34,7 +34,7 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
     let end = head.iter().rposition(|b| *b == b'\n').unwrap_or(start);
     for (column, name) in header.names.iter().enumerate() {
         let name = String::from_utf8_lossy(name);
-        if !NAMES.contains(&&*name) {
+        if !LAMMPS_CATEGORIES.contains(&&*name) {
             continue;
         }
         let rows = Lines::new(head, start..end.max(start)).take(header.count);

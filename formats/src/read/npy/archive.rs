@@ -9,9 +9,10 @@ use std::io::Cursor;
 use zip::ZipArchive;
 
 use super::header::{Header, show};
-use super::layout::{ArrayLayout, POSITION_NAMES};
+use super::layout::ArrayLayout;
 use super::member::{self, Member, in_member, zip_error};
 use super::{check_frame, frame_steps, read_array};
+use crate::names::POSITION_ARRAYS;
 use crate::read::Step;
 use crate::read::columns::{self, Column};
 use crate::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles};
@@ -106,7 +107,7 @@ impl<'a> Archive<'a> {
             |member: usize| self.members.get(member).map(|m| ArrayLayout::of(&m.header));
         let mut refused = None;
         let only = (self.members.len() == 1).then_some(0);
-        for member in POSITION_NAMES.iter().filter_map(|n| named(n)).chain(only) {
+        for member in POSITION_ARRAYS.iter().filter_map(|n| named(n)).chain(only) {
             match layout_of(member) {
                 Some(Ok(layout)) => return Ok((Source::Array(member), layout)),
                 Some(Err(error)) => {

@@ -4,20 +4,8 @@
 use super::dtype::{Dtype, Field, MAX_COMPONENTS, Number};
 use super::header::{Header, show};
 use crate::ParseError;
+use crate::names::POSITION_ARRAYS;
 use crate::read::columns::{self, Column, Lane, ParticleLayout};
-
-/// Names under which positions are saved, the surest first.
-pub(super) const POSITION_NAMES: [&str; 9] = [
-    "positions",
-    "position",
-    "pos",
-    "points",
-    "coordinates",
-    "coords",
-    "coord",
-    "xyz",
-    "r",
-];
 
 /// Steps without particles take no bytes, so nothing else bounds their number.
 const MAX_EMPTY_FRAMES: usize = 1 << 16;
@@ -213,7 +201,7 @@ fn position_fields(fields: &[Field]) -> Result<Vec<usize>, ParseError> {
             .iter()
             .position(|f| f.name.eq_ignore_ascii_case(name) && components.contains(&f.components))
     };
-    let vector = POSITION_NAMES.iter().find_map(|name| named(name, 2..=3));
+    let vector = POSITION_ARRAYS.iter().find_map(|name| named(name, 2..=3));
     if let Some(place) = vector {
         return Ok(vec![place]);
     }

@@ -19,7 +19,7 @@ use self::layout::ArrayLayout;
 use super::columns::ParticleLayout;
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, FileExtent, Reader};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
 /// One numpy array.
@@ -113,8 +113,16 @@ impl Reader for Npz {
         read(source.bytes(), step, budget)
     }
 
-    fn has_packed_arrays(&self, _head: &[u8], len: u64, particles: &RawParticles) -> bool {
-        len < particles.byte_len()
+    /// An array of all steps is decompressed for each of them.
+    fn unpacked_arrays_len(&self, _head: &[u8], file: FileExtent, particles: &RawParticles) -> u64 {
+        let all_steps = particles.byte_len().saturating_mul(file.step_count);
+        if file.byte_len < all_steps {
+            particles
+                .largest_array_len()
+                .saturating_mul(file.step_count)
+        } else {
+            0
+        }
     }
 }
 

@@ -23,7 +23,7 @@ use super::text::same_length;
 use super::vtk::{MOST_COMPONENTS, parse_values};
 use super::{ByteSource, Step};
 use crate::format::Format;
-use crate::reader::{Confidence, Reader};
+use crate::reader::{Confidence, FileExtent, Reader};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
 use blocks::{Encoding, Fault, Source, payload};
@@ -85,9 +85,13 @@ impl Reader for XmlVtk {
         })
     }
 
-    fn has_packed_arrays(&self, head: &[u8], _len: u64, _particles: &RawParticles) -> bool {
+    fn unpacked_arrays_len(&self, head: &[u8], _file: FileExtent, particles: &RawParticles) -> u64 {
         let has = |text: &[u8]| memmem::find(head, text).is_some();
-        has(b"compressor=") || !has(b"encoding=\"raw\"")
+        if has(b"compressor=") || !has(b"encoding=\"raw\"") {
+            particles.largest_array_len()
+        } else {
+            0
+        }
     }
 }
 

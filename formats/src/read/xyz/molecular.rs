@@ -3,6 +3,7 @@
 use std::ops::Range;
 
 use super::comment;
+use crate::names::{POSITION_PROPERTIES, SPECIES_PROPERTIES};
 use crate::read::Step;
 use crate::read::input::TextInput;
 use crate::read::table::{
@@ -254,14 +255,14 @@ fn extended_columns(
 }
 
 fn is_position(name: &[u8]) -> bool {
-    ["pos", "position", "positions", "coordinates"]
+    POSITION_PROPERTIES
         .iter()
         .any(|known| name.eq_ignore_ascii_case(known.as_bytes()))
 }
 
 fn is_species(name: &[u8], kind: &[u8]) -> bool {
     let is_named = |known: &str| name.eq_ignore_ascii_case(known.as_bytes());
-    kind.eq_ignore_ascii_case(b"S") && ["species", "element", "symbol"].into_iter().any(is_named)
+    kind.eq_ignore_ascii_case(b"S") && SPECIES_PROPERTIES.into_iter().any(is_named)
 }
 
 /// The array for a property whose first field is `cell`. Text and truth values have none, save species: given as

@@ -1,0 +1,113 @@
+//! The names of particle properties in files: one table for readers, conversion and rendering.
+//!
+//! The preferred name comes first. Names are compared without regard to case, see [`is_one_of`]. The lists for one
+//! property differ where formats do: `r` is a position among numpy arrays and a colour among columns. A property
+//! without a list, such as density or mass, has no meaning to the program and keeps the name that it has in its file.
+
+/// Names of a per-particle id. `ids` is numpy's plural, `Idp` is DualSPHysics'.
+pub const ID: [&str; 3] = ["id", "ids", "Idp"];
+
+/// Names of a velocity of three components.
+pub const VELOCITY: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];
+
+/// The name under which native frames hold radii that differ.
+pub const RADIUS: &str = "radius";
+
+/// Names of a radius or diameter, with the factor that makes it a radius. `pscale` is Houdini's.
+pub const RADII: [(&str, f64); 3] = [(RADIUS, 1.0), ("pscale", 1.0), ("diameter", 0.5)];
+
+/// Names of a colour of three or four components.
+pub const COLOR: [&str; 8] = [
+    "color", "colors", "colour", "colours", "rgb", "rgba", "rgbcolor", "cd",
+];
+
+/// Names of a colour whose integers are sRGB codes. Not `Cd`, which is linear.
+pub(crate) const COLOR_CODES: [&str; 4] = ["color", "colors", "rgb", "rgba"];
+
+/// Names of numpy arrays and fields that hold positions.
+pub(crate) const POSITION_ARRAYS: [&str; 9] = [
+    "positions",
+    "position",
+    "pos",
+    "points",
+    "coordinates",
+    "coords",
+    "coord",
+    "xyz",
+    "r",
+];
+
+/// Names of position columns without the component: `pos` of `pos_x`. The empty one stands for plain `x`, `y`, `z`.
+pub(crate) const POSITION_STEMS: [&str; 11] = [
+    "",
+    "pos",
+    "points",
+    "position",
+    "positions",
+    "point",
+    "coords",
+    "coord",
+    "coordinates",
+    "coordinate",
+    "p",
+];
+
+/// Names of positions among the `Properties` of extended XYZ.
+pub(crate) const POSITION_PROPERTIES: [&str; 4] = ["pos", "position", "positions", "coordinates"];
+
+/// Names of elements or species among the `Properties` of extended XYZ.
+pub(crate) const SPECIES_PROPERTIES: [&str; 3] = ["species", "element", "symbol"];
+
+/// LAMMPS columns of names, even if all of them happen to look like numbers.
+pub(crate) const LAMMPS_CATEGORIES: [&str; 2] = ["element", "typelabel"];
+
+/// LAMMPS columns of integers that must stay exact.
+pub(crate) const LAMMPS_INTEGERS: [&str; 3] = ["id", "type", "mol"];
+
+/// LAMMPS columns that together are a vector, and its name.
+pub(crate) const LAMMPS_VECTORS: [([&str; 3], &str); 2] = [
+    (["vx", "vy", "vz"], "velocity"),
+    (["fx", "fy", "fz"], "force"),
+];
+
+/// Stems to which a component is joined without anything between, `vx` and `PosX`, and the name of the vector if the
+/// stem is not its name.
+pub(crate) const JOINED_STEMS: [(&str, Option<&str>); 12] = [
+    ("v", Some("velocity")),
+    ("f", Some("force")),
+    ("a", Some("acceleration")),
+    ("n", Some("normal")),
+    ("p", None),
+    ("pos", None),
+    ("position", None),
+    ("coord", None),
+    ("vel", None),
+    ("velocity", None),
+    ("acc", None),
+    ("force", None),
+];
+
+/// Table columns that together are a colour.
+pub(crate) const COLOR_COLUMNS: [[&str; 3]; 2] = [["red", "green", "blue"], ["r", "g", "b"]];
+
+/// Scalars of binary records that together are a vector, by its name. The first that is complete is taken.
+pub(crate) const RECORD_VECTORS: [(&str, &[&str]); 6] = [
+    ("velocity", &["vx", "vy", "vz"]),
+    ("normal", &["nx", "ny", "nz"]),
+    ("color", &["red", "green", "blue", "alpha"]),
+    ("color", &["red", "green", "blue"]),
+    ("color", &["diffuse_red", "diffuse_green", "diffuse_blue"]),
+    ("color", &["r", "g", "b"]),
+];
+
+/// True if `name` is one of `names`, without regard to case.
+pub fn is_one_of(name: &str, names: &[&str]) -> bool {
+    names.iter().any(|known| known.eq_ignore_ascii_case(name))
+}
+
+/// True if `name` is a name of a radius or diameter.
+pub(crate) fn is_radius_name(name: &str) -> bool {
+    RADII
+        .iter()
+        .any(|(known, _)| known.eq_ignore_ascii_case(name))
+}
