@@ -57,7 +57,7 @@ impl AttributeData {
         });
     }
 
-    /// Moves the numbers of `more`, which has the same type, behind its own; without effect for another type.
+    /// Appends the numbers of `more`, which has the same type; without effect for another type.
     pub(crate) fn append(&mut self, more: &mut Self) {
         macro_rules! append {
             ($($variant:ident),*) => {

@@ -1,7 +1,7 @@
-//! How much memory reading one file may take.
+//! Memory limit for reading one file.
 //!
 //! A file of a few hundred kilobytes can ask for gigabytes: as gzip, as a member of an archive, as a block of
-//! VTK XML, or as text of short numbers. The caller says how much there is; a file that needs more fails by
+//! VTK XML, or as text of short numbers. The caller sets the limit; a file that needs more fails by
 //! name before the memory is taken.
 
 use crate::ParseError;
@@ -17,7 +17,7 @@ impl MemoryBudget {
     /// No limit but that of the machine.
     pub const UNLIMITED: Self = Self::new(u64::MAX, "free some memory");
 
-    /// So many bytes. `remedy` says in a message what to do about it: `raise the limit`.
+    /// A budget of `bytes`. Messages end with `remedy`, as in `raise the limit`.
     pub const fn new(bytes: u64, remedy: &'static str) -> Self {
         Self { bytes, remedy }
     }
@@ -36,7 +36,7 @@ impl MemoryBudget {
         }
     }
 
-    /// What is left beside `held` bytes.
+    /// The budget minus `held` bytes.
     pub(crate) const fn less(self, held: u64) -> Self {
         Self {
             bytes: self.bytes.saturating_sub(held),
@@ -44,7 +44,7 @@ impl MemoryBudget {
         }
     }
 
-    /// The part of it that the bytes of a file may take which has to be in memory as a whole: the rest is for
+    /// The share for the bytes of a file that has to be in memory as a whole: the rest is for
     /// the numbers.
     pub(crate) const fn for_content(self) -> Self {
         Self {
@@ -53,7 +53,7 @@ impl MemoryBudget {
         }
     }
 
-    /// That `need` bytes are allowed; `what` begins the message, as in `decompressed it is`.
+    /// Checks that `need` bytes are allowed; `what` begins the message, as in `decompressed it is`.
     ///
     /// # Errors
     /// [`ParseError::TooLarge`].

@@ -1,4 +1,4 @@
-//! The bytes of a file from front to back, gzip taken off on the way.
+//! The bytes of a file from front to back, decompressed.
 
 use std::io::{self, BufRead, Read, Seek};
 
@@ -8,15 +8,15 @@ use crate::budget::MemoryBudget;
 use crate::gzip::is_gzip;
 use crate::{FrameError, ParseError};
 
-/// Bytes that are unpacked before it is looked again whether they are too many.
+/// Bytes that are decompressed between two checks of the budget.
 const STEP: usize = 1 << 20;
 
-/// Why the next bytes cannot be had.
+/// Why the next bytes cannot be read.
 #[derive(Debug)]
 pub(crate) enum StreamError {
-    /// The system says so.
+    /// An error of the operating system.
     Io(io::Error),
-    /// They are damaged, or too many.
+    /// The bytes are damaged, or too many.
     Bytes(ParseError),
 }
 
@@ -36,7 +36,7 @@ impl StreamError {
     }
 }
 
-/// Uncompressed bytes that come in their order, a bounded number at a time.
+/// Uncompressed bytes in order, a bounded number at a time.
 pub(crate) trait ByteStream {
     /// Appends up to `most` bytes to `to`; fewer only at the end.
     ///
@@ -44,39 +44,39 @@ pub(crate) trait ByteStream {
     /// [`StreamError`].
     fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, StreamError>;
 
-    /// Passes over `count` bytes if that takes no reading; else nothing happens, and it is false.
+    /// Skips `count` bytes if that needs no reading; else returns false and does nothing.
     fn pass(&mut self, count: usize) -> bool;
 
-    /// How many bytes there were, and oddities, once all have been given.
+    /// The number of bytes, and notes, once all have been returned.
     fn ended(&self) -> Option<(usize, &[String])>;
 }
 
 /// The content of a file, compressed by gzip or not.
 pub(crate) struct Decompressor<R> {
-    state: State<R>,
+    state: DecompressorState<R>,
     is_compressed: bool,
     /// Uncompressed bytes so far.
     at: usize,
     notes: Vec<String>,
 }
 
-enum State<R> {
+enum DecompressorState<R> {
     Plain(R),
     Packed(GzDecoder<R>),
     Ended,
 }
 
 impl<R: BufRead + Seek> Decompressor<R> {
-    /// What `reader` gives, from its beginning.
+    /// The content of `reader`, from its beginning.
     ///
     /// # Errors
     /// It cannot be read.
     pub(crate) fn new(mut reader: R) -> io::Result<Self> {
         let is_compressed = is_gzip(reader.fill_buf()?);
         let state = if is_compressed {
-            State::Packed(GzDecoder::new(reader))
+            DecompressorState::Packed(GzDecoder::new(reader))
         } else {
-            State::Plain(reader)
+            DecompressorState::Plain(reader)
         };
         Ok(Self {
             state,
@@ -97,7 +97,7 @@ impl<R: BufRead + Seek> Decompressor<R> {
     ) -> Result<Vec<String>, StreamError> {
         loop {
             budget.check(bytes.len() as u64, TOO_LARGE)?;
-            // What was reserved is used up first.
+            // Use the reserved capacity first.
             let step = match bytes.capacity() - bytes.len() {
                 0 => STEP,
                 room => room.min(STEP),
@@ -113,22 +113,22 @@ impl<R: BufRead + Seek> Decompressor<R> {
         }
     }
 
-    /// Whether gzip was found.
+    /// Whether the file is gzip.
     pub(crate) const fn is_compressed(&self) -> bool {
         self.is_compressed
     }
 
-    /// Oddities so far.
+    /// Notes so far.
     pub(crate) fn into_notes(self) -> Vec<String> {
         self.notes
     }
 
-    /// What follows a stream of gzip: another one, or the end. Zeros are padding; anything else is ignored
+    /// The state after a gzip stream: another stream, or the end. Zeros are padding; anything else is ignored
     /// with a note, as `gzip -d` does.
-    fn after_member(&mut self, mut reader: R) -> io::Result<State<R>> {
+    fn after_member(&mut self, mut reader: R) -> io::Result<DecompressorState<R>> {
         let next = reader.fill_buf()?;
         if next.first() == Some(&0x1f) && next.get(1).is_none_or(|b| *b == 0x8b) {
-            return Ok(State::Packed(GzDecoder::new(reader)));
+            return Ok(DecompressorState::Packed(GzDecoder::new(reader)));
         }
         let (mut count, mut is_padding) = (0, true);
         loop {
@@ -145,16 +145,16 @@ impl<R: BufRead + Seek> Decompressor<R> {
             self.notes
                 .push(format!("{count} bytes after the gzip stream are ignored"));
         }
-        Ok(State::Ended)
+        Ok(DecompressorState::Ended)
     }
 }
 
-/// What the message about too large a content begins with.
+/// Beginning of the message for too large content.
 const TOO_LARGE: &str = "decompressed it is";
 
 impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
     fn pass(&mut self, count: usize) -> bool {
-        let State::Plain(reader) = &mut self.state else {
+        let DecompressorState::Plain(reader) = &mut self.state else {
             return false;
         };
         let passed = i64::try_from(count).is_ok_and(|count| reader.seek_relative(count).is_ok());
@@ -165,7 +165,7 @@ impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
     }
 
     fn ended(&self) -> Option<(usize, &[String])> {
-        matches!(self.state, State::Ended).then_some((self.at, &self.notes))
+        matches!(self.state, DecompressorState::Ended).then_some((self.at, &self.notes))
     }
 
     fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, StreamError> {
@@ -173,25 +173,25 @@ impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
         while to.len() - start < most {
             let left = (most - (to.len() - start)) as u64;
             let before = to.len();
-            match std::mem::replace(&mut self.state, State::Ended) {
-                State::Plain(mut reader) => {
+            match std::mem::replace(&mut self.state, DecompressorState::Ended) {
+                DecompressorState::Plain(mut reader) => {
                     let read = reader.by_ref().take(left).read_to_end(to);
                     if read.map_err(StreamError::Io)? as u64 == left {
-                        self.state = State::Plain(reader);
+                        self.state = DecompressorState::Plain(reader);
                     }
                 }
-                State::Packed(mut decoder) => {
+                DecompressorState::Packed(mut decoder) => {
                     let read = decoder.by_ref().take(left).read_to_end(to);
                     let at = self.at + (to.len() - before);
                     let read = read.map_err(|e| damaged(at, e))?;
                     self.state = if read as u64 == left {
-                        State::Packed(decoder)
+                        DecompressorState::Packed(decoder)
                     } else {
                         let reader = decoder.into_inner();
                         self.after_member(reader).map_err(StreamError::Io)?
                     };
                 }
-                State::Ended => break,
+                DecompressorState::Ended => break,
             }
             self.at += to.len() - before;
         }
@@ -199,14 +199,14 @@ impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
     }
 }
 
-/// What is wrong with a stream of gzip after `at` good bytes.
+/// The error of a gzip stream after `at` good bytes.
 fn damaged(at: usize, error: io::Error) -> StreamError {
     if error.raw_os_error().is_some() {
         return StreamError::Io(error);
     }
     let what = match error.kind() {
         io::ErrorKind::UnexpectedEof => {
-            "the gzip stream breaks off here; perhaps it is still being written".to_owned()
+            "the gzip stream ends early here; perhaps it is still being written".to_owned()
         }
         io::ErrorKind::OutOfMemory => "no memory left to unpack the gzip stream".to_owned(),
         _ => format!("the gzip stream is damaged: {error}"),

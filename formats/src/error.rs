@@ -1,9 +1,9 @@
-//! What can go wrong with a frame, by what the caller can do next.
+//! Errors of frames, by what the caller can do next.
 //!
 //! Parsers work on bytes and report an offset ([`ParseError`]); the edge that opened the file adds
 //! the path ([`FrameError`]).
 //!
-//! What an error says may quote the file, so it is made one line of bounded length where the error is
+//! Messages may quote the file, so they are made one line of bounded length where the error is
 //! made, for all readers.
 
 use std::io;
@@ -25,13 +25,13 @@ pub enum ParseError {
     /// A valid file of a kind this version does not read.
     #[error("{what}")]
     Unsupported {
-        /// What it is and what to do instead.
+        /// The kind of file and the remedy.
         what: String,
     },
     /// Reading it takes more memory than is allowed.
     #[error("{what}")]
     TooLarge {
-        /// How much is allowed and what to do about it.
+        /// The limit and the remedy.
         what: String,
     },
 }
@@ -59,7 +59,7 @@ impl ParseError {
         }
     }
 
-    /// The same fault in a file of which `start` bytes come before those that were looked at.
+    /// The same fault in a file with `start` bytes before those that were parsed.
     #[must_use]
     pub(crate) fn behind(self, start: usize) -> Self {
         match self {
@@ -71,7 +71,7 @@ impl ParseError {
         }
     }
 
-    /// The same fault at the same place, told as `tell` has it.
+    /// The same fault at the same offset, with the message changed by `reword`.
     #[must_use]
     pub fn retold(self, tell: impl FnOnce(&str) -> String) -> Self {
         match self {
@@ -108,12 +108,12 @@ pub enum FrameError {
         /// The fact and the remedy.
         what: String,
     },
-    /// Valid, but not for this version.
+    /// A valid file that this version does not read.
     #[error("{}: {what}", path.display())]
     Unsupported {
         /// The file.
         path: PathBuf,
-        /// What it is and what to do instead.
+        /// The kind of file and the remedy.
         what: String,
     },
     /// Reading it takes more memory than is allowed; worth a retry with more.
@@ -121,7 +121,7 @@ pub enum FrameError {
     TooLarge {
         /// The file.
         path: PathBuf,
-        /// How much is allowed and what to do about it.
+        /// The limit and the remedy.
         what: String,
     },
     /// The operating system refused; perhaps worth a retry.

@@ -73,7 +73,7 @@ pub struct RawParticles {
     /// Everything else that is numeric and per particle; each holds exactly one value group a
     /// particle.
     pub attributes: Vec<Attribute>,
-    /// Simulation time, if the file tells.
+    /// Simulation time, if the file has it.
     pub time: Option<f64>,
     /// Step number written inside the file (LAMMPS `TIMESTEP`), if any.
     pub step: Option<i64>,

@@ -50,7 +50,7 @@ pub fn fill_box(settings: &BoxSettings) -> Vec<Vec3> {
 }
 
 impl BoxSettings {
-    /// Particle `index` of [`fill_box`]. The state only counts up, so every particle can start at its own place.
+    /// Particle `index` of [`fill_box`]. The state only counts up, so every particle can start at its own state.
     #[inline]
     pub fn particle(&self, index: u64) -> Vec3 {
         let first = index.wrapping_mul(3);

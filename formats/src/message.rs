@@ -6,7 +6,7 @@ use std::borrow::Cow;
 const START: usize = 560;
 /// Characters that are kept of its end, where the remedy is.
 const END: usize = 240;
-/// Messages of so many characters are left whole: a shortened one is, with what it says of the gap.
+/// Messages up to this many characters are not shortened. A shortened one, with its note about the gap, is as long.
 const MOST: usize = START + END + 60;
 
 /// `text` as one line of bounded length that a terminal shows as it is: characters that control it,

@@ -1,4 +1,4 @@
-//! Regular files, and what tells one that was written to.
+//! Regular files, and how to notice that one was written to.
 
 use std::fs;
 use std::io;

@@ -57,13 +57,13 @@ impl ScalarType {
     /// Decodes all of `bytes`, which must be a whole number of scalars.
     ///
     /// # Errors
-    /// [`ParseError::Malformed`] at byte 0 if the length is no multiple of [`Self::size`].
+    /// [`ParseError::Malformed`] at byte 0 if the length is not a multiple of [`Self::size`].
     pub fn decode(self, endian: Endian, bytes: &[u8]) -> Result<AttributeData, ParseError> {
         if !bytes.len().is_multiple_of(self.size()) {
             return Err(ParseError::malformed(
                 0,
                 format!(
-                    "{} bytes are no whole number of {}",
+                    "{} bytes are not a whole number of {}",
                     bytes.len(),
                     self.name()
                 ),

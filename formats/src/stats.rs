@@ -1,4 +1,4 @@
-//! What `inspect` says of a frame: counts, bounds, means, and the range of every attribute.
+//! What `inspect` reports about a frame: counts, bounds, means, and the range of every attribute.
 //!
 //! All from the numbers as the file has them, in f64 or exact integers; sums are taken in fixed
 //! pieces, so that the result does not depend on the number of threads.

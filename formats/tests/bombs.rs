@@ -141,7 +141,7 @@ fn other_formats_in_gzip() {
     bomb(
         "dump.0.gz",
         &gz(&dump(&rows.repeat(few), few)),
-        "in memory its numbers are",
+        "its numbers in memory are",
     );
     // Lists of steps.
     bomb(

@@ -6,7 +6,7 @@ use super::{
     BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, Q10Block, Q16Block, WIDTH,
 };
 
-/// Leaves where they lie. Lengths fit each other (`count` particles fill so many blocks, these so many
+/// Leaves in place. Lengths fit each other (`count` particles fill so many blocks, these so many
 /// nodes); the contents are those of a file and may be anything.
 #[derive(Debug, Clone, Copy)]
 pub struct StoredLeaves<'a> {
@@ -43,7 +43,7 @@ pub struct CompactBlocks<'a, B> {
 /// Radii by encoding; `low + code * step` where they are coded.
 #[derive(Debug, Clone, Copy)]
 pub enum StoredRadii<'a> {
-    /// All alike, or not told: none here.
+    /// All alike, or unknown: none here.
     None,
     /// As they are.
     F32(&'a [BlockRadii]),
@@ -68,7 +68,7 @@ pub enum StoredRadii<'a> {
 }
 
 impl<B: CompactBlock> CompactBlocks<'_, B> {
-    /// The positions of block `index`, of which `frame` is the grid. A reference to a block that is not
+    /// The positions of block `index` in its grid `frame`. A reference to a block that is not
     /// there, which only a damaged file has, gives the block decoded as if it were coded.
     ///
     /// # Panics

@@ -4,12 +4,12 @@ use std::sync::atomic::{AtomicU64, Ordering};
 
 /// Bytes held now and at most.
 #[derive(Debug, Default)]
-pub(super) struct Account {
+pub(super) struct MemoryAccount {
     now: AtomicU64,
     most: AtomicU64,
 }
 
-impl Account {
+impl MemoryAccount {
     pub(super) fn hold(&self, bytes: u64) {
         let now = self.now.fetch_add(bytes, Ordering::Relaxed) + bytes;
         self.most.fetch_max(now, Ordering::Relaxed);

@@ -4,7 +4,7 @@ use std::sync::Mutex;
 
 use glam::{DVec3, Vec3};
 
-use super::columns::{Columns, RadiusColumn};
+use super::columns::{RadiusColumn, StoredColumns};
 use super::source::ParticleSource;
 use crate::{FrameError, is_near};
 
@@ -17,19 +17,19 @@ pub(super) struct Batch {
     pub(super) rows: Vec<u8>,
     /// Where in the stretch they were; empty if all of it is finite.
     kept: Vec<u32>,
-    /// As the source gives them.
+    /// In the order of the source.
     pub(super) world: Vec<DVec3>,
     pub(super) values: Vec<u8>,
 }
 
-/// A stretch of the source.
+/// A range of particles of the source.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Stretch {
+pub(super) struct ParticleRange {
     pub(super) first: u64,
     pub(super) len: usize,
 }
 
-impl Stretch {
+impl ParticleRange {
     /// Stretch number `number` of those of `len` that `count` particles are cut into.
     pub(super) fn nth(number: u64, len: usize, count: u64) -> Self {
         let first = number * len as u64;
@@ -47,7 +47,7 @@ impl Batch {
         &mut self,
         source: &dyn ParticleSource,
         origin: DVec3,
-        stretch: Stretch,
+        stretch: ParticleRange,
     ) -> Result<(), FrameError> {
         self.world.resize(stretch.len, DVec3::ZERO);
         source.read_positions(stretch.first, &mut self.world)?;
@@ -65,7 +65,7 @@ impl Batch {
         Ok(())
     }
 
-    /// Calls `see` with the place in the stretch of each particle that is kept.
+    /// Calls `see` with the index in the batch of each particle that is kept.
     pub(super) fn for_each_place(&self, mut see: impl FnMut(usize)) {
         if self.kept.len() == self.positions.len() {
             self.kept.iter().for_each(|place| see(*place as usize));
@@ -80,7 +80,7 @@ impl Batch {
         source: &dyn ParticleSource,
         attribute: usize,
         width: usize,
-        stretch: Stretch,
+        stretch: ParticleRange,
     ) -> Result<(), FrameError> {
         self.values.resize(stretch.len * width, 0);
         source.read_values(attribute, stretch.first, &mut self.values)
@@ -91,8 +91,8 @@ impl Batch {
     pub(super) fn read_rows(
         &mut self,
         source: &dyn ParticleSource,
-        columns: &Columns,
-        stretch: Stretch,
+        columns: &StoredColumns,
+        stretch: ParticleRange,
         errors: &mut [f64],
     ) -> Result<(), FrameError> {
         let width = columns.width();
@@ -133,8 +133,8 @@ impl Batch {
         Ok(())
     }
 
-    /// The places of the particles in the source as values of `size` bytes.
-    fn fill_places(&mut self, size: usize, stretch: Stretch) {
+    /// The indices of the particles in the source as values of `size` bytes.
+    fn fill_places(&mut self, size: usize, stretch: ParticleRange) {
         self.values.clear();
         for place in stretch.first..stretch.first + stretch.len as u64 {
             self.values.extend_from_slice(&place.to_le_bytes()[..size]);
@@ -142,12 +142,12 @@ impl Batch {
     }
 }
 
-/// Things that are used again, as many as are in use at a time: what a thread takes costs no memory that another
+/// Buffers for reuse, as many as are in use at a time: a thread takes no new memory while another
 /// has let go.
 #[derive(Debug, Default)]
-pub(super) struct Shelf<T>(Mutex<Vec<T>>);
+pub(super) struct BufferPool<T>(Mutex<Vec<T>>);
 
-impl<T: Default> Shelf<T> {
+impl<T: Default> BufferPool<T> {
     pub(super) fn take(&self) -> T {
         let mut all = self.0.lock().unwrap_or_else(|e| e.into_inner());
         all.pop().unwrap_or_default()

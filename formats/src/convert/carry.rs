@@ -4,14 +4,19 @@ use glam::Vec3;
 use rayon::prelude::*;
 
 use super::curve::Curve;
-use super::order::Part;
+use super::order::PartData;
 
 /// Particles that a task counts.
 const TASK: usize = 1 << 16;
 
 /// Takes from `part` those particles beyond a multiple of `unit` that are last on `curve`: the next part begins
 /// where they are.
-pub(super) fn carry_last(part: &mut Part, curve: &Curve, width: usize, unit: usize) -> Part {
+pub(super) fn carry_last(
+    part: &mut PartData,
+    curve: &Curve,
+    width: usize,
+    unit: usize,
+) -> PartData {
     let count = part.len() % unit;
     let mut carried = last_on(&part.positions, curve, count);
     carried.sort_unstable();
@@ -78,7 +83,7 @@ mod tests {
 
     /// Every particle of `all` is in one of `parts`, with its own row: its number.
     #[track_caller]
-    fn assert_complete(all: &[Vec3], parts: [&Part; 2]) {
+    fn assert_complete(all: &[Vec3], parts: [&PartData; 2]) {
         let mut seen = vec![false; all.len()];
         for part in parts {
             assert_eq!(part.rows.len(), 4 * part.len());
@@ -103,7 +108,7 @@ mod tests {
             let curve = Curve::over(&all);
             let (part, carried) = carried_of(&all, &curve);
             // Of a cell with very many it does not matter which.
-            let cells = |part: &Part| -> Vec<usize> {
+            let cells = |part: &PartData| -> Vec<usize> {
                 part.positions.iter().map(|p| curve.cell(*p)).collect()
             };
             let (before, after) = (cells(&part), cells(&carried));
@@ -112,15 +117,16 @@ mod tests {
         let even = fill_box(&BoxSettings::thesis(10_000, 1));
         let curve = Curve::over(&even);
         let (part, carried) = carried_of(&even, &curve);
-        let places =
-            |part: &Part| -> Vec<u64> { part.positions.iter().map(|p| curve.place(*p)).collect() };
+        let places = |part: &PartData| -> Vec<u64> {
+            part.positions.iter().map(|p| curve.place(*p)).collect()
+        };
         assert!(places(&part).iter().max() <= places(&carried).iter().min());
     }
 
     /// What stays and what goes on.
     #[track_caller]
-    fn carried_of(all: &[Vec3], curve: &Curve) -> (Part, Part) {
-        let mut part = Part {
+    fn carried_of(all: &[Vec3], curve: &Curve) -> (PartData, PartData) {
+        let mut part = PartData {
             rows: (0..).take(all.len()).flat_map(u32::to_le_bytes).collect(),
             positions: all.to_vec(),
         };

@@ -1,4 +1,4 @@
-//! What is kept of a particle beside its position: a row of bytes that goes with it.
+//! What is stored of a particle beside its position: a row of bytes.
 
 use std::path::Path;
 
@@ -13,9 +13,9 @@ use crate::{ScalarType, is_radius};
 /// The rows of a conversion: the radius in f32 first where particles have their own, then attributes as they
 /// will be stored.
 #[derive(Debug, Clone)]
-pub(super) struct Columns {
+pub(super) struct StoredColumns {
     pub(super) radius: Option<RadiusColumn>,
-    pub(super) attributes: Vec<Column>,
+    pub(super) attributes: Vec<StoredColumn>,
 }
 
 /// Radii of their own.
@@ -29,8 +29,8 @@ pub(super) struct RadiusColumn {
 
 /// One attribute.
 #[derive(Debug, Clone)]
-pub(super) struct Column {
-    /// Number in the source; `None` for a particle's place in it.
+pub(super) struct StoredColumn {
+    /// Number in the source; `None` for the particle's index.
     pub(super) attribute: Option<usize>,
     pub(super) name: String,
     pub(super) components: usize,
@@ -56,7 +56,7 @@ impl RadiusColumn {
     }
 }
 
-impl Column {
+impl StoredColumn {
     /// Bytes of one particle in the source.
     pub(super) fn source_width(&self) -> usize {
         self.components * self.scalar.size()
@@ -118,7 +118,7 @@ impl Column {
     }
 }
 
-/// Infinities and what is no number are stored as such where they can be.
+/// Infinities and what is not a number are stored as such where they can be.
 fn difference(value: f64, stored: f64) -> f64 {
     let is_same = value == stored || value.is_nan() && stored.is_nan();
     if is_same { 0.0 } else { (value - stored).abs() }
@@ -138,7 +138,7 @@ fn code_of(value: f64, range: [f64; 2]) -> u8 {
     }
 }
 
-impl Columns {
+impl StoredColumns {
     /// What `settings` keep of `source`.
     pub(super) fn choose(
         source: &dyn ParticleSource,
@@ -170,7 +170,7 @@ impl Columns {
             if has_radius && is_float(attribute) && attribute.name.eq_ignore_ascii_case(RADIUS) {
                 continue;
             }
-            columns.push(Column {
+            columns.push(StoredColumn {
                 attribute: Some(number),
                 name: attribute.name.clone(),
                 components: attribute.components,
@@ -192,12 +192,17 @@ impl Columns {
     /// Bytes of a row.
     pub(super) fn width(&self) -> usize {
         let radius = self.radius.map_or(0, |_| RadiusColumn::WIDTH);
-        radius + self.attributes.iter().map(Column::width).sum::<usize>()
+        radius
+            + self
+                .attributes
+                .iter()
+                .map(StoredColumn::width)
+                .sum::<usize>()
     }
 
     /// Most bytes that one particle has for one attribute of the source.
     pub(super) fn widest(&self) -> usize {
-        let widths = self.attributes.iter().map(Column::source_width);
+        let widths = self.attributes.iter().map(StoredColumn::source_width);
         widths.chain([8]).max().unwrap_or(8)
     }
 }
@@ -209,14 +214,14 @@ impl ConvertSettings {
     }
 }
 
-fn place_column(count: u64) -> Column {
+fn place_column(count: u64) -> StoredColumn {
     let is_short = u32::try_from(count).is_ok();
     let scalar = if is_short {
         ScalarType::U32
     } else {
         ScalarType::U64
     };
-    Column {
+    StoredColumn {
         attribute: None,
         name: "id".to_owned(),
         components: 1,
@@ -282,7 +287,7 @@ fn check(
     } = settings.radius
         && !is_radius(radius)
     {
-        let what = format!("{radius} is no radius; give one above zero");
+        let what = format!("{radius} is not a radius; give one above zero");
         return Err(ConvertError::refused(path, what));
     }
     Ok(())

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use crate::order::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
 
-/// Bits of a place on the curve below those of the top cells.
+/// Bits of a curve position below those of the top cells.
 const LOWER_BITS: u32 = 3 * (AXIS_BITS - TopCells::MAX_LEVELS);
 
 /// The curve over the bulk of some particles: those that escaped are at its border.
@@ -24,7 +24,7 @@ impl Curve {
         Self { grid, top }
     }
 
-    /// The place of `position`, 63 bits.
+    /// The curve position of `position`, 63 bits.
     #[inline]
     pub(super) fn place(&self, position: Vec3) -> u64 {
         hilbert(
@@ -36,13 +36,13 @@ impl Curve {
         .0
     }
 
-    /// The highest bits of the place, at little cost.
+    /// The highest bits of the curve position, at little cost.
     #[inline]
     pub(super) fn cell(&self, position: Vec3) -> usize {
         self.top.cell_of(position)
     }
 
-    /// Cells that [`Self::cell`] tells apart.
+    /// Cells that [`Self::cell`] distinguishes.
     pub(super) fn cells(&self) -> usize {
         self.top.len()
     }

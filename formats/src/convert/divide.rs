@@ -7,18 +7,18 @@ use std::sync::{Arc, Mutex};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::batch::{Batch, Shelf, Stretch};
+use super::batch::{Batch, BufferPool, ParticleRange};
 use super::curve::Cuts;
 use super::limits::Limits;
-use super::output::Output;
+use super::output::FrameOutput;
 use super::settings::{ConvertError, Phase};
-use super::store::{Chunk, Held, Store};
+use super::store::{Chunk, ChunkStore, StoredChunk};
 use crate::FrameError;
 
-/// Particles that are together in one stretch of a curve.
+/// Particles of one section of the curve, not yet ordered.
 #[derive(Debug)]
-pub(super) struct Pile {
-    pub(super) held: Vec<Held>,
+pub(super) struct UnorderedPart {
+    pub(super) held: Vec<StoredChunk>,
     pub(super) len: usize,
     /// The curve that it was cut from.
     pub(super) cuts: Arc<Cuts>,
@@ -29,14 +29,14 @@ pub(super) struct Pile {
 /// A part that is being filled.
 #[derive(Debug, Default)]
 struct Heap {
-    held: Vec<Held>,
+    held: Vec<StoredChunk>,
     len: usize,
     open: Option<Chunk>,
 }
 
-/// Records of a stretch, sorted by part.
+/// Records of a batch, sorted by part.
 #[derive(Debug, Default)]
-struct Staged {
+struct PartitionedBatch {
     positions: Vec<Vec3>,
     rows: Vec<u8>,
     /// Where each part begins, and the end.
@@ -47,16 +47,19 @@ struct Staged {
 
 /// All of the source in parts.
 pub(super) fn divide_source(
-    output: &mut Output,
+    output: &mut FrameOutput,
     cuts: Cuts,
     limits: &Limits,
-    store: &Store,
-) -> Result<Vec<Pile>, ConvertError> {
+    store: &ChunkStore,
+) -> Result<Vec<UnorderedPart>, ConvertError> {
     let (asked, columns) = (output.asked, output.columns);
     let width = columns.width();
     let total = asked.source.count();
     let stretches = total.div_ceil(limits.batch_len as u64);
-    let (batches, stages) = (Shelf::<Batch>::default(), Shelf::<Staged>::default());
+    let (batches, stages) = (
+        BufferPool::<Batch>::default(),
+        BufferPool::<PartitionedBatch>::default(),
+    );
     let errors = Mutex::new(std::mem::take(&mut output.errors));
     let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
     let mut first = 0;
@@ -66,7 +69,7 @@ pub(super) fn divide_source(
             .into_par_iter()
             .map(|number| {
                 let (mut batch, mut staged) = (batches.take(), stages.take());
-                let stretch = Stretch::nth(number, limits.batch_len, total);
+                let stretch = ParticleRange::nth(number, limits.batch_len, total);
                 batch.read_positions(asked.source, asked.settings.origin, stretch)?;
                 let mut own_errors = vec![0.0; columns.attributes.len()];
                 batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
@@ -79,7 +82,7 @@ pub(super) fn divide_source(
                 batches.put(batch);
                 Ok(staged)
             })
-            .collect::<Result<Vec<Staged>, ConvertError>>()?;
+            .collect::<Result<Vec<PartitionedBatch>, ConvertError>>()?;
         append_all(&mut heaps, &staged, width, store)?;
         staged.into_iter().for_each(|s| stages.put(s));
         first = end;
@@ -97,18 +100,18 @@ pub(super) fn divide_source(
 
 /// `pile` in smaller parts.
 pub(super) fn divide_pile(
-    pile: Pile,
+    pile: UnorderedPart,
     cuts: Cuts,
     width: usize,
     limits: &Limits,
-    store: &Store,
-) -> Result<Vec<Pile>, ConvertError> {
-    let stages = Shelf::<Staged>::default();
+    store: &ChunkStore,
+) -> Result<Vec<UnorderedPart>, ConvertError> {
+    let stages = BufferPool::<PartitionedBatch>::default();
     let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
     let together = (limits.window * limits.batch_len / store.chunk_len()).max(1);
     let mut held = pile.held.into_iter();
     loop {
-        let some: Vec<Held> = held.by_ref().take(together).collect();
+        let some: Vec<StoredChunk> = held.by_ref().take(together).collect();
         if some.is_empty() {
             break;
         }
@@ -121,7 +124,7 @@ pub(super) fn divide_pile(
                 })?;
                 Ok(staged)
             })
-            .collect::<Result<Vec<Staged>, FrameError>>()?;
+            .collect::<Result<Vec<PartitionedBatch>, FrameError>>()?;
         append_all(&mut heaps, &staged, width, store)?;
         staged.into_iter().for_each(|s| stages.put(s));
     }
@@ -130,9 +133,9 @@ pub(super) fn divide_pile(
 
 fn append_all(
     heaps: &mut [Heap],
-    staged: &[Staged],
+    staged: &[PartitionedBatch],
     width: usize,
-    store: &Store,
+    store: &ChunkStore,
 ) -> Result<(), FrameError> {
     heaps
         .par_iter_mut()
@@ -148,15 +151,15 @@ fn closed(
     heaps: Vec<Heap>,
     cuts: Cuts,
     depth: u32,
-    store: &Store,
-) -> Result<Vec<Pile>, ConvertError> {
+    store: &ChunkStore,
+) -> Result<Vec<UnorderedPart>, ConvertError> {
     let cuts = Arc::new(cuts);
     let mut piles = Vec::with_capacity(heaps.len());
     for mut heap in heaps {
         if let Some(open) = heap.open.take() {
             heap.held.push(store.put(open)?);
         }
-        piles.push(Pile {
+        piles.push(UnorderedPart {
             held: heap.held,
             len: heap.len,
             cuts: Arc::clone(&cuts),
@@ -171,10 +174,10 @@ impl Heap {
     /// Takes in records `range` of `staged`.
     fn append(
         &mut self,
-        staged: &Staged,
+        staged: &PartitionedBatch,
         mut range: Range<usize>,
         width: usize,
-        store: &Store,
+        store: &ChunkStore,
     ) -> Result<(), FrameError> {
         self.len += range.len();
         while !range.is_empty() {
@@ -199,7 +202,7 @@ impl Heap {
     }
 }
 
-impl Staged {
+impl PartitionedBatch {
     /// Takes in records, in their order within each part.
     fn sort(&mut self, positions: &[Vec3], rows: &[u8], width: usize, cuts: &Cuts) {
         self.parts.clear();

@@ -3,7 +3,7 @@
 use super::settings::ConvertSettings;
 use crate::order::kd;
 
-/// Most particles that are ordered together when all of them fit into memory: their places have 32 bits, and a
+/// Most particles that are ordered together when all of them fit into memory: their indices have 32 bits, and a
 /// longer order is no better.
 const LARGEST_WHOLE: u64 = 1 << 26;
 /// Most particles of a part: some 200 MiB. One run each of 10^8 took 11.6 s, and 13.5 s with twice as many.

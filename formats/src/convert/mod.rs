@@ -32,12 +32,12 @@ mod store;
 mod survey;
 mod whole;
 
-use account::Account;
-use columns::Columns;
+use account::MemoryAccount;
+use columns::StoredColumns;
 use limits::Limits;
-use output::Output;
-use parts::Divided;
-use survey::{Asked, Reading, survey};
+use output::FrameOutput;
+use parts::PartCounts;
+use survey::{BatchSettings, ConvertRequest, survey};
 
 pub use foreign::open_source;
 pub use settings::{
@@ -49,20 +49,20 @@ pub use sources::{BlockSettings, BlockSource, BoxSource, NativeSource, RawSource
 /// Writes what `source` holds to `path` as a native frame.
 ///
 /// # Errors
-/// [`ConvertError`]; nothing is left behind then.
+/// [`ConvertError`]; no file is left over then.
 pub fn convert(
     source: &dyn ParticleSource,
     path: &Path,
     settings: &ConvertSettings,
     progress: &dyn Progress,
 ) -> Result<ConvertReport, ConvertError> {
-    let asked = Asked {
+    let asked = ConvertRequest {
         source,
         path,
         settings,
         progress,
     };
-    let columns = Columns::choose(source, settings, path)?;
+    let columns = StoredColumns::choose(source, settings, path)?;
     let limits = Limits::of(settings, source.count(), columns.width(), columns.widest());
     convert_within(asked, columns, limits)
 }
@@ -78,25 +78,25 @@ pub fn convert_in_parts(
     path: &Path,
     settings: &ConvertSettings,
 ) -> Result<ConvertReport, ConvertError> {
-    let asked = Asked {
+    let asked = ConvertRequest {
         source,
         path,
         settings,
         progress: &(),
     };
-    let columns = Columns::choose(source, settings, path)?;
+    let columns = StoredColumns::choose(source, settings, path)?;
     convert_within(asked, columns, Limits::SMALLEST)
 }
 
 /// Converts within `limits`.
 fn convert_within(
-    asked: Asked,
-    columns: Columns,
+    asked: ConvertRequest,
+    columns: StoredColumns,
     limits: Limits,
 ) -> Result<ConvertReport, ConvertError> {
     let mut clock = Clock::new();
-    let account = Account::default();
-    let reading = Reading {
+    let account = MemoryAccount::default();
+    let reading = BatchSettings {
         batch_len: limits.batch_len,
         sample_stride: if limits.is_whole {
             0
@@ -107,10 +107,10 @@ fn convert_within(
     let survey = survey(asked, &columns, reading)?;
     clock.lap(Phase::Survey);
     let (columns, common) = survey.settled(asked.path, columns)?;
-    let mut output = Output::new(asked, &columns, &survey, common, limits.run_len);
+    let mut output = FrameOutput::new(asked, &columns, &survey, common, limits.run_len);
     let divided = if limits.is_whole {
         whole::convert(&mut output, &limits, &account)?;
-        Divided {
+        PartCounts {
             parts: 1,
             spilled_bytes: 0,
         }

@@ -5,20 +5,20 @@ use std::ops::Range;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::account::Account;
-use super::columns::{Columns, RadiusColumn};
+use super::account::MemoryAccount;
+use super::columns::{RadiusColumn, StoredColumns};
 use crate::native::{FrameWriter, Run, arrange};
 use crate::order::kd;
 
 /// Particles that are ordered together.
 #[derive(Debug, Default)]
-pub(super) struct Part {
+pub(super) struct PartData {
     pub(super) positions: Vec<Vec3>,
     /// A row for each particle.
     pub(super) rows: Vec<u8>,
 }
 
-impl Part {
+impl PartData {
     pub(super) fn len(&self) -> usize {
         self.positions.len()
     }
@@ -77,9 +77,9 @@ impl Part {
     }
 }
 
-/// Room to order parts, used again for each.
+/// Buffers to order parts, reused for each.
 #[derive(Debug, Default)]
-pub(super) struct Ordered {
+pub(super) struct OrderedPart {
     /// In tree order.
     pub(super) positions: Vec<Vec3>,
     /// Where in the part each of them was; empty if there are no rows.
@@ -90,10 +90,10 @@ pub(super) struct Ordered {
     attributes: Vec<Vec<u8>>,
 }
 
-/// Particles of which a task gathers the rows.
+/// Particles whose rows one task gathers.
 const TASK: usize = 4096;
 
-impl Ordered {
+impl OrderedPart {
     /// Room to order parts of `len` particles with rows of `width` bytes.
     pub(super) fn with_room(len: usize, width: usize) -> Self {
         Self {
@@ -104,7 +104,7 @@ impl Ordered {
     }
 
     /// Takes in the order of `part`.
-    pub(super) fn order(&mut self, part: &Part, account: &Account) {
+    pub(super) fn order(&mut self, part: &PartData, account: &MemoryAccount) {
         let len = part.len();
         self.positions.resize(len, Vec3::ZERO);
         let is_followed = !part.rows.is_empty();
@@ -125,8 +125,8 @@ impl Ordered {
     /// Gives particles `run` of `part`, which was ordered, to the file.
     pub(super) fn push(
         &mut self,
-        part: &Part,
-        columns: &Columns,
+        part: &PartData,
+        columns: &StoredColumns,
         run: Range<usize>,
         writer: &mut FrameWriter,
     ) -> std::io::Result<()> {
@@ -139,7 +139,7 @@ impl Ordered {
         })
     }
 
-    fn gather(&mut self, part: &Part, columns: &Columns, run: &Range<usize>) {
+    fn gather(&mut self, part: &PartData, columns: &StoredColumns, run: &Range<usize>) {
         let width = columns.width();
         self.attributes.resize(columns.attributes.len(), Vec::new());
         if width == 0 {

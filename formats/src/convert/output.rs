@@ -1,18 +1,18 @@
 //! The frame that comes of a conversion, begun when the first part is in order.
 
-use super::columns::Columns;
-use super::order::{Ordered, Part};
+use super::columns::StoredColumns;
+use super::order::{OrderedPart, PartData};
 use super::settings::{ConvertError, Phase, RadiusRule};
-use super::survey::{Asked, Survey};
+use super::survey::{ConvertRequest, Survey};
 use crate::FrameError;
 use crate::native::{
     FrameIndex, FrameSpec, FrameWriter, RadiusSpec, radius_range, smallest_encoding,
 };
 
-/// Takes parts that are in order.
-pub(super) struct Output<'a> {
-    pub(super) asked: Asked<'a>,
-    pub(super) columns: &'a Columns,
+/// Writes ordered parts to the frame.
+pub(super) struct FrameOutput<'a> {
+    pub(super) asked: ConvertRequest<'a>,
+    pub(super) columns: &'a StoredColumns,
     pub(super) survey: &'a Survey,
     /// Largest error of each attribute; known before the first part comes.
     pub(super) errors: Vec<f64>,
@@ -23,10 +23,10 @@ pub(super) struct Output<'a> {
     writer: Option<FrameWriter>,
 }
 
-impl<'a> Output<'a> {
+impl<'a> FrameOutput<'a> {
     pub(super) fn new(
-        asked: Asked<'a>,
-        columns: &'a Columns,
+        asked: ConvertRequest<'a>,
+        columns: &'a StoredColumns,
         survey: &'a Survey,
         common: Option<f32>,
         run_len: usize,
@@ -43,8 +43,12 @@ impl<'a> Output<'a> {
         }
     }
 
-    /// Writes `part`, of which `ordered` has the order.
-    pub(super) fn push(&mut self, part: &Part, ordered: &mut Ordered) -> Result<(), ConvertError> {
+    /// Writes `part` in the order of `ordered`.
+    pub(super) fn push(
+        &mut self,
+        part: &PartData,
+        ordered: &mut OrderedPart,
+    ) -> Result<(), ConvertError> {
         let mut writer = match self.writer.take() {
             Some(writer) => writer,
             None => self.begin(ordered)?,
@@ -68,7 +72,7 @@ impl<'a> Output<'a> {
     pub(super) fn finish(mut self) -> Result<FrameIndex, ConvertError> {
         let writer = match self.writer.take() {
             Some(writer) => writer,
-            None => self.begin(&Ordered::default())?,
+            None => self.begin(&OrderedPart::default())?,
         };
         self.asked.source.check()?;
         let total = self.survey.count;
@@ -78,8 +82,8 @@ impl<'a> Output<'a> {
     }
 
     /// Begins the frame, whose first particles are `ordered`.
-    fn begin(&self, ordered: &Ordered) -> Result<FrameWriter, ConvertError> {
-        let Asked {
+    fn begin(&self, ordered: &OrderedPart) -> Result<FrameWriter, ConvertError> {
+        let ConvertRequest {
             source,
             settings,
             path,

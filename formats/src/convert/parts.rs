@@ -7,36 +7,36 @@ use std::{panic, thread};
 use glam::Vec3;
 
 use super::Clock;
-use super::account::Account;
+use super::account::MemoryAccount;
 use super::carry::carry_last;
 use super::curve::Cuts;
-use super::divide::{Pile, divide_pile, divide_source};
+use super::divide::{UnorderedPart, divide_pile, divide_source};
 use super::limits::Limits;
-use super::order::{Ordered, Part};
-use super::output::Output;
+use super::order::{OrderedPart, PartData};
+use super::output::FrameOutput;
 use super::settings::{ConvertError, Phase};
-use super::store::{Store, StoreSettings};
+use super::store::{ChunkStore, StoreSettings};
 use crate::FrameError;
 
 /// How often a part is divided again. Each time its curve is over its own particles alone; what is too large
-/// then is cut anywhere, because nearly all of it is in one place.
+/// then is cut anywhere, because nearly all of its particles are at one position.
 const MOST_DIVISIONS: u32 = 8;
 /// Particles of a pile that its quantiles are taken from.
 const SAMPLE: usize = 1 << 14;
 
-/// What came of it beside the frame.
-pub(super) struct Divided {
+/// Counts for the report.
+pub(super) struct PartCounts {
     pub(super) parts: usize,
     pub(super) spilled_bytes: u64,
 }
 
 /// Divides, orders and writes everything.
 pub(super) fn convert(
-    output: &mut Output,
+    output: &mut FrameOutput,
     limits: &Limits,
-    account: &Account,
+    account: &MemoryAccount,
     clock: &mut Clock,
-) -> Result<Divided, ConvertError> {
+) -> Result<PartCounts, ConvertError> {
     let width = output.columns.width();
     let count = usize::try_from(output.survey.count).unwrap_or(usize::MAX);
     let parts = count.div_ceil(limits.aimed_len()).clamp(1, limits.parts);
@@ -48,26 +48,26 @@ pub(super) fn convert(
         open: cuts.len(),
         dir: scratch_dir(output),
     };
-    let store = Store::new(settings, account);
+    let store = ChunkStore::new(settings, account);
     account.hold(limits.window_bytes as u64);
     let mut piles = divide_source(output, cuts, limits, &store)?;
     account.let_go(limits.window_bytes as u64);
     clock.lap(Phase::Divide);
     piles.reverse();
-    let waiting = Waiting {
+    let waiting = PartQueue {
         piles,
         width,
         limits,
         store: &store,
     };
     let parts = order_all(output, waiting, account)?;
-    Ok(Divided {
+    Ok(PartCounts {
         parts,
         spilled_bytes: store.spilled(),
     })
 }
 
-fn scratch_dir(output: &Output) -> PathBuf {
+fn scratch_dir(output: &FrameOutput) -> PathBuf {
     let beside = || match output.asked.path.parent() {
         Some(parent) if parent != Path::new("") => parent.to_owned(),
         _ => PathBuf::from("."),
@@ -77,27 +77,30 @@ fn scratch_dir(output: &Output) -> PathBuf {
 }
 
 /// Parts that are still to be ordered.
-struct Waiting<'a> {
+struct PartQueue<'a> {
     /// The next one is the last.
-    piles: Vec<Pile>,
+    piles: Vec<UnorderedPart>,
     width: usize,
     limits: &'a Limits,
-    store: &'a Store<'a>,
+    store: &'a ChunkStore<'a>,
 }
 
 fn order_all(
-    output: &mut Output,
-    mut waiting: Waiting,
-    account: &Account,
+    output: &mut FrameOutput,
+    mut waiting: PartQueue,
+    account: &MemoryAccount,
 ) -> Result<usize, ConvertError> {
     let store = waiting.store;
     let unit = waiting.limits.unit();
     let room = waiting.limits.part_len + unit;
     let width = waiting.width;
-    let (mut part, mut spare) = (Part::with_room(room, width), Part::with_room(room, width));
+    let (mut part, mut spare) = (
+        PartData::with_room(room, width),
+        PartData::with_room(room, width),
+    );
     account.hold(part.bytes() + spare.bytes());
-    let mut ordered = Ordered::with_room(room, width);
-    let mut carried = Part::default();
+    let mut ordered = OrderedPart::with_room(room, width);
+    let mut carried = PartData::default();
     let mut parts = 0;
     let Some(mut pile) = waiting.next()? else {
         return Ok(0);
@@ -133,10 +136,10 @@ fn order_all(
 }
 
 fn write(
-    output: &mut Output,
-    part: &Part,
-    ordered: &mut Ordered,
-    account: &Account,
+    output: &mut FrameOutput,
+    part: &PartData,
+    ordered: &mut OrderedPart,
+    account: &MemoryAccount,
 ) -> Result<(), ConvertError> {
     if part.len() == 0 {
         return Ok(());
@@ -145,14 +148,18 @@ fn write(
     output.push(part, ordered)
 }
 
-fn load(pile: &mut Pile, store: &Store, part: &mut Part) -> Result<(), FrameError> {
+fn load(
+    pile: &mut UnorderedPart,
+    store: &ChunkStore,
+    part: &mut PartData,
+) -> Result<(), FrameError> {
     let mut held = pile.held.drain(..);
     held.try_for_each(|held| store.load(held, part))
 }
 
-impl Waiting<'_> {
+impl PartQueue<'_> {
     /// The next part, small enough to be ordered.
-    fn next(&mut self) -> Result<Option<Pile>, ConvertError> {
+    fn next(&mut self) -> Result<Option<UnorderedPart>, ConvertError> {
         while let Some(pile) = self.piles.pop() {
             if pile.len == 0 {
                 continue;
@@ -166,7 +173,7 @@ impl Waiting<'_> {
         Ok(None)
     }
 
-    fn divided(&self, mut pile: Pile) -> Result<Vec<Pile>, ConvertError> {
+    fn divided(&self, mut pile: UnorderedPart) -> Result<Vec<UnorderedPart>, ConvertError> {
         if pile.depth < MOST_DIVISIONS {
             let sample = self.sample(&mut pile)?;
             let parts = pile.len.div_ceil(self.limits.aimed_len());
@@ -179,7 +186,7 @@ impl Waiting<'_> {
     }
 
     /// Some of the positions of `pile`, spread evenly.
-    fn sample(&self, pile: &mut Pile) -> Result<Vec<Vec3>, ConvertError> {
+    fn sample(&self, pile: &mut UnorderedPart) -> Result<Vec<Vec3>, ConvertError> {
         let each = (pile.len / SAMPLE).max(1);
         let mut sample = Vec::with_capacity(pile.len / each + pile.held.len());
         // Chunks that are away are read for this; there are few such parts.
@@ -193,8 +200,8 @@ impl Waiting<'_> {
 }
 
 /// Pieces of `pile` of up to `most` particles, as it comes.
-fn cut(pile: Pile, most: usize) -> Vec<Pile> {
-    let mut pieces: Vec<Pile> = Vec::new();
+fn cut(pile: UnorderedPart, most: usize) -> Vec<UnorderedPart> {
+    let mut pieces: Vec<UnorderedPart> = Vec::new();
     for held in pile.held {
         let len = held.len();
         match pieces.last_mut() {
@@ -202,7 +209,7 @@ fn cut(pile: Pile, most: usize) -> Vec<Pile> {
                 piece.len += len;
                 piece.held.push(held);
             }
-            _ => pieces.push(Pile {
+            _ => pieces.push(UnorderedPart {
                 held: vec![held],
                 len,
                 cuts: Arc::clone(&pile.cuts),

@@ -9,7 +9,7 @@ use crate::FrameError;
 
 /// A file that is gone when it is dropped, and on Unix has no name from the start.
 #[derive(Debug)]
-pub(super) struct Scratch {
+pub(super) struct ScratchFile {
     /// The directory, which errors name.
     dir: PathBuf,
     file: File,
@@ -18,7 +18,7 @@ pub(super) struct Scratch {
     path: PathBuf,
 }
 
-impl Scratch {
+impl ScratchFile {
     /// A new file in `dir`.
     ///
     /// # Errors
@@ -94,9 +94,9 @@ impl Scratch {
 }
 
 #[cfg(not(unix))]
-impl Drop for Scratch {
+impl Drop for ScratchFile {
     fn drop(&mut self) {
-        // Windows removes it once the handle is closed; what becomes of it then is not told.
+        // Windows removes it once the handle is closed; a failure is not reported.
         let _ = fs::remove_file(&self.path);
     }
 }

@@ -1,4 +1,4 @@
-//! What a conversion is asked for, what it reports, and why it may end early.
+//! Settings, report and errors of a conversion.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -18,7 +18,7 @@ pub struct ConvertSettings {
     pub bound: Bound,
     /// World position of the zero of the stored positions.
     pub origin: DVec3,
-    /// Whether y points up for whoever made the particles, so that viewers need not be told.
+    /// Whether y points up in the program that made the particles, so that viewers need no option for it.
     pub is_y_up: bool,
     /// Whose radii.
     pub radius: RadiusRule,
@@ -29,15 +29,15 @@ pub struct ConvertSettings {
     pub other_attributes: AttributeChoice,
     /// How these attributes are stored. Names are those of the source, exactly.
     pub attributes: Vec<(String, AttributeChoice)>,
-    /// Whether each particle's place in the source is kept, as an attribute `id` where there is none.
+    /// Whether each particle's index in the source is kept, as an attribute `id` where there is none.
     pub keep_ids: bool,
-    /// Where what does not fit into memory lies meanwhile, in a file without a name; `None` is the directory of
-    /// the frame.
+    /// The directory of the nameless scratch file for what does not fit into memory; `None` is the directory of the
+    /// frame.
     pub scratch_dir: Option<PathBuf>,
 }
 
 impl ConvertSettings {
-    /// Memory if nothing is said.
+    /// Default memory.
     pub const USUAL_MEMORY: u64 = 2 << 30;
     /// What the smallest conversion may hold.
     pub const LEAST_MEMORY: u64 = 64 << 20;
@@ -63,11 +63,11 @@ impl Default for ConvertSettings {
 /// Which radii a frame gets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusRule {
-    /// This one for all particles, whatever the source says.
+    /// This one for all particles, whatever the source has.
     All(f32),
     /// Those of the source: an attribute named `radius`, `pscale` or half a `diameter`, else one for all.
     Source {
-        /// For all particles if the source tells none.
+        /// For all particles if the source has none.
         otherwise: Option<f32>,
     },
 }
@@ -113,7 +113,7 @@ impl Phase {
     }
 }
 
-/// Is told how far a conversion is and may end it. Asked from many threads, some times a second at least.
+/// Receives the progress of a conversion and may cancel it. Called from many threads, several times a second at least.
 pub trait Progress: Sync {
     /// `done` of `total` particles have passed `phase`. Breaking ends the conversion with
     /// [`ConvertError::Interrupted`].
@@ -127,13 +127,13 @@ impl Progress for () {
     }
 }
 
-/// Why there is no frame. Nothing is left behind then, and what was at the path still is.
+/// Why there is no frame. No file is left over then, and what was at the path still is.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvertError {
     /// The source, the frame or the scratch file, whichever the path names.
     #[error(transparent)]
     Frame(#[from] FrameError),
-    /// What the source holds cannot be stored as asked.
+    /// The particles cannot be stored with these settings.
     #[error("{}: {what}", path.display())]
     Refused {
         /// The frame that was to be written.

@@ -1,11 +1,11 @@
-//! Where the particles of a frame come from: anything that gives runs of them, in any order and as often as
-//! asked, so that a frame need not fit into memory.
+//! Sources of the particles of a frame: they provide ranges of particles, in any order and as often as
+//! needed, so that a frame need not fit into memory.
 
 use glam::DVec3;
 
 use crate::{FrameError, ScalarType};
 
-/// Particles of one frame, by their place in the source. Runs are asked for by many threads at once.
+/// Particles of one frame, by their index in the source. Many threads read ranges at once.
 pub trait ParticleSource: Sync {
     /// Particles.
     fn count(&self) -> u64;
@@ -13,7 +13,7 @@ pub trait ParticleSource: Sync {
     /// What else there is of each particle, in the order of [`Self::read_values`].
     fn attributes(&self) -> &[SourceAttribute];
 
-    /// A radius that all particles have, scene units, if the source tells one. Radii of their own are an
+    /// The radius of all particles, scene units, if the source has one. Radii of their own are an
     /// attribute.
     fn common_radius(&self) -> Option<f32> {
         None
@@ -29,21 +29,21 @@ pub trait ParticleSource: Sync {
         None
     }
 
-    /// World positions of the particles from place `first` on, which need not be finite. The same ones each
+    /// World positions of the particles from index `first` on, which need not be finite. The same ones each
     /// time, as precise as the source has them.
     ///
     /// # Errors
     /// If there are no such particles, or what should be there is damaged.
     fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), FrameError>;
 
-    /// The values of attribute number `attribute` of the particles from place `first` on: all components of
+    /// The values of attribute number `attribute` of the particles from index `first` on: all components of
     /// one particle, then of the next, little-endian.
     ///
     /// # Errors
     /// As [`Self::read_positions`]; also if `to` does not hold whole particles.
     fn read_values(&self, attribute: usize, first: u64, to: &mut [u8]) -> Result<(), FrameError>;
 
-    /// Whether all that was read was there: asked before what came of it is published.
+    /// Checks that everything that was read was there, before the result is published.
     ///
     /// # Errors
     /// [`FrameError::Malformed`] if a mapped file changed meanwhile.

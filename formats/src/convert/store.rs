@@ -12,9 +12,9 @@ use std::thread::{self, JoinHandle};
 
 use glam::Vec3;
 
-use super::account::Account;
-use super::order::Part;
-use super::scratch::Scratch;
+use super::account::MemoryAccount;
+use super::order::PartData;
+use super::scratch::ScratchFile;
 use crate::FrameError;
 
 /// Chunks on their way to the disk at most.
@@ -27,9 +27,9 @@ pub(super) struct Chunk {
     pub(super) rows: Vec<u8>,
 }
 
-/// Records that were put away.
+/// Stored records.
 #[derive(Debug)]
-pub(super) enum Held {
+pub(super) enum StoredChunk {
     Here(Chunk),
     /// In a slot of the scratch file.
     Away {
@@ -38,7 +38,7 @@ pub(super) enum Held {
     },
 }
 
-impl Held {
+impl StoredChunk {
     pub(super) fn len(&self) -> usize {
         match self {
             Self::Here(chunk) => chunk.positions.len(),
@@ -62,26 +62,26 @@ pub(super) struct StoreSettings {
     pub(super) dir: PathBuf,
 }
 
-/// Where records are.
+/// Memory and scratch file for records.
 #[derive(Debug)]
-pub(super) struct Store<'a> {
-    shared: Arc<Shared>,
-    account: &'a Account,
+pub(super) struct ChunkStore<'a> {
+    shared: Arc<SharedState>,
+    account: &'a MemoryAccount,
     writer: Mutex<Option<Writer>>,
 }
 
 #[derive(Debug)]
-struct Shared {
+struct SharedState {
     settings: StoreSettings,
-    state: Mutex<State>,
+    state: Mutex<ChunkState>,
     /// A chunk is free, or there is a fault.
     freed: Condvar,
 }
 
 #[derive(Debug, Default)]
-struct State {
+struct ChunkState {
     free: Vec<Chunk>,
-    /// Chunks there are.
+    /// Allocated chunks.
     made: usize,
     /// Chunks that stay in memory.
     kept: usize,
@@ -95,16 +95,16 @@ struct State {
 
 #[derive(Debug)]
 struct Writer {
-    scratch: Arc<Scratch>,
+    scratch: Arc<ScratchFile>,
     chunks: SyncSender<(Chunk, u64)>,
     thread: JoinHandle<()>,
 }
 
-impl<'a> Store<'a> {
-    pub(super) fn new(mut settings: StoreSettings, account: &'a Account) -> Self {
+impl<'a> ChunkStore<'a> {
+    pub(super) fn new(mut settings: StoreSettings, account: &'a MemoryAccount) -> Self {
         // Few, and never so small that nothing could move.
         settings.chunks = settings.chunks.max(settings.open + ON_THE_WAY + 2);
-        let shared = Shared {
+        let shared = SharedState {
             settings,
             state: Mutex::default(),
             freed: Condvar::new(),
@@ -157,13 +157,13 @@ impl<'a> Store<'a> {
     ///
     /// # Errors
     /// If there can be no scratch file, or something could not be put away.
-    pub(super) fn put(&self, chunk: Chunk) -> Result<Held, FrameError> {
+    pub(super) fn put(&self, chunk: Chunk) -> Result<StoredChunk, FrameError> {
         let settings = &self.shared.settings;
         let mut state = self.shared.state();
         let is_full = chunk.positions.len() == settings.chunk_len;
         if !is_full || state.kept + settings.open + ON_THE_WAY < settings.chunks {
             state.kept += 1;
-            return Ok(Held::Here(chunk));
+            return Ok(StoredChunk::Here(chunk));
         }
         drop(state);
         // Before anything is counted as leaving: others would wait for it.
@@ -181,7 +181,7 @@ impl<'a> Store<'a> {
             self.shared.left();
             return Err(self.lost());
         }
-        Ok(Held::Away { slot, len })
+        Ok(StoredChunk::Away { slot, len })
     }
 
     /// Calls `see` with the records of `held`, which is free then.
@@ -190,17 +190,17 @@ impl<'a> Store<'a> {
     /// If they cannot be read.
     pub(super) fn give_back<T>(
         &self,
-        held: Held,
+        held: StoredChunk,
         see: impl FnOnce(&Chunk) -> T,
     ) -> Result<T, FrameError> {
         match held {
-            Held::Here(chunk) => {
+            StoredChunk::Here(chunk) => {
                 let seen = see(&chunk);
                 self.shared.state().kept -= 1;
                 self.shared.free(chunk);
                 Ok(seen)
             }
-            Held::Away { slot, len } => {
+            StoredChunk::Away { slot, len } => {
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, slot, len);
                 let seen = read.map(|()| see(&chunk));
@@ -217,12 +217,12 @@ impl<'a> Store<'a> {
     /// If they cannot be read.
     pub(super) fn look<T>(
         &self,
-        held: &Held,
+        held: &StoredChunk,
         see: impl FnOnce(&Chunk) -> T,
     ) -> Result<T, FrameError> {
         match held {
-            Held::Here(chunk) => Ok(see(chunk)),
-            Held::Away { slot, len } => {
+            StoredChunk::Here(chunk) => Ok(see(chunk)),
+            StoredChunk::Away { slot, len } => {
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, *slot, *len);
                 let seen = read.map(|()| see(&chunk));
@@ -232,11 +232,11 @@ impl<'a> Store<'a> {
         }
     }
 
-    /// Moves the records of `held` behind those of `part`.
+    /// Appends the records of `held` to those of `part`.
     ///
     /// # Errors
     /// If they cannot be read.
-    pub(super) fn load(&self, held: Held, part: &mut Part) -> Result<(), FrameError> {
+    pub(super) fn load(&self, held: StoredChunk, part: &mut PartData) -> Result<(), FrameError> {
         self.give_back(held, |chunk| {
             part.positions.extend_from_slice(&chunk.positions);
             part.rows.extend_from_slice(&chunk.rows);
@@ -285,7 +285,7 @@ impl<'a> Store<'a> {
 
     fn start(&self) -> Result<Writer, FrameError> {
         let dir = &self.shared.settings.dir;
-        let scratch = Arc::new(Scratch::create(dir)?);
+        let scratch = Arc::new(ScratchFile::create(dir)?);
         let (chunks, to_write) = sync_channel(ON_THE_WAY);
         let (shared, file) = (Arc::clone(&self.shared), Arc::clone(&scratch));
         let thread = thread::Builder::new()
@@ -306,7 +306,7 @@ impl<'a> Store<'a> {
     }
 }
 
-impl Drop for Store<'_> {
+impl Drop for ChunkStore<'_> {
     /// The scratch file is gone when this returns.
     fn drop(&mut self) {
         let writer = self.writer.get_mut().unwrap_or_else(|e| e.into_inner());
@@ -328,8 +328,8 @@ impl StoreSettings {
     }
 }
 
-impl Shared {
-    fn state(&self) -> MutexGuard<'_, State> {
+impl SharedState {
+    fn state(&self) -> MutexGuard<'_, ChunkState> {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
@@ -348,7 +348,7 @@ impl Shared {
     }
 
     /// Writes what comes until nothing does any more; after a fault it only takes in.
-    fn write_all(&self, scratch: &Scratch, chunks: &Receiver<(Chunk, u64)>) {
+    fn write_all(&self, scratch: &ScratchFile, chunks: &Receiver<(Chunk, u64)>) {
         let mut is_sound = true;
         for (chunk, slot) in chunks {
             if is_sound && let Err(fault) = self.write(scratch, &chunk, slot) {
@@ -360,7 +360,7 @@ impl Shared {
         }
     }
 
-    fn write(&self, scratch: &Scratch, chunk: &Chunk, slot: u64) -> Result<(), FrameError> {
+    fn write(&self, scratch: &ScratchFile, chunk: &Chunk, slot: u64) -> Result<(), FrameError> {
         let at = slot * self.settings.bytes();
         let positions: &[u8] = bytemuck::cast_slice(&chunk.positions);
         scratch.write(positions, at)?;

@@ -6,8 +6,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::batch::{Batch, Shelf, Stretch};
-use super::columns::Columns;
+use super::batch::{Batch, BufferPool, ParticleRange};
+use super::columns::StoredColumns;
 use super::settings::{ConvertError, ConvertSettings, Phase, Progress};
 use super::source::ParticleSource;
 use crate::native::StoredType;
@@ -30,18 +30,18 @@ pub(super) struct Survey {
     ranges: Vec<Vec<[f64; 2]>>,
 }
 
-/// How a source is read.
+/// How a source is read in batches.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Reading {
-    /// Particles of a stretch.
+pub(super) struct BatchSettings {
+    /// Particles of a batch.
     pub(super) batch_len: usize,
     /// One of so many particles is in the sample; 0 for none.
     pub(super) sample_stride: u64,
 }
 
-/// What a stretch has.
+/// Survey of one batch.
 #[derive(Debug, Default)]
-struct Found {
+struct BatchSurvey {
     kept: u32,
     rounding_squared: f64,
     radii: Option<[f32; 2]>,
@@ -50,20 +50,20 @@ struct Found {
     ranges: Vec<Vec<[f64; 2]>>,
 }
 
-/// Everything that a conversion knows before it begins to read.
+/// The arguments of a conversion.
 #[derive(Clone, Copy)]
-pub(super) struct Asked<'a> {
+pub(super) struct ConvertRequest<'a> {
     pub(super) source: &'a dyn ParticleSource,
     pub(super) path: &'a Path,
     pub(super) settings: &'a ConvertSettings,
     pub(super) progress: &'a dyn Progress,
 }
 
-impl Asked<'_> {
+impl ConvertRequest<'_> {
     /// Tells how far it is.
     ///
     /// # Errors
-    /// If whoever is told wants it to end.
+    /// If the progress callback cancels the conversion.
     pub(super) fn advance(&self, phase: Phase, done: u64, total: u64) -> Result<(), ConvertError> {
         if self.progress.advanced(phase, done, total).is_break() {
             return Err(ConvertError::Interrupted);
@@ -82,17 +82,17 @@ impl Asked<'_> {
 
 /// Reads everything once.
 pub(super) fn survey(
-    asked: Asked,
-    columns: &Columns,
-    reading: Reading,
+    asked: ConvertRequest,
+    columns: &StoredColumns,
+    reading: BatchSettings,
 ) -> Result<Survey, ConvertError> {
     let total = asked.source.count();
     let stretches = total.div_ceil(reading.batch_len as u64);
-    let (batches, done) = (Shelf::<Batch>::default(), AtomicU64::new(0));
-    let found: Vec<Found> = (0..stretches)
+    let (batches, done) = (BufferPool::<Batch>::default(), AtomicU64::new(0));
+    let found: Vec<BatchSurvey> = (0..stretches)
         .into_par_iter()
         .map(|number| {
-            let stretch = Stretch::nth(number, reading.batch_len, total);
+            let stretch = ParticleRange::nth(number, reading.batch_len, total);
             let mut batch = batches.take();
             let found = look(asked, columns, &mut batch, stretch, reading.sample_stride)?;
             batches.put(batch);
@@ -105,17 +105,17 @@ pub(super) fn survey(
 }
 
 fn look(
-    asked: Asked,
-    columns: &Columns,
+    asked: ConvertRequest,
+    columns: &StoredColumns,
     batch: &mut Batch,
-    stretch: Stretch,
+    stretch: ParticleRange,
     stride: u64,
-) -> Result<Found, ConvertError> {
+) -> Result<BatchSurvey, ConvertError> {
     let origin = asked.settings.origin;
     batch.read_positions(asked.source, origin, stretch)?;
-    let mut found = Found {
+    let mut found = BatchSurvey {
         kept: u32::try_from(batch.positions.len()).unwrap_or(u32::MAX),
-        ..Found::default()
+        ..BatchSurvey::default()
     };
     let mut kept = batch.positions.iter();
     batch.for_each_place(|place| {
@@ -146,7 +146,7 @@ fn look(
                 let values = batch.values[place * width..][..width].chunks_exact(size);
                 for (value, [low, high]) in values.zip(&mut ranges) {
                     let value = StoredType::Plain(column.scalar).value(value, [0.0; 2]);
-                    // What is no number must not pass unseen.
+                    // What is not a number must not pass unseen.
                     let value = if value.is_nan() { f64::INFINITY } else { value };
                     (*low, *high) = (low.min(value), high.max(value));
                 }
@@ -157,9 +157,9 @@ fn look(
     Ok(found)
 }
 
-/// One particle of each run of `stride`, at a place that looks random: sources are often ordered. Which ones
+/// One particle of each run of `stride`, at a pseudo-random index: sources are often ordered. Which ones
 /// does not depend on how the source is cut.
-fn sample_of(batch: &Batch, origin: glam::DVec3, stretch: Stretch, stride: u64) -> Vec<Vec3> {
+fn sample_of(batch: &Batch, origin: glam::DVec3, stretch: ParticleRange, stride: u64) -> Vec<Vec3> {
     let mut sample = Vec::new();
     if stride == 0 {
         return sample;
@@ -178,7 +178,11 @@ fn sample_of(batch: &Batch, origin: glam::DVec3, stretch: Stretch, stride: u64) 
     sample
 }
 
-fn gathered(path: &Path, columns: &Columns, found: Vec<Found>) -> Result<Survey, ConvertError> {
+fn gathered(
+    path: &Path,
+    columns: &StoredColumns,
+    found: Vec<BatchSurvey>,
+) -> Result<Survey, ConvertError> {
     let mut survey = Survey {
         count: 0,
         kept: Vec::with_capacity(found.len()),
@@ -219,8 +223,8 @@ impl Survey {
     pub(super) fn settled(
         &self,
         path: &Path,
-        mut columns: Columns,
-    ) -> Result<(Columns, Option<f32>), ConvertError> {
+        mut columns: StoredColumns,
+    ) -> Result<(StoredColumns, Option<f32>), ConvertError> {
         for (column, ranges) in columns.attributes.iter_mut().zip(&self.ranges) {
             if column.stored != StoredType::Ranged {
                 continue;

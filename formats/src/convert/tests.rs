@@ -74,8 +74,8 @@ fn asked<'a>(
     source: &'a dyn ParticleSource,
     path: &'a Path,
     settings: &'a ConvertSettings,
-) -> Asked<'a> {
-    Asked {
+) -> ConvertRequest<'a> {
+    ConvertRequest {
         source,
         path,
         settings,
@@ -90,7 +90,7 @@ fn convert_to(
     settings: &ConvertSettings,
     limits: Limits,
 ) -> Result<ConvertReport, ConvertError> {
-    let columns = Columns::choose(source, settings, path)?;
+    let columns = StoredColumns::choose(source, settings, path)?;
     convert_within(asked(source, path, settings), columns, limits)
 }
 
@@ -467,9 +467,9 @@ fn an_interrupted_conversion_leaves_nothing() {
     fs::write(&path, b"old").expect("writable");
     let settings = settings();
     let run = |calls: u64, limits: Limits| {
-        let columns = Columns::choose(&source, &settings, &path).expect("fit");
+        let columns = StoredColumns::choose(&source, &settings, &path).expect("fit");
         let ends = Ends(AtomicU64::new(calls));
-        let asked = Asked {
+        let asked = ConvertRequest {
             progress: &ends,
             ..asked(&source, &path, &settings)
         };

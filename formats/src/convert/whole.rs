@@ -5,33 +5,33 @@ use std::sync::Mutex;
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::account::Account;
-use super::batch::{Batch, Shelf, Stretch};
+use super::account::MemoryAccount;
+use super::batch::{Batch, BufferPool, ParticleRange};
 use super::limits::Limits;
-use super::order::{Ordered, Part};
-use super::output::Output;
+use super::order::{OrderedPart, PartData};
+use super::output::FrameOutput;
 use super::settings::ConvertError;
 
 /// Reads everything, orders and writes it.
 pub(super) fn convert(
-    output: &mut Output,
+    output: &mut FrameOutput,
     limits: &Limits,
-    account: &Account,
+    account: &MemoryAccount,
 ) -> Result<(), ConvertError> {
     let part = load(output, limits)?;
     account.hold(part.bytes());
-    let mut ordered = Ordered::default();
+    let mut ordered = OrderedPart::default();
     ordered.order(&part, account);
     output.push(&part, &mut ordered)
 }
 
 /// All finite particles in the order of the source.
-fn load(output: &mut Output, limits: &Limits) -> Result<Part, ConvertError> {
+fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertError> {
     let (asked, columns) = (output.asked, output.columns);
     let kept = &output.survey.kept;
     let (count, width) = (output.survey.count, columns.width());
     let count = usize::try_from(count).unwrap_or(usize::MAX);
-    let mut part = Part {
+    let mut part = PartData {
         positions: vec![Vec3::ZERO; count],
         rows: vec![0; count * width],
     };
@@ -44,12 +44,15 @@ fn load(output: &mut Output, limits: &Limits) -> Result<Part, ConvertError> {
         (own_rows, rows) = rows.split_at_mut(own.len() * width);
         places.push((number, own, own_rows));
     }
-    let (batches, errors) = (Shelf::<Batch>::default(), Mutex::new(&mut output.errors));
+    let (batches, errors) = (
+        BufferPool::<Batch>::default(),
+        Mutex::new(&mut output.errors),
+    );
     places
         .into_par_iter()
         .try_for_each(|(number, positions, rows)| {
             let mut batch = batches.take();
-            let stretch = Stretch::nth(number, limits.batch_len, asked.source.count());
+            let stretch = ParticleRange::nth(number, limits.batch_len, asked.source.count());
             batch.read_positions(asked.source, asked.settings.origin, stretch)?;
             if batch.positions.len() != positions.len() {
                 return Err(asked.changed());

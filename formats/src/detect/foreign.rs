@@ -1,4 +1,4 @@
-//! Files that are known but not read: what they are, and what to do instead.
+//! Known formats that are not read: what they are, and what to do instead.
 
 use std::path::Path;
 
@@ -128,7 +128,7 @@ const MAGICS: &[(&[u8], &str)] = &[
     (b"\xfe\xff", UTF16),
 ];
 
-const IMAGE: &str = "an image, no particle file";
+const IMAGE: &str = "an image, not a particle file";
 const ARCHIVE: &str = "an archive, which is not read; unpack it and give its files";
 const TRAJECTORY: &str = "a GROMACS trajectory (.xtc, .trr), which is not read; write .xyz with MDAnalysis, VMD or OVITO";
 const DCD: &str = "a DCD trajectory, which is not read; write .xyz with MDAnalysis, VMD or OVITO";
@@ -159,7 +159,7 @@ pub(super) fn refuse(head: &[u8], path: &Path, shortest: usize) -> Result<(), Pa
     what.map_or(Ok(()), |what| Err(ParseError::unsupported(what)))
 }
 
-/// What is known by bytes behind the first.
+/// Formats that are known by bytes after the first.
 fn by_structure(head: &[u8]) -> Option<&'static str> {
     let at = |at: usize, bytes: &[u8]| head.get(at..).is_some_and(|b| b.starts_with(bytes));
     // A header of 256 bytes between its lengths, as Fortran writes it
@@ -170,14 +170,14 @@ fn by_structure(head: &[u8]) -> Option<&'static str> {
         (is_usdz(head), USD),
         (at(257, b"ustar"), ARCHIVE),
         (at(0, b"RIFF") && at(8, b"WEBP"), IMAGE),
-        (at(4, b"ftyp"), "a video or image, no particle file"),
+        (at(4, b"ftyp"), "a video or image, not a particle file"),
         (is_gadget, GADGET),
     ]
     .into_iter()
     .find_map(|(is_one, what)| is_one.then_some(what))
 }
 
-/// The text that begins them says what they hold; not all versions have it, so the name counts, too.
+/// Their first text names the content. Not all versions have it, so the file name counts, too.
 fn is_dualsphysics(head: &[u8], path: &Path) -> bool {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     let name = name.to_ascii_lowercase();

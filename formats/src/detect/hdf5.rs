@@ -1,8 +1,8 @@
-//! HDF5 files: nothing of them is read, but who wrote them tells what to do.
+//! HDF5 files: not read, but the program that wrote one decides what the message recommends.
 
 use memchr::memmem;
 
-/// What every HDF5 file has at byte 0, or at 512, 1024... behind a block of the user's.
+/// What every HDF5 file has at byte 0, or at 512, 1024... after a user block.
 const SIGNATURE: &[u8] = b"\x89HDF\r\n\x1a\n";
 
 /// Where the signature is looked for.
@@ -43,7 +43,7 @@ const LAYOUTS: &[(&[&[u8]], &str)] = &[
 const UNKNOWN: &str = "an HDF5 file, which is not read yet; write positions and attributes to .npz with h5py and numpy, \
                        or save as .vtu or .csv with the program that made it";
 
-/// What to say of `bytes`, the beginning of a file, if that is HDF5.
+/// The message for `bytes`, the beginning of a file, if that is HDF5.
 pub(super) fn what(bytes: &[u8]) -> Option<&'static str> {
     let is_at = |at: &usize| bytes.get(*at..).is_some_and(|b| b.starts_with(SIGNATURE));
     // A file that is shorter than its signature is still one.

@@ -52,7 +52,8 @@ impl Format {
             }
             None => likely.ok_or_else(|| {
                 let (opening, names) = (opening(head), names());
-                let what = format!("no particle format begins with {opening}; read are {names}");
+                let what =
+                    format!("no particle format begins with {opening}; supported are {names}");
                 ParseError::malformed(0, what)
             }),
         }

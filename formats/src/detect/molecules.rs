@@ -1,4 +1,4 @@
-//! Text formats of molecular simulations that are not read: known by how their lines are built.
+//! Text formats of molecular simulations that are not read, recognised by the structure of their lines.
 
 const LAMMPS_DATA: &str = "a LAMMPS data file, which is the start of a simulation and is not read; write a dump from it \
                            (`write_dump all custom out.dump id type x y z`)";
@@ -8,7 +8,7 @@ const PROTEIN: &str =
     "a Protein Data Bank file, which is not read; write .xyz with Open Babel, MDAnalysis or OVITO";
 const CIF: &str = "a CIF file, which is not read; write .xyz with Open Babel, ASE or OVITO";
 
-/// What to say of `head`, the beginning of a file, if that is one of them.
+/// The message for `head`, the beginning of a file, if that is one of them.
 pub(super) fn what(head: &[u8]) -> Option<&'static str> {
     let lines: Vec<&[u8]> = head
         .split(|b| *b == b'\n')

@@ -1,4 +1,4 @@
-//! An attribute of a native frame in place: values are decoded as they are asked for.
+//! An attribute of a native frame in place: values are decoded on access.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use super::layout::AttributeIndex;
 use super::stored::StoredType;
 use crate::{Attribute, AttributeData, Endian, ParseError, ScalarType};
 
-/// The values of an attribute where they lie.
+/// The values of an attribute in place.
 #[derive(Debug, Clone, Copy)]
 pub struct AttributeView<'a> {
     index: &'a AttributeIndex,
@@ -65,7 +65,7 @@ impl<'a> AttributeView<'a> {
     }
 
     /// The low 32 bits of a whole number, as ids are shown; `None` if there is no such particle or its
-    /// value is no whole number.
+    /// value is not a whole number.
     pub fn low_bits(&self, index: usize) -> Option<u32> {
         let bytes = self.bytes_of(index, 0)?;
         let StoredType::Plain(kind) = self.stored else {
@@ -83,7 +83,7 @@ impl<'a> AttributeView<'a> {
         Some(u32::from_le_bytes(std::array::from_fn(byte)))
     }
 
-    /// Copies the values of the particles at `places` as [`Self::to_attribute`] has them, little-endian; `None`
+    /// Copies the values of the particles `places` as [`Self::to_attribute`] has them, little-endian; `None`
     /// if there are too few.
     pub(crate) fn copy_to(&self, places: Range<usize>, to: &mut [u8]) -> Option<()> {
         let width = self.components().checked_mul(self.stored.size())?;

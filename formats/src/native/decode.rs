@@ -1,4 +1,4 @@
-//! Native frames as plain particles: for those who do not trace in place.
+//! Native frames decoded to plain particles, where they are not traced in place.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -31,7 +31,7 @@ impl NativeFrame<'_> {
     }
 
     /// Every so many particles, at most `most` and whole blocks of them, in world coordinates, with their
-    /// attributes and radii: enough to tell percentiles by without reading all of a large frame.
+    /// attributes and radii: enough for percentiles without reading all of a large frame.
     ///
     /// # Errors
     /// As [`Self::to_raw`].
@@ -98,13 +98,13 @@ impl NativeFrame<'_> {
         self.around_some(queries, count)
     }
 
-    /// What `tell` says of the squares of the distances from some particles to those around them in the file.
+    /// The result of `tell` for the squared distances from some particles to those around them in the file.
     fn around_some<T: Send>(
         &self,
         queries: usize,
         tell: impl Fn(&mut dyn Iterator<Item = f32>) -> T + Sync,
     ) -> Result<Vec<T>, ParseError> {
-        /// Particles on either side of the one asked for: a cell of the order and half the next.
+        /// Particles on either side of the given one: a cell of the order and half the next.
         const AROUND: usize = 1536;
         let leaves = self.leaves()?;
         let count = self.len()?;
@@ -148,7 +148,7 @@ impl NativeFrame<'_> {
         })
     }
 
-    /// The radius of a particle, if the frame tells.
+    /// The radius of a particle, if the frame has it.
     fn radius_of<'s>(&self, leaves: &'s StoredLeaves) -> Option<impl Fn(usize) -> f32 + 's> {
         let common = match &self.index().radius {
             RadiusIndex::None => return None,

@@ -47,7 +47,7 @@ pub fn write(path: &Path, frame: &ParticleFrame, step: Option<i64>) -> Result<()
 ///
 /// # Errors
 /// [`FrameError::Io`] if attributes or radii do not fit the particles, one of them is not finite, or the
-/// file cannot be written; nothing is left behind then.
+/// file cannot be written; no file is left over then.
 pub fn store(
     path: &Path,
     frame: &ParticleFrame,
@@ -210,7 +210,7 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
         }
     }
     if !frame.positions.par_iter().all(is_near) {
-        return bad("a position is no number or too far away".to_owned());
+        return bad("a position is not a number or too far away".to_owned());
     }
     Ok(())
 }

@@ -114,7 +114,7 @@ pub struct Section {
 /// Radii of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub enum RadiusIndex {
-    /// The frame does not tell.
+    /// Unknown.
     None,
     /// All particles alike.
     Common(f32),
@@ -166,7 +166,7 @@ pub struct FrameIndex {
     pub encoding: u32,
     /// How particles are ordered, [`ORDER_KD`].
     pub order: u32,
-    /// Which axis points up for whoever made the particles: 0 if that is not told, or [`UP_Y`].
+    /// Which axis points up in the program that made the particles: 0 if unknown, or [`UP_Y`].
     pub up: u32,
     /// World position of the zero of the stored positions.
     pub origin: [f64; 3],
@@ -287,7 +287,7 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     Ok(index)
 }
 
-/// Checks the header and gives the place of the index.
+/// Checks the header and returns the range of the index.
 fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
     let short = || {
         let what = format!(
@@ -338,7 +338,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
         .filter(|(start, end)| *start >= HEADER_LEN && *start <= *end && *end == bytes.len())
         .map(|(start, end)| start..end)
         .ok_or_else(|| {
-            ParseError::malformed(24, "the index lies outside the file; convert it again")
+            ParseError::malformed(24, "the index is outside the file; convert it again")
         })?;
     if word(40) != xxh3_64(&bytes[index.clone()]) {
         return Err(ParseError::malformed(
@@ -383,11 +383,11 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
     if numbers.into_iter().any(|n| !n.is_finite()) || index.count > 0 && !(0..3).all(is_box) {
         return Err(ParseError::malformed(
             end,
-            "the index is damaged: origin or bounds are no numbers",
+            "the index is damaged: origin or bounds are not numbers",
         ));
     }
     check_radius(index, check)?;
-    // Sections that lie on each other would be read into more memory than the file has bytes.
+    // Overlapping sections would be read into more memory than the file has bytes.
     let lens = index.sections().into_iter().map(|(_, section)| section.len);
     let sum = lens.fold(0, u64::saturating_add);
     if sum > end as u64 {
@@ -405,7 +405,7 @@ fn check_radius(index: &FrameIndex, check: SectionCheck) -> Result<(), ParseErro
     match &index.radius {
         RadiusIndex::None => Ok(()),
         RadiusIndex::Common(radius) if radius.is_finite() => Ok(()),
-        RadiusIndex::Common(_) => bad("the radius is no number"),
+        RadiusIndex::Common(_) => bad("the radius is not a number"),
         RadiusIndex::PerParticle(radii) => {
             let Some(code) = RadiusCode::of_code(radii.code) else {
                 return Err(ParseError::unsupported(format!(
@@ -414,7 +414,7 @@ fn check_radius(index: &FrameIndex, check: SectionCheck) -> Result<(), ParseErro
                 )));
             };
             if !(radii.low.is_finite() && radii.high.is_finite() && radii.low <= radii.high) {
-                return bad("the range of the radii is no range");
+                return bad("the range of the radii is not a range");
             }
             let lanes = blocks_of(check.count).checked_mul(BLOCK_SIZE as u64);
             let len = lanes.and_then(|lanes| lanes.checked_mul(code.size() as u64));
@@ -450,7 +450,7 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
     check.length(&what, &attribute.section, check.count.checked_mul(width))
 }
 
-/// Checks where sections lie.
+/// Checks the ranges of sections.
 #[derive(Clone, Copy)]
 struct SectionCheck {
     /// Particles.

@@ -1,4 +1,4 @@
-//! Files in memory without reading them: the only place of the crate with a memory map.
+//! Memory-mapped files: the only module of the crate with a memory map.
 //!
 //! Somebody may cut a file short while it is mapped; touching pages that are gone then raises a signal that
 //! ends a process. Here such pages become zeros and the file is marked as lost, so that whoever used it
@@ -31,7 +31,7 @@ pub enum Access {
     Read,
 }
 
-/// A file whose bytes lie in memory as they are touched.
+/// A memory-mapped file.
 #[derive(Debug)]
 pub struct MappedFile {
     path: PathBuf,
@@ -46,7 +46,7 @@ impl MappedFile {
     /// Maps the file at `path`.
     ///
     /// # Errors
-    /// [`FrameError`] if it cannot be opened or is no regular file.
+    /// [`FrameError`] if it cannot be opened or is not a regular file.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
         let io = |e| FrameError::io(path, e);
         // Opening a pipe would wait for a writer.
@@ -66,7 +66,7 @@ impl MappedFile {
         })
     }
 
-    /// Where the file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -78,7 +78,7 @@ impl MappedFile {
     }
 
     /// Says that the bytes will be read from front to back, so that the system reads ahead and lets go of
-    /// what lies behind. Only advice: whether it is taken changes nothing but speed.
+    /// pages already read. Only advice: it changes nothing but speed.
     pub(crate) fn advise_sequential(&self) {
         #[cfg(unix)]
         let _ = self.map.advise(memmap2::Advice::Sequential);
@@ -111,12 +111,12 @@ impl MappedFile {
 #[derive(Debug)]
 pub struct NativeFile {
     path: PathBuf,
-    bytes: Bytes,
+    bytes: FileBytes,
     index: FrameIndex,
 }
 
 #[derive(Debug)]
-enum Bytes {
+enum FileBytes {
     Mapped(MappedFile),
     /// Aligned as sections are, see [`super::layout::ALIGN`].
     Read(AlignedVec<64>),
@@ -129,8 +129,8 @@ impl NativeFile {
     /// [`FrameError`] if it cannot be read, or is damaged, cut off, or of another version.
     pub fn open(path: &Path, access: Access) -> Result<Self, FrameError> {
         let bytes = match access {
-            Access::Map => Bytes::Mapped(MappedFile::open(path)?),
-            Access::Read => Bytes::Read(read(path)?),
+            Access::Map => FileBytes::Mapped(MappedFile::open(path)?),
+            Access::Read => FileBytes::Read(read(path)?),
         };
         let index = parse(bytes.as_slice()).map_err(|e| e.in_file(path))?;
         Ok(Self {
@@ -140,7 +140,7 @@ impl NativeFile {
         })
     }
 
-    /// Where the file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
@@ -157,7 +157,7 @@ impl NativeFile {
 
     /// Whether the bytes are those of the file itself.
     pub const fn is_mapped(&self) -> bool {
-        matches!(self.bytes, Bytes::Mapped(_))
+        matches!(self.bytes, FileBytes::Mapped(_))
     }
 
     /// The particles in place. Take it anew for every use: it looks again whether a mapped file is still
@@ -181,13 +181,13 @@ impl NativeFile {
     /// [`FrameError::Malformed`] if it is not.
     pub fn check(&self) -> Result<(), FrameError> {
         match &self.bytes {
-            Bytes::Mapped(file) => file.check(),
-            Bytes::Read(_) => Ok(()),
+            FileBytes::Mapped(file) => file.check(),
+            FileBytes::Read(_) => Ok(()),
         }
     }
 }
 
-impl Bytes {
+impl FileBytes {
     fn as_slice(&self) -> &[u8] {
         match self {
             Self::Mapped(file) => file.bytes(),
@@ -199,7 +199,7 @@ impl Bytes {
 /// The whole file, aligned as its sections are.
 ///
 /// # Errors
-/// [`FrameError`] if it cannot be read or is no regular file.
+/// [`FrameError`] if it cannot be read or is not a regular file.
 pub(crate) fn read(path: &Path) -> Result<AlignedVec<64>, FrameError> {
     let io = |e| FrameError::io(path, e);
     regular_len(path)?;
@@ -220,7 +220,7 @@ pub(crate) fn read(path: &Path) -> Result<AlignedVec<64>, FrameError> {
 ///
 /// Native frames are published by rename and never written in place, so only somebody outside can do
 /// that. [`MappedFile::check`] compares length and time of change; what is cut off reads as zeros (see
-/// `guard`). Contents are plain numbers, of which any bit pattern is valid, and never used as indices
+/// `guard`). Contents are plain numbers, valid for any bit pattern, and never used as indices
 /// unchecked, so that a change between two looks is a wrong picture that is found out, at worst a fault
 /// that costs the frame.
 fn map(file: &File) -> io::Result<Mmap> {
@@ -241,7 +241,7 @@ mod guard {
     const REGIONS: usize = 64;
 
     struct Region {
-        /// First address; 0 if the place is free, 1 while it is taken.
+        /// First address; 0 if the entry is free, 1 while it is taken.
         start: AtomicUsize,
         end: AtomicUsize,
         lost: AtomicBool,

@@ -1,4 +1,4 @@
-//! The native frame file `.spf`: particles in tree order, in blocks that are traced where they lie.
+//! The native frame file `.spf`: particles in tree order, in blocks that are traced in place.
 //!
 //! [`layout`] has the bytes, [`FrameWriter`] makes files, [`NativeFile`] maps them. All parsing works on
 //! `&[u8]`. Files written by other programs are [`crate::read`]'s.
@@ -114,7 +114,7 @@ fn section_of<'a>(bytes: &'a [u8], section: &Section) -> Result<&'a [u8], ParseE
         .ok()
         .zip(end.and_then(|end| usize::try_from(end).ok()))
         .and_then(|(start, end)| bytes.get(start..end))
-        .ok_or_else(|| ParseError::malformed(0, "a section lies outside the file"))
+        .ok_or_else(|| ParseError::malformed(0, "a section is outside the file"))
 }
 
 #[cfg(test)]

@@ -21,7 +21,7 @@ const TASK: usize = 64;
 
 /// Leaves over a run of particles.
 #[derive(Debug, Default)]
-pub(super) struct Leaves<B> {
+pub(super) struct EncodedLeaves<B> {
     /// A node for each eight blocks.
     pub(super) nodes: Vec<Node>,
     /// Blocks, coded or referring to `wide` (counted from the run's first).
@@ -34,9 +34,9 @@ pub(super) struct Leaves<B> {
     pub(super) bounds: Aabb,
 }
 
-/// What encoding needs to know of the frame.
+/// Limits of the encoding of a frame.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Allowed {
+pub(super) struct EncodeLimits {
     /// The largest error of a position.
     pub(super) bound: Bound,
     /// The radius of all particles, if they have one.
@@ -49,7 +49,7 @@ pub(super) trait StoredBlock: Copy + Send + Sync + bytemuck::Pod {
     const IS_EXACT: bool;
 
     /// `block` in the grid `frame`, with its largest error; none if a position would leave the grid's box or
-    /// the block cannot be told from a reference.
+    /// the block cannot be distinguished from a reference.
     fn encode(block: &Block, node: &Node, slot: usize) -> Option<(Self, f64)>;
 
     /// A reference to a block that is kept as it is; `None` if this encoding keeps all of them so.
@@ -58,7 +58,7 @@ pub(super) trait StoredBlock: Copy + Send + Sync + bytemuck::Pod {
     /// The block's positions as they will be read, where they were coded.
     fn stored(&self, frame: &BlockFrame) -> Block;
 
-    /// Itself, or a reference to a block that is kept `by` places later.
+    /// Itself, or a reference to a wide block at index `by`.
     #[must_use]
     fn shifted(self, by: u32) -> Self;
 
@@ -100,7 +100,7 @@ impl<B: CompactBlock + Send + Sync> StoredBlock for B {
         let mut codes = [[0; BLOCK_SIZE]; 3];
         let axes = [&block.x, &block.y, &block.z];
         for (axis, (codes, values)) in codes.iter_mut().zip(axes).enumerate() {
-            let grid = Grid {
+            let grid = CodeGrid {
                 base: frame.base[axis],
                 step: steps[axis],
                 largest: B::LARGEST[axis],
@@ -140,7 +140,7 @@ impl<B: CompactBlock + Send + Sync> StoredBlock for B {
 }
 
 /// The codes of a block on one axis.
-struct Grid {
+struct CodeGrid {
     base: f32,
     step: f32,
     largest: u32,
@@ -148,7 +148,7 @@ struct Grid {
     planes: [f64; 2],
 }
 
-impl Grid {
+impl CodeGrid {
     /// The code nearest to `value` whose position is inside the box; the next ones inwards are tried
     /// where rounding leads outside.
     #[expect(
@@ -183,9 +183,9 @@ fn largest_distance(a: &Block, b: &Block) -> f64 {
 pub(super) fn encode<B: StoredBlock>(
     positions: &[Vec3],
     radii: Option<&CodedRadii>,
-    allowed: Allowed,
-) -> Leaves<B> {
-    let parts: Vec<Leaves<B>> = positions
+    allowed: EncodeLimits,
+) -> EncodedLeaves<B> {
+    let parts: Vec<EncodedLeaves<B>> = positions
         .par_chunks(TASK * GROUP)
         .enumerate()
         .map(|(task, positions)| {
@@ -193,10 +193,10 @@ pub(super) fn encode<B: StoredBlock>(
             encode_task(positions, radii, allowed)
         })
         .collect();
-    let mut all = Leaves {
+    let mut all = EncodedLeaves {
         nodes: Vec::with_capacity(positions.len().div_ceil(GROUP)),
         blocks: Vec::with_capacity(positions.len().div_ceil(BLOCK_SIZE)),
-        ..Leaves::empty()
+        ..EncodedLeaves::empty()
     };
     for part in parts {
         all.append(part);
@@ -207,9 +207,9 @@ pub(super) fn encode<B: StoredBlock>(
 fn encode_task<B: StoredBlock>(
     positions: &[Vec3],
     radii: Option<&[BlockRadii]>,
-    allowed: Allowed,
-) -> Leaves<B> {
-    let mut leaves = Leaves::empty();
+    allowed: EncodeLimits,
+) -> EncodedLeaves<B> {
+    let mut leaves = EncodedLeaves::empty();
     for (group, positions) in positions.chunks(GROUP).enumerate() {
         let radii = radii.map(|radii| &radii[group * WIDTH..]);
         leaves.push_group(positions, radii, allowed);
@@ -217,7 +217,7 @@ fn encode_task<B: StoredBlock>(
     leaves
 }
 
-impl<B: StoredBlock> Leaves<B> {
+impl<B: StoredBlock> EncodedLeaves<B> {
     fn empty() -> Self {
         Self {
             nodes: Vec::new(),
@@ -229,7 +229,12 @@ impl<B: StoredBlock> Leaves<B> {
     }
 
     /// Takes in up to eight blocks under one node.
-    fn push_group(&mut self, positions: &[Vec3], radii: Option<&[BlockRadii]>, allowed: Allowed) {
+    fn push_group(
+        &mut self,
+        positions: &[Vec3],
+        radii: Option<&[BlockRadii]>,
+        allowed: EncodeLimits,
+    ) {
         let mut blocks = [Block::zeroed(); WIDTH];
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let chunks = positions.chunks(BLOCK_SIZE);
@@ -255,7 +260,7 @@ impl<B: StoredBlock> Leaves<B> {
         node: &Node,
         slot: usize,
         radii: Option<&BlockRadii>,
-        allowed: Allowed,
+        allowed: EncodeLimits,
     ) {
         let smallest = |r: &BlockRadii| r.0.iter().copied().fold(f32::INFINITY, f32::min);
         let radius = radii.map(smallest).or(allowed.radius);

@@ -30,18 +30,18 @@ pub(super) fn piece<T: Pod + Send>(numbers: Vec<T>) -> Piece {
     Box::new(Numbers(numbers))
 }
 
-/// Gives sections their places, one after the other.
-pub(super) struct Places {
+/// Assigns offsets to sections, one after the other.
+pub(super) struct SectionOffsets {
     /// Where the next one begins.
     pub(super) next: u64,
 }
 
-impl Places {
+impl SectionOffsets {
     /// A section of `len` bytes; none if that is beyond 64 bits.
-    pub(super) fn section(&mut self, len: u64) -> Option<Filling> {
+    pub(super) fn section(&mut self, len: u64) -> Option<SectionProgress> {
         let offset = self.next;
         self.next = offset.checked_add(len)?.checked_next_multiple_of(ALIGN)?;
-        Some(Filling {
+        Some(SectionProgress {
             offset,
             filled: 0,
             hash: Xxh3::new(),
@@ -49,20 +49,20 @@ impl Places {
     }
 }
 
-/// A section that is being filled.
-pub(super) struct Filling {
+/// A section that is being written.
+pub(super) struct SectionProgress {
     offset: u64,
     filled: u64,
     hash: Xxh3,
 }
 
-impl fmt::Debug for Filling {
+impl fmt::Debug for SectionProgress {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} bytes at {}", self.filled, self.offset)
     }
 }
 
-impl Filling {
+impl SectionProgress {
     fn append(&mut self, file: &Unpublished, bytes: &[u8]) -> io::Result<()> {
         file.write_all_at(bytes, self.offset + self.filled)?;
         self.filled += bytes.len() as u64;
@@ -80,46 +80,46 @@ impl Filling {
     }
 }
 
-/// A file and its sections, in the hands of the thread that fills them.
+/// Writes sections to a file on a thread of its own.
 #[derive(Debug)]
-pub(super) struct Sections {
+pub(super) struct SectionWriter {
     /// `None` once the thread has ended.
-    at_work: Option<AtWork>,
+    at_work: Option<WriterThread>,
 }
 
 #[derive(Debug)]
-struct AtWork {
+struct WriterThread {
     pieces: SyncSender<(usize, Piece)>,
-    thread: JoinHandle<io::Result<Filled>>,
+    thread: JoinHandle<io::Result<WrittenSections>>,
 }
 
-/// What the thread hands back.
+/// The result of the thread.
 #[derive(Debug)]
-pub(super) struct Filled {
+pub(super) struct WrittenSections {
     /// The file, not yet published.
     pub(super) file: Unpublished,
     /// Its sections in the order they were given.
-    pub(super) sections: Vec<Filling>,
+    pub(super) sections: Vec<SectionProgress>,
 }
 
-impl Sections {
+impl SectionWriter {
     /// Begins to fill `sections` of `file`.
     ///
     /// # Errors
     /// If no thread can be started.
-    pub(super) fn begin(file: Unpublished, sections: Vec<Filling>) -> io::Result<Self> {
+    pub(super) fn begin(file: Unpublished, sections: Vec<SectionProgress>) -> io::Result<Self> {
         let (pieces, to_write) = sync_channel(WAITING);
-        let filled = Filled { file, sections };
+        let filled = WrittenSections { file, sections };
         let thread = thread::Builder::new()
             .name("spherule-write".to_owned())
             .spawn(move || fill(filled, &to_write))?;
-        let at_work = AtWork { pieces, thread };
+        let at_work = WriterThread { pieces, thread };
         Ok(Self {
             at_work: Some(at_work),
         })
     }
 
-    /// Puts `piece` behind what section number `section` holds.
+    /// Appends `piece` to section number `section`.
     ///
     /// # Errors
     /// The system's reason why this or an earlier piece cannot be written.
@@ -137,13 +137,13 @@ impl Sections {
     ///
     /// # Errors
     /// The system's reason why something cannot be written.
-    pub(super) fn finish(mut self) -> io::Result<Filled> {
+    pub(super) fn finish(mut self) -> io::Result<WrittenSections> {
         self.end()?
             .ok_or_else(|| io::Error::other("an earlier part could not be written"))
     }
 
-    fn end(&mut self) -> io::Result<Option<Filled>> {
-        let Some(AtWork { pieces, thread }) = self.at_work.take() else {
+    fn end(&mut self) -> io::Result<Option<WrittenSections>> {
+        let Some(WriterThread { pieces, thread }) = self.at_work.take() else {
             return Ok(None);
         };
         drop(pieces);
@@ -154,18 +154,21 @@ impl Sections {
     }
 }
 
-impl Drop for Sections {
+impl Drop for SectionWriter {
     /// The file is gone when this returns.
     fn drop(&mut self) {
-        if let Some(AtWork { pieces, thread }) = self.at_work.take() {
+        if let Some(WriterThread { pieces, thread }) = self.at_work.take() {
             drop(pieces);
-            // What became of a file that nobody wants is not told.
+            // Errors of a discarded file are not reported.
             let _ = thread.join();
         }
     }
 }
 
-fn fill(mut filled: Filled, pieces: &Receiver<(usize, Piece)>) -> io::Result<Filled> {
+fn fill(
+    mut filled: WrittenSections,
+    pieces: &Receiver<(usize, Piece)>,
+) -> io::Result<WrittenSections> {
     for (section, piece) in pieces {
         filled.sections[section].append(&filled.file, (*piece).as_ref())?;
     }

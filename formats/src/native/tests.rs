@@ -40,16 +40,16 @@ fn frame(count: u8, origin: DVec3) -> ParticleFrame {
     }
 }
 
-struct Written {
+struct WrittenFrame {
     _dir: tempfile::TempDir,
     path: PathBuf,
 }
 
-fn written(frame: &ParticleFrame) -> Written {
+fn written(frame: &ParticleFrame) -> WrittenFrame {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     write(&path, frame, Some(7)).expect("writable");
-    Written { _dir: dir, path }
+    WrittenFrame { _dir: dir, path }
 }
 
 fn bytes(frame: &ParticleFrame) -> Vec<u8> {

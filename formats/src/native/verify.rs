@@ -1,8 +1,8 @@
 //! Whether a native frame is whole: checksums, and beyond them whether its numbers can be what a frame has.
 //!
-//! Opening checks header and index. Reading all of a frame compares checksums, which tells damage on the
+//! Opening checks header and index. Reading all of a frame compares checksums, which finds damage on the
 //! disk or the way. What a faulty writer made, or somebody forged, has good checksums: here its nodes,
-//! positions, radii and padding are looked at too. The first fault is told, the same whatever the threads.
+//! positions, radii and padding are looked at too. The first fault is reported, the same for any number of threads.
 
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
@@ -84,7 +84,7 @@ impl NativeFrame<'_> {
         contents.verify()
     }
 
-    /// Sections do not lie on each other, and between them is nothing.
+    /// Sections do not overlap, and between them is nothing.
     fn verify_padding(&self) -> Result<(), ParseError> {
         let (bytes, index) = (self.bytes(), self.index());
         if bytes
@@ -102,7 +102,7 @@ impl NativeFrame<'_> {
         let mut end = HEADER_LEN as u64;
         for (what, section) in &sections {
             if section.offset < end {
-                let what = format!("{what} lie on the section before");
+                let what = format!("{what} overlap the section before");
                 return Err(fault(section.offset, &what));
             }
             self.verify_zeros(end, section.offset)?;
@@ -168,7 +168,7 @@ impl Contents<'_> {
         }
     }
 
-    /// Errors that are told are numbers.
+    /// Stored errors are numbers.
     fn verify_errors(&self) -> Result<(), ParseError> {
         let is_error = |error: f64| error.is_finite() && error >= 0.0;
         let radii = match &self.index.radius {
@@ -180,10 +180,10 @@ impl Contents<'_> {
         if errors.all(is_error) {
             return Ok(());
         }
-        // Where in the index is not known: it lies behind all sections.
+        // The offset in the index is not known: the index follows all sections.
         let ends = self.index.sections().into_iter();
         let end = ends.map(|(_, s)| s.offset + s.len).max().unwrap_or(0);
-        Err(fault(end, "the index: a largest error is no number"))
+        Err(fault(end, "the index: a largest error is not a number"))
     }
 
     /// Every wide block is referred to, as often as there are.

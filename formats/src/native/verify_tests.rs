@@ -271,7 +271,7 @@ fn numbers_where_zeros_belong() {
     });
     told(
         &bytes,
-        "attribute id lie on the section before",
+        "attribute id overlap the section before",
         |i| i.positions.offset,
         |i, _| {
             i.attributes[0].section.offset = i.positions.offset;
@@ -281,7 +281,7 @@ fn numbers_where_zeros_belong() {
         let ends = i.sections().into_iter().map(|(_, s)| s.offset + s.len);
         ends.max().expect("sections")
     };
-    told(&bytes, "a largest error is no number", last, |i, _| {
+    told(&bytes, "a largest error is not a number", last, |i, _| {
         i.attributes[0].max_error = -1.0;
     });
 }

@@ -1,4 +1,4 @@
-//! Makes native frames: sections at places known beforehand, filled run by run in tree order, so that a
+//! Writes native frames: sections at offsets known beforehand, filled run by run in tree order, so that a
 //! frame of any size passes through in pieces.
 
 use std::io;
@@ -12,9 +12,9 @@ use super::layout::{
     ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,
     Section, UP_Y, blocks_of, header, nodes_len, positions_len,
 };
-use super::quantize::{Allowed, GROUP, Leaves, StoredBlock, encode};
+use super::quantize::{EncodeLimits, EncodedLeaves, GROUP, StoredBlock, encode};
 use super::radii::CodedRadii;
-use super::sections::{Filling, Places, Sections, piece};
+use super::sections::{SectionOffsets, SectionProgress, SectionWriter, piece};
 use super::{Bound, RadiusRange, StoredType};
 use crate::blocks::{Aabb, BLOCK_SIZE, Block, Q10Block, Q16Block};
 use crate::order::index_u32;
@@ -29,7 +29,7 @@ pub struct FrameSpec {
     pub encoding: Encoding,
     /// How far they may be from the true ones; blocks beyond are stored as they are.
     pub bound: Bound,
-    /// Whether y points up for whoever made the particles; else it is not told.
+    /// Whether y points up in the program that made the particles; else unknown.
     pub is_y_up: bool,
     /// World position of the zero of the positions.
     pub origin: DVec3,
@@ -50,7 +50,7 @@ pub struct FrameSpec {
 /// Radii of a frame that is to be written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusSpec {
-    /// Not told.
+    /// Unknown.
     None,
     /// All alike.
     Common(f32),
@@ -88,7 +88,7 @@ pub struct Run<'a> {
 /// are written.
 const CODED_LEN: usize = 1 << 18;
 
-/// Numbers of the sections as they lie in the file; attributes follow, and what is kept as it is comes last,
+/// Numbers of the sections in the order of the file; attributes follow, and what is kept as it is comes last,
 /// because its length is not known before.
 const POSITIONS: usize = 0;
 const NODES: usize = 1;
@@ -99,7 +99,7 @@ const ATTRIBUTES: usize = 3;
 /// until then.
 #[derive(Debug)]
 pub struct FrameWriter {
-    sections: Sections,
+    sections: SectionWriter,
     spec: FrameSpec,
     /// Particles that were pushed.
     pushed: u64,
@@ -125,7 +125,7 @@ impl FrameWriter {
             .filter(|_| u32::try_from(blocks_of(spec.count)).is_ok())
             .ok_or_else(|| invalid(format!("{} particles are too many for a frame", spec.count)))?;
         Ok(Self {
-            sections: Sections::begin(Unpublished::create(path)?, sections)?,
+            sections: SectionWriter::begin(Unpublished::create(path)?, sections)?,
             pushed: 0,
             wide: 0,
             max_error: 0.0,
@@ -170,8 +170,8 @@ impl FrameWriter {
             )));
         }
         let filled = self.sections.finish()?;
-        let sections: Vec<Section> = filled.sections.iter().map(Filling::done).collect();
-        let measured = Measured {
+        let sections: Vec<Section> = filled.sections.iter().map(SectionProgress::done).collect();
+        let measured = FrameSummary {
             max_error: self.max_error,
             radius_error: self.radius_error,
             bounds: self.bounds,
@@ -211,14 +211,14 @@ impl FrameWriter {
         positions: &[Vec3],
         radii: Option<&CodedRadii>,
     ) -> io::Result<()> {
-        let allowed = Allowed {
+        let allowed = EncodeLimits {
             bound: self.spec.bound,
             radius: match self.spec.radius {
                 RadiusSpec::Common(radius) => Some(radius),
                 RadiusSpec::None | RadiusSpec::PerParticle(_) => None,
             },
         };
-        let mut leaves: Leaves<B> = encode(positions, radii, allowed);
+        let mut leaves: EncodedLeaves<B> = encode(positions, radii, allowed);
         // Fewer than blocks, which were counted in 32 bits.
         leaves.shift(u32::try_from(self.wide).map_err(io::Error::other)?);
         self.wide += leaves.wide.len() as u64;
@@ -256,9 +256,9 @@ impl FrameWriter {
     }
 }
 
-/// The places of all sections; none if the file would be too long.
-fn sections_of(spec: &FrameSpec) -> Option<Vec<Filling>> {
-    let mut places = Places {
+/// The offsets of all sections; none if the file would be too long.
+fn sections_of(spec: &FrameSpec) -> Option<Vec<SectionProgress>> {
+    let mut places = SectionOffsets {
         next: HEADER_LEN as u64,
     };
     let radii = match spec.radius {
@@ -279,14 +279,14 @@ fn sections_of(spec: &FrameSpec) -> Option<Vec<Filling>> {
     Some(sections)
 }
 
-/// What is known when all is written.
-struct Measured {
+/// Values that are known after all runs are written.
+struct FrameSummary {
     max_error: f64,
     radius_error: f32,
     bounds: Aabb,
 }
 
-fn index_of(spec: &FrameSpec, measured: &Measured, sections: &[Section]) -> FrameIndex {
+fn index_of(spec: &FrameSpec, measured: &FrameSummary, sections: &[Section]) -> FrameIndex {
     let wide = ATTRIBUTES + spec.attributes.len();
     let attribute = |(spec, section): (&AttributeSpec, &Section)| AttributeIndex {
         name: spec.name.clone(),
@@ -336,7 +336,7 @@ pub fn wide_blocks(
     bound: Bound,
     radius: Option<f32>,
 ) -> usize {
-    let allowed = Allowed { bound, radius };
+    let allowed = EncodeLimits { bound, radius };
     let runs = positions.chunks(CODED_LEN);
     runs.map(|run| match encoding {
         Encoding::F32 => 0,

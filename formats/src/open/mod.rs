@@ -81,7 +81,7 @@ impl Content {
 }
 
 impl FrameFile {
-    /// [`Self::open_within`] all memory that there is.
+    /// [`Self::open_within`] without a limit.
     ///
     /// # Errors
     /// As [`Self::open_within`].
@@ -89,7 +89,7 @@ impl FrameFile {
         Self::open_within(path, MemoryBudget::UNLIMITED)
     }
 
-    /// Reads and understands the file at `path`, whatever its name.
+    /// Reads the file at `path`, whatever its name.
     ///
     /// # Errors
     /// [`FrameError::Io`] if it cannot be read or changed size meanwhile,
@@ -152,18 +152,18 @@ impl FrameFile {
         Ok((Content::Whole(bytes), stamp, notes))
     }
 
-    /// Understands `bytes` as the content of a file at `path`, which is not touched.
+    /// Reads `bytes` as the content of a file at `path`, which is not opened.
     ///
     /// # Errors
-    /// As [`Self::open`], less the reading.
+    /// As [`Self::open`], except for reading the file.
     pub fn from_bytes(path: &Path, bytes: Vec<u8>) -> Result<Self, FrameError> {
         Self::from_bytes_within(path, bytes, MemoryBudget::UNLIMITED)
     }
 
-    /// [`Self::from_bytes`] if it can be unpacked and read within `budget`.
+    /// [`Self::from_bytes`], decompressed and read within `budget`.
     ///
     /// # Errors
-    /// As [`Self::open_within`], less the reading.
+    /// As [`Self::open_within`], except for reading the file.
     pub fn from_bytes_within(
         path: &Path,
         bytes: Vec<u8>,
@@ -214,12 +214,12 @@ impl FrameFile {
         })
     }
 
-    /// Where the file is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// Which format it is.
+    /// Format of the file.
     pub const fn format(&self) -> Format {
         self.format
     }
@@ -239,7 +239,7 @@ impl FrameFile {
         self.stored_len
     }
 
-    /// Bytes of the uncompressed content. Of a packed text a guess until it was read to its end.
+    /// Bytes of the uncompressed content. For compressed text an estimate until it was read to its end.
     pub fn unpacked_len(&self) -> u64 {
         match &self.content {
             Content::Streamed(file) => file.unpacked_len(&self.path),
@@ -253,7 +253,7 @@ impl FrameFile {
         self.content.held_len(self.format)
     }
 
-    /// Bytes that are held on the way from the content to the numbers of `particles`: of arrays that are packed,
+    /// Bytes that are held beside content and numbers while `particles` are read: arrays that are compressed,
     /// or text in XML, in the content.
     pub fn unpacked_arrays_len(&self, particles: &RawParticles) -> u64 {
         let file = FileExtent {
@@ -264,7 +264,7 @@ impl FrameFile {
         reader.unpacked_arrays_len(self.bytes(), file, particles)
     }
 
-    /// Oddities that did not stop the file from being understood; those at the end of a large text once it
+    /// Oddities that did not stop the file from being read; those at the end of a large text once it
     /// was read.
     pub fn notes(&self) -> &[String] {
         match &self.content {
@@ -300,7 +300,7 @@ impl FrameFile {
                 particles.map_err(in_file)?
             }
         };
-        let fits = left.check(particles.byte_len(), "in memory its numbers are");
+        let fits = left.check(particles.byte_len(), "its numbers in memory are");
         fits.map_err(in_file)?;
         Ok(particles)
     }

@@ -17,7 +17,7 @@ const STATES: usize = 24;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CurveState(u8);
 
-/// `[state][octant]`: the octant's place on the curve in the low three bits, the state inside it
+/// `[state][octant]`: the octant's position on the curve in the low three bits, the state inside it
 /// above.
 const ONE_LEVEL: [[u8; 8]; STATES] = one_level();
 /// `[state][two octants]`: six bits of curve, the state inside above them.
@@ -101,7 +101,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid of 2^21 cells along the longest of `size`, from `min`; what lies outside goes to the
+    /// A grid of 2^21 cells along the longest of `size`, from `min`; what is outside goes to the
     /// border cells.
     pub fn new(min: Vec3, size: Vec3) -> Self {
         let cells = (1_u32 << AXIS_BITS) as f32;
@@ -185,7 +185,7 @@ impl TopCells {
         self.levels
     }
 
-    /// The place on the curve of the cell that `point` lies in.
+    /// The curve position of the cell that contains `point`.
     #[inline]
     pub fn cell_of(&self, point: Vec3) -> usize {
         let shift = AXIS_BITS - self.levels;
@@ -219,7 +219,7 @@ const fn low_bits(value: u64, mask: u64) -> usize {
 }
 
 /// Follows the curve from `state` through `levels` levels of `morton`, of which `skip` levels from
-/// the top are passed over. Returns the place on the curve (`3 * levels` bits) and the state there.
+/// the top are passed over. Returns the curve position (`3 * levels` bits) and the state there.
 #[inline]
 pub fn hilbert(morton: u64, skip: u32, levels: u32, state: CurveState) -> (u64, CurveState) {
     debug_assert!(skip + levels <= AXIS_BITS);

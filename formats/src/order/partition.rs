@@ -66,7 +66,7 @@ pub fn table_bytes(count: u64) -> u64 {
 }
 
 /// Scatters `centers` into `points`, and their indices into `indices` unless that is empty.
-/// `cell_of` tells the cell of the particle with an index and position, below `cell_count`.
+/// `cell_of` returns the cell of the particle with an index and position, below `cell_count`.
 ///
 /// # Panics
 /// If `points` (or a non-empty `indices`) is shorter than `centers`.

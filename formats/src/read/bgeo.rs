@@ -5,7 +5,7 @@
 //! writers disagree about them. Newer Houdini containers share the extension only and are refused by
 //! name. Gzip around the file is undone by the caller. Layout after partio's `BGEO.cpp`.
 
-use super::columns::{self, Column, Lane, ParticleLayout};
+use super::columns::{self, ParticleLayout, Strided, StridedColumn};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader};
@@ -85,7 +85,7 @@ impl Reader for Bgeo {
 /// geometry files and for point attributes of type string.
 fn point_layout(bytes: &[u8]) -> Result<ParticleLayout, ParseError> {
     check_kind(bytes)?;
-    let mut cursor = Cursor { bytes, at: 9 };
+    let mut cursor = HeaderCursor { bytes, at: 9 };
     let count = cursor.count("points")?;
     cursor.at = 25;
     let definition_count = cursor.count("point attributes")?;
@@ -139,10 +139,10 @@ fn check_kind(bytes: &[u8]) -> Result<(), ParseError> {
     if !bytes.starts_with(MAGIC) {
         return Err(ParseError::malformed(
             0,
-            "no bgeo file: it does not begin with BgeoV",
+            "not a bgeo file: it does not begin with BgeoV",
         ));
     }
-    let mut cursor = Cursor { bytes, at: 5 };
+    let mut cursor = HeaderCursor { bytes, at: 5 };
     match cursor.i32("the version")? {
         VERSION => Ok(()),
         other => Err(ParseError::unsupported(format!(
@@ -152,7 +152,7 @@ fn check_kind(bytes: &[u8]) -> Result<(), ParseError> {
 }
 
 /// One point attribute of the header.
-struct Definition {
+struct AttributeDefinition {
     name: String,
     components: usize,
     scalar: ScalarType,
@@ -164,14 +164,14 @@ fn column(
     components: usize,
     start: usize,
     stride: usize,
-) -> Column {
+) -> StridedColumn {
     let lanes = (0..components)
-        .map(|c| Lane {
+        .map(|c| Strided {
             start: start + 4 * c,
             stride,
         })
         .collect();
-    Column {
+    StridedColumn {
         name: name.into(),
         scalar,
         endian: Endian::Big,
@@ -180,10 +180,14 @@ fn column(
 }
 
 /// The attributes in the order of the file.
-fn attribute_columns(definitions: Vec<Definition>, start: usize, stride: usize) -> Vec<Column> {
+fn attribute_columns(
+    definitions: Vec<AttributeDefinition>,
+    start: usize,
+    stride: usize,
+) -> Vec<StridedColumn> {
     let mut at = start + POSITION_BYTES;
     let mut columns = Vec::with_capacity(definitions.len());
-    for Definition {
+    for AttributeDefinition {
         name,
         components,
         scalar,
@@ -196,17 +200,17 @@ fn attribute_columns(definitions: Vec<Definition>, start: usize, stride: usize) 
 }
 
 /// Walks the header; every step is checked against the end of the file.
-struct Cursor<'a> {
+struct HeaderCursor<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-impl Cursor<'_> {
+impl HeaderCursor<'_> {
     fn take(&mut self, len: usize, what: &str) -> Result<&[u8], ParseError> {
         let end = self.at.checked_add(len);
         let taken = end.and_then(|end| self.bytes.get(self.at..end));
         let Some(taken) = taken else {
-            // The cursor jumps to fixed places, which a short file does not have.
+            // The cursor jumps to fixed offsets, which a short file does not have.
             return Err(ParseError::malformed(
                 self.at.min(self.bytes.len()),
                 format!("file ends within {what}"),
@@ -236,7 +240,7 @@ impl Cursor<'_> {
             .map_err(|_| ParseError::malformed(at, format!("the number of {what} is {count}")))
     }
 
-    fn definition(&mut self) -> Result<Definition, ParseError> {
+    fn definition(&mut self) -> Result<AttributeDefinition, ParseError> {
         const WHAT: &str = "a point attribute definition";
         let name_len = self.u16(WHAT)?;
         let name = String::from_utf8_lossy(self.take(name_len, WHAT)?).into_owned();
@@ -264,7 +268,7 @@ impl Cursor<'_> {
         } else {
             self.take(4 * components, "the default values of a point attribute")?;
         }
-        Ok(Definition {
+        Ok(AttributeDefinition {
             name,
             components,
             scalar,

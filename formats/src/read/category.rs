@@ -25,7 +25,7 @@ const SECOND: usize = 27;
 /// Atomic numbers by first and second letter; 0 where there is no such symbol.
 const NUMBERS: [u8; 26 * SECOND] = numbers();
 
-/// The first number of a name that is no element.
+/// The first number of a name that is not an element.
 const FIRST_OTHER: u32 = 1000;
 /// How many numbers there are for them: all are whole numbers in f32.
 const OTHERS: u32 = 16_000_000;

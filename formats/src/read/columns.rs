@@ -1,7 +1,7 @@
-//! Numbers that sit at fixed steps in a file, gathered into one array a property.
+//! Numbers with fixed strides in a file, gathered into one array a property.
 //!
 //! Interleaved records (BGEO, binary PLY, structured NPY), planes one after another (Fortran order)
-//! and plain rows are all the same to it: a [`Column`] says for each of its components where the
+//! and plain rows are all described alike: a [`StridedColumn`] has for each of its components the offset of the
 //! first number is and how far it is to the next particle's. Parsing headers is left to the readers.
 
 mod fill;
@@ -18,9 +18,9 @@ use crate::{
 /// that a file with many properties still crosses the memory bus once.
 const BLOCK: usize = 4096;
 
-/// Where one component is: particle `i` has it at byte `start + i * stride`.
+/// Offset and stride of one component: particle `i` has it at byte `start + i * stride`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Lane {
+pub(crate) struct Strided {
     /// Byte of particle 0.
     pub(crate) start: usize,
     /// Bytes from one particle to the next.
@@ -29,7 +29,7 @@ pub(crate) struct Lane {
 
 /// One property of all particles.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Column {
+pub(crate) struct StridedColumn {
     /// Name in the file.
     pub(crate) name: String,
     /// Stored type of every component.
@@ -37,15 +37,15 @@ pub(crate) struct Column {
     /// Stored byte order of every component.
     pub(crate) endian: Endian,
     /// One per component.
-    pub(crate) lanes: Vec<Lane>,
+    pub(crate) lanes: Vec<Strided>,
 }
 
-impl Column {
+impl StridedColumn {
     fn same_storage(&self, other: &Self) -> bool {
         self.scalar == other.scalar && self.endian == other.endian
     }
 
-    /// Whether all of `count` particles lie within `len` bytes.
+    /// Whether all of `count` particles are within `len` bytes.
     fn fits(&self, count: usize, len: usize) -> bool {
         self.lanes.iter().all(|lane| {
             count == 0
@@ -58,7 +58,7 @@ impl Column {
     }
 }
 
-/// Refuses `count` particles of at least `each` bytes, from byte `at` on, that cannot be in a file
+/// Rejects `count` particles of at least `each` bytes, from byte `at` on, that do not fit into a file
 /// of `len` bytes.
 ///
 /// # Errors
@@ -85,26 +85,30 @@ pub(super) fn check_room(
     }
 }
 
-/// Where the particles of one time step are, without a look at their values.
+/// Offsets and strides of the particles of one time step, without their values.
 #[derive(Debug, Clone, PartialEq)]
 pub(crate) struct ParticleLayout {
     /// Particles.
     pub(crate) count: usize,
     /// Positions: two or three components in all, x first. A missing third is 0: a run in the plane.
-    pub(crate) axes: Vec<Column>,
+    pub(crate) axes: Vec<StridedColumn>,
     /// The homogeneous coordinate, one f32, by which positions of f32 are divided unless it is 0 or 1.
-    pub(crate) weight: Option<Column>,
-    /// What else there is, each of at least one component.
-    pub(crate) attributes: Vec<Column>,
-    /// Simulation time, if the file tells.
+    pub(crate) weight: Option<StridedColumn>,
+    /// Other properties, each of at least one component.
+    pub(crate) attributes: Vec<StridedColumn>,
+    /// Simulation time, if the file has it.
     pub(crate) time: Option<f64>,
-    /// Step number, if the file tells.
+    /// Step number, if the file has it.
     pub(crate) step: Option<i64>,
 }
 
 impl ParticleLayout {
     /// `count` particles with these `axes` and `attributes`; those without components are left out.
-    pub(crate) fn new(count: usize, axes: Vec<Column>, mut attributes: Vec<Column>) -> Self {
+    pub(crate) fn new(
+        count: usize,
+        axes: Vec<StridedColumn>,
+        mut attributes: Vec<StridedColumn>,
+    ) -> Self {
         attributes.retain(|column| !column.lanes.is_empty());
         Self {
             count,
@@ -116,7 +120,7 @@ impl ParticleLayout {
         }
     }
 
-    /// Refuses columns that reach past the end of a file of `len` bytes.
+    /// Rejects columns that reach past the end of a file of `len` bytes.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] at the end of the file, with the name of the column.
@@ -131,13 +135,13 @@ impl ParticleLayout {
     /// As [`Self::check`].
     pub(super) fn particles(self, bytes: &[u8]) -> Result<RawParticles, ParseError> {
         self.check(bytes.len())?;
-        let columns: Vec<Column> = self.columns().cloned().collect();
+        let columns: Vec<StridedColumn> = self.columns().cloned().collect();
         let gathered = gather(bytes, self.count, &columns);
         Ok(self.assemble(gathered))
     }
 
     /// Axes, the homogeneous coordinate, attributes.
-    fn columns(&self) -> impl Iterator<Item = &Column> {
+    fn columns(&self) -> impl Iterator<Item = &StridedColumn> {
         let columns = self.axes.iter().chain(&self.weight);
         columns.chain(&self.attributes)
     }
@@ -172,13 +176,13 @@ impl ParticleLayout {
 pub(super) struct GrowingParticles {
     layout: ParticleLayout,
     data: Vec<AttributeData>,
-    /// How many there are so far.
+    /// Particles so far.
     count: usize,
     budget: MemoryBudget,
 }
 
 impl GrowingParticles {
-    /// None yet; there is room for `room`, which are a guess, if `budget` allows as many.
+    /// No particles yet, with capacity for an estimate of `room` if `budget` allows it.
     pub(super) fn new(layout: ParticleLayout, room: usize, budget: MemoryBudget) -> Self {
         let each = layout.columns().map(|c| c.lanes.len() * c.scalar.size());
         let need = each.fold(0, usize::saturating_add).saturating_mul(room);
@@ -187,7 +191,7 @@ impl GrowingParticles {
         } else {
             0
         };
-        let empty = |column: &Column| {
+        let empty = |column: &StridedColumn| {
             let mut data = zeros(column.scalar, 0);
             data.reserve(column.lanes.len().saturating_mul(room));
             data
@@ -213,7 +217,7 @@ impl GrowingParticles {
             .map(|c| c.lanes.len() * c.scalar.size() * count);
         self.budget.check(
             held + more.sum::<usize>() as u64,
-            "in memory its numbers are",
+            "its numbers in memory are",
         )?;
         for (column, data) in self.layout.columns().zip(&mut self.data) {
             let mut block = zeros(column.scalar, column.lanes.len() * count);
@@ -254,7 +258,7 @@ fn divided(position: Vec3, w: f32) -> Vec3 {
 pub(super) fn values(
     bytes: &[u8],
     count: usize,
-    column: &Column,
+    column: &StridedColumn,
 ) -> Result<AttributeData, ParseError> {
     check_columns([column], count, bytes.len())?;
     let mut gathered = gather(bytes, count, std::slice::from_ref(column));
@@ -262,7 +266,7 @@ pub(super) fn values(
 }
 
 /// x, y and z of one type become one column, which decodes without a detour.
-fn join_alike(axes: Vec<Column>) -> Vec<Column> {
+fn join_alike(axes: Vec<StridedColumn>) -> Vec<StridedColumn> {
     match axes.split_first() {
         Some((first, rest)) if rest.iter().all(|c| c.same_storage(first)) => {
             let mut joined = first.clone();
@@ -274,7 +278,7 @@ fn join_alike(axes: Vec<Column>) -> Vec<Column> {
 }
 
 fn check_columns<'c>(
-    columns: impl IntoIterator<Item = &'c Column>,
+    columns: impl IntoIterator<Item = &'c StridedColumn>,
     count: usize,
     len: usize,
 ) -> Result<(), ParseError> {
@@ -288,7 +292,7 @@ fn check_columns<'c>(
 }
 
 /// Decodes all `columns` of `count` particles, which fit.
-fn gather(bytes: &[u8], count: usize, columns: &[Column]) -> Vec<AttributeData> {
+fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<AttributeData> {
     let mut gathered: Vec<AttributeData> = columns
         .iter()
         .map(|c| zeros(c.scalar, c.lanes.len() * count))
@@ -372,7 +376,7 @@ pub(super) fn positions(parts: Vec<AttributeData>, count: usize) -> Positions {
 /// Collects scalars that are known to be the parts of a vector (`vx vy vz`, `nx ny nz`,
 /// `red green blue` with or without `alpha`, `r g b`) under the name of the vector. Parts that are missing or
 /// of different types stay as they are.
-pub(super) fn group_vectors(mut columns: Vec<Column>) -> Vec<Column> {
+pub(super) fn group_vectors(mut columns: Vec<StridedColumn>) -> Vec<StridedColumn> {
     for (name, parts) in RECORD_VECTORS {
         let places: Option<Vec<usize>> = parts
             .iter()
@@ -390,8 +394,8 @@ pub(super) fn group_vectors(mut columns: Vec<Column>) -> Vec<Column> {
 }
 
 /// Replaces the columns at `places` by one called `name`, where the earliest of them was.
-fn merge_columns(columns: &mut Vec<Column>, places: &[usize], name: &str) {
-    let parts: Vec<Column> = places
+fn merge_columns(columns: &mut Vec<StridedColumn>, places: &[usize], name: &str) {
+    let parts: Vec<StridedColumn> = places
         .iter()
         .filter_map(|p| columns.get(*p).cloned())
         .collect();
@@ -401,7 +405,7 @@ fn merge_columns(columns: &mut Vec<Column>, places: &[usize], name: &str) {
     if !parts.iter().all(|c| c.same_storage(first)) {
         return;
     }
-    let merged = Column {
+    let merged = StridedColumn {
         name: name.to_owned(),
         scalar: first.scalar,
         endian: first.endian,

@@ -44,7 +44,7 @@ impl TestedReader {
         all.remove(0)
     }
 
-    /// The message of the error that `read` gives for the first step, whatever `steps` says.
+    /// The message of the error that `read` gives for the first step, whatever `steps` returns.
     #[track_caller]
     pub(super) fn error(self, bytes: &[u8]) -> ParseError {
         fit_to_show((self.read)(bytes, &Step::whole(bytes.len())).expect_err("a bad file"))

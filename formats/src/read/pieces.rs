@@ -20,7 +20,10 @@ fn is_text(format: Format, bytes: &[u8]) -> bool {
     if format == csv::FORMAT {
         true
     } else if format == xyz::FORMAT {
-        matches!(xyz::kind(bytes), Ok(xyz::Kind::Molecular | xyz::Kind::Bare))
+        matches!(
+            xyz::kind(bytes),
+            Ok(xyz::XyzVariant::Molecular | xyz::XyzVariant::Bare)
+        )
     } else {
         format.is_streamed(bytes)
     }

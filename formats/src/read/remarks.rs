@@ -1,6 +1,6 @@
 //! Wording of the remarks that several readers make, see [`crate::reader::Reader::remarks`].
 
-/// That the cell of a file is not used; `periodic` is what the file says of its boundaries.
+/// The remark that the cell of a file is not used; `periodic` are the flags of its boundaries.
 pub(super) fn unused_cell(periodic: Option<&str>) -> String {
     let boundaries = periodic.map_or_else(String::new, |flags| {
         format!(" and its periodic boundaries ({flags})")

@@ -4,8 +4,8 @@ use super::input::TextInput;
 
 /// The uncompressed content of a file.
 ///
-/// All of it lies in memory: mapped, read or decompressed. Only where [`crate::reader::Reader::stream_unit`] says
-/// that a format can be read in pieces may it be a stream, of which [`Self::text`] holds a window.
+/// All of it is in memory: mapped, read or decompressed. Only if [`crate::reader::Reader::stream_unit`] reports
+/// that a file can be read in pieces, it may be a stream; [`Self::text`] then holds a window of it.
 #[derive(Debug)]
 pub(crate) struct ByteSource<'a> {
     text: TextInput<'a>,

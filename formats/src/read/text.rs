@@ -87,7 +87,7 @@ pub(super) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
         .filter(|word| !word.is_empty())
 }
 
-/// `bytes` as text of the same length, so that places in it are places in the file: each byte that is no
+/// `bytes` as text of the same length, so that offsets in it are offsets in the file: each byte that is no
 /// UTF-8 becomes a question mark.
 pub(super) fn same_length(bytes: &[u8]) -> Cow<'_, str> {
     if let Ok(text) = str::from_utf8(bytes) {

@@ -1,18 +1,18 @@
-//! Why an input is no sequence, with the remedy.
+//! Why an input is not a sequence, with the remedy.
 
 use std::fmt::Write as _;
 use std::io;
 use std::path::{Path, PathBuf};
 
 /// Why no sequence could be made of an input. None of these is about the content of a frame:
-/// damaged files are told when they are loaded.
+/// damaged files are reported when they are loaded.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum SequenceError {
     /// A file or directory that is not there.
     #[error("{}: no such file or directory{hint}", path.display())]
     Missing {
-        /// What was asked for.
+        /// The requested name.
         path: PathBuf,
         /// Empty, or `; ` and names that come close.
         hint: String,
@@ -44,7 +44,7 @@ pub enum SequenceError {
         /// What is wrong and the remedy.
         what: String,
     },
-    /// Several sequences in one place.
+    /// Several sequences in one directory.
     #[error("{}: {} sequences are here; give the pattern of one:{}", path.display(), groups.len(), listed(groups))]
     Ambiguous {
         /// The directory.
@@ -65,10 +65,10 @@ pub enum SequenceError {
         /// The other.
         second: PathBuf,
     },
-    /// A part was asked for that the steps do not have.
+    /// A requested part does not exist.
     #[error("no part is called `{name}`; the parts are {}", if known.len() > 1 { known.join(", ") } else { "not named: there is one file a step".to_owned() })]
     NoSuchPart {
-        /// What was asked for.
+        /// The requested name.
         name: String,
         /// What there is.
         known: Vec<String>,

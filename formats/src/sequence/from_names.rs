@@ -3,12 +3,12 @@
 use std::path::{Path, PathBuf};
 
 use super::SequenceError;
-use super::group::{self, Group};
-use super::name::Name;
+use super::group::{self, FileGroup};
+use super::name::FileName;
 use super::pattern::Pattern;
 
 /// A file with its frame number, if its name has one, and the index of its part.
-type Numbered = (PathBuf, Option<i64>, u32);
+type NumberedFile = (PathBuf, Option<i64>, u32);
 
 /// The frames of files of these `names`: of a directory with these files, or with a `pattern`, of those that fit it.
 ///
@@ -18,9 +18,12 @@ type Numbered = (PathBuf, Option<i64>, u32);
 pub fn frames_of_names(
     pattern: Option<&Path>,
     names: &[&Path],
-) -> Result<Vec<Numbered>, SequenceError> {
+) -> Result<Vec<NumberedFile>, SequenceError> {
     let names = match pattern.map(Pattern::parse).transpose()? {
-        None => names.iter().map(|name| Name::parse(name, None)).collect(),
+        None => names
+            .iter()
+            .map(|name| FileName::parse(name, None))
+            .collect(),
         Some(pattern) => names
             .iter()
             .filter_map(|name| fitting(&pattern, name))
@@ -34,17 +37,20 @@ pub fn frames_of_names(
 /// # Errors
 /// As [`super::Sequence::open`].
 #[doc(hidden)]
-pub fn frames_of_list(names: &[&Path]) -> Result<Vec<Numbered>, SequenceError> {
-    let names = names.iter().map(|name| Name::parse(name, None)).collect();
+pub fn frames_of_list(names: &[&Path]) -> Result<Vec<NumberedFile>, SequenceError> {
+    let names = names
+        .iter()
+        .map(|name| FileName::parse(name, None))
+        .collect();
     numbered(group::listed(names, &mut Vec::new())?)
 }
 
-fn fitting(pattern: &Pattern, path: &Path) -> Option<Name> {
+fn fitting(pattern: &Pattern, path: &Path) -> Option<FileName> {
     let name = path.file_name()?.to_string_lossy();
-    Some(Name::parse(path, pattern.fit(&name)?.number))
+    Some(FileName::parse(path, pattern.fit(&name)?.number))
 }
 
-fn numbered(group: Group) -> Result<Vec<Numbered>, SequenceError> {
+fn numbered(group: FileGroup) -> Result<Vec<NumberedFile>, SequenceError> {
     let files = group.files.into_iter();
     Ok(files
         .map(|file| (file.path, file.number, file.part))

@@ -10,17 +10,17 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 
 use super::error::{GroupSummary, SequenceError, counted};
-use super::name::Name;
+use super::name::FileName;
 
-/// Files that make one sequence, sorted by number, then part.
+/// The files of one sequence, sorted by number, then part.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Group {
+pub(super) struct FileGroup {
     pub files: Vec<GroupFile>,
     /// One name for each part.
     pub parts: Vec<String>,
 }
 
-/// One file with its place in the sequence as far as the name tells.
+/// One file and what its name says about its position in the sequence.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct GroupFile {
     pub path: PathBuf,
@@ -31,19 +31,19 @@ pub(super) struct GroupFile {
 
 /// Names that differ in numbers only, with the column that counts frames.
 #[derive(Debug, Clone)]
-struct Run {
-    names: Vec<Name>,
+struct NameSeries {
+    names: Vec<FileName>,
     column: Option<usize>,
     /// Columns that vary along with the frame.
     free: Vec<usize>,
 }
 
-impl Run {
+impl NameSeries {
     fn numbers(&self) -> BTreeSet<i64> {
         self.names.iter().filter_map(|n| self.number(n)).collect()
     }
 
-    fn number(&self, name: &Name) -> Option<i64> {
+    fn number(&self, name: &FileName) -> Option<i64> {
         self.column.and_then(|c| name.numbers.get(c).copied())
     }
 
@@ -57,18 +57,18 @@ impl Run {
 
 /// Runs that share frame numbers.
 #[derive(Debug, Default)]
-struct Candidate {
-    runs: Vec<Run>,
+struct SequenceCandidate {
+    runs: Vec<NameSeries>,
     numbers: BTreeSet<i64>,
 }
 
-impl Candidate {
+impl SequenceCandidate {
     fn frames(&self) -> usize {
         self.numbers.len().max(1)
     }
 
     fn summary(&self) -> GroupSummary {
-        let patterns: Vec<String> = self.runs.iter().map(Run::pattern).collect();
+        let patterns: Vec<String> = self.runs.iter().map(NameSeries::pattern).collect();
         let pattern = match self.runs.as_slice() {
             // A file by itself is named: which of its numbers counts frames is a guess.
             [run] if run.names.len() == 1 => run.names[0].pattern(None, &[]),
@@ -89,34 +89,35 @@ impl Candidate {
 /// [`SequenceError::Ambiguous`]: rendering the wrong half of a directory would be worse.
 pub(super) fn pick(
     directory: &std::path::Path,
-    names: Vec<Name>,
+    names: Vec<FileName>,
     notes: &mut Vec<String>,
-) -> Result<Group, SequenceError> {
+) -> Result<FileGroup, SequenceError> {
     const CLEARLY_MORE: usize = 4;
-    let mut by_extension = BTreeMap::<String, Vec<Name>>::new();
+    let mut by_extension = BTreeMap::<String, Vec<FileName>>::new();
     for name in names {
         by_extension
             .entry(name.extension.clone())
             .or_default()
             .push(name);
     }
-    let mut candidates: Vec<Candidate> = by_extension.into_values().flat_map(candidates).collect();
-    let weight = |c: &Candidate| (!c.numbers.is_empty(), c.frames());
+    let mut candidates: Vec<SequenceCandidate> =
+        by_extension.into_values().flat_map(candidates).collect();
+    let weight = |c: &SequenceCandidate| (!c.numbers.is_empty(), c.frames());
     candidates.sort_by_key(|c| std::cmp::Reverse(weight(c)));
     let Some((first, others)) = candidates.split_first() else {
         return Err(SequenceError::NoInput);
     };
-    let is_minor = |c: &Candidate| {
+    let is_minor = |c: &SequenceCandidate| {
         let unnumbered = c.numbers.is_empty() && first.numbers.len() > 1;
         unnumbered || c.frames() * CLEARLY_MORE <= first.frames()
     };
     if !others.iter().all(is_minor) {
         return Err(SequenceError::Ambiguous {
             path: directory.to_owned(),
-            groups: candidates.iter().map(Candidate::summary).collect(),
+            groups: candidates.iter().map(SequenceCandidate::summary).collect(),
         });
     }
-    for other in others.iter().map(Candidate::summary) {
+    for other in others.iter().map(SequenceCandidate::summary) {
         notes.push(format!(
             "`{}` ({}) is left out",
             other.pattern,
@@ -128,7 +129,10 @@ pub(super) fn pick(
 
 /// The sequence that listed files make: parts if they share frame numbers, else by number, else
 /// in the order given. Nothing is left out.
-pub(super) fn listed(names: Vec<Name>, notes: &mut Vec<String>) -> Result<Group, SequenceError> {
+pub(super) fn listed(
+    names: Vec<FileName>,
+    notes: &mut Vec<String>,
+) -> Result<FileGroup, SequenceError> {
     let order: Vec<PathBuf> = names.iter().map(|n| n.path.clone()).collect();
     let mut candidates = candidates(names);
     if candidates.len() == 1 && (order.len() == 1 || !candidates[0].numbers.is_empty()) {
@@ -157,21 +161,21 @@ pub(super) fn listed(names: Vec<Name>, notes: &mut Vec<String>) -> Result<Group,
         part: 0,
         number: Some(number),
     });
-    Ok(Group {
+    Ok(FileGroup {
         files: files.collect(),
         parts: vec![String::new()],
     })
 }
 
 /// Runs of `names`, joined where they share frame numbers.
-fn candidates(names: Vec<Name>) -> Vec<Candidate> {
-    let mut by_text = BTreeMap::<Vec<String>, Vec<Name>>::new();
+fn candidates(names: Vec<FileName>) -> Vec<SequenceCandidate> {
+    let mut by_text = BTreeMap::<Vec<String>, Vec<FileName>>::new();
     for name in names {
         by_text.entry(name.literals.clone()).or_default().push(name);
     }
-    let mut runs: Vec<Run> = by_text.into_values().flat_map(runs).collect();
+    let mut runs: Vec<NameSeries> = by_text.into_values().flat_map(runs).collect();
     runs.sort_by_key(|run| std::cmp::Reverse(run.names.len()));
-    let mut candidates: Vec<Candidate> = Vec::new();
+    let mut candidates: Vec<SequenceCandidate> = Vec::new();
     // Candidates that have a frame number: only those can share it.
     let mut homes = BTreeMap::<i64, BTreeSet<usize>>::new();
     for run in runs {
@@ -186,7 +190,7 @@ fn candidates(names: Vec<Name>) -> Vec<Candidate> {
         });
         let home = home.map_or(candidates.len(), |(home, _)| home);
         if home == candidates.len() {
-            candidates.push(Candidate::default());
+            candidates.push(SequenceCandidate::default());
         }
         for number in &numbers {
             homes.entry(*number).or_default().insert(home);
@@ -199,7 +203,7 @@ fn candidates(names: Vec<Name>) -> Vec<Candidate> {
 }
 
 /// Finds the frame column of names that differ in numbers only, see the module's head.
-fn runs(names: Vec<Name>) -> Vec<Run> {
+fn runs(names: Vec<FileName>) -> Vec<NameSeries> {
     let given = names.first().and_then(|n| n.frame_column);
     let columns = names.first().map_or(0, |n| n.numbers.len());
     let values =
@@ -209,21 +213,21 @@ fn runs(names: Vec<Name>) -> Vec<Run> {
     let column = given
         .or_else(|| varying.iter().copied().find(|c| distinct(*c)))
         .or_else(|| varying.last().copied())
-        .or_else(|| names.first().and_then(Name::lone_column));
+        .or_else(|| names.first().and_then(FileName::lone_column));
     let free: Vec<usize> = varying.into_iter().filter(|c| Some(*c) != column).collect();
     if free.is_empty() || column.is_some_and(distinct) {
-        return vec![Run {
+        return vec![NameSeries {
             names,
             column,
             free,
         }];
     }
-    let mut split = BTreeMap::<Vec<i64>, Vec<Name>>::new();
+    let mut split = BTreeMap::<Vec<i64>, Vec<FileName>>::new();
     for name in names {
         let key = free.iter().map(|c| name.numbers[*c]).collect();
         split.entry(key).or_default().push(name);
     }
-    let run = |names| Run {
+    let run = |names| NameSeries {
         names,
         column,
         free: Vec::new(),
@@ -231,10 +235,10 @@ fn runs(names: Vec<Name>) -> Vec<Run> {
     split.into_values().map(run).collect()
 }
 
-fn into_group(candidate: Candidate) -> Result<Group, SequenceError> {
+fn into_group(candidate: SequenceCandidate) -> Result<FileGroup, SequenceError> {
     let mut runs = candidate.runs;
-    runs.sort_by_cached_key(Run::pattern);
-    let patterns: Vec<String> = runs.iter().map(Run::pattern).collect();
+    runs.sort_by_cached_key(NameSeries::pattern);
+    let patterns: Vec<String> = runs.iter().map(NameSeries::pattern).collect();
     let mut files: Vec<GroupFile> = Vec::new();
     for (part, run) in (0..).zip(&runs) {
         files.extend(run.names.iter().map(|name| GroupFile {
@@ -256,13 +260,13 @@ fn into_group(candidate: Candidate) -> Result<Group, SequenceError> {
             });
         }
     }
-    Ok(Group {
+    Ok(FileGroup {
         files,
         parts: part_names(&patterns),
     })
 }
 
-/// What tells the patterns apart: `Fluid` and `Oil` of `ParticleData_Fluid_#.vtk` and
+/// The parts of the names that differ between patterns: `Fluid` and `Oil` of `ParticleData_Fluid_#.vtk` and
 /// `ParticleData_Oil_#.vtk`. The whole pattern where nothing short does.
 fn part_names(patterns: &[String]) -> Vec<String> {
     if patterns.len() < 2 {

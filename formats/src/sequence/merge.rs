@@ -8,7 +8,7 @@ use crate::attribute::with_values;
 use crate::message::one_line;
 use crate::{Attribute, AttributeData, Positions, RawParticles, ScalarType};
 
-/// Name of the attribute that tells the parts apart: an index into the sequence's part names.
+/// Name of the attribute that distinguishes the parts: an index into the sequence's part names.
 pub const PART_ATTRIBUTE: &str = "part";
 
 /// Puts `parts` (index of the part, its particles) after one another and adds the attribute
@@ -16,7 +16,7 @@ pub const PART_ATTRIBUTE: &str = "part";
 ///
 /// Attributes that all parts with particles have in the same number of components are kept, in
 /// a type that holds them all; a part without particles takes none away, because writers drop
-/// the attributes then. What is lost is told in `notes`.
+/// the attributes then. `notes` reports what is lost.
 pub fn merge(parts: Vec<(u32, RawParticles)>, notes: &mut Vec<String>) -> RawParticles {
     let count = parts.iter().map(|(_, p)| p.positions.len()).sum();
     let mut part = Vec::with_capacity(count);
@@ -67,7 +67,7 @@ fn merge_attributes(parts: &mut [RawParticles], notes: &mut Vec<String>) -> Vec<
         .filter(|p| !p.positions.is_empty())
         .collect();
     let Some((first, others)) = filled.split_first_mut() else {
-        // No particles at all: the longest list of names tells the most.
+        // No particles at all: the longest list of names has the most information.
         let fullest = parts.iter_mut().max_by_key(|p| p.attributes.len());
         return fullest.map_or(Vec::new(), |p| std::mem::take(&mut p.attributes));
     };
@@ -187,7 +187,7 @@ fn convert(data: AttributeData, kind: ScalarType) -> AttributeData {
     }
 }
 
-/// `all` with `more` behind it; both are of one type.
+/// `all` followed by `more`; both are of one type.
 fn append(mut all: AttributeData, more: AttributeData) -> AttributeData {
     macro_rules! append {
         ($($variant:ident),*) => {

@@ -1,77 +1,43 @@
-//! Which files are which frame: directories, patterns, lists; several files a step, several steps
+//! Finds the frames of a sequence of files: directories, patterns, lists; several files a step, several steps
 //! a file.
 //!
 //! Grouping looks at names only (`group.rs` has the rules); contents are looked at where a format
 //! may hold several steps. What a file holds is checked when its frame is loaded, so one damaged
 //! file costs one frame and not the sequence.
 
-use std::collections::{BTreeMap, BTreeSet, HashSet};
-use std::fs;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::{Path, PathBuf};
-use std::sync::{Arc, Mutex, PoisonError};
-use std::time::SystemTime;
+use std::sync::{Arc, Mutex};
 
-use glam::DVec3;
-
+use crate::MemoryBudget;
 use crate::detect::Format;
 use crate::native::layout::UP_Y;
 use crate::native::{self, Access, NativeFile};
-use crate::open::FrameFile;
-use crate::{FrameError, MemoryBudget, ParseError, ParticleFrame, RawParticles};
 
 mod error;
 mod from_names;
 mod group;
+mod input;
+mod load;
 mod merge;
 mod name;
+mod notes;
 mod pattern;
 mod scan;
 
 pub use error::{GroupSummary, SequenceError};
 #[doc(hidden)]
 pub use from_names::{frames_of_list, frames_of_names};
+pub use input::SequenceInput;
+pub use load::Loaded;
 pub use merge::{PART_ATTRIBUTE, merge};
 
-use group::Group;
-use name::Name;
+use group::FileGroup;
+use input::listed_names;
+use load::{CachedFile, stamp};
+use name::FileName;
+use notes::{note_gaps, note_missing_parts};
 use pattern::Pattern;
-
-/// What a user names.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub enum SequenceInput {
-    /// All particle files of a directory.
-    Directory(PathBuf),
-    /// `dump.#.vtk`, `frame_####.bgeo`, `%04d`, `*`, `?` in the file name.
-    Pattern(PathBuf),
-    /// Files, each of which may be a pattern or a directory itself.
-    Files(Vec<PathBuf>),
-}
-
-impl SequenceInput {
-    /// Tells by what is on disk: a directory, one file, or else a pattern if it has wildcards.
-    pub fn from_path(path: impl Into<PathBuf>) -> Self {
-        let path = path.into();
-        if path.is_dir() {
-            Self::Directory(path)
-        } else if !path.exists() && pattern::has_wildcards(&path) {
-            Self::Pattern(path)
-        } else {
-            Self::Files(vec![path])
-        }
-    }
-
-    /// One argument is read as by [`Self::from_path`], several are files.
-    pub fn from_paths(mut paths: Vec<PathBuf>) -> Self {
-        match (paths.pop(), paths.is_empty()) {
-            (Some(only), true) => Self::from_path(only),
-            (Some(last), false) => {
-                paths.push(last);
-                Self::Files(paths)
-            }
-            (None, _) => Self::Files(paths),
-        }
-    }
-}
 
 /// One file of a frame.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -99,32 +65,12 @@ pub struct Sequence {
     frames: Vec<SequenceFrame>,
     parts: Vec<String>,
     notes: Vec<String>,
-    cache: Mutex<Option<Cached>>,
+    cache: Mutex<Option<CachedFile>>,
     budget: MemoryBudget,
 }
 
-/// A frame as it is in its files, and what was in memory for it.
-#[derive(Debug)]
-pub struct Loaded {
-    /// The particles, parts merged.
-    pub particles: RawParticles,
-    /// Oddities of the files, and what got lost in merging.
-    pub notes: Vec<String>,
-    /// Bytes of all its files, uncompressed.
-    pub all_bytes: u64,
-    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time.
-    pub content_bytes: u64,
-}
-
-/// The file with several steps that was used last, so that its steps do not read it again each.
-#[derive(Debug)]
-struct Cached {
-    file: Arc<FrameFile>,
-    stamp: Option<(u64, SystemTime)>,
-}
-
 impl Sequence {
-    /// [`Self::open_within`] all memory that there is.
+    /// [`Self::open_within`] without a limit.
     ///
     /// # Errors
     /// As [`Self::open_within`].
@@ -132,10 +78,10 @@ impl Sequence {
         Self::open_within(input, MemoryBudget::UNLIMITED)
     }
 
-    /// Finds the frames of `input`, of which each file is read within `budget`.
+    /// Finds the frames of `input`. Each file is read within `budget`.
     ///
     /// # Errors
-    /// [`SequenceError`] if there is nothing, or no way to tell which files belong together.
+    /// [`SequenceError`] if there is nothing, or nothing shows which files belong together.
     pub fn open_within(input: &SequenceInput, budget: MemoryBudget) -> Result<Self, SequenceError> {
         let mut notes = Vec::new();
         let group = match input {
@@ -152,7 +98,7 @@ impl Sequence {
         Ok(Self::from_group(group, notes, budget))
     }
 
-    fn from_group(group: Group, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
+    fn from_group(group: FileGroup, mut notes: Vec<String>, budget: MemoryBudget) -> Self {
         let (numbered, last) = scan::number_steps(group.files, budget, &mut notes);
         let mut by_number = BTreeMap::<i64, Vec<PartFile>>::new();
         for entry in numbered {
@@ -164,7 +110,7 @@ impl Sequence {
             .collect();
         note_gaps(&frames, &mut notes);
         note_missing_parts(&frames, &group.parts, &mut notes);
-        let cache = last.filter(|f| f.steps().len() > 1).map(|file| Cached {
+        let cache = last.filter(|f| f.steps().len() > 1).map(|file| CachedFile {
             stamp: stamp(file.path()),
             file: Arc::new(file),
         });
@@ -205,11 +151,11 @@ impl Sequence {
             .collect()
     }
 
-    /// Keeps only the parts that `names` mean: those of the name in whatever case, else all whose names contain it.
+    /// Keeps only the parts that match `names`: those of the name in whatever case, else all whose names contain it.
     /// Frames without any of them are left out.
     ///
     /// # Errors
-    /// The first name that means no part.
+    /// The first name that matches no part.
     pub fn keep_parts(&mut self, names: &[String]) -> Result<(), SequenceError> {
         let mut meant = BTreeSet::new();
         for name in names {
@@ -235,12 +181,12 @@ impl Sequence {
         self.frames.retain(wanted);
     }
 
-    /// What a user should know: gaps, files left out, missing parts.
+    /// Notes for the user: gaps, files left out, missing parts.
     pub fn notes(&self) -> &[String] {
         &self.notes
     }
 
-    /// What the files of the first frame say that is not in their particles ([`crate::open::remarks`]), each once.
+    /// Remarks about the files of the first frame ([`crate::open::remarks`]), each once.
     pub fn remarks(&self) -> Vec<String> {
         let mut all: Vec<String> = Vec::new();
         for path in self.inputs(0) {
@@ -260,9 +206,9 @@ impl Sequence {
         parts.iter().map(|p| p.path.as_path()).collect()
     }
 
-    /// The file of frame `index` if that is one native frame, which can be used where it lies.
+    /// The file of frame `index` if that is one native frame, which can be traced in place.
     pub fn native_file(&self, index: usize) -> Option<&Path> {
-        // What cannot be looked at is told when it is read.
+        // A file that cannot be opened is reported when it is read.
         let is_native = |path: &&Path| crate::open::is_native(path).unwrap_or(false);
         self.lone_file(index).filter(is_native)
     }
@@ -275,99 +221,9 @@ impl Sequence {
         let is_alone = self.parts.len() < 2 && part.step.is_none();
         is_alone.then_some(&part.path)
     }
-
-    /// Reads frame `index`: finite particles, relative to `origin`.
-    ///
-    /// # Errors
-    /// As [`Self::load_raw`].
-    ///
-    /// # Panics
-    /// If there is no frame `index`.
-    pub fn load(&self, index: usize, origin: DVec3) -> Result<ParticleFrame, FrameError> {
-        Ok(ParticleFrame::from_raw(self.load_raw(index)?, origin))
-    }
-
-    /// Reads frame `index` (not: frame number) as it is in the files, parts merged.
-    ///
-    /// # Errors
-    /// [`FrameError`] of the first file that cannot be read.
-    ///
-    /// # Panics
-    /// If there is no frame `index`.
-    pub fn load_raw(&self, index: usize) -> Result<RawParticles, FrameError> {
-        self.load_measured(index).map(|loaded| loaded.particles)
-    }
-
-    /// Like [`Self::load_raw`], with what got lost in merging the parts and what was read.
-    ///
-    /// # Errors
-    /// As [`Self::load_raw`].
-    ///
-    /// # Panics
-    /// If there is no frame `index`.
-    pub fn load_measured(&self, index: usize) -> Result<Loaded, FrameError> {
-        let frame = &self.frames[index];
-        let mut notes = Vec::new();
-        let (mut all_bytes, mut content_bytes) = (0, 0);
-        let mut parts = Vec::with_capacity(frame.parts.len());
-        for part in &frame.parts {
-            let (file, step) = self.file_of(part)?;
-            let particles = file.read(step)?;
-            notes.extend_from_slice(file.notes());
-            all_bytes += file.unpacked_len();
-            let held = file.held_len() + file.unpacked_arrays_len(&particles);
-            content_bytes = content_bytes.max(held);
-            parts.push((part.part, particles));
-        }
-        let only = if self.parts.len() < 2 {
-            parts.pop().map(|(_, only)| only)
-        } else {
-            None
-        };
-        let particles = only.unwrap_or_else(|| merge(parts, &mut notes));
-        Ok(Loaded {
-            particles,
-            notes,
-            all_bytes,
-            content_bytes,
-        })
-    }
-
-    /// The opened file of `part` and the step in it.
-    fn file_of(&self, part: &PartFile) -> Result<(Arc<FrameFile>, usize), FrameError> {
-        let Some(step) = part.step else {
-            let file = FrameFile::open_within(&part.path, self.budget)?;
-            return match file.steps() {
-                [_, second, ..] => {
-                    let what = format!(
-                        "{} time steps where one was expected; give such files one at a time",
-                        file.steps().len()
-                    );
-                    Err(ParseError::malformed(second.start(), what).in_file(&part.path))
-                }
-                _ => Ok((Arc::new(file), 0)),
-            };
-        };
-        let stamp = stamp(&part.path);
-        let lock = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Some(cached) = lock().as_ref()
-            && cached.file.path() == part.path
-            && cached.stamp == stamp
-        {
-            return Ok((Arc::clone(&cached.file), step));
-        }
-        // Let go of the old one first: two large files need not be in memory at once.
-        *lock() = None;
-        let file = Arc::new(FrameFile::open_within(&part.path, self.budget)?);
-        *lock() = Some(Cached {
-            file: Arc::clone(&file),
-            stamp,
-        });
-        Ok((file, step))
-    }
 }
 
-/// Indices of the `parts` that `name` means, see [`Sequence::keep_parts`].
+/// Indices of the `parts` that match `name`, see [`Sequence::keep_parts`].
 fn parts_meant(parts: &[String], name: &str) -> Vec<u32> {
     let wanted = name.to_lowercase();
     let matching = |fits: &dyn Fn(&str) -> bool| -> Vec<u32> {
@@ -375,7 +231,7 @@ fn parts_meant(parts: &[String], name: &str) -> Vec<u32> {
         let found = named.filter(|(_, part)| fits(&part.to_lowercase()));
         found.map(|(index, _)| index).collect()
     };
-    // Names that differ in case only are told apart where they are written as they are.
+    // An exact match wins over names that differ in case only.
     let as_written = (0..).zip(parts).filter(|(_, part)| *part == name);
     let as_written: Vec<u32> = as_written.map(|(index, _)| index).collect();
     let whole = matching(&|part| part == wanted);
@@ -403,133 +259,11 @@ fn y_is_up(path: &Path) -> bool {
     format.reader().is_y_up(&head)
 }
 
-/// The frame number that the name of a file tells when there are no others to compare with: what
+/// The frame number in the name of a file when there are no others to compare with: what
 /// follows the word `frame`, else the last number.
 pub fn lone_frame_number(path: &Path) -> Option<i64> {
-    let name = Name::parse(path, None);
+    let name = FileName::parse(path, None);
     name.numbers.get(name.lone_column()?).copied()
-}
-
-/// Tells a rewritten file from the one that was read.
-fn stamp(path: &Path) -> Option<(u64, SystemTime)> {
-    let meta = fs::metadata(path).ok()?;
-    Some((meta.len(), meta.modified().ok()?))
-}
-
-/// The files of a list, its patterns and directories filled in; the same file twice is once.
-fn listed_names(paths: &[PathBuf]) -> Result<Vec<Name>, SequenceError> {
-    let mut names: Vec<Name> = Vec::new();
-    let mut known = HashSet::new();
-    for path in paths {
-        let found = match SequenceInput::from_path(path) {
-            SequenceInput::Directory(path) => scan::directory(&path)?,
-            SequenceInput::Pattern(path) => scan::fitting(&Pattern::parse(&path)?, &path)?,
-            SequenceInput::Files(_) if path.exists() => vec![Name::parse(path, None)],
-            SequenceInput::Files(_) => {
-                return Err(SequenceError::missing(path));
-            }
-        };
-        for name in found {
-            if known.insert(name.path.clone()) {
-                names.push(name);
-            }
-        }
-    }
-    if names.is_empty() {
-        return Err(SequenceError::NoInput);
-    }
-    Ok(names)
-}
-
-/// Tells where the numbering jumps by more than it usually does.
-fn note_gaps(frames: &[SequenceFrame], notes: &mut Vec<String>) {
-    const SHOWN: usize = 5;
-    let pairs = || frames.windows(2).map(|w| (w[0].number, w[1].number));
-    let mut strides = BTreeMap::<i64, usize>::new();
-    for (a, b) in pairs() {
-        *strides.entry(b.saturating_sub(a)).or_default() += 1;
-    }
-    // The most frequent one, the smallest of equals.
-    let usual = strides
-        .iter()
-        .max_by_key(|(stride, count)| (**count, std::cmp::Reverse(**stride)));
-    let Some((usual, _)) = usual else { return };
-    let gaps: Vec<String> = pairs()
-        .filter(|(a, b)| b.saturating_sub(*a) > *usual)
-        .map(|(a, b)| format!("{a} to {b}"))
-        .collect();
-    if gaps.is_empty() {
-        return;
-    }
-    let more = match gaps.len().saturating_sub(SHOWN) {
-        0 => String::new(),
-        more => format!(" and {more} times more"),
-    };
-    let shown = gaps[..gaps.len().min(SHOWN)].join(", ");
-    notes.push(format!(
-        "frame numbers go up by {usual}, but jump from {shown}{more}"
-    ));
-}
-
-fn note_missing_parts(frames: &[SequenceFrame], parts: &[String], notes: &mut Vec<String>) {
-    if parts.len() < 2 {
-        return;
-    }
-    // Frames that have a part, in their order; a frame may have several steps of one.
-    let mut present: Vec<Vec<usize>> = vec![Vec::new(); parts.len()];
-    for (place, frame) in frames.iter().enumerate() {
-        for part in &frame.parts {
-            if let Some(places) = present.get_mut(part.part as usize)
-                && places.last() != Some(&place)
-            {
-                places.push(place);
-            }
-        }
-    }
-    for (name, present) in parts.iter().zip(present) {
-        if present.len() == frames.len() {
-            continue;
-        }
-        let mut present = present.into_iter().peekable();
-        let missing: Vec<i64> = frames
-            .iter()
-            .enumerate()
-            .filter(|(place, _)| present.next_if_eq(place).is_none())
-            .map(|(_, frame)| frame.number)
-            .collect();
-        notes.push(format!(
-            "part `{name}` is missing in {} of {} frames: {}",
-            missing.len(),
-            frames.len(),
-            ranges(&missing)
-        ));
-    }
-}
-
-/// Sorted numbers as `1-4, 7`; long lists are cut.
-fn ranges(numbers: &[i64]) -> String {
-    const SHOWN: usize = 8;
-    let mut runs: Vec<(i64, i64)> = Vec::new();
-    for &number in numbers {
-        match runs.last_mut() {
-            Some((_, last)) if number == *last || Some(number) == last.checked_add(1) => {
-                *last = number;
-            }
-            _ => runs.push((number, number)),
-        }
-    }
-    let text = |(first, last): &(i64, i64)| {
-        if first == last {
-            first.to_string()
-        } else {
-            format!("{first}-{last}")
-        }
-    };
-    let mut texts: Vec<String> = runs.iter().take(SHOWN).map(text).collect();
-    if runs.len() > SHOWN {
-        texts.push("...".to_owned());
-    }
-    texts.join(", ")
 }
 
 #[cfg(test)]

@@ -11,7 +11,7 @@ use crate::registry::strip_gz;
 
 /// A file name, split so that names of one sequence differ in `numbers` only.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Name {
+pub(super) struct FileName {
     /// The file.
     pub path: PathBuf,
     /// Text around the numbers, one more than there are numbers; without the extension.
@@ -28,7 +28,7 @@ pub(super) struct Name {
     suffix: String,
 }
 
-impl Name {
+impl FileName {
     /// Splits the name of `path`; `frame` is the byte range that a pattern says is the number.
     pub(super) fn parse(path: &Path, frame: Option<Range<usize>>) -> Self {
         let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -161,8 +161,8 @@ impl Splitter {
 mod tests {
     use super::*;
 
-    fn parse(name: &str) -> Name {
-        Name::parse(Path::new(name), None)
+    fn parse(name: &str) -> FileName {
+        FileName::parse(Path::new(name), None)
     }
 
     #[test]
@@ -216,7 +216,7 @@ mod tests {
 
     #[test]
     fn a_pattern_may_cut_a_run_of_digits() {
-        let name = Name::parse(Path::new("x17.vtk"), Some(2..3));
+        let name = FileName::parse(Path::new("x17.vtk"), Some(2..3));
         assert_eq!(name.pattern(Some(1), &[]), "x1#.vtk");
         assert_eq!((name.numbers, name.frame_column), (vec![1, 7], Some(1)));
     }

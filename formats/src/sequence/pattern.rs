@@ -16,11 +16,11 @@ use super::name::sign_may_follow;
 pub(super) struct Pattern {
     /// Where the files are.
     pub directory: PathBuf,
-    tokens: Vec<Token>,
+    tokens: Vec<PatternToken>,
 }
 
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Token {
+enum PatternToken {
     Char(char),
     AnyText,
     AnyChar,
@@ -29,7 +29,7 @@ enum Token {
 
 /// A name that fits: where in it the frame number is, if the pattern has one.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Fit {
+pub(super) struct PatternMatch {
     pub number: Option<Range<usize>>,
 }
 
@@ -53,7 +53,12 @@ impl Pattern {
             ));
         }
         let tokens = tokens(&name.to_string_lossy());
-        if tokens.iter().filter(|t| **t == Token::Number).count() > 1 {
+        if tokens
+            .iter()
+            .filter(|t| **t == PatternToken::Number)
+            .count()
+            > 1
+        {
             return Err(bad(
                 "only one # can be the frame number; write * for the other numbers",
             ));
@@ -62,10 +67,10 @@ impl Pattern {
     }
 
     /// Fits the pattern to a whole file name.
-    pub(super) fn fit(&self, name: &str) -> Option<Fit> {
-        let mut search = Search {
+    pub(super) fn fit(&self, name: &str) -> Option<PatternMatch> {
+        let mut search = PatternSearch {
             name,
-            fit: Fit { number: None },
+            fit: PatternMatch { number: None },
             dead_ends: HashSet::new(),
         };
         search.fits(&self.tokens, 0).then_some(search.fit)
@@ -77,29 +82,29 @@ pub(super) fn has_wildcards(path: &Path) -> bool {
     path.components().any(|component| {
         tokens(&component.as_os_str().to_string_lossy())
             .iter()
-            .any(|t| !matches!(t, Token::Char(_)))
+            .any(|t| !matches!(t, PatternToken::Char(_)))
     })
 }
 
-fn tokens(text: &str) -> Vec<Token> {
+fn tokens(text: &str) -> Vec<PatternToken> {
     let mut tokens = Vec::new();
     let mut rest = text;
     while let Some(first) = rest.chars().next() {
         let (token, len) = match first {
             '#' => (
-                Token::Number,
+                PatternToken::Number,
                 rest.len() - rest.trim_start_matches('#').len(),
             ),
             '*' => (
-                Token::AnyText,
+                PatternToken::AnyText,
                 rest.len() - rest.trim_start_matches('*').len(),
             ),
-            '?' => (Token::AnyChar, 1),
+            '?' => (PatternToken::AnyChar, 1),
             '%' => match printf_len(rest) {
-                Some(len) => (Token::Number, len),
-                None => (Token::Char('%'), 1),
+                Some(len) => (PatternToken::Number, len),
+                None => (PatternToken::Char('%'), 1),
             },
-            other => (Token::Char(other), other.len_utf8()),
+            other => (PatternToken::Char(other), other.len_utf8()),
         };
         tokens.push(token);
         rest = &rest[len..];
@@ -115,27 +120,27 @@ fn printf_len(text: &str) -> Option<usize> {
 }
 
 /// A name under way to its fit.
-struct Search<'a> {
+struct PatternSearch<'a> {
     name: &'a str,
-    fit: Fit,
-    /// Tokens left and place in the name of what does not fit. Each is tried once: without that, a pattern with
+    fit: PatternMatch,
+    /// Remaining tokens and offset in the name of what does not match. Each is tried once: without that, a pattern with
     /// many `*` would take time that grows exponentially.
     dead_ends: HashSet<(usize, usize)>,
 }
 
-impl Search<'_> {
+impl PatternSearch<'_> {
     /// Backtracking match: `*` takes as little as it can, a number as much as it can.
-    fn fits(&mut self, tokens: &[Token], at: usize) -> bool {
+    fn fits(&mut self, tokens: &[PatternToken], at: usize) -> bool {
         let rest = &self.name[at..];
         let Some((token, left)) = tokens.split_first() else {
             return rest.is_empty();
         };
         let next = rest.chars().next();
         match token {
-            Token::Char(c) => next == Some(*c) && self.fits(left, at + c.len_utf8()),
-            Token::AnyChar => next.is_some_and(|c| self.fits(left, at + c.len_utf8())),
-            Token::AnyText if left.is_empty() => true,
-            Token::AnyText => {
+            PatternToken::Char(c) => next == Some(*c) && self.fits(left, at + c.len_utf8()),
+            PatternToken::AnyChar => next.is_some_and(|c| self.fits(left, at + c.len_utf8())),
+            PatternToken::AnyText if left.is_empty() => true,
+            PatternToken::AnyText => {
                 if !self.dead_ends.insert((tokens.len(), at)) {
                     return false;
                 }
@@ -144,7 +149,7 @@ impl Search<'_> {
                     .into_iter()
                     .any(|skipped| self.fits(left, at + skipped))
             }
-            Token::Number => {
+            PatternToken::Number => {
                 let unsigned = match rest.strip_prefix('-') {
                     Some(unsigned) if sign_may_follow(&self.name[..at]) => unsigned,
                     _ => rest,

@@ -1,11 +1,11 @@
-//! What is on disk: directory listings, and the steps inside files that hold several.
+//! Directory listings, and the steps inside files that hold several.
 
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use super::group::GroupFile;
-use super::name::Name;
+use super::name::FileName;
 use super::pattern::Pattern;
 use super::{PartFile, SequenceError};
 use crate::MemoryBudget;
@@ -15,15 +15,15 @@ use crate::read::Step;
 
 /// The particle files of a directory. Pictures, notes, hidden and unfinished files are passed
 /// over by name; only where no name is known are the files looked into.
-pub(super) fn directory(path: &Path) -> Result<Vec<Name>, SequenceError> {
+pub(super) fn directory(path: &Path) -> Result<Vec<FileName>, SequenceError> {
     let files = list(path)?;
     let known = files.iter().filter(|f| Format::by_name(f).is_some());
-    let mut names: Vec<Name> = known.map(|f| Name::parse(f, None)).collect();
+    let mut names: Vec<FileName> = known.map(|f| FileName::parse(f, None)).collect();
     let mut refusal = None;
     if names.is_empty() {
         for file in &files {
             match detect_file(file) {
-                Ok(_) => names.push(Name::parse(file, None)),
+                Ok(_) => names.push(FileName::parse(file, None)),
                 Err(e @ crate::FrameError::Unsupported { .. }) if refusal.is_none() => {
                     refusal = Some(e.to_string());
                 }
@@ -41,14 +41,14 @@ pub(super) fn directory(path: &Path) -> Result<Vec<Name>, SequenceError> {
 }
 
 /// The files that fit `pattern`; those with a known name if any has one.
-pub(super) fn fitting(pattern: &Pattern, text: &Path) -> Result<Vec<Name>, SequenceError> {
+pub(super) fn fitting(pattern: &Pattern, text: &Path) -> Result<Vec<FileName>, SequenceError> {
     let files = list(&pattern.directory)?;
     let fit = |path: &PathBuf| {
         let name = path.file_name()?.to_string_lossy();
         let fit = pattern.fit(&name)?;
-        Some(Name::parse(path, fit.number))
+        Some(FileName::parse(path, fit.number))
     };
-    let mut names: Vec<Name> = files.iter().filter_map(fit).collect();
+    let mut names: Vec<FileName> = files.iter().filter_map(fit).collect();
     if names.is_empty() {
         return Err(SequenceError::NoMatch {
             pattern: text.display().to_string(),
@@ -99,7 +99,7 @@ fn list(path: &Path) -> Result<Vec<PathBuf>, SequenceError> {
     Ok(files)
 }
 
-/// What a directory without particle files has, by extension.
+/// Describes a directory without particle files, by extension.
 fn what_is_there(path: &Path, files: &[PathBuf]) -> String {
     let mut directories: Vec<String> = fs::read_dir(path)
         .into_iter()
@@ -164,7 +164,7 @@ fn closest(wanted: &Path, directory: &Path, files: &[PathBuf]) -> String {
 
 /// A file of the sequence with the number of one of its steps.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Numbered {
+pub(super) struct NumberedStep {
     pub number: i64,
     pub file: PartFile,
 }
@@ -179,11 +179,11 @@ pub(super) fn number_steps(
     files: Vec<GroupFile>,
     budget: MemoryBudget,
     notes: &mut Vec<String>,
-) -> (Vec<Numbered>, Option<FrameFile>) {
+) -> (Vec<NumberedStep>, Option<FrameFile>) {
     let lone = files.len() == 1;
-    let mut scan = Scan {
+    let mut scan = StepScan {
         budget,
-        ..Scan::default()
+        ..StepScan::default()
     };
     let several = files.iter().enumerate().any(|(i, f)| {
         may_hold_many(&f.path) && scan.is_suspect(&files, i) && scan.steps(i, &f.path).len() > 1
@@ -193,7 +193,7 @@ pub(super) fn number_steps(
             Some([step]) if lone => step.number,
             _ => None,
         };
-        let numbered = files.iter().enumerate().map(|(index, f)| Numbered {
+        let numbered = files.iter().enumerate().map(|(index, f)| NumberedStep {
             number: own(index).or(f.number).unwrap_or(0),
             file: PartFile {
                 path: f.path.clone(),
@@ -219,7 +219,10 @@ pub(super) fn number_steps(
 
 /// Numbers steps; of two with the same number in one part the later is kept, as a restarted
 /// run repeats its first step.
-fn number_entries(entries: Vec<(Option<i64>, PartFile)>, notes: &mut Vec<String>) -> Vec<Numbered> {
+fn number_entries(
+    entries: Vec<(Option<i64>, PartFile)>,
+    notes: &mut Vec<String>,
+) -> Vec<NumberedStep> {
     let written = entries.iter().all(|(number, _)| number.is_some());
     let mut counts = BTreeMap::<u32, i64>::new();
     let mut numbered = BTreeMap::<(i64, u32), PartFile>::new();
@@ -234,11 +237,11 @@ fn number_entries(entries: Vec<(Option<i64>, PartFile)>, notes: &mut Vec<String>
     }
     if !repeated.is_empty() {
         notes.push(format!(
-            "steps {} are there more than once; the last of each is taken",
-            super::ranges(&repeated)
+            "steps {} occur more than once; the last of each is used",
+            super::notes::ranges(&repeated)
         ));
     }
-    let entry = |((number, _), file)| Numbered { number, file };
+    let entry = |((number, _), file)| NumberedStep { number, file };
     numbered.into_iter().map(entry).collect()
 }
 
@@ -250,16 +253,16 @@ fn may_hold_many(path: &Path) -> bool {
 }
 
 #[derive(Default)]
-struct Scan {
+struct StepScan {
     seen: BTreeMap<usize, Vec<Step>>,
-    /// Largest file seen to hold one step.
+    /// Largest file that holds one step, so far.
     single: u64,
     /// The file opened last: the caller may want it next.
     last: Option<FrameFile>,
     budget: MemoryBudget,
 }
 
-impl Scan {
+impl StepScan {
     fn is_suspect(&self, files: &[GroupFile], index: usize) -> bool {
         let len = fs::metadata(&files[index].path).map_or(0, |m| m.len());
         index == 0 || index + 1 == files.len() || len > self.single.saturating_add(self.single / 2)

@@ -2,10 +2,11 @@
 
 use std::fs;
 
-use glam::Vec3;
+use glam::{DVec3, Vec3};
 
+use super::notes::ranges;
 use super::*;
-use crate::{AttributeData, native};
+use crate::{AttributeData, ParticleFrame, RawParticles, native};
 
 struct Dir(tempfile::TempDir);
 

@@ -22,7 +22,7 @@ impl Unpublished {
     /// Begins the file that will be `path`.
     ///
     /// # Errors
-    /// Whatever creating says.
+    /// [`io::Error`] of creating the file.
     pub(crate) fn create(path: &Path) -> io::Result<Self> {
         let part = temporary_name(path)?;
         let file = OpenOptions::new()
@@ -41,7 +41,7 @@ impl Unpublished {
     /// Writes `bytes` from byte `at` of the file on.
     ///
     /// # Errors
-    /// Whatever writing says.
+    /// [`io::Error`] of writing.
     #[cfg(unix)]
     pub(crate) fn write_all_at(&self, bytes: &[u8], at: u64) -> io::Result<()> {
         std::os::unix::fs::FileExt::write_all_at(&self.file, bytes, at)
@@ -50,7 +50,7 @@ impl Unpublished {
     /// Writes `bytes` from byte `at` of the file on.
     ///
     /// # Errors
-    /// Whatever writing says.
+    /// [`io::Error`] of writing.
     #[cfg(not(unix))]
     pub(crate) fn write_all_at(&self, bytes: &[u8], at: u64) -> io::Result<()> {
         use std::io::{Seek, SeekFrom};
@@ -62,7 +62,7 @@ impl Unpublished {
     /// Syncs the file and gives it its name.
     ///
     /// # Errors
-    /// Whatever syncing or renaming says; the temporary file is removed then.
+    /// [`io::Error`] of syncing or renaming; the temporary file is removed then.
     pub(crate) fn publish(mut self) -> io::Result<()> {
         self.file.sync_all()?;
         fs::rename(&self.part, &self.path)?;
@@ -74,7 +74,7 @@ impl Unpublished {
 impl Drop for Unpublished {
     fn drop(&mut self) {
         if !self.is_published {
-            // Why it was not published is what is told.
+            // The error that prevented publishing is reported.
             let _ = fs::remove_file(&self.part);
         }
     }
@@ -83,7 +83,7 @@ impl Drop for Unpublished {
 /// Fills a file under a temporary name beside `path`, syncs it and renames it to `path`.
 ///
 /// # Errors
-/// Whatever creating, writing, syncing or renaming says; the temporary file is removed then.
+/// [`io::Error`] of creating, writing, syncing or renaming; the temporary file is removed then.
 pub(crate) fn publish<E: From<io::Error>>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&File>) -> Result<(), E>,

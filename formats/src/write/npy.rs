@@ -19,7 +19,7 @@ pub fn write(path: &Path, positions: &[Vec3]) -> Result<(), FrameError> {
 }
 
 /// Writes the positions of `source` to `path` in its order, rounded to f32, whole or not at all; attributes have
-/// no place in the format.
+/// no equivalent in the format.
 ///
 /// # Errors
 /// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` wants that.

@@ -17,21 +17,21 @@ const PIECE: usize = 1 << 14;
 /// Pieces that are made at once.
 const TOGETHER: usize = 32;
 
-/// Why a file was not written to its end.
-pub(super) enum Ended {
-    /// The file's fault.
+/// Why writing a file ended early.
+pub(super) enum WriteError {
+    /// An error of the file.
     Io(io::Error),
-    /// Anybody else's.
+    /// Any other error.
     Told(ConvertError),
 }
 
-impl From<io::Error> for Ended {
+impl From<io::Error> for WriteError {
     fn from(error: io::Error) -> Self {
         Self::Io(error)
     }
 }
 
-impl From<FrameError> for Ended {
+impl From<FrameError> for WriteError {
     fn from(error: FrameError) -> Self {
         Self::Told(error.into())
     }
@@ -40,21 +40,21 @@ impl From<FrameError> for Ended {
 /// Fills the file `path` by `fill`, whole or not at all.
 pub(super) fn publish_stream(
     path: &Path,
-    fill: impl FnOnce(&mut BufWriter<&std::fs::File>) -> Result<(), Ended>,
+    fill: impl FnOnce(&mut BufWriter<&std::fs::File>) -> Result<(), WriteError>,
 ) -> Result<(), ConvertError> {
     publish(path, fill).map_err(|ended| match ended {
-        Ended::Io(error) => FrameError::io(path, error).into(),
-        Ended::Told(error) => error,
+        WriteError::Io(error) => FrameError::io(path, error).into(),
+        WriteError::Told(error) => error,
     })
 }
 
-/// Writes what `make` puts behind `bytes` for each stretch of places, in order.
+/// Writes what `make` appends to `bytes` for each range of particles, in order.
 fn write_pieces(
     file: &mut impl Write,
     count: u64,
     progress: &dyn Progress,
     make: impl Fn(u64, usize, &mut Vec<u8>) -> Result<(), FrameError> + Sync,
-) -> Result<(), Ended> {
+) -> Result<(), WriteError> {
     let pieces = count.div_ceil(PIECE as u64);
     let mut made = vec![Vec::new(); TOGETHER];
     for first in (0..pieces).step_by(TOGETHER) {
@@ -72,7 +72,7 @@ fn write_pieces(
             .try_for_each(|bytes| file.write_all(bytes))?;
         let done = count.min(end * PIECE as u64);
         if let ControlFlow::Break(()) = progress.advanced(Phase::Finish, done, count) {
-            return Err(Ended::Told(ConvertError::Interrupted));
+            return Err(WriteError::Told(ConvertError::Interrupted));
         }
     }
     Ok(())
@@ -84,7 +84,7 @@ pub(super) fn write_positions(
     source: &dyn ParticleSource,
     progress: &dyn Progress,
     to_bytes: impl Fn(f32) -> [u8; 4] + Sync,
-) -> Result<(), Ended> {
+) -> Result<(), WriteError> {
     write_pieces(file, source.count(), progress, |first, len, bytes| {
         let mut positions = vec![DVec3::ZERO; len];
         source.read_positions(first, &mut positions)?;
@@ -103,7 +103,7 @@ pub(super) fn write_values(
     source: &dyn ParticleSource,
     attribute: usize,
     progress: &dyn Progress,
-) -> Result<(), Ended> {
+) -> Result<(), WriteError> {
     let own = &source.attributes()[attribute];
     let (width, size) = (own.width(), own.scalar.size());
     write_pieces(file, source.count(), progress, |first, len, bytes| {
@@ -120,7 +120,7 @@ pub(super) fn write_numbers<const N: usize>(
     count: u64,
     progress: &dyn Progress,
     bytes_of: impl Fn(u64) -> [u8; N] + Sync,
-) -> Result<(), Ended> {
+) -> Result<(), WriteError> {
     write_pieces(file, count, progress, |first, len, bytes| {
         for number in first..first + len as u64 {
             bytes.extend_from_slice(&bytes_of(number));

@@ -7,7 +7,7 @@ use std::path::Path;
 use glam::Vec3;
 
 use super::atomic::publish;
-use super::stream::{Ended, publish_stream, write_numbers, write_positions, write_values};
+use super::stream::{WriteError, publish_stream, write_numbers, write_positions, write_values};
 use crate::attribute::with_values;
 use crate::convert::{ConvertError, ParticleSource, Progress};
 use crate::{Attribute, FrameError, ScalarType};
@@ -33,9 +33,9 @@ pub fn stream(
     progress: &dyn Progress,
 ) -> Result<(), ConvertError> {
     let cells = if source.count() <= MOST_SHORT {
-        Cells::Short
+        CellFormat::Short
     } else {
-        Cells::Long
+        CellFormat::Long
     };
     publish_stream(path, |file| fill_from(file, source, progress, cells))
 }
@@ -45,7 +45,7 @@ const MOST_SHORT: u64 = (i32::MAX / 2) as u64;
 
 /// How cells are written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Cells {
+enum CellFormat {
     /// Version 4.2: in each cell its length and its particle, 32 bits.
     Short,
     /// Version 5.1: where each cell ends, and the particles, 64 bits.
@@ -56,12 +56,12 @@ fn fill_from(
     file: &mut impl Write,
     source: &dyn ParticleSource,
     progress: &dyn Progress,
-    cells: Cells,
-) -> Result<(), Ended> {
+    cells: CellFormat,
+) -> Result<(), WriteError> {
     let count = source.count();
     let version = match cells {
-        Cells::Short => "4.2",
-        Cells::Long => "5.1",
+        CellFormat::Short => "4.2",
+        CellFormat::Long => "5.1",
     };
     write!(
         file,
@@ -69,12 +69,12 @@ fn fill_from(
     )?;
     write_positions(file, source, progress, f32::to_be_bytes)?;
     match cells {
-        Cells::Short => {
+        CellFormat::Short => {
             write!(file, "\nVERTICES {count} {}\n", 2 * count)?;
             // Both halves of the number: one particle, and which.
             write_numbers(file, count, progress, |i| ((1 << 32) | i).to_be_bytes())?;
         }
-        Cells::Long => {
+        CellFormat::Long => {
             write!(
                 file,
                 "\nVERTICES {} {count}\nOFFSETS vtktypeint64\n",
@@ -221,13 +221,13 @@ mod tests {
             radius: None,
             has_velocity: true,
         });
-        let read = |cells: Cells| {
+        let read = |cells: CellFormat| {
             let mut bytes = Vec::new();
             assert!(fill_from(&mut bytes, &source, &(), cells).is_ok());
             let steps = FORMAT.steps(&bytes).expect("whole");
             FORMAT.read(&bytes, &steps[0]).expect("whole")
         };
-        let (short, long) = (read(Cells::Short), read(Cells::Long));
+        let (short, long) = (read(CellFormat::Short), read(CellFormat::Long));
         assert_eq!(short, long);
         let mut expected = vec![glam::DVec3::ZERO; 40_000];
         source.read_positions(0, &mut expected).expect("made");

@@ -1,10 +1,10 @@
-//! A mapped file whose numbers lie at fixed steps, as a source of particles.
+//! A mapped file whose numbers have fixed strides, as a source of particles.
 
 use glam::DVec3;
 
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::native::MappedFile;
-use crate::read::columns::{Column, ParticleLayout};
+use crate::read::columns::{ParticleLayout, StridedColumn};
 use crate::{FrameError, ParseError};
 
 /// Particles of a mapped file.
@@ -19,7 +19,7 @@ pub(super) struct ColumnSource {
 impl ColumnSource {
     /// The particles of `file`, in which `layout` was found and into which it fits.
     pub(super) fn new(file: MappedFile, layout: ParticleLayout) -> Self {
-        let attribute = |column: &Column| SourceAttribute {
+        let attribute = |column: &StridedColumn| SourceAttribute {
             name: column.name.clone(),
             components: column.lanes.len(),
             scalar: column.scalar,
@@ -32,7 +32,7 @@ impl ColumnSource {
         }
     }
 
-    /// The place of the first of `count` particles from `first` on.
+    /// The index of the first of `count` particles from `first` on.
     fn place(&self, first: u64, count: usize) -> Result<usize, FrameError> {
         let place = usize::try_from(first).ok();
         let fits = |place: &usize| {
@@ -42,7 +42,7 @@ impl ColumnSource {
         place.filter(fits).ok_or_else(|| {
             let all = self.layout.count;
             self.bad(format!(
-                "{count} particles from {first} on were asked for, the file holds {all}"
+                "{count} particles from {first} on do not exist, the file has {all}"
             ))
         })
     }
@@ -86,7 +86,7 @@ impl ParticleSource for ColumnSource {
         if !to.len().is_multiple_of(width) {
             let (len, name) = (to.len(), &described.name);
             return Err(self.bad(format!(
-                "{len} bytes are no whole number of {width}, which {name} has for a particle"
+                "{len} bytes are not a whole number of {width}, which {name} has for a particle"
             )));
         }
         let first = self.place(first, to.len() / width)?;

@@ -1,6 +1,6 @@
 //! Files of other programs as sources of particles that are never in memory as a whole.
 //!
-//! Which files can be is decided here, by format: their numbers must lie at fixed steps in the file itself.
+//! The reader of the format decides which files qualify: their numbers must have fixed strides in the file itself.
 //! Text, compressed files and files of several steps are read into memory by [`crate::FrameFile`] instead.
 
 use std::path::Path;
@@ -17,8 +17,8 @@ mod columns;
 
 use columns::ColumnSource;
 
-/// The particles of the file at `path`, where they lie. None if they cannot be used so: then
-/// [`crate::FrameFile`] reads them, or says why not.
+/// The particles of the mapped file at `path`. `None` if they have no fixed strides: then
+/// [`crate::FrameFile`] reads them, or returns the error.
 ///
 /// # Errors
 /// As [`crate::FrameFile::open`] and [`crate::FrameFile::read`] of the same file.
@@ -29,7 +29,7 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
         return Ok(None);
     }
     let layout = layout_of(file.bytes(), path);
-    // Zeros for bytes that are gone must not be told as a fault of the file.
+    // Zeros for bytes that are gone must not be reported as a fault of the file.
     file.check()?;
     let layout = layout.map_err(|e| e.in_file(path))?;
     Ok(layout.map(|layout| Box::new(ColumnSource::new(file, layout)) as Box<dyn ParticleSource>))

@@ -1,4 +1,4 @@
-//! What streams out of a file is what its reader reads.
+//! A mapped source has the same particles as the reader.
 
 mod damage;
 mod made;

@@ -42,7 +42,7 @@ struct Slab {
     height: u64,
 }
 
-/// How far particles are from their places on the grid at most, in spacings.
+/// Largest distance of particles from their grid positions, in spacings.
 const DISORDER: f32 = 0.2;
 
 impl BlockSource {

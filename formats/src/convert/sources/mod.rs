@@ -16,12 +16,12 @@ use std::path::Path;
 
 use crate::FrameError;
 
-/// The places `first` and following, `len` of them, of `count`.
+/// The indices `first` and following, `len` of them, of `count`.
 fn places(path: &Path, first: u64, len: usize, count: u64) -> Result<Range<usize>, FrameError> {
     let end = first.checked_add(len as u64).filter(|end| *end <= count);
     let range = end.and_then(|end| Some(usize::try_from(first).ok()?..usize::try_from(end).ok()?));
     range.ok_or_else(|| {
-        let what = format!("{len} particles after {first} were asked for, there are {count}");
+        let what = format!("{len} particles after {first} do not exist, there are {count}");
         FrameError::io(path, io::Error::new(io::ErrorKind::InvalidInput, what))
     })
 }

@@ -5,8 +5,8 @@ use std::sync::atomic::{AtomicU16, Ordering};
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::item::{Item, key};
-use super::plan::{Bracket, CutPlan, Way, descend};
+use super::item::{KeyedParticle, key};
+use super::plan::{CutPlan, MedianBracket, Side, descend};
 use crate::order::index_u32;
 
 /// Fewest particles that a task is made for.
@@ -16,7 +16,7 @@ const UNDECIDED_TASK_LEN: usize = 2048;
 
 /// Which cell each particle is in.
 #[derive(Debug)]
-pub(super) struct Assigned {
+pub(super) struct CellAssignment {
     /// By particle; empty when there is but one cell.
     cells: Vec<AtomicU16>,
     pub(super) cell_count: usize,
@@ -24,7 +24,7 @@ pub(super) struct Assigned {
     pub(super) bytes: u64,
 }
 
-impl Assigned {
+impl CellAssignment {
     /// The cell of the particle with that index.
     #[inline(always)]
     pub(super) fn cell(&self, index: usize) -> usize {
@@ -35,10 +35,10 @@ impl Assigned {
 }
 
 /// Cuts all of `centers` as planned.
-pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> Assigned {
+pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> CellAssignment {
     let cell_count = plan.brackets.len() + 1;
     if cell_count == 1 {
-        return Assigned {
+        return CellAssignment {
             cells: Vec::new(),
             cell_count,
             bytes: 0,
@@ -48,11 +48,11 @@ pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> Assigned {
     let undecided_bytes = loop {
         match cut_all(centers, &plan, &cells) {
             Ok(bytes) => break bytes,
-            Err(Outside { cuts }) => plan.widen(&cuts),
+            Err(BracketMiss { cuts }) => plan.widen(&cuts),
         }
     };
     let bytes = plan.bytes.max(size_of_val(&cells[..]) + undecided_bytes) as u64;
-    Assigned {
+    CellAssignment {
         cells,
         cell_count,
         bytes,
@@ -61,15 +61,15 @@ pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> Assigned {
 
 /// The medians of these cuts are not in their brackets.
 #[derive(Debug, Clone, PartialEq, Eq)]
-struct Outside {
+struct BracketMiss {
     cuts: Vec<usize>,
 }
 
 /// Writes the cell of every particle. Returns the bytes needed for the undecided ones.
-fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usize, Outside> {
+fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usize, BracketMiss> {
     let parts = 4 * rayon::current_num_threads();
     let chunk_len = centers.len().div_ceil(parts).max(TASK_LEN);
-    let chunks: Vec<Passed> = centers
+    let chunks: Vec<PassCounts> = centers
         .par_chunks(chunk_len)
         .zip(cells.par_chunks(chunk_len))
         .enumerate()
@@ -92,7 +92,7 @@ fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usiz
     let held: usize = chunks.iter().map(|c| capacity(&c.undecided)).sum();
     let bytes = (held + capacity(&undecided)) * size_of::<u32>();
     drop(chunks);
-    let whole = Subtree {
+    let whole = CutSubtree {
         first_cut: 0,
         brackets: &plan.brackets,
         middles: &plan.middles,
@@ -104,28 +104,28 @@ fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usiz
     Ok(bytes)
 }
 
-/// What a pass over some particles found.
-struct Passed {
+/// Result of a pass over some particles.
+struct PassCounts {
     /// Particles in each cell.
     counts: Vec<u32>,
     /// By cut, the particles that it has to decide.
     undecided: Vec<Vec<u32>>,
 }
 
-fn pass(first: usize, centers: &[Vec3], cells: &[AtomicU16], plan: &CutPlan) -> Passed {
+fn pass(first: usize, centers: &[Vec3], cells: &[AtomicU16], plan: &CutPlan) -> PassCounts {
     let brackets = &plan.brackets[..];
-    let mut passed = Passed {
+    let mut passed = PassCounts {
         counts: vec![0; brackets.len() + 1],
         undecided: vec![Vec::new(); brackets.len()],
     };
     for (offset, (center, own)) in centers.iter().zip(cells).enumerate() {
         let index = index_u32(first + offset);
         match descend(brackets, keys_of(*center, index)) {
-            Way::Cell(cell) => {
+            Side::Cell(cell) => {
                 own.store(cell_u16(cell), Ordering::Relaxed);
                 passed.counts[cell] += 1;
             }
-            Way::Undecided(cut) => passed.undecided[cut].push(index),
+            Side::Undecided(cut) => passed.undecided[cut].push(index),
         }
     }
     passed
@@ -151,10 +151,10 @@ fn cell_u16(cell: usize) -> u16 {
 }
 
 /// A cut and all below it.
-struct Subtree<'a> {
+struct CutSubtree<'a> {
     /// Number of the cut in the plan.
     first_cut: usize,
-    brackets: &'a [Bracket],
+    brackets: &'a [MedianBracket],
     middles: &'a [usize],
     /// By cut, the particles that it has to decide.
     undecided: &'a mut [Vec<u32>],
@@ -164,9 +164,9 @@ struct Subtree<'a> {
     counts: &'a mut [usize],
 }
 
-impl<'a> Subtree<'a> {
+impl<'a> CutSubtree<'a> {
     /// Decides all particles that are left.
-    fn decide(self, centers: &[Vec3], cells: &[AtomicU16]) -> Result<(), Outside> {
+    fn decide(self, centers: &[Vec3], cells: &[AtomicU16]) -> Result<(), BracketMiss> {
         let (Some(bracket), Some(middle)) = (self.brackets.first(), self.middles.first()) else {
             return Ok(());
         };
@@ -179,12 +179,12 @@ impl<'a> Subtree<'a> {
         let own = std::mem::take(&mut self.undecided[0]);
         let (mut low, mut high) = self.halves();
         let Some(rank) = middle.checked_sub(low.len()).filter(|r| *r <= own.len()) else {
-            return Err(Outside { cuts: vec![cut] });
+            return Err(BracketMiss { cuts: vec![cut] });
         };
-        let mut items: Vec<Item> = own
+        let mut items: Vec<KeyedParticle> = own
             .par_iter()
             .with_min_len(UNDECIDED_TASK_LEN)
-            .map(|index| Item::new(centers[*index as usize], *index))
+            .map(|index| KeyedParticle::new(centers[*index as usize], *index))
             .collect();
         drop(own);
         if rank < items.len() {
@@ -211,7 +211,7 @@ impl<'a> Subtree<'a> {
         let half = self.brackets.len() / 2;
         let (undecided_low, undecided_high) = self.undecided[1..].split_at_mut(half);
         let (counts_low, counts_high) = self.counts.split_at_mut(half + 1);
-        let low = Subtree {
+        let low = CutSubtree {
             first_cut: self.first_cut + 1,
             brackets: &self.brackets[1..=half],
             middles: &self.middles[1..=half],
@@ -219,7 +219,7 @@ impl<'a> Subtree<'a> {
             first_cell: self.first_cell,
             counts: counts_low,
         };
-        let high = Subtree {
+        let high = CutSubtree {
             first_cut: self.first_cut + 1 + half,
             brackets: &self.brackets[half + 1..],
             middles: &self.middles[half + 1..],
@@ -237,13 +237,13 @@ impl<'a> Subtree<'a> {
     }
 
     /// Takes in particles that the cut above has decided.
-    fn take(&mut self, items: &[Item], cells: &[AtomicU16]) {
-        let ways: Vec<Way> = items
+    fn take(&mut self, items: &[KeyedParticle], cells: &[AtomicU16]) {
+        let ways: Vec<Side> = items
             .par_iter()
             .with_min_len(UNDECIDED_TASK_LEN)
             .map(|item| {
                 let way = descend(self.brackets, keys_of(item.center(), item.number()));
-                if let Way::Cell(cell) = way {
+                if let Side::Cell(cell) = way {
                     let own = &cells[item.number() as usize];
                     own.store(cell_u16(self.first_cell + cell), Ordering::Relaxed);
                 }
@@ -252,8 +252,8 @@ impl<'a> Subtree<'a> {
             .collect();
         for (item, way) in items.iter().zip(ways) {
             match way {
-                Way::Cell(cell) => self.counts[cell] += 1,
-                Way::Undecided(cut) => self.undecided[cut].push(item.number()),
+                Side::Cell(cell) => self.counts[cell] += 1,
+                Side::Undecided(cut) => self.undecided[cut].push(item.number()),
             }
         }
     }
@@ -273,7 +273,7 @@ mod tests {
             .collect()
     }
 
-    fn cells(assigned: &Assigned) -> Vec<usize> {
+    fn cells(assigned: &CellAssignment) -> Vec<usize> {
         (0..assigned.cells.len())
             .map(|i| assigned.cell(i))
             .collect()
@@ -298,10 +298,10 @@ mod tests {
         let points = points();
         let expected = cells(&assign(&points, CutPlan::from_sample(&points)));
         let mut plan = CutPlan::from_sample(&points);
-        let last = plan.brackets.iter().rposition(Bracket::is_cut);
+        let last = plan.brackets.iter().rposition(MedianBracket::is_cut);
         for cut in [0, 1, last.expect("more than one cell")] {
             let axis = index_u32(plan.brackets[cut].axis());
-            plan.brackets[cut] = Bracket::between(key(0.9, 0), key(0.9, 1), axis);
+            plan.brackets[cut] = MedianBracket::between(key(0.9, 0), key(0.9, 1), axis);
         }
         assert!(cells(&assign(&points, plan)) == expected);
     }

@@ -5,14 +5,14 @@
 
 use glam::Vec3;
 
-use super::item::{Item, widest};
+use super::item::{KeyedParticle, widest};
 use super::middle_of;
 
 /// Memory of one thread for cutting cells.
 #[derive(Default)]
 pub(super) struct CellScratch {
-    items: Vec<Item>,
-    spare: Vec<Item>,
+    items: Vec<KeyedParticle>,
+    spare: Vec<KeyedParticle>,
     keys: Vec<i32>,
 }
 
@@ -21,12 +21,14 @@ impl CellScratch {
     pub(super) fn sort(&mut self, points: &mut [Vec3], indices: &mut [u32]) {
         self.items.clear();
         if indices.is_empty() {
-            self.items.extend(points.iter().map(|p| Item::new(*p, 0)));
+            self.items
+                .extend(points.iter().map(|p| KeyedParticle::new(*p, 0)));
         } else {
             let pairs = points.iter().zip(&*indices);
-            self.items.extend(pairs.map(|(p, i)| Item::new(*p, *i)));
+            self.items
+                .extend(pairs.map(|(p, i)| KeyedParticle::new(*p, *i)));
         }
-        self.spare.resize(points.len(), Item::default());
+        self.spare.resize(points.len(), KeyedParticle::default());
         self.keys.resize(points.len(), 0);
         cut(
             &mut self.items,
@@ -40,8 +42,8 @@ impl CellScratch {
 
 /// Cuts `items` down to blocks and writes them out.
 fn cut(
-    items: &mut [Item],
-    spare: &mut [Item],
+    items: &mut [KeyedParticle],
+    spare: &mut [KeyedParticle],
     keys: &mut [i32],
     points: &mut [Vec3],
     indices: &mut [u32],
@@ -60,7 +62,7 @@ fn cut(
     cut(spare_high, items_high, keys_high, points_high, indices_high);
 }
 
-fn write(items: &[Item], points: &mut [Vec3], indices: &mut [u32]) {
+fn write(items: &[KeyedParticle], points: &mut [Vec3], indices: &mut [u32]) {
     for (point, item) in points.iter_mut().zip(items) {
         *point = item.center();
     }
@@ -69,7 +71,7 @@ fn write(items: &[Item], points: &mut [Vec3], indices: &mut [u32]) {
     }
 }
 
-fn widest_axis(items: &[Item]) -> usize {
+fn widest_axis(items: &[KeyedParticle]) -> usize {
     let (mut min, mut max) = (Vec3::INFINITY, Vec3::NEG_INFINITY);
     for item in items {
         min = min.min(item.center());
@@ -78,8 +80,14 @@ fn widest_axis(items: &[Item]) -> usize {
     widest(max - min)
 }
 
-/// Brings the `middle` lowest of `items` along `axis` to the front of `to`, the others behind them.
-fn part(items: &[Item], to: &mut [Item], keys: &mut [i32], axis: usize, middle: usize) {
+/// Brings the `middle` lowest of `items` along `axis` to the front of `to`, the others after them.
+fn part(
+    items: &[KeyedParticle],
+    to: &mut [KeyedParticle],
+    keys: &mut [i32],
+    axis: usize,
+    middle: usize,
+) {
     for (key, item) in keys.iter_mut().zip(items) {
         *key = item.place(axis);
     }
@@ -105,12 +113,12 @@ mod tests {
 
     #[test]
     fn ties_keep_their_order() {
-        let items: Vec<Item> = (0..64)
-            .map(|i| Item::new(Vec3::X * (i % 2) as f32, i))
+        let items: Vec<KeyedParticle> = (0..64)
+            .map(|i| KeyedParticle::new(Vec3::X * (i % 2) as f32, i))
             .collect();
-        let mut to = vec![Item::default(); 64];
+        let mut to = vec![KeyedParticle::default(); 64];
         part(&items, &mut to, &mut [0; 64], 0, 48);
-        let numbers: Vec<u32> = to.iter().map(Item::number).collect();
+        let numbers: Vec<u32> = to.iter().map(KeyedParticle::number).collect();
         let is_low = |i: &u32| i.is_multiple_of(2) || *i < 32;
         let (low, high): (Vec<u32>, Vec<u32>) = (0..64).partition(is_low);
         assert_eq!(numbers, [low, high].concat());

@@ -2,15 +2,15 @@
 
 use glam::Vec3;
 
-/// Position and a number that tells equal positions apart: 16 bytes, moved as one.
+/// Position and a number that distinguishes equal positions: 16 bytes, moved as one.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(16))]
-pub(super) struct Item {
+pub(super) struct KeyedParticle {
     center: [f32; 3],
     number: u32,
 }
 
-impl Item {
+impl KeyedParticle {
     pub(super) fn new(center: Vec3, number: u32) -> Self {
         Self {
             center: center.to_array(),

@@ -2,7 +2,7 @@
 //!
 //! Cuts are at whole nodes ([`aligned_middle`]), so each aligned run of 16, 128, 1024... particles is a
 //! cell of the tree and nothing but the order has to be found. The upper cuts are made without
-//! moving anything (`plan.rs`, `assign.rs`): a sample says between which two particles each median must
+//! moving anything (`plan.rs`, `assign.rs`): a sample bounds the particles between which each median must
 //! lie, one pass over all particles decides all but those few, and these are then decided exactly.
 //! One scatter (`partition.rs`) brings every particle into its cell of the cache's size, and the
 //! cells are cut further one by one (`cell.rs`). All of it is parallel, and the cells are of equal
@@ -27,7 +27,7 @@ use cell::CellScratch;
 use plan::CutPlan;
 
 /// Writes `centers` into `points` in the order of the tree, and their indices into `indices` unless
-/// that is empty. `lap` is told when a phase ends: `sample`, `cuts`, `scatter`, `cells`. Returns the
+/// that is empty. `lap` is called when a phase ends: `sample`, `cuts`, `scatter`, `cells`. Returns the
 /// most bytes held beside the two.
 ///
 /// # Panics

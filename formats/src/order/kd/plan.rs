@@ -1,14 +1,14 @@
 //! The upper cuts as far as a sample knows them: which axis, and between which two particles the
 //! median must lie.
 //!
-//! The rank that a value has in a sample of m particles tells its rank among all within a few times
-//! sqrt(m)/2 (as in the selection of Floyd & Rivest 1975). Whatever lies outside of that bracket is
+//! The rank of a value in a sample of m particles gives its rank among all within a few times
+//! sqrt(m)/2 (as in the selection of Floyd & Rivest 1975). Everything outside of that bracket is
 //! decided by one comparison.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::item::{Item, widest};
+use super::item::{KeyedParticle, widest};
 use super::middle_of;
 use crate::order::index_u32;
 
@@ -29,24 +29,24 @@ const DEVIATIONS: f64 = 4.5;
 /// A task for less than this costs more than it saves.
 const PARALLEL_LEN: usize = 4096;
 
-/// Where a median may lie: particles with keys from `low` on, up to `width` above it, are undecided.
+/// The possible keys of a median: particles with keys from `low` on, up to `width` above it, are undecided.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Bracket {
+pub(super) struct MedianBracket {
     low: i64,
     width: u64,
     axis: u32,
 }
 
-/// On which side of a cut a particle is.
+/// The side of a cut that a particle is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Way {
+pub(super) enum Side {
     /// In the cell with that number.
     Cell(usize),
     /// The cut with that number has to decide.
     Undecided(usize),
 }
 
-impl Bracket {
+impl MedianBracket {
     /// No cut: everything is low.
     const NONE: Self = Self {
         low: i64::MAX,
@@ -81,14 +81,14 @@ impl Bracket {
 /// Follows the cuts in `brackets`, a whole binary tree in preorder, as far as they are sure. `keys`
 /// are the particle's along each axis.
 #[inline(always)]
-pub(super) fn descend(brackets: &[Bracket], keys: [i64; 4]) -> Way {
+pub(super) fn descend(brackets: &[MedianBracket], keys: [i64; 4]) -> Side {
     let (mut cut, mut cell) = (0, 0);
     let mut half = brackets.len().div_ceil(2);
     while half > 0 {
         let bracket = &brackets[cut];
         let key = keys[(bracket.axis & 3) as usize];
         if key.wrapping_sub(bracket.low).cast_unsigned() < bracket.width {
-            return Way::Undecided(cut);
+            return Side::Undecided(cut);
         }
         let is_high = key >= bracket.low;
         // By a shift and not by a condition, which would become a branch that is mispredicted every
@@ -97,14 +97,14 @@ pub(super) fn descend(brackets: &[Bracket], keys: [i64; 4]) -> Way {
         cell = 2 * cell + usize::from(is_high);
         half >>= 1;
     }
-    Way::Cell(cell)
+    Side::Cell(cell)
 }
 
 /// The upper cuts: a whole binary tree in preorder, with cuts that are none where cells are small
 /// enough already.
 #[derive(Debug)]
 pub(super) struct CutPlan {
-    pub(super) brackets: Vec<Bracket>,
+    pub(super) brackets: Vec<MedianBracket>,
     /// How many particles are below each cut.
     pub(super) middles: Vec<usize>,
     /// Bytes that were needed to find them.
@@ -119,15 +119,15 @@ impl CutPlan {
         }
         let cuts = (1 << depth_of(centers.len(), cell_len)) - 1;
         let mut plan = Self {
-            brackets: vec![Bracket::NONE; cuts],
+            brackets: vec![MedianBracket::NONE; cuts],
             middles: vec![0; cuts],
             bytes: 0,
         };
         if cuts > 0 {
             let mut sample = sample_of(centers);
-            let mut spare = vec![Item::default(); sample.len()];
+            let mut spare = vec![KeyedParticle::default(); sample.len()];
             plan.bytes = 2 * size_of_val(&sample[..]);
-            let subtree = Subtree {
+            let subtree = BracketSubtree {
                 brackets: &mut plan.brackets,
                 middles: &mut plan.middles,
                 cell_len,
@@ -141,7 +141,7 @@ impl CutPlan {
     pub(super) fn widen(&mut self, cuts: &[usize]) {
         for cut in cuts {
             let bracket = &mut self.brackets[*cut];
-            *bracket = Bracket::everything(bracket.axis);
+            *bracket = MedianBracket::everything(bracket.axis);
         }
     }
 }
@@ -156,28 +156,28 @@ fn depth_of(len: usize, cell_len: usize) -> u32 {
 }
 
 /// One particle of each run, at a place in the run that looks random: files are often ordered.
-fn sample_of(centers: &[Vec3]) -> Vec<Item> {
+fn sample_of(centers: &[Vec3]) -> Vec<KeyedParticle> {
     (0..centers.len() / STRIDE)
         .into_par_iter()
         .with_min_len(PARALLEL_LEN)
         .map(|run| {
             let hash = (run as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 40;
             let index = run * STRIDE + hash as usize % STRIDE;
-            Item::new(centers[index], index_u32(index))
+            KeyedParticle::new(centers[index], index_u32(index))
         })
         .collect()
 }
 
 /// A cut and all below it.
-struct Subtree<'a> {
-    brackets: &'a mut [Bracket],
+struct BracketSubtree<'a> {
+    brackets: &'a mut [MedianBracket],
     middles: &'a mut [usize],
     cell_len: usize,
 }
 
-impl Subtree<'_> {
-    /// Finds the brackets for `len` particles, of which `sample` are known.
-    fn fill(self, len: usize, sample: &mut [Item], spare: &mut [Item]) {
+impl BracketSubtree<'_> {
+    /// Finds the brackets for `len` particles from `sample`.
+    fn fill(self, len: usize, sample: &mut [KeyedParticle], spare: &mut [KeyedParticle]) {
         if len <= self.cell_len {
             return;
         }
@@ -200,12 +200,12 @@ impl Subtree<'_> {
         let (brackets_low, brackets_high) = brackets.split_at_mut(half);
         let (middles_low, middles_high) = middles.split_at_mut(half);
         let cell_len = self.cell_len;
-        let low = Subtree {
+        let low = BracketSubtree {
             brackets: brackets_low,
             middles: middles_low,
             cell_len,
         };
-        let high = Subtree {
+        let high = BracketSubtree {
             brackets: brackets_high,
             middles: middles_high,
             cell_len,
@@ -219,9 +219,13 @@ impl Subtree<'_> {
 
 /// The axis along which the bulk of the particles extends farthest: a few that escaped shall not
 /// decide.
-fn widest_axis(sample: &[Item]) -> usize {
+fn widest_axis(sample: &[KeyedParticle]) -> usize {
     let stride = sample.len().div_ceil(AXIS_LEN).max(1);
-    let points: Vec<Vec3> = sample.iter().step_by(stride).map(Item::center).collect();
+    let points: Vec<Vec3> = sample
+        .iter()
+        .step_by(stride)
+        .map(KeyedParticle::center)
+        .collect();
     let Some(last) = points.len().checked_sub(1) else {
         return 0;
     };
@@ -235,7 +239,7 @@ fn widest_axis(sample: &[Item]) -> usize {
 }
 
 /// The bracket of the particle that has `fraction` of all below it, and the best guess at its key.
-fn bracket_for(sample: &[Item], axis: usize, fraction: f64) -> (Bracket, i64) {
+fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianBracket, i64) {
     let axis_number = index_u32(axis);
     let stride = sample.len().div_ceil(SELECT_LEN).max(1);
     let mut keys: Vec<i64> = sample.iter().step_by(stride).map(|i| i.key(axis)).collect();
@@ -247,7 +251,7 @@ fn bracket_for(sample: &[Item], axis: usize, fraction: f64) -> (Bracket, i64) {
     )]
     let [rank, spread] = [count * fraction, 1.0 + DEVIATIONS * deviation].map(|r| r as usize);
     if rank >= keys.len() {
-        return (Bracket::everything(axis_number), i64::MAX);
+        return (MedianBracket::everything(axis_number), i64::MAX);
     }
     let (below, guess, above) = keys.select_nth_unstable(rank);
     let low = match rank.checked_sub(spread) {
@@ -259,12 +263,12 @@ fn bracket_for(sample: &[Item], axis: usize, fraction: f64) -> (Bracket, i64) {
     } else {
         i64::MAX
     };
-    (Bracket::between(low, high, axis_number), *guess)
+    (MedianBracket::between(low, high, axis_number), *guess)
 }
 
 /// Moves what is under `pivot` to the front of `to` and the others to its end; returns how many
 /// are in front.
-fn part(items: &[Item], to: &mut [Item], axis: usize, pivot: i64) -> usize {
+fn part(items: &[KeyedParticle], to: &mut [KeyedParticle], axis: usize, pivot: i64) -> usize {
     let (mut low, mut high) = (0, items.len());
     for item in items {
         let is_low = item.key(axis) < pivot;

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{BLOCK, Column, Lane, ParticleLayout, divided};
+use super::{BLOCK, ParticleLayout, Strided, StridedColumn, divided};
 use crate::{AttributeData, Endian, ScalarType};
 
 impl ParticleLayout {
@@ -56,7 +56,7 @@ impl ParticleLayout {
     }
 }
 
-impl Column {
+impl StridedColumn {
     /// Reads the values of the particles from `first` on, little-endian: all components of one, then of the
     /// next. `bytes` are those of a file in which the column fits, and `to` holds whole particles of it.
     pub(crate) fn read_values(&self, bytes: &[u8], first: usize, to: &mut [u8]) {
@@ -94,7 +94,7 @@ impl Column {
     clippy::cast_lossless,
     reason = "one body for ten types, and no wider type to keep integers of 64 bits in"
 )]
-fn fill_f64(to: &mut [f64], bytes: &[u8], column: &Column, lanes: &[Lane], first: usize) {
+fn fill_f64(to: &mut [f64], bytes: &[u8], column: &StridedColumn, lanes: &[Strided], first: usize) {
     macro_rules! fill {
         ($ty:ty) => {
             match column.endian {
@@ -121,11 +121,11 @@ fn fill_f64(to: &mut [f64], bytes: &[u8], column: &Column, lanes: &[Lane], first
     }
 }
 
-/// Decodes particles `first..end` of a column that [`Column::fits`].
+/// Decodes particles `first..end` of a column that [`StridedColumn::fits`].
 pub(super) fn fill(
     data: &mut AttributeData,
     bytes: &[u8],
-    column: &Column,
+    column: &StridedColumn,
     first: usize,
     end: usize,
 ) {
@@ -161,12 +161,12 @@ pub(super) fn fill(
 fn fill_block<T, const S: usize>(
     block: &mut [T],
     bytes: &[u8],
-    lanes: &[Lane],
+    lanes: &[Strided],
     first: usize,
     decode: impl Fn([u8; S]) -> T,
 ) {
     let width = lanes.len();
-    let tail = |lane: &Lane| {
+    let tail = |lane: &Strided| {
         bytes
             .get(lane.start + first * lane.stride..)
             .unwrap_or_default()
@@ -200,7 +200,7 @@ fn fill_block<T, const S: usize>(
 }
 
 /// The first lane, if the others follow it byte by byte within a record.
-fn adjacent_run<const S: usize>(lanes: &[Lane]) -> Option<Lane> {
+fn adjacent_run<const S: usize>(lanes: &[Strided]) -> Option<Strided> {
     let first = *lanes.first()?;
     let adjacent = lanes.iter().enumerate().all(|(component, lane)| {
         lane.stride == first.stride && lane.start == first.start + component * S

@@ -4,12 +4,12 @@ use std::ops::Range;
 
 use super::{BYTE_ORDER_MARK, names};
 use crate::ParseError;
-use crate::read::table::{Comments, Decimal, Dialect, Separator, Surplus, cells};
+use crate::read::table::{Comments, Decimal, Dialect, ExtraCells, Separator, cells};
 use crate::read::text::{self, Line, Lines};
 
 /// What was found out about a table.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Layout {
+pub(super) struct TableLayout {
     /// How rows are written.
     pub(super) dialect: Dialect,
     /// Cleaned names of the columns, if there are any.
@@ -18,7 +18,7 @@ pub(super) struct Layout {
     pub(super) columns: usize,
     /// The bytes with the rows.
     pub(super) rows: Range<usize>,
-    /// Simulation time, if a line before the names tells it.
+    /// Simulation time, if a line before the names has it.
     pub(super) time: Option<f64>,
     /// Where the names are.
     names_at: usize,
@@ -39,7 +39,7 @@ const SAMPLE_BYTES: usize = 1 << 20;
 /// Lines of numbers that may come before the names.
 const LINES_OF_FACTS: usize = 32;
 
-impl Layout {
+impl TableLayout {
     /// Finds the table.
     ///
     /// # Errors
@@ -57,7 +57,7 @@ impl Layout {
         };
         let lines = Lines::new(bytes, start..bytes.len());
         let dialect = dialect(lines.clone());
-        Search {
+        LayoutSearch {
             dialect,
             time: None,
             candidate: None,
@@ -81,7 +81,7 @@ impl Layout {
 }
 
 /// The walk to the first row.
-struct Search<'a> {
+struct LayoutSearch<'a> {
     dialect: Dialect,
     time: Option<f64>,
     /// The last line that could name columns, none of them a position.
@@ -90,8 +90,8 @@ struct Search<'a> {
     comment: Option<Line<'a>>,
 }
 
-impl<'a> Search<'a> {
-    fn run(mut self, mut lines: Lines<'a>, end: usize) -> Result<Layout, ParseError> {
+impl<'a> LayoutSearch<'a> {
+    fn run(mut self, mut lines: Lines<'a>, end: usize) -> Result<TableLayout, ParseError> {
         loop {
             let at = lines.at();
             let Some(line) = lines.next() else {
@@ -159,7 +159,7 @@ impl<'a> Search<'a> {
 
     /// A row of numbers: the names are in a comment, or in a line without positions (which is an
     /// error to come), or there are none.
-    fn first_row(self, cells: &[&[u8]], rows: Range<usize>) -> Result<Layout, ParseError> {
+    fn first_row(self, cells: &[&[u8]], rows: Range<usize>) -> Result<TableLayout, ParseError> {
         let columns = cells.len();
         if let Some(line) = self.candidate {
             let names = clean(&split(line.text, self.dialect.separator));
@@ -183,7 +183,7 @@ impl<'a> Search<'a> {
             let at = rows.start;
             return Ok(self.layout(None, columns, at, rows));
         }
-        let what = "no column names, and the first three columns are no numbers";
+        let what = "no column names, and the first three columns are not numbers";
         Err(ParseError::malformed(rows.start, what))
     }
 
@@ -193,8 +193,8 @@ impl<'a> Search<'a> {
         columns: usize,
         names_at: usize,
         rows: Range<usize>,
-    ) -> Layout {
-        Layout {
+    ) -> TableLayout {
+        TableLayout {
             dialect: self.dialect,
             names,
             columns,
@@ -206,7 +206,7 @@ impl<'a> Search<'a> {
 }
 
 /// The separator that splits a sample into the most numbers, in rows of the same length; a sample
-/// without rows of numbers goes by the names of positions.
+/// without rows of numbers is chosen by the names of positions.
 fn dialect(lines: Lines<'_>) -> Dialect {
     let start = lines.at();
     let comments = Comments::HashOrSlashes;
@@ -243,7 +243,7 @@ fn dialect(lines: Lines<'_>) -> Dialect {
         separator,
         decimal: decimal(separator),
         comments,
-        surplus: Surplus::Empty,
+        surplus: ExtraCells::Empty,
     }
 }
 

@@ -6,7 +6,7 @@
 
 use super::input::TextInput;
 use super::sniff::{TextShape, is_text, text_shape};
-use super::table::{Numbers, OnText, Place, Table, Target};
+use super::table::{NumberKind, Table, TargetArray, TargetComponent, TextPolicy};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::names::{COLOR_CODES, is_one_of, is_radius_name};
@@ -16,7 +16,7 @@ use crate::{MemoryBudget, ParseError, RawParticles};
 mod layout;
 mod names;
 
-use layout::Layout;
+use layout::TableLayout;
 
 /// What some editors put before UTF-8 text.
 pub(super) const BYTE_ORDER_MARK: &[u8] = b"\xef\xbb\xbf";
@@ -70,7 +70,7 @@ impl Reader for Csv {
 /// # Errors
 /// [`ParseError::Unsupported`] for UTF-16; [`read`] reports other faults.
 pub(super) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
-    let time = match Layout::find(text.head()) {
+    let time = match TableLayout::find(text.head()) {
         Ok(layout) => layout.time,
         Err(error @ ParseError::Unsupported { .. }) => return Err(error),
         Err(_) => None,
@@ -87,14 +87,14 @@ pub(super) fn steps(text: &TextInput<'_>) -> Result<Vec<Step>, ParseError> {
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if there are no positions among the columns, a row has another
-/// number of cells, or a position is no number; [`ParseError::Unsupported`] for UTF-16;
+/// number of cells, or a position is not a number; [`ParseError::Unsupported`] for UTF-16;
 /// [`ParseError::TooLarge`] beyond `budget`.
 pub(super) fn read(
     text: &mut TextInput<'_>,
     budget: MemoryBudget,
 ) -> Result<RawParticles, ParseError> {
     let head = text.head();
-    let layout = Layout::find(head)?;
+    let layout = TableLayout::find(head)?;
     let (fields, targets) = layout_columns(&layout)?;
     let rows = head.get(layout.rows.clone()).unwrap_or_default();
     let lines = memchr::memchr_iter(b'\n', rows).count() as u64;
@@ -126,13 +126,13 @@ const LAYOUT_LINES: usize = 300;
 
 /// Rows, if `head`, the beginning of a file, holds all that decides the layout of the table.
 pub(super) fn stream_unit(head: &[u8]) -> Option<StreamUnit> {
-    let layout = Layout::find(head).ok()?;
+    let layout = TableLayout::find(head).ok()?;
     let rows = head.get(layout.rows).unwrap_or_default();
     let lines = memchr::memchr_iter(b'\n', rows).take(LAYOUT_LINES);
     (lines.count() == LAYOUT_LINES).then_some(StreamUnit::Rows)
 }
 
-fn layout_columns(layout: &Layout) -> Result<Columns, ParseError> {
+fn layout_columns(layout: &TableLayout) -> Result<TableColumns, ParseError> {
     match &layout.names {
         Some(names) => named_columns(names).ok_or_else(|| layout.no_positions(names)),
         None => Ok(numbered_columns(layout.columns)),
@@ -141,20 +141,20 @@ fn layout_columns(layout: &Layout) -> Result<Columns, ParseError> {
 
 /// True if a line of `bytes` names positions.
 pub(super) fn finds_columns(bytes: &[u8]) -> bool {
-    Layout::find(bytes)
+    TableLayout::find(bytes)
         .is_ok_and(|layout| layout.names.is_some_and(|n| names::position(&n).is_some()))
 }
 
-type Columns = (Vec<Option<Place>>, Vec<Target>);
+type TableColumns = (Vec<Option<TargetComponent>>, Vec<TargetArray>);
 
 /// Where the columns called `names` go; `None` if no positions are among them.
-fn named_columns(names: &[String]) -> Option<Columns> {
+fn named_columns(names: &[String]) -> Option<TableColumns> {
     let axes = names::position(names)?;
-    let mut fields: Vec<Option<Place>> = vec![None; names.len()];
-    let mut targets = vec![Target::positions()];
+    let mut fields: Vec<Option<TargetComponent>> = vec![None; names.len()];
+    let mut targets = vec![TargetArray::positions()];
     let mut assign = |column: usize, target, component| {
         if let Some(field) = fields.get_mut(column) {
-            *field = Some(Place { target, component });
+            *field = Some(TargetComponent { target, component });
         }
     };
     for (component, column) in axes.into_iter().enumerate() {
@@ -166,11 +166,11 @@ fn named_columns(names: &[String]) -> Option<Columns> {
         for (component, column) in group.columns.iter().enumerate() {
             assign(*column, targets.len(), component);
         }
-        targets.push(Target::attribute(
+        targets.push(TargetArray::attribute(
             group.name.clone(),
             group.columns.len(),
             numbers_of(&group),
-            OnText::LeaveOut,
+            TextPolicy::LeaveOut,
         ));
     }
     Some((fields, targets))
@@ -178,28 +178,28 @@ fn named_columns(names: &[String]) -> Option<Columns> {
 
 /// Vectors and radii are real, even if all of a file happen to be integers. Integers of a colour are codes and stay
 /// what they are.
-fn numbers_of(group: &names::Group) -> Numbers {
+fn numbers_of(group: &names::ColumnGroup) -> NumberKind {
     let is_color = is_one_of(&group.name, &COLOR_CODES);
     if (group.columns.len() > 1 && !is_color) || is_radius_name(&group.name) {
-        Numbers::Real
+        NumberKind::Real
     } else {
-        Numbers::WholeIfAll
+        NumberKind::WholeIfAll
     }
 }
 
 /// Positions in the first three of `columns` columns, then `column_4`...
-fn numbered_columns(columns: usize) -> Columns {
-    let place = |target, component| Some(Place { target, component });
+fn numbered_columns(columns: usize) -> TableColumns {
+    let place = |target, component| Some(TargetComponent { target, component });
     let mut fields = vec![place(0, 0), place(0, 1), place(0, 2)];
-    let mut targets = vec![Target::positions()];
+    let mut targets = vec![TargetArray::positions()];
     for column in 4..=columns {
         fields.push(place(targets.len(), 0));
         let name = format!("column_{column}");
-        targets.push(Target::attribute(
+        targets.push(TargetArray::attribute(
             name,
             1,
-            Numbers::WholeIfAll,
-            OnText::LeaveOut,
+            NumberKind::WholeIfAll,
+            TextPolicy::LeaveOut,
         ));
     }
     (fields, targets)

@@ -6,7 +6,7 @@ use crate::names::{COLOR_COLUMNS, JOINED_STEMS, POSITION_STEMS};
 
 /// Columns that are one attribute.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Group {
+pub(super) struct ColumnGroup {
     /// The common name.
     pub(super) name: String,
     /// The column of each component.
@@ -15,7 +15,7 @@ pub(super) struct Group {
 
 /// Which number of a vector a column is.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-enum Part {
+enum NameComponent {
     Index(usize),
     Axis(usize),
 }
@@ -42,7 +42,8 @@ pub(super) fn clean(raw: &[u8]) -> String {
 pub(super) fn position(names: &[String]) -> Option<[Option<usize>; 3]> {
     let mut found = [[None; 3]; POSITION_STEMS.len()];
     for (column, name) in names.iter().enumerate() {
-        let Some((stem, Part::Axis(part) | Part::Index(part))) = split(name) else {
+        let Some((stem, NameComponent::Axis(part) | NameComponent::Index(part))) = split(name)
+        else {
             continue;
         };
         let stem = stem.to_ascii_lowercase();
@@ -62,9 +63,9 @@ pub(super) fn position(names: &[String]) -> Option<[Option<usize>; 3]> {
 
 /// What is left of cleaned `names` without the position `axes`, vectors together, in the order of
 /// the first column of each. A column without a name is left out.
-pub(super) fn attributes(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
+pub(super) fn attributes(names: &[String], axes: [Option<usize>; 3]) -> Vec<ColumnGroup> {
     let vectors = vectors(names, axes);
-    let mut grouped: BTreeMap<usize, Option<Group>> = BTreeMap::new();
+    let mut grouped: BTreeMap<usize, Option<ColumnGroup>> = BTreeMap::new();
     for group in vectors {
         let first = group.columns.iter().min().copied().unwrap_or_default();
         for column in &group.columns {
@@ -77,7 +78,7 @@ pub(super) fn attributes(names: &[String], axes: [Option<usize>; 3]) -> Vec<Grou
         match grouped.remove(&column) {
             Some(group) => attributes.extend(group),
             None if axes.contains(&Some(column)) || name.is_empty() => {}
-            None => attributes.push(Group {
+            None => attributes.push(ColumnGroup {
                 name: name.clone(),
                 columns: vec![column],
             }),
@@ -87,15 +88,15 @@ pub(super) fn attributes(names: &[String], axes: [Option<usize>; 3]) -> Vec<Grou
 }
 
 /// Columns of one stem whose components are 0, 1, 2... or x, y and perhaps z, each once.
-fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
+fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<ColumnGroup> {
     let mut by_stem: BTreeMap<(&str, bool), BTreeMap<usize, Vec<usize>>> = BTreeMap::new();
     for (column, name) in names.iter().enumerate() {
         if axes.contains(&Some(column)) {
             continue;
         }
         let (key, component) = match split(name) {
-            Some((stem, Part::Index(index))) => ((stem, false), index),
-            Some((stem, Part::Axis(axis))) => ((stem, true), axis),
+            Some((stem, NameComponent::Index(index))) => ((stem, false), index),
+            Some((stem, NameComponent::Axis(axis))) => ((stem, true), axis),
             None => continue,
         };
         let columns = by_stem.entry(key).or_default();
@@ -108,7 +109,7 @@ fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
             .enumerate()
             .all(|(index, (component, columns))| index == *component && columns.len() == 1);
         if complete && columns.len() > 1 && !stem.is_empty() {
-            groups.push(Group {
+            groups.push(ColumnGroup {
                 name: vector_name(stem).to_owned(),
                 columns: columns.into_values().flatten().collect(),
             });
@@ -119,7 +120,7 @@ fn vectors(names: &[String], axes: [Option<usize>; 3]) -> Vec<Group> {
 }
 
 /// The columns of red, green and blue.
-fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<Group> {
+fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<ColumnGroup> {
     COLOR_COLUMNS.iter().find_map(|parts| {
         let column = |part: &&str| {
             let found = names
@@ -127,7 +128,7 @@ fn colors(names: &[String], axes: [Option<usize>; 3]) -> Option<Group> {
                 .position(|name| name.eq_ignore_ascii_case(part));
             found.filter(|column| !axes.contains(&Some(*column)))
         };
-        Some(Group {
+        Some(ColumnGroup {
             name: "color".to_owned(),
             columns: parts.iter().map(column).collect::<Option<_>>()?,
         })
@@ -143,21 +144,24 @@ fn vector_name(stem: &str) -> &str {
 
 /// The stem and the component of a name: `velocity:0`, `velocity_0`, `velocity[0]`, `Vel.x`,
 /// `vel_x`, `vx`; of a plain `x` the stem is empty.
-fn split(name: &str) -> Option<(&str, Part)> {
+fn split(name: &str) -> Option<(&str, NameComponent)> {
     let indexed = name
         .strip_suffix([']', ')'])
         .and_then(|rest| rest.rsplit_once(['[', '(']));
     if let Some((stem, index)) = indexed {
-        return Some((stem.trim_end(), Part::Index(index.trim().parse().ok()?)));
+        return Some((
+            stem.trim_end(),
+            NameComponent::Index(index.trim().parse().ok()?),
+        ));
     }
     if let Some((stem, part)) = name.rsplit_once([':', '.', '_', ' '])
         && !stem.is_empty()
     {
         if let Some(axis) = axis(part) {
-            return Some((stem, Part::Axis(axis)));
+            return Some((stem, NameComponent::Axis(axis)));
         }
         if !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit()) {
-            return Some((stem, Part::Index(part.parse().ok()?)));
+            return Some((stem, NameComponent::Index(part.parse().ok()?)));
         }
         return None;
     }
@@ -168,7 +172,7 @@ fn split(name: &str) -> Option<(&str, Part)> {
         || JOINED_STEMS
             .iter()
             .any(|(joined, _)| joined.eq_ignore_ascii_case(stem));
-    known.then_some((stem, Part::Axis(axis)))
+    known.then_some((stem, NameComponent::Axis(axis)))
 }
 
 fn axis(part: &str) -> Option<usize> {

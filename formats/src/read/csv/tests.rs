@@ -184,7 +184,7 @@ fn faults_have_names() {
         ("x,y,z\n1,2,3\n1,2", "perhaps still being written"),
         ("x,y,z\n1,2,3,4\n", "byte 12: line has more than 3 columns"),
         ("x,y,z\n1,2,3\n1,b,3\n", "byte 14: column 2 has \"b\""),
-        ("a,1,2,3\nb,4,5,6\n", "first three columns are no numbers"),
+        ("a,1,2,3\nb,4,5,6\n", "first three columns are not numbers"),
     ];
     for (text, expected) in cases {
         let found = fault(text);

@@ -23,7 +23,7 @@ pub(super) struct Axis {
 impl Axis {
     /// The numbers of `line`.
     pub(super) fn parse(line: Line<'_>) -> Self {
-        // One more than there may be tells enough.
+        // One more than allowed is enough to decide.
         let numbers: Option<Vec<f64>> = text::words(line.text).take(5).map(text::number).collect();
         Self {
             at: line.at,
@@ -35,7 +35,7 @@ impl Axis {
 impl Bounds {
     /// Takes the three lines after `ITEM: BOX BOUNDS`: `lo hi` for an orthogonal box, `lo hi tilt`
     /// for a triclinic one, an edge and a coordinate of the corner for a general triclinic one. The
-    /// number of values tells them apart, since not all programs write the flags.
+    /// number of values distinguishes them, since not all programs write the flags.
     pub(super) fn new(axes: [Axis; 3]) -> Result<Self, ParseError> {
         let [x, y, z] = axes.each_ref().map(|axis| &axis.numbers);
         match (&x[..], &y[..], &z[..]) {

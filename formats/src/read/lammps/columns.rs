@@ -1,10 +1,10 @@
 //! What the columns named on the `ITEM: ATOMS` line are.
 
 use super::bounds::Bounds;
-use super::header::Header;
+use super::header::DumpHeader;
 use crate::ParseError;
 use crate::names::{LAMMPS_CATEGORIES, LAMMPS_INTEGERS, LAMMPS_VECTORS};
-use crate::read::table::{Numbers, OnText, Place, Target};
+use crate::read::table::{NumberKind, TargetArray, TargetComponent, TextPolicy};
 use crate::read::text;
 
 /// Names of position columns, the wanted first, and whether they are fractions of the box.
@@ -16,20 +16,20 @@ const POSITIONS: [([&str; 3], bool); 4] = [
     (["xsu", "ysu", "zsu"], true),
 ];
 
-/// The plan for the rows of a step.
+/// Targets of the columns of a step.
 #[derive(Debug)]
-pub(super) struct Columns {
-    /// Where each column goes.
-    pub(super) fields: Vec<Option<Place>>,
+pub(super) struct DumpColumns {
+    /// The target of each column.
+    pub(super) fields: Vec<Option<TargetComponent>>,
     /// The arrays to fill, positions first.
-    pub(super) targets: Vec<Target>,
+    pub(super) targets: Vec<TargetArray>,
     /// The box that the positions are fractions of, if they are.
     pub(super) scaled_by: Option<Bounds>,
 }
 
-impl Columns {
-    /// Plans for the columns of `header`; those that are no numbers in `first_row` are left out.
-    pub(super) fn find(header: &Header, first_row: Option<&[u8]>) -> Result<Self, ParseError> {
+impl DumpColumns {
+    /// Chooses targets for the columns of `header`; columns without a number in `first_row` are left out.
+    pub(super) fn find(header: &DumpHeader, first_row: Option<&[u8]>) -> Result<Self, ParseError> {
         let column = |name: &str| header.names.iter().position(|n| n == name.as_bytes());
         let (axes, scaled) = position_columns(column).ok_or_else(|| no_positions(header))?;
         let scaled_by = match (scaled, header.bounds) {
@@ -42,7 +42,7 @@ impl Columns {
         };
         let mut plan = Self {
             fields: vec![None; header.names.len()],
-            targets: vec![Target::positions()],
+            targets: vec![TargetArray::positions()],
             scaled_by,
         };
         for (component, column) in axes.into_iter().enumerate() {
@@ -54,13 +54,13 @@ impl Columns {
 
     fn assign(&mut self, column: Option<usize>, target: usize, component: usize) {
         if let Some(field) = column.and_then(|column| self.fields.get_mut(column)) {
-            *field = Some(Place { target, component });
+            *field = Some(TargetComponent { target, component });
         }
     }
 
     fn add_attributes(
         &mut self,
-        header: &Header,
+        header: &DumpHeader,
         column: impl Fn(&str) -> Option<usize>,
         first_row: Option<&[u8]>,
     ) {
@@ -76,7 +76,7 @@ impl Columns {
             let taken = self.fields.get(index).is_some_and(Option::is_some);
             let target = self.targets.len();
             if !taken && LAMMPS_CATEGORIES.contains(&&*name) {
-                self.targets.push(Target::category(name));
+                self.targets.push(TargetArray::category(name));
                 self.assign(Some(index), target, 0);
                 continue;
             }
@@ -95,7 +95,7 @@ impl Columns {
                 continue;
             }
             self.targets.push(if LAMMPS_INTEGERS.contains(&&*name) {
-                Target::attribute(name, 1, Numbers::WholeIfAll, OnText::Fault)
+                TargetArray::attribute(name, 1, NumberKind::WholeIfAll, TextPolicy::Fault)
             } else {
                 real(&name, 1)
             });
@@ -104,8 +104,8 @@ impl Columns {
     }
 }
 
-fn real(name: &str, components: usize) -> Target {
-    Target::attribute(name, components, Numbers::Real, OnText::Fault)
+fn real(name: &str, components: usize) -> TargetArray {
+    TargetArray::attribute(name, components, NumberKind::Real, TextPolicy::Fault)
 }
 
 /// The columns of x, y and z, and whether they are scaled. A 2D run may do without z.
@@ -120,7 +120,7 @@ fn position_columns(column: impl Fn(&str) -> Option<usize>) -> Option<([Option<u
     solid.or(flat).copied()
 }
 
-fn no_positions(header: &Header) -> ParseError {
+fn no_positions(header: &DumpHeader) -> ParseError {
     let names: Vec<_> = header
         .names
         .iter()

@@ -10,7 +10,7 @@ use crate::{MemoryBudget, ParseError};
 
 /// What a header line announces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Item {
+pub(super) enum DumpItem {
     /// The number of the step.
     TimeStep,
     /// Simulation time (`dump_modify time yes`).
@@ -27,7 +27,7 @@ pub(super) enum Item {
     Other,
 }
 
-impl Item {
+impl DumpItem {
     /// What `line` announces; it begins with `ITEM:`.
     pub(super) fn of(line: &[u8]) -> Self {
         let rest = line.strip_prefix(ITEM).unwrap_or(line).trim_ascii_start();
@@ -53,9 +53,9 @@ impl Item {
     }
 }
 
-/// All that is said before the first atom.
+/// The header lines before the first atom.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Header {
+pub(super) struct DumpHeader {
     /// Number of the step.
     pub(super) number: Option<i64>,
     /// Simulation time.
@@ -74,20 +74,20 @@ pub(super) struct Header {
 
 /// Why a header could not be read.
 #[derive(Debug)]
-pub(super) enum Fault {
+pub(super) enum HeaderFault {
     /// It ends here.
     Ends(usize),
     /// It is wrong.
     Wrong(ParseError),
 }
 
-impl From<ParseError> for Fault {
+impl From<ParseError> for HeaderFault {
     fn from(error: ParseError) -> Self {
         Self::Wrong(error)
     }
 }
 
-impl Fault {
+impl HeaderFault {
     /// The error for `step`, whose header ends where `text` is. What is wrong in the last line of the file is
     /// wrong because the rest is missing.
     pub(super) fn explain(self, text: &mut TextInput<'_>, step: &Step) -> ParseError {
@@ -103,7 +103,7 @@ impl Fault {
     }
 }
 
-/// The error for a step that has too little; the file's end and a later step are told apart.
+/// The error for a step that has too little; distinguishes the end of the file from a later step.
 pub(super) fn cut_short(
     text: &mut TextInput<'_>,
     step: &Step,
@@ -114,7 +114,7 @@ pub(super) fn cut_short(
         CUT_SHORT.to_owned()
     } else {
         let end = step.byte_range().map_or(usize::MAX, |range| range.end);
-        format!("the step is broken off at byte {end}, where the next one begins")
+        format!("the step is cut short at byte {end}, where the next one begins")
     };
     ParseError::malformed(at, format!("{what}: {why}"))
 }
@@ -122,9 +122,12 @@ pub(super) fn cut_short(
 /// Bytes that a column takes on the way to its array, with its name.
 const COLUMN: usize = 256;
 
-impl Header {
+impl DumpHeader {
     /// Reads up to and including the `ITEM: ATOMS` line. Its columns may take as much as `budget` allows.
-    pub(super) fn parse(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Self, Fault> {
+    pub(super) fn parse(
+        text: &mut TextInput<'_>,
+        budget: MemoryBudget,
+    ) -> Result<Self, HeaderFault> {
         let mut header = Self {
             number: None,
             time: None,
@@ -137,36 +140,36 @@ impl Header {
         let mut count = None;
         loop {
             let Some(line) = text.line() else {
-                return Err(Fault::Ends(text.at()));
+                return Err(HeaderFault::Ends(text.at()));
             };
             if !line.text.starts_with(ITEM) {
                 continue; // the value of an item unknown here
             }
-            match Item::of(line.text) {
-                Item::TimeStep => header.number = Some(step_number(value(text)?)?),
-                Item::Time => header.time = text::number(value(text)?.text.trim_ascii()),
-                Item::Count => {
+            match DumpItem::of(line.text) {
+                DumpItem::TimeStep => header.number = Some(step_number(value(text)?)?),
+                DumpItem::Time => header.time = text::number(value(text)?.text.trim_ascii()),
+                DumpItem::Count => {
                     let line = value(text)?;
                     header.count_at = line.at;
                     count = Some(atom_count(line)?);
                 }
-                Item::Bounds => {
+                DumpItem::Bounds => {
                     let mut axis = || value(text).map(Axis::parse);
                     header.bounds = Some(Bounds::new([axis()?, axis()?, axis()?])?);
                 }
-                Item::Foreign => {
+                DumpItem::Foreign => {
                     let what = "a dump of entries or grid cells, not of atoms: use dump custom";
                     return Err(ParseError::unsupported(what).into());
                 }
-                Item::Atoms => {
+                DumpItem::Atoms => {
                     let columns = text::words(line.text).count();
                     let need = columns.saturating_mul(COLUMN) as u64;
-                    budget.check(need, "what its columns take is")?;
+                    budget.check(need, "its columns in memory are")?;
                     header.names_at = line.at;
                     header.names = text::words(line.text).skip(2).map(<[u8]>::to_vec).collect();
                     break;
                 }
-                Item::Other => {}
+                DumpItem::Other => {}
             }
         }
         header.count = count.ok_or_else(|| {
@@ -188,16 +191,16 @@ fn step_number(line: Line<'_>) -> Result<i64, ParseError> {
 }
 
 /// The line with the value of an item.
-fn value<'t>(text: &'t mut TextInput<'_>) -> Result<Line<'t>, Fault> {
+fn value<'t>(text: &'t mut TextInput<'_>) -> Result<Line<'t>, HeaderFault> {
     let at = text.at();
-    text.line().ok_or(Fault::Ends(at))
+    text.line().ok_or(HeaderFault::Ends(at))
 }
 
 fn atom_count(line: Line<'_>) -> Result<usize, ParseError> {
     let token = line.text.trim_ascii();
     let count = text::integer(token).and_then(|count| usize::try_from(count).ok());
     count.ok_or_else(|| {
-        let what = format!("{} is no number of atoms", text::shown(token));
+        let what = format!("{} is not a number of atoms", text::shown(token));
         ParseError::malformed(line.at, what)
     })
 }

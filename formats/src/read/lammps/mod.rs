@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use super::input::TextInput;
 use super::sniff::is_digits;
 use super::table::{
-    CUT_SHORT, Comments, Decimal, Dialect, RowsRead, Separator, Surplus, Table, most_rows,
+    CUT_SHORT, Comments, Decimal, Dialect, ExtraCells, RowsRead, Separator, Table, most_rows,
 };
 use super::{ByteSource, Step, text};
 use crate::format::Format;
@@ -23,8 +23,8 @@ mod columns;
 mod header;
 mod remarks;
 
-use columns::Columns;
-use header::{Header, Item};
+use columns::DumpColumns;
+use header::{DumpHeader, DumpItem};
 
 /// What every header line begins with.
 const ITEM: &[u8] = b"ITEM:";
@@ -87,7 +87,7 @@ impl Reader for Lammps {
 }
 
 /// The time steps that `text` holds, in file order. Of a step that occurs twice (after a restart)
-/// the last stays. One that is cut short is listed, so that reading it can say so.
+/// the last stays. One that is cut short is listed, so that reading it gives the error.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if there are no `ITEM:` lines or something else comes first,
@@ -95,7 +95,7 @@ impl Reader for Lammps {
 /// [`ParseError::TooLarge`] if the list of steps needs more than `budget`.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps: Vec<Step> = Vec::new();
-    let mut seen = Seen::default();
+    let mut seen = SeenItems::default();
     let mut pair = LinePair::default();
     check_start(text)?;
     let finder = memmem::Finder::new(ITEM);
@@ -103,19 +103,19 @@ fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, Pa
         let at = text.at();
         pair.go_to_next(text);
         let line = text.rest();
-        let item = Item::of(line.get(..pair.end - at).unwrap_or(line));
+        let item = DumpItem::of(line.get(..pair.end - at).unwrap_or(line));
         if steps.is_empty() || seen.ends_before(item) {
             if let Some(last) = steps.last_mut() {
                 last.end_at(at);
             }
             Step::push(&mut steps, at..at, budget)?;
-            seen = Seen::default();
+            seen = SeenItems::default();
         }
         seen.note(item);
         if let (Some(step), Some(value)) = (steps.last_mut(), pair.value) {
             match item {
-                Item::TimeStep => step.number = value.integer,
-                Item::Time => step.time = value.number,
+                DumpItem::TimeStep => step.number = value.integer,
+                DumpItem::Time => step.time = value.number,
                 _ => {}
             }
         }
@@ -158,14 +158,14 @@ fn read(
     let range = step.byte_range().cloned().unwrap_or_default();
     text.go_to(range.start);
     text.end_at(range.end);
-    let header = match Header::parse(text, budget) {
+    let header = match DumpHeader::parse(text, budget) {
         Ok(header) => header,
         Err(fault) => return Err(fault.explain(text, step)),
     };
     let blank = text.pass_blank_lines(header.count);
     let most = header.count - blank;
     let first = if most > 0 { text.peek_line() } else { None };
-    let columns = Columns::find(&header, first.map(|line| line.text));
+    let columns = DumpColumns::find(&header, first.map(|line| line.text));
     let (rows, scaled_by) = match columns {
         Ok(columns) => {
             let table = Table {
@@ -180,14 +180,14 @@ fn read(
     };
     let found = blank + rows.lines;
     if found < header.count {
-        let what = format!("{} atoms announced, {found} lines follow", header.count);
+        let what = format!("{} atoms expected, {found} lines follow", header.count);
         return Err(header::cut_short(text, step, header.count_at, &what));
     }
     check_end(text, header.count)?;
     let (mut positions, attributes) = rows.content?;
     if positions.len() != header.count {
         let what = format!(
-            "{} atoms announced, {} found: blank lines between them",
+            "{} atoms expected, {} found: blank lines between them",
             header.count,
             positions.len()
         );
@@ -208,7 +208,7 @@ const DIALECT: Dialect = Dialect {
     separator: Separator::Blanks,
     decimal: Decimal::Point,
     comments: Comments::None,
-    surplus: Surplus::Empty,
+    surplus: ExtraCells::Empty,
 };
 
 /// A line with one `ITEM:` or many, and the next line, which is looked at once for all of them.
@@ -216,12 +216,12 @@ const DIALECT: Dialect = Dialect {
 struct LinePair {
     /// Where the line ends.
     end: usize,
-    value: Option<Value>,
+    value: Option<ItemValue>,
 }
 
-/// What the line after an item says.
+/// The parsed line after an item.
 #[derive(Debug, Clone, Copy)]
-struct Value {
+struct ItemValue {
     integer: Option<i64>,
     number: Option<f64>,
 }
@@ -237,7 +237,7 @@ impl LinePair {
             let end = line.map(|line| line.at + line.text.len());
             let next = text.line().map(|line| {
                 let token = line.text.trim_ascii();
-                Value {
+                ItemValue {
                     integer: text::integer(token),
                     number: text::number(token),
                 }
@@ -249,23 +249,23 @@ impl LinePair {
     }
 }
 
-/// Which header lines of a step have passed.
+/// Header lines of a step that were seen so far.
 #[derive(Debug, Default)]
-struct Seen {
+struct SeenItems {
     step: bool,
     rows: bool,
 }
 
-impl Seen {
-    fn note(&mut self, item: Item) {
-        self.step |= item == Item::TimeStep;
-        self.rows |= matches!(item, Item::Atoms | Item::Foreign);
+impl SeenItems {
+    fn note(&mut self, item: DumpItem) {
+        self.step |= item == DumpItem::TimeStep;
+        self.rows |= matches!(item, DumpItem::Atoms | DumpItem::Foreign);
     }
 
-    /// True if `item` belongs to the next step: after the rows all do, and a second `TIMESTEP`
+    /// True if `item` belongs to the next step: after the rows every item does, and a second `TIMESTEP`
     /// follows a header that was broken off.
-    fn ends_before(&self, item: Item) -> bool {
-        self.rows || self.step && item == Item::TimeStep
+    fn ends_before(&self, item: DumpItem) -> bool {
+        self.rows || self.step && item == DumpItem::TimeStep
     }
 }
 
@@ -327,7 +327,7 @@ fn check_end(text: &mut TextInput<'_>, count: usize) -> Result<(), ParseError> {
         }
         let may_be_item = ITEM.starts_with(line.text);
         if !(may_be_item && !text.is_behind_newline() && text.is_file_end()) {
-            let what = format!("more lines than the {count} atoms announced");
+            let what = format!("more lines than the {count} atoms expected");
             return Err(ParseError::malformed(at, what));
         }
     }

@@ -1,7 +1,7 @@
-//! What a dump says that is not in the particles.
+//! Remarks about a dump: what is not in the particles.
 
 use super::ITEM;
-use super::header::{Header, Item};
+use super::header::{DumpHeader, DumpItem};
 use crate::MemoryBudget;
 use crate::names::LAMMPS_CATEGORIES;
 use crate::read::category;
@@ -14,9 +14,10 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
     let mut remarks = Vec::new();
     let mut items = Lines::new(head, 0..head.len());
     let bounds = items.find(|line| {
-        line.text.starts_with(ITEM) && matches!(Item::of(line.text), Item::Bounds | Item::Atoms)
+        line.text.starts_with(ITEM)
+            && matches!(DumpItem::of(line.text), DumpItem::Bounds | DumpItem::Atoms)
     });
-    if let Some(bounds) = bounds.filter(|line| Item::of(line.text) == Item::Bounds) {
+    if let Some(bounds) = bounds.filter(|line| DumpItem::of(line.text) == DumpItem::Bounds) {
         // `ITEM: BOX BOUNDS xy xz yz pp pp ff`
         let flags = text::words(bounds.text)
             .skip(3)
@@ -26,7 +27,7 @@ pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
         remarks.push(unused_cell(is_periodic.then(|| flags.join(" ")).as_deref()));
     }
     let mut text = TextInput::whole(head);
-    let Ok(header) = Header::parse(&mut text, MemoryBudget::UNLIMITED) else {
+    let Ok(header) = DumpHeader::parse(&mut text, MemoryBudget::UNLIMITED) else {
         return remarks;
     };
     let start = text.at();

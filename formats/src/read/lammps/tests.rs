@@ -297,7 +297,7 @@ fn a_last_step_cut_short() {
     }
     let cut = &bytes[..bytes.len() - 30];
     let error = read(cut, &steps(cut).unwrap()[1]).unwrap_err();
-    assert!(error.to_string().contains("column") || error.to_string().contains("announced"));
+    assert!(error.to_string().contains("column") || error.to_string().contains("expected"));
     // A number without its last digits must not take the place of another step.
     let text =
         "ITEM: TIMESTEP\n12\nITEM: NUMBER OF ATOMS\n0\nITEM: ATOMS x y z\nITEM: TIMESTEP\n12";
@@ -320,7 +320,7 @@ fn a_step_broken_off_inside_the_file() {
         let steps = steps(text.as_bytes()).unwrap();
         assert_eq!(steps.len(), 2);
         let error = read(text.as_bytes(), &steps[0]).unwrap_err().to_string();
-        let expected = format!("broken off at byte {}", broken.len());
+        let expected = format!("cut short at byte {}", broken.len());
         assert!(error.contains(&expected), "{error}");
         assert_eq!(read(text.as_bytes(), &steps[1]).unwrap().positions.len(), 2);
     }
@@ -350,7 +350,7 @@ fn faults_have_names() {
         ),
         (
             dump(BOX, "x y z", &[]).replace("ATOMS\n0", "ATOMS\n-1"),
-            "\"-1\" is no number of atoms",
+            "\"-1\" is not a number of atoms",
         ),
         (
             dump(BOX, "x y z", &[]).replace("STEP\n0", "STEP\n0.5"),
@@ -391,7 +391,7 @@ fn absurd_counts_allocate_nothing() {
         let text = dump(BOX, "x y z", &["1 2 3"]).replace("ATOMS\n1", &format!("ATOMS\n{count}"));
         let found = fault(&text);
         assert!(
-            found.contains("announced") || found.contains("is no number of atoms"),
+            found.contains("expected") || found.contains("is not a number of atoms"),
             "{found}"
         );
     }

@@ -8,13 +8,13 @@ use std::io::Cursor;
 
 use zip::ZipArchive;
 
-use super::header::{Header, show};
+use super::header::{NpyHeader, show};
 use super::layout::ArrayLayout;
-use super::member::{self, Member, in_member, zip_error};
+use super::member::{self, ArrayMember, in_member, zip_error};
 use super::{check_frame, frame_steps, read_array};
 use crate::names::POSITION_ARRAYS;
 use crate::read::Step;
-use crate::read::columns::{self, Column};
+use crate::read::columns::{self, StridedColumn};
 use crate::{Attribute, AttributeData, MemoryBudget, ParseError, RawParticles};
 
 /// Whether `bytes` begin like a zip archive, an empty one included.
@@ -26,11 +26,11 @@ pub(super) fn is_zip(bytes: &[u8]) -> bool {
 pub(super) struct Archive<'a> {
     bytes: &'a [u8],
     zip: ZipArchive<Cursor<&'a [u8]>>,
-    members: Vec<Member>,
+    members: Vec<ArrayMember>,
 }
 
 /// The members that hold the positions, as indices into `members`.
-enum Source {
+enum PositionMembers {
     /// One array of positions, or of structures with a position.
     Array(usize),
     /// One array for each of x, y and perhaps z.
@@ -81,8 +81,10 @@ impl<'a> Archive<'a> {
         let (source, layout) = self.source()?;
         check_frame(&layout, frame)?;
         let (mut particles, used) = match source {
-            Source::Array(member) => (self.read_positions(member, frame, budget)?, vec![member]),
-            Source::Axes(members) => (self.read_axes(&members, &layout, budget)?, members),
+            PositionMembers::Array(member) => {
+                (self.read_positions(member, frame, budget)?, vec![member])
+            }
+            PositionMembers::Axes(members) => (self.read_axes(&members, &layout, budget)?, members),
         };
         let mut held = particles.byte_len();
         for member in 0..self.members.len() {
@@ -98,9 +100,9 @@ impl<'a> Archive<'a> {
     }
 
     /// Finds the positions by name, or takes the only array there is.
-    fn source(&self) -> Result<(Source, ArrayLayout), ParseError> {
+    fn source(&self) -> Result<(PositionMembers, ArrayLayout), ParseError> {
         let named = |name: &str| {
-            let same = |m: &Member| m.name.eq_ignore_ascii_case(name);
+            let same = |m: &ArrayMember| m.name.eq_ignore_ascii_case(name);
             self.members.iter().position(same)
         };
         let layout_of =
@@ -109,7 +111,7 @@ impl<'a> Archive<'a> {
         let only = (self.members.len() == 1).then_some(0);
         for member in POSITION_ARRAYS.iter().filter_map(|n| named(n)).chain(only) {
             match layout_of(member) {
-                Some(Ok(layout)) => return Ok((Source::Array(member), layout)),
+                Some(Ok(layout)) => return Ok((PositionMembers::Array(member), layout)),
                 Some(Err(error)) => {
                     refused.get_or_insert_with(|| in_member(error, self.name(member)));
                 }
@@ -119,7 +121,7 @@ impl<'a> Archive<'a> {
         if let (Some(x), Some(y)) = (named("x"), named("y")) {
             let axes: Vec<usize> = [x, y].into_iter().chain(named("z")).collect();
             if let Some(layout) = self.axes_layout(&axes) {
-                return Ok((Source::Axes(axes), layout));
+                return Ok((PositionMembers::Axes(axes), layout));
             }
         }
         Err(refused.unwrap_or_else(|| self.no_positions()))
@@ -171,7 +173,7 @@ impl<'a> Archive<'a> {
                 pickled.join(", ")
             ));
         }
-        let shown = |m: &Member| format!("{} {}", m.name, show(&m.header.shape));
+        let shown = |m: &ArrayMember| format!("{} {}", m.name, show(&m.header.shape));
         let members: Vec<String> = self.members.iter().map(shown).collect();
         ParseError::unsupported(format!(
             "npz without positions among its members [{}]: save an (N, 3) array named positions",
@@ -232,7 +234,7 @@ impl<'a> Archive<'a> {
         decoded.map_err(|e| in_member(e, &found.name))
     }
 
-    /// Whether a member tells the time: one number, or one a step.
+    /// Whether a member holds the time: one number, or one a step.
     fn is_time(&self, member: usize, layout: &ArrayLayout) -> bool {
         self.members.get(member).is_some_and(|m| {
             let named = ["time", "times", "t"].contains(&m.name.as_str());
@@ -245,7 +247,7 @@ impl<'a> Archive<'a> {
         })
     }
 
-    /// The member that tells the time.
+    /// The member that holds the time.
     fn times(
         &mut self,
         layout: &ArrayLayout,
@@ -265,7 +267,7 @@ impl<'a> Archive<'a> {
             count,
             planes: false,
         };
-        let flat = Header {
+        let flat = NpyHeader {
             shape: vec![count],
             ..found.header.clone()
         };
@@ -286,7 +288,11 @@ fn time_of(times: Option<&Attribute>, frame: usize) -> Option<f64> {
 }
 
 /// One column by itself.
-fn decode(bytes: &[u8], count: usize, column: Column) -> Result<Option<Attribute>, ParseError> {
+fn decode(
+    bytes: &[u8],
+    count: usize,
+    column: StridedColumn,
+) -> Result<Option<Attribute>, ParseError> {
     let components = column.lanes.len();
     if components == 0 {
         return Ok(None);

@@ -1,6 +1,6 @@
 //! What an item of an array is made of: `descr` of the header, flattened to fields with offsets.
 
-use super::literal::Value;
+use super::literal::Literal;
 use crate::{Endian, ParseError, ScalarType};
 
 /// More numbers in one item than any particle has; wider fields are left out. It also bounds what a
@@ -9,20 +9,20 @@ pub(super) const MAX_COMPONENTS: usize = 64;
 
 /// Type and byte order of a number that can be decoded.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Number {
+pub(super) struct NumberType {
     pub(super) scalar: ScalarType,
     pub(super) endian: Endian,
 }
 
 /// One named part of an item.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Field {
+pub(super) struct RecordField {
     /// Name, with the names of enclosing structures before it (`outer.inner`).
     pub(super) name: String,
     /// Byte within the item.
     pub(super) offset: usize,
     /// How it is stored.
-    pub(super) number: Number,
+    pub(super) number: NumberType,
     /// Numbers in it, at most [`MAX_COMPONENTS`].
     pub(super) components: usize,
 }
@@ -31,10 +31,10 @@ pub(super) struct Field {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Dtype {
     /// One number.
-    Plain(Number),
+    Plain(NumberType),
     /// A structure; strings, padding, complex numbers and the like are left out of the list.
-    Record(Vec<Field>),
-    /// Something that is no number, by its code (`|S8`, `<f2`).
+    Record(Vec<RecordField>),
+    /// Something that is not a number, by its code (`|S8`, `<f2`).
     Opaque(String),
     /// Python objects somewhere in it.
     Pickled,
@@ -42,7 +42,7 @@ pub(super) enum Dtype {
 
 /// A type and its size.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Item {
+pub(super) struct ItemType {
     pub(super) dtype: Dtype,
     /// Bytes an item; 0 for pickled objects.
     pub(super) size: usize,
@@ -51,11 +51,11 @@ pub(super) struct Item {
 /// Reads the value of `descr`. `at` is the offset to blame.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] if it is no dtype or its size overflows.
-pub(super) fn parse(descr: &Value, at: usize) -> Result<Item, ParseError> {
+/// [`ParseError::Malformed`] if it is not a dtype or its size overflows.
+pub(super) fn parse(descr: &Literal, at: usize) -> Result<ItemType, ParseError> {
     match descr {
-        Value::Text(code) => parse_code(code, at),
-        Value::Sequence(fields) => {
+        Literal::Text(code) => parse_code(code, at),
+        Literal::Sequence(fields) => {
             let mut record = RecordBuilder {
                 at,
                 fields: Vec::new(),
@@ -70,18 +70,21 @@ pub(super) fn parse(descr: &Value, at: usize) -> Result<Item, ParseError> {
             } else {
                 Dtype::Record(record.fields)
             };
-            Ok(Item {
+            Ok(ItemType {
                 dtype,
                 size: record.size,
             })
         }
-        _ => Err(ParseError::malformed(at, "npy header: descr is no dtype")),
+        _ => Err(ParseError::malformed(
+            at,
+            "npy header: descr is not a dtype",
+        )),
     }
 }
 
 /// A plain type code: byte order, kind, size.
-fn parse_code(code: &str, at: usize) -> Result<Item, ParseError> {
-    let bad = || ParseError::malformed(at, format!("npy header: `{code}` is no dtype"));
+fn parse_code(code: &str, at: usize) -> Result<ItemType, ParseError> {
+    let bad = || ParseError::malformed(at, format!("npy header: `{code}` is not a dtype"));
     let order = code.chars().next().ok_or_else(bad)?;
     let endian = match order {
         '>' => Endian::Big,
@@ -91,7 +94,7 @@ fn parse_code(code: &str, at: usize) -> Result<Item, ParseError> {
     let mut chars = rest.chars();
     let kind = chars.next().ok_or_else(bad)?;
     if kind == 'O' {
-        return Ok(Item {
+        return Ok(ItemType {
             dtype: Dtype::Pickled,
             size: 0,
         });
@@ -114,19 +117,19 @@ fn parse_code(code: &str, at: usize) -> Result<Item, ParseError> {
         _ => return Err(bad()),
     };
     let dtype = match scalar {
-        Some(scalar) => Dtype::Plain(Number { scalar, endian }),
+        Some(scalar) => Dtype::Plain(NumberType { scalar, endian }),
         None => Dtype::Opaque(code.to_owned()),
     };
     // Unicode strings are counted in characters of 4 bytes.
     let width = if kind == 'U' { 4 } else { 1 };
     let size = size.checked_mul(width).ok_or_else(bad)?;
-    Ok(Item { dtype, size })
+    Ok(ItemType { dtype, size })
 }
 
 /// Lays fields one after another; numpy writes padding as unnamed void fields.
 struct RecordBuilder {
     at: usize,
-    fields: Vec<Field>,
+    fields: Vec<RecordField>,
     size: usize,
     pickled: bool,
 }
@@ -137,9 +140,9 @@ impl RecordBuilder {
     }
 
     /// Adds `(name, descr)` or `(name, descr, shape)`.
-    fn add(&mut self, field: &Value) -> Result<(), ParseError> {
-        let Value::Sequence(parts) = field else {
-            return Err(self.bad("a field of descr is no tuple"));
+    fn add(&mut self, field: &Literal) -> Result<(), ParseError> {
+        let Literal::Sequence(parts) = field else {
+            return Err(self.bad("a field of descr is not a tuple"));
         };
         let (name, descr, shape) = match parts.as_slice() {
             [name, descr] => (name, descr, None),
@@ -166,7 +169,7 @@ impl RecordBuilder {
         match item.dtype {
             Dtype::Pickled => self.pickled = true,
             Dtype::Plain(number) if (1..=MAX_COMPONENTS).contains(&components) => {
-                self.fields.push(Field {
+                self.fields.push(RecordField {
                     name: name.to_owned(),
                     offset,
                     number,
@@ -174,11 +177,12 @@ impl RecordBuilder {
                 });
             }
             Dtype::Record(inner) if components == 1 => {
-                self.fields.extend(inner.into_iter().map(|field| Field {
-                    name: format!("{name}.{}", field.name),
-                    offset: offset + field.offset,
-                    ..field
-                }));
+                self.fields
+                    .extend(inner.into_iter().map(|field| RecordField {
+                        name: format!("{name}.{}", field.name),
+                        offset: offset + field.offset,
+                        ..field
+                    }));
             }
             Dtype::Plain(_) | Dtype::Record(_) | Dtype::Opaque(_) => {}
         }
@@ -187,11 +191,11 @@ impl RecordBuilder {
 }
 
 /// A field with a title has the pair (title, name) for a name.
-fn field_name(value: &Value) -> Option<&str> {
+fn field_name(value: &Literal) -> Option<&str> {
     match value {
-        Value::Text(name) => Some(name),
-        Value::Sequence(pair) => match pair.as_slice() {
-            [Value::Text(_), Value::Text(name)] => Some(name),
+        Literal::Text(name) => Some(name),
+        Literal::Sequence(pair) => match pair.as_slice() {
+            [Literal::Text(_), Literal::Text(name)] => Some(name),
             _ => None,
         },
         _ => None,
@@ -199,14 +203,14 @@ fn field_name(value: &Value) -> Option<&str> {
 }
 
 /// A shape: a tuple of sizes, or one size.
-pub(super) fn dimensions(value: &Value) -> Option<Vec<usize>> {
-    let dimension = |value: &Value| match value {
-        Value::Integer(n) => usize::try_from(*n).ok(),
+pub(super) fn dimensions(value: &Literal) -> Option<Vec<usize>> {
+    let dimension = |value: &Literal| match value {
+        Literal::Integer(n) => usize::try_from(*n).ok(),
         _ => None,
     };
     match value {
-        Value::Sequence(sizes) => sizes.iter().map(dimension).collect(),
-        Value::Integer(_) => dimension(value).map(|d| vec![d]),
+        Literal::Sequence(sizes) => sizes.iter().map(dimension).collect(),
+        Literal::Integer(_) => dimension(value).map(|d| vec![d]),
         _ => None,
     }
 }

@@ -1,8 +1,8 @@
 //! The preamble of an NPY array, versions 1 to 3: magic, length, and a dictionary with type, order
 //! and shape.
 
-use super::dtype::{self, Dtype, Item};
-use super::literal::{self, Value};
+use super::dtype::{self, Dtype, ItemType};
+use super::literal::{self, Literal};
 use crate::ParseError;
 use crate::read::text::same_length;
 
@@ -15,9 +15,9 @@ const MAX_HEADER: usize = 1 << 20;
 
 /// A parsed header.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Header {
+pub(super) struct NpyHeader {
     /// Type and size of an item.
-    pub(super) item: Item,
+    pub(super) item: ItemType,
     /// The first index varies fastest.
     pub(super) fortran: bool,
     /// Sizes of the dimensions; empty for a scalar.
@@ -37,7 +37,7 @@ pub(super) fn length(bytes: &[u8]) -> Result<usize, ParseError> {
     let Some(rest) = bytes.strip_prefix(MAGIC) else {
         return Err(ParseError::malformed(
             0,
-            "no npy file: it does not begin with \\x93NUMPY",
+            "not an npy file: it does not begin with \\x93NUMPY",
         ));
     };
     let (start, text) = match rest {
@@ -58,13 +58,13 @@ pub(super) fn length(bytes: &[u8]) -> Result<usize, ParseError> {
     if text > MAX_HEADER {
         return Err(ParseError::malformed(
             8,
-            format!("npy header of {text} bytes, at most {MAX_HEADER} are believed"),
+            format!("npy header of {text} bytes, at most {MAX_HEADER} are allowed"),
         ));
     }
     Ok(start + text)
 }
 
-impl Header {
+impl NpyHeader {
     /// Parses the header at the start of `bytes`, which must hold all of it; the items need not be
     /// there, see [`Self::check_items`].
     ///
@@ -84,17 +84,21 @@ impl Header {
             let text: String = text.iter().copied().map(char::from).collect();
             (text.into(), |text| text.chars().count())
         };
-        let Value::Dict(entries) = literal::parse(&text, |before| start + bytes_of(before))? else {
-            return Err(ParseError::malformed(start, "npy header is no dictionary"));
+        let Literal::Dict(entries) = literal::parse(&text, |before| start + bytes_of(before))?
+        else {
+            return Err(ParseError::malformed(
+                start,
+                "npy header is not a dictionary",
+            ));
         };
         let entry = |name: &str| {
-            let named = |(key, _): &&(Value, Value)| *key == Value::Text(name.to_owned());
+            let named = |(key, _): &&(Literal, Literal)| *key == Literal::Text(name.to_owned());
             entries.iter().find(named).map(|(_, value)| value)
         };
         let bad = |what: &str| ParseError::malformed(start, format!("npy header: {what}"));
         let item = dtype::parse(entry("descr").ok_or_else(|| bad("no descr"))?, start)?;
         let fortran = match entry("fortran_order") {
-            Some(Value::Bool(fortran)) => *fortran,
+            Some(Literal::Bool(fortran)) => *fortran,
             _ => return Err(bad("no fortran_order")),
         };
         let shape = entry("shape").and_then(dtype::dimensions);

@@ -1,11 +1,11 @@
 //! Finds particles in the shape of an array: which dimension counts them, which one holds x, y, z,
 //! and whether there is one of time steps before.
 
-use super::dtype::{Dtype, Field, MAX_COMPONENTS, Number};
-use super::header::{Header, show};
+use super::dtype::{Dtype, MAX_COMPONENTS, NumberType, RecordField};
+use super::header::{NpyHeader, show};
 use crate::ParseError;
 use crate::names::POSITION_ARRAYS;
-use crate::read::columns::{self, Column, Lane, ParticleLayout};
+use crate::read::columns::{self, ParticleLayout, Strided, StridedColumn};
 
 /// Steps without particles take no bytes, so nothing else bounds their number.
 const MAX_EMPTY_FRAMES: usize = 1 << 16;
@@ -29,14 +29,14 @@ impl ArrayLayout {
     ///
     /// # Errors
     /// [`ParseError::Unsupported`] if it cannot be one.
-    pub(super) fn of(header: &Header) -> Result<Self, ParseError> {
+    pub(super) fn of(header: &NpyHeader) -> Result<Self, ParseError> {
         let layout = Self::of_shape(header)?;
         match layout.frames {
             Some(frames) if layout.count == 0 && frames > MAX_EMPTY_FRAMES => {
                 Err(ParseError::malformed(
                     header.data,
                     format!(
-                        "{frames} time steps without particles, at most {MAX_EMPTY_FRAMES} are believed"
+                        "{frames} time steps without particles, at most {MAX_EMPTY_FRAMES} are allowed"
                     ),
                 ))
             }
@@ -44,7 +44,7 @@ impl ArrayLayout {
         }
     }
 
-    fn of_shape(header: &Header) -> Result<Self, ParseError> {
+    fn of_shape(header: &NpyHeader) -> Result<Self, ParseError> {
         let shape = header.shape.as_slice();
         let layout = |frames, count, planes| Self {
             frames,
@@ -57,7 +57,7 @@ impl ArrayLayout {
                  numpy.savez",
             )),
             (Dtype::Opaque(code), _) => Err(ParseError::unsupported(format!(
-                "an array of `{code}` holds no positions that are read: save float32 or float64"
+                "an array of `{code}` cannot be read as positions: save float32 or float64"
             ))),
             (Dtype::Record(_), []) => Ok(layout(None, 1, false)),
             (Dtype::Record(_), [count]) => Ok(layout(None, *count, false)),
@@ -70,7 +70,7 @@ impl ArrayLayout {
             (Dtype::Plain(_), [frames, count, 2 | 3]) => Ok(layout(Some(*frames), *count, false)),
             (Dtype::Plain(_), [frames, 3, count]) => Ok(layout(Some(*frames), *count, true)),
             _ => Err(ParseError::unsupported(format!(
-                "an array of shape {} is no list of positions: save shape (N, 3), or a structured \
+                "an array of shape {} is not a list of positions: save shape (N, 3), or a structured \
                  array with a field pos or fields x, y, z",
                 show(shape)
             ))),
@@ -83,7 +83,7 @@ impl ArrayLayout {
     /// [`ParseError::Unsupported`] if a structure has no positions among its fields.
     pub(super) fn columns(
         &self,
-        header: &Header,
+        header: &NpyHeader,
         frame: usize,
     ) -> Result<ParticleLayout, ParseError> {
         match &header.item.dtype {
@@ -99,8 +99,8 @@ impl ArrayLayout {
 
     fn record_columns(
         &self,
-        header: &Header,
-        fields: &[Field],
+        header: &NpyHeader,
+        fields: &[RecordField],
         frame: usize,
     ) -> Result<ParticleLayout, ParseError> {
         let strides = header.strides();
@@ -109,10 +109,10 @@ impl ArrayLayout {
             [particles] => (header.data, *particles),
             _ => (header.data, header.item.size),
         };
-        let column = |field: &Field| {
+        let column = |field: &RecordField| {
             let size = field.number.scalar.size();
             let first = start + field.offset;
-            let lane = |c| Lane {
+            let lane = |c| Strided {
                 start: first + c * size,
                 stride,
             };
@@ -132,7 +132,12 @@ impl ArrayLayout {
 
     /// An array of numbers beside (or with) the positions, if it has one group for each particle of
     /// step `frame`. Without a dimension for time it holds for all steps.
-    pub(super) fn attribute(&self, name: &str, header: &Header, frame: usize) -> Option<Column> {
+    pub(super) fn attribute(
+        &self,
+        name: &str,
+        header: &NpyHeader,
+        frame: usize,
+    ) -> Option<StridedColumn> {
         let Dtype::Plain(number) = header.item.dtype else {
             return None;
         };
@@ -162,8 +167,8 @@ impl ArrayLayout {
     }
 }
 
-fn new_column(name: &str, number: Number, lanes: Vec<Lane>) -> Column {
-    Column {
+fn new_column(name: &str, number: NumberType, lanes: Vec<Strided>) -> StridedColumn {
+    StridedColumn {
         name: name.to_owned(),
         scalar: number.scalar,
         endian: number.endian,
@@ -172,7 +177,7 @@ fn new_column(name: &str, number: Number, lanes: Vec<Lane>) -> Column {
 }
 
 /// One lane for every index into `dimensions` (size, bytes between neighbours), the last fastest.
-fn lanes(start: usize, stride: usize, dimensions: &[(usize, usize)]) -> Option<Vec<Lane>> {
+fn lanes(start: usize, stride: usize, dimensions: &[(usize, usize)]) -> Option<Vec<Strided>> {
     let components = dimensions
         .iter()
         .try_fold(1, |n: usize, (size, _)| n.checked_mul(*size))?;
@@ -189,13 +194,13 @@ fn lanes(start: usize, stride: usize, dimensions: &[(usize, usize)]) -> Option<V
     Some(
         starts
             .into_iter()
-            .map(|start| Lane { start, stride })
+            .map(|start| Strided { start, stride })
             .collect(),
     )
 }
 
 /// The fields that are the position: one with two or three components, or x, y and perhaps z.
-fn position_fields(fields: &[Field]) -> Result<Vec<usize>, ParseError> {
+fn position_fields(fields: &[RecordField]) -> Result<Vec<usize>, ParseError> {
     let named = |name: &str, components: std::ops::RangeInclusive<usize>| {
         fields
             .iter()

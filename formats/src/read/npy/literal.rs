@@ -8,7 +8,7 @@ const MAX_DEPTH: usize = 32;
 
 /// A parsed literal.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Value {
+pub(super) enum Literal {
     /// `'text'` or `"text"`.
     Text(String),
     /// `12`, `-1` or `12L`.
@@ -18,19 +18,19 @@ pub(super) enum Value {
     /// `None`.
     None,
     /// A tuple or a list; headers use both for the same things.
-    Sequence(Vec<Value>),
+    Sequence(Vec<Literal>),
     /// `{key: value, ...}` in order of appearance.
-    Dict(Vec<(Value, Value)>),
+    Dict(Vec<(Literal, Literal)>),
 }
 
-/// Parses one literal; white space may follow it. `place` gives the offset in the file of what follows a
+/// Parses one literal; white space may follow it. `place` returns the offset in the file of what follows a
 /// part of `text`.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] at the character that does not fit.
-pub(super) fn parse(text: &str, place: impl Fn(&str) -> usize) -> Result<Value, ParseError> {
+pub(super) fn parse(text: &str, place: impl Fn(&str) -> usize) -> Result<Literal, ParseError> {
     let place = &place;
-    let mut parser = Parser { text, at: 0, place };
+    let mut parser = LiteralParser { text, at: 0, place };
     let value = parser.value(0)?;
     parser.skip_space();
     if parser.at < text.len() {
@@ -39,13 +39,13 @@ pub(super) fn parse(text: &str, place: impl Fn(&str) -> usize) -> Result<Value, 
     Ok(value)
 }
 
-struct Parser<'a> {
+struct LiteralParser<'a> {
     text: &'a str,
     at: usize,
     place: &'a dyn Fn(&str) -> usize,
 }
 
-impl Parser<'_> {
+impl LiteralParser<'_> {
     fn error(&self, expected: &str) -> ParseError {
         let found: String = self.rest().chars().take(20).collect();
         let before = self.text.get(..self.at).unwrap_or(self.text);
@@ -78,7 +78,7 @@ impl Parser<'_> {
         found
     }
 
-    fn value(&mut self, depth: usize) -> Result<Value, ParseError> {
+    fn value(&mut self, depth: usize) -> Result<Literal, ParseError> {
         if depth > MAX_DEPTH {
             return Err(self.error("less nesting"));
         }
@@ -88,36 +88,36 @@ impl Parser<'_> {
             Some(b'[') => self.sequence(b']', depth),
             Some(b'{') => self.dict(depth),
             Some(b'-' | b'0'..=b'9') => self.integer(),
-            _ if self.eat("True") => Ok(Value::Bool(true)),
-            _ if self.eat("False") => Ok(Value::Bool(false)),
-            _ if self.eat("None") => Ok(Value::None),
+            _ if self.eat("True") => Ok(Literal::Bool(true)),
+            _ if self.eat("False") => Ok(Literal::Bool(false)),
+            _ if self.eat("None") => Ok(Literal::None),
             // Python 2 marks strings as unicode or bytes.
-            Some(b'u' | b'b' | b'\'' | b'"') => self.string().map(Value::Text),
+            Some(b'u' | b'b' | b'\'' | b'"') => self.string().map(Literal::Text),
             _ => Err(self.error("a value")),
         }
     }
 
-    fn sequence(&mut self, close: u8, depth: usize) -> Result<Value, ParseError> {
+    fn sequence(&mut self, close: u8, depth: usize) -> Result<Literal, ParseError> {
         self.at += 1;
         let mut items = Vec::new();
         loop {
             self.skip_space();
             if self.peek() == Some(close) {
                 self.at += 1;
-                return Ok(Value::Sequence(items));
+                return Ok(Literal::Sequence(items));
             }
             items.push(self.value(depth + 1)?);
             self.separator(close)?;
         }
     }
 
-    fn dict(&mut self, depth: usize) -> Result<Value, ParseError> {
+    fn dict(&mut self, depth: usize) -> Result<Literal, ParseError> {
         self.at += 1;
         let mut entries = Vec::new();
         loop {
             self.skip_space();
             if self.eat("}") {
-                return Ok(Value::Dict(entries));
+                return Ok(Literal::Dict(entries));
             }
             let key = self.value(depth + 1)?;
             self.skip_space();
@@ -140,7 +140,7 @@ impl Parser<'_> {
         }
     }
 
-    fn integer(&mut self) -> Result<Value, ParseError> {
+    fn integer(&mut self) -> Result<Literal, ParseError> {
         let digits_from = usize::from(self.peek() == Some(b'-'));
         let digits = self.rest().bytes().skip(digits_from);
         let len = digits_from + digits.take_while(u8::is_ascii_digit).count();
@@ -149,7 +149,7 @@ impl Parser<'_> {
         self.at += len;
         // Python 2 wrote long integers as `2000L`.
         self.eat("L");
-        Ok(Value::Integer(number))
+        Ok(Literal::Integer(number))
     }
 
     fn string(&mut self) -> Result<String, ParseError> {

@@ -9,7 +9,7 @@ use std::io::{Cursor, Read};
 use zip::result::ZipError;
 use zip::{CompressionMethod, ZipArchive};
 
-use super::header::{self, Header};
+use super::header::{self, NpyHeader};
 use crate::{MemoryBudget, ParseError};
 
 /// Deflate cannot do better: 258 bytes for two bits.
@@ -18,19 +18,19 @@ const MAX_DEFLATE_RATIO: u64 = 1032;
 const MAX_RESERVE: usize = 1 << 26;
 
 /// One array of the archive, known by its header.
-pub(super) struct Member {
+pub(super) struct ArrayMember {
     /// Place in the central directory.
     index: usize,
     /// Without `.npy`.
     pub(super) name: String,
-    pub(super) header: Header,
+    pub(super) header: NpyHeader,
 }
 
-/// Reads the header of member `index`; `None` if it is no array.
+/// Reads the header of member `index`; `None` if it is not an array.
 pub(super) fn open(
     zip: &mut ZipArchive<Cursor<&[u8]>>,
     index: usize,
-) -> Result<Option<Member>, ParseError> {
+) -> Result<Option<ArrayMember>, ParseError> {
     let mut file = zip
         .by_index(index)
         .map_err(|e| zip_error(&e, "npz member"))?;
@@ -72,9 +72,9 @@ pub(super) fn open(
     read_to(&mut text, header::PREAMBLE)?;
     let len = header::length(&text).map_err(|e| in_member(e, name))?;
     read_to(&mut text, len)?;
-    let header = Header::parse(&text).map_err(|e| in_member(e, name))?;
+    let header = NpyHeader::parse(&text).map_err(|e| in_member(e, name))?;
     header.check_items(size).map_err(|e| in_member(e, name))?;
-    Ok(Some(Member {
+    Ok(Some(ArrayMember {
         index,
         name: name.to_owned(),
         header,
@@ -86,7 +86,7 @@ pub(super) fn open(
 pub(super) fn contents<'a>(
     bytes: &'a [u8],
     zip: &mut ZipArchive<Cursor<&'a [u8]>>,
-    member: &Member,
+    member: &ArrayMember,
     budget: MemoryBudget,
 ) -> Result<Cow<'a, [u8]>, ParseError> {
     let mut file = zip
@@ -99,7 +99,7 @@ pub(super) fn contents<'a>(
     if file.compression() == CompressionMethod::Stored && !file.encrypted() {
         let end = start.checked_add(size);
         let stored = end.and_then(|end| bytes.get(start..end));
-        let stored = stored.ok_or_else(|| damaged(format!("{size} bytes are not there")))?;
+        let stored = stored.ok_or_else(|| damaged(format!("{size} bytes are missing")))?;
         let mut sum = flate2::Crc::new();
         sum.update(stored);
         if sum.sum() != file.crc32() {
@@ -113,13 +113,13 @@ pub(super) fn contents<'a>(
         .check(need, "decompressed it is")
         .map_err(too_large)?;
     let mut inflated = Vec::with_capacity(size.min(MAX_RESERVE));
-    // One byte more than stated tells a member that goes on.
+    // One byte more than stated shows that the member continues.
     let bound = file.size().saturating_add(1);
     let read = file.by_ref().take(bound).read_to_end(&mut inflated);
     read.map_err(|e| damaged(e.to_string()))?;
     if inflated.len() != size {
         return Err(damaged(format!(
-            "{size} bytes are stated, {} or more inflate",
+            "{size} bytes expected, {} or more found",
             inflated.len()
         )));
     }

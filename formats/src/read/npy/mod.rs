@@ -1,6 +1,6 @@
 //! Arrays saved by numpy: NPY (one array) and NPZ (a zip of them).
 //!
-//! `header` says what an array is, `layout` where its particles are, `archive` looks through an NPZ;
+//! `header` parses the type and shape of an array, `layout` finds its particles, `archive` opens an NPZ;
 //! the shared column reader decodes. Nothing is ever unpickled: a pickle is a program. The header
 //! parser is our own because `npyz` allocates what a damaged header asks for and brings a parser
 //! generator and big integers with it for one dictionary. After NEP 1 and `numpy/lib/format.py`.
@@ -14,7 +14,7 @@ mod member;
 #[cfg(test)]
 mod tests;
 
-use self::header::Header;
+use self::header::NpyHeader;
 use self::layout::ArrayLayout;
 use super::columns::ParticleLayout;
 use super::{ByteSource, Step};
@@ -68,7 +68,7 @@ impl Reader for Npy {
 
     /// `None` for several steps.
     fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-        let header = Header::parse(bytes)?;
+        let header = NpyHeader::parse(bytes)?;
         header.check_items(bytes.len())?;
         match ArrayLayout::of(&header)?.frames {
             None | Some(1) => array_layout(bytes.len(), &header, 0).map(Some),
@@ -86,7 +86,7 @@ impl Reader for Npz {
         &["npz"]
     }
 
-    /// Any ZIP but one of USD files: the reader says what is missing in it.
+    /// Any ZIP but one of USD files: the reader reports what is missing in it.
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError> {
         let is_npz = archive::is_zip(head) && !is_usdz(head);
         Ok(Confidence::signature_if(is_npz))
@@ -149,7 +149,7 @@ fn steps(bytes: &[u8], budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     if archive::is_zip(bytes) {
         return archive::Archive::open(bytes)?.steps(budget);
     }
-    let header = Header::parse(bytes)?;
+    let header = NpyHeader::parse(bytes)?;
     header.check_items(bytes.len())?;
     Ok(frame_steps(&ArrayLayout::of(&header)?))
 }
@@ -166,17 +166,21 @@ fn read(bytes: &[u8], step: &Step, budget: MemoryBudget) -> Result<RawParticles,
     if archive::is_zip(bytes) {
         return archive::Archive::open(bytes)?.read(frame, budget);
     }
-    let header = Header::parse(bytes)?;
+    let header = NpyHeader::parse(bytes)?;
     read_array(bytes, &header, frame)
 }
 
 /// The particles of one array in step `frame`.
-fn read_array(bytes: &[u8], header: &Header, frame: usize) -> Result<RawParticles, ParseError> {
+fn read_array(bytes: &[u8], header: &NpyHeader, frame: usize) -> Result<RawParticles, ParseError> {
     array_layout(bytes.len(), header, frame)?.particles(bytes)
 }
 
-/// Where they are, in a file of `len` bytes.
-fn array_layout(len: usize, header: &Header, frame: usize) -> Result<ParticleLayout, ParseError> {
+/// Layout of the particles in a file of `len` bytes.
+fn array_layout(
+    len: usize,
+    header: &NpyHeader,
+    frame: usize,
+) -> Result<ParticleLayout, ParseError> {
     header.check_items(len)?;
     let layout = ArrayLayout::of(header)?;
     check_frame(&layout, frame)?;

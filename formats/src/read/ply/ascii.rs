@@ -2,22 +2,22 @@
 
 use std::str::FromStr;
 
-use super::header::{Element, Header, Property, shorten};
+use super::header::{Element, PlyHeader, Property, shorten};
 use crate::read::columns::{GrowingParticles, ParticleLayout};
 use crate::read::input::TextInput;
 use crate::{MemoryBudget, ParseError, RawParticles, ScalarType};
 
-/// Records that are turned into numbers before these are put behind those that are there.
+/// Records that are decoded before they are appended to the arrays.
 const BATCH: usize = 4096;
 
 /// Reads the records of `vertices`, an element of `header`, with `layout`.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if the file ends early, or at a line with too few or too many
-/// values or with something that is no number of the declared type; [`ParseError::TooLarge`] beyond `budget`.
+/// values or with something that is not a number of the declared type; [`ParseError::TooLarge`] beyond `budget`.
 pub(super) fn read(
     text: &mut TextInput<'_>,
-    header: &Header,
+    header: &PlyHeader,
     vertices: &Element,
     layout: ParticleLayout,
     budget: MemoryBudget,

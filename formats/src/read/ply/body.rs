@@ -1,14 +1,14 @@
-//! Finds the binary vertex records behind the header: skips the elements before them, and repacks them when
+//! Finds the binary vertex records after the header: skips the elements before them, and repacks them when
 //! they have lists in between, so that every record has the same size.
 
 use std::borrow::Cow;
 
-use super::header::{Element, Encoding, Header};
+use super::header::{Element, PlyEncoding, PlyHeader};
 use crate::read::columns::check_room;
 use crate::{Endian, ParseError, ScalarType};
 
 /// Vertex records of one size: the scalar properties, packed, in the order of the header.
-pub(super) struct Records<'a> {
+pub(super) struct VertexRecords<'a> {
     /// What holds them; the file itself if nothing had to be repacked.
     pub(super) bytes: Cow<'a, [u8]>,
     /// First byte of the first record.
@@ -23,24 +23,24 @@ pub(super) struct Records<'a> {
 /// [`ParseError::Malformed`] if the file ends early.
 pub(super) fn vertex_records<'a>(
     bytes: &'a [u8],
-    header: &Header,
+    header: &PlyHeader,
     vertices: &Element,
-) -> Result<Records<'a>, ParseError> {
+) -> Result<VertexRecords<'a>, ParseError> {
     let before = header
         .elements
         .iter()
         .take_while(|e| !std::ptr::eq(*e, vertices));
     let stride = vertices.scalar_bytes();
     let packed = match header.encoding {
-        Encoding::Ascii => Vec::new(),
-        Encoding::Binary(endian) => {
+        PlyEncoding::Ascii => Vec::new(),
+        PlyEncoding::Binary(endian) => {
             let mut at = header.body;
             for element in before {
                 at = skip(bytes, at, element, endian)?;
             }
             check_room(at, vertices.count, vertices.least_bytes(), bytes.len())?;
             if !vertices.has_lists() {
-                return Ok(Records {
+                return Ok(VertexRecords {
                     bytes: Cow::Borrowed(bytes),
                     start: at,
                     stride,
@@ -49,7 +49,7 @@ pub(super) fn vertex_records<'a>(
             pack(bytes, at, vertices, endian)?
         }
     };
-    Ok(Records {
+    Ok(VertexRecords {
         bytes: Cow::Owned(packed),
         start: 0,
         stride,

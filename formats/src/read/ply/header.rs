@@ -4,7 +4,7 @@ use crate::{Endian, ParseError, ScalarType};
 
 /// How the data after the header is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encoding {
+pub(super) enum PlyEncoding {
     /// One line of text an element.
     Ascii,
     /// Packed numbers.
@@ -49,21 +49,21 @@ impl Element {
 
 /// A parsed header.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Header {
-    pub(super) encoding: Encoding,
+pub(super) struct PlyHeader {
+    pub(super) encoding: PlyEncoding,
     /// In the order of their data.
     pub(super) elements: Vec<Element>,
     /// First byte of the data.
     pub(super) body: usize,
 }
 
-impl Header {
+impl PlyHeader {
     /// Reads up to and including the line `end_header`.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] at the offending line.
     pub(super) fn parse(bytes: &[u8]) -> Result<Self, ParseError> {
-        let mut lines = Lines::new(bytes)?;
+        let mut lines = HeaderLines::new(bytes)?;
         let mut encoding = None;
         let mut elements: Vec<Element> = Vec::new();
         loop {
@@ -106,13 +106,13 @@ impl Header {
 /// Header lines with their offsets. The data may begin with any byte, so a line ends at exactly one
 /// line feed (the carriage return before it is part of the line), or at one carriage return in files
 /// whose first line ends so.
-struct Lines<'a> {
+struct HeaderLines<'a> {
     bytes: &'a [u8],
     at: usize,
     end_of_line: u8,
 }
 
-impl<'a> Lines<'a> {
+impl<'a> HeaderLines<'a> {
     fn new(bytes: &'a [u8]) -> Result<Self, ParseError> {
         let is_space = |b: &u8| b.is_ascii_whitespace();
         let rest = bytes.strip_prefix(b"ply");
@@ -146,11 +146,11 @@ impl<'a> Lines<'a> {
     }
 }
 
-fn parse_format(at: usize, word: Option<&str>) -> Result<Encoding, ParseError> {
+fn parse_format(at: usize, word: Option<&str>) -> Result<PlyEncoding, ParseError> {
     match word {
-        Some("ascii") => Ok(Encoding::Ascii),
-        Some("binary_little_endian") => Ok(Encoding::Binary(Endian::Little)),
-        Some("binary_big_endian") => Ok(Encoding::Binary(Endian::Big)),
+        Some("ascii") => Ok(PlyEncoding::Ascii),
+        Some("binary_little_endian") => Ok(PlyEncoding::Binary(Endian::Little)),
+        Some("binary_big_endian") => Ok(PlyEncoding::Binary(Endian::Big)),
         other => Err(ParseError::malformed(
             at,
             format!("unknown ply format `{}`", shorten(other.unwrap_or(""))),

@@ -10,9 +10,9 @@ mod header;
 #[cfg(test)]
 mod tests;
 
-use self::body::Records;
-use self::header::{Element, Encoding, Header};
-use super::columns::{self, Column, Lane, ParticleLayout};
+use self::body::VertexRecords;
+use self::header::{Element, PlyEncoding, PlyHeader};
+use super::columns::{self, ParticleLayout, Strided, StridedColumn};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader, StreamUnit};
@@ -39,8 +39,8 @@ impl Reader for Ply {
 
     /// Words, if `head` is all of the header, and text follows.
     fn stream_unit(&self, head: &[u8]) -> Option<StreamUnit> {
-        let header = Header::parse(head).ok()?;
-        (header.encoding == Encoding::Ascii).then_some(StreamUnit::Words)
+        let header = PlyHeader::parse(head).ok()?;
+        (header.encoding == PlyEncoding::Ascii).then_some(StreamUnit::Words)
     }
 
     /// [`ParseError::Malformed`] for a broken header, [`ParseError::Unsupported`] for a mesh or a file
@@ -51,7 +51,7 @@ impl Reader for Ply {
         _budget: MemoryBudget,
     ) -> Result<Vec<Step>, ParseError> {
         let text = source.text();
-        let header = Header::parse(text.head())?;
+        let header = PlyHeader::parse(text.head())?;
         vertices(&header)?;
         Ok(vec![Step::whole(text.left_about())])
     }
@@ -69,9 +69,9 @@ impl Reader for Ply {
     ) -> Result<RawParticles, ParseError> {
         let text = source.text();
         let bytes = text.head();
-        let header = Header::parse(bytes)?;
+        let header = PlyHeader::parse(bytes)?;
         let vertices = vertices(&header)?;
-        if header.encoding == Encoding::Ascii {
+        if header.encoding == PlyEncoding::Ascii {
             let layout = vertices_layout(&header, vertices, 0, vertices.scalar_bytes())?;
             return ascii::read(text, &header, vertices, layout, budget);
         }
@@ -81,9 +81,9 @@ impl Reader for Ply {
 
     /// `None` if the vertices are text, or have lists between their numbers.
     fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-        let header = Header::parse(bytes)?;
+        let header = PlyHeader::parse(bytes)?;
         let vertices = vertices(&header)?;
-        if header.encoding == Encoding::Ascii || vertices.has_lists() {
+        if header.encoding == PlyEncoding::Ascii || vertices.has_lists() {
             return Ok(None);
         }
         let records = body::vertex_records(bytes, &header, vertices)?;
@@ -92,23 +92,23 @@ impl Reader for Ply {
 }
 
 fn records_layout(
-    header: &Header,
+    header: &PlyHeader,
     vertices: &Element,
-    records: &Records<'_>,
+    records: &VertexRecords<'_>,
 ) -> Result<ParticleLayout, ParseError> {
     vertices_layout(header, vertices, records.start, records.stride)
 }
 
 /// For records of `stride` bytes from byte `start` on.
 fn vertices_layout(
-    header: &Header,
+    header: &PlyHeader,
     vertices: &Element,
     start: usize,
     stride: usize,
 ) -> Result<ParticleLayout, ParseError> {
     let endian = match header.encoding {
-        Encoding::Ascii => Endian::Little,
-        Encoding::Binary(endian) => endian,
+        PlyEncoding::Ascii => Endian::Little,
+        PlyEncoding::Binary(endian) => endian,
     };
     let mut properties = vertex_columns(vertices, (start, stride), endian);
     let mut axes = Vec::with_capacity(3);
@@ -124,12 +124,12 @@ fn vertices_layout(
     Ok(ParticleLayout::new(vertices.count, axes, attributes))
 }
 
-fn is_named(column: &Column, name: &str) -> bool {
+fn is_named(column: &StridedColumn, name: &str) -> bool {
     column.name.eq_ignore_ascii_case(name)
 }
 
 /// The element that holds the particles.
-fn vertices(header: &Header) -> Result<&Element, ParseError> {
+fn vertices(header: &PlyHeader) -> Result<&Element, ParseError> {
     let faces = ["face", "tristrips"]
         .iter()
         .find_map(|name| header.element(name).filter(|e| e.count > 0));
@@ -153,16 +153,16 @@ fn vertex_columns(
     vertices: &Element,
     (start, stride): (usize, usize),
     endian: Endian,
-) -> Vec<Column> {
+) -> Vec<StridedColumn> {
     let mut offset = start;
     let mut columns = Vec::with_capacity(vertices.properties.len());
     for property in vertices.properties.iter().filter(|p| p.length.is_none()) {
         let name = property.name.strip_prefix("scalar_");
-        columns.push(Column {
+        columns.push(StridedColumn {
             name: name.unwrap_or(&property.name).to_owned(),
             scalar: property.scalar,
             endian,
-            lanes: vec![Lane {
+            lanes: vec![Strided {
                 start: offset,
                 stride,
             }],

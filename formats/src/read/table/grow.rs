@@ -1,29 +1,29 @@
 //! Columns that grow piece by piece, within a budget.
 
-use super::{Numbers, Target, Values};
+use super::{ColumnValues, NumberKind, TargetArray};
 use crate::{MemoryBudget, ParseError};
 
 /// What the message about too many numbers begins with.
-const TOO_LARGE: &str = "in memory its numbers are";
+const TOO_LARGE: &str = "its numbers in memory are";
 
 /// The values of all targets so far.
-pub(super) struct Growing {
-    values: Vec<Values>,
+pub(super) struct GrowingColumn {
+    values: Vec<ColumnValues>,
     bytes: u64,
     budget: MemoryBudget,
 }
 
-impl Growing {
+impl GrowingColumn {
     /// Nothing yet; there is room for `rows`, which are no more than a guess, if `budget` allows as many.
-    pub(super) fn new(targets: &[Target], rows: usize, budget: MemoryBudget) -> Self {
-        let numbers = |target: &Target| rows.saturating_mul(target.components);
+    pub(super) fn new(targets: &[TargetArray], rows: usize, budget: MemoryBudget) -> Self {
+        let numbers = |target: &TargetArray| rows.saturating_mul(target.components);
         let all = targets.iter().map(numbers).fold(0, usize::saturating_add);
         let fits = (all as u64).saturating_mul(size_of::<f64>() as u64) <= budget.bytes();
-        let empty = |target: &Target| {
+        let empty = |target: &TargetArray| {
             let room = if fits { numbers(target) } else { 0 };
             match target.numbers {
-                Numbers::Real => Values::Real(with_room(room)),
-                Numbers::WholeIfAll => Values::Whole(with_room(room)),
+                NumberKind::Real => ColumnValues::Real(with_room(room)),
+                NumberKind::WholeIfAll => ColumnValues::Whole(with_room(room)),
             }
         };
         Self {
@@ -33,12 +33,12 @@ impl Growing {
         }
     }
 
-    /// Puts the values of the next piece behind those that are there.
+    /// Appends the values of the next piece.
     ///
     /// # Errors
     /// [`ParseError::TooLarge`].
-    pub(super) fn append(&mut self, piece: Vec<Values>) -> Result<(), ParseError> {
-        let more: usize = piece.iter().map(Values::len).sum();
+    pub(super) fn append(&mut self, piece: Vec<ColumnValues>) -> Result<(), ParseError> {
+        let more: usize = piece.iter().map(ColumnValues::len).sum();
         self.bytes += (more * size_of::<f64>()) as u64;
         self.budget.check(self.bytes, TOO_LARGE)?;
         for (all, more) in self.values.iter_mut().zip(piece) {
@@ -50,7 +50,7 @@ impl Growing {
         Ok(())
     }
 
-    pub(super) fn into_values(self) -> Vec<Values> {
+    pub(super) fn into_values(self) -> Vec<ColumnValues> {
         self.values
     }
 }
@@ -63,26 +63,26 @@ fn with_room<T>(len: usize) -> Vec<T> {
 }
 
 /// `None` if there is no memory.
-fn append(all: &mut Values, more: Values) -> Option<()> {
+fn append(all: &mut ColumnValues, more: ColumnValues) -> Option<()> {
     match (&mut *all, more) {
-        (Values::Text, _) => {}
-        (_, Values::Text) => *all = Values::Text,
-        (Values::Whole(all), Values::Whole(more)) => {
+        (ColumnValues::Text, _) => {}
+        (_, ColumnValues::Text) => *all = ColumnValues::Text,
+        (ColumnValues::Whole(all), ColumnValues::Whole(more)) => {
             all.try_reserve(more.len()).ok()?;
             all.extend_from_slice(&more);
         }
-        (Values::Real(all), Values::Real(more)) => {
+        (ColumnValues::Real(all), ColumnValues::Real(more)) => {
             all.try_reserve(more.len()).ok()?;
             all.extend_from_slice(&more);
         }
-        (Values::Real(all), Values::Whole(more)) => {
+        (ColumnValues::Real(all), ColumnValues::Whole(more)) => {
             all.try_reserve(more.len()).ok()?;
             all.extend(more.iter().map(|v| *v as f64));
         }
-        (Values::Whole(whole), more @ Values::Real(_)) => {
+        (ColumnValues::Whole(whole), more @ ColumnValues::Real(_)) => {
             let whole = std::mem::take(whole);
             // In the same memory: both have eight bytes.
-            *all = Values::Real(whole.into_iter().map(|v| v as f64).collect());
+            *all = ColumnValues::Real(whole.into_iter().map(|v| v as f64).collect());
             return append(all, more);
         }
     }

@@ -19,10 +19,10 @@ mod values;
 
 pub(super) use cells::cells;
 use cells::is_blank;
-use grow::Growing;
-pub(super) use values::Values;
+use grow::GrowingColumn;
+pub(super) use values::ColumnValues;
 
-/// What to say of a line that ends where the file does.
+/// The message for a line that ends with the file.
 pub(crate) const CUT_SHORT: &str = "the file is cut short, perhaps still being written";
 
 /// What stands between two fields.
@@ -43,7 +43,7 @@ pub(super) enum Decimal {
     Comma,
 }
 
-/// Lines that are no rows, beside blank ones.
+/// Lines that are not rows, beside blank ones.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Comments {
     /// There are none.
@@ -54,7 +54,7 @@ pub(super) enum Comments {
 
 /// What to do with more fields in a row than the table has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Surplus {
+pub(super) enum ExtraCells {
     /// Pass over them.
     Ignored,
     /// They may only be empty (a separator at the end of each line).
@@ -71,21 +71,21 @@ pub(super) struct Dialect {
     /// Lines to pass over.
     pub(super) comments: Comments,
     /// What to do with more fields than expected.
-    pub(super) surplus: Surplus,
+    pub(super) surplus: ExtraCells,
 }
 
 /// The type that a target's numbers get.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Numbers {
+pub(super) enum NumberKind {
     /// f64 whatever they are.
     Real,
     /// i64 as long as every one of the file is an integer, else f64.
     WholeIfAll,
 }
 
-/// What to do if a field is no number.
+/// What to do if a field is not a number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum OnText {
+pub(super) enum TextPolicy {
     /// The file is damaged.
     Fault,
     /// The column is text; leave it out.
@@ -96,24 +96,24 @@ pub(super) enum OnText {
 
 /// An array to fill: one or more numbers a row.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Target {
+pub(super) struct TargetArray {
     /// Name of the attribute that it becomes.
     pub(super) name: String,
     /// Numbers a row.
     pub(super) components: usize,
     /// Their type.
-    pub(super) numbers: Numbers,
+    pub(super) numbers: NumberKind,
     /// What to do with text.
-    pub(super) on_text: OnText,
+    pub(super) on_text: TextPolicy,
 }
 
-impl Target {
+impl TargetArray {
     /// An attribute of `components` numbers a row.
     pub(super) fn attribute(
         name: impl Into<String>,
         components: usize,
-        numbers: Numbers,
-        on_text: OnText,
+        numbers: NumberKind,
+        on_text: TextPolicy,
     ) -> Self {
         Self {
             name: name.into(),
@@ -125,7 +125,7 @@ impl Target {
 
     /// An attribute for a column of names.
     pub(super) fn category(name: impl Into<String>) -> Self {
-        Self::attribute(name, 1, Numbers::WholeIfAll, OnText::Category)
+        Self::attribute(name, 1, NumberKind::WholeIfAll, TextPolicy::Category)
     }
 
     /// The positions: three f64 a row. Components that no field fills stay 0 (2D runs).
@@ -133,15 +133,15 @@ impl Target {
         Self {
             name: String::new(),
             components: 3,
-            numbers: Numbers::Real,
-            on_text: OnText::Fault,
+            numbers: NumberKind::Real,
+            on_text: TextPolicy::Fault,
         }
     }
 }
 
-/// Where a field goes.
+/// The array component that a field is stored in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Place {
+pub(super) struct TargetComponent {
     /// Index of the target.
     pub(super) target: usize,
     /// Which of its numbers.
@@ -153,10 +153,10 @@ pub(super) struct Place {
 pub(super) struct Table {
     /// How a row is written.
     pub(super) dialect: Dialect,
-    /// Where each field of a row goes; `None` passes over it. A row has at least that many fields.
-    pub(super) fields: Vec<Option<Place>>,
+    /// The target of each field of a row; `None` skips it. A row has at least that many fields.
+    pub(super) fields: Vec<Option<TargetComponent>>,
     /// The arrays to fill, positions first.
-    pub(super) targets: Vec<Target>,
+    pub(super) targets: Vec<TargetArray>,
     /// How many rows there may be: a guess, for which room is made.
     pub(super) rows: usize,
 }
@@ -167,7 +167,7 @@ pub(super) type Particles = (Positions, Vec<Attribute>);
 /// What came of the rows of a table.
 #[derive(Debug)]
 pub(super) struct RowsRead<T = Particles> {
-    /// Lines that there were, blank ones and those behind a fault included.
+    /// Lines found, including blank ones and those after a fault.
     pub(super) lines: usize,
     /// What is in them.
     pub(super) content: Result<T, ParseError>,
@@ -195,8 +195,8 @@ impl Table {
         text: &mut TextInput<'_>,
         most: usize,
         budget: MemoryBudget,
-    ) -> RowsRead<Vec<Values>> {
-        let mut values = Growing::new(&self.targets, self.rows, budget);
+    ) -> RowsRead<Vec<ColumnValues>> {
+        let mut values = GrowingColumn::new(&self.targets, self.rows, budget);
         let mut lines = 0;
         let fault = loop {
             let some = text.pieces(most - lines);
@@ -204,7 +204,7 @@ impl Table {
                 break None;
             }
             lines += some.iter().map(|piece| piece.lines).sum::<usize>();
-            let parsed: Vec<Result<Vec<Values>, ParseError>> = some
+            let parsed: Vec<Result<Vec<ColumnValues>, ParseError>> = some
                 .par_iter()
                 .map(|piece| {
                     let parsed = self.rows_of(piece).parse();
@@ -251,11 +251,6 @@ impl Table {
     }
 }
 
-/// Pieces that are parsed before their values are put together.
-pub(super) fn pieces_at_once() -> usize {
-    2 * rayon::current_num_threads()
-}
-
 /// The most rows of `fields` fields that `bytes` bytes can have, if none is empty.
 pub(super) fn most_rows(bytes: usize, fields: usize) -> usize {
     // A field takes two bytes with what follows it.
@@ -268,15 +263,15 @@ struct Rows<'t> {
     /// Whether the file ends with them.
     ends_file: bool,
     dialect: Dialect,
-    fields: &'t [Option<Place>],
-    targets: &'t [Target],
+    fields: &'t [Option<TargetComponent>],
+    targets: &'t [TargetArray],
 }
 
-fn particles(targets: Vec<Target>, values: Vec<Values>) -> Particles {
+fn particles(targets: Vec<TargetArray>, values: Vec<ColumnValues>) -> Particles {
     let mut values = values.into_iter();
     let positions = values
         .next()
-        .map_or(Positions::F64(Vec::new()), Values::into_positions);
+        .map_or(Positions::F64(Vec::new()), ColumnValues::into_positions);
     let attributes = targets.into_iter().skip(1).zip(values);
     let attributes = attributes
         .filter_map(|(target, values)| {
@@ -291,15 +286,19 @@ fn particles(targets: Vec<Target>, values: Vec<Values>) -> Particles {
 }
 
 impl Rows<'_> {
-    fn parse(&self) -> Result<Vec<Values>, ParseError> {
+    fn parse(&self) -> Result<Vec<ColumnValues>, ParseError> {
         let newlines = memchr::memchr_iter(b'\n', self.bytes).count();
         let rows = most_rows(self.bytes.len(), self.fields.len()).min(newlines + 1);
-        let mut values: Vec<Values> = self
+        let mut values: Vec<ColumnValues> = self
             .targets
             .iter()
             .map(|target| match target.numbers {
-                Numbers::Real => Values::Real(Vec::with_capacity(rows * target.components)),
-                Numbers::WholeIfAll => Values::Whole(Vec::with_capacity(rows * target.components)),
+                NumberKind::Real => {
+                    ColumnValues::Real(Vec::with_capacity(rows * target.components))
+                }
+                NumberKind::WholeIfAll => {
+                    ColumnValues::Whole(Vec::with_capacity(rows * target.components))
+                }
             })
             .collect();
         for line in Lines::new(self.bytes, 0..self.bytes.len()) {
@@ -317,7 +316,7 @@ impl Rows<'_> {
         Ok(values)
     }
 
-    fn row_of_words(&self, line: Line<'_>, values: &mut [Values]) -> Result<(), ParseError> {
+    fn row_of_words(&self, line: Line<'_>, values: &mut [ColumnValues]) -> Result<(), ParseError> {
         let text = line.text;
         let mut found = 0;
         let mut at = 0;
@@ -334,8 +333,8 @@ impl Rows<'_> {
             }
             if found == self.fields.len() {
                 match self.dialect.surplus {
-                    Surplus::Ignored => return Ok(()),
-                    Surplus::Empty => return Err(self.surplus(line.at + start)),
+                    ExtraCells::Ignored => return Ok(()),
+                    ExtraCells::Empty => return Err(self.surplus(line.at + start)),
                 }
             }
             self.store(found, &text[start..at], line.at + start, values)?;
@@ -348,7 +347,7 @@ impl Rows<'_> {
         &self,
         line: Line<'_>,
         separator: u8,
-        values: &mut [Values],
+        values: &mut [ColumnValues],
     ) -> Result<(), ParseError> {
         let mut found = 0;
         for cell in cells(line.text, separator) {
@@ -356,7 +355,7 @@ impl Rows<'_> {
             if found < self.fields.len() {
                 self.store(found, cell.text, at, values)?;
                 found += 1;
-            } else if self.dialect.surplus == Surplus::Ignored {
+            } else if self.dialect.surplus == ExtraCells::Ignored {
                 return Ok(());
             } else if !cell.text.is_empty() {
                 return Err(self.surplus(at));
@@ -371,26 +370,26 @@ impl Rows<'_> {
         field: usize,
         token: &[u8],
         at: usize,
-        values: &mut [Values],
+        values: &mut [ColumnValues],
     ) -> Result<(), ParseError> {
         let Some(place) = self.fields[field] else {
             return Ok(());
         };
-        let Target {
+        let TargetArray {
             components,
             on_text,
             ..
         } = self.targets[place.target];
         let from_end = components - place.component;
-        if on_text == OnText::Category {
+        if on_text == TextPolicy::Category {
             values[place.target].set_whole(from_end, category::code(token));
             return Ok(());
         }
         if values[place.target].set(from_end, token, self.dialect.decimal) {
             return Ok(());
         }
-        if on_text == OnText::LeaveOut {
-            values[place.target] = Values::Text;
+        if on_text == TextPolicy::LeaveOut {
+            values[place.target] = ColumnValues::Text;
             return Ok(());
         }
         let column = field + 1;

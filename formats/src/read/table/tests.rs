@@ -6,17 +6,17 @@ const WORDS: Dialect = Dialect {
     separator: Separator::Blanks,
     decimal: Decimal::Point,
     comments: Comments::None,
-    surplus: Surplus::Empty,
+    surplus: ExtraCells::Empty,
 };
 
-fn scalar(numbers: Numbers, on_text: OnText) -> Target {
-    Target::attribute("a", 1, numbers, on_text)
+fn scalar(numbers: NumberKind, on_text: TextPolicy) -> TargetArray {
+    TargetArray::attribute("a", 1, numbers, on_text)
 }
 
 /// A table of one column for each of `targets`.
-fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<Target>) -> InMemory<'_> {
+fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<TargetArray>) -> WholeText<'_> {
     let place = |target| {
-        Some(Place {
+        Some(TargetComponent {
             target,
             component: 0,
         })
@@ -27,18 +27,18 @@ fn columns(bytes: &[u8], dialect: Dialect, targets: Vec<Target>) -> InMemory<'_>
         targets,
         rows: 0,
     };
-    InMemory { bytes, table }
+    WholeText { bytes, table }
 }
 
 /// A table and its text.
-struct InMemory<'a> {
+struct WholeText<'a> {
     bytes: &'a [u8],
     table: Table,
 }
 
-impl InMemory<'_> {
+impl WholeText<'_> {
     /// As a whole, and the same in pieces.
-    fn parse(&self, budget: MemoryBudget) -> Result<Vec<Values>, ParseError> {
+    fn parse(&self, budget: MemoryBudget) -> Result<Vec<ColumnValues>, ParseError> {
         let parse = |mut text| self.table.parse(&mut text, usize::MAX, budget).content;
         let whole = parse(TextInput::whole(self.bytes));
         let pieces = parse(TextInput::in_pieces(self.bytes, false, 1000));
@@ -53,19 +53,19 @@ const PIECE: usize = 1 << 20;
 #[test]
 fn fields_go_where_they_belong() {
     let bytes = b"7 3 1 2\n\n  8\t6 4 5 \r\n";
-    let place = |target, component| Some(Place { target, component });
+    let place = |target, component| Some(TargetComponent { target, component });
     let table = Table {
         dialect: WORDS,
         fields: vec![place(1, 0), place(0, 2), place(0, 0), place(0, 1)],
         targets: vec![
-            Target::positions(),
-            scalar(Numbers::WholeIfAll, OnText::Fault),
+            TargetArray::positions(),
+            scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
         ],
         rows: 2,
     };
-    let table = InMemory { bytes, table };
+    let table = WholeText { bytes, table };
     let mut values = table.parse(MemoryBudget::UNLIMITED).unwrap();
-    assert_eq!(values.pop(), Some(Values::Whole(vec![7, 8])));
+    assert_eq!(values.pop(), Some(ColumnValues::Whole(vec![7, 8])));
     assert_eq!(
         values.pop().unwrap().into_positions(),
         Positions::F64(vec![DVec3::new(1., 2., 3.), DVec3::new(4., 5., 6.)])
@@ -74,7 +74,7 @@ fn fields_go_where_they_belong() {
 
 #[test]
 fn whole_numbers_give_way_to_fractions_and_text() {
-    let whole = || scalar(Numbers::WholeIfAll, OnText::LeaveOut);
+    let whole = || scalar(NumberKind::WholeIfAll, TextPolicy::LeaveOut);
     let parse = |text: &str| {
         let mut values = columns(text.as_bytes(), WORDS, vec![whole()])
             .parse(MemoryBudget::UNLIMITED)
@@ -82,10 +82,10 @@ fn whole_numbers_give_way_to_fractions_and_text() {
         values.pop().unwrap()
     };
     let big = "9007199254740993";
-    assert_eq!(parse(big), Values::Whole(vec![9_007_199_254_740_993]));
-    assert_eq!(parse("1\n2.5\n3"), Values::Real(vec![1., 2.5, 3.]));
-    assert_eq!(parse("1\nx\n3"), Values::Text);
-    assert_eq!(parse(""), Values::Whole(vec![]));
+    assert_eq!(parse(big), ColumnValues::Whole(vec![9_007_199_254_740_993]));
+    assert_eq!(parse("1\n2.5\n3"), ColumnValues::Real(vec![1., 2.5, 3.]));
+    assert_eq!(parse("1\nx\n3"), ColumnValues::Text);
+    assert_eq!(parse(""), ColumnValues::Whole(vec![]));
 }
 
 #[test]
@@ -98,15 +98,18 @@ fn many_pieces_are_joined_in_order() {
     }
     assert!(text.len() > 3 * PIECE);
     let targets = vec![
-        scalar(Numbers::WholeIfAll, OnText::Fault),
-        scalar(Numbers::WholeIfAll, OnText::Fault),
+        scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
+        scalar(NumberKind::WholeIfAll, TextPolicy::Fault),
     ];
     let values = columns(text.as_bytes(), WORDS, targets)
         .parse(MemoryBudget::UNLIMITED)
         .unwrap();
     let ids = (0..rows).map(i64::from).collect();
     let halves = (0..rows).map(|i| f64::from(i) * 0.5).collect();
-    assert_eq!(values, [Values::Whole(ids), Values::Real(halves)]);
+    assert_eq!(
+        values,
+        [ColumnValues::Whole(ids), ColumnValues::Real(halves)]
+    );
 }
 
 #[test]
@@ -117,7 +120,7 @@ fn the_first_fault_is_reported() {
     let table = columns(
         text.as_bytes(),
         WORDS,
-        vec![scalar(Numbers::Real, OnText::Fault)],
+        vec![scalar(NumberKind::Real, TextPolicy::Fault)],
     );
     let error = table
         .parse(MemoryBudget::UNLIMITED)
@@ -130,8 +133,8 @@ fn the_first_fault_is_reported() {
 fn an_unfinished_last_line_is_called_so() {
     let two = || {
         vec![
-            scalar(Numbers::Real, OnText::Fault),
-            scalar(Numbers::Real, OnText::Fault),
+            scalar(NumberKind::Real, TextPolicy::Fault),
+            scalar(NumberKind::Real, TextPolicy::Fault),
         ]
     };
     let error = |text: &str| {
@@ -182,17 +185,17 @@ fn empty_cells_are_nan_and_commas_may_be_points() {
         separator: Separator::Byte(b';'),
         decimal: Decimal::Comma,
         comments: Comments::HashOrSlashes,
-        surplus: Surplus::Empty,
+        surplus: ExtraCells::Empty,
     };
     let targets = vec![
-        scalar(Numbers::Real, OnText::Fault),
-        scalar(Numbers::WholeIfAll, OnText::LeaveOut),
+        scalar(NumberKind::Real, TextPolicy::Fault),
+        scalar(NumberKind::WholeIfAll, TextPolicy::LeaveOut),
     ];
     let text = b"# 1;2\n1,5;2;\n // 3\n;3;;\n";
     let values = columns(text, dialect, targets)
         .parse(MemoryBudget::UNLIMITED)
         .unwrap();
-    let [Values::Real(a), b] = &values[..] else {
+    let [ColumnValues::Real(a), b] = &values[..] else {
         panic!("{values:?}")
     };
     assert!(a[0] == 1.5 && a[1].is_nan() && a.len() == 2);

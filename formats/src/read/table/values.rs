@@ -9,7 +9,7 @@ use crate::{AttributeData, Positions};
 
 /// The numbers of one target.
 #[derive(Debug, Clone, PartialEq)]
-pub(in crate::read) enum Values {
+pub(in crate::read) enum ColumnValues {
     /// All are numbers.
     Real(Vec<f64>),
     /// All are integers.
@@ -18,7 +18,7 @@ pub(in crate::read) enum Values {
     Text,
 }
 
-impl Values {
+impl ColumnValues {
     /// Appends a row of zeros.
     pub(super) fn add_row(&mut self, components: usize) {
         match self {
@@ -83,14 +83,14 @@ impl Values {
         }
     }
 
-    /// The numbers of [`super::Target::positions`].
+    /// The numbers of [`super::TargetArray::positions`].
     pub(in crate::read) fn into_positions(self) -> Positions {
         let Self::Real(mut v) = self else {
             return Positions::F64(Vec::new());
         };
         v.truncate(v.len() / 3 * 3);
         let triples = try_cast_vec(v).or_else(|(_, mut v)| {
-            // The room behind them is no whole number of triples.
+            // The spare capacity is not a whole number of triples.
             v.shrink_to_fit();
             try_cast_vec(v)
         });

@@ -23,7 +23,7 @@ pub(in crate::read) fn parse_values(
 /// Parses the next `count` numbers of `text`, of type `scalar`.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] if there are fewer, or one is no number of that type; nothing is
+/// [`ParseError::Malformed`] if there are fewer, or one is not a number of that type; nothing is
 /// allocated for a count that the text cannot hold. [`ParseError::TooLarge`] if they take more than `budget`.
 pub(super) fn read_values(
     text: &mut TextInput<'_>,
@@ -51,7 +51,7 @@ pub(super) fn read_values(
     })
 }
 
-/// Passes over the next `count` words, whatever they are.
+/// Skips the next `count` words.
 ///
 /// # Errors
 /// [`ParseError::Malformed`] if there are fewer.
@@ -69,7 +69,7 @@ fn check_room(text: &TextInput<'_>, count: usize) -> Result<(), ParseError> {
     }
 }
 
-/// Shows the next `count` words with their places, and stays behind the last.
+/// Passes the next `count` words with their offsets to a callback, and stops after the last.
 fn each_word(
     text: &mut TextInput<'_>,
     count: usize,
@@ -106,7 +106,7 @@ fn ends_after(at: usize, done: usize, count: usize) -> ParseError {
     )
 }
 
-/// Words with a position: after each, `at` is the byte behind it.
+/// Words with a position: after each, `at` is the byte after it.
 struct Words<'a> {
     text: &'a [u8],
     at: usize,
@@ -144,11 +144,11 @@ fn read_numbers<T: Number>(
             let shown = word.get(..24).unwrap_or(word).escape_ascii();
             return Err(ParseError::malformed(
                 at,
-                format!("`{shown}` is no {}", T::NAME),
+                format!("`{shown}` is not a number of type {}", T::NAME),
             ));
         };
         if values.len() == most {
-            return Err(budget.exceeded("in memory its numbers are"));
+            return Err(budget.exceeded("its numbers in memory are"));
         }
         values.push(value);
         Ok(())

@@ -1,25 +1,25 @@
 //! The lines that introduce attributes: `SCALARS`, `VECTORS`, `FIELD` and the rest. Says what an
 //! attribute is called and how it is stored; its numbers are left to [`super::payload`].
 
-use super::cursor::{Cursor, Line};
-use super::payload::{Encoding, Stored, stored_type};
+use super::cursor::{LineCursor, VtkLine};
+use super::types::{VtkEncoding, VtkType, stored_type};
 use crate::{ParseError, ScalarType};
 
 /// One array about to follow.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct Header {
+pub(super) struct ArrayHeader {
     pub(super) name: String,
     pub(super) components: usize,
     /// Stated in a FIELD only; else it is the count of the section.
     pub(super) tuples: Option<usize>,
-    pub(super) stored: Stored,
+    pub(super) stored: VtkType,
 }
 
 /// Parses a count or a number of components.
 ///
 /// # Errors
 /// Malformed if it is missing, negative or no integer.
-pub(super) fn count(line: &Line, word: Option<&&[u8]>) -> Result<usize, ParseError> {
+pub(super) fn count(line: &VtkLine, word: Option<&&[u8]>) -> Result<usize, ParseError> {
     word.and_then(|w| parse_count(w)).ok_or_else(|| {
         ParseError::malformed(line.at, format!("`{}`: a count is expected", line.shown()))
     })
@@ -32,10 +32,10 @@ fn parse_count(word: &[u8]) -> Option<usize> {
 /// The array that an attribute keyword line announces; `None` if the keyword is none of an
 /// attribute. Takes the `LOOKUP_TABLE` line after `SCALARS` too, if it is there.
 pub(super) fn keyword_array(
-    line: &Line,
-    cursor: &mut Cursor<'_, '_>,
-    encoding: Encoding,
-) -> Result<Option<Header>, ParseError> {
+    line: &VtkLine,
+    cursor: &mut LineCursor<'_, '_>,
+    encoding: VtkEncoding,
+) -> Result<Option<ArrayHeader>, ParseError> {
     let keyword = line.first_word().to_ascii_uppercase();
     let components = match keyword.as_slice() {
         b"SCALARS" => {
@@ -55,7 +55,7 @@ pub(super) fn keyword_array(
     let [_, name @ .., stored] = words.as_slice() else {
         return Err(incomplete(line));
     };
-    Ok(Some(Header {
+    Ok(Some(ArrayHeader {
         name: decode_name(name),
         components,
         tuples: None,
@@ -64,18 +64,18 @@ pub(super) fn keyword_array(
 }
 
 /// `SCALARS name type [components]`; a name may hold blanks, so this reads from the right.
-fn scalars(line: &Line) -> Result<Header, ParseError> {
+fn scalars(line: &VtkLine) -> Result<ArrayHeader, ParseError> {
     let words = line.words();
     let (name, stored, components) = match words.as_slice() {
         [_, name @ .., stored, k]
-            if parse_count(k).is_some() && Stored::parse(stored).is_some() =>
+            if parse_count(k).is_some() && VtkType::parse(stored).is_some() =>
         {
             (name, stored, count(line, Some(k))?)
         }
         [_, name @ .., stored] => (name, stored, 1),
         [] | [_] => return Err(incomplete(line)),
     };
-    Ok(Header {
+    Ok(ArrayHeader {
         name: decode_name(name),
         components,
         tuples: None,
@@ -84,29 +84,29 @@ fn scalars(line: &Line) -> Result<Header, ParseError> {
 }
 
 /// `COLOR_SCALARS name k`: bytes in binary, numbers from 0 to 1 in ASCII.
-fn color_scalars(line: &Line, encoding: Encoding) -> Result<Header, ParseError> {
+fn color_scalars(line: &VtkLine, encoding: VtkEncoding) -> Result<ArrayHeader, ParseError> {
     let words = line.words();
     let [_, name @ .., components] = words.as_slice() else {
         return Err(incomplete(line));
     };
-    Ok(Header {
+    Ok(ArrayHeader {
         name: decode_name(name),
         components: count(line, Some(components))?,
         tuples: None,
-        stored: Stored::Scalar(match encoding {
-            Encoding::Ascii => ScalarType::F32,
-            Encoding::Binary => ScalarType::U8,
+        stored: VtkType::Scalar(match encoding {
+            VtkEncoding::Ascii => ScalarType::F32,
+            VtkEncoding::Binary => ScalarType::U8,
         }),
     })
 }
 
 /// `TEXTURE_COORDINATES name dimensions type`.
-fn texture_coordinates(line: &Line) -> Result<Header, ParseError> {
+fn texture_coordinates(line: &VtkLine) -> Result<ArrayHeader, ParseError> {
     let words = line.words();
     let [_, name @ .., components, stored] = words.as_slice() else {
         return Err(incomplete(line));
     };
-    Ok(Header {
+    Ok(ArrayHeader {
         name: decode_name(name),
         components: count(line, Some(components))?,
         tuples: None,
@@ -115,22 +115,22 @@ fn texture_coordinates(line: &Line) -> Result<Header, ParseError> {
 }
 
 /// `name components tuples type` inside a FIELD; `None` if the line is not that.
-pub(super) fn field_array(line: &Line) -> Option<Header> {
+pub(super) fn field_array(line: &VtkLine) -> Option<ArrayHeader> {
     let words = line.words();
     let [name @ .., components, tuples, stored] = words.as_slice() else {
         return None;
     };
-    Some(Header {
+    Some(ArrayHeader {
         name: decode_name(name),
         components: parse_count(components)?,
         tuples: Some(parse_count(tuples)?),
-        stored: Stored::parse(stored)?,
+        stored: VtkType::parse(stored)?,
     })
 }
 
-/// Steps over `LOOKUP_TABLE name`, which some writers leave out. With a size behind the name it is
+/// Skips `LOOKUP_TABLE name`, which some writers leave out. With a size after the name it is
 /// a table of its own and not the reference that belongs to SCALARS.
-fn skip_lookup_reference(cursor: &mut Cursor<'_, '_>) -> Result<(), ParseError> {
+fn skip_lookup_reference(cursor: &mut LineCursor<'_, '_>) -> Result<(), ParseError> {
     if !cursor.goes_on_with(b"LOOKUP_TABLE") {
         return Ok(());
     }
@@ -147,7 +147,7 @@ fn skip_lookup_reference(cursor: &mut Cursor<'_, '_>) -> Result<(), ParseError> 
     Ok(())
 }
 
-fn incomplete(line: &Line) -> ParseError {
+fn incomplete(line: &VtkLine) -> ParseError {
     ParseError::malformed(line.at, format!("`{}` is incomplete", line.shown()))
 }
 
@@ -178,8 +178,8 @@ fn decode_name(words: &[&[u8]]) -> String {
 mod tests {
     use super::*;
 
-    fn line(text: &str) -> Line {
-        Line {
+    fn line(text: &str) -> VtkLine {
+        VtkLine {
             at: 0,
             text: text.as_bytes().to_vec(),
         }

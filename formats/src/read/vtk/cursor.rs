@@ -1,4 +1,4 @@
-//! A place in a file that mixes text lines with binary payloads: takes lines and byte counts, never
+//! A cursor in a file that mixes text lines with binary payloads: takes lines and byte counts, never
 //! searches inside a payload.
 
 use crate::ParseError;
@@ -8,18 +8,18 @@ use crate::read::input::TextInput;
 const LONGEST_LINE: usize = 1 << 16;
 
 /// Reading position in the file.
-pub(super) struct Cursor<'c, 'a> {
+pub(super) struct LineCursor<'c, 'a> {
     text: &'c mut TextInput<'a>,
 }
 
 /// One text line without its end, and where it started.
 #[derive(Debug, Clone)]
-pub(super) struct Line {
+pub(super) struct VtkLine {
     pub(super) at: usize,
     pub(super) text: Vec<u8>,
 }
 
-impl<'c, 'a> Cursor<'c, 'a> {
+impl<'c, 'a> LineCursor<'c, 'a> {
     pub(super) const fn new(text: &'c mut TextInput<'a>) -> Self {
         Self { text }
     }
@@ -48,9 +48,9 @@ impl<'c, 'a> Cursor<'c, 'a> {
         self.text.take(count).then_some(())
     }
 
-    /// Does `look`, and goes back to where it began.
-    pub(super) fn ahead<T>(&mut self, look: impl FnOnce(&mut Cursor<'_, 'a>) -> T) -> T {
-        self.text.ahead(|text| look(&mut Cursor { text }))
+    /// Runs `look`, then returns to the current offset.
+    pub(super) fn ahead<T>(&mut self, look: impl FnOnce(&mut LineCursor<'_, 'a>) -> T) -> T {
+        self.text.ahead(|text| look(&mut LineCursor { text }))
     }
 
     /// Goes on to byte `at`.
@@ -58,7 +58,7 @@ impl<'c, 'a> Cursor<'c, 'a> {
         self.text.go_to(at);
     }
 
-    /// Whether `keyword` follows, behind white space.
+    /// Whether `keyword` follows, after white space.
     pub(super) fn goes_on_with(&mut self, keyword: &[u8]) -> bool {
         self.ahead(|cursor| {
             cursor.text.pass_blanks();
@@ -72,7 +72,7 @@ impl<'c, 'a> Cursor<'c, 'a> {
     }
 
     /// The next line, blank or not; `None` at the end of the file.
-    pub(super) fn line(&mut self) -> Result<Option<Line>, ParseError> {
+    pub(super) fn line(&mut self) -> Result<Option<VtkLine>, ParseError> {
         let there = self.text.want(LONGEST_LINE + 1);
         if there == 0 {
             return Ok(None);
@@ -94,17 +94,17 @@ impl<'c, 'a> Cursor<'c, 'a> {
         };
         let text = text.to_vec();
         self.text.advance(used);
-        Ok(Some(Line { at, text }))
+        Ok(Some(VtkLine { at, text }))
     }
 
     /// The next line that is not blank.
-    pub(super) fn keyword_line(&mut self) -> Result<Option<Line>, ParseError> {
+    pub(super) fn keyword_line(&mut self) -> Result<Option<VtkLine>, ParseError> {
         self.text.pass_blanks();
         self.line()
     }
 }
 
-impl Line {
+impl VtkLine {
     /// The words of the line.
     pub(super) fn words(&self) -> Vec<&[u8]> {
         self.text

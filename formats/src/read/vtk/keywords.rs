@@ -1,11 +1,11 @@
 //! The fixed words of the format: the version line, keywords, names of the time.
 
 use super::attributes::field_array;
-use super::cursor::Line;
+use super::cursor::VtkLine;
 use crate::ParseError;
 
 /// Major version from `# vtk DataFile Version 4.1`.
-pub(super) fn parse_version(line: &Line) -> Result<u32, ParseError> {
+pub(super) fn parse_version(line: &VtkLine) -> Result<u32, ParseError> {
     const MAGIC: &[u8] = b"# vtk DataFile Version";
     let version = line
         .text
@@ -21,13 +21,13 @@ pub(super) fn parse_version(line: &Line) -> Result<u32, ParseError> {
         ))),
         None => Err(ParseError::malformed(
             line.at,
-            format!("`{}` is no legacy VTK header", line.shown()),
+            format!("`{}` is not a legacy VTK header", line.shown()),
         )),
     }
 }
 
 /// True where a new part of the file may begin: a keyword, or an array of a FIELD.
-pub(super) fn is_section_start(line: &Line) -> bool {
+pub(super) fn is_section_start(line: &VtkLine) -> bool {
     is_keyword(line.first_word()) || field_array(line).is_some()
 }
 

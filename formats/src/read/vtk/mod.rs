@@ -1,7 +1,7 @@
 //! Legacy VTK (`.vtk`), versions 1 to 5.1, ASCII and binary: the points of POLYDATA and
 //! UNSTRUCTURED_GRID with all numeric point data.
 //!
-//! The file is walked line by line: a keyword line tells how many bytes of payload follow, exactly
+//! The file is walked line by line: a keyword line determines how many bytes of payload follow, exactly
 //! those are taken or skipped, so nothing is ever searched for inside binary data. Cells and cell
 //! data are stepped over: points without cells are particles too. Grids have no particles and are
 //! refused. Layout after "VTK File Formats" (the VTK user's guide) and after files of VTK 9,
@@ -15,24 +15,25 @@ mod payload;
 mod positions;
 #[cfg(test)]
 mod tests;
+mod types;
 mod walk;
 
 pub(in crate::read) use ascii::parse_values;
 pub(in crate::read) use positions::positions;
 
-use super::columns::{Column, ParticleLayout};
+use super::columns::{ParticleLayout, StridedColumn};
 use super::input::TextInput;
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader, StreamUnit};
 use crate::{Attribute, MemoryBudget, ParseError, RawParticles};
-use walk::{PointArray, Until, Walker};
+use walk::{PointArray, WalkEnd, Walker};
 
 /// More than any tensor or spectrum has. With no particles nothing else bounds the number, and
 /// callers keep something for each component.
 pub(in crate::read) const MOST_COMPONENTS: usize = 1 << 16;
 
-/// So many numbers of a particle can be listed however few the particles are.
+/// A particle may have this many numbers, however few particles there are.
 const FEW_COMPONENTS: usize = 4096;
 
 /// Legacy VTK, text or binary.
@@ -75,7 +76,7 @@ impl Reader for LegacyVtk {
         let mut step = Step::whole(text.left_about());
         step.time = Walker::begin(text, budget).ok().and_then(|mut walker| {
             // A fault on the way is for `read` to report; a time found before it is good.
-            let _ = walker.walk(Until::Points);
+            let _ = walker.walk(WalkEnd::Points);
             walker.time
         });
         Ok(vec![step])
@@ -92,7 +93,7 @@ impl Reader for LegacyVtk {
         let bytes = source.bytes();
         let text = source.text();
         let mut walker = Walker::begin(text, budget)?;
-        walker.walk(Until::End)?;
+        walker.walk(WalkEnd::End)?;
         let points = walker.points.take();
         let (arrays, time) = (std::mem::take(&mut walker.arrays), walker.time);
         let points = points.ok_or_else(|| no_points(text.at()))?;
@@ -120,14 +121,15 @@ impl Reader for LegacyVtk {
         if walker.is_text() {
             return Ok(None);
         }
-        walker.walk(Until::End)?;
+        walker.walk(WalkEnd::End)?;
         let points = walker.points.ok_or_else(|| no_points(bytes.len()))?;
         let components = walker.arrays.iter().map(|array| array.components);
         if components.fold(0, usize::saturating_add) > FEW_COMPONENTS.max(points.count) {
             return Ok(None);
         }
         let column = |array: PointArray| array.numbers.column(array.name, array.components);
-        let attributes: Option<Vec<Column>> = walker.arrays.into_iter().map(column).collect();
+        let attributes: Option<Vec<StridedColumn>> =
+            walker.arrays.into_iter().map(column).collect();
         let axes = points.numbers.column("POINTS".to_owned(), 3);
         Ok(axes
             .zip(attributes)

@@ -1,68 +1,12 @@
-//! The numbers behind a keyword line: what the type names mean and how many bytes they take, in
+//! The numbers after a keyword line: what the type names mean and how many bytes they take, in
 //! ASCII and in (always big-endian) binary.
 
 use super::ascii::{read_values, skip_words};
-use super::cursor::{Cursor, shown};
+use super::cursor::LineCursor;
 use super::keywords::is_section_start;
-use crate::read::columns::{Column, Lane};
+use super::types::{VtkEncoding, VtkType};
+use crate::read::columns::{Strided, StridedColumn};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, ScalarType};
-
-/// How the file stores numbers; line 3 of it.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Encoding {
-    Ascii,
-    Binary,
-}
-
-/// A type name of the format.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Stored {
-    /// The same size everywhere.
-    Scalar(ScalarType),
-    /// Size in binary files differs by writer: the usual type, then the other.
-    Either(ScalarType, ScalarType),
-    /// Eight to a byte in binary files.
-    Bit,
-    /// Text, one a line or with binary lengths; never a particle attribute here.
-    Text,
-}
-
-impl Stored {
-    /// The type called `name` in whatever case.
-    pub(super) fn parse(name: &[u8]) -> Option<Self> {
-        use ScalarType::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
-        let name = name.to_ascii_lowercase();
-        Some(match name.as_slice() {
-            b"bit" => Self::Bit,
-            b"char" | b"signed_char" | b"vtktypeint8" => Self::Scalar(I8),
-            b"unsigned_char" | b"vtktypeuint8" => Self::Scalar(U8),
-            b"short" | b"vtktypeint16" => Self::Scalar(I16),
-            b"unsigned_short" | b"vtktypeuint16" => Self::Scalar(U16),
-            b"int" | b"vtktypeint32" => Self::Scalar(I32),
-            b"unsigned_int" | b"vtktypeuint32" => Self::Scalar(U32),
-            b"float" | b"vtktypefloat32" => Self::Scalar(F32),
-            b"double" | b"vtktypefloat64" => Self::Scalar(F64),
-            b"vtktypeint64" | b"long_long" => Self::Scalar(I64),
-            b"vtktypeuint64" | b"unsigned_long_long" => Self::Scalar(U64),
-            // Written on Windows, `long` has 4 bytes.
-            b"long" => Self::Either(I64, I32),
-            b"unsigned_long" => Self::Either(U64, U32),
-            // 8 bytes in memory, but VTK writes `int`.
-            b"vtkidtype" => Self::Either(I32, I64),
-            b"string" | b"utf8_string" => Self::Text,
-            _ => return None,
-        })
-    }
-}
-
-/// Parses a type name.
-///
-/// # Errors
-/// Malformed, naming it, if there is no such type.
-pub(super) fn stored_type(at: usize, name: &[u8]) -> Result<Stored, ParseError> {
-    Stored::parse(name)
-        .ok_or_else(|| ParseError::malformed(at, format!("`{}` is no type of VTK", shown(name))))
-}
 
 /// `tuples * components`, checked.
 pub(super) fn value_count(
@@ -75,8 +19,8 @@ pub(super) fn value_count(
     })
 }
 
-/// The numbers of an array, in binary files where they lie.
-pub(super) enum Numbers {
+/// The numbers of an array, in binary files their offset.
+pub(super) enum ArrayNumbers {
     /// Of text.
     Decoded(AttributeData),
     /// Big-endian ones.
@@ -94,7 +38,7 @@ pub(super) enum Numbers {
     },
 }
 
-impl Numbers {
+impl ArrayNumbers {
     /// The numbers themselves; `bytes` are the file in which they were found.
     ///
     /// # Errors
@@ -102,7 +46,7 @@ impl Numbers {
     pub(super) fn decode(self, bytes: &[u8]) -> Result<AttributeData, ParseError> {
         let stored = |at: usize, len: usize| {
             let rest = bytes.get(at..).and_then(|rest| rest.get(..len));
-            rest.ok_or_else(|| ParseError::malformed(at, format!("{len} bytes are not there")))
+            rest.ok_or_else(|| ParseError::malformed(at, format!("{len} bytes are missing")))
         };
         match self {
             Self::Decoded(data) => Ok(data),
@@ -130,15 +74,15 @@ impl Numbers {
     }
 
     /// The numbers, `components` a particle, as a column; none for text and bits.
-    pub(super) fn column(&self, name: String, components: usize) -> Option<Column> {
+    pub(super) fn column(&self, name: String, components: usize) -> Option<StridedColumn> {
         let Self::Binary { at, scalar, .. } = *self else {
             return None;
         };
-        let lane = |component: usize| Lane {
+        let lane = |component: usize| Strided {
             start: at + component * scalar.size(),
             stride: components * scalar.size(),
         };
-        Some(Column {
+        Some(StridedColumn {
             name,
             scalar,
             endian: Endian::Big,
@@ -150,60 +94,60 @@ impl Numbers {
 /// Finds `count` numbers at the cursor, and reads them if they are text, within `budget`. `what` names them in errors.
 ///
 /// # Errors
-/// Malformed if the file is too short for them or a text is no number; Unsupported for text; too large.
+/// Malformed if the file is too short for them or a text is not a number; Unsupported for text; too large.
 pub(super) fn take_values(
-    cursor: &mut Cursor<'_, '_>,
-    (encoding, budget): (Encoding, MemoryBudget),
-    stored: Stored,
+    cursor: &mut LineCursor<'_, '_>,
+    (encoding, budget): (VtkEncoding, MemoryBudget),
+    stored: VtkType,
     count: usize,
     what: &str,
-) -> Result<Numbers, ParseError> {
-    if encoding == Encoding::Ascii {
+) -> Result<ArrayNumbers, ParseError> {
+    if encoding == VtkEncoding::Ascii {
         let scalar = match stored {
-            Stored::Scalar(scalar) => scalar,
-            Stored::Either(ScalarType::U64 | ScalarType::U32, _) => ScalarType::U64,
-            Stored::Either(..) => ScalarType::I64,
-            Stored::Bit => ScalarType::U8,
-            Stored::Text => return Err(text_is_no_number(what)),
+            VtkType::Scalar(scalar) => scalar,
+            VtkType::Either(ScalarType::U64 | ScalarType::U32, _) => ScalarType::U64,
+            VtkType::Either(..) => ScalarType::I64,
+            VtkType::Bit => ScalarType::U8,
+            VtkType::Text => return Err(text_is_no_number(what)),
         };
         let data = read_values(cursor.text(), count, scalar, budget)?;
-        return Ok(Numbers::Decoded(data));
+        return Ok(ArrayNumbers::Decoded(data));
     }
     let at = cursor.at();
     let scalar = match stored {
-        Stored::Scalar(scalar) => scalar,
-        Stored::Either(usual, other) => likelier(cursor, usual, other, count),
-        Stored::Bit => {
+        VtkType::Scalar(scalar) => scalar,
+        VtkType::Either(usual, other) => likelier(cursor, usual, other, count),
+        VtkType::Bit => {
             read_bit_bytes(cursor, count, what)?;
-            return Ok(Numbers::Bits { at, count });
+            return Ok(ArrayNumbers::Bits { at, count });
         }
-        Stored::Text => return Err(text_is_no_number(what)),
+        VtkType::Text => return Err(text_is_no_number(what)),
     };
     take_numbers(cursor, scalar, count, what)?;
-    Ok(Numbers::Binary { at, scalar, count })
+    Ok(ArrayNumbers::Binary { at, scalar, count })
 }
 
-/// Moves the cursor behind `count` values without keeping them.
+/// Skips `count` values.
 ///
 /// # Errors
 /// Malformed if the file is too short for them.
 pub(super) fn skip_values(
-    cursor: &mut Cursor<'_, '_>,
-    encoding: Encoding,
-    stored: Stored,
+    cursor: &mut LineCursor<'_, '_>,
+    encoding: VtkEncoding,
+    stored: VtkType,
     count: usize,
     what: &str,
 ) -> Result<(), ParseError> {
-    if stored == Stored::Text {
+    if stored == VtkType::Text {
         return skip_texts(cursor, encoding, count, what);
     }
-    if encoding == Encoding::Ascii {
+    if encoding == VtkEncoding::Ascii {
         return skip_words(cursor.text(), count);
     }
     let scalar = match stored {
-        Stored::Scalar(scalar) => scalar,
-        Stored::Either(usual, other) => likelier(cursor, usual, other, count),
-        Stored::Bit | Stored::Text => {
+        VtkType::Scalar(scalar) => scalar,
+        VtkType::Either(usual, other) => likelier(cursor, usual, other, count),
+        VtkType::Bit | VtkType::Text => {
             return read_bit_bytes(cursor, count, what);
         }
     };
@@ -212,7 +156,7 @@ pub(super) fn skip_values(
 
 /// The type of the two after whose payload the file goes on sensibly; the usual one in doubt.
 fn likelier(
-    cursor: &mut Cursor<'_, '_>,
+    cursor: &mut LineCursor<'_, '_>,
     usual: ScalarType,
     other: ScalarType,
     count: usize,
@@ -236,7 +180,7 @@ fn likelier(
 }
 
 fn take_numbers(
-    cursor: &mut Cursor<'_, '_>,
+    cursor: &mut LineCursor<'_, '_>,
     scalar: ScalarType,
     count: usize,
     what: &str,
@@ -255,7 +199,11 @@ fn take_numbers(
     })
 }
 
-fn read_bit_bytes(cursor: &mut Cursor<'_, '_>, count: usize, what: &str) -> Result<(), ParseError> {
+fn read_bit_bytes(
+    cursor: &mut LineCursor<'_, '_>,
+    count: usize,
+    what: &str,
+) -> Result<(), ParseError> {
     let bytes = count.div_ceil(8);
     cursor.take(bytes).ok_or_else(|| {
         ParseError::malformed(
@@ -278,18 +226,18 @@ fn unpack_bits(packed: &[u8], count: usize) -> AttributeData {
     AttributeData::U8(bits)
 }
 
-/// Strings: a line each, or in binary a length of 1, 2, 4 or 8 bytes (told by the two highest bits)
+/// Strings: a line each, or in binary a length of 1, 2, 4 or 8 bytes (given by the two highest bits)
 /// and the text.
 fn skip_texts(
-    cursor: &mut Cursor<'_, '_>,
-    encoding: Encoding,
+    cursor: &mut LineCursor<'_, '_>,
+    encoding: VtkEncoding,
     count: usize,
     what: &str,
 ) -> Result<(), ParseError> {
     for done in 0..count {
         let skipped = match encoding {
-            Encoding::Ascii => cursor.line()?.map(|_| ()),
-            Encoding::Binary => skip_binary_text(cursor),
+            VtkEncoding::Ascii => cursor.line()?.map(|_| ()),
+            VtkEncoding::Binary => skip_binary_text(cursor),
         };
         if skipped.is_none() {
             return Err(ParseError::malformed(
@@ -301,7 +249,7 @@ fn skip_texts(
     Ok(())
 }
 
-fn skip_binary_text(cursor: &mut Cursor<'_, '_>) -> Option<()> {
+fn skip_binary_text(cursor: &mut LineCursor<'_, '_>) -> Option<()> {
     let first = *cursor.rest().first()?;
     let width = match first >> 6 {
         3 => 1,

@@ -1,25 +1,24 @@
 //! The walk through a legacy file, from keyword line to keyword line, and what it finds.
 
 use super::MOST_COMPONENTS;
-use super::attributes::{Header, count, field_array, keyword_array};
-use super::cursor::{Cursor, Line, shown};
+use super::attributes::{ArrayHeader, count, field_array, keyword_array};
+use super::cursor::{LineCursor, VtkLine, shown};
 use super::keywords::{is_keyword, is_section_start, is_time_name, parse_version};
-use super::payload::{
-    Encoding, Numbers, Stored, skip_values, stored_type, take_values, value_count,
-};
+use super::payload::{ArrayNumbers, skip_values, take_values, value_count};
+use super::types::{VtkEncoding, VtkType, stored_type};
 use crate::read::input::TextInput;
 use crate::{MemoryBudget, ParseError};
 
-/// How far to walk.
+/// Where to stop walking.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Until {
+pub(super) enum WalkEnd {
     Points,
     End,
 }
 
-/// What attributes at this place belong to.
+/// What the following attributes belong to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Section {
+enum ArrayOwner {
     /// The dataset itself: time and the like, any length.
     Dataset,
     /// Particles, this many.
@@ -32,24 +31,24 @@ enum Section {
 pub(super) struct Points {
     pub(super) count: usize,
     /// Three a point.
-    pub(super) numbers: Numbers,
+    pub(super) numbers: ArrayNumbers,
 }
 
 /// Point data.
 pub(super) struct PointArray {
     pub(super) name: String,
     pub(super) components: usize,
-    pub(super) numbers: Numbers,
+    pub(super) numbers: ArrayNumbers,
 }
 
 /// The walk through the file and what it has found so far.
 pub(super) struct Walker<'c, 'a> {
-    cursor: Cursor<'c, 'a>,
+    cursor: LineCursor<'c, 'a>,
     /// What numbers that are text may still take.
     budget: MemoryBudget,
-    encoding: Encoding,
+    encoding: VtkEncoding,
     major: u32,
-    section: Section,
+    section: ArrayOwner,
     dataset_named: bool,
     /// Components of the array just passed: METADATA may name each on a line.
     components: usize,
@@ -64,7 +63,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         text: &'c mut TextInput<'a>,
         budget: MemoryBudget,
     ) -> Result<Self, ParseError> {
-        let mut cursor = Cursor::new(text);
+        let mut cursor = LineCursor::new(text);
         let ended =
             |at: usize| move || ParseError::malformed(at, "the file ends inside its header");
         let first = cursor.line()?.ok_or_else(ended(cursor.at()))?;
@@ -73,9 +72,9 @@ impl<'c, 'a> Walker<'c, 'a> {
         let kind = cursor.keyword_line()?;
         let kind = kind.ok_or_else(ended(cursor.at()))?;
         let encoding = if kind.starts_with("BINARY") {
-            Encoding::Binary
+            VtkEncoding::Binary
         } else if kind.starts_with("ASCII") {
-            Encoding::Ascii
+            VtkEncoding::Ascii
         } else {
             return Err(ParseError::malformed(
                 kind.at,
@@ -87,7 +86,7 @@ impl<'c, 'a> Walker<'c, 'a> {
             budget,
             encoding,
             major,
-            section: Section::Dataset,
+            section: ArrayOwner::Dataset,
             dataset_named: false,
             components: 1,
             points: None,
@@ -98,15 +97,15 @@ impl<'c, 'a> Walker<'c, 'a> {
 
     /// Whether numbers are text.
     pub(super) fn is_text(&self) -> bool {
-        self.encoding == Encoding::Ascii
+        self.encoding == VtkEncoding::Ascii
     }
 
-    pub(super) fn walk(&mut self, until: Until) -> Result<(), ParseError> {
+    pub(super) fn walk(&mut self, until: WalkEnd) -> Result<(), ParseError> {
         while let Some(line) = self.cursor.keyword_line()? {
             let keyword = line.first_word().to_ascii_uppercase();
             match keyword.as_slice() {
                 b"DATASET" => self.dataset(&line)?,
-                b"POINTS" if until == Until::Points => return Ok(()),
+                b"POINTS" if until == WalkEnd::Points => return Ok(()),
                 b"POINTS" => self.points(&line)?,
                 b"CELLS" | b"VERTICES" | b"LINES" | b"POLYGONS" | b"TRIANGLE_STRIPS" => {
                     self.cells(&line)?;
@@ -117,7 +116,7 @@ impl<'c, 'a> Walker<'c, 'a> {
                 }
                 b"POINT_DATA" => self.point_data(&line)?,
                 b"CELL_DATA" => {
-                    self.section = Section::Cells(count(&line, line.words().get(1))?);
+                    self.section = ArrayOwner::Cells(count(&line, line.words().get(1))?);
                 }
                 b"FIELD" => self.field(&line)?,
                 b"METADATA" => self.metadata()?,
@@ -128,7 +127,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         Ok(())
     }
 
-    fn dataset(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn dataset(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         let words = line.words();
         let kind = words
             .get(1)
@@ -149,12 +148,12 @@ impl<'c, 'a> Walker<'c, 'a> {
             }
             _ => Err(ParseError::malformed(
                 line.at,
-                format!("`{}` is no DATASET of VTK", line.shown()),
+                format!("`{}` is not a VTK dataset type", line.shown()),
             )),
         }
     }
 
-    fn points(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn points(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         if !self.dataset_named {
             return Err(ParseError::malformed(line.at, "POINTS before DATASET"));
         }
@@ -172,11 +171,11 @@ impl<'c, 'a> Walker<'c, 'a> {
         Ok(())
     }
 
-    fn point_data(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn point_data(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         let stated = count(line, line.words().get(1))?;
         match self.points.as_ref().map(|points| points.count) {
             Some(particles) if particles == stated => {
-                self.section = Section::Points(particles);
+                self.section = ArrayOwner::Points(particles);
                 Ok(())
             }
             Some(particles) => Err(ParseError::malformed(
@@ -189,7 +188,7 @@ impl<'c, 'a> Walker<'c, 'a> {
 
     /// Cells of any kind. Up to version 4.2 the second number counts integers; from 5.0 on the two
     /// numbers are the lengths of an OFFSETS and a CONNECTIVITY array.
-    fn cells(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn cells(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         let words = line.words();
         let first = count(line, words.get(1))?;
         let second = count(line, words.get(2))?;
@@ -217,7 +216,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         Ok(())
     }
 
-    fn skip(&mut self, line: &Line, name: &str, values: usize) -> Result<(), ParseError> {
+    fn skip(&mut self, line: &VtkLine, name: &str, values: usize) -> Result<(), ParseError> {
         let stored = stored_type(line.at, name.as_bytes())?;
         let what = line.shown();
         self.components = 1;
@@ -225,17 +224,22 @@ impl<'c, 'a> Walker<'c, 'a> {
     }
 
     /// Finds `values` numbers; those that were read are no longer in the budget.
-    fn take(&mut self, stored: Stored, values: usize, what: &str) -> Result<Numbers, ParseError> {
+    fn take(
+        &mut self,
+        stored: VtkType,
+        values: usize,
+        what: &str,
+    ) -> Result<ArrayNumbers, ParseError> {
         let how = (self.encoding, self.budget);
         let numbers = take_values(&mut self.cursor, how, stored, values, what)?;
-        if let Numbers::Decoded(data) = &numbers {
+        if let ArrayNumbers::Decoded(data) = &numbers {
             self.budget = self.budget.less(data.byte_len());
         }
         Ok(numbers)
     }
 
     /// `LOOKUP_TABLE name size`: RGBA, bytes in binary.
-    fn lookup_table(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn lookup_table(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         let words = line.words();
         let colors = count(line, words.last())?;
         let values = value_count(line.at, colors, 4)?;
@@ -244,7 +248,7 @@ impl<'c, 'a> Walker<'c, 'a> {
 
     /// `FIELD name k` and its arrays. Fewer than `k` may follow: SPlisHSPlasH counts arrays that
     /// it does not write.
-    fn field(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn field(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         let arrays = count(line, line.words().last())?;
         let mut done = 0;
         while done < arrays {
@@ -267,7 +271,7 @@ impl<'c, 'a> Walker<'c, 'a> {
             } else if !next.starts_with("NULL_ARRAY") {
                 return Err(ParseError::malformed(
                     next.at,
-                    format!("`{}` is no array of a FIELD", next.shown()),
+                    format!("`{}` is not an array of a FIELD", next.shown()),
                 ));
             }
             done += 1;
@@ -275,7 +279,7 @@ impl<'c, 'a> Walker<'c, 'a> {
         Ok(())
     }
 
-    fn attribute(&mut self, line: &Line) -> Result<(), ParseError> {
+    fn attribute(&mut self, line: &VtkLine) -> Result<(), ParseError> {
         match keyword_array(line, &mut self.cursor, self.encoding)? {
             Some(header) => self.array(line, header),
             None => Err(ParseError::malformed(
@@ -286,8 +290,8 @@ impl<'c, 'a> Walker<'c, 'a> {
     }
 
     /// Takes the payload of one array and keeps it if it is numeric and per particle.
-    fn array(&mut self, line: &Line, header: Header) -> Result<(), ParseError> {
-        let Header {
+    fn array(&mut self, line: &VtkLine, header: ArrayHeader) -> Result<(), ParseError> {
+        let ArrayHeader {
             name,
             components,
             tuples,
@@ -296,8 +300,8 @@ impl<'c, 'a> Walker<'c, 'a> {
         let particles = self.points.as_ref().map(|points| points.count);
         // Some writers leave POINT_DATA out; outside a FIELD that is what they mean.
         let section = match self.section {
-            Section::Points(n) | Section::Cells(n) => Some(n),
-            Section::Dataset => particles,
+            ArrayOwner::Points(n) | ArrayOwner::Cells(n) => Some(n),
+            ArrayOwner::Dataset => particles,
         };
         let Some(tuples) = tuples.or(section) else {
             return Err(ParseError::malformed(
@@ -306,9 +310,9 @@ impl<'c, 'a> Walker<'c, 'a> {
             ));
         };
         let is_ours = match self.section {
-            Section::Points(n) => n == tuples,
-            Section::Cells(_) => false,
-            Section::Dataset => is_keyword(line.first_word()) && particles == Some(tuples),
+            ArrayOwner::Points(n) => n == tuples,
+            ArrayOwner::Cells(_) => false,
+            ArrayOwner::Dataset => is_keyword(line.first_word()) && particles == Some(tuples),
         };
         let values = value_count(line.at, tuples, components)?;
         if components > MOST_COMPONENTS {
@@ -319,8 +323,8 @@ impl<'c, 'a> Walker<'c, 'a> {
         }
         self.components = components;
         let what = line.shown();
-        let is_time = self.section == Section::Dataset && values == 1 && is_time_name(&name);
-        if stored == Stored::Text || components == 0 || !(is_ours || is_time) {
+        let is_time = self.section == ArrayOwner::Dataset && values == 1 && is_time_name(&name);
+        if stored == VtkType::Text || components == 0 || !(is_ours || is_time) {
             return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
         }
         let numbers = self.take(stored, values, &what)?;

@@ -11,7 +11,7 @@ use crate::ParseError;
 /// share them could ask for work that grows with the square of its length.
 const MOST_READS: usize = 4;
 
-/// The blob behind the underscore.
+/// The blob after the underscore.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Appended<'a> {
     /// Byte of the file where the blob begins; offsets count from here.

@@ -25,7 +25,7 @@ const BASE64: GeneralPurpose = GeneralPurpose::new(
 
 /// How arrays are stored; attributes of the root element.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Encoding {
+pub(super) struct ArrayEncoding {
     pub(super) endian: Endian,
     pub(super) header: HeaderType,
     pub(super) compressor: Option<Compressor>,
@@ -33,22 +33,22 @@ pub(super) struct Encoding {
     pub(super) decoders: MemoryBudget,
 }
 
-/// Why an array cannot be had.
+/// Why an array cannot be read.
 #[derive(Debug)]
-pub(super) enum Fault {
+pub(super) enum ArrayFault {
     /// What is wrong with its bytes.
     Damaged(String),
     /// It needs too much memory.
     TooLarge(ParseError),
 }
 
-impl From<String> for Fault {
+impl From<String> for ArrayFault {
     fn from(what: String) -> Self {
         Self::Damaged(what)
     }
 }
 
-impl From<&str> for Fault {
+impl From<&str> for ArrayFault {
     fn from(what: &str) -> Self {
         Self::Damaged(what.to_owned())
     }
@@ -70,14 +70,14 @@ impl HeaderType {
     }
 }
 
-/// Bytes or characters that begin with the header of an array and go on at least to its end.
+/// Bytes or characters from the header of an array to its end, or further.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Source<'a> {
+pub(super) enum EncodedBytes<'a> {
     Raw(&'a [u8]),
     Base64(&'a [u8]),
 }
 
-impl<'a> Source<'a> {
+impl<'a> EncodedBytes<'a> {
     /// Bytes or characters that are left.
     const fn len(self) -> usize {
         match self {
@@ -85,7 +85,7 @@ impl<'a> Source<'a> {
         }
     }
 
-    /// The next `count` bytes, encoded as one run, and the source behind them.
+    /// The next `count` bytes, encoded as one run, and the source after them.
     fn run(self, count: usize) -> Result<(Cow<'a, [u8]>, Self), String> {
         match self {
             Self::Raw(bytes) => match bytes.split_at_checked(count) {
@@ -139,9 +139,9 @@ fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), String> {
 /// Where data without a compressor are.
 enum DataRun<'a> {
     /// In a run of their own (or raw).
-    New(Source<'a>),
+    New(EncodedBytes<'a>),
     /// Behind the header in the run that begins here.
-    Same(Source<'a>),
+    Same(EncodedBytes<'a>),
 }
 
 /// Up to `count` characters that are not white space (fewer at the end), and the rest.
@@ -175,10 +175,10 @@ fn take_chars(chars: &[u8], count: usize) -> (Cow<'_, [u8]>, &[u8]) {
 /// What is wrong: the header states another length, the source is too short, or a block is damaged.
 /// Nothing is allocated that the bytes at hand could not fill, or that decoders may not take.
 pub(super) fn payload<'a>(
-    source: Source<'a>,
-    encoding: Encoding,
+    source: EncodedBytes<'a>,
+    encoding: ArrayEncoding,
     need: usize,
-) -> Result<(Cow<'a, [u8]>, usize), Fault> {
+) -> Result<(Cow<'a, [u8]>, usize), ArrayFault> {
     let (bytes, rest) = match encoding.compressor {
         None => plain(source, encoding, need)?,
         Some(compressor) => compressed(source, encoding, compressor, need)?,
@@ -186,10 +186,14 @@ pub(super) fn payload<'a>(
     Ok((bytes, source.len() - rest.len()))
 }
 
-/// The bytes of an array, and what is behind them.
-type Payload<'a> = (Cow<'a, [u8]>, Source<'a>);
+/// The bytes of an array, and what follows them.
+type Payload<'a> = (Cow<'a, [u8]>, EncodedBytes<'a>);
 
-fn plain<'a>(source: Source<'a>, encoding: Encoding, need: usize) -> Result<Payload<'a>, String> {
+fn plain<'a>(
+    source: EncodedBytes<'a>,
+    encoding: ArrayEncoding,
+    need: usize,
+) -> Result<Payload<'a>, String> {
     let header = encoding.header.size();
     let (length, data) = source.length_and_data(header)?;
     let stated = integers(&length, encoding).next().unwrap_or(0);
@@ -210,11 +214,11 @@ fn plain<'a>(source: Source<'a>, encoding: Encoding, need: usize) -> Result<Payl
 }
 
 fn compressed<'a>(
-    source: Source<'a>,
-    encoding: Encoding,
+    source: EncodedBytes<'a>,
+    encoding: ArrayEncoding,
     compressor: Compressor,
     need: usize,
-) -> Result<Payload<'a>, Fault> {
+) -> Result<Payload<'a>, ArrayFault> {
     let size = encoding.header.size();
     let (first, rest) = source.run(size)?;
     let blocks = integers(&first, encoding).next().unwrap_or(0);
@@ -236,11 +240,11 @@ fn compressed<'a>(
 /// Decompresses all blocks, in parallel, once their sizes have been found to add up.
 fn inflate<'a>(
     header: &[u8],
-    data: Source<'a>,
-    encoding: Encoding,
+    data: EncodedBytes<'a>,
+    encoding: ArrayEncoding,
     compressor: Compressor,
     need: usize,
-) -> Result<Payload<'a>, Fault> {
+) -> Result<Payload<'a>, ArrayFault> {
     let mut header = integers(header, encoding);
     let (_, block_size, last) = (header.next(), header.next(), header.next());
     let block_size = block_size.unwrap_or(0);
@@ -299,29 +303,29 @@ fn inflate<'a>(
 /// The most that decompressing one of `blocks` takes beside its output.
 ///
 /// # Errors
-/// [`Fault::TooLarge`] if that is more than `budget`.
+/// [`ArrayFault::TooLarge`] if that is more than `budget`.
 fn decoder_bytes(
     blocks: &[&[u8]],
     compressor: Compressor,
     budget: MemoryBudget,
-) -> Result<u64, Fault> {
+) -> Result<u64, ArrayFault> {
     let each = blocks.iter().map(|block| compressor.memory(block));
     let each = each.max().unwrap_or(0);
     let what = format!("a compressed block needs {} MiB", each.div_ceil(1 << 20));
     let most = Compressor::MOST_MEMORY;
     if each > most {
-        return Err(Fault::Damaged(format!(
+        return Err(ArrayFault::Damaged(format!(
             "{what} for its dictionary, presets of xz no more than {} MiB; write it with a preset",
             most >> 20
         )));
     }
     let what = format!("{what} for its dictionary, which is");
-    budget.check(each, &what).map_err(Fault::TooLarge)?;
+    budget.check(each, &what).map_err(ArrayFault::TooLarge)?;
     Ok(each)
 }
 
 /// The integers of a header.
-fn integers(bytes: &[u8], encoding: Encoding) -> impl Iterator<Item = u64> + '_ {
+fn integers(bytes: &[u8], encoding: ArrayEncoding) -> impl Iterator<Item = u64> + '_ {
     bytes
         .chunks_exact(encoding.header.size())
         .map(move |chunk| {

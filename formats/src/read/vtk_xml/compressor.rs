@@ -79,7 +79,7 @@ impl Compressor {
                         usize::try_from(zlib.total_out()).unwrap_or(usize::MAX)
                     }
                     Ok(_) => {
-                        return Err(format!("zlib stream is no {wanted} bytes or is cut short"));
+                        return Err(format!("zlib stream is not {wanted} bytes or is cut short"));
                     }
                     Err(error) => return Err(format!("zlib: {error}")),
                 }

@@ -1,5 +1,5 @@
-//! The XML part of the file: which arrays there are, of what type, and where their bytes lie. What
-//! the bytes say is left to [`super::blocks`].
+//! The XML part of the file: which arrays there are, of what type, and where their bytes are. What
+//! the bytes contain is left to [`super::blocks`].
 //!
 //! Raw appended data makes the file invalid XML (it holds `<`, `&` and NUL), so the file is cut
 //! before `<AppendedData` and only the part in front meets the XML parser.
@@ -10,16 +10,16 @@ use quick_xml::XmlVersion;
 use quick_xml::events::{BytesStart, Event};
 use quick_xml::reader::Reader;
 
-use super::blocks::{Encoding, HeaderType};
+use super::blocks::{ArrayEncoding, HeaderType};
 use super::compressor::Compressor;
 use crate::{Endian, MemoryBudget, ParseError};
 
-/// What the XML says.
+/// The parsed XML.
 #[derive(Debug)]
-pub(super) struct Document<'a> {
-    pub(super) encoding: Encoding,
+pub(super) struct XmlDocument<'a> {
+    pub(super) encoding: ArrayEncoding,
     /// Arrays of the dataset as a whole: the time.
-    pub(super) fields: Vec<Array<'a>>,
+    pub(super) fields: Vec<DataArray<'a>>,
     pub(super) pieces: Vec<Piece<'a>>,
 }
 
@@ -27,65 +27,65 @@ pub(super) struct Document<'a> {
 #[derive(Debug)]
 pub(super) struct Piece<'a> {
     pub(super) points: usize,
-    pub(super) coordinates: Option<Array<'a>>,
-    pub(super) point_data: Vec<Array<'a>>,
+    pub(super) coordinates: Option<DataArray<'a>>,
+    pub(super) point_data: Vec<DataArray<'a>>,
 }
 
 /// One `<DataArray>`.
 #[derive(Debug)]
-pub(super) struct Array<'a> {
+pub(super) struct DataArray<'a> {
     /// Byte where its tag ends.
     pub(super) at: usize,
     pub(super) name: String,
     pub(super) type_name: String,
     pub(super) components: Option<usize>,
     pub(super) tuples: Option<usize>,
-    pub(super) place: Place<'a>,
+    pub(super) place: ArrayLocation<'a>,
 }
 
-/// Where the numbers of an array are.
+/// Where the numbers of an array are stored.
 #[derive(Debug)]
-pub(super) enum Place<'a> {
+pub(super) enum ArrayLocation<'a> {
     /// As text inside the element.
-    Ascii(Text<'a>),
+    Ascii(ElementText<'a>),
     /// As base64 inside the element.
-    Inline(Text<'a>),
-    /// In the appended data, this far behind the underscore.
+    Inline(ElementText<'a>),
+    /// In the appended data, at this offset from the underscore.
     Appended(usize),
 }
 
 /// Text of an element, without that of its children.
 #[derive(Debug, Default)]
-pub(super) struct Text<'a> {
+pub(super) struct ElementText<'a> {
     pub(super) at: usize,
     pub(super) text: Cow<'a, str>,
 }
 
 /// Elements that matter; what an element means depends on its parent.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-enum Tag {
+enum XmlElement {
     Root,
     Dataset,
     Piece,
     Points,
     PointData,
     FieldData,
-    Array,
+    DataArray,
     Other,
 }
 
-/// How far to parse.
+/// Where to stop parsing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Until {
+pub(super) enum ParseEnd {
     FirstPiece,
     End,
 }
 
-impl<'a> Document<'a> {
-    /// Parses `head`, the XML in front of the appended data. `is_cut` says that appended data
+impl<'a> XmlDocument<'a> {
+    /// Parses `head`, the XML in front of the appended data. `is_cut` is true if appended data
     /// follow, so that open elements at the end are right.
-    pub(super) fn parse(head: &'a str, is_cut: bool, until: Until) -> Result<Self, ParseError> {
-        let mut parser = Parser {
+    pub(super) fn parse(head: &'a str, is_cut: bool, until: ParseEnd) -> Result<Self, ParseError> {
+        let mut parser = XmlParser {
             document: None,
             path: Vec::new(),
         };
@@ -97,7 +97,7 @@ impl<'a> Document<'a> {
             match event {
                 Ok(Event::Start(start)) => {
                     let tag = parser.open(&start, at)?;
-                    if tag == Tag::Piece && until == Until::FirstPiece {
+                    if tag == XmlElement::Piece && until == ParseEnd::FirstPiece {
                         break;
                     }
                     parser.path.push(tag);
@@ -106,7 +106,7 @@ impl<'a> Document<'a> {
                     parser.open(&start, at)?;
                 }
                 Ok(Event::End(_)) => {
-                    is_closed |= parser.path.pop() == Some(Tag::Root);
+                    is_closed |= parser.path.pop() == Some(XmlElement::Root);
                 }
                 Ok(Event::Text(text)) => parser.text(text.into_inner(), at),
                 Ok(Event::CData(text)) => parser.text(text.into_inner(), at),
@@ -127,14 +127,14 @@ impl<'a> Document<'a> {
     }
 }
 
-struct Parser<'a> {
-    document: Option<Document<'a>>,
-    path: Vec<Tag>,
+struct XmlParser<'a> {
+    document: Option<XmlDocument<'a>>,
+    path: Vec<XmlElement>,
 }
 
-impl<'a> Parser<'a> {
-    /// Takes note of an element that begins and says what it is.
-    fn open(&mut self, start: &BytesStart<'_>, at: usize) -> Result<Tag, ParseError> {
+impl<'a> XmlParser<'a> {
+    /// Records the start of an element and returns its kind.
+    fn open(&mut self, start: &BytesStart<'_>, at: usize) -> Result<XmlElement, ParseError> {
         let name = start.local_name();
         let name: &str = name.as_ref();
         let Some(document) = &mut self.document else {
@@ -144,42 +144,45 @@ impl<'a> Parser<'a> {
                     format!("the root element is <{}>, not <VTKFile>", short(name)),
                 ));
             }
-            self.document = Some(Document {
+            self.document = Some(XmlDocument {
                 encoding: root(start, at)?,
                 fields: Vec::new(),
                 pieces: Vec::new(),
             });
-            return Ok(Tag::Root);
+            return Ok(XmlElement::Root);
         };
         let parent = self.path.last().copied();
         let tag = match (parent, name) {
-            (Some(Tag::Root | Tag::Dataset | Tag::Piece), "FieldData") => Tag::FieldData,
-            (Some(Tag::Root), _) => Tag::Dataset,
-            (Some(Tag::Dataset), "Piece") => Tag::Piece,
-            (Some(Tag::Piece), "Points") => Tag::Points,
-            (Some(Tag::Piece), "PointData") => Tag::PointData,
-            (Some(Tag::Points | Tag::PointData | Tag::FieldData), "DataArray" | "Array") => {
-                Tag::Array
+            (Some(XmlElement::Root | XmlElement::Dataset | XmlElement::Piece), "FieldData") => {
+                XmlElement::FieldData
             }
-            _ => Tag::Other,
+            (Some(XmlElement::Root), _) => XmlElement::Dataset,
+            (Some(XmlElement::Dataset), "Piece") => XmlElement::Piece,
+            (Some(XmlElement::Piece), "Points") => XmlElement::Points,
+            (Some(XmlElement::Piece), "PointData") => XmlElement::PointData,
+            (
+                Some(XmlElement::Points | XmlElement::PointData | XmlElement::FieldData),
+                "DataArray" | "Array",
+            ) => XmlElement::DataArray,
+            _ => XmlElement::Other,
         };
-        if tag == Tag::Piece {
+        if tag == XmlElement::Piece {
             document.pieces.push(Piece {
                 points: required_count(start, at, "NumberOfPoints")?,
                 coordinates: None,
                 point_data: Vec::new(),
             });
         }
-        if tag == Tag::Array {
+        if tag == XmlElement::DataArray {
             let array = array(start, at)?;
             match (parent, document.pieces.last_mut()) {
-                (Some(Tag::FieldData), _) => document.fields.push(array),
-                (Some(Tag::PointData), Some(piece)) => piece.point_data.push(array),
+                (Some(XmlElement::FieldData), _) => document.fields.push(array),
+                (Some(XmlElement::PointData), Some(piece)) => piece.point_data.push(array),
                 // The first array is the points, whatever its name.
-                (Some(Tag::Points), Some(piece)) if piece.coordinates.is_none() => {
+                (Some(XmlElement::Points), Some(piece)) if piece.coordinates.is_none() => {
                     piece.coordinates = Some(array);
                 }
-                _ => return Ok(Tag::Other),
+                _ => return Ok(XmlElement::Other),
             }
         }
         Ok(tag)
@@ -188,19 +191,21 @@ impl<'a> Parser<'a> {
     /// Adds text to the array that is open, if it is the innermost element.
     fn text(&mut self, text: Cow<'a, str>, end: usize) {
         let mut path = self.path.iter().rev();
-        if path.next() != Some(&Tag::Array) || text.trim_ascii().is_empty() {
+        if path.next() != Some(&XmlElement::DataArray) || text.trim_ascii().is_empty() {
             return;
         }
         let Some(document) = &mut self.document else {
             return;
         };
         let array = match (path.next(), document.pieces.last_mut()) {
-            (Some(Tag::FieldData), _) => document.fields.last_mut(),
-            (Some(Tag::PointData), Some(piece)) => piece.point_data.last_mut(),
-            (Some(Tag::Points), Some(piece)) => piece.coordinates.as_mut(),
+            (Some(XmlElement::FieldData), _) => document.fields.last_mut(),
+            (Some(XmlElement::PointData), Some(piece)) => piece.point_data.last_mut(),
+            (Some(XmlElement::Points), Some(piece)) => piece.coordinates.as_mut(),
             _ => None,
         };
-        let Some(Place::Ascii(place) | Place::Inline(place)) = array.map(|a| &mut a.place) else {
+        let Some(ArrayLocation::Ascii(place) | ArrayLocation::Inline(place)) =
+            array.map(|a| &mut a.place)
+        else {
             return;
         };
         if place.text.is_empty() {
@@ -215,7 +220,7 @@ impl<'a> Parser<'a> {
 }
 
 /// Checks the root element and reads how arrays are encoded.
-fn root(start: &BytesStart<'_>, at: usize) -> Result<Encoding, ParseError> {
+fn root(start: &BytesStart<'_>, at: usize) -> Result<ArrayEncoding, ParseError> {
     let kind = attribute(start, at, "type")?.unwrap_or_default();
     match kind.as_str() {
         "UnstructuredGrid" | "PolyData" => {}
@@ -259,7 +264,7 @@ fn root(start: &BytesStart<'_>, at: usize) -> Result<Encoding, ParseError> {
         None | Some("") => None,
         Some(name) => Some(Compressor::from_name(name)?),
     };
-    Ok(Encoding {
+    Ok(ArrayEncoding {
         endian,
         header,
         compressor,
@@ -267,12 +272,12 @@ fn root(start: &BytesStart<'_>, at: usize) -> Result<Encoding, ParseError> {
     })
 }
 
-fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<Array<'a>, ParseError> {
+fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<DataArray<'a>, ParseError> {
     let format = attribute(start, at, "format")?.unwrap_or_default();
     let place = match format.to_ascii_lowercase().as_str() {
-        "ascii" | "" => Place::Ascii(Text::default()),
-        "binary" => Place::Inline(Text::default()),
-        "appended" => Place::Appended(required_count(start, at, "offset")?),
+        "ascii" | "" => ArrayLocation::Ascii(ElementText::default()),
+        "binary" => ArrayLocation::Inline(ElementText::default()),
+        "appended" => ArrayLocation::Appended(required_count(start, at, "offset")?),
         _ => {
             return Err(ParseError::malformed(
                 at,
@@ -283,7 +288,7 @@ fn array<'a>(start: &BytesStart<'_>, at: usize) -> Result<Array<'a>, ParseError>
             ));
         }
     };
-    Ok(Array {
+    Ok(DataArray {
         at,
         name: attribute(start, at, "Name")?.unwrap_or_default(),
         type_name: attribute(start, at, "type")?.unwrap_or_default(),
@@ -313,7 +318,7 @@ fn optional_count(
         None => Ok(None),
         Some(value) if value.is_empty() => Ok(None),
         Some(value) => value.parse().map(Some).map_err(|_| {
-            ParseError::malformed(at, format!("{name}=\"{}\" is no count", short(&value)))
+            ParseError::malformed(at, format!("{name}=\"{}\" is not a count", short(&value)))
         }),
     }
 }

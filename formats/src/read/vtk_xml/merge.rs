@@ -3,14 +3,14 @@
 use std::collections::{HashMap, HashSet};
 
 use super::appended::Appended;
-use super::document::{Array, Document, Piece};
+use super::document::{DataArray, Piece, XmlDocument};
 use super::{scalar_type, value_count, values};
 use crate::read::vtk;
 use crate::{Attribute, AttributeData, ParseError, Positions, ScalarType};
 
 /// The positions of all pieces; double precision if any piece has it.
 pub(super) fn positions(
-    document: &Document<'_>,
+    document: &XmlDocument<'_>,
     appended: Option<Appended<'_>>,
 ) -> Result<Positions, ParseError> {
     let mut joined = Positions::F32(Vec::new());
@@ -60,7 +60,7 @@ fn into_f64(positions: Positions) -> Vec<glam::DVec3> {
 
 /// The attributes that every piece with particles has, with the same type and components.
 pub(super) fn attributes(
-    document: &Document<'_>,
+    document: &XmlDocument<'_>,
     appended: Option<Appended<'_>>,
 ) -> Result<Vec<Attribute>, ParseError> {
     let mut pieces: Vec<&Piece<'_>> = filled(document).collect();
@@ -72,7 +72,7 @@ pub(super) fn attributes(
         return Ok(Vec::new());
     };
     // A file may list as many arrays as it has room for: each is looked up, never searched for.
-    let others: Vec<(&Piece<'_>, ByKind<'_, '_>)> =
+    let others: Vec<(&Piece<'_>, ArraysByKind<'_, '_>)> =
         others.iter().map(|p| (*p, by_kind(p))).collect();
     let mut tried = HashSet::new();
     let mut names = HashSet::new();
@@ -84,7 +84,7 @@ pub(super) fn attributes(
         if components == 0 || !tried.insert(kind) || names.contains(array.name.as_str()) {
             continue;
         }
-        let everywhere: Option<Vec<&Array<'_>>> = others
+        let everywhere: Option<Vec<&DataArray<'_>>> = others
             .iter()
             .map(|(_, arrays)| arrays.get(&kind).copied())
             .collect();
@@ -113,17 +113,17 @@ pub(super) fn attributes(
 }
 
 /// Pieces that hold particles; VTK drops the attributes of the others.
-fn filled<'d, 'a>(document: &'d Document<'a>) -> impl Iterator<Item = &'d Piece<'a>> {
+fn filled<'d, 'a>(document: &'d XmlDocument<'a>) -> impl Iterator<Item = &'d Piece<'a>> {
     document.pieces.iter().filter(|piece| piece.points > 0)
 }
 
 /// What arrays of two pieces must share to be joined: name, components and type.
-type Kind<'p> = (&'p str, usize, Option<ScalarType>);
+type AttributeKind<'p> = (&'p str, usize, Option<ScalarType>);
 
 /// The first array of each kind in a piece.
-type ByKind<'p, 'a> = HashMap<Kind<'p>, &'p Array<'a>>;
+type ArraysByKind<'p, 'a> = HashMap<AttributeKind<'p>, &'p DataArray<'a>>;
 
-fn kind<'p>(array: &'p Array<'_>) -> Kind<'p> {
+fn kind<'p>(array: &'p DataArray<'_>) -> AttributeKind<'p> {
     (
         &array.name,
         array.components.unwrap_or(1),
@@ -131,7 +131,7 @@ fn kind<'p>(array: &'p Array<'_>) -> Kind<'p> {
     )
 }
 
-fn by_kind<'p, 'a>(piece: &'p Piece<'a>) -> ByKind<'p, 'a> {
+fn by_kind<'p, 'a>(piece: &'p Piece<'a>) -> ArraysByKind<'p, 'a> {
     let mut arrays = HashMap::with_capacity(piece.point_data.len());
     for array in &piece.point_data {
         arrays.entry(kind(array)).or_insert(array);
@@ -139,7 +139,7 @@ fn by_kind<'p, 'a>(piece: &'p Piece<'a>) -> ByKind<'p, 'a> {
     arrays
 }
 
-/// Appends `more`, which has the same type: it is of the same [`Kind`].
+/// Appends `more`, which has the same type: it is of the same [`AttributeKind`].
 fn extend(data: &mut AttributeData, more: AttributeData) {
     use AttributeData::{F32, F64, I8, I16, I32, I64, U8, U16, U32, U64};
     match (data, more) {
@@ -157,9 +157,9 @@ fn extend(data: &mut AttributeData, more: AttributeData) {
     }
 }
 
-fn not_numeric(array: &Array<'_>) -> ParseError {
+fn not_numeric(array: &DataArray<'_>) -> ParseError {
     ParseError::malformed(
         array.at,
-        format!("type `{}` is no number", super::short(&array.type_name)),
+        format!("type `{}` is not a number", super::short(&array.type_name)),
     )
 }

@@ -1,7 +1,7 @@
 //! XML VTK (`.vtu`, `.vtp`): the points of UnstructuredGrid and PolyData with all numeric point
 //! data, from any number of pieces, in every encoding that VTK, meshio and pyvisfile write.
 //!
-//! `document` reads the XML, `appended` finds the blob behind it, `blocks` gets the bytes of
+//! `document` reads the XML, `appended` finds the blob after it, `blocks` gets the bytes of
 //! an array out of either, `compressor` unpacks them, `merge` puts pieces together. Files that
 //! only list other files (`.pvtu`, `.vtm`, `.pvd`) and grids are refused by name. Layout after "VTK
 //! File Formats" (the VTK user's guide) and after files of VTK 9, ParaView, meshio and PySPH.
@@ -26,8 +26,8 @@ use crate::format::Format;
 use crate::reader::{Confidence, FileExtent, Reader};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
-use blocks::{Encoding, Fault, Source, payload};
-use document::{Array, Document, Place, Until, short};
+use blocks::{ArrayEncoding, ArrayFault, EncodedBytes, payload};
+use document::{ArrayLocation, DataArray, ParseEnd, XmlDocument, short};
 
 /// XML VTK: `.vtu` and `.vtp`.
 pub const FORMAT: Format = Format::new(&XmlVtk);
@@ -55,7 +55,7 @@ impl Reader for XmlVtk {
     ) -> Result<Vec<Step>, ParseError> {
         let bytes = source.bytes();
         let mut step = Step::whole(bytes.len());
-        step.time = parse(bytes, Until::FirstPiece, |mut document, appended| {
+        step.time = parse(bytes, ParseEnd::FirstPiece, |mut document, appended| {
             document.encoding.decoders = budget;
             Ok(time(&document, appended))
         })
@@ -73,7 +73,7 @@ impl Reader for XmlVtk {
         _step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
-        parse(source.bytes(), Until::End, |mut document, appended| {
+        parse(source.bytes(), ParseEnd::End, |mut document, appended| {
             check_shares(&document, appended)?;
             document.encoding.decoders = check_memory(&document, budget)?;
             Ok(RawParticles {
@@ -98,14 +98,14 @@ impl Reader for XmlVtk {
 /// Cuts the file, parses the XML in front and hands both parts on.
 fn parse<T>(
     bytes: &[u8],
-    until: Until,
-    then: impl FnOnce(Document<'_>, Option<Appended<'_>>) -> Result<T, ParseError>,
+    until: ParseEnd,
+    then: impl FnOnce(XmlDocument<'_>, Option<Appended<'_>>) -> Result<T, ParseError>,
 ) -> Result<T, ParseError> {
     let cut = appended::find(bytes);
     let head = bytes.get(..cut.unwrap_or(bytes.len())).unwrap_or_default();
     // Names in another encoding than UTF-8 are no reason to refuse the numbers.
     let head = same_length(head);
-    let document = Document::parse(&head, cut.is_some(), until)?;
+    let document = XmlDocument::parse(&head, cut.is_some(), until)?;
     check_total(&document, bytes.len())?;
     let spent = Cell::new(0);
     let appended = cut.map(|tag| Appended::parse(bytes, tag, &spent));
@@ -113,9 +113,9 @@ fn parse<T>(
     then(document, appended)
 }
 
-/// Refuses particle counts that no file of this length can hold; pieces that share their bytes
+/// Rejects particle counts that no file of this length can hold; pieces that share their bytes
 /// would get past the check of each array.
-fn check_total(document: &Document<'_>, file: usize) -> Result<(), ParseError> {
+fn check_total(document: &XmlDocument<'_>, file: usize) -> Result<(), ParseError> {
     let most = match document.encoding.compressor {
         Some(compressor) => compressor.most_output(file),
         None => file,
@@ -134,9 +134,12 @@ fn check_total(document: &Document<'_>, file: usize) -> Result<(), ParseError> {
     }
 }
 
-/// Refuses appended arrays that together need more than the appended bytes can hold: they share bytes, and
+/// Rejects appended arrays that together need more than the appended bytes can hold: they share bytes, and
 /// a small file with many such arrays would fill the memory.
-fn check_shares(document: &Document<'_>, appended: Option<Appended<'_>>) -> Result<(), ParseError> {
+fn check_shares(
+    document: &XmlDocument<'_>,
+    appended: Option<Appended<'_>>,
+) -> Result<(), ParseError> {
     let Some(appended) = appended else {
         return Ok(());
     };
@@ -147,7 +150,7 @@ fn check_shares(document: &Document<'_>, appended: Option<Appended<'_>>) -> Resu
     };
     let mut need = 0_usize;
     for (array, bytes) in array_sizes(document) {
-        if !matches!(array.place, Place::Appended(_)) {
+        if !matches!(array.place, ArrayLocation::Appended(_)) {
             continue;
         }
         need = need.saturating_add(bytes);
@@ -165,8 +168,11 @@ fn check_shares(document: &Document<'_>, appended: Option<Appended<'_>>) -> Resu
     Ok(())
 }
 
-/// Refuses arrays that together take more memory than is allowed, before any is unpacked. Returns what is left.
-fn check_memory(document: &Document<'_>, budget: MemoryBudget) -> Result<MemoryBudget, ParseError> {
+/// Rejects arrays that together take more memory than is allowed, before any is unpacked. Returns what is left.
+fn check_memory(
+    document: &XmlDocument<'_>,
+    budget: MemoryBudget,
+) -> Result<MemoryBudget, ParseError> {
     let sizes = array_sizes(document).map(|(_, bytes)| bytes as u64);
     let need = sizes.fold(0, u64::saturating_add);
     // The largest is there twice: as bytes, and as numbers.
@@ -177,7 +183,9 @@ fn check_memory(document: &Document<'_>, budget: MemoryBudget) -> Result<MemoryB
 }
 
 /// The numeric arrays and the bytes that their numbers take.
-fn array_sizes<'d, 'a>(document: &'d Document<'a>) -> impl Iterator<Item = (&'d Array<'a>, usize)> {
+fn array_sizes<'d, 'a>(
+    document: &'d XmlDocument<'a>,
+) -> impl Iterator<Item = (&'d DataArray<'a>, usize)> {
     document.pieces.iter().flat_map(|piece| {
         let coordinates = piece.coordinates.iter().map(|array| (array, 3));
         let data = piece.point_data.iter();
@@ -193,9 +201,9 @@ fn array_sizes<'d, 'a>(document: &'d Document<'a>) -> impl Iterator<Item = (&'d 
 /// A field of times has no more numbers: it is read before anything is known of the rest.
 const MOST_TIMES: usize = 1 << 16;
 
-/// The simulation time, if a field tells one. It is extra: a damaged field costs only the time.
-fn time(document: &Document<'_>, appended: Option<Appended<'_>>) -> Option<f64> {
-    let is_time = |array: &&Array<'_>| {
+/// The simulation time, if a field has it. It is optional: a damaged field costs only the time.
+fn time(document: &XmlDocument<'_>, appended: Option<Appended<'_>>) -> Option<f64> {
+    let is_time = |array: &&DataArray<'_>| {
         ["TimeValue", "TIME"]
             .iter()
             .any(|name| array.name.eq_ignore_ascii_case(name))
@@ -210,7 +218,7 @@ fn time(document: &Document<'_>, appended: Option<Appended<'_>>) -> Option<f64> 
     (!data.is_empty()).then(|| data.get_f64(0))
 }
 
-/// Type names; `None` for strings and other things that are no numbers.
+/// Type names; `None` for strings and other things that are not numbers.
 fn scalar_type(name: &str) -> Option<ScalarType> {
     Some(match name.to_ascii_lowercase().as_str() {
         "int8" => ScalarType::I8,
@@ -232,8 +240,8 @@ fn scalar_type(name: &str) -> Option<ScalarType> {
 /// # Errors
 /// Malformed, naming the array, if there are not exactly that many.
 fn values(
-    array: &Array<'_>,
-    encoding: Encoding,
+    array: &DataArray<'_>,
+    encoding: ArrayEncoding,
     appended: Option<Appended<'_>>,
     count: usize,
 ) -> Result<Option<AttributeData>, ParseError> {
@@ -249,7 +257,7 @@ fn values(
     let need = count.checked_mul(scalar.size());
     let need = need.ok_or_else(|| fault(array.at, format!("{count} numbers are too many")))?;
     let (at, source) = match &array.place {
-        Place::Ascii(text) => {
+        ArrayLocation::Ascii(text) => {
             let bytes = text.text.as_bytes();
             let (data, end) =
                 parse_values(bytes, 0, count, scalar).map_err(|error| match error {
@@ -265,8 +273,8 @@ fn values(
             }
             return Ok(Some(data));
         }
-        Place::Inline(text) => (text.at, Source::Base64(text.text.as_bytes())),
-        Place::Appended(offset) => {
+        ArrayLocation::Inline(text) => (text.at, EncodedBytes::Base64(text.text.as_bytes())),
+        ArrayLocation::Appended(offset) => {
             let Some(appended) = appended else {
                 return Err(fault(array.at, "the file has no <AppendedData>".to_owned()));
             };
@@ -278,20 +286,20 @@ fn values(
                 ));
             };
             let source = if appended.is_base64 {
-                Source::Base64(from)
+                EncodedBytes::Base64(from)
             } else {
-                Source::Raw(from)
+                EncodedBytes::Raw(from)
             };
             (appended.at + offset, source)
         }
     };
     let (bytes, used) = payload(source, encoding, need).map_err(|why| match why {
-        Fault::Damaged(what) => fault(at, what),
-        Fault::TooLarge(error) => {
+        ArrayFault::Damaged(what) => fault(at, what),
+        ArrayFault::TooLarge(error) => {
             error.retold(|what| format!("array `{}`: {what}", short(&array.name)))
         }
     })?;
-    let is_appended = matches!(array.place, Place::Appended(_));
+    let is_appended = matches!(array.place, ArrayLocation::Appended(_));
     if is_appended && !appended.is_none_or(|appended| appended.spend(used)) {
         let what = "it shares its bytes with too many others; each array needs bytes of its own";
         return Err(fault(at, what.to_owned()));
@@ -301,7 +309,11 @@ fn values(
 }
 
 /// `points * components`, checked.
-fn value_count(array: &Array<'_>, points: usize, components: usize) -> Result<usize, ParseError> {
+fn value_count(
+    array: &DataArray<'_>,
+    points: usize,
+    components: usize,
+) -> Result<usize, ParseError> {
     points
         .checked_mul(components)
         .filter(|_| components <= MOST_COMPONENTS)

@@ -1,10 +1,10 @@
-//! `.xyz`: three unrelated formats under one extension, told apart by [`kind`].
+//! `.xyz`: three unrelated formats under one extension; [`kind`] decides.
 //!
 //! Raw triples of f32 as splashsurf reads and writes them; molecular text with its extended form
 //! (the columns named in the comment line); and bare text with a point a line, which is read as a
 //! table ([`super::csv`]).
 
-use super::columns::{Column, Lane, ParticleLayout};
+use super::columns::{ParticleLayout, Strided, StridedColumn};
 use super::sniff::{TextShape, text_shape};
 use super::text::{self, Lines};
 use super::{ByteSource, Step, csv};
@@ -48,9 +48,9 @@ impl Reader for Xyz {
 
     fn stream_unit(&self, head: &[u8]) -> Option<StreamUnit> {
         match kind(head).ok()? {
-            Kind::Molecular => Some(StreamUnit::Rows),
-            Kind::Bare => csv::stream_unit(head),
-            Kind::Raw => None,
+            XyzVariant::Molecular => Some(StreamUnit::Rows),
+            XyzVariant::Bare => csv::stream_unit(head),
+            XyzVariant::Raw => None,
         }
     }
 
@@ -63,12 +63,12 @@ impl Reader for Xyz {
         let text = source.text();
         let head = text.head();
         match kind(head)? {
-            Kind::Raw => Ok(vec![Step::whole(head.len())]),
-            Kind::Molecular => {
+            XyzVariant::Raw => Ok(vec![Step::whole(head.len())]),
+            XyzVariant::Molecular => {
                 text.go_to(text_start(head));
                 molecular::steps(text, budget)
             }
-            Kind::Bare => csv::steps(text),
+            XyzVariant::Bare => csv::steps(text),
         }
     }
 
@@ -81,18 +81,18 @@ impl Reader for Xyz {
         let text = source.text();
         let head = text.head();
         match kind(head)? {
-            Kind::Raw => raw_layout(head).particles(head),
-            Kind::Molecular => {
+            XyzVariant::Raw => raw_layout(head).particles(head),
+            XyzVariant::Molecular => {
                 let range = step.byte_range().cloned().unwrap_or_default();
                 molecular::read(text, range, budget)
             }
-            Kind::Bare => csv::read(text, budget),
+            XyzVariant::Bare => csv::read(text, budget),
         }
     }
 
     /// `None` for text.
     fn layout(&self, bytes: &[u8]) -> Result<Option<ParticleLayout>, ParseError> {
-        Ok((kind(bytes)? == Kind::Raw).then(|| raw_layout(bytes)))
+        Ok((kind(bytes)? == XyzVariant::Raw).then(|| raw_layout(bytes)))
     }
 
     fn remarks(&self, head: &[u8]) -> Vec<String> {
@@ -102,7 +102,7 @@ impl Reader for Xyz {
 
 /// Which of the formats.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Kind {
+pub enum XyzVariant {
     /// Little-endian f32 triples without a header.
     Raw,
     /// Frames of a count, a comment, and a line for each atom.
@@ -125,17 +125,17 @@ const FEW: usize = 4 * TRIPLE;
 /// # Errors
 /// [`ParseError::Malformed`] if they are none: binary, but no whole number of triples, or text in
 /// which neither a count and atoms nor rows of numbers are found.
-pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
+pub fn kind(bytes: &[u8]) -> Result<XyzVariant, ParseError> {
     if bytes.is_empty() {
-        return Ok(Kind::Raw);
+        return Ok(XyzVariant::Raw);
     }
     let start = text_start(bytes);
     if let Some(at) = first_binary(bytes) {
         return if bytes.len().is_multiple_of(TRIPLE) {
-            Ok(Kind::Raw)
+            Ok(XyzVariant::Raw)
         } else {
             let what = format!(
-                "neither raw f32 triples ({} bytes are no multiple of {TRIPLE}; perhaps still being written) nor text (this byte is {:#04x})",
+                "neither raw f32 triples ({} bytes are not a multiple of {TRIPLE}; perhaps still being written) nor text (this byte is {:#04x})",
                 bytes.len(),
                 bytes.get(at).copied().unwrap_or_default()
             );
@@ -149,10 +149,10 @@ pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
         return molecular_kind(count, lines);
     }
     if first_row_has_numbers(bytes, start) || csv::finds_columns(bytes) {
-        return Ok(Kind::Bare);
+        return Ok(XyzVariant::Bare);
     }
     if bytes.len() <= FEW && bytes.len().is_multiple_of(TRIPLE) {
-        return Ok(Kind::Raw);
+        return Ok(XyzVariant::Raw);
     }
     let what = format!(
         "text, but {} is neither a particle count nor a row of numbers",
@@ -162,11 +162,11 @@ pub fn kind(bytes: &[u8]) -> Result<Kind, ParseError> {
 }
 
 fn raw_layout(bytes: &[u8]) -> ParticleLayout {
-    let lane = |axis: usize| Lane {
+    let lane = |axis: usize| Strided {
         start: axis * size_of::<f32>(),
         stride: TRIPLE,
     };
-    let axes = Column {
+    let axes = StridedColumn {
         name: "the positions".to_owned(),
         scalar: ScalarType::F32,
         endian: Endian::Little,
@@ -175,7 +175,7 @@ fn raw_layout(bytes: &[u8]) -> ParticleLayout {
     ParticleLayout::new(bytes.len() / TRIPLE, vec![axes], Vec::new())
 }
 
-/// Offset of the text behind a byte order mark.
+/// Offset of the text after a byte order mark.
 fn text_start(bytes: &[u8]) -> usize {
     if bytes.starts_with(csv::BYTE_ORDER_MARK) {
         csv::BYTE_ORDER_MARK.len()
@@ -218,15 +218,15 @@ fn is_utf8_text(text: &[u8]) -> bool {
 }
 
 /// With a count in the first line, the third decides; if the file ends before, it is cut short.
-fn molecular_kind(count: i64, mut lines: Lines<'_>) -> Result<Kind, ParseError> {
+fn molecular_kind(count: i64, mut lines: Lines<'_>) -> Result<XyzVariant, ParseError> {
     let comment = lines.next();
     let extended = comment.is_some_and(|line| comment::value(line.text, "Properties").is_some());
     let Some(third) = lines.next() else {
-        return Ok(Kind::Molecular);
+        return Ok(XyzVariant::Molecular);
     };
     let fields = text::words(third.text).take(4).count();
     if count == 0 || extended || fields >= 4 || lines.is_at_end() {
-        return Ok(Kind::Molecular);
+        return Ok(XyzVariant::Molecular);
     }
     let what = format!(
         "after a count and a comment an atom has an element and x y z, not {}",
@@ -235,7 +235,7 @@ fn molecular_kind(count: i64, mut lines: Lines<'_>) -> Result<Kind, ParseError> 
     Err(ParseError::malformed(third.at, what))
 }
 
-/// True if the first line that is no comment has three numbers.
+/// True if the first line that is not a comment has three numbers.
 fn first_row_has_numbers(bytes: &[u8], start: usize) -> bool {
     let mut lines = Lines::new(bytes, start..bytes.len());
     let row = lines.find(|line| {

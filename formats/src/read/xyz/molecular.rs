@@ -7,14 +7,14 @@ use crate::names::{POSITION_PROPERTIES, SPECIES_PROPERTIES};
 use crate::read::Step;
 use crate::read::input::TextInput;
 use crate::read::table::{
-    CUT_SHORT, Comments, Decimal, Dialect, Numbers, OnText, Place, RowsRead, Separator, Surplus,
-    Table, Target, most_rows,
+    CUT_SHORT, Comments, Decimal, Dialect, ExtraCells, NumberKind, RowsRead, Separator, Table,
+    TargetArray, TargetComponent, TextPolicy, most_rows,
 };
 use crate::read::text::{self, Line};
 use crate::{MemoryBudget, ParseError, RawParticles};
 
 /// The frames of `text`. Where a count should be and is not, the rest of the file is
-/// one last step, so that reading it can say so.
+/// one last step, so that reading it gives the error.
 pub(super) fn steps(
     text: &mut TextInput<'_>,
     budget: MemoryBudget,
@@ -84,13 +84,13 @@ pub(super) fn read(
     };
     let found = blank + rows.lines;
     if found < count {
-        let what = format!("{count} particles announced, {found} lines follow");
+        let what = format!("{count} particles expected, {found} lines follow");
         return Err(too_short(count_at, what));
     }
     let (positions, attributes) = rows.content?;
     if positions.len() != count {
         let what = format!(
-            "{count} particles announced, {} found: blank lines between them",
+            "{count} particles expected, {} found: blank lines between them",
             positions.len()
         );
         return Err(ParseError::malformed(count_at, what));
@@ -111,14 +111,14 @@ const DIALECT: Dialect = Dialect {
     separator: Separator::Blanks,
     decimal: Decimal::Point,
     comments: Comments::None,
-    surplus: Surplus::Ignored,
+    surplus: ExtraCells::Ignored,
 };
 
 fn count(line: Line<'_>) -> Result<usize, ParseError> {
     let token = line.text.trim_ascii();
     let count = text::integer(token).and_then(|count| usize::try_from(count).ok());
     count.ok_or_else(|| {
-        let what = format!("{} is no particle count", text::shown(token));
+        let what = format!("{} is not a particle count", text::shown(token));
         ParseError::malformed(line.at, what)
     })
 }
@@ -134,12 +134,12 @@ fn number(comment: Line<'_>) -> Option<i64> {
     text::integer(step.trim_ascii())
 }
 
-type Columns = (Vec<Option<Place>>, Vec<Target>);
+type TableColumns = (Vec<Option<TargetComponent>>, Vec<TargetArray>);
 
 /// The attribute for elements and species.
 pub(super) const NAME: &str = "element";
 
-/// Which column has the names of elements or species, if the first atom has one there that is no number.
+/// Which column has the names of elements or species, if the first atom has one there that is not a number.
 pub(super) fn name_column(comment: &[u8], first: &[u8]) -> Option<usize> {
     let column = match comment::value(comment, "Properties") {
         Some(properties) => {
@@ -161,12 +161,15 @@ pub(super) fn name_column(comment: &[u8], first: &[u8]) -> Option<usize> {
 
 /// The columns of plain text by the first atom: element (an attribute `type` if it is a number in
 /// every line, numbers for the names if it is one there), x, y, z, and `column_5`... for what follows.
-fn plain_columns(first: Option<Line<'_>>, budget: MemoryBudget) -> Result<Columns, ParseError> {
+fn plain_columns(
+    first: Option<Line<'_>>,
+    budget: MemoryBudget,
+) -> Result<TableColumns, ParseError> {
     let mut targets = vec![
-        Target::positions(),
-        Target::attribute("type", 1, Numbers::WholeIfAll, OnText::LeaveOut),
+        TargetArray::positions(),
+        TargetArray::attribute("type", 1, NumberKind::WholeIfAll, TextPolicy::LeaveOut),
     ];
-    let place = |target, component| Some(Place { target, component });
+    let place = |target, component| Some(TargetComponent { target, component });
     let mut fields = vec![place(1, 0), place(0, 0), place(0, 1), place(0, 2)];
     let Some(first) = first else {
         return Ok((fields, targets));
@@ -179,18 +182,18 @@ fn plain_columns(first: Option<Line<'_>>, budget: MemoryBudget) -> Result<Column
         );
         return Err(ParseError::malformed(first.at, what));
     }
-    budget.check((columns * COLUMN) as u64, "what its columns take is")?;
+    budget.check((columns * COLUMN) as u64, "its columns in memory are")?;
     if name_column(b"", first.text).is_some() {
-        targets[1] = Target::category(NAME);
+        targets[1] = TargetArray::category(NAME);
     }
     for column in 5..=columns {
         fields.push(place(targets.len(), 0));
         let name = format!("column_{column}");
-        targets.push(Target::attribute(
+        targets.push(TargetArray::attribute(
             name,
             1,
-            Numbers::WholeIfAll,
-            OnText::LeaveOut,
+            NumberKind::WholeIfAll,
+            TextPolicy::LeaveOut,
         ));
     }
     Ok((fields, targets))
@@ -203,17 +206,17 @@ fn extended_columns(
     at: usize,
     (size, budget): (usize, MemoryBudget),
     first: Option<&[u8]>,
-) -> Result<Columns, ParseError> {
+) -> Result<TableColumns, ParseError> {
     let malformed = |what: String| ParseError::malformed(at, what);
-    let mut targets = vec![Target::positions()];
+    let mut targets = vec![TargetArray::positions()];
     let mut fields = Vec::new();
     let mut positioned = false;
     let parts: Vec<&[u8]> = properties.split(|b| *b == b':').collect();
     let (triples, rest) = parts.as_chunks::<3>();
-    budget.check((triples.len() * COLUMN) as u64, "what its columns take is")?;
+    budget.check((triples.len() * COLUMN) as u64, "its columns in memory are")?;
     if !rest.is_empty() {
         return Err(malformed(
-            "Properties are no name:type:count triples".into(),
+            "Properties are not name:type:count triples".into(),
         ));
     }
     for [name, kind, count] in triples {
@@ -229,12 +232,12 @@ fn extended_columns(
             return Err(malformed(what));
         }
         let columns = if size > 0 { components } else { 0 };
-        let need =
-            (fields.len().saturating_add(columns)).saturating_mul(size_of::<Option<Place>>());
-        budget.check(need as u64, "what its columns take is")?;
+        let need = (fields.len().saturating_add(columns))
+            .saturating_mul(size_of::<Option<TargetComponent>>());
+        budget.check(need as u64, "its columns in memory are")?;
         let target = if is_position(name) && !positioned {
             if !matches!(components, 2 | 3) || !kind.eq_ignore_ascii_case(b"R") {
-                return Err(malformed(format!("property {shown} is no position")));
+                return Err(malformed(format!("property {shown} is not a position")));
             }
             positioned = true;
             Some(0)
@@ -245,8 +248,10 @@ fn extended_columns(
                 targets.len() - 1
             })
         };
-        fields
-            .extend((0..columns).map(|component| target.map(|target| Place { target, component })));
+        fields.extend(
+            (0..columns)
+                .map(|component| target.map(|target| TargetComponent { target, component })),
+        );
     }
     if !positioned {
         return Err(malformed("Properties name no positions (pos:R:3)".into()));
@@ -267,19 +272,24 @@ fn is_species(name: &[u8], kind: &[u8]) -> bool {
 
 /// The array for a property whose first field is `cell`. Text and truth values have none, save species: given as
 /// numbers, or by names.
-fn attribute(name: &[u8], kind: &[u8], components: usize, cell: Option<&[u8]>) -> Option<Target> {
+fn attribute(
+    name: &[u8],
+    kind: &[u8],
+    components: usize,
+    cell: Option<&[u8]>,
+) -> Option<TargetArray> {
     let is_name = || cell.is_some_and(|cell| text::number(cell).is_none());
     if components == 1 && is_species(name, kind) && is_name() {
-        return Some(Target::category(NAME));
+        return Some(TargetArray::category(NAME));
     }
     let shown = String::from_utf8_lossy(name);
     match kind {
-        b"R" | b"r" => Some((shown, Numbers::Real, OnText::Fault)),
-        b"I" | b"i" => Some((shown, Numbers::WholeIfAll, OnText::Fault)),
+        b"R" | b"r" => Some((shown, NumberKind::Real, TextPolicy::Fault)),
+        b"I" | b"i" => Some((shown, NumberKind::WholeIfAll, TextPolicy::Fault)),
         b"S" | b"s" if components == 1 && is_species(name, kind) => {
-            Some(("type".into(), Numbers::WholeIfAll, OnText::LeaveOut))
+            Some(("type".into(), NumberKind::WholeIfAll, TextPolicy::LeaveOut))
         }
         _ => None,
     }
-    .map(|(name, numbers, on_text)| Target::attribute(name, components, numbers, on_text))
+    .map(|(name, numbers, on_text)| TargetArray::attribute(name, components, numbers, on_text))
 }

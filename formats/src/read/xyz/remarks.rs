@@ -1,13 +1,13 @@
-//! What molecular text says that is not in the particles.
+//! Remarks about molecular text: what is not in the particles.
 
 use super::molecular::{self, NAME};
-use super::{Kind, Lines, comment, kind, text_start};
+use super::{Lines, XyzVariant, comment, kind, text_start};
 use crate::read::remarks::unused_cell;
 use crate::read::{category, text};
 
 /// See [`crate::read::remarks`].
 pub(in crate::read) fn remarks(head: &[u8]) -> Vec<String> {
-    if !matches!(kind(head), Ok(Kind::Molecular)) {
+    if !matches!(kind(head), Ok(XyzVariant::Molecular)) {
         return Vec::new();
     }
     let mut lines = Lines::new(head, text_start(head)..head.len());

@@ -32,25 +32,25 @@ fn fault(text: &str) -> String {
 
 #[test]
 fn three_kinds() {
-    let cases: [(&[u8], Kind); 16] = [
-        (b"", Kind::Raw),
-        (&[0; 24], Kind::Raw),
-        (b"AAAABBBBCCCC", Kind::Raw),
-        (b"1 2 3\n4 5 6\n", Kind::Bare), // twelve printable bytes, but numbers
-        (b"1,2,3\n4,5,6\n", Kind::Bare),
-        (b"# x y z\n1 2 3\n", Kind::Bare),
-        (b"//X Y Z R G B\n1 2 3 4 5 6\n", Kind::Bare),
-        (b"x y z\n1 2 3\n", Kind::Bare),
-        (b"1 2 3 255 0 0\n", Kind::Bare),
-        (b"1\n\nW 1 2 3\n", Kind::Molecular),
-        (b" 1 \r\ncomment\r\n7 1 2 3\r\n", Kind::Molecular),
-        (b"0\nnothing\n", Kind::Molecular),
-        (b"0\nnothing\n1\n\nW 1 2 3\n", Kind::Molecular),
-        (b"12\ncomm", Kind::Molecular),
-        (b"1\nProperties=pos:R:3\n1 2 3\n", Kind::Molecular),
+    let cases: [(&[u8], XyzVariant); 16] = [
+        (b"", XyzVariant::Raw),
+        (&[0; 24], XyzVariant::Raw),
+        (b"AAAABBBBCCCC", XyzVariant::Raw),
+        (b"1 2 3\n4 5 6\n", XyzVariant::Bare), // twelve printable bytes, but numbers
+        (b"1,2,3\n4,5,6\n", XyzVariant::Bare),
+        (b"# x y z\n1 2 3\n", XyzVariant::Bare),
+        (b"//X Y Z R G B\n1 2 3 4 5 6\n", XyzVariant::Bare),
+        (b"x y z\n1 2 3\n", XyzVariant::Bare),
+        (b"1 2 3 255 0 0\n", XyzVariant::Bare),
+        (b"1\n\nW 1 2 3\n", XyzVariant::Molecular),
+        (b" 1 \r\ncomment\r\n7 1 2 3\r\n", XyzVariant::Molecular),
+        (b"0\nnothing\n", XyzVariant::Molecular),
+        (b"0\nnothing\n1\n\nW 1 2 3\n", XyzVariant::Molecular),
+        (b"12\ncomm", XyzVariant::Molecular),
+        (b"1\nProperties=pos:R:3\n1 2 3\n", XyzVariant::Molecular),
         (
             "1\nin \u{e5}ngstr\u{f6}m\nW 1 2 3\n".as_bytes(),
-            Kind::Molecular,
+            XyzVariant::Molecular,
         ),
     ];
     for (bytes, expected) in cases {
@@ -79,7 +79,7 @@ fn neither_of_them() {
 #[test]
 fn raw_triples() {
     let bytes = sample("single_frames/raw.xyz");
-    assert_eq!(kind(&bytes), Ok(Kind::Raw));
+    assert_eq!(kind(&bytes), Ok(XyzVariant::Raw));
     let particles = only(&bytes);
     let Positions::F32(v) = &particles.positions else {
         panic!("raw files are f32")
@@ -93,7 +93,7 @@ fn raw_triples() {
     mixed.extend([0; 8]);
     assert!(kind(&mixed).is_err());
     mixed[100] = 0x80;
-    assert_eq!(kind(&mixed), Ok(Kind::Raw));
+    assert_eq!(kind(&mixed), Ok(XyzVariant::Raw));
 }
 
 #[test]
@@ -224,16 +224,19 @@ fn faults_have_names() {
     let cases = [
         (
             "2\n\nW 1 2 3\n",
-            "byte 0: 2 particles announced, 1 lines follow: the file is cut",
+            "byte 0: 2 particles expected, 1 lines follow: the file is cut",
         ),
         ("2\n\nW 1 2 3\nW 1 2\n", "byte 11: line has 3 of 4 columns"),
         ("1\n\nW 1 b 3\n", "column 3 has \"b\""),
         (
             "1\n\nW 1 2 3\nW 1 2 3\n",
-            "byte 11: \"W 1 2 3\" is no particle count",
+            "byte 11: \"W 1 2 3\" is not a particle count",
         ),
         ("1\nProperties=pos:R\n1 2 3 4\n", "name:type:count"),
-        ("1\nProperties=pos:R:4\n1 2 3 4\n", "\"pos\" is no position"),
+        (
+            "1\nProperties=pos:R:4\n1 2 3 4\n",
+            "\"pos\" is not a position",
+        ),
         (
             "1\nProperties=pos:R:x\n1 2 3 4\n",
             "\"pos\" has \"x\" columns",
@@ -258,7 +261,7 @@ fn faults_have_names() {
 fn absurd_counts_allocate_nothing() {
     for count in ["99999999999", "9223372036854775807"] {
         let found = fault(&format!("{count}\n\nW 1 2 3\n"));
-        assert!(found.contains("announced, 1 lines follow"), "{found}");
+        assert!(found.contains("expected, 1 lines follow"), "{found}");
     }
     let found = fault("99999999999999999999\n\nW 1 2 3\n");
     assert!(found.contains("neither a particle count"), "{found}");

@@ -4,10 +4,10 @@ use std::path::Path;
 
 use super::*;
 
-fn names(names: &[String]) -> Vec<Name> {
+fn names(names: &[String]) -> Vec<FileName> {
     names
         .iter()
-        .map(|n| Name::parse(Path::new(n), None))
+        .map(|n| FileName::parse(Path::new(n), None))
         .collect()
 }
 
@@ -16,7 +16,7 @@ fn owned(texts: &[&str]) -> Vec<String> {
 }
 
 #[track_caller]
-fn picked(files: &[String]) -> (Group, Vec<String>) {
+fn picked(files: &[String]) -> (FileGroup, Vec<String>) {
     let mut notes = Vec::new();
     let group = pick(Path::new("dir"), names(files), &mut notes).expect("one sequence");
     (group, notes)
@@ -30,7 +30,7 @@ fn ambiguous(files: &[&str]) -> String {
     error.to_string()
 }
 
-fn numbers(group: &Group) -> Vec<i64> {
+fn numbers(group: &FileGroup) -> Vec<i64> {
     group.files.iter().filter_map(|f| f.number).collect()
 }
 

@@ -81,7 +81,7 @@ fn shapes_are_understood() {
         .error(&npy("'<f4'", "(3,)", &counting(3)))
         .to_string();
     assert!(
-        text.starts_with("an array of shape (3,) is no list of positions"),
+        text.starts_with("an array of shape (3,) is not a list of positions"),
         "{text}"
     );
 }
@@ -233,18 +233,18 @@ fn structures_are_flattened() {
 fn strings_keep_their_escapes() {
     let text = r#"{u'a\'b\\': "c\x41\u00e9", b'n': None, 't': (True, -3, [])}"#;
     let parsed = literal::parse(text, str::len).unwrap();
-    let text = |s: &str| literal::Value::Text(s.to_owned());
+    let text = |s: &str| literal::Literal::Text(s.to_owned());
     let items = vec![
-        literal::Value::Bool(true),
-        literal::Value::Integer(-3),
-        literal::Value::Sequence(vec![]),
+        literal::Literal::Bool(true),
+        literal::Literal::Integer(-3),
+        literal::Literal::Sequence(vec![]),
     ];
     let expected = vec![
         (text("a'b\\"), text("cAé")),
-        (text("n"), literal::Value::None),
-        (text("t"), literal::Value::Sequence(items)),
+        (text("n"), literal::Literal::None),
+        (text("t"), literal::Literal::Sequence(items)),
     ];
-    assert_eq!(parsed, literal::Value::Dict(expected));
+    assert_eq!(parsed, literal::Literal::Dict(expected));
 }
 
 #[test]

@@ -157,11 +157,11 @@ fn broken_headers_are_named() {
         ),
         (
             "{'descr': '<q4', 'fortran_order': False, 'shape': (1, 3)}",
-            "`<q4` is no dtype",
+            "`<q4` is not a dtype",
         ),
         (
             "{'descr': '', 'fortran_order': False, 'shape': (1, 3)}",
-            "`` is no dtype",
+            "`` is not a dtype",
         ),
         (
             "{'descr': [('a',)], 'fortran_order': False, 'shape': (1,)}",

@@ -7,7 +7,7 @@ use super::*;
 fn truncation_is_refused() {
     for name in ["ascii", "be", "color", "double", "le"] {
         let bytes = single(name);
-        let header_end = Header::parse(&bytes).unwrap().body;
+        let header_end = PlyHeader::parse(&bytes).unwrap().body;
         // Without its last digits the text of the last number is another number, but a number.
         let needed = if name == "ascii" {
             bytes.len() - 8

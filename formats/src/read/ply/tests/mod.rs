@@ -328,7 +328,7 @@ proptest! {
         let _ = READER.all(&[b"ply\n".as_slice(), &bytes].concat());
         for big in [false, true] {
             let file = with_lists(big);
-            let body = Header::parse(&file).unwrap().body;
+            let body = PlyHeader::parse(&file).unwrap().body;
             let _ = READER.all(&[&file[..body], &bytes].concat());
         }
     }

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::made::{Made, NASTY, modern, splish};
+use super::made::{NASTY, TestFile, modern, splish};
 use super::{attribute, good, malformed, names, parse};
 use crate::{AttributeData, ParseError, Positions, RawParticles};
 
@@ -19,10 +19,10 @@ fn nasty_points(found: &RawParticles) {
 
 #[test]
 fn payloads_may_spell_keywords() {
-    let bytes = Made::new("4.1").three_points("POLYDATA").0;
+    let bytes = TestFile::new("4.1").three_points("POLYDATA").0;
     nasty_points(&good(&bytes));
     let found = good(
-        &Made::new("4.1")
+        &TestFile::new("4.1")
             .three_points("UNSTRUCTURED_GRID")
             .text("CELL_TYPES 3\n")
             .ints([1, 1, 1])
@@ -41,7 +41,7 @@ fn payloads_may_spell_keywords() {
 fn no_or_any_white_space_may_follow_a_payload() {
     for gap in ["", "\n", "\r\n", "\n\n", " \r\n \n"] {
         let found = good(
-            &Made::new("3.0")
+            &TestFile::new("3.0")
                 .text("DATASET POLYDATA\r\nPOINTS 3 float\r\n")
                 .floats(&NASTY)
                 .text(gap)
@@ -67,7 +67,7 @@ fn no_or_any_white_space_may_follow_a_payload() {
 #[test]
 fn every_kind_of_point_attribute_is_kept_and_cell_data_are_not() {
     let found = good(
-        &Made::new("4.2")
+        &TestFile::new("4.2")
             .three_points("POLYDATA")
             .text("CELL_DATA 2\nSCALARS id int\nLOOKUP_TABLE t\n")
             .ints([1, 2])
@@ -121,7 +121,7 @@ fn every_kind_of_point_attribute_is_kept_and_cell_data_are_not() {
 
 #[test]
 fn long_may_have_four_bytes() {
-    let start = || Made::new("4.0").three_points("POLYDATA");
+    let start = || TestFile::new("4.0").three_points("POLYDATA");
     for wide in [true, false] {
         let made = start().text("POINT_DATA 3\nSCALARS id long\nLOOKUP_TABLE default\n");
         let made = if wide {
@@ -174,7 +174,7 @@ fn ascii_is_free_form() {
 #[test]
 fn a_field_may_state_more_arrays_than_it_has() {
     let made = || {
-        Made::new("4.1")
+        TestFile::new("4.1")
             .three_points("POLYDATA")
             .text("POINT_DATA 3\nFIELD FieldData 4\na 1 3 int\n")
             .ints([1, 2, 3])
@@ -203,7 +203,7 @@ fn what_holds_no_particles_is_refused_by_name() {
         "RECTILINEAR_GRID",
         "FIELD",
     ] {
-        match parse(&Made::new("3.0").text(&format!("DATASET {kind}\n")).0) {
+        match parse(&TestFile::new("3.0").text(&format!("DATASET {kind}\n")).0) {
             Err(ParseError::Unsupported { what }) => assert!(what.contains(kind), "{what}"),
             other => panic!("{kind}: {other:?}"),
         }
@@ -218,7 +218,7 @@ fn what_holds_no_particles_is_refused_by_name() {
 fn old_cells_may_stand_in_a_new_file() {
     let cells = vec![0_i32; 20_000];
     let found = good(
-        &Made::new("5.1")
+        &TestFile::new("5.1")
             .three_points("POLYDATA")
             .text("VERTICES 1 20000\n")
             .ints(cells)

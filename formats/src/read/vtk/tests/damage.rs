@@ -2,7 +2,7 @@
 
 use proptest::prelude::*;
 
-use super::made::{Made, NASTY, modern, splish};
+use super::made::{NASTY, TestFile, modern, splish};
 use super::{attribute, good, malformed, parse, read, sample, steps};
 use crate::read::Step;
 use crate::{AttributeData, ParseError, Positions};
@@ -45,7 +45,7 @@ fn absurd_counts_are_refused_without_allocation() {
 #[test]
 fn errors_tell_place_and_need() {
     let (at, what) = malformed(
-        &Made::new("4.1")
+        &TestFile::new("4.1")
             .text("DATASET POLYDATA\nPOINTS 9 float\n")
             .floats(&NASTY)
             .0,
@@ -56,7 +56,7 @@ fn errors_tell_place_and_need() {
         "POINTS: 27 numbers of type f32 need 108 bytes, 36 are left"
     );
     let (_, what) = malformed(
-        &Made::new("4.1")
+        &TestFile::new("4.1")
             .three_points("POLYDATA")
             .text("POINT_DATA 4\n")
             .0,

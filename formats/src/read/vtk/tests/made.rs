@@ -6,9 +6,9 @@
 )]
 
 /// A binary file written piece by piece.
-pub(super) struct Made(pub(super) Vec<u8>);
+pub(super) struct TestFile(pub(super) Vec<u8>);
 
-impl Made {
+impl TestFile {
     pub(super) fn new(version: &str) -> Self {
         Self(format!("# vtk DataFile Version {version}\ntitle\nBINARY\n").into_bytes())
     }
@@ -63,7 +63,7 @@ pub(super) const NASTY: [f32; 9] = [
 pub(super) fn splish(points: &[[f32; 3]], ids: &[u32], velocity: &[[f32; 3]]) -> Vec<u8> {
     let n = points.len();
     let count = n as i32;
-    Made::new("4.1")
+    TestFile::new("4.1")
         .text(&format!("DATASET UNSTRUCTURED_GRID\nPOINTS {n} float\n"))
         .floats(points.as_flattened())
         .text(&format!("\nCELLS {n} {}\n", 2 * n))
@@ -84,7 +84,7 @@ pub(super) fn splish(points: &[[f32; 3]], ids: &[u32], velocity: &[[f32; 3]]) ->
 pub(super) fn modern(points: &[[f32; 3]], ids: &[u32], velocity: &[[f32; 3]]) -> Vec<u8> {
     let n = points.len();
     let count = n as i64;
-    Made::new("5.1")
+    TestFile::new("5.1")
         .text("DATASET POLYDATA\nFIELD FieldData 1\nTIME 1 1 double\n")
         .bytes(&0.25_f64.to_be_bytes())
         .text(&format!("\nPOINTS {n} float\n"))

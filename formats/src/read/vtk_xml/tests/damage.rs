@@ -129,7 +129,7 @@ fn places_are_those_of_the_file_whatever_its_names() {
     ]
     .concat();
     let Err(ParseError::Malformed { at, .. }) = parse_file(&file) else {
-        panic!("x is no number");
+        panic!("x is not a number");
     };
     assert_eq!(file[usize::try_from(at).unwrap()], b'x');
 }

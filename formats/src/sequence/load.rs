@@ -1,0 +1,130 @@
+//! Reads frames of a sequence and merges their parts.
+
+use std::fs;
+use std::path::Path;
+use std::sync::{Arc, PoisonError};
+use std::time::SystemTime;
+
+use glam::DVec3;
+
+use super::{PartFile, Sequence, merge};
+use crate::open::FrameFile;
+use crate::{FrameError, ParseError, ParticleFrame, RawParticles};
+
+/// A frame as it is in its files, and the memory that reading it took.
+#[derive(Debug)]
+pub struct Loaded {
+    /// The particles, parts merged.
+    pub particles: RawParticles,
+    /// Oddities of the files, and what got lost in merging.
+    pub notes: Vec<String>,
+    /// Bytes of all its files, uncompressed.
+    pub all_bytes: u64,
+    /// Bytes held at most for one of its files beside its numbers: one is in memory at a time.
+    pub content_bytes: u64,
+}
+
+/// The file with several steps that was used last, so that it is not opened again for each step.
+#[derive(Debug)]
+pub(super) struct CachedFile {
+    pub(super) file: Arc<FrameFile>,
+    pub(super) stamp: Option<(u64, SystemTime)>,
+}
+
+impl Sequence {
+    /// Reads frame `index`: finite particles, relative to `origin`.
+    ///
+    /// # Errors
+    /// As [`Self::load_raw`].
+    ///
+    /// # Panics
+    /// If there is no frame `index`.
+    pub fn load(&self, index: usize, origin: DVec3) -> Result<ParticleFrame, FrameError> {
+        Ok(ParticleFrame::from_raw(self.load_raw(index)?, origin))
+    }
+
+    /// Reads frame `index` (not: frame number) as it is in the files, parts merged.
+    ///
+    /// # Errors
+    /// [`FrameError`] of the first file that cannot be read.
+    ///
+    /// # Panics
+    /// If there is no frame `index`.
+    pub fn load_raw(&self, index: usize) -> Result<RawParticles, FrameError> {
+        self.load_measured(index).map(|loaded| loaded.particles)
+    }
+
+    /// Like [`Self::load_raw`], with what got lost in merging the parts and what was read.
+    ///
+    /// # Errors
+    /// As [`Self::load_raw`].
+    ///
+    /// # Panics
+    /// If there is no frame `index`.
+    pub fn load_measured(&self, index: usize) -> Result<Loaded, FrameError> {
+        let frame = &self.frames[index];
+        let mut notes = Vec::new();
+        let (mut all_bytes, mut content_bytes) = (0, 0);
+        let mut parts = Vec::with_capacity(frame.parts.len());
+        for part in &frame.parts {
+            let (file, step) = self.file_of(part)?;
+            let particles = file.read(step)?;
+            notes.extend_from_slice(file.notes());
+            all_bytes += file.unpacked_len();
+            let held = file.held_len() + file.unpacked_arrays_len(&particles);
+            content_bytes = content_bytes.max(held);
+            parts.push((part.part, particles));
+        }
+        let only = if self.parts.len() < 2 {
+            parts.pop().map(|(_, only)| only)
+        } else {
+            None
+        };
+        let particles = only.unwrap_or_else(|| merge(parts, &mut notes));
+        Ok(Loaded {
+            particles,
+            notes,
+            all_bytes,
+            content_bytes,
+        })
+    }
+
+    /// The opened file of `part` and the step in it.
+    fn file_of(&self, part: &PartFile) -> Result<(Arc<FrameFile>, usize), FrameError> {
+        let Some(step) = part.step else {
+            let file = FrameFile::open_within(&part.path, self.budget)?;
+            return match file.steps() {
+                [_, second, ..] => {
+                    let what = format!(
+                        "{} time steps where one was expected; give such files one at a time",
+                        file.steps().len()
+                    );
+                    Err(ParseError::malformed(second.start(), what).in_file(&part.path))
+                }
+                _ => Ok((Arc::new(file), 0)),
+            };
+        };
+        let stamp = stamp(&part.path);
+        let lock = || self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(cached) = lock().as_ref()
+            && cached.file.path() == part.path
+            && cached.stamp == stamp
+        {
+            return Ok((Arc::clone(&cached.file), step));
+        }
+        // Drop the old one first: two large files need not be in memory at once.
+        *lock() = None;
+        let file = Arc::new(FrameFile::open_within(&part.path, self.budget)?);
+        *lock() = Some(CachedFile {
+            file: Arc::clone(&file),
+            stamp,
+        });
+        Ok((file, step))
+    }
+}
+
+/// Length and time of modification, to notice that a file was rewritten.
+pub(super) fn stamp(path: &Path) -> Option<(u64, SystemTime)> {
+    let meta = fs::metadata(path).ok()?;
+    Some((meta.len(), meta.modified().ok()?))
+}
