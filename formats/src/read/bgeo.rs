@@ -5,7 +5,7 @@
 //! writers disagree about them. Newer Houdini containers share the extension only and are refused by
 //! name. Gzip around the file is undone by the caller. Layout after partio's `BGEO.cpp`.
 
-use super::columns::{self, ParticleLayout, Strided, StridedColumn};
+use super::columns::{self, ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader};
@@ -165,18 +165,8 @@ fn column(
     start: usize,
     stride: usize,
 ) -> StridedColumn {
-    let lanes = (0..components)
-        .map(|c| Strided {
-            start: start + 4 * c,
-            stride,
-        })
-        .collect();
-    StridedColumn {
-        name: name.into(),
-        scalar,
-        endian: Endian::Big,
-        lanes,
-    }
+    let first = ComponentStride { start, stride };
+    StridedColumn::interleaved(name, (scalar, Endian::Big), components, first)
 }
 
 /// The attributes in the order of the file.

@@ -20,7 +20,7 @@ const BLOCK: usize = 4096;
 
 /// Offset and stride of one component: particle `i` has it at byte `start + i * stride`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) struct Strided {
+pub(crate) struct ComponentStride {
     /// Byte of particle 0.
     pub(crate) start: usize,
     /// Bytes from one particle to the next.
@@ -37,21 +37,40 @@ pub(crate) struct StridedColumn {
     /// Stored byte order of every component.
     pub(crate) endian: Endian,
     /// One per component.
-    pub(crate) lanes: Vec<Strided>,
+    pub(crate) component_strides: Vec<ComponentStride>,
 }
 
 impl StridedColumn {
+    /// A column of `components` numbers that are adjacent in each record; `first` is the first of them.
+    pub(super) fn interleaved(
+        name: impl Into<String>,
+        (scalar, endian): (ScalarType, Endian),
+        components: usize,
+        first: ComponentStride,
+    ) -> Self {
+        let component = |index: usize| ComponentStride {
+            start: first.start + index * scalar.size(),
+            stride: first.stride,
+        };
+        Self {
+            name: name.into(),
+            scalar,
+            endian,
+            component_strides: (0..components).map(component).collect(),
+        }
+    }
+
     fn same_storage(&self, other: &Self) -> bool {
         self.scalar == other.scalar && self.endian == other.endian
     }
 
     /// Whether all of `count` particles are within `len` bytes.
     fn fits(&self, count: usize, len: usize) -> bool {
-        self.lanes.iter().all(|lane| {
+        self.component_strides.iter().all(|component_stride| {
             count == 0
                 || (count - 1)
-                    .checked_mul(lane.stride)
-                    .and_then(|last| last.checked_add(lane.start))
+                    .checked_mul(component_stride.stride)
+                    .and_then(|last| last.checked_add(component_stride.start))
                     .and_then(|last| last.checked_add(self.scalar.size()))
                     .is_some_and(|end| end <= len)
         })
@@ -109,7 +128,7 @@ impl ParticleLayout {
         axes: Vec<StridedColumn>,
         mut attributes: Vec<StridedColumn>,
     ) -> Self {
-        attributes.retain(|column| !column.lanes.is_empty());
+        attributes.retain(|column| !column.component_strides.is_empty());
         Self {
             count,
             axes: join_alike(axes),
@@ -155,7 +174,7 @@ impl ParticleLayout {
         let attributes = attributes
             .map(|(column, data)| Attribute {
                 name: column.name,
-                components: column.lanes.len(),
+                components: column.component_strides.len(),
                 data,
             })
             .collect();
@@ -184,7 +203,9 @@ pub(super) struct GrowingParticles {
 impl GrowingParticles {
     /// No particles yet, with capacity for an estimate of `room` if `budget` allows it.
     pub(super) fn new(layout: ParticleLayout, room: usize, budget: MemoryBudget) -> Self {
-        let each = layout.columns().map(|c| c.lanes.len() * c.scalar.size());
+        let each = layout
+            .columns()
+            .map(|c| c.component_strides.len() * c.scalar.size());
         let need = each.fold(0, usize::saturating_add).saturating_mul(room);
         let room = if need as u64 <= budget.bytes() {
             room
@@ -193,7 +214,7 @@ impl GrowingParticles {
         };
         let empty = |column: &StridedColumn| {
             let mut data = zeros(column.scalar, 0);
-            data.reserve(column.lanes.len().saturating_mul(room));
+            data.reserve(column.component_strides.len().saturating_mul(room));
             data
         };
         Self {
@@ -214,13 +235,13 @@ impl GrowingParticles {
         let more = self
             .layout
             .columns()
-            .map(|c| c.lanes.len() * c.scalar.size() * count);
+            .map(|c| c.component_strides.len() * c.scalar.size() * count);
         self.budget.check(
             held + more.sum::<usize>() as u64,
             "its numbers in memory are",
         )?;
         for (column, data) in self.layout.columns().zip(&mut self.data) {
-            let mut block = zeros(column.scalar, column.lanes.len() * count);
+            let mut block = zeros(column.scalar, column.component_strides.len() * count);
             fill(&mut block, records, column, 0, count);
             data.append(&mut block);
         }
@@ -270,7 +291,7 @@ fn join_alike(axes: Vec<StridedColumn>) -> Vec<StridedColumn> {
     match axes.split_first() {
         Some((first, rest)) if rest.iter().all(|c| c.same_storage(first)) => {
             let mut joined = first.clone();
-            joined.lanes = axes.into_iter().flat_map(|c| c.lanes).collect();
+            joined.component_strides = axes.into_iter().flat_map(|c| c.component_strides).collect();
             vec![joined]
         }
         _ => axes,
@@ -295,7 +316,7 @@ fn check_columns<'c>(
 fn gather(bytes: &[u8], count: usize, columns: &[StridedColumn]) -> Vec<AttributeData> {
     let mut gathered: Vec<AttributeData> = columns
         .iter()
-        .map(|c| zeros(c.scalar, c.lanes.len() * count))
+        .map(|c| zeros(c.scalar, c.component_strides.len() * count))
         .collect();
     for first in (0..count).step_by(BLOCK) {
         let end = count.min(first + BLOCK);
@@ -381,9 +402,9 @@ pub(super) fn group_vectors(mut columns: Vec<StridedColumn>) -> Vec<StridedColum
         let places: Option<Vec<usize>> = parts
             .iter()
             .map(|part| {
-                columns
-                    .iter()
-                    .position(|c| c.lanes.len() == 1 && c.name.eq_ignore_ascii_case(part))
+                columns.iter().position(|c| {
+                    c.component_strides.len() == 1 && c.name.eq_ignore_ascii_case(part)
+                })
             })
             .collect();
         if let Some(places) = places {
@@ -409,7 +430,10 @@ fn merge_columns(columns: &mut Vec<StridedColumn>, places: &[usize], name: &str)
         name: name.to_owned(),
         scalar: first.scalar,
         endian: first.endian,
-        lanes: parts.iter().flat_map(|c| c.lanes.clone()).collect(),
+        component_strides: parts
+            .iter()
+            .flat_map(|c| c.component_strides.clone())
+            .collect(),
     };
     let mut index = 0;
     columns.retain_mut(|column| {

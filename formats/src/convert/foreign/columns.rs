@@ -21,7 +21,7 @@ impl ColumnSource {
     pub(super) fn new(file: MappedFile, layout: ParticleLayout) -> Self {
         let attribute = |column: &StridedColumn| SourceAttribute {
             name: column.name.clone(),
-            components: column.lanes.len(),
+            components: column.component_strides.len(),
             scalar: column.scalar,
         };
         file.advise_sequential();

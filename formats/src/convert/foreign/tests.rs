@@ -150,7 +150,7 @@ fn a_run_beyond_the_end_is_refused() {
         let error = source
             .read_positions(first, &mut to)
             .expect_err("beyond the end");
-        assert!(error.to_string().contains("the file holds 1200"), "{error}");
+        assert!(error.to_string().contains("the file has 1200"), "{error}");
     }
     assert!(source.read_values(0, 1199, &mut [0; 12]).is_ok());
     assert!(source.read_values(0, 1199, &mut [0; 24]).is_err());

@@ -3,7 +3,7 @@
 use glam::DVec3;
 use rayon::prelude::*;
 
-use super::{BLOCK, ParticleLayout, Strided, StridedColumn, divided};
+use super::{BLOCK, ComponentStride, ParticleLayout, StridedColumn, divided};
 use crate::{AttributeData, Endian, ScalarType};
 
 impl ParticleLayout {
@@ -19,12 +19,12 @@ impl ParticleLayout {
 
     fn block_positions(&self, bytes: &[u8], first: usize, to: &mut [DVec3]) {
         match self.axes.as_slice() {
-            [column] if column.lanes.len() == 3 => {
+            [column] if column.component_strides.len() == 3 => {
                 fill_f64(
                     bytemuck::cast_slice_mut(to),
                     bytes,
                     column,
-                    &column.lanes,
+                    &column.component_strides,
                     first,
                 );
             }
@@ -32,11 +32,13 @@ impl ParticleLayout {
                 to.fill(DVec3::ZERO);
                 let mut numbers = [0.0; BLOCK];
                 let numbers = &mut numbers[..to.len()];
-                let lanes = columns
-                    .iter()
-                    .flat_map(|c| c.lanes.iter().map(move |lane| (c, *lane)));
-                for (axis, (column, lane)) in lanes.take(3).enumerate() {
-                    fill_f64(numbers, bytes, column, &[lane], first);
+                let component_strides = columns.iter().flat_map(|c| {
+                    c.component_strides
+                        .iter()
+                        .map(move |component_stride| (c, *component_stride))
+                });
+                for (axis, (column, component_stride)) in component_strides.take(3).enumerate() {
+                    fill_f64(numbers, bytes, column, &[component_stride], first);
                     for (position, number) in to.iter_mut().zip(&*numbers) {
                         position[axis] = *number;
                     }
@@ -46,7 +48,7 @@ impl ParticleLayout {
         if let Some(weight) = &self.weight {
             let mut numbers = [0.0; BLOCK];
             let numbers = &mut numbers[..to.len()];
-            fill_f64(numbers, bytes, weight, &weight.lanes, first);
+            fill_f64(numbers, bytes, weight, &weight.component_strides, first);
             for (position, w) in to.iter_mut().zip(numbers) {
                 #[expect(clippy::cast_possible_truncation, reason = "both are stored as f32")]
                 let exact = divided(position.as_vec3(), *w as f32);
@@ -60,7 +62,7 @@ impl StridedColumn {
     /// Reads the values of the particles from `first` on, little-endian: all components of one, then of the
     /// next. `bytes` are those of a file in which the column fits, and `to` holds whole particles of it.
     pub(crate) fn read_values(&self, bytes: &[u8], first: usize, to: &mut [u8]) {
-        let width = self.lanes.len() * self.scalar.size();
+        let width = self.component_strides.len() * self.scalar.size();
         to.par_chunks_mut(BLOCK * width.max(1))
             .enumerate()
             .for_each(|(block, to)| {
@@ -77,33 +79,49 @@ impl StridedColumn {
     fn block_values<const S: usize>(&self, bytes: &[u8], first: usize, to: &mut [u8]) {
         let (numbers, _) = to.as_chunks_mut::<S>();
         match self.endian {
-            Endian::Little => {
-                fill_block(numbers, bytes, &self.lanes, first, |stored: [u8; S]| stored)
-            }
-            Endian::Big => fill_block(numbers, bytes, &self.lanes, first, |mut stored: [u8; S]| {
-                stored.reverse();
-                stored
-            }),
+            Endian::Little => fill_block(
+                numbers,
+                bytes,
+                &self.component_strides,
+                first,
+                |stored: [u8; S]| stored,
+            ),
+            Endian::Big => fill_block(
+                numbers,
+                bytes,
+                &self.component_strides,
+                first,
+                |mut stored: [u8; S]| {
+                    stored.reverse();
+                    stored
+                },
+            ),
         }
     }
 }
 
-/// Decodes `lanes` of a column, from particle `first` on, as f64.
+/// Decodes `components` of a column, from particle `first` on, as f64.
 #[expect(
     clippy::cast_precision_loss,
     clippy::cast_lossless,
     reason = "one body for ten types, and no wider type to keep integers of 64 bits in"
 )]
-fn fill_f64(to: &mut [f64], bytes: &[u8], column: &StridedColumn, lanes: &[Strided], first: usize) {
+fn fill_f64(
+    to: &mut [f64],
+    bytes: &[u8],
+    column: &StridedColumn,
+    component_strides: &[ComponentStride],
+    first: usize,
+) {
     macro_rules! fill {
         ($ty:ty) => {
             match column.endian {
-                Endian::Little => {
-                    fill_block(to, bytes, lanes, first, |b| <$ty>::from_le_bytes(b) as f64)
-                }
-                Endian::Big => {
-                    fill_block(to, bytes, lanes, first, |b| <$ty>::from_be_bytes(b) as f64)
-                }
+                Endian::Little => fill_block(to, bytes, component_strides, first, |b| {
+                    <$ty>::from_le_bytes(b) as f64
+                }),
+                Endian::Big => fill_block(to, bytes, component_strides, first, |b| {
+                    <$ty>::from_be_bytes(b) as f64
+                }),
             }
         };
     }
@@ -131,15 +149,25 @@ pub(super) fn fill(
 ) {
     macro_rules! fill {
         ($v:expr, $ty:ty) => {{
-            let width = column.lanes.len();
+            let width = column.component_strides.len();
             let block = $v
                 .get_mut(first * width..end * width)
                 .expect("gather made room for every particle");
             match column.endian {
-                Endian::Little => {
-                    fill_block(block, bytes, &column.lanes, first, <$ty>::from_le_bytes)
-                }
-                Endian::Big => fill_block(block, bytes, &column.lanes, first, <$ty>::from_be_bytes),
+                Endian::Little => fill_block(
+                    block,
+                    bytes,
+                    &column.component_strides,
+                    first,
+                    <$ty>::from_le_bytes,
+                ),
+                Endian::Big => fill_block(
+                    block,
+                    bytes,
+                    &column.component_strides,
+                    first,
+                    <$ty>::from_be_bytes,
+                ),
             }
         }};
     }
@@ -161,17 +189,17 @@ pub(super) fn fill(
 fn fill_block<T, const S: usize>(
     block: &mut [T],
     bytes: &[u8],
-    lanes: &[Strided],
+    component_strides: &[ComponentStride],
     first: usize,
     decode: impl Fn([u8; S]) -> T,
 ) {
-    let width = lanes.len();
-    let tail = |lane: &Strided| {
+    let width = component_strides.len();
+    let tail = |component_stride: &ComponentStride| {
         bytes
-            .get(lane.start + first * lane.stride..)
+            .get(component_stride.start + first * component_stride.stride..)
             .unwrap_or_default()
     };
-    match adjacent_run::<S>(lanes) {
+    match adjacent_run::<S>(component_strides) {
         Some(run) if run.stride == width * S => {
             for (number, stored) in block.iter_mut().zip(tail(&run).as_chunks().0) {
                 *number = decode(*stored);
@@ -186,9 +214,9 @@ fn fill_block<T, const S: usize>(
             }
         }
         None => {
-            for (component, lane) in lanes.iter().enumerate() {
+            for (component, component_stride) in component_strides.iter().enumerate() {
                 let numbers = block.iter_mut().skip(component).step_by(width);
-                let records = tail(lane).chunks(lane.stride.max(1));
+                let records = tail(component_stride).chunks(component_stride.stride.max(1));
                 for (number, record) in numbers.zip(records) {
                     if let Some(stored) = record.first_chunk() {
                         *number = decode(*stored);
@@ -199,11 +227,15 @@ fn fill_block<T, const S: usize>(
     }
 }
 
-/// The first lane, if the others follow it byte by byte within a record.
-fn adjacent_run<const S: usize>(lanes: &[Strided]) -> Option<Strided> {
-    let first = *lanes.first()?;
-    let adjacent = lanes.iter().enumerate().all(|(component, lane)| {
-        lane.stride == first.stride && lane.start == first.start + component * S
-    });
-    (adjacent && lanes.len() * S <= first.stride).then_some(first)
+/// The first component, if the others follow it byte by byte within a record.
+fn adjacent_run<const S: usize>(component_strides: &[ComponentStride]) -> Option<ComponentStride> {
+    let first = *component_strides.first()?;
+    let adjacent = component_strides
+        .iter()
+        .enumerate()
+        .all(|(component, component_stride)| {
+            component_stride.stride == first.stride
+                && component_stride.start == first.start + component * S
+        });
+    (adjacent && component_strides.len() * S <= first.stride).then_some(first)
 }

@@ -293,7 +293,7 @@ fn decode(
     count: usize,
     column: StridedColumn,
 ) -> Result<Option<Attribute>, ParseError> {
-    let components = column.lanes.len();
+    let components = column.component_strides.len();
     if components == 0 {
         return Ok(None);
     }

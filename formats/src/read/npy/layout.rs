@@ -5,7 +5,7 @@ use super::dtype::{Dtype, MAX_COMPONENTS, NumberType, RecordField};
 use super::header::{NpyHeader, show};
 use crate::ParseError;
 use crate::names::POSITION_ARRAYS;
-use crate::read::columns::{self, ParticleLayout, Strided, StridedColumn};
+use crate::read::columns::{self, ComponentStride, ParticleLayout, StridedColumn};
 
 /// Steps without particles take no bytes, so nothing else bounds their number.
 const MAX_EMPTY_FRAMES: usize = 1 << 16;
@@ -110,14 +110,12 @@ impl ArrayLayout {
             _ => (header.data, header.item.size),
         };
         let column = |field: &RecordField| {
-            let size = field.number.scalar.size();
-            let first = start + field.offset;
-            let lane = |c| Strided {
-                start: first + c * size,
+            let first = ComponentStride {
+                start: start + field.offset,
                 stride,
             };
-            let lanes = (0..field.components).map(lane).collect();
-            new_column(&field.name, field.number, lanes)
+            let scalar = (field.number.scalar, field.number.endian);
+            StridedColumn::interleaved(&field.name, scalar, field.components, first)
         };
         let places = position_fields(fields)?;
         let axes = places.iter().filter_map(|p| fields.get(*p)).map(column);
@@ -162,22 +160,30 @@ impl ArrayLayout {
             dimensions.first().copied().filter(counts)?;
             dimensions.remove(0)
         };
-        let lanes = lanes(start, particles.1, &dimensions)?;
-        Some(new_column(name, number, lanes))
+        let component_strides = component_strides(start, particles.1, &dimensions)?;
+        Some(new_column(name, number, component_strides))
     }
 }
 
-fn new_column(name: &str, number: NumberType, lanes: Vec<Strided>) -> StridedColumn {
+fn new_column(
+    name: &str,
+    number: NumberType,
+    component_strides: Vec<ComponentStride>,
+) -> StridedColumn {
     StridedColumn {
         name: name.to_owned(),
         scalar: number.scalar,
         endian: number.endian,
-        lanes,
+        component_strides,
     }
 }
 
-/// One lane for every index into `dimensions` (size, bytes between neighbours), the last fastest.
-fn lanes(start: usize, stride: usize, dimensions: &[(usize, usize)]) -> Option<Vec<Strided>> {
+/// One component for every index into `dimensions` (size, bytes between neighbours), the last fastest.
+fn component_strides(
+    start: usize,
+    stride: usize,
+    dimensions: &[(usize, usize)],
+) -> Option<Vec<ComponentStride>> {
     let components = dimensions
         .iter()
         .try_fold(1, |n: usize, (size, _)| n.checked_mul(*size))?;
@@ -194,7 +200,7 @@ fn lanes(start: usize, stride: usize, dimensions: &[(usize, usize)]) -> Option<V
     Some(
         starts
             .into_iter()
-            .map(|start| Strided { start, stride })
+            .map(|start| ComponentStride { start, stride })
             .collect(),
     )
 }

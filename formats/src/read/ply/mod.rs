@@ -12,7 +12,7 @@ mod tests;
 
 use self::body::VertexRecords;
 use self::header::{Element, PlyEncoding, PlyHeader};
-use super::columns::{self, ParticleLayout, Strided, StridedColumn};
+use super::columns::{self, ComponentStride, ParticleLayout, StridedColumn};
 use super::{ByteSource, Step};
 use crate::format::Format;
 use crate::reader::{Confidence, Reader, StreamUnit};
@@ -158,15 +158,13 @@ fn vertex_columns(
     let mut columns = Vec::with_capacity(vertices.properties.len());
     for property in vertices.properties.iter().filter(|p| p.length.is_none()) {
         let name = property.name.strip_prefix("scalar_");
-        columns.push(StridedColumn {
-            name: name.unwrap_or(&property.name).to_owned(),
-            scalar: property.scalar,
-            endian,
-            lanes: vec![Strided {
-                start: offset,
-                stride,
-            }],
-        });
+        let first = ComponentStride {
+            start: offset,
+            stride,
+        };
+        let name = name.unwrap_or(&property.name);
+        let column = StridedColumn::interleaved(name, (property.scalar, endian), 1, first);
+        columns.push(column);
         offset += property.scalar.size();
     }
     columns

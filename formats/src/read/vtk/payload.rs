@@ -5,7 +5,7 @@ use super::ascii::{read_values, skip_words};
 use super::cursor::LineCursor;
 use super::keywords::is_section_start;
 use super::types::{VtkEncoding, VtkType};
-use crate::read::columns::{Strided, StridedColumn};
+use crate::read::columns::{ComponentStride, StridedColumn};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, ScalarType};
 
 /// `tuples * components`, checked.
@@ -78,16 +78,12 @@ impl ArrayNumbers {
         let Self::Binary { at, scalar, .. } = *self else {
             return None;
         };
-        let lane = |component: usize| Strided {
-            start: at + component * scalar.size(),
+        let first = ComponentStride {
+            start: at,
             stride: components * scalar.size(),
         };
-        Some(StridedColumn {
-            name,
-            scalar,
-            endian: Endian::Big,
-            lanes: (0..components).map(lane).collect(),
-        })
+        let scalar = (scalar, Endian::Big);
+        Some(StridedColumn::interleaved(name, scalar, components, first))
     }
 }
 

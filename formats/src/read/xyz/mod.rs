@@ -4,7 +4,7 @@
 //! (the columns named in the comment line); and bare text with a point a line, which is read as a
 //! table ([`super::csv`]).
 
-use super::columns::{ParticleLayout, Strided, StridedColumn};
+use super::columns::{ComponentStride, ParticleLayout, StridedColumn};
 use super::sniff::{TextShape, text_shape};
 use super::text::{self, Lines};
 use super::{ByteSource, Step, csv};
@@ -162,16 +162,12 @@ pub fn kind(bytes: &[u8]) -> Result<XyzVariant, ParseError> {
 }
 
 fn raw_layout(bytes: &[u8]) -> ParticleLayout {
-    let lane = |axis: usize| Strided {
-        start: axis * size_of::<f32>(),
+    let first = ComponentStride {
+        start: 0,
         stride: TRIPLE,
     };
-    let axes = StridedColumn {
-        name: "the positions".to_owned(),
-        scalar: ScalarType::F32,
-        endian: Endian::Little,
-        lanes: (0..3).map(lane).collect(),
-    };
+    let scalar = (ScalarType::F32, Endian::Little);
+    let axes = StridedColumn::interleaved("the positions", scalar, 3, first);
     ParticleLayout::new(bytes.len() / TRIPLE, vec![axes], Vec::new())
 }
 

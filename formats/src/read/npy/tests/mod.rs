@@ -143,7 +143,7 @@ fn absurd_sizes_are_refused() {
 #[test]
 fn broken_headers_are_named() {
     for (dictionary, words) in [
-        ("[]", "no dictionary"),
+        ("[]", "not a dictionary"),
         ("{'shape': (1, 3), 'fortran_order': False}", "no descr"),
         ("{'descr': '<f4', 'shape': (1, 3)}", "no fortran_order"),
         (
@@ -169,7 +169,7 @@ fn broken_headers_are_named() {
         ),
         (
             "{'descr': ['a'], 'fortran_order': False, 'shape': (1,)}",
-            "no tuple",
+            "not a tuple",
         ),
         ("{'descr' '<f4'}", "expected `:`"),
         ("{'descr': '<f4' 'shape'}", "expected `,`"),
