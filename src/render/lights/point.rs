@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use super::{Light, LightSamples};
+use super::light::{Light, LightSamples};
 use crate::math::{LANES, Lanes3, Supported, lane_kernel};
 use crate::scene::Falloff;
 
