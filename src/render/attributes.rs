@@ -117,7 +117,7 @@ impl RenderContext<'_> {
     ) -> DataSample {
         let PacketScratch { hits, blend, .. } = packet;
         let channels = self.settings.channels;
-        let is_particle = hits.material[lane] != MaterialId::GROUND;
+        let is_particle = hits.material[lane].is_of_particles();
         let wants_particle = is_particle && (channels.id || channels.velocity);
         let particle = wants_particle.then(|| self.particle_at(hits, lane));
         let normal = lane3(&hits.normal, lane);

@@ -119,9 +119,7 @@ struct Drops(Balls);
 
 impl Shape for Drops {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
-        let material = self.material();
-        let hit = self.0.crossing(ray, side)?;
-        Some(Intersection { material, ..hit })
+        self.0.crossing(ray, side)
     }
 
     fn material(&self) -> MaterialId {

@@ -86,7 +86,7 @@ impl Integrator for WhittedIntegrator<'_> {
             material.shading_points(context.simd, rays, &packet.hits, inside, &mut packet.points);
             let lit = material.lit_lanes(lanes, inside);
             self.add_direct_light(segments, &**material, lit, depth, packet);
-            if id == MaterialId::PARTICLES {
+            if material.constants().sends_rays() {
                 self.scatter(segments, material.constants(), lanes, depth, packet, next);
             }
         }

@@ -44,6 +44,11 @@ impl WhittedMaterial {
         self.diffuse > 0.0 || self.specular > 0.0
     }
 
+    /// Whether further rays leave it.
+    pub(in crate::render) fn sends_rays(&self) -> bool {
+        self.reflection > 0.0 || self.dielectric.transmission > 0.0
+    }
+
     /// An opaque material that only scatters.
     pub(in crate::render) fn matte(ambient: f32, diffuse: f32, ambient_light: Vec3) -> Self {
         let material = scene::Material {

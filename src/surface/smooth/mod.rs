@@ -123,7 +123,7 @@ impl ArrayTask for CrossPacket<'_> {
             let from = Side::of_lane(self.inside, lane);
             if let Some(meeting) = built.tree.first_crossing(&ray, from) {
                 let hit = self.surface.hit(&ray, &meeting, from);
-                self.hits.set(lane, &hit);
+                self.hits.set(lane, &hit, MaterialId::PARTICLES);
                 self.rays.t_max[lane] = hit.t;
             }
         }
@@ -181,7 +181,6 @@ impl SmoothSurface<'_> {
             particle: 0,
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,
-            material: MaterialId::PARTICLES,
         };
         match (&self.built.field, &self.built.exact) {
             (Some(field), Some(layout)) => exact::refined(field, layout, ray, hit),
