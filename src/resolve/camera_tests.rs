@@ -77,7 +77,9 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());
     assert_eq!(scenes[0].lights, scenes[1].lights);
     // The default lights come from where frame 0 is seen from.
-    let to_light = scenes[0].lights[0].at(glam::Vec3::ZERO).unwrap().to_light;
+    let crate::scene::LightKind::Directional { to_light } = scenes[0].lights[0].kind else {
+        panic!("the key light is directional");
+    };
     let away = |frame: usize| -scenes[frame].camera.forward().dot(to_light);
     assert!(away(0) > 0.5 && away(1) < away(0));
 }

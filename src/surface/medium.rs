@@ -4,7 +4,7 @@
 use glam::Vec3;
 
 use super::spheres::{SphereSurface, sphere_hit};
-use super::{Intersection, Intersections, ShadingNormals, Shape, Side};
+use super::{Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side};
 use crate::accel::Coherence;
 use crate::accel::intervals::TreeExit;
 use crate::accel::traverse::TreeHit;
@@ -164,7 +164,7 @@ fn end_at(
     hits: &mut Intersections,
 ) {
     if let Some(hit) = found {
-        hits.set(lane, &hit);
+        hits.set(lane, &hit, MaterialId::PARTICLES);
         rays.t_max[lane] = hit.t;
     }
 }

@@ -50,7 +50,8 @@ pub trait Shape: Sync {
         self.crossing(ray, Side::Outside)
     }
 
-    /// What all of it is made of.
+    /// What all of it is made of. [`MaterialId::PARTICLES`] is for the particles alone: any other shape has a material
+    /// of its own.
     fn material(&self) -> MaterialId {
         MaterialId::PARTICLES
     }
@@ -79,7 +80,7 @@ pub trait Shape: Sync {
         for lane in 0..rays.len() {
             let found = self.crossing(&rays.ray(lane), Side::of_lane(inside, lane));
             if let Some(hit) = found {
-                hits.set(lane, &hit);
+                hits.set(lane, &hit, self.material());
                 rays.t_max[lane] = hit.t;
             }
         }

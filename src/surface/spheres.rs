@@ -80,7 +80,6 @@ pub(super) fn sphere_hit(
         lift: 0.0,
         particle: tree.particle(hit.slot),
         anchor: point,
-        material: MaterialId::PARTICLES,
         offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
     };
     normals.shade(tree, ray, met, radius)
@@ -93,7 +92,6 @@ impl Shape for SphereSurface<'_> {
         let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
         Some(Intersection {
             particle: self.first + hit.particle,
-            material: self.material,
             ..hit
         })
     }
@@ -137,7 +135,7 @@ impl Shape for SphereSurface<'_> {
                 let hit = self
                     .normals
                     .shade(&self.tree, &ray, hits.get(lane), radii[lane]);
-                hits.set(lane, &hit);
+                hits.set(lane, &hit, self.material);
             }
         }
     }

@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::field::FieldParticles;
-use super::{Intersection, Intersections, MaterialId, Shape, Side, SurfaceSettings};
+use super::{Intersection, Intersections, Shape, Side, SurfaceSettings};
 use crate::accel::Coherence;
 use crate::math::{Supported, first_lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
@@ -103,7 +103,6 @@ impl SmoothSurface<'_> {
             particle: 0,
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,
-            material: MaterialId::PARTICLES,
         };
         match (&self.built.field, &self.built.exact) {
             (Some(field), Some(layout)) => exact::refined(field, layout, ray, hit),
@@ -148,7 +147,7 @@ impl Shape for SmoothSurface<'_> {
         for lane in lanes_in(crossings.mask) {
             let from = Side::of_lane(inside, lane);
             let hit = self.hit(&rays.ray(lane), &crossings, lane, from);
-            hits.set(lane, &hit);
+            hits.set(lane, &hit, self.material());
             rays.t_max[lane] = hit.t;
         }
     }
