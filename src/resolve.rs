@@ -8,12 +8,12 @@ use crate::manifest::{
     AutoLength, Background as BackgroundSetting, ColorSetting, Falloff as FalloffSetting,
     GroundHeight, GroundPattern, LightKind, Manifest, RadiusSetting,
 };
+use crate::metrics::memory::available;
 use crate::output::{Compression, ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
 use crate::render::{Channels, RenderSettings};
-use crate::report::memory::available;
 use crate::scene::{
     Background, Bounds, CameraError, Checker, ColorMap, Falloff, Ground, Light, PathError, Scene,
     default_lights, material,

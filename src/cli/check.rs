@@ -7,9 +7,9 @@ use spherule_jobs::{Foreseen, FrameState, Job, Mode};
 use super::plan::{Plan, RunArgs, one_fits};
 use super::work::use_threads;
 use super::{CliError, Outcome, disk, print};
+use crate::metrics::Bytes;
+use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
-use crate::report::Bytes;
-use crate::report::memory::available;
 use crate::survey::Survey;
 
 mod camera;

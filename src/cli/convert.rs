@@ -22,8 +22,8 @@ use super::work::{
 use super::{CliError, Outcome, events, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
 use crate::manifest::{MAX_THREADS, ProgressMode, real_dir};
+use crate::metrics::Bytes;
 use crate::reading::conversion_budget;
-use crate::report::Bytes;
 use crate::survey::Survey;
 
 /// What the job of a conversion is called in its plan.

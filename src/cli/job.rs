@@ -13,8 +13,8 @@ use super::CliError;
 use super::job_args::JobArgs;
 use super::numbers::{number, pixels, whole};
 use crate::manifest::{self, Look, Manifest, Override};
+use crate::metrics::Bytes;
 use crate::reading::read_budget;
-use crate::report::Bytes;
 
 /// What can be said on the command line about the pictures. Every key of the manifest has
 /// `--set`; the usual ones have a flag.

@@ -18,10 +18,10 @@ use crate::accel::Structure;
 use crate::manifest::{
     Manifest, OutputPattern, SCHEMA_FILE, is_marked, marked, named_place, read_manifest, real_dir,
 };
+use crate::metrics::Bytes;
+use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
-use crate::report::Bytes;
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::report::memory::available;
 use crate::resolve::{self, check_views, question};
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;

@@ -6,8 +6,8 @@ use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml, described};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
+use crate::metrics::Bytes;
 use crate::render::{DEFAULT_MIN_WEIGHT, MAX_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS};
-use crate::report::Bytes;
 use crate::scene::ground;
 use crate::surface::SurfaceKind;
 

@@ -13,7 +13,7 @@ use super::look::read_size;
 use super::named;
 use super::reader::{Field, Section};
 use super::write::{Entries, Toml, described};
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 
 /// Name of the file that ends following if the manifest names none, beside the images.
 pub const STOP_FILE: &str = "job.stop";

@@ -11,13 +11,14 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 use super::setup::Setup;
 use super::trace::TracedFrame;
 use super::{Event, InHand, Passed, Stage, Watch};
+use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::mishap::is_place_at_fault;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
 use crate::render::Film;
+use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
-use crate::report::{FrameReport, MemoryPeaks, MemoryUse};
 
 /// Why an image is not there.
 #[derive(Debug, thiserror::Error)]

@@ -10,8 +10,8 @@ use super::decoded::DecodedFrame;
 use super::in_place::{Opened, StoredFrame};
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
+use crate::metrics::memory::{available, process_room};
 use crate::mishap::may_be_unfinished;
-use crate::report::memory::{available, process_room};
 
 /// Why a frame cannot be drawn.
 #[derive(Debug, thiserror::Error)]

@@ -17,8 +17,8 @@ use spherule_formats::sequence::Sequence;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
+use crate::metrics::Bytes;
 use crate::render::{Film, scratch_bytes};
-use crate::report::Bytes;
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
 

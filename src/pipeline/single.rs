@@ -14,9 +14,10 @@ use super::load::load_frame;
 use super::renderer::renderer_of;
 use super::setup::Setup;
 use super::trace::TracedFrame;
+use crate::metrics::MemoryPeaks;
 use crate::mishap::{guarded, is_place_at_fault};
 use crate::output::encode_preview;
-use crate::report::{FrameReport, MemoryPeaks};
+use crate::report::FrameReport;
 
 /// Why there is no image.
 #[derive(Debug)]

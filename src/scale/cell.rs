@@ -9,10 +9,10 @@ use super::peaks::Peaks;
 use super::{Budget, CellRequest, Particles, stored};
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, TreeBuilder};
+use crate::metrics::memory;
 use crate::render::{Film, ParticleShading, RayCounts, RenderSettings, render};
 use crate::report::FrameReport;
-use crate::report::memory;
-use crate::report::scale::{BuildTimes, CellMeasurement, PerParticle, RayRates, Spread};
+use crate::scale::report::{BuildTimes, CellMeasurement, PerParticle, RayRates, Spread};
 use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::spheres::SphereSurface;
 

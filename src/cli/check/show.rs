@@ -9,8 +9,8 @@ use crate::accel::Structure;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
 use crate::cli::work::list;
+use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
-use crate::report::Bytes;
 use crate::survey::Survey;
 
 impl Check<'_> {

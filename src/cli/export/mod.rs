@@ -12,7 +12,7 @@ use super::job::{Asked, absolute, is_manifest, read_manifest};
 use super::plan::Plan;
 use super::{CliError, Outcome, print};
 use crate::manifest::{Manifest, Override, named_place};
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 
 mod openjd;
 mod place;

@@ -12,7 +12,7 @@ use super::super::job::absolute;
 use super::super::{CliError, Outcome};
 use super::{CommonArgs, Work, deliver, grace, text, tidy};
 use crate::manifest::MAX_THREADS;
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 
 #[derive(Debug, Args)]
 pub(super) struct SlurmArgs {

@@ -11,7 +11,7 @@ use crate::accel::Structure;
 use crate::cli::CliError;
 use crate::cli::job::absolute;
 use crate::cli::work::useful_threads;
-use crate::report::scale::{InputSummary, ScaleSettings};
+use crate::scale::report::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 
 /// Seconds a cell where nothing else is said: the thesis's minute.

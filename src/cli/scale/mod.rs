@@ -16,7 +16,7 @@ use crate::cli::child::{self, Ended};
 use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
-use crate::report::scale::{
+use crate::scale::report::{
     CellMeasurement, CellOutcome, CellReport, MADE_BY, ScaleReport, files, table,
 };
 use crate::scale::{Budget, CellRequest, Motion, Representation, Task};

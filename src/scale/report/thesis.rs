@@ -1,6 +1,7 @@
 //! What the thesis measured (tables 2 to 5): i7-7700HQ at 2.8 GHz, 16 GB, GeForce GTX 1050 Ti with
 //! 4 GB, OptiX; box, camera and depth as here, 1920x1080.
 
+use crate::report::THESIS_BYTES_PER_PARTICLE as BYTES;
 use crate::scale::Motion;
 
 /// The thesis's machine and settings.
@@ -72,9 +73,6 @@ pub const BUILD_SECONDS: [Figure; 3] = [
     figure("kdtree", 10_000_000, 2.5),
     figure("sbvh", 10_000_000, 80.0),
 ];
-
-/// Bytes a particle that its program held at most: "about 350" at 1e7, whatever the structure.
-pub const BYTES: f64 = 350.0;
 
 /// The same by structure.
 pub const BYTES_PER_PARTICLE: [Figure; 4] = [

@@ -3,11 +3,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::frame::{BuildSummary, FrameBytes, RaySummary, RssSummary};
-use super::machine::Machine;
+use super::{Budget, Motion, Representation};
 use crate::accel::Structure;
 use crate::render::RayCounts;
-use crate::scale::{Budget, Motion, Representation};
+use crate::report::frame::{BuildSummary, FrameBytes, RaySummary, RssSummary};
+use crate::report::machine::Machine;
 
 pub mod csv;
 pub mod files;
