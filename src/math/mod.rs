@@ -20,6 +20,9 @@ pub type Lanes = [f32; LANES];
 /// A vector or a linear RGB colour for each lane, one array per component.
 pub type Lanes3 = [Lanes; 3];
 
+/// An integer for each lane.
+pub type Integers = [i32; LANES];
+
 /// The same number in all lanes.
 pub const fn splat(value: f32) -> Lanes {
     [value; LANES]

@@ -8,8 +8,8 @@ use std::time::Instant;
 use serde_json::json;
 use spherule_jobs::{Job, JobError, Publisher, publish};
 
+use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::trace::TracedFrame;
 use super::{Event, InHand, Passed, Stage, Watch};
 use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::mishap::is_place_at_fault;

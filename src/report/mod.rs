@@ -1,5 +1,6 @@
 //! What a run says of itself: time and memory of every frame, for people and for scripts.
 
+mod escape;
 pub mod frame;
 pub mod job;
 pub mod machine;

@@ -18,6 +18,7 @@ use crate::accel::Structure;
 
 pub mod cell;
 pub mod convert;
+mod measure;
 mod motion;
 mod particles;
 mod peaks;

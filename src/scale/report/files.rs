@@ -8,14 +8,7 @@ use std::path::{Path, PathBuf};
 use serde_json::Value;
 use spherule_jobs::{Publisher, publish};
 
-use super::{MADE_BY, ScaleReport, csv, page};
-
-/// The typed report.
-pub const JSON: &str = "scale.json";
-/// One row a cell.
-pub const CSV: &str = "scale.csv";
-/// Tables and plots.
-pub const HTML: &str = "scale.html";
+use super::{CSV, HTML, JSON, MADE_BY, ScaleReport, csv, page};
 
 /// How a file under one of the names is known to be ours.
 type Mark = fn(&str) -> bool;

@@ -19,6 +19,20 @@ pub mod thesis;
 /// Who makes these reports; tells ours from files of the same name.
 pub const MADE_BY: &str = "spherule scale";
 
+/// File of the typed report.
+pub const JSON: &str = "scale.json";
+/// File of one row per cell.
+pub const CSV: &str = "scale.csv";
+/// File of tables and plots.
+pub const HTML: &str = "scale.html";
+
+/// Bytes in the thesis's "MB".
+pub(super) const MIB: f64 = 1_048_576.0;
+/// What stands where a cell has failed.
+pub(super) const FAILED: &str = "failed";
+/// What stands where nothing was measured.
+pub(super) const MISSING: &str = "-";
+
 /// Everything that was measured, cell by cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReport {

@@ -1,8 +1,10 @@
 //! `scale.html`: the tables with the thesis's figures beside ours, and plots against the particle
 //! count on logarithmic axes.
 
-use super::table::{self, MIB, MISSING};
-use super::{CellMeasurement, Column, MADE_BY, ScaleReport, files, parts, thesis};
+use super::table;
+use super::{
+    CSV, CellMeasurement, Column, FAILED, JSON, MADE_BY, MIB, MISSING, ScaleReport, parts, thesis,
+};
 use crate::report::page::{Page, Table};
 use crate::report::plots::{Axis, Line, Plot, Series};
 use crate::scale::Motion;
@@ -57,8 +59,8 @@ pub fn html(report: &ScaleReport) -> String {
     page.fold("Every cell, with its rays and its memory by purpose");
     page.table(&cells(report));
     page.end_fold();
-    page.link("The same for programs:", files::JSON);
-    page.link("And for spreadsheets:", files::CSV);
+    page.link("The same for programs:", JSON);
+    page.link("And for spreadsheets:", CSV);
     page.html()
 }
 
@@ -344,7 +346,7 @@ fn cells(report: &ScaleReport) -> Table {
         ];
         match cell.measured() {
             Some(measured) => table.row(names.into_iter().chain(numbers(measured))),
-            None => table.bad_row(names.into_iter().chain([table::FAILED.to_owned()])),
+            None => table.bad_row(names.into_iter().chain([FAILED.to_owned()])),
         }
     }
     table

@@ -1,8 +1,8 @@
 //! Memory by part: rows are counts in a column of the other tables, columns parts. And what the native
 //! frames took to make.
 
-use super::table::{FAILED, MIB, MISSING};
 use super::{CellMeasurement, Column, Conversion, ScaleReport, thesis};
+use super::{FAILED, MIB, MISSING};
 
 /// Heads of the table of bytes.
 pub(super) const HEADS: [&str; 11] = [

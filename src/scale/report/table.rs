@@ -5,15 +5,10 @@ use std::fmt::Write as _;
 
 use spherule_formats::escape_controls;
 
-use super::{CellMeasurement, CellReport, Column, ScaleReport, Spread, parts};
+use super::{
+    CellMeasurement, CellReport, Column, FAILED, MIB, MISSING, ScaleReport, Spread, parts,
+};
 use crate::scale::{Budget, Motion};
-
-/// Bytes in the thesis's "MB".
-pub(super) const MIB: f64 = 1_048_576.0;
-/// What stands where a cell has failed.
-pub(super) const FAILED: &str = "failed";
-/// What stands where nothing was measured.
-pub(super) const MISSING: &str = "-";
 
 /// All tables, with a heading each.
 pub fn text(report: &ScaleReport) -> String {

@@ -173,7 +173,7 @@ fn memory_by_part_tells_the_file_from_memory() {
         ["12.00", "0.00", "0.60", "12.60", "12.60", "0.00"]
     );
     // Nothing was measured there.
-    assert!(row("kdtree")[2..].iter().all(|cell| cell == table::MISSING));
+    assert!(row("kdtree")[2..].iter().all(|cell| cell == MISSING));
     assert_eq!(row("the thesis, about")[5], "350");
     assert!(rows.iter().all(|row| row.len() == parts::HEADS.len()));
     assert_eq!(
@@ -284,7 +284,7 @@ fn our_own_files_are_told_from_others() {
     assert_eq!(files::foreign(dir), None);
     files::write(dir, &report()).unwrap();
     assert_eq!(files::foreign(dir), None);
-    for name in [files::HTML, files::CSV, files::JSON] {
+    for name in [HTML, CSV, JSON] {
         let path = dir.join(name);
         std::fs::write(&path, "{}").unwrap();
         assert_eq!(files::foreign(dir), Some(path));

@@ -7,8 +7,7 @@
     reason = "loops over lanes, each of many arrays"
 )]
 
-use super::steps::Integers;
-use crate::math::{LANES, Lanes, Lanes3, splat};
+use crate::math::{Integers, LANES, Lanes, Lanes3, splat};
 
 /// Rounds of the search in a bracket; false position with Illinois steps gains more than a digit each.
 const ROUNDS: usize = 6;

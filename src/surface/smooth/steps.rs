@@ -7,14 +7,11 @@
 use super::brick::{VOXEL_BITS, VOXELS, VOXELS_I32};
 use super::root::{Segments, first_roots};
 use super::tree::BrickTree;
-use crate::math::{LANES, Lanes, Lanes3, lane_kernel, splat};
+use crate::math::{Integers, LANES, Lanes, Lanes3, lane_kernel, splat};
 use crate::ray::RayPacket;
 
 /// Components of directions are kept this far from zero, so that their inverses are finite.
 const MIN_DIRECTION: f32 = 1e-9;
-
-/// Integers for each lane.
-pub(super) type Integers = [i32; LANES];
 
 /// Rays in voxels from the root's corner; distances stay those of the rays.
 #[derive(Default)]
