@@ -157,7 +157,7 @@ impl SurfaceBuilder {
         let normals = shading_normals(&setup.picture.surface);
         let body: Box<dyn Shape + '_> = match setup.picture.surface.kind {
             SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
-            SurfaceKind::Medium => Box::new(MediumSurface::new(tree).shaded_by(normals)),
+            SurfaceKind::Union => Box::new(MediumSurface::new(tree).shaded_by(normals)),
             SurfaceKind::Smooth => Box::new(self.smooth.surface()),
         };
         let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);
