@@ -36,7 +36,7 @@ mod generate;
 mod init;
 mod inspect;
 mod job;
-mod job_args;
+mod key_flags;
 mod numbers;
 mod plan;
 mod print;

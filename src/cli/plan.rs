@@ -156,7 +156,7 @@ impl Plan {
                 Mode::Resume if self.manifest.job.follow => Mode::RequeueChanged,
                 mode => mode,
             },
-            patience: self.manifest.job.takeover_after.duration(),
+            patience: self.manifest.job.takeover_after,
         })
     }
 

@@ -299,7 +299,7 @@ impl<'a> MemoryModel<'a> {
         // A smooth surface has no tree over particles.
         let particles = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => 0,
-            SurfaceKind::Spheres | SurfaceKind::Medium => frame.particles,
+            SurfaceKind::Spheres | SurfaceKind::Union => frame.particles,
         };
         let count = usize::try_from(particles).unwrap_or(usize::MAX);
         let settings = self.setup.build_settings(count, values);
@@ -330,7 +330,7 @@ impl<'a> MemoryModel<'a> {
         };
         let smooth = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => smooth_bytes(self.setup, frame.particles),
-            SurfaceKind::Spheres | SurfaceKind::Medium => SurfaceBytes::default(),
+            SurfaceKind::Spheres | SurfaceKind::Union => SurfaceBytes::default(),
         };
         SurfaceBytes {
             building: spray + smooth.building,

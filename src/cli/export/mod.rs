@@ -175,8 +175,12 @@ fn asked(args: &CommonArgs) -> Result<Asked, CliError> {
         Override::new("input.frames", range.clone(), "--frames").map_err(CliError::Other)
     });
     let overrides = frames.transpose()?.into_iter().collect();
+    let (manifest, warnings) = Manifest::parse_with_warnings(&content, path, overrides)?;
+    for warning in warnings {
+        note!("{warning}");
+    }
     Ok(Asked {
-        manifest: Manifest::parse_with(&content, path, overrides)?,
+        manifest,
         base: path.parent().map_or_else(PathBuf::new, Path::to_owned),
         file: Some(path.clone()),
         unchanged: Manifest::parse(&content, path).ok(),

@@ -235,7 +235,7 @@ fn every_way_to_write_text() {
 
 #[test]
 fn one_medium_takes_what_spheres_take() {
-    let options = [&SMALL[..], &["--surface", "medium"]].concat();
+    let options = [&SMALL[..], &["--surface", "union"]].concat();
     compare("npy", |path| block(path, 500_000), &options);
 }
 

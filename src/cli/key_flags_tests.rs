@@ -2,8 +2,7 @@
 
 use std::collections::BTreeSet;
 
-use clap::{Args as _, Command, FromArgMatches as _};
-
+use super::*;
 use crate::cli::plan::RunArgs;
 use crate::manifest::Manifest;
 
@@ -11,7 +10,10 @@ use crate::manifest::Manifest;
 /// there.
 const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard"];
 
-/// Every other option with a value that is not the default, and the key that it is laid over.
+/// Options for parts of `material.color`.
+const COLORS: [&str; 3] = ["color_by", "map", "range"];
+
+/// Other options with a value that is not the default, and the key that it is laid over.
 const FLAGS: [(&str, &str); 32] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
@@ -29,7 +31,7 @@ const FLAGS: [(&str, &str); 32] = [
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
-    ("--surface medium", "render.surface = \"medium\""),
+    ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--exact-surface", "surface.exact = true"),
     ("--spray", "surface.spray = true"),
@@ -83,12 +85,13 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 5] = [
-    "memory_limit",
-    "memory_ceiling",
+const WORDS: [&str; 6] = [
+    "memory-limit",
+    "memory-ceiling",
+    "parts",
     "color_by",
     "range",
-    "stop_file",
+    "stop-file",
 ];
 
 #[test]
@@ -119,18 +122,23 @@ fn defaults_in_the_help_are_those_of_the_manifest() {
 
 #[test]
 fn no_option_is_forgotten() {
-    let known = FLAGS.iter().map(|(flags, _)| {
-        let flag = flags.split_whitespace().rfind(|w| w.starts_with("--"));
-        let first = flags.split_whitespace().next();
-        let flag = if flags.starts_with("--isolate") {
-            flag
-        } else {
-            first
-        };
-        flag.unwrap().trim_start_matches('-').replace('-', "_")
-    });
-    let known: BTreeSet<String> = known.chain(ACTIONS.map(str::to_owned)).collect();
-    let command = command();
-    let all = command.get_arguments().map(|a| a.get_id().to_string());
-    assert_eq!(all.collect::<BTreeSet<_>>(), known);
+    let of_keys: Vec<&str> = key_flags().iter().map(|key| key.flag.name).collect();
+    let tried = FLAGS.iter().flat_map(|(flags, _)| flags.split_whitespace());
+    let tried: BTreeSet<&str> = tried.filter_map(|flag| flag.strip_prefix("--")).collect();
+    for argument in command().get_arguments() {
+        let name = argument.get_id().as_str();
+        assert!(
+            ACTIONS.contains(&name) || COLORS.contains(&name) || of_keys.contains(&name),
+            "{name}"
+        );
+        assert!(
+            !COLORS.contains(&name) || tried.contains(&*name.replace('_', "-")),
+            "{name}"
+        );
+    }
+    // Every kind of value is tried.
+    for key in key_flags() {
+        let is_tried = |other: &KeyFlag| other.kind == key.kind && tried.contains(other.flag.name);
+        assert!(key_flags().iter().any(is_tried), "{key:?}");
+    }
 }

@@ -28,12 +28,12 @@ fn body(count: usize) -> (Vec<Vec3>, Vec<f32>) {
     spheres.unzip()
 }
 
-fn each_structure(centers: &[Vec3], radius: SphereRadius, check: impl Fn(MediumSurface)) {
+fn each_structure(centers: &[Vec3], radius: SphereRadius, check: impl Fn(UnionSurface)) {
     for structure in Structure::ALL {
         let mut builder = TreeBuilder::new();
         let spheres = Spheres { centers, radius };
         builder.build(&spheres, &BuildSettings::new(structure));
-        check(MediumSurface::new(builder.tree().view()));
+        check(UnionSurface::new(builder.tree().view()));
     }
 }
 

@@ -16,14 +16,14 @@ const TOUCHING: f32 = 1e-2;
 
 /// The union of a tree's spheres.
 #[derive(Debug, Clone, Copy)]
-pub struct MediumSurface<'a> {
+pub struct UnionSurface<'a> {
     tree: TreeView<'a>,
     /// The same, each for itself.
     spheres: SphereSurface<'a>,
     normals: ShadingNormals,
 }
 
-impl<'a> MediumSurface<'a> {
+impl<'a> UnionSurface<'a> {
     /// The union of the spheres of `tree`.
     pub fn new(tree: TreeView<'a>) -> Self {
         Self {
@@ -82,7 +82,7 @@ impl<'a> MediumSurface<'a> {
     }
 }
 
-impl Shape for MediumSurface<'_> {
+impl Shape for UnionSurface<'_> {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
         match side {
             Side::Outside => self.entry(ray),
@@ -128,7 +128,7 @@ impl Shape for MediumSurface<'_> {
     }
 }
 
-impl MediumSurface<'_> {
+impl UnionSurface<'_> {
     /// Where rays that lie close together enter. From outside all spheres that is the first sphere that they meet,
     /// unless they only touch it.
     fn enter(&self, rays: &mut RayPacket, hits: &mut Intersections) {
@@ -170,5 +170,5 @@ fn end_at(
 }
 
 #[cfg(test)]
-#[path = "medium_tests.rs"]
+#[path = "union_tests.rs"]
 mod tests;
