@@ -313,7 +313,7 @@ impl<'a> Keys<'a> {
             }
             Self::List(entries) => {
                 entries.section(name, about);
-                keys(&mut Keys::List(&mut **entries));
+                keys(&mut Keys::List(entries));
             }
         }
     }
@@ -340,7 +340,7 @@ impl<'a> Keys<'a> {
             Self::List(entries) => {
                 for (index, item) in items.iter_mut().enumerate() {
                     entries.item(path, index, about);
-                    keys(item, &mut Keys::List(&mut **entries));
+                    keys(item, &mut Keys::List(entries));
                 }
             }
         }
