@@ -101,7 +101,7 @@ fn argument(key: &KeyFlag) -> Arg {
     match key.kind {
         FlagKind::Integer if key.unit == Some("pixels") => argument.value_parser(pixels),
         FlagKind::Integer => argument.value_parser(whole),
-        FlagKind::Number if key.unit == Some("seconds") => argument.value_parser(seconds),
+        FlagKind::Number if key.flag.value_name == "SECONDS" => argument.value_parser(seconds),
         FlagKind::Number => argument.value_parser(number),
         FlagKind::List => argument.value_delimiter(',').action(ArgAction::Append),
         // These names are explained in the help.
