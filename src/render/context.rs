@@ -77,6 +77,7 @@ impl<'a> RenderContext<'a> {
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
         let interior = Interior::of(&scene.material, is_connected);
         let eye = scene.camera.eye();
+        let [width, height] = settings.full_size();
         let is_eye_inside = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(is_eye_inside),
@@ -86,7 +87,7 @@ impl<'a> RenderContext<'a> {
             scene,
             settings,
             simd: Supported::default(),
-            camera: CameraLanes::new(&scene.camera, settings.width, settings.height),
+            camera: CameraLanes::new(&scene.camera, width, height),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),

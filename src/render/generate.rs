@@ -6,8 +6,10 @@ use super::{
     film::FilmTile,
     sampler::PathSeed,
     scratch::{Pixel, SampleGroup},
+    settings::RenderSettings,
     shading::camera_rays,
     stream::SegmentPacket,
+    tile::mosaic_start,
 };
 use crate::math::{LANES, first_lanes, splat};
 
@@ -20,8 +22,9 @@ impl RenderContext<'_> {
         group: &mut SampleGroup,
     ) {
         group.clear();
+        let [left, top] = self.first_pixel(tile);
         for (column, row) in pixels {
-            let (x, y) = (tile.left + column, tile.top + row);
+            let (x, y) = (left + column, top + row);
             group.pixels.push(Pixel {
                 column,
                 row,
@@ -29,6 +32,18 @@ impl RenderContext<'_> {
                 data: DataSample::MISS,
             });
             group.push_pixel(x as f32, y as f32, self.sampler.points(x, y));
+        }
+    }
+
+    /// The first pixel of `tile` in the image that the camera sees.
+    fn first_pixel(&self, tile: &FilmTile<'_>) -> [u32; 2] {
+        let RenderSettings { width, height, .. } = *self.settings;
+        match self.settings.mosaic_of {
+            None => [tile.left, tile.top],
+            Some([full_width, full_height]) => [
+                mosaic_start(tile.left, width, full_width),
+                mosaic_start(tile.top, height, full_height),
+            ],
         }
     }
 

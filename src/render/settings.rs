@@ -45,6 +45,9 @@ pub struct RenderSettings {
     pub transparent_background: bool,
     /// Planes to fill.
     pub channels: Channels,
+    /// If given, the image is a mosaic: its tiles of 16x16 pixels are tiles of an image of this width and height, spread
+    /// evenly over it. What a mosaic costs for each pixel, the whole image costs.
+    pub mosaic_of: Option<[u32; 2]>,
 }
 
 impl RenderSettings {
@@ -58,13 +61,22 @@ impl RenderSettings {
             min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,
             channels: Channels::COLOR,
+            mosaic_of: None,
         }
     }
 
+    /// Pixels across and down of the image that the camera sees.
+    pub(super) fn full_size(&self) -> [u32; 2] {
+        self.mosaic_of.unwrap_or([self.width, self.height])
+    }
+
     pub(super) fn validate(&self) -> Result<(), RenderError> {
+        let [full_width, full_height] = self.full_size();
         for (name, value, max) in [
             ("width", self.width, MAX_SIDE),
             ("height", self.height, MAX_SIDE),
+            ("width", full_width, MAX_SIDE),
+            ("height", full_height, MAX_SIDE),
             ("samples", self.samples, MAX_SAMPLES),
             ("max_depth", self.max_depth, MAX_DEPTH),
         ] {
