@@ -80,7 +80,7 @@ impl FrameRenderer for CpuRenderer {
     /// Renders `frame`, the one that was built last.
     ///
     /// # Errors
-    /// [`RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
+    /// [`crate::render::RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
     /// meanwhile; the others are settings that were checked before.
     fn render(
         &mut self,
