@@ -170,8 +170,7 @@ impl<'a> Check<'a> {
         let Some((_, setup)) = &self.pictures else {
             return;
         };
-        let fitting = self.tasks.iter().filter(|task| task.refused.is_none());
-        let Some(heaviest) = fitting.max_by_key(|task| self.size(setup, task).raw) else {
+        let Some(heaviest) = self.to_do().max_by_key(|task| self.size(setup, task).raw) else {
             return;
         };
         let others = self.spread_tasks(heaviest);

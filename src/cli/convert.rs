@@ -12,8 +12,9 @@ use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
-use super::job::{absolute, apart};
+use super::job::apart;
 use super::numbers::{USUAL_BOUND, duration, not_negative, positive};
+use super::paths::absolute;
 use super::progress::Progress;
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,

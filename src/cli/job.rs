@@ -1,6 +1,5 @@
 //! From arguments to a manifest and its sequence: what `render` and `init` share.
 
-use std::env;
 use std::io;
 use std::panic;
 use std::path::{Path, PathBuf};
@@ -10,8 +9,9 @@ use clap::Args;
 use spherule_formats::sequence::{Sequence, SequenceError, SequenceInput};
 
 use super::CliError;
-use super::key_flags::KeyFlags;
+use super::key_flags::{KeyFlags, over};
 use super::numbers::number;
+use super::paths::{absolute, text};
 use crate::manifest::{self, Look, Manifest, Override};
 use crate::metrics::Bytes;
 use crate::reading::read_budget;
@@ -207,34 +207,4 @@ pub(super) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
             .join()
             .unwrap_or_else(|fault| panic::resume_unwind(fault))
     })
-}
-
-/// As typed, `path` is relative to here; laid over a manifest from a file it would be relative to that.
-pub(super) fn path_as_typed(path: &str, from_file: bool) -> Result<String, CliError> {
-    if from_file {
-        text(&absolute(Path::new(path))?)
-    } else {
-        Ok(path.to_owned())
-    }
-}
-
-pub(super) fn over(
-    key: &str,
-    value: impl Into<toml::Value>,
-    shown: &str,
-) -> Result<Override, CliError> {
-    Override::new(key, value, shown).map_err(CliError::Other)
-}
-
-/// `path` from the root, without looking at what is there.
-pub(super) fn absolute(path: &Path) -> Result<PathBuf, CliError> {
-    if path.as_os_str().is_empty() {
-        return env::current_dir().map_err(CliError::io(Path::new(".")));
-    }
-    std::path::absolute(path).map_err(CliError::io(path))
-}
-
-fn text(path: &Path) -> Result<String, CliError> {
-    let text = path.to_str().map(str::to_owned);
-    text.ok_or_else(|| CliError::other(format!("{}: the path is not UTF-8", path.display())))
 }

@@ -6,8 +6,8 @@ use clap::{Arg, ArgAction, ArgMatches, Args, Command, FromArgMatches};
 use toml::Value;
 
 use super::CliError;
-use super::job::{over, path_as_typed};
 use super::numbers::{number, pixels, seconds, whole};
+use super::paths::path_as_typed;
 use crate::manifest::{FlagKind, KeyFlag, Override, ProgressMode, key_flags};
 
 /// Headings of the help, in this order.
@@ -79,6 +79,15 @@ impl FromArgMatches for KeyFlags {
     }
 }
 
+/// Sets `key`; messages call it `shown`.
+pub(super) fn over(
+    key: &str,
+    value: impl Into<toml::Value>,
+    shown: &str,
+) -> Result<Override, CliError> {
+    Override::new(key, value, shown).map_err(CliError::Other)
+}
+
 fn argument(key: &KeyFlag) -> Arg {
     let is_switch = key.kind == FlagKind::Switch;
     let default = key.default.as_ref().filter(|_| !is_switch);
@@ -101,7 +110,7 @@ fn argument(key: &KeyFlag) -> Arg {
     match key.kind {
         FlagKind::Integer if key.unit == Some("pixels") => argument.value_parser(pixels),
         FlagKind::Integer => argument.value_parser(whole),
-        FlagKind::Number if key.flag.value_name == "SECONDS" => argument.value_parser(seconds),
+        FlagKind::Seconds => argument.value_parser(seconds),
         FlagKind::Number => argument.value_parser(number),
         FlagKind::List => argument.value_delimiter(',').action(ArgAction::Append),
         // These names are explained in the help.
@@ -127,7 +136,9 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
             matches.get_flag(name).then(|| Value::from(!usual))
         }
         FlagKind::Integer => matches.get_one::<i64>(name).map(|v| Value::from(*v)),
-        FlagKind::Number => matches.get_one::<f64>(name).map(|v| Value::from(*v)),
+        FlagKind::Number | FlagKind::Seconds => {
+            matches.get_one::<f64>(name).map(|v| Value::from(*v))
+        }
         FlagKind::Text(_) => text().map(Value::from),
         FlagKind::NumberOrText => text().map(|text| {
             let whole = text.parse::<i64>().map(Value::from);

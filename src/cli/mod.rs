@@ -38,6 +38,7 @@ mod inspect;
 mod job;
 mod key_flags;
 mod numbers;
+mod paths;
 mod plan;
 mod print;
 mod progress;

@@ -8,7 +8,8 @@ use spherule_formats::Sequence;
 use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish, read_regular_text};
 
 use super::CliError;
-use super::job::{Asked, ManifestArgs, absolute, apart};
+use super::job::{Asked, ManifestArgs, apart};
+use super::paths::absolute;
 use super::schema::{is_schema, schema_text};
 use super::shard::Shard;
 use super::work::{

@@ -10,7 +10,8 @@ use clap::Args;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
-use super::job::{Asked, ManifestArgs, absolute};
+use super::job::{Asked, ManifestArgs};
+use super::paths::absolute;
 use super::plan::{Plan, one_fits};
 use super::render::tell;
 use super::work::{chosen, list, use_threads};

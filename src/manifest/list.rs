@@ -103,7 +103,9 @@ impl Entries {
             kind: T::kind(&key),
             schema: with_words(T::schema(&key), &key),
             flag_kind: match (key.word, T::FLAG) {
-                (Some(_), FlagKind::Integer | FlagKind::Number) => FlagKind::NumberOrText,
+                (Some(_), FlagKind::Integer | FlagKind::Number | FlagKind::Seconds) => {
+                    FlagKind::NumberOrText
+                }
                 (_, FlagKind::Text(false)) => {
                     FlagKind::Text(T::words().iter().any(|word| word.starts_with('-')))
                 }

@@ -8,7 +8,8 @@ use clap::{Args, Subcommand};
 use spherule_jobs::export::{Chunks, ExportError};
 use spherule_jobs::{Mode, publish};
 
-use super::job::{Asked, absolute, is_manifest, read_manifest};
+use super::job::{Asked, is_manifest, read_manifest};
+use super::paths::absolute;
 use super::plan::Plan;
 use super::{CliError, Outcome, print};
 use crate::manifest::{Manifest, Override, named_place};
