@@ -41,8 +41,8 @@ pub struct Probe {
     pub read: f64,
     /// Building the tree and the surface, measured.
     pub build: f64,
-    /// Frames of which a part of the image was traced. What follows is the mean over those spread over the job, else of
-    /// the heaviest one.
+    /// Frames whose images were traced in part. The figures below are means over the frames that are spread over the
+    /// job. If there are none, they are those of the heaviest frame.
     pub frames: u32,
     /// Tracing, estimated.
     pub trace: f64,
@@ -251,8 +251,8 @@ impl Probe {
     /// Tracing on trial takes no longer than this for a frame.
     pub const TIME_BOX: Duration = Duration::from_secs(3);
 
-    /// Seconds on `threads` for frames of these sizes, of which `probed` is the heaviest one. Tracing and encoding share
-    /// the threads; where frames overlap, reading goes beside them but for the first frame.
+    /// The time for frames of these sizes on `threads` threads, seconds. `probed` is the size of the heaviest frame.
+    /// Tracing and encoding share the threads. Where frames overlap, all frames but the first are read meanwhile.
     pub fn seconds_for(
         &self,
         frames: &[FrameSize],

@@ -80,8 +80,8 @@ impl FrameRenderer for CpuRenderer {
     /// Renders `frame`, the one that was built last.
     ///
     /// # Errors
-    /// [`crate::render::RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
-    /// meanwhile; the others are settings that were checked before.
+    /// [`crate::render::RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame
+    /// changed meanwhile. The other errors are settings that were checked before.
     fn render(
         &mut self,
         setup: &Setup,

@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 use super::{film::FilmTile, scratch::SampleGroup};
-use crate::math::{LANES, Lanes, Lanes3};
+use crate::math::{LANES, Lanes, Lanes3, fold};
 
 impl SampleGroup {
     /// Stores the mean of the `samples` of each pixel, and the data of the pixel.
@@ -41,18 +41,10 @@ fn pixel_sum(radiance: &[Lanes3], coverage: &[Lanes], range: Range<usize>) -> [f
     sum
 }
 
-/// The sum over a packet's lanes in a fixed order that vectorises: halves onto halves.
+/// The sum over the lanes of a packet.
 #[inline(always)]
-fn sum_of_lanes(mut lanes: Lanes) -> f32 {
-    macro_rules! halve {
-        ($($half:literal)*) => {$(
-            for lane in 0..$half {
-                lanes[lane] += lanes[lane + $half];
-            }
-        )*};
-    }
-    halve!(8 4 2 1);
-    lanes[0]
+fn sum_of_lanes(lanes: Lanes) -> f32 {
+    fold(lanes, |a, b| a + b)
 }
 
 #[cfg(test)]

@@ -87,16 +87,14 @@ impl SampleGroup {
 
     /// Adds samples at these offsets, across and down, from the corner of a pixel.
     pub(super) fn push_pixel(&mut self, x: f32, y: f32, (across, down): (&[f32], &[f32])) {
-        let (across_packets, across_rest) = across.as_chunks::<LANES>();
-        let (down_packets, down_rest) = down.as_chunks::<LANES>();
-        if !self.len.is_multiple_of(LANES) || !across_rest.is_empty() {
+        if !self.len.is_multiple_of(LANES) || !across.len().is_multiple_of(LANES) {
             for (across, down) in across.iter().zip(down) {
                 self.push(x + across, y + down);
             }
             return;
         }
-        debug_assert!(down_rest.is_empty());
-        for (across, down) in across_packets.iter().zip(down_packets) {
+        let (across, down) = (across.as_chunks().0, down.as_chunks().0);
+        for (across, down) in across.iter().zip(down) {
             self.push_packet([
                 across.map(|offset| x + offset),
                 down.map(|offset| y + offset),

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::math::{Lanes, Lanes3, lane3, set_lane3, splat};
-use crate::ray::PACKET_SIZE;
+use crate::ray::{PACKET_SIZE, RayPacket};
 
 /// Names a material of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -118,6 +118,18 @@ impl Intersections {
         self.opacity[lane] = 1.0;
         self.particle[lane] = hit.particle;
         self.material[lane] = material;
+    }
+
+    /// Puts `hit` with a surface of `material` into `lane`, and ends the ray there.
+    pub(super) fn end_ray(
+        &mut self,
+        rays: &mut RayPacket,
+        lane: usize,
+        hit: &Intersection,
+        material: MaterialId,
+    ) {
+        self.set(lane, hit, material);
+        rays.t_max[lane] = hit.t;
     }
 
     /// The intersection in `lane`.

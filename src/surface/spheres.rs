@@ -8,7 +8,7 @@ use super::{Dimming, Intersection, Intersections, MaterialId, ShadingNormals, Sh
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
 use crate::accel::{Coherence, TreeHits};
-use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in};
+use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in, larger};
 use crate::ray::{Ray, RayPacket};
 
 /// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
@@ -195,7 +195,6 @@ fn intersections_body(
     met: u32,
     hits: &mut Intersections,
 ) {
-    let larger = |a: f32, b: f32| if a > b { a } else { b };
     for l in 0..LANES {
         let is_met = met >> l & 1 == 1;
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];

@@ -3,8 +3,9 @@
 
 use glam::Vec3;
 
+use super::shape::intersect_one_by_one;
 use super::spheres::{SphereSurface, sphere_hit};
-use super::{Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side};
+use super::{Intersection, Intersections, ShadingNormals, Shape, Side};
 use crate::accel::Coherence;
 use crate::accel::intervals::TreeExit;
 use crate::accel::traverse::TreeHit;
@@ -113,13 +114,7 @@ impl Shape for UnionSurface<'_> {
             self.enter(rays, hits);
             return;
         }
-        for lane in 0..rays.len() {
-            let ray = rays.ray(lane);
-            if ray.t_max > ray.t_min {
-                let found = self.crossing(&ray, Side::of_lane(inside, lane));
-                end_at(found, lane, rays, hits);
-            }
-        }
+        intersect_one_by_one(self, rays, inside, hits);
     }
 
     /// Also for rays that start inside: what is met are the surfaces of spheres.
@@ -152,20 +147,10 @@ impl UnionSurface<'_> {
             } else {
                 found
             };
-            end_at(found, lane, rays, hits);
+            if let Some(hit) = found {
+                hits.end_ray(rays, lane, &hit, self.material());
+            }
         }
-    }
-}
-
-fn end_at(
-    found: Option<Intersection>,
-    lane: usize,
-    rays: &mut RayPacket,
-    hits: &mut Intersections,
-) {
-    if let Some(hit) = found {
-        hits.set(lane, &hit, MaterialId::PARTICLES);
-        rays.t_max[lane] = hit.t;
     }
 }
 

@@ -1,9 +1,9 @@
 //! Packets in plain loops, for kernels that have no packet tests of their own.
 
 use super::super::hits::TreeHits;
-use super::beam::{fold, larger, smaller};
 use super::packet::{EnteredChildren, LaneSlabs, key_of};
 use super::{Beam, Kernel, PacketKernel, PacketSphere, SLAB_SLACK};
+use crate::math::{fold, larger, smaller};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};

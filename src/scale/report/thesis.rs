@@ -1,7 +1,7 @@
 //! What the thesis measured (tables 2 to 5): i7-7700HQ at 2.8 GHz, 16 GB, GeForce GTX 1050 Ti with
 //! 4 GB, OptiX; box, camera and depth as here, 1920x1080.
 
-use crate::report::THESIS_BYTES_PER_PARTICLE as BYTES;
+use crate::report::THESIS_BYTES_PER_PARTICLE;
 use crate::scale::Motion;
 
 /// The thesis's machine and settings.
@@ -76,10 +76,10 @@ pub const BUILD_SECONDS: [Figure; 3] = [
 
 /// The same by structure.
 pub const BYTES_PER_PARTICLE: [Figure; 4] = [
-    figure("lbvh", 10_000_000, BYTES),
-    figure("kdtree", 10_000_000, BYTES),
-    figure("bvh", 10_000_000, BYTES),
-    figure("sbvh", 10_000_000, BYTES),
+    figure("lbvh", 10_000_000, THESIS_BYTES_PER_PARTICLE),
+    figure("kdtree", 10_000_000, THESIS_BYTES_PER_PARTICLE),
+    figure("bvh", 10_000_000, THESIS_BYTES_PER_PARTICLE),
+    figure("sbvh", 10_000_000, THESIS_BYTES_PER_PARTICLE),
 ];
 
 /// Table 5: peak memory. Its "MB" are of 1024 x 1024 bytes: the large ones are whole tenths of

@@ -8,6 +8,7 @@
 use glam::Vec3;
 
 use super::field::FieldParticles;
+use super::shape::crossing_of_packet;
 use super::{Intersection, Intersections, Shape, Side, SurfaceSettings};
 use crate::accel::Coherence;
 use crate::math::{Supported, first_lanes, lanes_in};
@@ -117,12 +118,7 @@ impl SmoothSurface<'_> {
 
 impl Shape for SmoothSurface<'_> {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
-        let mut packet = RayPacket::default();
-        packet.push(ray);
-        let mut hits = Intersections::default();
-        let inside = u32::from(side == Side::Inside);
-        self.intersect(&mut packet, Coherence::Incoherent, inside, &mut hits);
-        (hits.mask == 1).then(|| hits.get(0))
+        crossing_of_packet(self, ray, side)
     }
 
     fn is_connected(&self) -> bool {
@@ -147,8 +143,7 @@ impl Shape for SmoothSurface<'_> {
         for lane in lanes_in(crossings.mask) {
             let from = Side::of_lane(inside, lane);
             let hit = self.hit(&rays.ray(lane), &crossings, lane, from);
-            hits.set(lane, &hit, self.material());
-            rays.t_max[lane] = hit.t;
+            hits.end_ray(rays, lane, &hit, self.material());
         }
     }
 

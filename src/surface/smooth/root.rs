@@ -25,8 +25,9 @@ pub(super) struct Segments {
     pub(super) sign: Lanes,
 }
 
-/// The part of the way along each segment at which the field, of which these are the values at the corners of the
-/// voxel, first gets to `threshold`. A ray that starts beyond crosses at 0. The first result has a bit for each ray of `lanes` that crosses.
+/// Finds the first crossing of each segment: the fraction of its length at which the field reaches `threshold`. The field
+/// is given by its values at the `corners` of the voxels. A ray that starts beyond the surface crosses it at 0. The first
+/// result has a bit for each ray of `lanes` that crosses.
 #[inline(always)]
 pub(super) fn first_roots(
     corners: &[Integers; 8],
