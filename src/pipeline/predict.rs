@@ -18,6 +18,7 @@ use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::metrics::Bytes;
+use crate::output::PackBuffers;
 use crate::render::{Film, scratch_bytes};
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
@@ -419,10 +420,10 @@ impl<'a> MemoryModel<'a> {
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
         // Bands have 32 rows at most, blocks that pack well 16. Colours are kept in half precision.
-        let rows = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
+        let band = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
         let threads = rayon::current_num_threads() as u64;
-        // Each thread has a block twice, and some are packed, at worst as large as they were.
-        let bands = rows * (2 * (threads + 1) + threads + 2);
+        // Each thread packs one, and some are packed, at worst as large as they were.
+        let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
         (9 * pixels).max(bands)
     }
 }
