@@ -166,7 +166,7 @@ pub struct MemoryModel<'a> {
 
 /// Data of the program, its threads' stacks and small allocations; large pieces go back to the system when they are
 /// freed ([`RETURNED`]). Measured on sequences of up to 1e6 particles, by what the other parts leave.
-const PROGRAM: u64 = 9 << 19;
+const PROGRAM: u64 = 3 << 20;
 /// The same for each thread.
 const THREAD: u64 = 256 << 10;
 
