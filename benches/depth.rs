@@ -11,9 +11,9 @@ use glam::Vec3;
 use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule::ray::Ray;
 use spherule::scene::material::{reflect, refract};
-use spherule::surface::medium::MediumSurface;
 use spherule::surface::smooth::SmoothGrid;
 use spherule::surface::spheres::SphereSurface;
+use spherule::surface::union::UnionSurface;
 use spherule::surface::{Intersection, Shape, Side, SurfaceSettings};
 use spherule_formats::generate::{BoxSettings, fill_box};
 
@@ -57,7 +57,7 @@ fn main() {
         for larger in OVERLAPS {
             build(&mut builder, larger);
             let name = format!("{name}, {larger} times the radius");
-            tell(&name, "medium", &MediumSurface::new(builder.tree().view()));
+            tell(&name, "medium", &UnionSurface::new(builder.tree().view()));
         }
         let mut grid = SmoothGrid::default();
         grid.build(&centers, radius, &SurfaceSettings::DEFAULT, false, None)

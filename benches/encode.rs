@@ -72,10 +72,17 @@ fn rendered(place: &Path, is_quick: bool) -> Vec<PathBuf> {
     };
     let inputs = [("box", cubes, "0"), ("dam", path(dam), "9")];
     let image = |(name, input, frame): (&str, String, &str)| {
-        let output = path(place.join(format!("{name}.####.exr")));
+        // A job has one input, and a directory is a job.
+        let output = path(place.join(name).join("image.####.exr"));
         let what = ["render", &input, "-o", &output, "--frames", frame];
         run(&[&what[..], &["--channels", ALL], size].concat());
-        place.join(format!("{name}.{frame:0>4}.exr"))
+        let image = place.join(format!("{name}.exr"));
+        fs::rename(
+            place.join(name).join(format!("image.{frame:0>4}.exr")),
+            &image,
+        )
+        .expect("an image");
+        image
     };
     inputs.into_iter().map(image).collect()
 }

@@ -27,6 +27,7 @@ pub mod cli;
 pub mod conversion;
 pub mod manifest;
 pub mod math;
+pub mod metrics;
 mod mishap;
 pub mod output;
 pub mod pipeline;

@@ -3,7 +3,7 @@
 
 use spherule_formats::MemoryBudget;
 
-use crate::report::memory::{available, process_room};
+use crate::metrics::memory::{available, process_room};
 
 /// Files that take no more are always read: a job with a tiny limit is refused for what its frames need and
 /// not for what a look at them takes.

@@ -1,21 +1,20 @@
-//! From what was asked ([`Manifest`]) and what was found ([`Survey`]) to pictures ([`Setup`]).
+//! Turns a [`Manifest`] and a [`Survey`] of the particles into a [`Setup`]: every "auto" gets its value.
 
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
-use crate::accel::BvhSettings;
+use crate::accel::{BvhSettings, SbvhSettings};
 use crate::manifest::{
-    AutoLength, Background as BackgroundSetting, ColorSetting, Falloff as FalloffSetting,
-    GroundHeight, GroundPattern, LightKind, Manifest, RadiusSetting,
+    ColorSetting, DEFAULT_MAP, GroundPattern, LightKind, Manifest, MapName, RadiusSetting,
 };
-use crate::output::{Compression, ExrOptions, PreviewOptions};
+use crate::metrics::memory::available;
+use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
 use crate::render::{Channels, RenderSettings};
-use crate::report::memory::available;
 use crate::scene::{
-    Background, Bounds, CameraError, Checker, ColorMap, Falloff, Ground, Light, PathError, Scene,
+    Background, Bounds, CameraError, Checker, ColorMap, Ground, Light, PathError, Scene,
     default_lights, material,
 };
 use crate::surface::SurfaceKind;
@@ -26,14 +25,14 @@ mod surface;
 
 pub use camera::check_views;
 
-/// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
+/// A radius under this part of the bounds' diagonal vanishes in f32.
 const LEAST_RADIUS: f64 = 1e-6;
 
 /// About this part of the bounds' diagonal is the edge of a square on the floor: some can be counted
 /// through the particles, and none is a few pixels.
 const TILE: f64 = 1.0 / 8.0;
 
-/// Why there can be no pictures.
+/// Why there can be no images.
 #[derive(Debug, thiserror::Error)]
 pub enum ResolveError {
     /// A value is understood but not drawn by this version.
@@ -54,7 +53,7 @@ pub enum ResolveError {
         /// What there is.
         has: String,
     },
-    /// Neither the frames nor their spacing tell a radius.
+    /// The radius follows neither from the frames nor from the spacing of particles.
     #[error(
         "input.radius: the frames bring none, and particles that are few, in one place or far apart \
          do not tell it; give a length with --radius"
@@ -97,7 +96,7 @@ pub enum ResolveError {
     },
 }
 
-/// What the survey has to find out.
+/// What the survey has to determine.
 pub fn question(manifest: &Manifest) -> Question<'_> {
     Question {
         color: match &manifest.material.color {
@@ -118,7 +117,7 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
     }
 }
 
-/// Settles everything about the pictures of a job.
+/// Determines everything about the images of a job.
 ///
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
@@ -145,7 +144,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     };
     let mut ground = ground(manifest, &bounds, up, survey.origin);
     if surface.kind != SurfaceKind::Spheres
-        && manifest.render.ground_height == GroundHeight::Auto
+        && manifest.render.ground_height.is_none()
         && let Some(ground) = &mut ground
     {
         // Through the lowest centres: a body that only touched the floor would lie on a film of air, which
@@ -186,7 +185,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         render,
         surface,
         exr: ExrOptions {
-            compression: compression(manifest),
+            compression: output.compression,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
@@ -199,12 +198,15 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     };
     let run = RunSettings {
         memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
-        accelerator: manifest.render.accelerator.structure(),
+        accelerator: manifest.render.accelerator,
         bvh: BvhSettings {
             preset: manifest.render.bvh_preset,
             leaves: manifest.render.bvh_leaves,
         },
-        sbvh: manifest.render.sbvh,
+        sbvh: SbvhSettings {
+            alpha: manifest.render.sbvh_alpha,
+            budget: manifest.render.sbvh_budget,
+        },
         access: match manifest.input.mmap {
             true => Access::Map,
             false => Access::Read,
@@ -301,16 +303,14 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
     })
 }
 
-/// The colour map where none is given.
-const DEFAULT_MAP: &str = "viridis";
-
 fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
-    let mapped = |name: &str, map: &str, range: Option<[f64; 2]>, required: bool| {
+    let mapped = |name: &str, map: Option<MapName>, range: Option<[f64; 2]>, required: bool| {
         let found = survey
             .color
             .as_ref()
             .map_or([0.0, 1.0], |c| [c.low, c.high]);
         let [low, high] = range.unwrap_or(found);
+        let map = map.unwrap_or(DEFAULT_MAP).name();
         let map = ColorMap::new(map, narrow(low), narrow(high)).map_err(|e| {
             ResolveError::Unsupported {
                 key: "material.color.map",
@@ -324,9 +324,9 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
         })
     };
     match &manifest.material.color {
-        ColorSetting::Rgb(rgb) => Ok(ColorRule::Constant(Vec3::from_array(*rgb))),
+        ColorSetting::Rgb(rgb) => Ok(ColorRule::Constant(*rgb)),
         ColorSetting::Auto => match (&survey.color, &survey.rgb) {
-            (Some(color), _) => mapped(&color.attribute, DEFAULT_MAP, None, false),
+            (Some(color), _) => mapped(&color.attribute, None, None, false),
             (None, Some(rgb)) => Ok(ColorRule::Rgb {
                 name: rgb.attribute.clone(),
                 required: false,
@@ -334,10 +334,7 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
             (None, None) => Ok(ColorRule::Constant(material::DEFAULT_COLOR)),
         },
         ColorSetting::AutoWith { map, range } => match &survey.color {
-            Some(color) => {
-                let map = map.map_or(DEFAULT_MAP, |map| map.name());
-                mapped(&color.attribute, map, *range, false)
-            }
+            Some(color) => mapped(&color.attribute, *map, *range, false),
             None => {
                 require_attribute(survey, "material.color", "velocity")?;
                 Ok(ColorRule::Constant(material::DEFAULT_COLOR))
@@ -356,8 +353,7 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
                     required: true,
                 });
             }
-            let map = map.map_or(DEFAULT_MAP, |map| map.name());
-            mapped(attribute, map, *range, true)
+            mapped(attribute, *map, *range, true)
         }
     }
 }
@@ -367,19 +363,13 @@ fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
         .lights
         .iter()
         .filter_map(|light| {
-            let radiance = Vec3::from_array(light.color) * light.intensity;
+            let radiance = light.color * light.intensity;
             match &light.kind {
-                LightKind::Point { position, falloff } => Some(Light::point_with(
-                    DVec3::from_array(*position),
-                    origin,
-                    radiance,
-                    match falloff {
-                        FalloffSetting::None => Falloff::None,
-                        FalloffSetting::InverseSquare => Falloff::InverseSquare,
-                    },
-                )),
+                LightKind::Point { position, falloff } => {
+                    Some(Light::point_with(*position, origin, radiance, *falloff))
+                }
                 LightKind::Directional { direction } => {
-                    Light::directional(DVec3::from_array(*direction).as_vec3(), radiance)
+                    Light::directional(direction.as_vec3(), radiance)
                 }
             }
         })
@@ -387,15 +377,8 @@ fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {
-    match &manifest.render.background {
-        BackgroundSetting::Auto => Background::default_for(up),
-        BackgroundSetting::Plain(rgb) => Background::Constant(Vec3::from_array(*rgb)),
-        BackgroundSetting::Gradient { bottom, top } => Background::Gradient {
-            bottom: Vec3::from_array(*bottom),
-            top: Vec3::from_array(*top),
-            up,
-        },
-    }
+    let asked = manifest.render.background;
+    asked.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
 }
 
 fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Option<Ground> {
@@ -404,33 +387,22 @@ fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Opt
         return None;
     }
     let mut ground = Ground::under(bounds, up.as_vec3(), origin);
-    if let GroundHeight::At(height) = render.ground_height {
+    if let Some(height) = render.ground_height {
         let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
         ground.center += (relative - ground.height) * ground.up;
         ground.height = relative;
     }
-    ground.color = Vec3::from_array(render.ground_color);
+    ground.color = render.ground_color;
     ground.checker = match render.ground_pattern {
         GroundPattern::Plain => None,
         GroundPattern::Checker => Some(Checker {
             tile: match render.ground_tile {
-                AutoLength::Length(tile) => narrow(tile),
-                AutoLength::Auto => surface::round(bounds.diagonal() * TILE),
+                Some(tile) => narrow(tile),
+                None => surface::round(bounds.diagonal() * TILE),
             },
         }),
     };
     Some(ground)
-}
-
-fn compression(manifest: &Manifest) -> Compression {
-    use crate::manifest::Compression as Setting;
-    match manifest.output.compression {
-        Setting::None => Compression::None,
-        Setting::Rle => Compression::Rle,
-        Setting::Zip => Compression::Zip,
-        Setting::Zips => Compression::Zips,
-        Setting::Piz => Compression::Piz,
-    }
 }
 
 /// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.

@@ -1,10 +1,10 @@
-"""Renders a mesh of water over a checkered ground by Cycles on the CPU, from a camera as a manifest has it.
+"""Renders a mesh of water over a chequered ground with Cycles on the CPU. The camera has the keys of a manifest.
 
     pip install bpy
     python docs/compare/water.py water.obj water.png --eye -2.6 2.6 3.5 --look-at 0.15 0.85 0.05 --ground 0.03
 
-Lengths are those of the particles' files, y is up unless --up says otherwise, colours are linear RGB.
-Everything that is not an option here is as Blender has it.
+Lengths have the unit of the particle files. y is up unless --up is given. Colours are linear RGB.
+All other settings are Blender's defaults.
 """
 
 import argparse

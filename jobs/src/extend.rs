@@ -2,7 +2,8 @@
 
 use std::collections::HashSet;
 
-use crate::planning::{Extension, Prints, extended_plan};
+use crate::fingerprint_cache::FingerprintCache;
+use crate::planning::{Extension, extended_plan};
 use crate::{Entry, FrameState, InputChange, Job, JobError, JobRequest, JobState, foreign};
 
 impl Job {
@@ -15,7 +16,7 @@ impl Job {
         request.check()?;
         let dir = self.state.dir.clone();
         let new = request.selected();
-        let mut prints = Prints::ahead(request, &new, Some(&self.state.plan));
+        let mut prints = FingerprintCache::ahead(request, &new, Some(&self.state.plan));
         let locking = |e| JobError::io(&dir, "agreeing with other workers", e);
         let lock = self.claims.desk().lock().map_err(locking)?;
         self.refresh()?;

@@ -7,7 +7,7 @@
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
-use crate::planning::Prints;
+use crate::fingerprint_cache::FingerprintCache;
 use crate::{JobError, JobRequest, JobState, Mode, PlannedFrame, PlannedInput};
 
 /// Frames whose contents are compared, spread over the sequence.
@@ -23,7 +23,7 @@ const MAX_DIRS: usize = 16;
 pub(crate) fn check_input(
     state: &JobState,
     request: &JobRequest,
-    prints: &mut Prints,
+    prints: &mut FingerprintCache,
 ) -> Result<(), JobError> {
     let planned = state.plan.frames().iter().flat_map(|f| &f.inputs);
     let mut given = request.frames.iter().flat_map(|f| &f.inputs);
@@ -68,7 +68,11 @@ fn shown(input: &PlannedInput, dirs: &HashSet<PathBuf>) -> PathBuf {
 
 /// Whether more than half of the frames that can be compared were made from files of the same contents. The
 /// first frames of two simulations often are the same; the last frame of one may have been completed since.
-fn has_same_contents(state: &JobState, request: &JobRequest, prints: &mut Prints) -> bool {
+fn has_same_contents(
+    state: &JobState,
+    request: &JobRequest,
+    prints: &mut FingerprintCache,
+) -> bool {
     let shared: Vec<(&PlannedFrame, &[PathBuf])> = request
         .frames
         .iter()
@@ -89,7 +93,7 @@ fn has_same_contents(state: &JobState, request: &JobRequest, prints: &mut Prints
     2 * compared.iter().filter(|same| **same).count() > compared.len()
 }
 
-fn is_same_frame(old: &[PlannedInput], new: &[PathBuf], prints: &mut Prints) -> bool {
+fn is_same_frame(old: &[PlannedInput], new: &[PathBuf], prints: &mut FingerprintCache) -> bool {
     let mut pairs = old.iter().zip(new);
     old.len() == new.len()
         && pairs.all(|(old, new)| match (&old.fingerprint, prints.of(new)) {

@@ -14,8 +14,9 @@ use std::thread;
 
 use serde_json::Value;
 
+use crate::fingerprint_cache::FingerprintCache;
 use crate::ledger::{ENDED, LedgerFile, LedgerWriter, News, fold, ledger_files, remove};
-use crate::planning::{Extension, Prints, merged_plan, new_plan, stored_path};
+use crate::planning::{Extension, merged_plan, new_plan, stored_path};
 use crate::work::{Desk, WorkerView, sweep_parts, workers};
 use crate::{
     Claims, Entry, FrameState, InputChange, JobError, JobRequest, JobState, Ledger, Mode,
@@ -107,7 +108,7 @@ impl Job {
         let dir = named(dir);
         request.check()?;
         let selected = request.selected();
-        let mut prints = Prints::default();
+        let mut prints = FingerprintCache::default();
         let forgotten = request.mode == Mode::Force || !dir.exists();
         let (old, ledger) = if forgotten {
             (None, Ledger::default())
@@ -196,7 +197,7 @@ impl Job {
             Mode::Force => None,
             _ => Plan::load(dir)?,
         };
-        let mut prints = Prints::ahead(&request, &selected, known.as_ref());
+        let mut prints = FingerprintCache::ahead(&request, &selected, known.as_ref());
         let desk = Desk::take(dir, request.patience)
             .map_err(|e| JobError::io(dir, "beginning to work in it", e))?;
         let locking = |e| JobError::io(dir, "agreeing with other workers", e);
@@ -367,7 +368,7 @@ fn begin<E: Into<Box<dyn Error + Send + Sync>>>(
     dir: &Path,
     request: &JobRequest,
     ledger: Ledger,
-    prints: &mut Prints,
+    prints: &mut FingerprintCache,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<JobState, JobError> {
     refuse_ledgers(dir)?;

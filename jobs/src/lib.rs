@@ -18,6 +18,7 @@ mod error;
 pub mod export;
 mod extend;
 mod fingerprint;
+mod fingerprint_cache;
 mod foreign;
 mod input;
 mod interrupt;

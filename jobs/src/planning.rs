@@ -1,24 +1,25 @@
 //! Plans as they come of requests: of nothing, or of the plan that is there.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::error::Error;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 
 use serde_json::Value;
 
+use crate::fingerprint_cache::{FingerprintCache, wanted};
 use crate::input::{check_input, input_dirs};
 use crate::{
-    Fingerprint, FrameRequest, InputChange, JobError, JobRequest, JobState, Mode, Plan,
-    PlannedFrame, PlannedInput,
+    FrameRequest, InputChange, JobError, JobRequest, JobState, Mode, Plan, PlannedFrame,
+    PlannedInput,
 };
 
 /// The plan of a job that begins.
 pub(crate) fn new_plan(
     dir: &Path,
     request: &JobRequest,
-    prints: &mut Prints,
+    prints: &mut FingerprintCache,
 ) -> Result<Plan, JobError> {
-    let mut frames = prints.plan(dir, &request.frames)?;
+    let mut frames = planned_frames(prints, dir, &request.frames)?;
     frames.sort_by_key(|f| f.number);
     let dirs = input_dirs(&[], request);
     let settings = request.settings.clone();
@@ -31,7 +32,7 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     state: &JobState,
     request: &JobRequest,
     selected: &[i64],
-    prints: &mut Prints,
+    prints: &mut FingerprintCache,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<Extension, JobError> {
     check_input(state, request, prints)?;
@@ -40,7 +41,7 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     if request.mode != Mode::KeepDone && !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
-    let mut frames = prints.plan(&dir, wanted(request, selected, Some(&state.plan)))?;
+    let mut frames = planned_frames(prints, &dir, wanted(request, selected, Some(&state.plan)))?;
     let mut stale = Vec::new();
     match request.mode {
         Mode::Resume => {
@@ -105,14 +106,14 @@ pub(crate) fn extended_plan(
     state: &JobState,
     request: &JobRequest,
     new: &[i64],
-    prints: &mut Prints,
+    prints: &mut FingerprintCache,
 ) -> Result<Extension, JobError> {
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
     if !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
-    let mut frames = prints.plan(&dir, wanted(request, new, Some(&state.plan)))?;
+    let mut frames = planned_frames(prints, &dir, wanted(request, new, Some(&state.plan)))?;
     keep_cleared_away(state, &mut frames);
     let changes = changed_inputs(state, &frames);
     let mut plan = state.plan.clone();
@@ -145,71 +146,29 @@ fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange>
     changes
 }
 
-/// Fingerprints that have been taken; a file that many frames share is read once.
-#[derive(Debug, Default)]
-pub(crate) struct Prints {
-    known: HashMap<PathBuf, Option<Fingerprint>>,
-}
-
-impl Prints {
-    /// Those of all inputs of `request` that a plan over `old` needs.
-    pub(crate) fn ahead(request: &JobRequest, selected: &[i64], old: Option<&Plan>) -> Self {
-        let mut prints = Self::default();
-        let needed = wanted(request, selected, old);
-        for path in needed.iter().flat_map(|frame| &frame.inputs) {
-            prints.of(path);
-        }
-        prints
-    }
-
-    /// That of the file at `path`; None if it cannot be read.
-    pub(crate) fn of(&mut self, path: &Path) -> Option<Fingerprint> {
-        if let Some(known) = self.known.get(path) {
-            return known.clone();
-        }
-        let print = Fingerprint::of_file(path).ok();
-        self.known.insert(path.to_owned(), print.clone());
-        print
-    }
-
-    fn plan<'a>(
-        &mut self,
-        dir: &Path,
-        frames: impl IntoIterator<Item = &'a FrameRequest>,
-    ) -> Result<Vec<PlannedFrame>, JobError> {
-        let mut planned = Vec::new();
-        for frame in frames {
-            let mut inputs = Vec::with_capacity(frame.inputs.len());
-            for path in &frame.inputs {
-                inputs.push(PlannedInput {
-                    path: utf8(path)?,
-                    fingerprint: self.of(path),
-                });
-            }
-            let outputs = frame.outputs.iter().map(|path| stored_path(dir, path));
-            planned.push(PlannedFrame {
-                number: frame.number,
-                inputs,
-                outputs: outputs.collect::<Result<_, _>>()?,
+/// `frames` as a plan in `dir` lists them.
+fn planned_frames<'a>(
+    fingerprints: &mut FingerprintCache,
+    dir: &Path,
+    frames: impl IntoIterator<Item = &'a FrameRequest>,
+) -> Result<Vec<PlannedFrame>, JobError> {
+    let mut planned = Vec::new();
+    for frame in frames {
+        let mut inputs = Vec::with_capacity(frame.inputs.len());
+        for path in &frame.inputs {
+            inputs.push(PlannedInput {
+                path: utf8(path)?,
+                fingerprint: fingerprints.of(path),
             });
         }
-        Ok(planned)
+        let outputs = frame.outputs.iter().map(|path| stored_path(dir, path));
+        planned.push(PlannedFrame {
+            number: frame.number,
+            inputs,
+            outputs: outputs.collect::<Result<_, _>>()?,
+        });
     }
-}
-
-/// The frames that are to be looked at. Those outside the selection that the plan knows are not, so that
-/// one of many runs over a long sequence reads only its own inputs.
-fn wanted<'a>(
-    request: &'a JobRequest,
-    selected: &[i64],
-    old: Option<&Plan>,
-) -> Vec<&'a FrameRequest> {
-    let selected: HashSet<i64> = selected.iter().copied().collect();
-    let is_known = |number| old.is_some_and(|plan| plan.frame(number).is_some());
-    let frames = request.frames.iter();
-    frames
-        .filter(|f| selected.contains(&f.number) || !is_known(f.number))
-        .collect()
+    Ok(planned)
 }
 
 /// Relative to `dir` where it can be, so that the directory may be moved.

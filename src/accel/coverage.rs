@@ -37,7 +37,7 @@ impl WideTree {
         let mut pending = Vec::new();
         pending.extend((!self.nodes.is_empty()).then_some((Linked::ROOT, everywhere)));
         let (view, directions) = (self.view(), directions());
-        let topology = Linked::of(&view);
+        let topology = view.linked();
         while let Some((code, cell)) = pending.pop() {
             match Linked::number(code) {
                 Place::Block(block) => {

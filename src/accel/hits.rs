@@ -1,6 +1,6 @@
 //! What the rays of a packet hit, lane by lane.
 
-use super::simd::{fold, larger};
+use crate::math::{fold, larger};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
 /// How the rays of a packet lie. It decides how they are traced, never what they hit.

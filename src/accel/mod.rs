@@ -25,6 +25,7 @@ mod near;
 mod packet;
 mod ploc;
 mod predict;
+mod preset;
 mod report;
 mod sbvh;
 pub mod simd;

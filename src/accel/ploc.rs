@@ -15,12 +15,12 @@ use glam::{Vec3, Vec3A};
 use obvhs::bvh2::Bvh2;
 use obvhs::bvh2::node::Bvh2Node;
 use obvhs::bvh2::reinsertion::ReinsertionOptimizer;
-use obvhs::ploc::{PlocBuilder, SortPrecision};
+use obvhs::ploc::PlocBuilder;
 use rayon::prelude::*;
 
 use super::Aabb;
 use super::binary::{BinaryNode, BinaryTree};
-use super::bvh::BvhPreset;
+use super::preset::{BvhPreset, Effort};
 use super::report::PhaseClock;
 use spherule_formats::order::index_u32;
 
@@ -41,17 +41,6 @@ pub(super) struct Clustered {
     pub(super) tree: BinaryTree,
     /// Most bytes held at any time, the boxes not counted where they are computed.
     pub(super) peak_bytes: u64,
-}
-
-/// What a preset asks of obvhs.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Effort {
-    /// Passes in which only direct neighbours are looked at.
-    pub(super) near_passes: usize,
-    /// Part of the nodes that each round of reinsertion tries to place better.
-    pub(super) reinsertion: f32,
-    /// Bits of the Morton codes.
-    pub(super) precision: SortPrecision,
 }
 
 /// Clusters `count` boxes of spheres, each of which `bounds_of` tells; `padding` is what boxes of

@@ -11,7 +11,8 @@ use std::sync::atomic::{AtomicU64, Ordering};
 use super::levels::{Child, UpperLevels, build_levels, level_counts, level_starts, sah_cost};
 use super::report::PhaseClock;
 use super::simd::{SimdLevel, Supported};
-use super::view::{LEVEL_CODES, TieOrder, TreeView, split_levels};
+use super::topology::LEVEL_CODES;
+use super::view::{TieOrder, TreeView, split_levels};
 use super::{Aabb, BuildReport, Structure};
 use spherule_formats::blocks::{
     BLOCK_SIZE, CompactBlocks, FARTHEST_PLANE, Node, StoredBlocks, StoredLeaves, StoredRadii, WIDTH,

@@ -6,7 +6,6 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use super::view::{LEVEL_CODES, TreeView};
 use spherule_formats::blocks::{Node, WIDTH};
 
 /// What a code stands for.
@@ -36,6 +35,9 @@ pub(super) trait Topology<'a>: Copy {
     fn child(self, children: Self::Children, slot: u32) -> u32;
 }
 
+/// Levels that a code of an implicit tree can tell apart.
+pub(super) const LEVEL_CODES: usize = 16;
+
 /// Bits of an implicit code below the level, and of a node's number in a link.
 const INDEX_BITS: u32 = 28;
 const INDEX_MASK: u32 = (1 << INDEX_BITS) - 1;
@@ -47,22 +49,13 @@ const _: () = assert!(LEVEL_CODES == 1 << (u32::BITS - INDEX_BITS));
 /// mapped. A code is the level in the upper bits, the number in the level under it.
 #[derive(Clone, Copy)]
 pub(super) struct Implicit<'a> {
-    levels: &'a [&'a [Node]; LEVEL_CODES],
-    depth: u32,
-    mapped_level: u32,
-    mapped: &'a [u32],
+    pub(super) levels: &'a [&'a [Node]; LEVEL_CODES],
+    pub(super) depth: u32,
+    pub(super) mapped_level: u32,
+    pub(super) mapped: &'a [u32],
 }
 
 impl<'a> Implicit<'a> {
-    pub(super) fn of(tree: &'a TreeView<'a>) -> Self {
-        Self {
-            levels: &tree.levels,
-            depth: tree.depth,
-            mapped_level: tree.mapped_level,
-            mapped: tree.mapped,
-        }
-    }
-
     /// Number of the first child of node `index` on `level`, among the nodes (or blocks) below.
     #[inline(always)]
     pub(super) fn first_child(self, level: u32, index: usize) -> usize {
@@ -154,18 +147,11 @@ const BLOCK: u32 = 1 << 31;
 /// set.
 #[derive(Clone, Copy)]
 pub(super) struct Linked<'a> {
-    nodes: &'a [Node],
-    links: &'a [Link],
+    pub(super) nodes: &'a [Node],
+    pub(super) links: &'a [Link],
 }
 
 impl<'a> Linked<'a> {
-    pub(super) fn of(tree: &TreeView<'a>) -> Self {
-        Self {
-            nodes: tree.levels[0],
-            links: tree.links,
-        }
-    }
-
     /// What `code` stands for, a node by its number.
     #[inline(always)]
     pub(super) fn number(code: u32) -> Place<usize> {
@@ -216,7 +202,7 @@ mod tests {
             ..WideTree::default()
         };
         let view = tree.view();
-        let linked = Linked::of(&view);
+        let linked = view.linked();
         let places = |code: u32| {
             [0, 1, 2].map(|slot| Linked::number(linked.child(linked.children(code), slot)))
         };

@@ -44,7 +44,7 @@ impl WideTree {
     /// Checks whole levels from the blocks up.
     fn validate_levels(&self) -> Result<(), String> {
         let view = self.view();
-        let topology = Implicit::of(&view);
+        let topology = view.implicit();
         let levels = self.level_starts.len();
         let mut below: Vec<Aabb> = (0..self.blocks.len())
             .map(|b| self.block_bounds(b))
@@ -130,7 +130,7 @@ impl WideTree {
         levels: usize,
         reached: &mut Reached,
     ) -> Result<Aabb, String> {
-        let topology = Linked::of(view);
+        let topology = view.linked();
         let Place::Node(index) = Linked::number(code) else {
             return Err(format!("code {code} is no node"));
         };

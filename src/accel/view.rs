@@ -9,12 +9,9 @@ use super::Aabb;
 use super::hits::TreeHits;
 use super::leaves::{Coded, Exact, Leaves};
 use super::simd::{KernelTask, PacketKernel, RunTask, SimdLevel, Supported};
-use super::topology::{Implicit, Link, Linked, Topology};
+use super::topology::{Implicit, LEVEL_CODES, Link, Linked, Topology};
 use crate::math::{LANES, Lanes, Lanes3, lanes_in, set_lane3};
 use spherule_formats::blocks::{BLOCK_SIZE, Node, StoredBlocks, StoredRadii};
-
-/// Levels that a code of an implicit tree can tell apart.
-pub(super) const LEVEL_CODES: usize = 16;
 
 /// A tree over spheres, to be traced. See [`TreeView::nearest`] and its neighbours.
 #[derive(Debug, Clone, Copy)]
@@ -68,6 +65,24 @@ pub(super) enum TieOrder {
 }
 
 impl<'a> TreeView<'a> {
+    /// Whole levels; only of a tree without links.
+    pub(super) fn implicit(&'a self) -> Implicit<'a> {
+        Implicit {
+            levels: &self.levels,
+            depth: self.depth,
+            mapped_level: self.mapped_level,
+            mapped: self.mapped,
+        }
+    }
+
+    /// Any shape; only of a tree with links.
+    pub(super) fn linked(&self) -> Linked<'a> {
+        Linked {
+            nodes: self.levels[0],
+            links: self.links,
+        }
+    }
+
     /// Box of the spheres; empty without particles.
     pub fn bounds(&self) -> Aabb {
         self.bounds
@@ -196,16 +211,16 @@ impl<'a> TreeView<'a> {
     pub(super) fn run<W: TreeTask>(&self, task: W) -> W::Output {
         match self.blocks {
             StoredBlocks::F32(blocks) if self.links.is_empty() => {
-                self.run_in(Implicit::of(self), Exact(blocks), task)
+                self.run_in(self.implicit(), Exact(blocks), task)
             }
-            StoredBlocks::F32(blocks) => self.run_in(Linked::of(self), Exact(blocks), task),
+            StoredBlocks::F32(blocks) => self.run_in(self.linked(), Exact(blocks), task),
             StoredBlocks::Q16(blocks) => {
                 let leaves = Coded::new(blocks, self.leaf_nodes());
-                self.run_in(Implicit::of(self), leaves, task)
+                self.run_in(self.implicit(), leaves, task)
             }
             StoredBlocks::Q10(blocks) => {
                 let leaves = Coded::new(blocks, self.leaf_nodes());
-                self.run_in(Implicit::of(self), leaves, task)
+                self.run_in(self.implicit(), leaves, task)
             }
         }
     }

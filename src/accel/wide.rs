@@ -13,8 +13,9 @@ use rayon::prelude::*;
 
 use super::levels::{Child, UpperLevels, build_levels, level_counts, level_starts, sah_cost};
 use super::simd::{SimdLevel, Supported};
+use super::topology::LEVEL_CODES;
 use super::topology::Link;
-use super::view::{LEVEL_CODES, TieOrder, TreeView, split_levels};
+use super::view::{TieOrder, TreeView, split_levels};
 use super::{Aabb, BuildReport, Phase, Structure};
 use spherule_formats::blocks::{
     BLOCK_SIZE, Block, BlockRadii, Node, StoredBlocks, StoredRadii, WIDTH,

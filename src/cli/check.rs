@@ -1,5 +1,7 @@
 //! `spherule check`: what `render` would do with the same arguments. Writes nothing but its answer.
 
+use std::time::{Duration, Instant};
+
 use clap::Args;
 use spherule_formats::Sequence;
 use spherule_jobs::{Foreseen, FrameState, Job, Mode};
@@ -7,9 +9,9 @@ use spherule_jobs::{Foreseen, FrameState, Job, Mode};
 use super::plan::{Plan, RunArgs, one_fits};
 use super::work::use_threads;
 use super::{CliError, Outcome, disk, print};
+use crate::metrics::Bytes;
+use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
-use crate::report::Bytes;
-use crate::report::memory::available;
 use crate::survey::Survey;
 
 mod camera;
@@ -69,6 +71,8 @@ struct Check<'a> {
     pictures: Option<(Survey, Setup)>,
     tasks: Vec<ImageTask>,
     schedule: Option<Schedule>,
+    /// Looking at the sequence takes the same time when it is rendered.
+    survey_time: Duration,
     probe: Option<Probe>,
     free_memory: Option<u64>,
     free_disk: Option<u64>,
@@ -84,6 +88,7 @@ impl<'a> Check<'a> {
             pictures: None,
             tasks: Vec::new(),
             schedule: None,
+            survey_time: Duration::ZERO,
             probe: None,
             free_memory: available(),
             free_disk: None,
@@ -106,11 +111,13 @@ impl<'a> Check<'a> {
                 note!("{change} since it was rendered; it would be rendered again");
             }
         }
+        let start = Instant::now();
         let pictures = match self.foreseen.as_ref().and_then(|f| f.resolved.as_ref()) {
             Some(resolved) => self.plan.settle(resolved, self.sequence),
             None => self.plan.survey(self.sequence),
         };
         self.pictures = self.noted(pictures);
+        self.survey_time = start.elapsed();
         let frames = match &self.foreseen {
             Some(foreseen) => foreseen.pending(),
             None => self.plan.selected(self.sequence),
@@ -158,16 +165,16 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Measures the heaviest frame that is to be done.
+    /// Measures the heaviest frame that is to be done, and some others.
     fn look_at_time(&mut self) {
         let Some((_, setup)) = &self.pictures else {
             return;
         };
-        let fitting = self.tasks.iter().filter(|task| task.refused.is_none());
-        let Some(heaviest) = fitting.max_by_key(|task| self.size(setup, task).raw) else {
+        let Some(heaviest) = self.to_do().max_by_key(|task| self.size(setup, task).raw) else {
             return;
         };
-        match probe(setup, self.sequence, heaviest) {
+        let others = self.spread_tasks(heaviest);
+        match probe(setup, self.sequence, heaviest, &others) {
             Ok(probe) => self.probe = Some(probe),
             // Costs that frame alone when its turn comes.
             Err(reason) => note!("frame {}: {reason}", heaviest.frame),
@@ -191,6 +198,19 @@ impl<'a> Check<'a> {
         self.tasks.iter().filter(|task| task.refused.is_none())
     }
 
+    /// Up to four frames that are to be done, spread evenly over them; not the `heaviest`.
+    fn spread_tasks(&self, heaviest: &ImageTask) -> Vec<&ImageTask> {
+        let all: Vec<&ImageTask> = self.to_do().collect();
+        let mut spread: Vec<&ImageTask> = Vec::new();
+        for eighth in [1, 5, 3, 7] {
+            let task = all[all.len() * eighth / 8];
+            if task.frame != heaviest.frame && spread.iter().all(|t| t.frame != task.frame) {
+                spread.push(task);
+            }
+        }
+        spread
+    }
+
     fn disk_bytes(&self) -> Option<f64> {
         // An image that was given up tells no size.
         let probe = self.probe.filter(|probe| !probe.is_lower_bound)?;
@@ -200,10 +220,12 @@ impl<'a> Check<'a> {
     fn seconds(&self) -> Option<f64> {
         let probe = self.probe?;
         let (_, setup) = self.pictures.as_ref()?;
+        let threads = rayon::current_num_threads();
         let overlap = self.schedule.as_ref()?.overlap;
         let sizes: Vec<FrameSize> = self.to_do().map(|task| self.size(setup, task)).collect();
         let probed = self.to_do().find(|task| task.frame == probe.frame)?;
-        Some(probe.seconds_for(&sizes, &self.size(setup, probed), overlap))
+        let frames = probe.seconds_for(&sizes, &self.size(setup, probed), overlap, threads);
+        Some(self.survey_time.as_secs_f64() + frames)
     }
 
     /// Frames of the run that stand so.

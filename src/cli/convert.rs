@@ -12,8 +12,9 @@ use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::{Sequence, SequenceFrame};
 use spherule_jobs::{DEFAULT_PATIENCE, FrameRange, Job, JobRequest, Mode};
 
-use super::job::{absolute, apart};
+use super::job::apart;
 use super::numbers::{USUAL_BOUND, duration, not_negative, positive};
+use super::paths::absolute;
 use super::progress::Progress;
 use super::work::{
     Finished, KIND, WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey,
@@ -22,8 +23,8 @@ use super::work::{
 use super::{CliError, Outcome, events, signals};
 use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
 use crate::manifest::{MAX_THREADS, ProgressMode, real_dir};
+use crate::metrics::Bytes;
 use crate::reading::conversion_budget;
-use crate::report::Bytes;
 use crate::survey::Survey;
 
 /// What the job of a conversion is called in its plan.

@@ -15,7 +15,7 @@ use spherule_jobs::Interrupt;
 
 use super::numbers::{USUAL_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 
 const WORDS: signals::Words = signals::Words {
     asked: "stopping",

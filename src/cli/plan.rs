@@ -8,7 +8,8 @@ use spherule_formats::Sequence;
 use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish, read_regular_text};
 
 use super::CliError;
-use super::job::{Asked, ManifestArgs, absolute, apart};
+use super::job::{Asked, ManifestArgs, apart};
+use super::paths::absolute;
 use super::schema::{is_schema, schema_text};
 use super::shard::Shard;
 use super::work::{
@@ -18,10 +19,10 @@ use crate::accel::Structure;
 use crate::manifest::{
     Manifest, OutputPattern, SCHEMA_FILE, is_marked, marked, named_place, read_manifest, real_dir,
 };
+use crate::metrics::Bytes;
+use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
-use crate::report::Bytes;
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::report::memory::available;
 use crate::resolve::{self, check_views, question};
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;
@@ -156,7 +157,7 @@ impl Plan {
                 Mode::Resume if self.manifest.job.follow => Mode::RequeueChanged,
                 mode => mode,
             },
-            patience: self.manifest.job.takeover_after.duration(),
+            patience: self.manifest.job.takeover_after,
         })
     }
 

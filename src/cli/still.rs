@@ -10,7 +10,8 @@ use clap::Args;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
-use super::job::{Asked, ManifestArgs, absolute};
+use super::job::{Asked, ManifestArgs};
+use super::paths::absolute;
 use super::plan::{Plan, one_fits};
 use super::render::tell;
 use super::work::{chosen, list, use_threads};
@@ -36,14 +37,14 @@ const EXAMPLES: &str = "Examples:
     mut_arg("frames", no_job),
     mut_arg("progress", no_job),
     mut_arg("isolate", no_job),
-    mut_arg("memory_ceiling", no_job),
+    mut_arg("memory-ceiling", no_job),
     mut_arg("retries", no_job),
-    mut_arg("takeover_after", no_job),
+    mut_arg("takeover-after", no_job),
     mut_arg("grace", no_job),
     mut_arg("follow", no_job),
     mut_arg("idle", no_job),
     mut_arg("settle", no_job),
-    mut_arg("stop_file", no_job),
+    mut_arg("stop-file", no_job),
 )]
 pub(super) struct StillArgs {
     #[command(flatten)]
@@ -66,7 +67,7 @@ const WORDS: signals::Words = signals::Words {
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let start = Instant::now();
     let _signals = signals::listen(WORDS)?;
-    let shown = args.manifest.output.take().map(PathBuf::from);
+    let shown = args.manifest.keys.take("output").map(PathBuf::from);
     let shown = shown.ok_or_else(|| CliError::other("--output: is missing"))?;
     let kind = kind(&shown)?;
     let output = absolute(&shown)?;

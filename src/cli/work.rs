@@ -10,7 +10,8 @@ use serde_json::{Value, json};
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, JobError, Mode, PLAN_FILE};
 
-use super::job::{absolute, is_manifest, read_manifest};
+use super::job::{is_manifest, read_manifest};
+use super::paths::absolute;
 use super::progress::{Ended, duration};
 use super::shard::Shard;
 use super::{CliError, Outcome, events};

@@ -5,7 +5,7 @@ use spherule_formats::native::layout::VERSION;
 use spherule_formats::native::{Bound, Encoding};
 
 use super::attributes::AttributeChoices;
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 /// What was asked for.

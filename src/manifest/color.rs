@@ -1,31 +1,12 @@
 //! Colours: plain ones, and those that an attribute of the particles gives through a map.
 
-use super::named;
-use super::reader::{Field, Section, narrow};
-use super::schema::{name_schema, rgb_schema, words};
-use super::write::{Toml, described};
+use glam::Vec3;
+use serde_json::{Value as Json, json};
 
-named! {
-    /// Colour maps by name; the renderer knows what they look like.
-    ColorMap {
-        /// Dark violet to yellow, even in lightness.
-        Viridis = "viridis",
-        /// The rainbow, evened out.
-        Turbo = "turbo",
-        /// Blue to yellow through red.
-        Plasma = "plasma",
-        /// Black to pale yellow through red.
-        Inferno = "inferno",
-        /// Black to pale pink through violet.
-        Magma = "magma",
-        /// Blue to yellow, the same to colour-blind eyes.
-        Cividis = "cividis",
-        /// Blue to red through white, for values around a middle.
-        RedBlue = "red-blue",
-        /// Black to white.
-        Greys = "greys",
-    }
-}
+use super::key::Key;
+use super::reader::{Field, nearest};
+use super::value::{Fault, Value, numbers_schema, quoted};
+use crate::scene::Background;
 
 /// Where a particle's colour comes from.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,189 +16,206 @@ pub enum ColorSetting {
     /// By speed, through a map that is not the usual one.
     AutoWith {
         /// The map; None is the usual one.
-        map: Option<ColorMap>,
+        map: Option<MapName>,
         /// Values at the two ends of the map; None is what the whole sequence has.
         range: Option<[f64; 2]>,
     },
     /// Linear RGB, the same for all.
-    Rgb([f32; 3]),
+    Rgb(Vec3),
     /// An attribute: colours as they are unless a map or a range is given, anything else through a map,
     /// vectors by their length.
     Attribute {
         /// Name of the attribute.
         attribute: String,
         /// The map; None is viridis.
-        map: Option<ColorMap>,
+        map: Option<MapName>,
         /// Values at the two ends of the map; None is what the whole sequence has.
         range: Option<[f64; 2]>,
     },
 }
 
-/// What rays see that meet nothing. Linear RGB.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Background {
-    /// A calm gradient.
-    Auto,
-    /// One colour.
-    Plain([f32; 3]),
-    /// From straight down to straight up.
-    Gradient {
-        /// Straight down.
-        bottom: [f32; 3],
-        /// Straight up.
-        top: [f32; 3],
-    },
-}
+/// Colour maps that are offered, by the names of [`crate::scene::ColorMap`].
+pub const COLOR_MAPS: [&str; 8] = [
+    "viridis", "turbo", "plasma", "inferno", "magma", "cividis", "red-blue", "greys",
+];
 
-/// Linear RGB: three numbers from 0.
-pub(super) fn rgb(field: &Field<'_>) -> Option<[f32; 3]> {
-    field.or_wants(as_rgb(field), "three numbers from 0, as [0.6, 0.7, 0.9]")
-}
+/// The map where none is named.
+pub const DEFAULT_MAP: MapName = MapName(COLOR_MAPS[0]);
 
-/// The same, up to 1.
-pub(super) fn rgb_to_1(field: &Field<'_>) -> Option<[f32; 3]> {
-    let color = as_rgb(field).filter(|color| color.iter().all(|c| *c <= 1.0));
-    field.or_wants(color, "three numbers from 0 to 1, as [0.6, 0.9, 0.95]")
-}
+/// One of [`COLOR_MAPS`].
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct MapName(&'static str);
 
-fn as_rgb(field: &Field<'_>) -> Option<[f32; 3]> {
-    let color = field.as_numbers::<3>()?.map(narrow);
-    let holds = |c: &f32| c.is_finite() && *c >= 0.0;
-    color.iter().all(holds).then_some(color)
-}
+impl MapName {
+    /// The map of that name, if there is one.
+    pub fn named(name: &str) -> Option<Self> {
+        let known = COLOR_MAPS.into_iter().find(|known| *known == name);
+        known.map(Self)
+    }
 
-impl ColorSetting {
-    pub(super) fn read(field: &Field<'_>) -> Option<Self> {
-        if field.as_text() == Some("auto") {
-            return Some(Self::Auto);
-        }
-        if !field.is_table() {
-            let rgb = as_rgb(field).map(Self::Rgb);
-            return field.or_wants(
-                rgb,
-                "three numbers from 0, as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\"",
-            );
-        }
-        let mut section = field.section()?;
-        let is_auto =
-            section.lacks("attribute") && !(section.lacks("map") && section.lacks("range"));
-        let attribute = section.optional("attribute", Field::name);
-        let map = section.optional("map", |f| f.choice_of("colour map", ColorMap::ALL));
-        let range = section.optional("range", |f| {
-            let range = f.as_numbers::<2>().filter(|[low, high]| low < high);
-            f.or_wants(range, "two rising numbers, as [0.0, 4.0]")
-        });
-        if section.lacks("attribute") && !is_auto {
-            section.missing("attribute", "the name of an attribute, as \"velocity\"");
-        }
-        section.finish();
-        if is_auto {
-            return Some(Self::AutoWith { map, range });
-        }
-        Some(Self::Attribute {
-            attribute: attribute?,
-            map,
-            range,
-        })
+    /// As users type it.
+    pub const fn name(self) -> &'static str {
+        self.0
     }
 }
 
-impl Toml for ColorSetting {
+impl Value for MapName {
+    fn kind(_: &Key) -> String {
+        "a colour map".to_owned()
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let text = field.as_text().ok_or(Fault::Unwanted)?;
+        Self::named(text).ok_or_else(|| {
+            let hint = nearest(text, &COLOR_MAPS).map(|n| format!("; did you mean {n}?"));
+            Fault::Because(format!(
+                "unknown colour map `{text}`; choose one of {}{}",
+                COLOR_MAPS.join(", "),
+                hint.unwrap_or_default()
+            ))
+        })
+    }
+
     fn toml(&self) -> String {
-        match self {
-            Self::Auto => "auto".toml(),
-            Self::Rgb(rgb) => rgb.toml(),
-            Self::AutoWith { map, range } => {
-                format!("{{ {} }}", mapping(*map, *range).trim_start_matches(", "))
-            }
+        quoted(self.0)
+    }
+
+    fn schema(_: &Key) -> Json {
+        json!({ "enum": COLOR_MAPS })
+    }
+}
+
+/// The ends of a colour map.
+impl Value for [f64; 2] {
+    fn kind(_: &Key) -> String {
+        "two rising numbers, as [0.0, 4.0]".to_owned()
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let range = field.as_numbers().filter(|[low, high]: &Self| low < high);
+        range.ok_or(Fault::Unwanted)
+    }
+
+    fn toml(&self) -> String {
+        format!("[{:?}, {:?}]", self[0], self[1])
+    }
+
+    fn schema(_: &Key) -> Json {
+        numbers_schema(2)
+    }
+}
+
+impl Value for ColorSetting {
+    fn kind(_: &Key) -> String {
+        "three numbers from 0, as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\""
+            .to_owned()
+    }
+
+    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
+        if field.as_text() == Some("auto") {
+            return Ok(Self::Auto);
+        }
+        let Some(mut section) = field.as_table() else {
+            return Vec3::parse(field, key).map(Self::Rgb);
+        };
+        let lacks = |key| section.lacks(key);
+        let is_auto = lacks("attribute") && !(lacks("map") && lacks("range"));
+        let (mut attribute, mut map, mut range) = (String::new(), None, None);
+        let mut name = Key::new("attribute", &[]);
+        if !is_auto {
+            name = name.required("the name of an attribute, as \"velocity\"");
+        }
+        section.read(&name, &mut attribute);
+        section.read(&Key::new("map", &[]), &mut map);
+        section.read(&Key::new("range", &[]), &mut range);
+        section.finish();
+        Ok(match is_auto {
+            true => Self::AutoWith { map, range },
+            false => Self::Attribute {
+                attribute,
+                map,
+                range,
+            },
+        })
+    }
+
+    fn toml(&self) -> String {
+        let (attribute, map, range) = match self {
+            Self::Auto => return quoted("auto"),
+            Self::Rgb(rgb) => return rgb.toml(),
+            Self::AutoWith { map, range } => (None, map, range),
             Self::Attribute {
                 attribute,
                 map,
                 range,
-            } => {
-                format!(
-                    "{{ attribute = {}{} }}",
-                    attribute.toml(),
-                    mapping(*map, *range)
-                )
-            }
-        }
+            } => (Some(attribute), map, range),
+        };
+        let pairs = [
+            attribute.map(|attribute| format!("attribute = {}", attribute.toml())),
+            map.map(|map| format!("map = {}", map.toml())),
+            range.map(|range| format!("range = {}", range.toml())),
+        ];
+        let pairs: Vec<String> = pairs.into_iter().flatten().collect();
+        format!("{{ {} }}", pairs.join(", "))
+    }
+
+    fn schema(key: &Key) -> Json {
+        json!({ "anyOf": [
+            { "const": "auto" },
+            Vec3::schema(key),
+            {
+                "type": "object",
+                "properties": {
+                    "attribute": String::schema(key),
+                    "map": MapName::schema(key),
+                    "range": <[f64; 2]>::schema(key),
+                },
+                "minProperties": 1,
+                "additionalProperties": false,
+            },
+        ] })
     }
 }
 
-/// The keys of a map, each after a comma.
-fn mapping(map: Option<ColorMap>, range: Option<[f64; 2]>) -> String {
-    let map = map.map_or(String::new(), |m| format!(", map = {}", m.toml()));
-    let range = range.map_or(String::new(), |r| format!(", range = {}", r.toml()));
-    map + &range
-}
+/// Where up is, [`Background::with_up`] says.
+impl Value for Background {
+    fn kind(_: &Key) -> String {
+        "three numbers from 0, as [0.1, 0.1, 0.1], { bottom = [...], top = [...] },".to_owned()
+    }
 
-described!(ColorSetting, {
-    "anyOf": [
-        { "const": "auto" },
-        rgb_schema(),
-        {
-            "type": "object",
-            "properties": {
-                "attribute": name_schema(),
-                "map": { "enum": words(&[], ColorMap::ALL) },
-                "range": { "type": "array", "items": { "type": "number" }, "minItems": 2, "maxItems": 2 },
-            },
-            "minProperties": 1,
-            "additionalProperties": false,
-        },
-    ],
-});
-
-impl Background {
-    pub(super) fn read(field: &Field<'_>) -> Option<Self> {
-        if field.as_text() == Some("auto") {
-            return Some(Self::Auto);
-        }
-        if !field.is_table() {
-            let plain = as_rgb(field).map(Self::Plain);
-            return field.or_wants(
-                plain,
-                "three numbers from 0, as [0.1, 0.1, 0.1], { bottom = [...], top = [...] }, or \"auto\"",
-            );
-        }
-        let mut section: Section<'_> = field.section()?;
-        let bottom = section.optional("bottom", rgb);
-        let top = section.optional("top", rgb);
-        for key in ["bottom", "top"] {
-            if section.lacks(key) {
-                section.missing(key, "three numbers from 0, as [0.1, 0.1, 0.1]");
-            }
+    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
+        let Some(mut section) = field.as_table() else {
+            return Vec3::parse(field, key).map(Self::Constant);
+        };
+        let (mut bottom, mut top) = (Vec3::ZERO, Vec3::ZERO);
+        for (name, color) in [("bottom", &mut bottom), ("top", &mut top)] {
+            let key = Key::new(name, &[]).required("three numbers from 0, as [0.1, 0.1, 0.1]");
+            section.read(&key, color);
         }
         section.finish();
-        Some(Self::Gradient {
-            bottom: bottom?,
-            top: top?,
-        })
+        let up = Vec3::Z;
+        Ok(Self::Gradient { bottom, top, up })
     }
-}
 
-impl Toml for Background {
     fn toml(&self) -> String {
         match self {
-            Self::Auto => "auto".toml(),
-            Self::Plain(rgb) => rgb.toml(),
-            Self::Gradient { bottom, top } => {
+            Self::Constant(rgb) => rgb.toml(),
+            Self::Gradient { bottom, top, .. } => {
                 format!("{{ bottom = {}, top = {} }}", bottom.toml(), top.toml())
             }
         }
     }
-}
 
-described!(Background, {
-    "anyOf": [
-        { "const": "auto" },
-        rgb_schema(),
-        {
-            "type": "object",
-            "properties": { "bottom": rgb_schema(), "top": rgb_schema() },
-            "required": ["bottom", "top"],
-            "additionalProperties": false,
-        },
-    ],
-});
+    fn schema(key: &Key) -> Json {
+        let rgb = Vec3::schema(key);
+        json!({ "anyOf": [
+            rgb,
+            {
+                "type": "object",
+                "properties": { "bottom": rgb, "top": rgb },
+                "required": ["bottom", "top"],
+                "additionalProperties": false,
+            },
+        ] })
+    }
+}

@@ -1,31 +1,24 @@
-//! `[[light]]`: what shines. With none given, lights are placed by the camera.
+//! `[[light]]`: light sources. With none given, lights are placed by the camera.
 
-use super::color::rgb;
-use super::named;
-use super::reader::{Field, Section};
-use super::write::Entries;
+use glam::{DVec3, Vec3};
 
-named! {
-    /// How a point light fades.
-    Falloff {
-        /// Not at all, as in the thesis.
-        None = "none",
-        /// By the square of the distance.
-        InverseSquare = "inverse-square",
-    }
-}
+use super::key::{Key, Keys, keys};
+use super::value::named;
+use crate::scene::Falloff;
+
+named!(Falloff: None = "none", InverseSquare = "inverse-square");
+
+pub(super) const ABOUT: &[&str] =
+    &["Light sources; without any, a key light and a soft fill are placed by the camera"];
 
 /// `type` in the file.
-#[derive(Clone, Copy)]
+#[derive(Clone, Copy, PartialEq)]
 enum LightType {
     Point,
     Directional,
 }
 
-const LIGHT_TYPES: &[(LightType, &str)] = &[
-    (LightType::Point, "point"),
-    (LightType::Directional, "directional"),
-];
+named!(LightType: Point = "point", Directional = "directional");
 
 /// Where light comes from. World coordinates.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,14 +26,14 @@ pub enum LightKind {
     /// From a point, in all directions.
     Point {
         /// The point.
-        position: [f64; 3],
+        position: DVec3,
         /// How it fades with distance.
         falloff: Falloff,
     },
     /// From far away.
     Directional {
-        /// The way the light travels; not 0, of any length.
-        direction: [f64; 3],
+        /// Direction in which the light travels; not 0, of any length.
+        direction: DVec3,
     },
 }
 
@@ -50,70 +43,77 @@ pub struct Light {
     /// Where it comes from.
     pub kind: LightKind,
     /// Linear RGB.
-    pub color: [f32; 3],
+    pub color: Vec3,
     /// Factor on the colour.
     pub intensity: f32,
 }
 
-impl Light {
-    pub(super) fn read(mut section: Section<'_>) -> Option<Self> {
-        let kind = section.optional("type", |f| f.choice(LIGHT_TYPES));
-        if section.lacks("type") {
-            section.missing("type", "\"point\" or \"directional\"");
+impl Default for Light {
+    fn default() -> Self {
+        Self {
+            kind: LightKind::of(LightType::Point),
+            color: Vec3::ONE,
+            intensity: 1.0,
         }
-        let color = section.value("color", [1.0; 3], rgb);
-        let intensity = section.value("intensity", 1.0, |f| {
-            f.number32("a number from 0", |v| v >= 0.0)
-        });
-        let kind = match kind {
-            Some(LightType::Point) => Self::read_point(&mut section),
-            Some(LightType::Directional) => Self::read_directional(&mut section),
-            // Which keys are known depends on the type, so the rest is not judged.
-            None => return None,
-        };
-        section.finish();
-        Some(Self {
-            kind: kind?,
-            color,
-            intensity,
+    }
+}
+
+impl LightKind {
+    const fn of(kind: LightType) -> Self {
+        match kind {
+            LightType::Point => Self::Point {
+                position: DVec3::new(0.0, 0.0, 10.0),
+                falloff: Falloff::None,
+            },
+            LightType::Directional => Self::Directional {
+                direction: DVec3::NEG_Z,
+            },
+        }
+    }
+}
+
+impl Light {
+    /// One of every type.
+    pub(super) fn examples() -> [Self; 2] {
+        [LightType::Point, LightType::Directional].map(|kind| Self {
+            kind: LightKind::of(kind),
+            ..Self::default()
         })
     }
 
-    fn read_point(section: &mut Section<'_>) -> Option<LightKind> {
-        let position = section.optional("position", Field::point);
-        let falloff = section.value("falloff", Falloff::None, |f| f.choice(Falloff::ALL));
-        if section.lacks("position") {
-            section.missing("position", "a point light needs it, as [0.0, 0.0, 10.0]");
-        }
-        let position = position?;
-        Some(LightKind::Point { position, falloff })
-    }
-
-    fn read_directional(section: &mut Section<'_>) -> Option<LightKind> {
-        let direction = section.optional("direction", Field::direction);
-        if section.lacks("direction") {
-            section.missing(
-                "direction",
-                "a directional light needs the way it travels, as [0.0, 0.0, -1.0]",
-            );
-        }
-        direction.map(|direction| LightKind::Directional { direction })
-    }
-
-    pub(super) fn entries(&self, index: usize, out: &mut Entries) {
-        out.item("light", index);
-        match &self.kind {
-            LightKind::Point { position, falloff } => {
-                out.put("type", "point", "point | directional");
-                out.put("position", position, "where");
-                out.put("falloff", falloff, "none | inverse-square");
+    pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
+        let mut kind = match self.kind {
+            LightKind::Point { .. } => LightType::Point,
+            LightKind::Directional { .. } => LightType::Directional,
+        };
+        let key = Key::new("type", &["point | directional"]);
+        keys.key(key.required("\"point\" or \"directional\""), &mut kind);
+        if let Some(section) = keys.reading() {
+            // Which keys are known depends on the type, so the rest is not judged.
+            if !section.has("type") {
+                section.close();
+                return;
             }
-            LightKind::Directional { direction } => {
-                out.put("type", "directional", "point | directional");
-                out.put("direction", direction, "the way the light travels");
-            }
+            self.kind = LightKind::of(kind);
         }
-        out.put("color", &self.color, "linear RGB");
-        out.put("intensity", &self.intensity, "factor on the colour");
+        match &mut self.kind {
+            LightKind::Point { position, falloff } => keys!(keys:
+                /// Position of the light
+                position => *position, required("a point light needs it, as [0.0, 0.0, 10.0]");
+                /// Falloff with distance: none | inverse-square
+                falloff => *falloff;
+            ),
+            LightKind::Directional { direction } => keys!(keys:
+                /// Direction in which the light travels
+                direction => *direction, direction(),
+                    required("a directional light needs the direction in which it travels, as [0.0, 0.0, -1.0]");
+            ),
+        }
+        keys!(keys:
+            /// Colour, linear RGB
+            color => self.color;
+            /// Factor on the colour
+            intensity => self.intensity, from(0);
+        );
     }
 }

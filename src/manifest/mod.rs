@@ -1,10 +1,10 @@
-//! The manifest: everything a job is, typed, with the defaults, read from TOML.
+//! The manifest: all settings of a job, typed, with their defaults, read from TOML.
 //!
-//! A manifest may be laid over by options of the command line ([`Override`]). Everything wrong
-//! with it is told at once, each with line and column (or the option) and key. What "auto" turns
-//! into is left to others.
+//! Each key is declared once (`key.rs`). Options of the command line replace values of the file ([`Override`]). All
+//! problems are reported at once, each with line and column (or the option) and key. What "auto" means for given
+//! particles is decided in `resolve`.
 
-use std::fmt;
+use std::fmt::{self, Write as _};
 use std::path::Path;
 
 use spherule_jobs::FrameRange;
@@ -12,17 +12,21 @@ use spherule_jobs::FrameRange;
 use crate::render::{MAX_LITERAL_DEPTH, RendererKind};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
+use key::{Affects, Keys};
+use list::Entries;
 use reader::{Problem, Problems, Section};
 use tree::{Node, Place};
-use write::Entries;
 
 mod camera;
 mod color;
 mod file;
+mod flags;
 mod input;
-mod length;
+mod key;
 mod light;
-mod look;
+mod list;
+#[cfg(test)]
+mod manual;
 mod material;
 mod output;
 mod pattern;
@@ -31,89 +35,58 @@ mod places_tests;
 mod preset;
 mod reader;
 mod rebase;
+mod render;
 mod same;
 mod schema;
 mod surface;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod value;
 mod work;
 #[cfg(test)]
 mod work_tests;
-mod write;
 
 pub use camera::{Camera, CameraKey, CameraMode};
-pub use color::{Background, ColorMap, ColorSetting};
+pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
 pub use file::{is_marked, marked, read_manifest};
-pub use input::{Input, RadiusSetting, UpAxis};
-pub use length::AutoLength;
-pub use light::{Falloff, Light, LightKind};
-pub use look::{Accelerator, GroundHeight, GroundPattern, Image, Render};
-pub use material::{Fresnel, Material};
-pub use output::{Channel, Compression, Output};
+pub use flags::{KeyFlag, key_flags};
+pub use input::{Input, Paths, RadiusSetting, UpAxis};
+pub use key::Flag;
+pub use light::{Light, LightKind};
+pub use material::Material;
+pub use output::{Channel, Output};
 pub use pattern::OutputPattern;
 pub use preset::Look;
 pub(crate) use reader::nearest;
 pub(crate) use rebase::without_dots;
 pub use rebase::{named_place, real_dir};
+pub use render::{GroundPattern, Image, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use tree::Override;
-pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Seconds, Work};
-
-/// An enum whose variants have the names that users type.
-macro_rules! named {
-    ($(#[$meta:meta])* $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $text:literal,)+ }) => {
-        $(#[$meta])*
-        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-        pub enum $name {
-            $($(#[$variant_meta])* $variant,)+
-        }
-
-        impl $name {
-            /// All, with the names that users type.
-            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
-
-            /// As users type it.
-            pub const fn name(self) -> &'static str {
-                match self {
-                    $(Self::$variant => $text,)+
-                }
-            }
-        }
-
-        impl $crate::manifest::write::Toml for $name {
-            fn toml(&self) -> String {
-                $crate::manifest::write::Toml::toml(self.name())
-            }
-        }
-
-        $crate::manifest::write::described!($name, {
-            "enum": $crate::manifest::schema::words(&[], $name::ALL),
-        });
-    };
-}
-use named;
+pub use value::FlagKind;
+pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
 
 /// See the module.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
-    /// Which particles.
+    /// Which particles to render.
     pub input: Input,
-    /// From where.
+    /// Where the image is taken from.
     pub camera: Camera,
-    /// How large.
+    /// Size and sampling of the image.
     pub image: Image,
-    /// How traced.
+    /// How the image is traced.
     pub render: Render,
-    /// What rays meet: `render.surface` and `[surface]`.
+    /// What rays hit: `render.surface` and `[surface]`.
     pub surface: SurfaceSettings,
-    /// Made of what.
+    /// What particles are made of.
     pub material: Material,
-    /// In which light; with none, a key light and a soft fill are placed by the camera.
+    /// Light sources; with none, a key light and a soft fill are placed by the camera.
     pub lights: Vec<Light>,
-    /// Into which images.
+    /// Which images are written.
     pub output: Output,
-    /// How the work is gone about; no image depends on it.
+    /// Execution options; no image depends on them.
     pub job: Work,
 }
 
@@ -157,62 +130,93 @@ impl Manifest {
     /// Reads a manifest. `path` is for messages only.
     ///
     /// # Errors
-    /// It is no TOML, or has unknown keys or values that will not do.
+    /// It is not TOML, or has unknown keys or invalid values.
     pub fn parse(text: &str, path: &Path) -> Result<Self, ManifestError> {
         Self::parse_with(text, path, Vec::new())
     }
 
-    /// Reads a manifest with `overrides` laid over it in order. The text may be empty if they
-    /// give all that is needed (`input.path`).
+    /// Reads a manifest and applies `overrides` in order. The text may be empty if they give all that is needed
+    /// (`input.path`).
     ///
     /// # Errors
-    /// As [`Manifest::parse`]; what comes from an override is told by its name.
+    /// As [`Manifest::parse`]; problems of an override are reported by its name.
     pub fn parse_with(
         text: &str,
         path: &Path,
         overrides: Vec<Override>,
     ) -> Result<Self, ManifestError> {
+        Self::parse_with_warnings(text, path, overrides).map(|(manifest, _)| manifest)
+    }
+
+    /// The same, with warnings about what is still read and should be written differently.
+    ///
+    /// # Errors
+    /// As [`Manifest::parse_with`].
+    pub fn parse_with_warnings(
+        text: &str,
+        path: &Path,
+        overrides: Vec<Override>,
+    ) -> Result<(Self, Vec<String>), ManifestError> {
         let problems = Problems::default();
         let mut tree = Node::parse(text).map_err(|(place, what)| {
             let key = String::new();
-            told(vec![Problem { place, key, what }], text, path)
+            ManifestError::new(vec![Problem { place, key, what }], text, path)
         })?;
-        // What lies under everything fills the gaps that are left.
+        // Defaults of a look fill the gaps that are left.
         let (under, over): (Vec<_>, Vec<_>) = overrides.into_iter().partition(Override::is_under);
         for overlay in over.into_iter().chain(under) {
             if let Err(problem) = tree.lay_over(overlay) {
-                problems.borrow_mut().push(problem);
+                problems.errors.borrow_mut().push(problem);
             }
         }
-        let manifest = Self::read(Section::root(&tree, &problems));
-        let problems = problems.into_inner();
-        if problems.is_empty() {
-            Ok(manifest)
+        let mut manifest = Self::new("");
+        let mut root = Keys::Read(Section::root(&tree, &problems));
+        manifest.keys(&mut root);
+        manifest.check(&mut root);
+        root.finish();
+        let errors = problems.errors.into_inner();
+        if errors.is_empty() {
+            let warnings = problems.warnings.into_inner();
+            Ok((manifest, ManifestError::new(warnings, text, path).lines))
         } else {
-            Err(told(problems, text, path))
+            Err(ManifestError::new(errors, text, path))
         }
     }
 
-    fn read(mut root: Section<'_>) -> Self {
-        let mut render = root.section("render");
-        let surface = surface::kind(&mut render);
-        let manifest = Self {
-            input: Input::read(root.section("input")),
-            camera: Camera::read(root.section("camera")),
-            image: Image::read(root.section("image")),
-            surface: surface::read(root.section("surface"), surface),
-            render: Render::read(render),
-            material: Material::read(root.section("material")),
-            lights: root
-                .sections("light")
-                .into_iter()
-                .filter_map(Light::read)
-                .collect(),
-            output: Output::read(root.section("output")),
-            job: Work::read(root.section("job")),
+    /// Goes through all keys: the one place that knows the tables, in the order of the commented file.
+    fn keys(&mut self, keys: &mut Keys<'_>) {
+        keys.section("input", Input::ABOUT, |keys| self.input.keys(keys));
+        keys.section("camera", Camera::ABOUT, |keys| self.camera.all_keys(keys));
+        keys.section("image", Image::ABOUT, |keys| self.image.keys(keys));
+        keys.section("render", Render::ABOUT, |keys| {
+            surface::kind_key(&mut self.surface, keys);
+            self.render.keys(keys);
+        });
+        keys.section("surface", surface::ABOUT, |keys| {
+            surface::all_keys(&mut self.surface, keys);
+        });
+        keys.section("material", material::ABOUT, |keys| self.material.keys(keys));
+        keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
+        keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
+        keys.list(
+            "light",
+            "light",
+            light::ABOUT,
+            &mut self.lights,
+            Light::keys,
+        );
+    }
+
+    /// Checks what tables need of one another.
+    fn check(&self, root: &mut Keys<'_>) {
+        let Some(root) = root.reading() else {
+            return;
         };
-        if manifest.doubles_rays_too_often() {
-            let depth = manifest.render.max_depth;
+        if self.branches_at_spheres()
+            && self.render.min_weight == 0.0
+            && self.render.max_depth > MAX_LITERAL_DEPTH
+        {
+            let depth = self.render.max_depth;
             root.section("render").wrong(
                 "min_weight",
                 &format!(
@@ -221,22 +225,22 @@ impl Manifest {
                 ),
             );
         }
-        root.finish();
-        manifest
     }
 
-    /// Whether both branches at transmissive spheres are to be followed deeper than rays can be counted.
-    fn doubles_rays_too_often(&self) -> bool {
-        self.branches_at_spheres()
-            && self.render.min_weight == 0.0
-            && self.render.max_depth > MAX_LITERAL_DEPTH
-    }
-
-    /// Whether rays go on in two directions where they meet a sphere: `render.min_weight` is for these pictures alone.
+    /// Whether rays branch at spheres into reflected and refracted ones; only then `render.min_weight` matters.
     fn branches_at_spheres(&self) -> bool {
-        self.surface.kind == SurfaceKind::Spheres
-            && self.material.reflection > 0.0
-            && self.material.transmission > 0.0
+        self.surface.kind == SurfaceKind::Spheres && self.material.constants.branches()
+    }
+
+    /// Whether images of this manifest depend on keys that are declared with `affects`.
+    fn depends_on(&self, affects: Affects) -> bool {
+        match affects {
+            Affects::Images => true,
+            Affects::Nothing => false,
+            Affects::SmoothSurfaces => self.surface.kind == SurfaceKind::Smooth,
+            Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
+            Affects::BranchingSpheres => self.branches_at_spheres(),
+        }
     }
 
     /// Whether each of `frame_count` frames gets an image of its own.
@@ -261,12 +265,11 @@ impl Manifest {
         })
     }
 
-    /// What images depend on besides the particles, as dotted key and TOML value, in a fixed
-    /// order. Left out: `input.path` and frames, which are told by the files themselves, the
-    /// accelerator, what no ray of these pictures meets (`render.min_weight` for opaque spheres), the
-    /// directory of the images, and all of `[job]`.
+    /// What images depend on besides the particles, as dotted key and TOML value, in a fixed order. Left out are keys
+    /// that do not affect images, or not those of this manifest (see `Affects`), and the directory of the images. Input
+    /// files are identified by fingerprints of their own.
     pub fn settings(&self) -> Vec<(String, String)> {
-        let mut settings = self.entries().settings();
+        let mut settings = self.entries().settings(|affects| self.depends_on(affects));
         let renderer = format!("{:?}", RendererKind::default().name());
         settings.push((same::RENDERER.to_owned(), renderer));
         settings
@@ -278,30 +281,32 @@ impl Manifest {
         // that file is missing.
         let mut text = format!("#:schema ./{SCHEMA_FILE}\n# {ABOUT}\n");
         text.push_str(&self.entries().file());
-        if self.camera.keys.is_empty() {
-            text.push_str(camera::NO_KEYS);
-        }
-        if self.lights.is_empty() {
-            text.push_str(AUTO_LIGHTS);
+        let examples = Self::examples().entries();
+        for (list, comment, is_empty) in [
+            ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
+            ("light", AUTO_LIGHTS, self.lights.is_empty()),
+        ] {
+            if is_empty {
+                let _ = write!(text, "\n# {comment}\n{}", examples.commented_out(list));
+            }
         }
         text
     }
 
+    /// All keys with their values.
     fn entries(&self) -> Entries {
-        let mut out = Entries::default();
-        self.input.entries(&mut out);
-        self.camera.entries(&mut out);
-        self.image.entries(&mut out);
-        let branches = self.branches_at_spheres();
-        self.render.entries(self.surface.kind, branches, &mut out);
-        surface::entries(&self.surface, &mut out);
-        self.material.entries(&mut out);
-        self.output.entries(&mut out);
-        self.job.entries(&mut out);
-        for (index, light) in self.lights.iter().enumerate() {
-            light.entries(index, &mut out);
-        }
-        out
+        let mut entries = Entries::default();
+        // Listing changes nothing; the same calls read.
+        self.clone().keys(&mut Keys::List(&mut entries));
+        entries
+    }
+
+    /// A manifest with an item of every kind in each list.
+    fn examples() -> Self {
+        let mut manifest = Self::new("");
+        manifest.camera.keys = vec![CameraKey::default()];
+        manifest.lights = Light::examples().to_vec();
+        manifest
     }
 }
 
@@ -312,52 +317,54 @@ const ABOUT: &str =
 const NEEDS_NUMBER: &str =
     "several frames would get the same name; put #### into it, as in frame.####.exr";
 
-const AUTO_LIGHTS: &str = r#"
-# Without [[light]], a key light and a soft fill are placed by the camera.
-# [[light]]
-# type = "point"                          # point | directional
-# position = [0.0, 0.0, 10.0]             # directional: direction = [0.0, 0.0, -1.0], the way it travels
-# falloff = "none"                        # none | inverse-square
-# color = [1.0, 1.0, 1.0]                 # linear RGB
-# intensity = 1.0                         # factor on the colour
-"#;
+const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
+                       first and after the last.";
+
+const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill are placed by the camera. A directional light has \
+                           a direction instead of position and falloff.";
 
 /// Every key outside lists.
 fn known_keys() -> Vec<String> {
-    Manifest::new("").entries().keys()
+    let entries = Manifest::new("").entries();
+    entries.list().iter().map(|e| e.key.clone()).collect()
 }
 
-/// Problems that are told at once.
-const MOST_TOLD: usize = 50;
+/// Most problems that are shown at once.
+const MOST_SHOWN: usize = 50;
 
-/// In the order of the file; options come first, as what is asked for last.
-fn told(mut problems: Vec<Problem>, text: &str, path: &Path) -> ManifestError {
-    problems.sort_by_key(|p| match p.place {
-        Place::Option(_) => 0,
-        Place::Byte(at) => at + 1,
-        Place::Nowhere => usize::MAX,
-    });
-    let told = |problem: &Problem| {
-        let place = match &problem.place {
-            Place::Option(shown) => shown.clone(),
-            Place::Nowhere => path.display().to_string(),
-            Place::Byte(at) => {
-                let before = text.get(..*at).unwrap_or(text);
-                let line = before.matches('\n').count() + 1;
-                let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
-                format!("{}: line {line}, column {column}", path.display())
-            }
-        };
-        if problem.key.is_empty() {
-            format!("{place}: {}", problem.what)
-        } else {
-            format!("{place}: {}: {}", problem.key, problem.what)
+impl ManifestError {
+    /// In the order of the file; options come first, as what was asked for last.
+    fn new(mut problems: Vec<Problem>, text: &str, path: &Path) -> Self {
+        problems.sort_by_key(|p| match p.place {
+            Place::Option(_) => 0,
+            Place::Byte(at) => at + 1,
+            Place::Nowhere => usize::MAX,
+        });
+        // Work grows with the text alone, however much is wrong with it.
+        let shown = problems.iter().take(MOST_SHOWN);
+        let mut lines: Vec<String> = shown.map(|problem| message(problem, text, path)).collect();
+        if problems.len() > MOST_SHOWN {
+            lines.push(format!("{}: and more like these", path.display()));
+        }
+        Self { lines }
+    }
+}
+
+/// Place, key and text of a problem.
+fn message(problem: &Problem, text: &str, path: &Path) -> String {
+    let place = match &problem.place {
+        Place::Option(shown) => shown.clone(),
+        Place::Nowhere => path.display().to_string(),
+        Place::Byte(at) => {
+            let before = text.get(..*at).unwrap_or(text);
+            let line = before.matches('\n').count() + 1;
+            let column = before.rsplit('\n').next().map_or(0, |l| l.chars().count()) + 1;
+            format!("{}: line {line}, column {column}", path.display())
         }
     };
-    // Work grows with the text alone, however much is wrong with it.
-    let mut lines: Vec<String> = problems.iter().take(MOST_TOLD).map(told).collect();
-    if problems.len() > MOST_TOLD {
-        lines.push(format!("{}: and more like these", path.display()));
+    if problem.key.is_empty() {
+        format!("{place}: {}", problem.what)
+    } else {
+        format!("{place}: {}: {}", problem.key, problem.what)
     }
-    ManifestError { lines }
 }

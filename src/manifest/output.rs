@@ -1,9 +1,12 @@
-//! `[output]`: which images, with what in them.
+//! `[output]`: which images are written, and what is in them.
 
-use super::named;
+use serde_json::{Value as Json, json};
+
+use super::key::{Key, section};
 use super::pattern::OutputPattern;
-use super::reader::{Field, Section};
-use super::write::{Entries, Toml};
+use super::reader::Field;
+use super::value::{Fault, Value, named, quoted};
+use crate::output::Compression;
 
 named! {
     /// What an image can hold.
@@ -20,126 +23,58 @@ named! {
         P = "P",
         /// Velocity.
         V = "V",
-        /// Colour before light.
+        /// Base colour, before lighting.
         Albedo = "albedo",
     }
 }
 
-named! {
-    /// How an EXR file is compressed, without loss.
-    Compression {
-        /// Not.
-        None = "none",
-        /// By runs.
-        Rle = "rle",
-        /// 16 lines at a time.
-        Zip = "zip",
-        /// Each line alone.
-        Zips = "zips",
-        /// By wavelets: good for noise.
-        Piz = "piz",
+named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz = "piz");
+
+/// Names of images if the manifest gives none.
+const DEFAULT_PATH: &str = "out/frame.####.exr";
+
+section! {
+    /// Which images are written, and what is in them
+    Output {
+        /// Images to write; #### or %04d is the frame number, with at least that many digits
+        path: OutputPattern = OutputPattern::parse(DEFAULT_PATH).expect("a good pattern"),
+            flag("output", "PATTERN", "Output");
+        /// Channels of the images: RGBA,Z,N,id,P,V,albedo
+        channels: Vec<Channel> = vec![Channel::Rgba, Channel::Z, Channel::N, Channel::Id],
+            example("[\"RGBA\", \"Z\"]"), flag("channels", "LIST", "Output");
+        /// Lossless compression of the EXR: none | rle | zip | zips | piz
+        compression: Compression = Compression::Zip;
+        /// A PNG beside each image
+        preview: bool = true;
+        /// Exposure of the PNG in stops
+        preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
+        /// No background in the EXR, for compositing; previews show it
+        transparent: bool = false;
+        /// Frames per second, stored in the images
+        fps: Option<f64> = None, above(0), example("24.0"), unset("not stored");
     }
 }
 
-/// `[output]`.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Output {
-    /// Names of the images; relative to the manifest.
-    pub path: OutputPattern,
-    /// What is in them; each once, never empty.
-    pub channels: Vec<Channel>,
-    /// How they are compressed.
-    pub compression: Compression,
-    /// Whether a PNG is written beside each image.
-    pub preview: bool,
-    /// Brightness of the PNG, stops.
-    pub preview_exposure: f32,
-    /// Leaves the background out of the images, so that they lie over others; previews show it.
-    pub transparent: bool,
-    /// Frames per second, noted in the images.
-    pub fps: Option<f64>,
-}
-
-impl Default for Output {
-    fn default() -> Self {
-        Self {
-            path: OutputPattern::parse("out/frame.####.exr").expect("a good pattern"),
-            channels: vec![Channel::Rgba, Channel::Z, Channel::N, Channel::Id],
-            compression: Compression::Zip,
-            preview: true,
-            preview_exposure: 0.0,
-            transparent: false,
-            fps: None,
-        }
-    }
-}
-
-impl Output {
-    pub(super) fn read(mut section: Section<'_>) -> Self {
-        let default = Self::default();
-        let output = Self {
-            path: section.value("path", default.path, |f| {
-                OutputPattern::parse(&f.text()?)
-                    .map_err(|what| f.fail(&what))
-                    .ok()
-            }),
-            channels: section.value("channels", default.channels, read_channels),
-            compression: section.value("compression", default.compression, |f| {
-                f.choice(Compression::ALL)
-            }),
-            preview: section.value("preview", default.preview, Field::bool),
-            preview_exposure: section.value("preview_exposure", default.preview_exposure, |f| {
-                f.number32("stops from -100 to 100", |v| v.abs() <= 100.0)
-            }),
-            transparent: section.value("transparent", default.transparent, Field::bool),
-            fps: section.optional("fps", |f| f.number("a number above 0", |v| v > 0.0)),
-        };
-        section.finish();
-        output
+impl Value for OutputPattern {
+    fn kind(_: &Key) -> String {
+        "text in quotes".to_owned()
     }
 
-    pub(super) fn entries(&self, out: &mut Entries) {
-        out.section("output");
-        out.put(
-            "path",
-            self.path.as_str(),
-            "#### or %04d is the frame number",
-        );
-        // A job may be moved together with its images.
-        out.depends_on(Some(self.path.file_name().toml()));
-        out.put("channels", &self.channels, "RGBA, Z, N, id, P, V, albedo");
-        out.put(
-            "compression",
-            &self.compression,
-            "none | rle | zip | zips | piz",
-        );
-        out.put("preview", &self.preview, "PNG beside each image");
-        out.put("preview_exposure", &self.preview_exposure, "stops");
-        out.put(
-            "transparent",
-            &self.transparent,
-            "leaves the background out of the EXR, to lay it over something else",
-        );
-        out.maybe(
-            "fps",
-            self.fps.as_ref(),
-            "24.0",
-            "frames per second, noted in the images",
-        );
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let text = field.as_text().ok_or(Fault::Unwanted)?;
+        Self::parse(text).map_err(Fault::Because)
     }
-}
 
-fn read_channels(field: &Field<'_>) -> Option<Vec<Channel>> {
-    let items = field.items().filter(|items| !items.is_empty());
-    let items = field.or_wants(items, "a list of channels, as [\"RGBA\", \"Z\"]")?;
-    let mut channels = Vec::new();
-    for item in items {
-        let channel = item.choice(Channel::ALL)?;
-        if channels.contains(&channel) {
-            item.fail(&format!("{} is there twice", channel.name()));
-            return None;
-        }
-        channels.push(channel);
+    fn toml(&self) -> String {
+        quoted(self.as_str())
     }
-    Some(channels)
+
+    fn schema(_: &Key) -> Json {
+        json!({ "type": "string", "pattern": r"[^/\\]\.[eE][xX][rR]$" })
+    }
+
+    /// A job may be moved together with its images.
+    fn setting(&self) -> String {
+        quoted(self.file_name())
+    }
 }

@@ -18,6 +18,22 @@ fn told_below(text: &str, wanted: &str) {
 }
 
 #[test]
+fn an_old_word_is_read_with_a_warning() {
+    let text = "input.path = \"a\"\n[render]\nsurface = \"medium\"";
+    let read = |text| Manifest::parse_with_warnings(text, Path::new("job.toml"), Vec::new());
+    let (manifest, warnings) = read(text).unwrap();
+    assert_eq!(
+        warnings,
+        [
+            "job.toml: line 3, column 11: render.surface: \"medium\" is now called \"union\"; the old name still works"
+        ]
+    );
+    let shown = manifest.to_commented_toml();
+    assert!(shown.contains("surface = \"union\""), "{shown}");
+    assert_eq!(read(&shown).unwrap(), (manifest, Vec::new()));
+}
+
+#[test]
 fn keys_in_tables() {
     for (text, place, key, nearest) in [
         ("[rendre]", "line 3, column 2", "rendre", "render"),

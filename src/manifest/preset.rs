@@ -78,8 +78,11 @@ impl Look {
 mod tests {
     use std::path::Path;
 
+    use glam::Vec3;
+
     use super::*;
-    use crate::manifest::{AutoLength, Background, GroundPattern, Manifest};
+    use crate::manifest::{GroundPattern, Manifest};
+    use crate::scene::Background;
     use crate::surface::SurfaceKind;
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
@@ -106,7 +109,7 @@ mod tests {
         assert_eq!(plain.surface.kind, SurfaceKind::Smooth);
         assert_eq!(plain.render.max_depth, 8);
         assert_eq!(plain.render.ground_pattern, GroundPattern::Checker);
-        assert_eq!(plain.material.transmission, 1.0);
+        assert_eq!(plain.material.constants.transmission, 1.0);
         assert!(plain.render.ground && plain.material.absorption[0] < 1.0);
     }
 
@@ -118,10 +121,10 @@ mod tests {
             &["render.surface=spheres", "render.background=[1,0,0]"],
         );
         assert_eq!(mixed.render.max_depth, 5);
-        assert_eq!(mixed.render.ground_tile, AutoLength::Length(2.0));
-        assert_eq!(mixed.material.absorption, [1.0; 3]);
+        assert_eq!(mixed.render.ground_tile, Some(2.0));
+        assert_eq!(mixed.material.absorption, Vec3::ONE);
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
-        assert_eq!(mixed.render.background, Background::Plain([1.0, 0.0, 0.0]));
+        assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
         assert!(mixed.render.ground);
         // What is wrong there is told once, by its own place.
         let wrong = "input.path = \"data\"\nrender = 3";

@@ -1,11 +1,13 @@
-//! Takes typed values out of a [`Node`] tree and gathers everything that is wrong with it, each
-//! with its place and key, so that one look is enough to mend a manifest.
+//! Reads typed values from a [`Node`] tree and collects everything that is wrong with it, each problem with its
+//! place and key, so that one run is enough to fix a manifest.
 
 use std::cell::RefCell;
 
+use super::key::Key;
 use super::tree::{Kind, Node, Place};
+use super::value::{Fault, Slot, Value};
 
-/// One thing wrong with a manifest.
+/// One thing wrong with a manifest, or to be warned of.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Problem {
     pub(super) place: Place,
@@ -14,7 +16,26 @@ pub(super) struct Problem {
     pub(super) what: String,
 }
 
-pub(super) type Problems = RefCell<Vec<Problem>>;
+/// Everything that was found.
+#[derive(Debug, Default)]
+pub(super) struct Problems {
+    pub(super) errors: RefCell<Vec<Problem>>,
+    pub(super) warnings: RefCell<Vec<Problem>>,
+}
+
+impl Problems {
+    fn note(&self, place: &Place, key: &str, what: &str) {
+        push(&self.errors, place, key, what);
+    }
+}
+
+fn push(list: &RefCell<Vec<Problem>>, place: &Place, key: &str, what: &str) {
+    list.borrow_mut().push(Problem {
+        place: place.clone(),
+        key: key.to_owned(),
+        what: what.to_owned(),
+    });
+}
 
 /// A table being read. Keys that nobody asked for by the time of [`Section::finish`] are unknown.
 pub(super) struct Section<'a> {
@@ -22,22 +43,31 @@ pub(super) struct Section<'a> {
     node: Option<&'a Node>,
     asked: Vec<&'static str>,
     problems: &'a Problems,
+    /// How many errors there were before the first key was read.
+    errors_before: usize,
+    is_closed: bool,
 }
 
 /// One value that is there.
 pub(super) struct Field<'a> {
-    pub(super) key: String,
+    key: String,
     node: &'a Node,
     problems: &'a Problems,
 }
 
 impl<'a> Section<'a> {
-    pub(super) const fn root(node: &'a Node, problems: &'a Problems) -> Self {
+    pub(super) fn root(node: &'a Node, problems: &'a Problems) -> Self {
+        Self::new(String::new(), Some(node), problems)
+    }
+
+    fn new(path: String, node: Option<&'a Node>, problems: &'a Problems) -> Self {
         Self {
-            path: String::new(),
-            node: Some(node),
+            path,
+            node,
             asked: Vec::new(),
             problems,
+            errors_before: problems.errors.borrow().len(),
+            is_closed: false,
         }
     }
 
@@ -62,35 +92,42 @@ impl<'a> Section<'a> {
         })
     }
 
+    /// Reads `key` into `slot`, which keeps its value if the key is missing or wrong.
+    pub(super) fn read<S: Slot>(&mut self, key: &Key, slot: &mut S) {
+        let Some(field) = self.get(key.name) else {
+            if let Some(why) = key.required {
+                self.missing(key.name, why);
+            }
+            return;
+        };
+        if key.word.is_some() && field.as_text() == key.word {
+            slot.set(None);
+            return;
+        }
+        let old = key.renamed.filter(|[old, _]| field.as_text() == Some(old));
+        let renamed = old.map(|[old, new]| {
+            let what = format!("\"{old}\" is now called \"{new}\"; the old name still works");
+            push(
+                &self.problems.warnings,
+                &field.node.place,
+                &field.key,
+                &what,
+            );
+            Node {
+                kind: Kind::Text(new.to_owned()),
+                place: field.node.place.clone(),
+            }
+        });
+        let node = renamed.as_ref().unwrap_or(field.node);
+        if let Some(value) = (Field { node, ..field }).value::<S::Value>(key) {
+            slot.set(Some(value));
+        }
+    }
+
     /// The table under `key`; a missing one reads as empty.
     pub(super) fn section(&mut self, key: &'static str) -> Self {
-        let missing = Self {
-            path: self.full_key(key),
-            node: None,
-            asked: Vec::new(),
-            problems: self.problems,
-        };
+        let missing = Self::new(self.full_key(key), None, self.problems);
         self.get(key).and_then(|f| f.section()).unwrap_or(missing)
-    }
-
-    /// The value under `key` as `read` has it, or `default` if it is missing (or wrong, which is
-    /// a problem by then).
-    pub(super) fn value<T>(
-        &mut self,
-        key: &'static str,
-        default: T,
-        read: impl FnOnce(&Field<'a>) -> Option<T>,
-    ) -> T {
-        self.optional(key, read).unwrap_or(default)
-    }
-
-    /// The same without a default.
-    pub(super) fn optional<T>(
-        &mut self,
-        key: &'static str,
-        read: impl FnOnce(&Field<'a>) -> Option<T>,
-    ) -> Option<T> {
-        self.get(key).and_then(|field| read(&field))
     }
 
     /// Every table in the list under `key`.
@@ -99,7 +136,11 @@ impl<'a> Section<'a> {
             return Vec::new();
         };
         let items = field.items().unwrap_or_else(|| {
-            field.wants(&format!("a list of tables, as [[{}]] begins", field.key));
+            field.fail(&format!(
+                "wants a list of tables, as [[{}]] begins, not {}",
+                field.key,
+                field.node.describe()
+            ));
             Vec::new()
         });
         items.iter().filter_map(Field::section).collect()
@@ -132,15 +173,27 @@ impl<'a> Section<'a> {
     }
 
     fn problem(&self, place: Place, key: &str, what: &str) {
-        self.problems.borrow_mut().push(Problem {
-            place,
-            key: self.full_key(key),
-            what: what.to_owned(),
-        });
+        self.problems.note(&place, &self.full_key(key), what);
+    }
+
+    /// Whether `key` is there and was read without a problem.
+    pub(super) fn has(&self, key: &str) -> bool {
+        let full_key = self.full_key(key);
+        let errors = self.problems.errors.borrow();
+        let mut own = errors.iter().skip(self.errors_before);
+        !self.lacks(key) && own.all(|problem| problem.key != full_key)
+    }
+
+    /// Gives up: which keys are known depends on one that is wrong.
+    pub(super) const fn close(&mut self) {
+        self.is_closed = true;
     }
 
     /// Notes every key that nobody asked for.
     pub(super) fn finish(self) {
+        if self.is_closed {
+            return;
+        }
         let Some(Kind::Table(table)) = self.node.map(|n| &n.kind) else {
             return;
         };
@@ -148,7 +201,7 @@ impl<'a> Section<'a> {
             if self.asked.contains(&key.as_str()) {
                 continue;
             }
-            if self.problems.borrow().len() > super::MOST_TOLD {
+            if self.problems.errors.borrow().len() > super::MOST_SHOWN {
                 break;
             }
             let what = match nearest(key, &self.asked) {
@@ -164,26 +217,26 @@ impl<'a> Section<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// Notes that something else is wanted.
-    pub(super) fn wants(&self, what: &str) {
-        self.fail(&format!("wants {what}, not {}", self.node.describe()));
+    /// The value, or None and a problem.
+    pub(super) fn value<T: Value>(&self, key: &Key) -> Option<T> {
+        let what = match T::parse(self, key) {
+            Ok(value) => return Some(value),
+            Err(Fault::Noted) => return None,
+            Err(Fault::Because(what)) => what,
+            Err(Fault::Unwanted) => {
+                let text = self.as_text().unwrap_or_default();
+                let hint = nearest(text, &T::words()).map(|n| format!("; did you mean {n}?"));
+                let (wants, hint) = (key.wants::<T>(), hint.unwrap_or_default());
+                format!("wants {wants}, not {}{hint}", self.node.describe())
+            }
+        };
+        self.fail(&what);
+        None
     }
 
-    /// Notes that the value will not do.
+    /// Notes that the value is not accepted.
     pub(super) fn fail(&self, what: &str) {
-        self.problems.borrow_mut().push(Problem {
-            place: self.node.place.clone(),
-            key: self.key.clone(),
-            what: what.to_owned(),
-        });
-    }
-
-    /// The value, or a note that `what` is wanted.
-    pub(super) fn or_wants<T>(&self, value: Option<T>, what: &str) -> Option<T> {
-        if value.is_none() {
-            self.wants(what);
-        }
-        value
+        self.problems.note(&self.node.place, &self.key, what);
     }
 
     pub(super) fn as_text(&self) -> Option<&'a str> {
@@ -196,6 +249,13 @@ impl<'a> Field<'a> {
     pub(super) const fn as_integer(&self) -> Option<i64> {
         match self.node.kind {
             Kind::Integer(i) => Some(i),
+            _ => None,
+        }
+    }
+
+    pub(super) const fn as_bool(&self) -> Option<bool> {
+        match self.node.kind {
+            Kind::Bool(b) => Some(b),
             _ => None,
         }
     }
@@ -217,10 +277,6 @@ impl<'a> Field<'a> {
         numbers.try_into().ok().filter(|_| all)
     }
 
-    pub(super) const fn is_table(&self) -> bool {
-        matches!(self.node.kind, Kind::Table(_))
-    }
-
     /// The items of a list.
     pub(super) fn items(&self) -> Option<Vec<Self>> {
         let Kind::Array(items) = &self.node.kind else {
@@ -234,101 +290,18 @@ impl<'a> Field<'a> {
         Some(items.iter().enumerate().map(item).collect())
     }
 
-    pub(super) fn section(&self) -> Option<Section<'a>> {
-        if !self.is_table() {
-            self.wants("a table");
-            return None;
+    /// The table that this is.
+    pub(super) fn as_table(&self) -> Option<Section<'a>> {
+        let is_table = matches!(self.node.kind, Kind::Table(_));
+        is_table.then(|| Section::new(self.key.clone(), Some(self.node), self.problems))
+    }
+
+    fn section(&self) -> Option<Section<'a>> {
+        let table = self.as_table();
+        if table.is_none() {
+            self.fail(&format!("wants a table, not {}", self.node.describe()));
         }
-        Some(Section {
-            path: self.key.clone(),
-            node: Some(self.node),
-            asked: Vec::new(),
-            problems: self.problems,
-        })
-    }
-
-    pub(super) fn text(&self) -> Option<String> {
-        self.or_wants(self.as_text().map(str::to_owned), "text in quotes")
-    }
-
-    /// Text that is not empty.
-    pub(super) fn name(&self) -> Option<String> {
-        let text = self.as_text().filter(|t| !t.trim().is_empty());
-        self.or_wants(text.map(str::to_owned), "a name in quotes")
-    }
-
-    pub(super) fn bool(&self) -> Option<bool> {
-        let value = match self.node.kind {
-            Kind::Bool(b) => Some(b),
-            _ => None,
-        };
-        self.or_wants(value, "true or false")
-    }
-
-    pub(super) fn count(&self, from: u32, to: u32) -> Option<u32> {
-        let value = self.as_integer().and_then(|i| u32::try_from(i).ok());
-        let value = value.filter(|v| (from..=to).contains(v));
-        self.or_wants(value, &format!("a whole number from {from} to {to}"))
-    }
-
-    /// A finite number for which `holds`; `what` says which those are.
-    pub(super) fn number(&self, what: &str, holds: impl Fn(f64) -> bool) -> Option<f64> {
-        self.or_wants(self.as_number().filter(|v| holds(*v)), what)
-    }
-
-    /// The same in single precision, for shading; must stay finite in it.
-    pub(super) fn number32(&self, what: &str, holds: impl Fn(f32) -> bool) -> Option<f32> {
-        let value = self.as_number().map(narrow);
-        self.or_wants(value.filter(|v| v.is_finite() && holds(*v)), what)
-    }
-
-    pub(super) fn point(&self) -> Option<[f64; 3]> {
-        self.or_wants(self.as_numbers(), "three numbers, as [0.0, 1.0, 2.0]")
-    }
-
-    pub(super) fn direction(&self) -> Option<[f64; 3]> {
-        let value = self
-            .as_numbers()
-            .filter(|v: &[f64; 3]| v.iter().any(|c| *c != 0.0));
-        self.or_wants(
-            value,
-            "three numbers that are not all 0, as [0.0, 0.0, 1.0]",
-        )
-    }
-
-    /// One of `names`, each of which is a `what`.
-    pub(super) fn choice_of<T: Copy>(&self, what: &str, names: &[(T, &'static str)]) -> Option<T> {
-        let is_known = |text: &str| names.iter().any(|(_, name)| *name == text);
-        let Some(unknown) = self.as_text().filter(|text| !is_known(text)) else {
-            return self.choice(names);
-        };
-        let known: Vec<&'static str> = names.iter().map(|(_, name)| *name).collect();
-        let hint = nearest(unknown, &known).map(|n| format!("; did you mean {n}?"));
-        self.fail(&format!(
-            "unknown {what} `{unknown}`; choose one of {}{}",
-            known.join(", "),
-            hint.unwrap_or_default()
-        ));
-        None
-    }
-
-    /// One of `names`.
-    pub(super) fn choice<T: Copy>(&self, names: &[(T, &'static str)]) -> Option<T> {
-        let known: Vec<&'static str> = names.iter().map(|(_, name)| *name).collect();
-        let Some(text) = self.as_text() else {
-            self.wants(&format!("one of {}", known.join(", ")));
-            return None;
-        };
-        let found = names.iter().find(|(_, name)| *name == text);
-        if found.is_none() {
-            let hint = nearest(text, &known).map(|n| format!("; did you mean {n}?"));
-            let hint = hint.unwrap_or_default();
-            self.wants(&format!("one of {}", known.join(", ")));
-            if let Some(problem) = self.problems.borrow_mut().last_mut() {
-                problem.what.push_str(&hint);
-            }
-        }
-        found.map(|(value, _)| *value)
+        table
     }
 }
 

@@ -19,7 +19,7 @@ impl Manifest {
                 ));
             }
         }
-        for path in &mut self.input.path {
+        for path in self.input.path.iter_mut() {
             *path = rebased(path, from, to)?;
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
@@ -117,7 +117,7 @@ mod tests {
         let before = manifest.clone();
         manifest.rebase(here, there).unwrap();
         assert_eq!(
-            manifest.input.path,
+            *manifest.input.path,
             ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]
         );
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
@@ -135,7 +135,7 @@ mod tests {
         assert!(manifest.rebase(Path::new("a"), there).is_err());
         let mut all = Manifest::new("out");
         all.rebase(here, there).unwrap();
-        assert_eq!(all.input.path, ["."]);
+        assert_eq!(*all.input.path, ["."]);
     }
 
     #[test]

@@ -1,19 +1,22 @@
-//! Settings of an older job that are written otherwise than now and make the same pictures.
+//! Settings of an older job that are written differently from now and make the same images.
 //!
-//! Keys and values have changed between versions. A job goes on with the settings that its plan has, so what makes no
-//! difference to the pictures must not look like a change.
+//! Keys and values have changed between versions. A job resumes with the settings of its plan, so what makes no
+//! difference to the images must not look like a change.
 
-use super::write::Toml;
-use super::{ColorMap, ColorSetting, Manifest};
+use super::value::Value;
+use super::{ColorSetting, DEFAULT_MAP, Manifest};
 
 const MIN_WEIGHT: &str = "render.min_weight";
 const COLOR: &str = "material.color";
+const SURFACE: &str = "render.surface";
+/// The value of [`SURFACE`] that older versions wrote, and the one that means the same.
+const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
 /// Who renders; not in a manifest as long as there is one.
 pub(super) const RENDERER: &str = "renderer";
 
 impl Manifest {
-    /// The [`Manifest::settings`], each in the words of the `planned` settings of a job where those make the same
-    /// pictures. `has_rgb` says whether the job found colours in the attribute that it is coloured by.
+    /// The [`Manifest::settings`], each as written in the `planned` settings of a job where those make the same
+    /// images. `has_rgb` says whether the job found colours in the attribute that it is coloured by.
     pub fn settings_as_planned(
         &self,
         planned: &[(String, String)],
@@ -22,15 +25,26 @@ impl Manifest {
         let value = |key: &str| planned.iter().find(|(k, _)| k == key).map(|(_, v)| v);
         let mut settings = self.settings();
         match (self.literal_min_weight(), value(MIN_WEIGHT)) {
-            // No picture depends on it. If those of the job did, the material has changed as well.
+            // No image depends on it. If those of the job did, the material has changed as well.
             (None, Some(old)) => settings.push((MIN_WEIGHT.to_owned(), old.clone())),
             // Versions without the key followed both branches always.
             (Some(0.0), None) => settings.retain(|(key, _)| key != MIN_WEIGHT),
             _ => {}
         }
+        // Versions without a key made the images that its default makes now; above are those that did not.
+        let usual = Self::new("").settings();
+        let is_usual =
+            |setting: &(String, String)| usual.contains(setting) && setting.0 != MIN_WEIGHT;
+        settings.retain(|setting| value(&setting.0).is_some() || !is_usual(setting));
         // Versions without the key had one renderer.
         if value(RENDERER).is_none() {
             settings.retain(|(key, _)| key != RENDERER);
+        }
+        if value(SURFACE).is_some_and(|old| old == UNION[0])
+            && let Some((_, new)) = settings.iter_mut().find(|(key, _)| key == SURFACE)
+            && new == UNION[1]
+        {
+            UNION[0].clone_into(new);
         }
         if let Some(old) = value(COLOR)
             && self.has_color_written(old, has_rgb)
@@ -41,7 +55,7 @@ impl Manifest {
         settings
     }
 
-    /// [`super::Render::min_weight`], if any picture depends on it.
+    /// [`super::Render::min_weight`], if any image depends on it.
     fn literal_min_weight(&self) -> Option<f32> {
         self.branches_at_spheres().then_some(self.render.min_weight)
     }
@@ -68,8 +82,8 @@ impl Manifest {
             };
             same.toml() == text
         };
-        let is_usual = matches!(map, None | Some(ColorMap::Viridis));
-        is_mapped && is_usual && (written(None) || written(Some(ColorMap::Viridis)))
+        let is_usual = map.is_none_or(|map| map == DEFAULT_MAP);
+        is_mapped && is_usual && (written(None) || written(Some(DEFAULT_MAP)))
     }
 }
 
@@ -107,7 +121,7 @@ mod tests {
             ("", Some("0.5"), ""),
             ("render.min_weight = 0.5", None, ""),
             (
-                "render.surface = \"medium\"\nmaterial.transmission = 1",
+                "render.surface = \"union\"\nmaterial.transmission = 1",
                 None,
                 "",
             ),
@@ -120,6 +134,30 @@ mod tests {
             let found = changes(&manifest, &planned, false);
             assert_eq!(found.join("; "), wanted, "{rest}");
         }
+    }
+
+    #[test]
+    fn a_key_that_was_added_later_has_its_default() {
+        let key = "image.samples";
+        let plain = manifest("");
+        let without = rewritten(&plain, key, None);
+        assert!(changes(&plain, &without, false).is_empty());
+        let other = manifest("image.samples = 3");
+        let found = changes(&other, &without, false);
+        assert_eq!(found, ["image.samples: (not set) -> 3"]);
+    }
+
+    #[test]
+    fn a_union_was_once_called_a_medium() {
+        let union = manifest("render.surface = \"union\"");
+        let planned = rewritten(&union, SURFACE, Some("\"medium\""));
+        assert!(changes(&union, &planned, false).is_empty());
+        assert_eq!(manifest("render.surface = \"medium\""), union);
+        let spheres = changes(&manifest(""), &planned, false).join("; ");
+        assert!(
+            spheres.contains("render.surface: \"medium\" -> \"spheres\""),
+            "{spheres}"
+        );
     }
 
     #[test]

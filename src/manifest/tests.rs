@@ -1,5 +1,9 @@
-use super::*;
+use glam::{DVec3, Vec3};
 use proptest::prelude::*;
+
+use super::*;
+use crate::output::Compression;
+use crate::scene::{Background, Falloff};
 
 /// The example of the design, as users find it in the documentation.
 const EXAMPLE: &str = r#"
@@ -82,17 +86,17 @@ fn the_example_reads() {
     wanted.input.frames = Some("1-17".parse().unwrap());
     wanted.input.up = Some(UpAxis::Y);
     wanted.camera.mode = CameraMode::Fixed;
-    wanted.camera.eye = Some([0.0; 3]);
-    wanted.camera.look_at = Some([5.0, 5.0, 0.0]);
-    wanted.camera.up = Some([0.0, 0.0, 1.0]);
-    wanted.render.background = Background::Plain([0.05, 0.06, 0.08]);
-    wanted.material.color = ColorSetting::Rgb([0.6, 0.7, 0.9]);
+    wanted.camera.eye = Some(DVec3::ZERO);
+    wanted.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
+    wanted.camera.up = Some(DVec3::Z);
+    wanted.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
+    wanted.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
     wanted.lights = vec![Light {
         kind: LightKind::Point {
-            position: [0.0, 0.0, 10.0],
+            position: DVec3::new(0.0, 0.0, 10.0),
             falloff: Falloff::None,
         },
-        color: [1.0; 3],
+        color: Vec3::ONE,
         intensity: 1.0,
     }];
     assert_eq!(manifest, wanted);
@@ -186,7 +190,7 @@ fn wrong_types_say_what_is_wanted() {
     }
     for right in ["0", "0.5", "8"] {
         let set = format!("render.sbvh_budget={right}");
-        let budget = with_sets(&[&set]).unwrap().render.sbvh.budget;
+        let budget = with_sets(&[&set]).unwrap().render.sbvh_budget;
         assert_eq!(budget, right.parse::<f32>().unwrap());
     }
     refused(
@@ -350,7 +354,7 @@ fn input_is_checked() {
     );
     refused("[input]\npath = \"a\"\nframes = \"1-z\"", "character 3");
     let manifest = parse("[input]\npath = [\"a\", \"b\"]\nframes = 7\nradius = 2");
-    assert_eq!(manifest.input.path, ["a", "b"]);
+    assert_eq!(*manifest.input.path, ["a", "b"]);
     assert_eq!(manifest.input.frames, Some("7".parse().unwrap()));
     assert_eq!(manifest.input.radius, RadiusSetting::Length(2.0));
     // Which of the frames 1-3 there are is known only with the sequence.
@@ -411,7 +415,7 @@ fn sets_lie_over_the_file() {
         manifest.material.color,
         ColorSetting::Attribute {
             attribute: "velocity".to_owned(),
-            map: Some(ColorMap::Turbo),
+            map: MapName::named("turbo"),
             range: None
         }
     );
@@ -422,7 +426,7 @@ fn sets_lie_over_the_file() {
 #[test]
 fn a_map_alone_is_laid_into_what_is_there() {
     let auto = |range| ColorSetting::AutoWith {
-        map: Some(ColorMap::Turbo),
+        map: MapName::named("turbo"),
         range,
     };
     let color = |sets: &[&str]| {
@@ -503,7 +507,7 @@ fn both_branches_are_followed_to_a_bounded_depth() {
     );
     assert!(error.contains("max_depth of at most 8"), "{error}");
     assert!(with("min_weight = 1e-5\nmax_depth = 64").is_ok());
-    assert!(with("min_weight = 0\nmax_depth = 64\nsurface = \"medium\"").is_ok());
+    assert!(with("min_weight = 0\nmax_depth = 64\nsurface = \"union\"").is_ok());
     assert!(with("min_weight = 1e-6").is_err() && with("min_weight = 1.5").is_err());
     let opaque = "[input]\npath = \"a\"\n[render]\nmin_weight = 0\nmax_depth = 64\n";
     assert_eq!(parse(opaque).render.min_weight, 0.0);
@@ -588,8 +592,8 @@ light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", posit
     let manifest = parse(text);
     assert_eq!(manifest.camera.mode, CameraMode::Keys);
     assert_eq!(manifest.camera.keys[0].frame, -1);
-    assert_eq!(manifest.camera.keys[0].up, Some([0.0, 1.0, 0.0]));
-    assert_eq!(manifest.render.ground_height, GroundHeight::At(-2.0));
+    assert_eq!(manifest.camera.keys[0].up, Some(DVec3::Y));
+    assert_eq!(manifest.render.ground_height, Some(-2.0));
     assert_eq!(parse(&manifest.to_commented_toml()), manifest);
 }
 
@@ -603,11 +607,11 @@ proptest! {
         let narrow = narrow.abs().min(f32::MAX);
         let mut manifest = Manifest::new(path);
         manifest.lights = vec![Light {
-            kind: LightKind::Point { position: wide, falloff: Falloff::None },
-            color: [narrow; 3],
+            kind: LightKind::Point { position: wide.into(), falloff: Falloff::None },
+            color: Vec3::splat(narrow),
             intensity: narrow,
         }];
-        manifest.material.color = ColorSetting::Rgb([narrow; 3]);
+        manifest.material.color = ColorSetting::Rgb(Vec3::splat(narrow));
         prop_assert_eq!(&parse(&manifest.to_commented_toml()), &manifest);
     }
 

@@ -1,5 +1,5 @@
 //! A manifest as a tree of values that know where they came from: a place in the file, or an
-//! option of the command line that was laid over it.
+//! option of the command line that replaced it.
 
 use std::collections::BTreeMap;
 
@@ -38,7 +38,7 @@ pub(super) enum Kind {
     Other,
 }
 
-/// One value laid over the manifest, as by `--set render.max_depth=5`, or under it.
+/// A value that replaces one of the manifest, as by `--set render.max_depth=5`, or a default for it.
 #[derive(Debug, Clone)]
 pub struct Override {
     keys: Vec<String>,
@@ -47,7 +47,7 @@ pub struct Override {
 }
 
 impl Override {
-    /// Parses `render.max_depth=5`: a dotted key and a TOML value; a value that is no TOML is
+    /// Parses `render.max_depth=5`: a dotted key and a TOML value; a value that is not TOML is
     /// taken as text, so that quotes are not needed.
     ///
     /// # Errors
@@ -77,7 +77,7 @@ impl Override {
         })
     }
 
-    /// Lays `value` over the dotted `key`; `shown` is what messages call it: `--output`.
+    /// Sets the dotted `key` to `value`; `shown` is what messages call it: `--output`.
     ///
     /// # Errors
     /// A part of the key is empty.
@@ -90,7 +90,7 @@ impl Override {
         })
     }
 
-    /// The same as a default: anything that the manifest or another override says goes before it.
+    /// The same as a default: a value of the manifest or of another override takes precedence.
     #[must_use]
     pub fn under(self) -> Self {
         Self {

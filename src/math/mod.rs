@@ -20,6 +20,9 @@ pub type Lanes = [f32; LANES];
 /// A vector or a linear RGB colour for each lane, one array per component.
 pub type Lanes3 = [Lanes; 3];
 
+/// An integer for each lane.
+pub type Integers = [i32; LANES];
+
 /// The same number in all lanes.
 pub const fn splat(value: f32) -> Lanes {
     [value; LANES]
@@ -48,6 +51,32 @@ pub fn set_lane3(lanes: &mut Lanes3, lane: usize, value: glam::Vec3) {
     for (axis, lanes) in lanes.iter_mut().enumerate() {
         lanes[lane] = value[axis];
     }
+}
+
+/// The smaller number, as SIMD instructions compute it: `b` if either is NaN.
+#[inline(always)]
+pub const fn smaller(a: f32, b: f32) -> f32 {
+    if a < b { a } else { b }
+}
+
+/// The larger number, as SIMD instructions compute it: `b` if either is NaN.
+#[inline(always)]
+pub const fn larger(a: f32, b: f32) -> f32 {
+    if a > b { a } else { b }
+}
+
+/// Combines all lanes into one number, halves onto halves: a fixed order, which compilers turn into whole registers.
+#[inline(always)]
+pub fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
+    macro_rules! halve {
+        ($($half:literal)*) => {$(
+            for lane in 0..$half {
+                lanes[lane] = of(lanes[lane], lanes[lane + $half]);
+            }
+        )*};
+    }
+    halve!(8 4 2 1);
+    lanes[0]
 }
 
 /// The numbers of the lanes whose bits are set in `mask`, ascending.

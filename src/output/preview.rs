@@ -5,8 +5,9 @@ use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
 
 use super::{
     OutputError,
-    view::{byte_from_linear, dither_threshold, view_transform},
+    view::{bytes_from_linear, dither_threshold, view_transform},
 };
+use crate::math::Supported;
 use crate::math::functions::exp2;
 use crate::render::Film;
 
@@ -26,18 +27,26 @@ pub struct PreviewOptions {
 /// If the encoder refuses the image.
 pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, OutputError> {
     let gain = exp2(options.exposure);
-    let mut pixels = Vec::with_capacity(film.color.len() * 3);
-    let places = (0..film.height).flat_map(|y| (0..film.width).map(move |x| (x, y)));
-    for (&[r, g, b, a], (x, y)) in film.color.iter().zip(places) {
-        let behind = options.backdrop.unwrap_or_default() * (1.0 - a);
-        let shown = view_transform((Vec3::new(r, g, b) + behind) * gain);
-        // One threshold for all components: grey stays grey.
-        let threshold = dither_threshold(x, y);
-        pixels.extend(shown.to_array().map(|v| byte_from_linear(v, threshold)));
+    let width = film.width.max(1) as usize;
+    let mut bytes = vec![0; film.color.len() * 3];
+    let (mut linear, mut thresholds) = (vec![0.0; 3 * width], vec![0.0; 3 * width]);
+    let rows = film.color.chunks(width).zip(bytes.chunks_mut(3 * width));
+    for (y, (row, bytes)) in (0..film.height).zip(rows) {
+        let pixels = linear.as_chunks_mut().0.iter_mut();
+        for (pixel, &[r, g, b, a]) in pixels.zip(row) {
+            let behind = options.backdrop.unwrap_or_default() * (1.0 - a);
+            *pixel = view_transform((Vec3::new(r, g, b) + behind) * gain).to_array();
+        }
+        let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
+        for (pixel, x) in pixels.zip(0..film.width) {
+            // One threshold for all components: grey stays grey.
+            *pixel = [dither_threshold(x, y); 3];
+        }
+        bytes_from_linear(Supported::default(), &linear, &thresholds, bytes);
     }
     let mut file = Vec::new();
     PngEncoder::new(&mut file)
-        .write_image(&pixels, film.width, film.height, ExtendedColorType::Rgb8)
+        .write_image(&bytes, film.width, film.height, ExtendedColorType::Rgb8)
         .map_err(OutputError::Png)?;
     Ok(file)
 }

@@ -10,6 +10,7 @@
 use glam::Vec3;
 
 use crate::math::functions::pow;
+use crate::math::lane_kernel;
 
 /// How fast highlights go to white with the light that is taken away.
 const DESATURATION: f32 = 0.15;
@@ -28,6 +29,7 @@ pub fn view_transform(color: Vec3) -> Vec3 {
 }
 
 /// The sRGB transfer function (IEC 61966-2-1) for linear light in 0 to 1.
+#[inline(always)]
 pub fn srgb_from_linear(linear: f32) -> f32 {
     if linear <= 0.003_130_8 {
         12.92 * linear
@@ -38,6 +40,7 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
 
 /// A screen's byte for linear light, rounded up where what is left of it is above `1 - threshold`: 0.5 rounds to the
 /// nearest. Thresholds between 1/512 and 511/512 leave light that is a byte's own as that byte.
+#[inline(always)]
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -45,6 +48,18 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
 )]
 pub fn byte_from_linear(linear: f32, threshold: f32) -> u8 {
     (srgb_from_linear(linear.clamp(0.0, 1.0)) * 255.0 + threshold) as u8
+}
+
+lane_kernel! {
+    /// [`byte_from_linear`] for many values at once; all slices are of one length.
+    pub(super) fn bytes_from_linear(linear: &[f32], thresholds: &[f32], bytes: &mut [u8]) = bytes_body;
+}
+
+#[inline(always)]
+fn bytes_body(linear: &[f32], thresholds: &[f32], bytes: &mut [u8]) {
+    for ((byte, linear), threshold) in bytes.iter_mut().zip(linear).zip(thresholds) {
+        *byte = byte_from_linear(*linear, *threshold);
+    }
 }
 
 /// Where the pixel in column `x` and row `y` rounds up, from 1/512 to 511/512: dithering, so that gradients do not
@@ -68,6 +83,7 @@ pub fn dither_threshold(x: u32, y: u32) -> f32 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::math::{SimdLevel, Supported};
 
     #[test]
     fn what_a_screen_can_show_stays_true() {
@@ -104,6 +120,21 @@ mod tests {
                 let linear = view_transform(Vec3::splat(linear_from_byte(byte))).x;
                 assert_eq!(byte_from_linear(linear, threshold), byte, "{threshold}");
             }
+        }
+    }
+
+    #[test]
+    fn many_bytes_are_those_of_one_after_the_other() {
+        let linear: Vec<f32> = (0..5000_u16)
+            .map(|i| f32::from(i) / 4900.0 - 0.01)
+            .collect();
+        let thresholds: Vec<f32> = (0..5000).map(|i| dither_threshold(i, i / 7)).collect();
+        let wanted = linear.iter().zip(&thresholds);
+        let wanted: Vec<u8> = wanted.map(|(l, t)| byte_from_linear(*l, *t)).collect();
+        for level in SimdLevel::ALL {
+            let mut bytes = vec![7; linear.len()];
+            bytes_from_linear(Supported::or_best(level), &linear, &thresholds, &mut bytes);
+            assert!(bytes == wanted, "{level:?}");
         }
     }
 

@@ -6,7 +6,7 @@ use rayon::prelude::*;
 use spherule_formats::order::index_u32;
 use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radius};
 
-use super::load::{LoadError, missing};
+use super::load_error::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::scene::RgbEncoding;
 use crate::survey::{id_of, velocity_of};

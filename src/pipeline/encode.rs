@@ -6,18 +6,20 @@ use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
 use serde_json::json;
+use spherule_formats::sequence::Sequence;
 use spherule_jobs::{Job, JobError, Publisher, publish};
 
+use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::trace::TracedFrame;
 use super::{Event, InHand, Passed, Stage, Watch};
+use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::mishap::is_place_at_fault;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
 use crate::render::Film;
+use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
-use crate::report::{FrameReport, MemoryPeaks, MemoryUse};
 
 /// Why an image is not there.
 #[derive(Debug, thiserror::Error)]
@@ -45,6 +47,7 @@ pub(super) struct Written {
 
 pub(super) fn write_stage(
     setup: &Setup,
+    sequence: &Sequence,
     traced: Receiver<InHand<TracedFrame>>,
     next: &Written,
     job: &mut Job,
@@ -61,6 +64,9 @@ pub(super) fn write_stage(
                     return Err(JobError::TakenForDead { dir });
                 }
                 let task = frame.task.clone();
+                if sequence.maps_files() {
+                    peaks.looks_only();
+                }
                 match write_frame(setup, frame, &mut peaks) {
                     Ok((mut report, film)) => {
                         if let Some(films) = &next.films {

@@ -9,7 +9,7 @@ use spherule_formats::native::{AttributeView, FrameIndex, NativeFile, NativeFram
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ScalarType, is_radius};
 
-use super::load::{LoadError, missing};
+use super::load_error::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};

@@ -21,6 +21,7 @@ mod decoded;
 mod encode;
 mod in_place;
 mod load;
+mod load_error;
 mod predict;
 mod probe;
 mod rays;
@@ -35,15 +36,16 @@ mod trace;
 pub use decoded::{DecodedFrame, DecodedShading};
 pub use encode::encode_frame;
 pub use in_place::{StoredFrame, StoredShading};
-pub(crate) use load::attribute_list;
-pub use load::{LoadError, LoadedFrame, LoadedParticles, load_frame};
+pub use load::{LoadedFrame, LoadedParticles, load_frame};
+pub use load_error::LoadError;
+pub(crate) use load_error::attribute_list;
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, probe};
-pub use renderer::{FrameRenderer, renderer_of};
+pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, Picture, RadiusRule, RunSettings, Setup};
 pub use single::{PictureKind, SingleFault, make_image, make_picture};
-pub use trace::{BuiltFrame, CpuRenderer, TraceError, TracedFrame};
+pub use trace::{CpuRenderer, renderer_of};
 
 use read_threads::ReadThreads;
 
@@ -159,7 +161,7 @@ pub fn run(
             let writer_ended = &is_over;
             let next = encode::Written { is_written, films };
             let writer = scope.spawn(move || {
-                let ended = encode::write_stage(setup, traced, &next, job, watch);
+                let ended = encode::write_stage(setup, sequence, traced, &next, job, watch);
                 writer_ended.store(ended.is_err(), Ordering::Relaxed);
                 ended
             });

@@ -17,8 +17,9 @@ use spherule_formats::sequence::Sequence;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
+use crate::metrics::Bytes;
+use crate::output::PackBuffers;
 use crate::render::{Film, scratch_bytes};
-use crate::report::Bytes;
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
 
@@ -165,7 +166,7 @@ pub struct MemoryModel<'a> {
 
 /// Data of the program, its threads' stacks and small allocations; large pieces go back to the system when they are
 /// freed ([`RETURNED`]). Measured on sequences of up to 1e6 particles, by what the other parts leave.
-const PROGRAM: u64 = 9 << 19;
+const PROGRAM: u64 = 3 << 20;
 /// The same for each thread.
 const THREAD: u64 = 256 << 10;
 
@@ -299,7 +300,7 @@ impl<'a> MemoryModel<'a> {
         // A smooth surface has no tree over particles.
         let particles = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => 0,
-            SurfaceKind::Spheres | SurfaceKind::Medium => frame.particles,
+            SurfaceKind::Spheres | SurfaceKind::Union => frame.particles,
         };
         let count = usize::try_from(particles).unwrap_or(usize::MAX);
         let settings = self.setup.build_settings(count, values);
@@ -330,7 +331,7 @@ impl<'a> MemoryModel<'a> {
         };
         let smooth = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => smooth_bytes(self.setup, frame.particles),
-            SurfaceKind::Spheres | SurfaceKind::Medium => SurfaceBytes::default(),
+            SurfaceKind::Spheres | SurfaceKind::Union => SurfaceBytes::default(),
         };
         SurfaceBytes {
             building: spray + smooth.building,
@@ -419,10 +420,10 @@ impl<'a> MemoryModel<'a> {
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
         // Bands have 32 rows at most, blocks that pack well 16. Colours are kept in half precision.
-        let rows = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
+        let band = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
         let threads = rayon::current_num_threads() as u64;
-        // Each thread has a block twice, and some are packed, at worst as large as they were.
-        let bands = rows * (2 * (threads + 1) + threads + 2);
+        // Each thread packs one, and some are packed, at worst as large as they were.
+        let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
         (9 * pixels).max(bands)
     }
 }

@@ -64,7 +64,7 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
     assert!((1 << 10..1 << 16).contains(&few), "{few}");
     assert_eq!(need(&smooth, 0).surface, 0);
     let mut medium = setup();
-    medium.picture.surface.kind = SurfaceKind::Medium;
+    medium.picture.surface.kind = SurfaceKind::Union;
     assert_eq!(need(&medium, 1_000_000), need(&setup(), 1_000_000));
 }
 

@@ -1,28 +1,39 @@
-//! How long a job will take, from a small measurement: one frame is read and built as it will be,
-//! and traced at a fraction of its pixels.
+//! How long a job will take, from a small measurement: the heaviest frame and a few others are read and built as they
+//! will be, and a part of the tiles of their images is traced.
 //!
-//! An estimate. A coarse image's rays are less alike than a fine one's, so it rather takes too long;
-//! other frames are taken in proportion to their files; the machine is taken to be as busy as it is
-//! now. Tracing has a time box: what is not done by its end gives a lower bound.
+//! An estimate. It assumes that reading and building grow with the size of the files, that the frames that were tried
+//! stand for the others, and that the machine stays as busy as it is now. Tracing has a time box: if not even the
+//! smallest trial ends within it, the result is a lower bound.
 
 use std::time::{Duration, Instant};
 
+use rayon::ThreadPoolBuilder;
 use serde::Serialize;
 use spherule_formats::sequence::Sequence;
 
-use super::{FrameSize, ImageTask, Overlap, Setup, TraceError, load_frame, renderer_of};
+use super::{
+    BuiltFrame, FrameRenderer, FrameSize, ImageTask, Overlap, Setup, TraceError, load_frame,
+    renderer_of,
+};
 use crate::output::{encode_exr, encode_preview};
 use crate::render::{Deadline, Film, RenderError};
 
-/// Pixels across of the first image that is tried; each further has twice as many.
-const FIRST_WIDTH: u32 = 96;
-/// Tracing that takes so many seconds tells enough.
-const ENOUGH: f64 = 0.2;
+/// Pixels across of the first mosaic of tiles that is tried; each further one has twice as many.
+const FIRST_WIDTH: u32 = 32;
+/// Tracing that takes so many seconds is measured well enough,
+const ENOUGH: f64 = 0.15;
+/// and so many pixels stand for the image well enough, wherever the particles are in it: 200 tiles.
+const ENOUGH_PIXELS: u32 = 51_200;
+/// Samples a pixel on trial, at most. The rays of more samples do not cost less, and the rays that are followed in a
+/// connected body are the same.
+const MOST_SAMPLES: u32 = 96;
+/// Frames beside the heaviest one are tried until so much time has passed.
+const TIME_FOR_OTHERS: Duration = Duration::from_secs(2);
 
 /// What one frame takes, seconds; bytes of its image.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Probe {
-    /// The frame.
+    /// The heaviest frame.
     pub frame: i64,
     /// Its particles.
     pub particles: u64,
@@ -30,137 +41,240 @@ pub struct Probe {
     pub read: f64,
     /// Building the tree and the surface, measured.
     pub build: f64,
+    /// Frames whose images were traced in part. The figures below are means over the frames that are spread over the
+    /// job. If there are none, they are those of the heaviest frame.
+    pub frames: u32,
     /// Tracing, estimated.
     pub trace: f64,
-    /// Encoding, estimated.
+    /// Encoding on one thread, estimated.
     pub encode: f64,
-    /// Bytes of its images, estimated.
+    /// Bytes of the images, estimated.
     pub image_bytes: f64,
-    /// The part of the camera's rays that were traced.
+    /// The part of the camera rays that were traced.
     pub traced_part: f64,
-    /// Whether the time for the measurement was over before the smallest image was traced, so that tracing takes
+    /// Whether the time for the measurement was over before the smallest mosaic was traced, so that tracing takes
     /// longer than estimated.
     pub is_lower_bound: bool,
 }
 
-/// A small image that was tried.
+/// A mosaic of an image that was tried.
 struct Trial {
+    setup: Setup,
     film: Film,
     seconds: f64,
-    /// Whether it was given up.
-    is_cut_off: bool,
+    is_interrupted: bool,
 }
 
-/// Measures the frame of `task`.
+/// What one image takes, seconds, and its bytes.
+#[derive(Debug, Clone, Copy, Default)]
+struct ImageCost {
+    trace: f64,
+    encode: f64,
+    bytes: f64,
+}
+
+/// Measures the frame of `heaviest`, and the images of `others` as long as that does not take long; among these, the
+/// first ones are tried first.
 ///
 /// # Errors
-/// Why it cannot be rendered.
-pub fn probe(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<Probe, String> {
-    probe_for(Probe::TIME_BOX, setup, sequence, task)
+/// Why the heaviest frame cannot be rendered.
+pub fn probe(
+    setup: &Setup,
+    sequence: &Sequence,
+    heaviest: &ImageTask,
+    others: &[&ImageTask],
+) -> Result<Probe, String> {
+    probe_for(Probe::TIME_BOX, setup, sequence, heaviest, others)
 }
 
-/// As [`probe`], with no more than `time_box` to trace in.
-pub(super) fn probe_for(
+/// As [`probe`], with no more than `time_box` to trace the heaviest frame in.
+fn probe_for(
     time_box: Duration,
     setup: &Setup,
     sequence: &Sequence,
-    task: &ImageTask,
+    heaviest: &ImageTask,
+    others: &[&ImageTask],
 ) -> Result<Probe, String> {
-    let loaded = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
-    let read = loaded.read_time.as_secs_f64();
-    let mut tracer = renderer_of(setup.picture.renderer);
-    let frame = tracer.prepare(setup, loaded).map_err(|e| e.to_string())?;
-    let deadline = Deadline(Instant::now() + time_box);
-    let full = &setup.picture.render;
-    let rays = |width: u32, height: u32| f64::from(width) * f64::from(height);
-    let mut last: Option<Trial> = None;
-    let mut width = FIRST_WIDTH.min(full.width);
-    loop {
-        let mut small = setup.clone();
-        small.picture.render.width = width;
-        small.picture.render.height = (full.height / (full.width / width)).max(1);
-        small.picture.render.samples = 1;
-        let start = Instant::now();
-        let traced = tracer.image(&small, &frame, &deadline);
-        let seconds = start.elapsed().as_secs_f64();
-        let trial = match (traced, last.take()) {
-            (Ok((film, _)), _) => Trial {
-                film,
-                seconds,
-                is_cut_off: false,
-            },
-            // The image before, a quarter of this one, tells enough.
-            (Err(TraceError::Render(RenderError::Interrupted)), Some(whole)) => whole,
-            (Err(TraceError::Render(RenderError::Interrupted)), None) => Trial {
-                film: Film::new(
-                    small.picture.render.width,
-                    small.picture.render.height,
-                    small.picture.render.channels,
-                ),
-                seconds,
-                is_cut_off: true,
-            },
-            (Err(error), _) => return Err(error.to_string()),
-        };
-        let is_whole = !trial.is_cut_off && trial.film.width == width;
-        if is_whole && trial.seconds < ENOUGH && 2 * width <= full.width {
-            last = Some(trial);
-            width *= 2;
-            continue;
+    let start = Instant::now();
+    let mut renderer = renderer_of(setup.picture.renderer);
+
+    // Measure the heaviest frame
+    let (report, trial_size, traced_part, first) = {
+        let frame = prepare(&mut *renderer, setup, sequence, heaviest)?;
+        let trial = largest_trial(&*renderer, setup, &frame, Instant::now() + time_box)?;
+        let size = [trial.film.width, trial.film.height];
+        let part = (!trial.is_interrupted).then(|| trial.part(setup));
+        (frame.report, size, part, trial.cost(setup, heaviest)?)
+    };
+    let mut costs = Vec::new();
+
+    // Measure others, in memory that is free again
+    for task in others.iter().filter(|_| traced_part.is_some()) {
+        if start.elapsed() > TIME_FOR_OTHERS {
+            break;
         }
-        let Trial {
-            film,
-            seconds: trace,
-            is_cut_off,
-        } = trial;
+        // A frame that cannot be rendered takes no time.
+        let deadline = Instant::now() + time_box;
+        let trial = prepare(&mut *renderer, setup, sequence, task)
+            .and_then(|frame| Trial::of(&*renderer, setup, &frame, trial_size, deadline));
+        let trial = trial.ok().filter(|trial| !trial.is_interrupted);
+        costs.extend(trial.and_then(|trial| trial.cost(setup, task).ok()));
+    }
+    let frames = 1 + u32::try_from(costs.len()).unwrap_or(0);
+    if costs.is_empty() {
+        costs.push(first);
+    }
+    let mean =
+        |part: fn(&ImageCost) -> f64| costs.iter().map(part).sum::<f64>() / costs.len() as f64;
+    Ok(Probe {
+        frame: heaviest.frame,
+        particles: report.particles,
+        read: report.seconds.read,
+        build: report.seconds.build + report.seconds.surface,
+        frames,
+        trace: mean(|cost| cost.trace),
+        encode: mean(|cost| cost.encode),
+        image_bytes: mean(|cost| cost.bytes),
+        traced_part: traced_part.unwrap_or(0.0),
+        is_lower_bound: traced_part.is_none(),
+    })
+}
+
+fn prepare(
+    renderer: &mut dyn FrameRenderer,
+    setup: &Setup,
+    sequence: &Sequence,
+    task: &ImageTask,
+) -> Result<BuiltFrame, String> {
+    let loaded = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
+    renderer.prepare(setup, loaded).map_err(|e| e.to_string())
+}
+
+/// Traces larger and larger mosaics of the image of `frame` until one tells enough. Returns the last one that ended
+/// before `deadline`, or the first one.
+fn largest_trial(
+    renderer: &dyn FrameRenderer,
+    setup: &Setup,
+    frame: &BuiltFrame,
+    deadline: Instant,
+) -> Result<Trial, String> {
+    let full = &setup.picture.render;
+    let mut width = FIRST_WIDTH.min(full.width);
+    let mut last: Option<Trial> = None;
+    loop {
+        let height = u64::from(full.height) * u64::from(width) / u64::from(full.width);
+        let height = u32::try_from(height).unwrap_or(full.height).max(1);
+        let trial = Trial::of(renderer, setup, frame, [width, height], deadline)?;
+        if trial.is_interrupted {
+            return Ok(last.unwrap_or(trial));
+        }
+        let tells_enough = trial.seconds > ENOUGH && width * height >= ENOUGH_PIXELS;
+        let next_ends = Instant::now() + Duration::from_secs_f64(4.0 * trial.seconds) < deadline;
+        if tells_enough || !next_ends || 2 * width > full.width {
+            return Ok(trial);
+        }
+        last = Some(trial);
+        width *= 2;
+    }
+}
+
+impl Trial {
+    /// Traces a mosaic of the image of `frame` with `width` by `height` pixels.
+    fn of(
+        renderer: &dyn FrameRenderer,
+        setup: &Setup,
+        frame: &BuiltFrame,
+        [width, height]: [u32; 2],
+        deadline: Instant,
+    ) -> Result<Self, String> {
+        let mut setup = setup.clone();
+        let settings = &mut setup.picture.render;
+        settings.mosaic_of = Some([settings.width, settings.height]);
+        (settings.width, settings.height) = (width, height);
+        settings.samples = settings.samples.min(MOST_SAMPLES);
+        let channels = settings.channels;
         let start = Instant::now();
-        let exr = encode_exr(&film, &small.picture.exr).map_err(|e| e.to_string())?;
-        let mut bytes = exr.bytes.len();
+        let traced = renderer.image(&setup, frame, &Deadline(deadline));
+        let seconds = start.elapsed().as_secs_f64();
+        let (film, is_interrupted) = match traced {
+            Ok((film, _)) => (film, false),
+            Err(TraceError::Render(RenderError::Interrupted)) => {
+                (Film::new(width, height, channels), true)
+            }
+            Err(error) => return Err(error.to_string()),
+        };
+        Ok(Self {
+            setup,
+            film,
+            seconds,
+            is_interrupted,
+        })
+    }
+
+    /// The part of the pixels of the full image.
+    fn pixels(&self, full: &Setup) -> f64 {
+        let pixels = |width: u32, height: u32| f64::from(width) * f64::from(height);
+        let full = &full.picture.render;
+        pixels(self.film.width, self.film.height) / pixels(full.width, full.height)
+    }
+
+    /// The part of the camera rays of the full image.
+    fn part(&self, full: &Setup) -> f64 {
+        let samples = f64::from(self.setup.picture.render.samples);
+        self.pixels(full) * samples / f64::from(full.picture.render.samples)
+    }
+
+    /// What the full image takes by this one.
+    fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, String> {
+        // Beside a pool that traces, one thread encodes.
+        let pool = ThreadPoolBuilder::new().num_threads(1).build();
+        let pool = pool.map_err(|e| e.to_string())?;
+        let start = Instant::now();
+        let exr = pool.install(|| encode_exr(&self.film, &full.picture.exr));
+        let mut bytes = exr.map_err(|e| e.to_string())?.bytes.len();
         if task.preview.is_some() {
-            let camera = small.camera_at(task.frame).map_err(|e| e.to_string())?;
-            let options = small.preview_from(&camera);
-            let png = encode_preview(&film, &options).map_err(|e| e.to_string())?;
+            let camera = full.camera_at(task.frame).map_err(|e| e.to_string())?;
+            let options = full.preview_from(&camera);
+            let png = encode_preview(&self.film, &options).map_err(|e| e.to_string())?;
             bytes += png.len();
         }
         let encode = start.elapsed().as_secs_f64();
-        let pixels = rays(full.width, full.height) / rays(film.width, film.height);
-        let samples = f64::from(full.samples);
-        return Ok(Probe {
-            frame: task.frame,
-            particles: frame.report.particles,
-            read,
-            build: frame.report.seconds.build + frame.report.seconds.surface,
-            trace: trace * pixels * samples,
-            encode: encode * pixels,
-            image_bytes: bytes as f64 * pixels,
-            traced_part: if is_cut_off {
-                0.0
-            } else {
-                1.0 / (pixels * samples)
-            },
-            is_lower_bound: is_cut_off,
-        });
+        Ok(ImageCost {
+            trace: self.seconds / self.part(full),
+            encode: encode / self.pixels(full),
+            bytes: bytes as f64 / self.pixels(full),
+        })
     }
 }
 
 impl Probe {
-    /// Tracing on trial takes no longer than this.
+    /// Tracing on trial takes no longer than this for a frame.
     pub const TIME_BOX: Duration = Duration::from_secs(3);
 
-    /// Seconds for frames of these sizes, of which `probed` is the one that was measured. Tracing and
-    /// encoding share the processors; reading goes beside them where frames overlap.
-    pub fn seconds_for(&self, frames: &[FrameSize], probed: &FrameSize, overlap: Overlap) -> f64 {
+    /// The time for frames of these sizes on `threads` threads, seconds. `probed` is the size of the heaviest frame.
+    /// Tracing and encoding share the threads. Where frames overlap, all frames but the first are read meanwhile.
+    pub fn seconds_for(
+        &self,
+        frames: &[FrameSize],
+        probed: &FrameSize,
+        overlap: Overlap,
+        threads: usize,
+    ) -> f64 {
+        let read = |frame: &FrameSize| self.read * frame.raw as f64 / probed.raw.max(1) as f64;
         let seconds = |frame: &FrameSize| {
-            let part = frame.raw as f64 / probed.raw.max(1) as f64;
-            let (read, build) = (self.read * part, self.build * part);
-            let image = self.trace + self.encode;
+            let build = self.build * frame.raw as f64 / probed.raw.max(1) as f64;
+            let image = (self.trace + self.encode / threads as f64).max(self.encode);
             build
                 + match overlap {
-                    Overlap::Stages => image.max(read),
-                    Overlap::None => image + read,
+                    Overlap::Stages => image.max(read(frame)),
+                    Overlap::None => image + read(frame),
                 }
         };
-        frames.iter().map(seconds).sum()
+        let first = match overlap {
+            Overlap::Stages => frames.first().map_or(0.0, read),
+            Overlap::None => 0.0,
+        };
+        first + frames.iter().map(seconds).sum::<f64>()
     }
 }
 
@@ -188,10 +302,43 @@ mod tests {
             preview: None,
             refused: None,
         };
-        let cut_off = probe_for(Duration::ZERO, &setup, &sequence, &task).expect("a probe");
+        let cut_off =
+            probe_for(Duration::ZERO, &setup, &sequence, &task, &[&task]).expect("a probe");
         assert!(cut_off.is_lower_bound && cut_off.traced_part == 0.0);
+        assert_eq!(cut_off.frames, 1);
         assert!(cut_off.particles > 0 && cut_off.trace > 0.0);
-        let whole = probe_for(Duration::from_secs(3600), &setup, &sequence, &task);
+        let whole = probe_for(
+            Duration::from_secs(3600),
+            &setup,
+            &sequence,
+            &task,
+            &[&task],
+        );
         assert!(whole.is_ok_and(|probe| !probe.is_lower_bound && probe.traced_part > 0.0));
+    }
+
+    #[test]
+    fn reading_goes_beside_images_but_for_the_first_frame() {
+        let probe = Probe {
+            frame: 2,
+            particles: 100,
+            read: 2.0,
+            build: 1.0,
+            frames: 1,
+            trace: 4.0,
+            encode: 2.0,
+            image_bytes: 1.0,
+            traced_part: 0.1,
+            is_lower_bound: false,
+        };
+        let size = |raw| FrameSize {
+            raw,
+            ..FrameSize::default()
+        };
+        let frames = [size(50), size(100), size(300)];
+        let seconds = |overlap| probe.seconds_for(&frames, &size(100), overlap, 2);
+        // Built in 0.5, 1 and 3 s, read in 1, 2 and 6 s, the last beyond the image's 5 s.
+        assert_eq!(seconds(Overlap::Stages), 1.0 + (5.5 + 6.0 + 9.0));
+        assert_eq!(seconds(Overlap::None), 6.5 + 8.0 + 14.0);
     }
 }

@@ -11,12 +11,13 @@ use spherule_jobs::publish;
 use super::ImageTask;
 use super::encode::{WriteError, write_frame};
 use super::load::load_frame;
-use super::renderer::renderer_of;
+use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::trace::TracedFrame;
+use super::trace::renderer_of;
+use crate::metrics::MemoryPeaks;
 use crate::mishap::{guarded, is_place_at_fault};
 use crate::output::encode_preview;
-use crate::report::{FrameReport, MemoryPeaks};
+use crate::report::FrameReport;
 
 /// Why there is no image.
 #[derive(Debug)]

@@ -9,14 +9,15 @@ use super::decoded::DecodedFrame;
 use super::setup::Setup;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
+use crate::metrics::MemoryUse;
+use crate::metrics::memory::available;
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into};
-use crate::report::memory::available;
-use crate::report::{FrameReport, MemoryUse};
+use crate::report::FrameReport;
 use crate::scene::Scene;
-use crate::surface::medium::MediumSurface;
 use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, spray_of};
+use crate::surface::union::UnionSurface;
 use crate::surface::{
     GradientNormals, MaterialId, NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind,
     SurfaceSettings,
@@ -157,7 +158,7 @@ impl SurfaceBuilder {
         let normals = shading_normals(&setup.picture.surface);
         let body: Box<dyn Shape + '_> = match setup.picture.surface.kind {
             SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
-            SurfaceKind::Medium => Box::new(MediumSurface::new(tree).shaded_by(normals)),
+            SurfaceKind::Union => Box::new(UnionSurface::new(tree).shaded_by(normals)),
             SurfaceKind::Smooth => Box::new(self.smooth.surface()),
         };
         let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);

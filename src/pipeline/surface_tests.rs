@@ -76,7 +76,7 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn 
 /// Every surface there is.
 fn surfaces() -> Vec<SurfaceSettings> {
     let mut all = Vec::new();
-    for kind in [SurfaceKind::Spheres, SurfaceKind::Medium] {
+    for kind in [SurfaceKind::Spheres, SurfaceKind::Union] {
         for (normals, spray) in [
             (NormalKind::Auto, false),
             (NormalKind::Pca, false),

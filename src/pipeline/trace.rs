@@ -1,87 +1,20 @@
 //! Second stage: the tree is built and the image traced.
 
-use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
-use spherule_formats::FrameError;
-
-use super::ImageTask;
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
-use super::renderer::FrameRenderer;
+use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{ColorRule, Setup};
 use super::surface::{SurfaceBuilder, spheres};
-use crate::accel::stored::{StoredFault, StoredSettings, StoredTree};
+use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
-use crate::render::{Colors, Film, ParticleShading, RayCounts, RenderError, Stop};
+use crate::metrics::MemoryUse;
+use crate::render::{Colors, Film, ParticleShading, RayCounts, RendererKind, Stop};
+use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
-use crate::report::{FrameReport, MemoryUse};
 use crate::scene::material::DEFAULT_COLOR;
-use crate::scene::{Camera, CameraError};
-use crate::surface::smooth::SmoothError;
-
-/// Why there is no image of a frame that was read.
-#[derive(Debug, thiserror::Error)]
-pub enum TraceError {
-    /// Rendering was interrupted, or a setting makes no image.
-    #[error(transparent)]
-    Render(#[from] RenderError),
-    /// The nodes of a native frame cannot be traced.
-    #[error("{}: {fault}; convert the frame again", path.display())]
-    Stored {
-        /// The frame.
-        path: PathBuf,
-        /// What is wrong with it.
-        fault: StoredFault,
-    },
-    /// A native frame changed while it was traced, or cannot be used on this machine.
-    #[error(transparent)]
-    File(#[from] FrameError),
-    /// The surface would not fit into memory.
-    #[error(transparent)]
-    Surface(#[from] SmoothError),
-    /// There is no picture from where the camera is.
-    #[error("camera: {0}")]
-    Camera(#[from] CameraError),
-}
-
-/// An image in memory.
-#[derive(Debug)]
-pub struct TracedFrame {
-    /// What it is.
-    pub task: ImageTask,
-    /// Where it was taken from.
-    pub camera: Camera,
-    /// The planes.
-    pub film: Film,
-    /// Simulation time, if known.
-    pub time: Option<f64>,
-    /// The report so far.
-    pub report: FrameReport,
-    /// Memory when the image was finished and everything it was made of still there.
-    pub memory: MemoryUse,
-}
-
-/// A frame whose tree stands in the tracer; what shading needs beside it.
-#[derive(Debug)]
-pub struct BuiltFrame {
-    pub(super) task: ImageTask,
-    particles: BuiltParticles,
-    time: Option<f64>,
-    pub(super) report: FrameReport,
-    /// What the user should know of it.
-    pub(super) notes: Vec<String>,
-}
-
-/// What is left of a frame's particles beside the tree.
-#[derive(Debug)]
-enum BuiltParticles {
-    /// The tree has copied the rest.
-    Decoded(DecodedShading),
-    /// All of it: the tree's leaves are here.
-    Stored(StoredFrame),
-}
 
 /// Traces frame after frame in the same buffers, on the threads of the current pool.
 #[derive(Debug, Default)]
@@ -147,8 +80,8 @@ impl FrameRenderer for CpuRenderer {
     /// Renders `frame`, the one that was built last.
     ///
     /// # Errors
-    /// [`RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
-    /// meanwhile; the others are settings that were checked before.
+    /// [`crate::render::RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame
+    /// changed meanwhile. The other errors are settings that were checked before.
     fn render(
         &mut self,
         setup: &Setup,
@@ -263,4 +196,11 @@ fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> Pa
 
 fn seconds(time: Duration) -> f64 {
     time.as_secs_f64()
+}
+
+/// The renderer of that kind, without memory yet.
+pub fn renderer_of(kind: RendererKind) -> Box<dyn FrameRenderer> {
+    match kind {
+        RendererKind::Cpu => Box::new(CpuRenderer::default()),
+    }
 }

@@ -1,11 +1,12 @@
-//! What is looked up where camera rays meet something: base colours, and the data of a pixel beside its colour.
+//! Attributes at intersections: base colours, and for camera rays coverage and the data channels of pixels.
 
 use glam::Vec3;
 
 use super::{
-    Channels,
     aov::{DataSample, NO_ID},
-    integrator::{PacketScratch, Pixel, WhittedIntegrator},
+    context::RenderContext,
+    film::Channels,
+    scratch::{PacketScratch, Pixel},
     shading::depths,
 };
 use crate::math::{Lanes, lane3, lanes_in, set_lane3, splat, splat3};
@@ -15,16 +16,16 @@ use crate::surface::{Intersections, MaterialId};
 /// Colour of foam and spray, linear RGB.
 const SPRAY: Vec3 = Vec3::splat(0.9);
 
-impl WhittedIntegrator<'_> {
-    /// Base colours of what a packet meets.
-    pub(super) fn base_colors(&self, packet: &mut PacketScratch) {
+impl RenderContext<'_> {
+    /// Looks up the base colours at the intersections of a packet; those of particles where `has_color`.
+    pub(super) fn base_colors(&self, has_color: bool, packet: &mut PacketScratch) {
         let PacketScratch {
             hits, base, blend, ..
         } = packet;
         let particles = hits.lanes_of(MaterialId::PARTICLES);
         if let Some(color) = self.color {
             *base = splat3(color);
-        } else if self.particle_constants().has_color() {
+        } else if has_color {
             for lane in lanes_in(particles) {
                 set_lane3(base, lane, self.particle_color(hits, lane, blend));
             }
@@ -35,7 +36,7 @@ impl WhittedIntegrator<'_> {
         }
     }
 
-    /// Base colour of the particle, or of the place between particles, in `lane`.
+    /// Base colour of the particle, or of the point between particles, in `lane`.
     fn particle_color(
         &self,
         hits: &Intersections,
@@ -45,8 +46,7 @@ impl WhittedIntegrator<'_> {
         if let Some(color) = self.color {
             return color;
         }
-        let particles = self.particles.filter(|shape| shape.is_connected());
-        let Some(particles) = particles else {
+        let Some(particles) = self.connected_particles() else {
             return self.source.color(hits.particle[lane]);
         };
         blend.clear();
@@ -55,7 +55,7 @@ impl WhittedIntegrator<'_> {
         self.source.blended_color(blend)
     }
 
-    /// Base colour of what is not a particle of the body.
+    /// Base colour of the floor or of spray.
     fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
         match (hits.material[lane], &self.scene.ground) {
             (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
@@ -63,7 +63,7 @@ impl WhittedIntegrator<'_> {
         }
     }
 
-    /// What of each sample surfaces cover: a fading floor covers all, unless the background is left out.
+    /// Part of each sample that surfaces cover. A floor that fades covers all of it, unless the background is left out.
     pub(super) fn coverage(&self, hits: &Intersections) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => 0.0,
@@ -72,7 +72,8 @@ impl WhittedIntegrator<'_> {
         })
     }
 
-    /// Keeps for each pixel the data of its nearest sample, the first of equal ones.
+    /// Keeps for each pixel the data of its nearest sample, the first of equal ones. The rays are those of the samples
+    /// from number `first` on.
     pub(super) fn gather_data(
         &self,
         rays: &RayPacket,
@@ -106,7 +107,7 @@ impl WhittedIntegrator<'_> {
         }
     }
 
-    /// The data of what the camera ray in `lane` meets.
+    /// The data at the intersection of the camera ray in `lane`.
     fn data(
         &self,
         rays: &RayPacket,
@@ -116,7 +117,7 @@ impl WhittedIntegrator<'_> {
     ) -> DataSample {
         let PacketScratch { hits, blend, .. } = packet;
         let channels = self.settings.channels;
-        let is_particle = hits.material[lane] != MaterialId::GROUND;
+        let is_particle = hits.material[lane].is_of_particles();
         let wants_particle = is_particle && (channels.id || channels.velocity);
         let particle = wants_particle.then(|| self.particle_at(hits, lane));
         let normal = lane3(&hits.normal, lane);

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{
     brute::{Ball, Balls},
-    integrator::WhittedIntegrator,
+    integrator::testing,
     solid::Solid,
     *,
 };
@@ -97,9 +97,10 @@ fn radiance_at(
     let plane = scene.ground.as_ref().map(Plane::new);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();
-    let mut integrator = WhittedIntegrator::new(shapes, scene, &source, settings);
+    let mut integrator =
+        WhittedIntegrator::new(RenderContext::new(shapes, scene, &source, settings));
     integrator.split.least = split;
-    integrator.radiance_at(films)
+    testing::radiance_at(&integrator, films)
 }
 
 /// The middle of the film with every ray followed.
@@ -118,9 +119,7 @@ struct Drops(Balls);
 
 impl Shape for Drops {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
-        let material = self.material();
-        let hit = self.0.crossing(ray, side)?;
-        Some(Intersection { material, ..hit })
+        self.0.crossing(ray, side)
     }
 
     fn material(&self) -> MaterialId {
@@ -271,7 +270,8 @@ fn more_samples_draw_sooner() {
             ..depth(8)
         };
         let shapes: Vec<&dyn Shape> = vec![&solid];
-        let integrator = WhittedIntegrator::new(shapes, &scene, &source, &settings);
+        let integrator =
+            WhittedIntegrator::new(RenderContext::new(shapes, &scene, &source, &settings));
         integrator.split.least
     };
     assert_eq!([1, 16, 4096].map(split), [0.02, 0.2, 1.0]);

@@ -6,7 +6,7 @@ use glam::{DVec3, Vec2, Vec3};
 
 use super::{
     brute::{Ball, Balls},
-    integrator::WhittedIntegrator,
+    integrator::testing::radiance_at,
     solid::Solid,
     *,
 };
@@ -242,9 +242,10 @@ fn radiance_does_not_depend_on_what_shares_a_packet() {
     };
     for shape in shapes {
         let of = |films: &[Vec2], segments: usize| {
-            let mut integrator = WhittedIntegrator::new(vec![shape], &scene, &source, &settings);
-            integrator.segments = segments;
-            let (colors, counts) = integrator.radiance_at(films);
+            let mut integrator =
+                WhittedIntegrator::new(RenderContext::new(vec![shape], &scene, &source, &settings));
+            integrator.context.max_segments = segments;
+            let (colors, counts) = radiance_at(&integrator, films);
             let bits = |color: Vec3| color.to_array().map(f32::to_bits);
             (colors.into_iter().map(bits).collect::<Vec<_>>(), counts)
         };

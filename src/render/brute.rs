@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 use crate::{
     math::{Lanes, lanes_in},
     ray::{Ray, RayPacket},
-    surface::{Intersection, MaterialId, Shape, Side},
+    surface::{Intersection, Shape, Side},
 };
 
 /// Centre and radius.
@@ -62,7 +62,6 @@ impl Ball {
                 lift: 0.0,
                 particle,
                 anchor: point.as_vec3(),
-                material: MaterialId::PARTICLES,
                 offset: (1e-4 * self.radius).max(8.0 * f32::EPSILON * scale),
             }
         })

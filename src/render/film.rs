@@ -1,5 +1,6 @@
 //! The finished image: one array per group of channels, row by row from the top.
 
+use bytemuck::zeroed_vec;
 use glam::Vec3;
 use thiserror::Error;
 
@@ -121,14 +122,32 @@ impl Film {
         }
     }
 
-    /// Makes this a film of that size with these planes. Where it is one, its memory stays, and what is in it: who
-    /// renders sets every pixel.
+    /// A film of zeros, which takes memory only where it is written.
+    fn zeroed(width: u32, height: u32, channels: Channels) -> Self {
+        let count = width as usize * height as usize;
+        let vectors = |wanted: bool| wanted.then(|| zeroed_vec::<Vec3>(count));
+        Self {
+            width,
+            height,
+            color: zeroed_vec(count),
+            depth: channels.depth.then(|| zeroed_vec(count)),
+            normal: vectors(channels.normal),
+            position: vectors(channels.position),
+            velocity: vectors(channels.velocity),
+            albedo: vectors(channels.albedo),
+            id: channels.id.then(|| zeroed_vec(count)),
+        }
+    }
+
+    /// Makes this a film of that size with these planes. Where it is one, its memory stays, and what is in it. Who
+    /// renders sets every pixel, so that the threads that trace are the first to write new planes: each 4 KiB cost
+    /// them a page fault then.
     pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels) {
         let is_fit = (self.width, self.height) == (width, height) && self.channels() == channels;
         if !is_fit {
             // Not both at once.
             *self = Self::default();
-            *self = Self::new(width, height, channels);
+            *self = Self::zeroed(width, height, channels);
         }
     }
 
@@ -292,6 +311,10 @@ fn put<T>(plane: &mut Option<Rows<'_, T>>, (column, row): (usize, usize), value:
         rows[row][column] = value;
     }
 }
+
+#[cfg(test)]
+#[path = "film_tests.rs"]
+mod every_pixel;
 
 #[cfg(test)]
 mod tests {

@@ -61,6 +61,47 @@ fn settings() -> RenderSettings {
 }
 
 #[test]
+fn a_mosaic_has_tiles_of_the_whole_image() {
+    let heap = heap(60);
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    let scene = heap_scene(0.8);
+    let image = |settings: &RenderSettings| {
+        let never = AtomicBool::new(false);
+        render(&[&heap], &scene, &source, settings, &never)
+            .unwrap()
+            .0
+    };
+    let whole = image(&settings());
+    // Shares of 25 columns and of 50 rows; the last column of tiles is cut.
+    let mosaic = image(&RenderSettings {
+        width: 40,
+        height: 16,
+        mosaic_of: Some([75, 50]),
+        ..settings()
+    });
+    for (x, y) in (0..16).flat_map(|y| (0..40).map(move |x| (x, y))) {
+        let (left, top) = ([4, 29, 54][x / 16], 17);
+        let (here, there) = (40 * y + x, 75 * (top + y) + left + x % 16);
+        assert_eq!(mosaic.color[here], whole.color[there], "{x} {y}");
+        assert_eq!(
+            mosaic.id.as_ref().unwrap()[here],
+            whole.id.as_ref().unwrap()[there]
+        );
+    }
+    // A mosaic of all tiles is the image itself.
+    let all = RenderSettings {
+        width: 64,
+        height: 48,
+        ..settings()
+    };
+    let mosaic = RenderSettings {
+        mosaic_of: Some([64, 48]),
+        ..all
+    };
+    assert!(image(&mosaic) == image(&all));
+}
+
+#[test]
 fn the_same_film_on_any_number_of_threads() {
     let heap = heap(60);
     let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));

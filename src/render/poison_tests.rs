@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use super::{
     brute::{Ball, Balls},
-    integrator::WhittedIntegrator,
+    integrator::testing::shaded,
     solid::Solid,
     stream::SegmentPacket,
     *,
@@ -63,22 +63,25 @@ fn segments(scene: &Scene) -> SegmentPacket {
     segments
 }
 
-/// All that a packet leaves behind for its samples but `poisoned`, as bits.
+/// All that a packet leaves behind for its samples but `poisoned`, as bits, with coherent rays and with others.
 fn left(
     integrator: &WhittedIntegrator<'_>,
     segments: &SegmentPacket,
     poisoned: usize,
 ) -> Vec<[u32; 3]> {
-    let (radiance, next) = integrator.shaded(segments);
     let bits = |v: Vec3| v.to_array().map(f32::to_bits);
-    let others = (0..LANES).filter(|lane| *lane != poisoned);
-    let mut all: Vec<_> = others.map(|lane| bits(lane3(&radiance, lane))).collect();
-    for stream in [&next.reflected, &next.refracted] {
-        for packet in stream.packets() {
-            for (lane, ray) in packet.rays.rays().enumerate() {
-                if packet.sample[lane] as usize != poisoned {
-                    let throughput = lane3(&packet.throughput, lane);
-                    all.extend([ray.origin, ray.direction, throughput].map(bits));
+    let mut all = Vec::new();
+    for depth in [1, 2] {
+        let (radiance, next) = shaded(integrator, segments, depth);
+        let others = (0..LANES).filter(|lane| *lane != poisoned);
+        all.extend(others.map(|lane| bits(lane3(&radiance, lane))));
+        for stream in [&next.reflected, &next.refracted] {
+            for packet in stream.packets() {
+                for (lane, ray) in packet.rays.rays().enumerate() {
+                    if packet.sample[lane] as usize != poisoned {
+                        let throughput = lane3(&packet.throughput, lane);
+                        all.extend([ray.origin, ray.direction, throughput].map(bits));
+                    }
                 }
             }
         }
@@ -93,10 +96,10 @@ fn check(shape: &dyn Shape, transmission: f32) {
     let plane = scene.ground.as_ref().map(Plane::new);
     let mut shapes: Vec<&dyn Shape> = plane.iter().map(|plane| plane as &dyn Shape).collect();
     shapes.push(shape);
-    let integrator = WhittedIntegrator::new(shapes, &scene, &source, &settings);
+    let integrator = WhittedIntegrator::new(RenderContext::new(shapes, &scene, &source, &settings));
     let clean = segments(&scene);
     assert!(
-        left(&integrator, &clean, 0).len() > 20,
+        left(&integrator, &clean, 0).len() > 40,
         "there is something to see"
     );
     for lane in [0, 5, 6, 15] {
@@ -190,7 +193,8 @@ fn poisoned_particles_change_nothing_for_rays_at_others() {
         let settings = RenderSettings::new(4, 4);
         let clean = segments(&scene);
         let of = |shape: &dyn Shape, lane: usize| {
-            let integrator = WhittedIntegrator::new(vec![shape], &scene, &source, &settings);
+            let integrator =
+                WhittedIntegrator::new(RenderContext::new(vec![shape], &scene, &source, &settings));
             left(&integrator, &clean, lane)
         };
         for (lane, poison) in [5, 6, 9].into_iter().flat_map(|l| POISON.map(|p| (l, p))) {

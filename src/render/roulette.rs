@@ -5,7 +5,11 @@
 //! and image synthesis", 1990). The weights of both always add up to what they were, and so does their mean.
 //! Draws come of the pixel, the sample and the path since, so that they do not depend on threads.
 
-use super::{MAX_DEPTH, RenderSettings, sampler::PathSeed};
+use super::{
+    context::Interior,
+    sampler::PathSeed,
+    settings::{MAX_DEPTH, RenderSettings},
+};
 
 /// Path weight in a connected body from which on both rays are followed, times the samples of a pixel: noise that few
 /// samples do not even out costs fewer rays than it is worth. Bounded by [`SPLIT_LEAST`] for few samples.
@@ -35,24 +39,21 @@ pub(super) struct SplitRule {
 }
 
 impl SplitRule {
-    /// The rule for spheres that are bodies of their own.
-    pub(super) fn spheres(settings: &RenderSettings) -> Self {
+    /// The rule for particles with that interior. Opaque surfaces leave one ray.
+    pub(super) fn new(settings: &RenderSettings, interior: Interior) -> Self {
+        let least = match interior {
+            Interior::Opaque => f32::INFINITY,
+            Interior::Spheres => settings.min_weight,
+            Interior::Body => (SPLIT * settings.samples as f32).clamp(SPLIT_LEAST, 1.0),
+        };
         Self {
-            least: settings.min_weight,
-            favors_first: false,
-        }
-    }
-
-    /// The rule for one connected body.
-    pub(super) fn body(settings: &RenderSettings) -> Self {
-        Self {
-            least: (SPLIT * settings.samples as f32).clamp(SPLIT_LEAST, 1.0),
-            favors_first: true,
+            least,
+            favors_first: interior == Interior::Body,
         }
     }
 
     /// Rays of one sample at any depth, at most: the path weights of a sample never add up to more than 1.
-    pub(super) fn most_paths(&self, max_depth: u32) -> usize {
+    pub(super) fn max_paths(&self, max_depth: u32) -> usize {
         let doubled = 1_usize << (max_depth.min(MAX_DEPTH) - 1).min(30);
         #[expect(
             clippy::cast_possible_truncation,
@@ -60,7 +61,8 @@ impl SplitRule {
             reason = "saturates"
         )]
         let weighed = (1.0 / self.least) as usize;
-        doubled.min(weighed.saturating_add(usize::from(self.favors_first)))
+        let weighed = weighed.saturating_add(usize::from(self.favors_first));
+        doubled.min(weighed).max(1)
     }
 
     /// The weights with which the reflected and the refracted ray are followed, of their own `weights`. `arriving` is

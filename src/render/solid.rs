@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{
     ray::Ray,
-    surface::{Intersection, MaterialId, Shape, Side},
+    surface::{Intersection, Shape, Side},
 };
 
 /// What a body fills.
@@ -86,7 +86,6 @@ impl Solid {
             particle: 0,
             offset: 1e-5 * scale.max(1.0),
             anchor: point.as_vec3(),
-            material: MaterialId::PARTICLES,
         }
     }
 }

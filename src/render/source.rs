@@ -5,7 +5,7 @@ use std::ops::Mul;
 
 use glam::Vec3;
 
-use super::NO_ID;
+use super::aov::NO_ID;
 use crate::scene::ColorMap;
 
 /// Looks up what belongs to particle `index` of the frame, as [`crate::surface::Intersection`] counts

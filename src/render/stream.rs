@@ -43,7 +43,7 @@ impl SegmentPacket {
 }
 
 /// Rays that leave the surfaces of a packet, one for each lane.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 #[repr(C, align(64))]
 pub(super) struct ScatteredRays {
     pub(super) origin: Lanes3,
@@ -52,18 +52,6 @@ pub(super) struct ScatteredRays {
     pub(super) weight: Lanes,
     /// The same times the throughput of the packet.
     pub(super) throughput: Lanes3,
-}
-
-impl Default for ScatteredRays {
-    fn default() -> Self {
-        let zero = [splat(0.0); 3];
-        Self {
-            origin: zero,
-            direction: zero,
-            weight: splat(0.0),
-            throughput: zero,
-        }
-    }
 }
 
 /// Path segments of one depth, packed without gaps. Its memory lives on when it is cleared.
@@ -85,8 +73,13 @@ impl RayStream {
     }
 
     /// All packets; the last may have fewer rays than lanes.
+    #[cfg(test)]
     pub(super) fn packets(&self) -> &[SegmentPacket] {
         &self.packets[..self.len.div_ceil(LANES)]
+    }
+
+    fn packets_mut(&mut self) -> &mut [SegmentPacket] {
+        &mut self.packets[..self.len.div_ceil(LANES)]
     }
 
     /// Appends the rays in `lanes`, in order, which leave surfaces that `parents` meet; those in `inside` start inside
@@ -128,18 +121,30 @@ impl RayStream {
     }
 }
 
-/// The sum over a packet's lanes in a fixed order that vectorises: halves onto halves.
-#[inline(always)]
-pub(super) fn sum_of_lanes(mut lanes: Lanes) -> f32 {
-    macro_rules! halve {
-        ($($half:literal)*) => {$(
-            for lane in 0..$half {
-                lanes[lane] += lanes[lane + $half];
-            }
-        )*};
+/// The rays of one depth, by how they left a surface.
+#[derive(Debug, Default)]
+pub(super) struct RayStreams {
+    pub(super) reflected: RayStream,
+    pub(super) refracted: RayStream,
+}
+
+impl RayStreams {
+    /// Removes all segments.
+    pub(super) fn clear(&mut self) {
+        self.reflected.clear();
+        self.refracted.clear();
     }
-    halve!(8 4 2 1);
-    lanes[0]
+
+    /// Whether there is no segment.
+    pub(super) fn is_empty(&self) -> bool {
+        self.reflected.len() + self.refracted.len() == 0
+    }
+
+    /// All packets, reflected rays first.
+    pub(super) fn packets_mut(&mut self) -> impl Iterator<Item = &mut SegmentPacket> {
+        let refracted = self.refracted.packets_mut().iter_mut();
+        self.reflected.packets_mut().iter_mut().chain(refracted)
+    }
 }
 
 #[cfg(test)]
@@ -189,11 +194,5 @@ mod tests {
                 }
             }
         }
-    }
-
-    #[test]
-    fn sums_take_every_lane() {
-        let lanes = std::array::from_fn(|lane| lane as f32);
-        assert_eq!(sum_of_lanes(lanes), 120.0);
     }
 }

@@ -6,6 +6,17 @@ use super::film::FilmTile;
 /// to stay in the cache.
 pub(super) const SIDE: u32 = 16;
 
+/// Where the tile at `start` of a mosaic `length` pixels long begins in the full image: its middle is that of an equal
+/// share of the `full` pixels, unless the tile would not lie within.
+pub(super) fn mosaic_start(start: u32, length: u32, full: u32) -> u32 {
+    let (number, count) = (u64::from(start / SIDE), u64::from(length.div_ceil(SIDE)));
+    let middle = (2 * number + 1) * u64::from(full) / (2 * count);
+    let middle = u32::try_from(middle).unwrap_or(full);
+    middle
+        .saturating_sub(SIDE / 2)
+        .min(full.saturating_sub(SIDE))
+}
+
 /// Column and row of each pixel of `tile` along a Z-order curve, so that every aligned square of a power of two is
 /// finished before the next one is begun: 16 successive samples lie in 4x4 pixels, or in a smaller square.
 pub(super) fn pixels_of(tile: &FilmTile<'_>) -> impl Iterator<Item = (u32, u32)> + use<> {
@@ -23,6 +34,19 @@ fn z_order() -> impl Iterator<Item = (u32, u32)> {
 mod tests {
     use super::*;
     use crate::ray::PACKET_SIZE;
+
+    #[test]
+    fn tiles_of_a_mosaic_lie_within_the_image() {
+        let starts = |length, full| {
+            let starts = (0..length).step_by(SIDE as usize);
+            let all: Vec<_> = starts.map(|at| mosaic_start(at, length, full)).collect();
+            all
+        };
+        assert_eq!(starts(48, 192), [24, 88, 152]);
+        assert_eq!(starts(40, 48), [0, 16, 32]);
+        assert_eq!(starts(7, 7), [0]);
+        assert_eq!(starts(32, 18), [0, 2]);
+    }
 
     #[test]
     fn sixteen_places_are_a_square() {

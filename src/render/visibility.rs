@@ -1,140 +1,148 @@
-//! What stands between shading points and lights.
+//! The occlude stage: what shadow rays keep between shading points and lights.
 //!
-//! Rays to lights go straight on through transmissive bodies, so there are no caustics. They keep
-//! `transmission*(1-r)` at each crossing of a surface, with `r` for the angle outside on both sides of it (a ray
-//! that was bent there would have come from such an angle, and is never reflected totally), and what one connected body
-//! does not absorb.
+//! Shadow rays go straight on through transmissive bodies, so there are no caustics. They keep `transmission*(1-r)` at
+//! each crossing of a surface, with `r` for the angle outside on both sides of it (a ray that was bent there would have
+//! come from such an angle, and is never totally reflected), and the transmittance of a connected body's medium.
 
 use super::{
-    integrator::{Interior, WhittedIntegrator},
+    context::{Interior, RenderContext},
     lights::LightSamples,
-    materials::{attenuate, passed_straight},
+    materials::{attenuate, cross_straight},
+    ray_counts::RayCounts,
     shading::product,
+    stream::SegmentPacket,
 };
 use crate::accel::Coherence;
-use crate::math::{Lanes3, first_lanes, lane3, lanes_in, splat};
+use crate::math::{Lanes, Lanes3, first_lanes, lane3, lanes_in, splat};
 use crate::ray::RayPacket;
 use crate::surface::{Intersections, MaterialId, Shape};
 
-/// Most crossings of one body that a ray to a light is followed through.
+/// Most crossings of one body along a shadow ray.
 const MAX_CROSSINGS: u32 = 64;
 
-/// Light below this part is dark.
+/// Transmittance below which a shadow ray ends.
 const DARK: f32 = 1.0 / 4096.0;
 
-impl WhittedIntegrator<'_> {
-    /// The lanes that a light reaches. Its contribution is dimmed by what it comes through; shading points in `inside`
-    /// lie in one connected body.
-    pub(super) fn visible(
+impl RenderContext<'_> {
+    /// Traces the rays to a light from shading points of `segments`, and multiplies the radiance of `samples` by what the
+    /// rays keep. Returns the lanes that the light reaches.
+    pub(super) fn trace_shadow_rays(
         &self,
+        segments: &SegmentPacket,
+        depth: u32,
         samples: &mut LightSamples,
-        coherence: Coherence,
-        inside: u32,
         crossings: &mut Intersections,
+        counts: &mut RayCounts,
     ) -> u32 {
-        let rays = &samples.rays;
-        // Rays that an opaque shape stops need not be traced on.
-        let mut lanes = samples.lanes;
+        samples.rays.set_len(segments.rays.len());
+        counts.shadow += u64::from(samples.lanes.count_ones());
+        let coherence = Self::coherence(depth);
+
+        // Opaque shapes first: rays that they stop need not be traced on
         for shape in &self.shapes {
             let is_opaque =
                 self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES;
-            if is_opaque && lanes != 0 {
-                lanes &= !shape.occluded(rays, coherence, lanes);
+            if is_opaque && samples.lanes != 0 {
+                samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
             }
         }
         let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
-            return lanes;
+            return samples.lanes;
         };
-        if lanes == 0 {
+        if samples.lanes == 0 {
             return 0;
         }
-        let mut kept = [splat(1.0); 3];
+
+        // Then transmissive ones
+        let mut transmittance = [splat(1.0); 3];
         let reached = match self.interior {
-            Interior::Body => self.through_body(
-                particles, rays, coherence, lanes, inside, crossings, &mut kept,
-            ),
-            _ => self.through_spheres(particles, rays, lanes, &mut kept),
+            Interior::Body => {
+                let inside = segments.inside;
+                let (samples, transmittance) = (&*samples, &mut transmittance);
+                self.cross_body(
+                    particles,
+                    samples,
+                    coherence,
+                    inside,
+                    crossings,
+                    transmittance,
+                )
+            }
+            _ => self.cross_spheres(particles, samples, &mut transmittance),
         };
-        let arriving = samples.radiance;
-        product(self.simd, &arriving, &kept, &mut samples.radiance);
+        let unoccluded = samples.radiance;
+        product(
+            self.simd,
+            &unoccluded,
+            &transmittance,
+            &mut samples.radiance,
+        );
         reached
     }
 
-    /// What rays keep on their way through spheres that are bodies of their own. The lanes where that is anything.
-    fn through_spheres(
+    /// The transmittance of spheres that are bodies of their own. Returns the lanes in which it is not 0.
+    fn cross_spheres(
         &self,
         spheres: &dyn Shape,
-        rays: &RayPacket,
-        lanes: u32,
-        kept: &mut Lanes3,
+        samples: &LightSamples,
+        transmittance: &mut Lanes3,
     ) -> u32 {
-        let material = self.particle_constants();
-        let passed = |cosine: f32| material.passed_straight(cosine);
-        spheres.transmittance(rays, lanes, &passed, &mut kept[0]);
-        kept[1] = kept[0];
-        kept[2] = kept[0];
-        let is_lit = |lane: usize| u32::from(kept[0][lane] > 0.0) << lane;
-        lanes_in(lanes).fold(0, |reached, lane| reached | is_lit(lane))
+        let passed = |cosine: f32| self.boundary.straight_transmittance(cosine);
+        spheres.transmittance(&samples.rays, samples.lanes, &passed, &mut transmittance[0]);
+        transmittance[1] = transmittance[0];
+        transmittance[2] = transmittance[0];
+        let is_lit = |lane: usize| u32::from(transmittance[0][lane] > 0.0) << lane;
+        lanes_in(samples.lanes).fold(0, |reached, lane| reached | is_lit(lane))
     }
 
-    /// What rays keep on their way through one connected body, crossing after crossing of all rays at once. The lanes
-    /// where that is anything.
-    #[expect(
-        clippy::too_many_arguments,
-        reason = "what rays carry, and where results go"
-    )]
-    fn through_body(
+    /// The transmittance of one connected body, crossing after crossing of all rays at once; those in `inside` start in
+    /// the body. Returns the lanes in which it is not 0.
+    fn cross_body(
         &self,
         body: &dyn Shape,
-        rays: &RayPacket,
+        samples: &LightSamples,
         mut coherence: Coherence,
-        lanes: u32,
         mut inside: u32,
         hits: &mut Intersections,
-        kept: &mut Lanes3,
+        transmittance: &mut Lanes3,
     ) -> u32 {
-        let material = self.particle_constants();
+        let (rays, boundary) = (&samples.rays, &self.boundary);
         let mut ahead = *rays;
-        let mut reached = lanes;
-        let mut alive = lanes;
-        // Where the way since the last crossing begins.
+        let (mut reached, mut alive) = (samples.lanes, samples.lanes);
+        // Distances of the last crossings
         let mut from = rays.t_min;
         for _ in 0..MAX_CROSSINGS {
+            // Find the next crossing of each ray
             for lane in lanes_in(!alive & first_lanes(rays.len())) {
                 ahead.t_max[lane] = -1.0;
             }
             hits.clear();
             body.intersect(&mut ahead, coherence, inside & alive, hits);
-            let met = hits.mask & alive;
-            // The way inside, to a crossing or to the light; one without an end is a crack in the surface.
-            let mut length = splat(0.0);
-            for lane in lanes_in(alive & inside) {
-                let end = if met >> lane & 1 == 1 {
-                    hits.t[lane]
-                } else {
-                    rays.t_max[lane]
-                };
-                length[lane] = if end.is_finite() {
-                    end - from[lane]
-                } else {
-                    0.0
-                };
-            }
+            let crossing = hits.mask & alive;
+
+            // Attenuate by the medium up to there and by the crossing
+            let lanes = alive & inside;
+            let length = inside_lengths(rays, hits, crossing, lanes, &from);
             attenuate(
                 self.simd,
-                &material.extinction,
+                &boundary.extinction,
                 &length,
-                alive & inside,
-                kept,
+                lanes,
+                transmittance,
             );
-            passed_straight(self.simd, material, rays, hits, met, kept);
-            let is_dark = |lane: usize| lane3(kept, lane).max_element() < DARK;
-            let dark = lanes_in(met).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane);
+            cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
+
+            // End rays that keep nothing
+            let is_dark = |lane| lane3(transmittance, lane).max_element() < DARK;
+            let dark =
+                lanes_in(crossing).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane);
             reached &= !dark;
-            alive = met & !dark;
+            alive = crossing & !dark;
             if alive == 0 {
                 break;
             }
+
+            // Go on beyond the crossing
             for lane in lanes_in(alive) {
                 from[lane] = hits.t[lane];
                 ahead.t_min[lane] = hits.t[lane] + hits.offset[lane];
@@ -145,4 +153,27 @@ impl WhittedIntegrator<'_> {
         }
         reached
     }
+}
+
+/// Lengths of the ways of `lanes` inside a body, `from` the last crossing to the next one in `crossing`, else to the
+/// light. A way without an end left by a crack in the surface, and counts as none.
+fn inside_lengths(
+    rays: &RayPacket,
+    hits: &Intersections,
+    crossing: u32,
+    lanes: u32,
+    from: &Lanes,
+) -> Lanes {
+    let mut length = splat(0.0);
+    for lane in lanes_in(lanes) {
+        let end = if crossing >> lane & 1 == 1 {
+            hits.t[lane]
+        } else {
+            rays.t_max[lane]
+        };
+        if end.is_finite() {
+            length[lane] = end - from[lane];
+        }
+    }
+    length
 }

@@ -1,41 +1,81 @@
-//! Eq. 4.1 for the rays of a packet: `I = ambient + sum of lights + reflection*r*S + transmission*(1-r)*T`, with
-//! Blinn and Phong's reflection of lights (4.2, program 3.1) and `r` by Schlick (4.3). Both weights 1 give 4.1 to the
-//! letter.
+//! Whitted ray tracing: eq. 4.1 of the thesis, `I = ambient + sum of lights + reflection*r*S + transmission*(1-r)*T`,
+//! with lights reflected as by Blinn and Phong (4.2, program 3.1) and `r` by Schlick (4.3). Both weights 1 give 4.1 to
+//! the letter.
 //!
 //! The surface of one connected body is lit from outside alone; from inside it only reflects and refracts.
 
 use glam::Vec3;
 
 use super::{
-    RayCounts,
-    integrator::{Depth, Interior, NextRays, PacketScratch, WhittedIntegrator},
-    materials::{Material, WhittedMaterial, attenuate, leaving},
-    roulette::{REFLECTED, REFRACTED},
+    context::{Interior, RenderContext},
+    integrator::Integrator,
+    materials::{Material, WhittedMaterial, materials_of},
+    roulette::{REFLECTED, REFRACTED, SplitRule},
+    scratch::PacketScratch,
+    settings::RenderSettings,
     shading::{add, add_background, product, scale},
-    stream::{RayStream, ScatteredRays, SegmentPacket},
+    stream::{RayStreams, SegmentPacket},
 };
 use crate::math::{lane3, lanes_in, splat};
 use crate::surface::MaterialId;
 
-impl WhittedIntegrator<'_> {
-    /// Adds to the radiance of a packet what its segments see, and appends what they reflect and refract to `next`.
-    pub(super) fn shade(
+/// Follows reflected and refracted rays, and samples every light at each intersection.
+pub(super) struct WhittedIntegrator<'a> {
+    pub(super) context: RenderContext<'a>,
+    /// By [`MaterialId`].
+    materials: [Box<dyn Material>; MaterialId::COUNT],
+    /// Which of two rays are followed.
+    pub(super) split: SplitRule,
+}
+
+impl<'a> WhittedIntegrator<'a> {
+    pub(super) fn new(context: RenderContext<'a>) -> Self {
+        let is_connected = context.connected_particles().is_some();
+        Self {
+            materials: materials_of(context.scene, is_connected),
+            split: SplitRule::new(context.settings, context.interior),
+            context,
+        }
+    }
+
+    fn particle_constants(&self) -> &WhittedMaterial {
+        self.materials[usize::from(MaterialId::PARTICLES.0)].constants()
+    }
+}
+
+/// Path segments of one sample at any one depth, at most.
+pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize {
+    SplitRule::new(settings, interior).max_paths(settings.max_depth)
+}
+
+impl Integrator for WhittedIntegrator<'_> {
+    fn context(&self) -> &RenderContext<'_> {
+        &self.context
+    }
+
+    fn max_paths(&self) -> usize {
+        self.split.max_paths(self.context.settings.max_depth)
+    }
+
+    fn is_stochastic(&self) -> bool {
+        self.context.interior != Interior::Opaque
+    }
+
+    fn shade(
         &self,
         segments: &SegmentPacket,
-        depth: Depth,
+        depth: u32,
         packet: &mut PacketScratch,
-        next: &mut NextRays,
-        counts: &mut RayCounts,
+        next: &mut RayStreams,
     ) {
-        packet.throughput = segments.throughput;
-        self.attenuate_on_the_way(segments, packet);
-        if depth.sees_background {
-            self.add_seen_background(segments, packet);
+        let context = &self.context;
+        if context.sees_background(depth) {
+            context.add_background(segments, packet);
         }
         if packet.hits.mask == 0 {
             return;
         }
-        self.base_colors(packet);
+        context.base_colors(self.particle_constants().has_color(), packet);
         for (number, material) in (0..).zip(&self.materials) {
             let id = MaterialId(number);
             let lanes = packet.hits.lanes_of(id);
@@ -43,191 +83,143 @@ impl WhittedIntegrator<'_> {
                 continue;
             }
             let (rays, inside) = (&segments.rays, segments.inside);
-            material.shading_points(self.simd, rays, &packet.hits, inside, &mut packet.points);
+            material.shading_points(context.simd, rays, &packet.hits, inside, &mut packet.points);
             let lit = material.lit_lanes(lanes, inside);
-            self.add_direct(segments, &**material, lit, depth, packet, counts);
-            if id == MaterialId::PARTICLES {
+            self.add_direct_light(segments, &**material, lit, depth, packet);
+            if material.constants().sends_rays() {
                 self.scatter(segments, material.constants(), lanes, depth, packet, next);
             }
         }
     }
+}
 
-    /// Takes from the throughput what the medium takes between the start of the rays and their intersections.
-    fn attenuate_on_the_way(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
-        let extinction = self.particle_constants().extinction;
-        if extinction == Vec3::ZERO {
-            return;
-        }
-        let hits = &packet.hits;
-        let lanes = match self.interior {
-            Interior::Opaque => 0,
-            // Behind a ray that leaves a sphere lies the way through it.
-            Interior::Spheres => {
-                hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)
-            }
-            // A way inside that has no end is a crack in the surface, and its length unknown.
-            Interior::Body => segments.inside & hits.mask,
-        };
-        if lanes != 0 {
-            attenuate(
-                self.simd,
-                &extinction,
-                &hits.t,
-                lanes,
-                &mut packet.throughput,
-            );
-        }
-    }
-
-    /// Adds the background, where nothing is met and through what is only partly there.
-    fn add_seen_background(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
-        let hits = &packet.hits;
-        let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
-        if lanes == 0 {
-            return;
-        }
-        let seen = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
-            0 => 1.0,
-            _ => 1.0 - hits.opacity[lane],
-        });
-        scale(self.simd, &packet.throughput, &seen, &mut packet.weight);
-        let direction = &segments.rays.direction;
-        let (weight, radiance) = (&packet.weight, &mut packet.radiance);
-        add_background(
-            self.simd,
-            &self.background,
-            direction,
-            weight,
-            lanes,
-            radiance,
-        );
-    }
-
-    /// Adds ambient light and that of lights at the shading points of `lanes`.
-    fn add_direct(
+impl WhittedIntegrator<'_> {
+    /// Adds ambient light and the light of all lights at the shading points of `lanes`.
+    fn add_direct_light(
         &self,
         segments: &SegmentPacket,
         material: &dyn Material,
         lanes: u32,
-        depth: Depth,
+        depth: u32,
         packet: &mut PacketScratch,
-        counts: &mut RayCounts,
     ) {
         if lanes == 0 {
             return;
         }
-        let simd = self.simd;
-        scale(
-            simd,
-            &packet.throughput,
-            &packet.hits.opacity,
-            &mut packet.weight,
-        );
+        let (simd, constants) = (self.context.simd, material.constants());
+        let PacketScratch {
+            hits,
+            throughput,
+            radiance,
+            base,
+            points,
+            light: samples,
+            crossings,
+            weight,
+            counts,
+            ..
+        } = packet;
+
+        // Add ambient light
+        scale(simd, throughput, &hits.opacity, weight);
         let mut colored = [splat(0.0); 3];
-        product(simd, &packet.base, &packet.weight, &mut colored);
-        add(
-            simd,
-            &colored,
-            &material.constants().ambient,
-            lanes,
-            &mut packet.radiance,
-        );
-        if !material.constants().scatters() {
+        product(simd, base, weight, &mut colored);
+        add(simd, &colored, &constants.ambient, lanes, radiance);
+
+        // Add the light of each light that is visible
+        if !constants.scatters() {
             return;
         }
-        for light in &self.lights {
-            let PacketScratch {
-                points,
-                light: samples,
-                base,
-                weight,
-                radiance,
-                crossings,
-                ..
-            } = packet;
-            let rays = &segments.rays;
+        for light in &self.context.lights {
             light.sample_li(simd, &points.start, samples);
+            let rays = &segments.rays;
             material.reflect(simd, rays, points, base, weight, lanes, samples);
             if samples.lanes == 0 {
                 continue;
             }
-            let mut visible = samples.lanes;
-            if light.casts_shadow() {
-                samples.rays.set_len(rays.len());
-                counts.shadow += u64::from(visible.count_ones());
-                visible = self.visible(samples, depth.coherence, segments.inside, crossings);
-            }
+            let visible = if light.casts_shadow() {
+                let context = &self.context;
+                context.trace_shadow_rays(segments, depth, samples, crossings, counts)
+            } else {
+                samples.lanes
+            };
             add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
         }
     }
 
-    /// Appends the rays that leave the shading points of `lanes` to `next`. Where the recursion ends, they see the
-    /// background.
+    /// Appends the rays that leave the shading points of `lanes` to `next`. At the last depth, they see the background.
     fn scatter(
         &self,
         segments: &SegmentPacket,
         material: &WhittedMaterial,
         lanes: u32,
-        depth: Depth,
+        depth: u32,
         packet: &mut PacketScratch,
-        next: &mut NextRays,
+        next: &mut RayStreams,
     ) {
+        let context = &self.context;
+        let is_last = depth >= context.settings.max_depth;
+        if self.is_stochastic() && !is_last {
+            self.split_weights(segments, lanes, depth, packet);
+        }
         let PacketScratch {
             points,
             throughput,
             radiance,
             ..
         } = packet;
-        let ends = depth.number >= self.settings.max_depth;
-        let (inside, passed) = match self.interior {
+        let (inside, beyond) = match context.interior {
             Interior::Opaque | Interior::Spheres => (0, 0),
             Interior::Body => (segments.inside, !segments.inside),
         };
-        if self.interior != Interior::Opaque && !ends {
-            for lane in lanes_in(lanes) {
-                let weights = [points.reflected.weight[lane], points.refracted.weight[lane]];
-                let arriving = lane3(throughput, lane).max_element();
-                let (path, sample) = (segments.path[lane], segments.sample[lane]);
-                let sample = sample % self.settings.samples;
-                let weights = self
-                    .split
-                    .weights(weights, arriving, depth.number, path, sample);
-                [points.reflected.weight[lane], points.refracted.weight[lane]] = weights;
+        let reflected = (
+            material.reflection,
+            &mut points.reflected,
+            &mut next.reflected,
+            inside,
+            REFLECTED,
+        );
+        let refracted = (
+            material.dielectric.transmission,
+            &mut points.refracted,
+            &mut next.refracted,
+            beyond,
+            REFRACTED,
+        );
+        for (weight, rays, stream, inside, branch) in [reflected, refracted] {
+            if weight <= 0.0 {
+                continue;
             }
-        }
-        let mut send = |rays: &mut ScatteredRays, stream: &mut RayStream, inside, branch| {
             let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
             let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
-            scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
-            if ends {
+            scale(context.simd, throughput, &rays.weight, &mut rays.throughput);
+            if is_last {
                 let (direction, weight) = (&rays.direction, &rays.throughput);
-                add_background(
-                    self.simd,
-                    &self.background,
-                    direction,
-                    weight,
-                    lanes,
-                    radiance,
-                );
+                let background = &context.background;
+                add_background(context.simd, background, direction, weight, lanes, radiance);
             } else {
                 stream.push(lanes, rays, segments, inside, branch);
             }
-        };
-        if material.reflection > 0.0 {
-            send(
-                &mut points.reflected,
-                &mut next.reflected,
-                inside,
-                REFLECTED,
-            );
         }
-        if material.transmission > 0.0 {
-            send(
-                &mut points.refracted,
-                &mut next.refracted,
-                passed,
-                REFRACTED,
-            );
+    }
+
+    /// Chooses which of the two rays that leave the shading points of `lanes` are followed, and with what weights.
+    fn split_weights(
+        &self,
+        segments: &SegmentPacket,
+        lanes: u32,
+        depth: u32,
+        packet: &mut PacketScratch,
+    ) {
+        let points = &mut packet.points;
+        let (reflected, refracted) = (&mut points.reflected.weight, &mut points.refracted.weight);
+        for lane in lanes_in(lanes) {
+            let arriving = lane3(&packet.throughput, lane).max_element();
+            let (path, sample) = (segments.path[lane], segments.sample[lane]);
+            let sample = sample % self.context.settings.samples;
+            let weights = [reflected[lane], refracted[lane]];
+            let weights = self.split.weights(weights, arriving, depth, path, sample);
+            [reflected[lane], refracted[lane]] = weights;
         }
     }
 }

@@ -112,7 +112,7 @@ pub struct RaySummary {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RssSummary {
-    /// Heap and stacks: [`crate::report::MemoryPeaks::anonymous`].
+    /// Heap and stacks: [`crate::metrics::MemoryPeaks::anonymous`].
     pub anonymous_peak: u64,
     /// Mapped files.
     pub file_peak: u64,

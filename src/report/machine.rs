@@ -5,8 +5,8 @@ use std::thread;
 
 use serde::{Deserialize, Serialize};
 
-use super::memory;
 use crate::accel::simd::SimdLevel;
+use crate::metrics::memory;
 
 /// Hardware and program.
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,37 +1,10 @@
 //! A report as one HTML file: no scripts, nothing fetched, readable on a phone, in light and in
 //! dark. Whatever comes from outside (file names, messages) is escaped here and nowhere else.
 
-use std::borrow::Cow;
 use std::fmt::Write as _;
 
-use spherule_formats::is_control;
-
+use super::escape::escaped;
 use super::plots::{self, Plot};
-
-/// Text as it stands in HTML, in elements and in quoted attributes. Control characters, which HTML
-/// forbids, and those that turn the direction of what follows are spelt out.
-pub fn escaped(text: &str) -> Cow<'_, str> {
-    let is_odd = |c: char| is_control(c) && c != '\n' && c != '\t';
-    if !text
-        .chars()
-        .any(|c| matches!(c, '&' | '<' | '>' | '"' | '\'') || is_odd(c))
-    {
-        return Cow::Borrowed(text);
-    }
-    let mut html = String::with_capacity(text.len() + 16);
-    for c in text.chars() {
-        match c {
-            '&' => html += "&amp;",
-            '<' => html += "&lt;",
-            '>' => html += "&gt;",
-            '"' => html += "&quot;",
-            '\'' => html += "&#39;",
-            c if is_odd(c) => html.extend(c.escape_unicode()),
-            c => html.push(c),
-        }
-    }
-    Cow::Owned(html)
-}
 
 /// A table: heads, then rows. Cells are plain text.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]

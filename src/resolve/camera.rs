@@ -1,4 +1,4 @@
-//! Where the camera goes, and whether there is a picture from everywhere on its way.
+//! The camera path, and whether every view along it is possible.
 
 use glam::DVec3;
 
@@ -8,7 +8,7 @@ use crate::pipeline::Setup;
 use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
 use crate::scene::{Bounds, Camera, CameraKey, CameraPath, CameraView, Framing, KeyedPath};
 
-/// The way that is asked for; `up` is the scene's.
+/// The path that the manifest asks for; `up` is the scene's.
 pub(super) fn path(
     manifest: &Manifest,
     bounds: &Bounds,
@@ -16,7 +16,7 @@ pub(super) fn path(
     aspect: f64,
 ) -> Result<CameraPath, ResolveError> {
     let camera = &manifest.camera;
-    let up = camera.up.map_or(up, DVec3::from_array);
+    let up = camera.up.unwrap_or(up);
     let framing = Framing {
         up,
         azimuth: camera.azimuth.unwrap_or(DEFAULT_AZIMUTH),
@@ -26,15 +26,12 @@ pub(super) fn path(
     };
     Ok(match camera.mode {
         CameraMode::Auto => CameraPath::Still(Camera::framing(bounds, &framing)),
-        CameraMode::Fixed => {
-            let point = |p: Option<[f64; 3]>| DVec3::from_array(p.unwrap_or_default());
-            CameraPath::Still(CameraView {
-                eye: point(camera.eye),
-                look_at: point(camera.look_at),
-                up,
-                fov: camera.fov,
-            })
-        }
+        CameraMode::Fixed => CameraPath::Still(CameraView {
+            eye: camera.eye.unwrap_or_default(),
+            look_at: camera.look_at.unwrap_or_default(),
+            up,
+            fov: camera.fov,
+        }),
         CameraMode::Turntable => CameraPath::turntable(bounds, &framing, camera.degrees_per_frame),
         CameraMode::Keys => {
             let keys = camera.keys.iter().map(|key| keyed(key, up, camera.fov));
@@ -48,9 +45,9 @@ fn keyed(key: &manifest::CameraKey, up: DVec3, fov: f64) -> CameraKey {
     CameraKey {
         frame: key.frame,
         view: CameraView {
-            eye: DVec3::from_array(key.eye),
-            look_at: DVec3::from_array(key.look_at),
-            up: key.up.map_or(up, DVec3::from_array),
+            eye: key.eye,
+            look_at: key.look_at,
+            up: key.up.unwrap_or(up),
             fov: key.fov.unwrap_or(fov),
         },
     }
@@ -73,10 +70,10 @@ pub(super) fn at_start(
     Ok(Camera::new(&path.start(), aspect, origin)?)
 }
 
-/// Looks whether there is a picture from where the camera is at each of `frames`.
+/// Checks that the camera's view at each of `frames` is possible.
 ///
 /// # Errors
-/// [`ResolveError::View`] for the first frame without, by its number and the keys around it.
+/// [`ResolveError::View`] for the first frame where it is not, with its number and the keys around it.
 pub fn check_views(
     setup: &Setup,
     frames: impl IntoIterator<Item = i64>,

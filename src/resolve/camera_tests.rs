@@ -25,8 +25,8 @@ pub(in crate::resolve) fn survey() -> Survey {
 fn key(frame: i64, eye: [f64; 3]) -> Key {
     Key {
         frame,
-        eye,
-        look_at: [0.0; 3],
+        eye: eye.into(),
+        look_at: DVec3::ZERO,
         up: None,
         fov: None,
     }
@@ -52,10 +52,10 @@ fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {
 fn keys_take_from_the_camera_what_they_leave_out() {
     let setup = setup(|camera| {
         camera.mode = CameraMode::Keys;
-        camera.up = Some([0.0, 3.0, 0.0]);
+        camera.up = Some(3.0 * DVec3::Y);
         camera.fov = 33.0;
         camera.keys = vec![key(1, [5.0, 0.0, 0.0]), key(2, [6.0, 0.0, 0.0])];
-        camera.keys[1].up = Some([0.0, 0.0, 1.0]);
+        camera.keys[1].up = Some(DVec3::Z);
         camera.keys[1].fov = Some(50.0);
     });
     let path = setup.unwrap().picture.path;
@@ -77,7 +77,9 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());
     assert_eq!(scenes[0].lights, scenes[1].lights);
     // The default lights come from where frame 0 is seen from.
-    let to_light = scenes[0].lights[0].at(glam::Vec3::ZERO).unwrap().to_light;
+    let crate::scene::LightKind::Directional { to_light } = scenes[0].lights[0].kind else {
+        panic!("the key light is directional");
+    };
     let away = |frame: usize| -scenes[frame].camera.forward().dot(to_light);
     assert!(away(0) > 0.5 && away(1) < away(0));
 }
@@ -110,7 +112,7 @@ fn a_key_without_a_picture_is_named() {
         "camera.key: two keys have frame 1; a frame has one view"
     );
     let mut over = [key(1, [5.0, 0.0, 0.0]), key(9, [5.0, 0.0, 0.0])];
-    over[1].up = Some([0.0, 0.0, -1.0]);
+    over[1].up = Some(DVec3::NEG_Z);
     let error = told(over);
     assert!(error.starts_with("camera.key: up turns upside down from frame 1 to frame 9"));
 }

@@ -1,9 +1,7 @@
-//! What rays meet and what it is made of, and which settings make no sense together.
-
-use glam::Vec3;
+//! Surface and material, and which settings contradict each other.
 
 use super::{ResolveError, narrow};
-use crate::manifest::{AutoLength, Fresnel as FresnelSetting, Manifest};
+use crate::manifest::Manifest;
 use crate::scene::{Bounds, Fresnel, Material, material};
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 use crate::survey::Survey;
@@ -12,14 +10,14 @@ use crate::survey::Survey;
 /// a pool seen from above has a tint, a drop has none. Tuned on dam breaks.
 const ABSORPTION: f64 = 0.25;
 
-/// Radii of particles that a sphere of one medium has. Spheres that only touch leave all the room between them
-/// empty, and light goes through a sponge of beads; these fill it with something to spare.
+/// Radius of the spheres of a union, in particle radii. Spheres that only touch leave gaps between them, and light
+/// passes through a sponge of beads; these spheres overlap enough to close the gaps.
 const OVERLAP: f32 = 1.8;
 
 /// The surface as asked for.
 ///
 /// # Errors
-/// Settings that cannot be had together.
+/// Settings that contradict each other.
 pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveError> {
     let surface = manifest.surface;
     let unsupported = |key, what: &str| {
@@ -31,14 +29,14 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
             return unsupported(
                 "surface.normals",
                 "\"field\" is for one body; for smooth normals of spheres take \"pca\", for one body set \
-                 render.surface to \"medium\" or \"smooth\"",
+                 render.surface to \"union\" or \"smooth\"",
             );
         }
         (SurfaceKind::Smooth, NormalKind::Sphere | NormalKind::Pca) => {
             return unsupported(
                 "surface.normals",
                 "a smooth surface has the normals of its field; take \"auto\" or \"field\", or set render.surface \
-                 to \"spheres\" or \"medium\"",
+                 to \"spheres\" or \"union\"",
             );
         }
         _ => {}
@@ -53,7 +51,7 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
     if surface.spray && surface.kind == SurfaceKind::Spheres {
         return unsupported(
             "surface.spray",
-            "lies beside one body; set render.surface to \"medium\" or \"smooth\", or leave it out",
+            "lies beside one body; set render.surface to \"union\" or \"smooth\", or leave it out",
         );
     }
     Ok(surface)
@@ -64,34 +62,27 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
 pub(super) fn radius(kind: SurfaceKind, survey: &Survey) -> Option<f32> {
     let packed = match kind {
         SurfaceKind::Spheres => None,
-        SurfaceKind::Medium => survey.packed_radius.map(|radius| OVERLAP * radius),
+        SurfaceKind::Union => survey.packed_radius.map(|radius| OVERLAP * radius),
         SurfaceKind::Smooth => survey.packed_radius,
     };
     packed.or(survey.radius)
 }
 
-/// What it is made of.
+/// The material.
 pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
     let m = &manifest.material;
     let length = match m.absorption_length {
-        AutoLength::Length(length) => narrow(length),
-        AutoLength::Auto => narrow(bounds.diagonal() * ABSORPTION).max(f32::MIN_POSITIVE),
+        Some(length) => narrow(length),
+        None => narrow(bounds.diagonal() * ABSORPTION).max(f32::MIN_POSITIVE),
+    };
+    let usual = match manifest.surface.kind {
+        SurfaceKind::Spheres => Fresnel::Schlick,
+        SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
     };
     Material {
-        ambient: m.ambient,
-        diffuse: m.diffuse,
-        specular: m.specular,
-        shininess: m.shininess,
-        ior: m.ior,
-        reflection: m.reflection,
-        transmission: m.transmission,
-        fresnel: match (m.fresnel, manifest.surface.kind) {
-            (FresnelSetting::Schlick, _) | (FresnelSetting::Auto, SurfaceKind::Spheres) => {
-                Fresnel::Schlick
-            }
-            (FresnelSetting::Exact | FresnelSetting::Auto, _) => Fresnel::Exact,
-        },
-        extinction: material::extinction(Vec3::from_array(m.absorption), length),
+        fresnel: m.fresnel.unwrap_or(usual),
+        extinction: material::extinction(m.absorption, length),
+        ..m.constants
     }
 }
 

@@ -38,12 +38,12 @@ fn each_surface_has_a_radius_of_its_own() {
     };
     assert_eq!(radius(SurfaceKind::Spheres, &found), Some(0.4));
     assert_eq!(radius(SurfaceKind::Smooth, &found), Some(0.5));
-    assert_eq!(radius(SurfaceKind::Medium, &found), Some(0.9));
+    assert_eq!(radius(SurfaceKind::Union, &found), Some(0.9));
     let older = Survey {
         packed_radius: None,
         ..found
     };
-    for kind in [SurfaceKind::Smooth, SurfaceKind::Medium] {
+    for kind in [SurfaceKind::Smooth, SurfaceKind::Union] {
         assert_eq!(radius(kind, &older), Some(0.4));
     }
 }
@@ -61,12 +61,12 @@ fn what_makes_no_sense_together_is_refused() {
         refused(&smooth, "surface.normals: a smooth surface has");
     }
     refused(
-        "render.surface = \"medium\"\nsurface.exact = true",
+        "render.surface = \"union\"\nsurface.exact = true",
         "surface.exact",
     );
     for right in [
         "surface.normals = \"pca\"",
-        "render.surface = \"medium\"\nsurface.normals = \"field\"\nsurface.spray = true",
+        "render.surface = \"union\"\nsurface.normals = \"field\"\nsurface.spray = true",
         "render.surface = \"smooth\"\nsurface.exact = true\nmaterial.absorption = [0, 1, 1]",
     ] {
         settings(&manifest(right)).unwrap();

@@ -9,7 +9,7 @@ use spherule_formats::native::{self, Bound, StoreSettings};
 
 use super::peaks::Peaks;
 use super::{CellRequest, Particles};
-use crate::report::scale::Conversion;
+use crate::scale::report::Conversion;
 
 /// How far compact positions may be from the true ones, as where `convert` is told nothing.
 const BOUND: Bound = Bound::OfRadius(0.02);

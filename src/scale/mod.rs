@@ -2,7 +2,7 @@
 //! camera that moves, and say how fast and in how much memory.
 //!
 //! The unit is a *cell*: one particle count, one structure, one motion, one representation. What is
-//! asked of a cell is a [`CellRequest`], what comes out is in `report::scale`. A cell measures the
+//! asked of a cell is a [`CellRequest`], what comes out is in `scale::report`. A cell measures the
 //! memory of its whole process, so whoever wants several runs each in a process of its own, and so is
 //! the native frame made that some are traced from; that, and all printing, is left to the caller.
 
@@ -18,9 +18,11 @@ use crate::accel::Structure;
 
 pub mod cell;
 pub mod convert;
+mod measure;
 mod motion;
 mod particles;
 mod peaks;
+pub mod report;
 mod stage;
 mod stored;
 

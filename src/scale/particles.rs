@@ -7,8 +7,8 @@ use spherule_formats::{ParticleFrame, Radius, is_radius};
 
 use super::{CellRequest, FrameSource, Source, Stage};
 use crate::accel::{SphereRadius, Spheres};
+use crate::metrics::memory;
 use crate::reading::read_budget;
-use crate::report::memory;
 use crate::scene::Bounds;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 

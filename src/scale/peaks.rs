@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
 use std::time::Duration;
 
-use crate::report::MemoryUse;
+use crate::metrics::MemoryUse;
 use crate::report::frame::RssSummary;
 
 /// Between two looks: often enough for what lasts as long as a phase of a build of 1e6.

@@ -7,7 +7,7 @@ use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, NativeFile};
 
 use super::CellRequest;
-use super::cell::{Builds, Measured, trace};
+use super::measure::{Builds, Measured, trace};
 use super::peaks::Peaks;
 use crate::accel::stored::{StoredSettings, StoredTree};
 

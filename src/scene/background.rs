@@ -39,6 +39,15 @@ impl Background {
         }
     }
 
+    /// The same with a gradient along `up`.
+    #[must_use]
+    pub fn with_up(self, up: Vec3) -> Self {
+        match self {
+            Self::Constant(_) => self,
+            Self::Gradient { bottom, top, .. } => Self::Gradient { bottom, top, up },
+        }
+    }
+
     /// The colour in unit `direction`.
     pub fn color(&self, direction: Vec3) -> Vec3 {
         match *self {

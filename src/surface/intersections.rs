@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use crate::math::{Lanes, Lanes3, lane3, set_lane3, splat};
-use crate::ray::PACKET_SIZE;
+use crate::ray::{PACKET_SIZE, RayPacket};
 
 /// Names a material of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -18,6 +18,11 @@ impl MaterialId {
     pub const GROUND: Self = Self(2);
     /// Materials that there are.
     pub const COUNT: usize = 3;
+
+    /// Whether its surfaces are those of particles, with attributes.
+    pub fn is_of_particles(self) -> bool {
+        matches!(self, Self::PARTICLES | Self::SPRAY)
+    }
 }
 
 /// The intersection of one ray.
@@ -41,8 +46,6 @@ pub struct Intersection {
     pub offset: f32,
     /// Where to step from: `point`, unless that lies on a finer surface than rays meet.
     pub anchor: Vec3,
-    /// What the surface is made of.
-    pub material: MaterialId,
 }
 
 /// The nearest intersection of each ray of a packet. The fields of lanes outside `mask` mean nothing.
@@ -99,11 +102,11 @@ impl Intersections {
         self.mask = 0;
     }
 
-    /// Puts `hit` into `lane`.
+    /// Puts `hit` with a surface of `material` into `lane`.
     ///
     /// # Panics
     /// If there is no such lane.
-    pub fn set(&mut self, lane: usize, hit: &Intersection) {
+    pub fn set(&mut self, lane: usize, hit: &Intersection, material: MaterialId) {
         self.mask |= 1 << lane;
         self.t[lane] = hit.t;
         set_lane3(&mut self.point, lane, hit.point);
@@ -114,7 +117,19 @@ impl Intersections {
         self.lift[lane] = hit.lift;
         self.opacity[lane] = 1.0;
         self.particle[lane] = hit.particle;
-        self.material[lane] = hit.material;
+        self.material[lane] = material;
+    }
+
+    /// Puts `hit` with a surface of `material` into `lane`, and ends the ray there.
+    pub(super) fn end_ray(
+        &mut self,
+        rays: &mut RayPacket,
+        lane: usize,
+        hit: &Intersection,
+        material: MaterialId,
+    ) {
+        self.set(lane, hit, material);
+        rays.t_max[lane] = hit.t;
     }
 
     /// The intersection in `lane`.
@@ -131,7 +146,6 @@ impl Intersections {
             offset: self.offset[lane],
             lift: self.lift[lane],
             particle: self.particle[lane],
-            material: self.material[lane],
         }
     }
 

@@ -5,7 +5,6 @@ mod dimming;
 pub mod field;
 mod gradient;
 mod intersections;
-pub mod medium;
 mod neighbours;
 mod normals;
 mod pca;
@@ -15,6 +14,7 @@ mod shape;
 pub mod smooth;
 pub mod spheres;
 pub mod spray;
+pub mod union;
 
 pub(crate) use dimming::Dimming;
 pub use gradient::GradientNormals;

@@ -1,8 +1,9 @@
 //! The floor: an endless plane that fades into the background, met from above only.
 
+use super::shape::crossing_of_packet;
 use super::{Intersection, Intersections, MaterialId, Shape, Side};
 use crate::accel::Coherence;
-use crate::math::{LANES, Supported, first_lanes, lane_kernel};
+use crate::math::{LANES, Supported, first_lanes, lane_kernel, larger};
 use crate::ray::{Ray, RayPacket};
 use crate::scene::Ground;
 
@@ -25,12 +26,7 @@ impl<'a> Plane<'a> {
 
 impl Shape for Plane<'_> {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
-        let _ = side;
-        let mut rays = RayPacket::default();
-        rays.push(ray);
-        let mut hits = Intersections::default();
-        self.intersect(&mut rays, Coherence::Coherent, 0, &mut hits);
-        (hits.mask != 0).then(|| hits.get(0))
+        crossing_of_packet(self, ray, side)
     }
 
     fn material(&self) -> MaterialId {
@@ -68,7 +64,6 @@ fn intersect_plane_body(
     } else {
         f32::MIN_POSITIVE
     };
-    let larger = |a: f32, b: f32| if a > b { a } else { b };
     let mut met = 0;
     for l in 0..LANES {
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];

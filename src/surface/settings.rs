@@ -6,8 +6,8 @@ pub enum SurfaceKind {
     /// Spheres, each a body of its own.
     #[default]
     Spheres,
-    /// Overlapping spheres as one connected body of one medium.
-    Medium,
+    /// The union of the spheres: one connected body.
+    Union,
     /// The isosurface of the particles' SPH colour field.
     Smooth,
 }

@@ -50,7 +50,8 @@ pub trait Shape: Sync {
         self.crossing(ray, Side::Outside)
     }
 
-    /// What all of it is made of.
+    /// What all of it is made of. [`MaterialId::PARTICLES`] is for the particles alone: any other shape has a material
+    /// of its own.
     fn material(&self) -> MaterialId {
         MaterialId::PARTICLES
     }
@@ -76,13 +77,7 @@ pub trait Shape: Sync {
         hits: &mut Intersections,
     ) {
         let _ = coherence;
-        for lane in 0..rays.len() {
-            let found = self.crossing(&rays.ray(lane), Side::of_lane(inside, lane));
-            if let Some(hit) = found {
-                hits.set(lane, &hit);
-                rays.t_max[lane] = hit.t;
-            }
-        }
+        intersect_one_by_one(self, rays, inside, hits);
     }
 
     /// The rays of `lanes` that meet it anywhere between their ends: a bit for each.
@@ -127,4 +122,31 @@ pub trait Shape: Sync {
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
         each(hit.particle, 1.0);
     }
+}
+
+/// [`Shape::intersect`] by [`Shape::crossing`].
+pub(super) fn intersect_one_by_one<S: Shape + ?Sized>(
+    shape: &S,
+    rays: &mut RayPacket,
+    inside: u32,
+    hits: &mut Intersections,
+) {
+    for lane in 0..rays.len() {
+        let ray = rays.ray(lane);
+        if ray.t_max > ray.t_min
+            && let Some(hit) = shape.crossing(&ray, Side::of_lane(inside, lane))
+        {
+            hits.end_ray(rays, lane, &hit, shape.material());
+        }
+    }
+}
+
+/// [`Shape::crossing`] by [`Shape::intersect`].
+pub(super) fn crossing_of_packet(shape: &dyn Shape, ray: &Ray, side: Side) -> Option<Intersection> {
+    let mut rays = RayPacket::default();
+    rays.push(ray);
+    let mut hits = Intersections::default();
+    let inside = u32::from(side == Side::Inside);
+    shape.intersect(&mut rays, Coherence::Incoherent, inside, &mut hits);
+    (hits.mask == 1).then(|| hits.get(0))
 }

@@ -8,7 +8,7 @@ use super::{Dimming, Intersection, Intersections, MaterialId, ShadingNormals, Sh
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
 use crate::accel::{Coherence, TreeHits};
-use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in};
+use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in, larger};
 use crate::ray::{Ray, RayPacket};
 
 /// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
@@ -80,7 +80,6 @@ pub(super) fn sphere_hit(
         lift: 0.0,
         particle: tree.particle(hit.slot),
         anchor: point,
-        material: MaterialId::PARTICLES,
         offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
     };
     normals.shade(tree, ray, met, radius)
@@ -93,7 +92,6 @@ impl Shape for SphereSurface<'_> {
         let hit = sphere_hit(&self.tree, ray, hit, &self.normals);
         Some(Intersection {
             particle: self.first + hit.particle,
-            material: self.material,
             ..hit
         })
     }
@@ -137,7 +135,7 @@ impl Shape for SphereSurface<'_> {
                 let hit = self
                     .normals
                     .shade(&self.tree, &ray, hits.get(lane), radii[lane]);
-                hits.set(lane, &hit);
+                hits.set(lane, &hit, self.material);
             }
         }
     }
@@ -197,7 +195,6 @@ fn intersections_body(
     met: u32,
     hits: &mut Intersections,
 ) {
-    let larger = |a: f32, b: f32| if a > b { a } else { b };
     for l in 0..LANES {
         let is_met = met >> l & 1 == 1;
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];

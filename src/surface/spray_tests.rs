@@ -4,8 +4,8 @@ use super::*;
 use crate::accel::Coherence;
 use crate::accel::{BuildSettings, SbvhSettings, SphereRadius, Spheres, Structure, TreeBuilder};
 use crate::ray::{Ray, RayPacket};
-use crate::surface::medium::MediumSurface;
 use crate::surface::spheres::SphereSurface;
+use crate::surface::union::UnionSurface;
 use crate::surface::{Intersections, MaterialId, Shape, Side};
 
 fn built(centers: &[Vec3], radius: f32, settings: &BuildSettings) -> TreeBuilder {
@@ -76,7 +76,7 @@ fn drops_are_met_beside_and_before_a_body() {
         Vec3::new(0.0, 5.0, 0.0),
     ];
     let spray = built(&drops, 0.25, &BuildSettings::default());
-    let medium = MediumSurface::new(body.tree().view());
+    let medium = UnionSurface::new(body.tree().view());
     let drops = SphereSurface::new(spray.tree().view()).of(MaterialId::SPRAY, 2);
     let shapes: [&dyn Shape; 2] = [&medium, &drops];
     let along = |y: f32| Ray::new(Vec3::new(-10.0, y, 0.0), Vec3::X);

@@ -22,9 +22,8 @@ mod stream;
 
 use look::Look;
 use packing::Spacing;
-use robust::{
-    estimate_packed, estimate_radius, narrow, robust_bounds, robust_largest, robust_range,
-};
+use packing::narrow;
+use robust::{estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range};
 
 /// Frames looked at; evenly spread, first and last among them. All of a shorter sequence.
 const FRAMES: usize = 24;

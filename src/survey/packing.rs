@@ -4,8 +4,6 @@
 //! disorder, and the nearest of a dozen neighbours is nearer than they are apart: the radius comes out about a
 //! fifth too small, and the field of such particles has holes in the middle of the fluid.
 
-use super::robust::narrow;
-
 /// Particles are counted this far around one, in median distances to the nearest neighbour. Of a fluid about
 /// 30 are found: enough for a density, few enough not to reach out of thin sheets.
 const REACH: f32 = 2.5;
@@ -49,6 +47,11 @@ pub(super) fn packed_radius(touching: f32, mut counts: Vec<u32>) -> Option<f32> 
     let spacing = libm::cbrt(volume / f64::from(count));
     let most = MOST * f64::from(touching);
     Some(narrow((0.5 * RATHER_LARGE * spacing).min(most)))
+}
+
+#[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
+pub(super) fn narrow(value: f64) -> f32 {
+    value as f32
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_formats::{Attribute, Positions};
 
-use super::packing;
+use super::packing::{self};
 
 /// Particles of a frame that percentiles are taken from.
 const SAMPLE: usize = 20_000;
@@ -56,11 +56,6 @@ pub(super) fn robust_bounds(
         0.5 * extent
     };
     Some((min.max(first - margin), max.min(last + margin)))
-}
-
-#[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
-pub(super) fn narrow(value: f64) -> f32 {
-    value as f32
 }
 
 /// The 99th percentile of `count` radii; 0 without finite ones.

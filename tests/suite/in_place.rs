@@ -73,7 +73,7 @@ fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
     dam_break(&shop.join("in"), 1..=1);
     let options = ["--encoding", "q16", "--max-error", "0.05"];
     for (name, surface) in [
-        ("water", &["--look", "water", "--surface", "medium"][..]),
+        ("water", &["--look", "water", "--surface", "union"][..]),
         ("pca", &["--set", "surface.normals=\"pca\""]),
     ] {
         shop.run(&[&["convert", "in", "-o", name][..], &options].concat())

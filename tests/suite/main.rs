@@ -3,6 +3,7 @@
 mod harness;
 mod picture;
 
+mod architecture;
 mod arithmetic;
 mod bad_input;
 mod camera;

@@ -140,7 +140,7 @@ fn radii_of_their_own() {
 
 #[test]
 fn water_of_one_body() {
-    for surface in ["medium", "smooth"] {
+    for surface in ["union", "smooth"] {
         let water = ["--look", "water", "--spray", "--surface", surface];
         let file = "emitter_sph/ParticleData_Fluid_10.bgeo";
         same_on_sample(file, &[&water[..], ALL_CHANNELS].concat());

@@ -18,7 +18,7 @@ const WATER: [&str; 6] = [
 
 #[test]
 fn jobs_of_spheres_as_one_body_with_spray() {
-    jobs_with_spray("medium");
+    jobs_with_spray("union");
 }
 
 #[test]

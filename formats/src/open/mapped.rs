@@ -19,10 +19,21 @@ pub(super) struct SteppedFile {
 
 impl SteppedFile {
     /// The file that had `stamp` and begins with `head`.
-    pub(super) fn new(mut head: Vec<u8>, stamp: FileStamp) -> Self {
-        head.truncate(HEAD_LEN);
-        head.shrink_to_fit();
+    pub(super) fn new(head: &[u8], stamp: FileStamp) -> Self {
+        let head = head[..head.len().min(HEAD_LEN)].to_vec();
         Self { head, stamp }
+    }
+
+    /// Whether the file has several steps. A file with one step is read as a whole: its pages would count as memory
+    /// of the process either way. A damaged file is mapped, to find the fault without reading everything.
+    pub(super) fn is_worth_mapping(
+        &self,
+        path: &Path,
+        format: Format,
+        budget: MemoryBudget,
+    ) -> bool {
+        let steps = self.steps(path, format, budget);
+        steps.map_or(true, |steps| steps.len() > 1)
     }
 
     pub(super) fn head(&self) -> &[u8] {

@@ -136,8 +136,10 @@ impl FrameFile {
             return Ok((Content::Streamed(Box::new(file)), stamp, Vec::new()));
         }
         if !is_compressed && format.may_hold_many_steps() {
-            let file = SteppedFile::new(bytes, stamp);
-            return Ok((Content::Stepped(file), stamp, Vec::new()));
+            let file = SteppedFile::new(&bytes, stamp);
+            if file.is_worth_mapping(path, format, budget) {
+                return Ok((Content::Stepped(file), stamp, Vec::new()));
+            }
         }
         let room = budget.for_content();
         if !is_compressed {
@@ -251,6 +253,11 @@ impl FrameFile {
     /// Bytes that are held beside the numbers while these are read.
     pub fn held_len(&self) -> u64 {
         self.content.held_len(self.format)
+    }
+
+    /// Whether the file is mapped while a step is read.
+    pub const fn is_mapped(&self) -> bool {
+        matches!(self.content, Content::Stepped(_))
     }
 
     /// Bytes that are held beside content and numbers while `particles` are read: arrays that are compressed,

@@ -89,6 +89,12 @@ impl Sequence {
         })
     }
 
+    /// Whether the file of several steps that was used last is mapped while a step is read.
+    pub fn maps_files(&self) -> bool {
+        let cache = self.cache.lock().unwrap_or_else(PoisonError::into_inner);
+        cache.as_ref().is_some_and(|cached| cached.file.is_mapped())
+    }
+
     /// The opened file of `part` and the step in it.
     fn file_of(&self, part: &PartFile) -> Result<(Arc<FrameFile>, usize), FrameError> {
         let Some(step) = part.step else {

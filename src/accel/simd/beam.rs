@@ -9,6 +9,7 @@ use glam::Vec3;
 
 use super::super::Aabb;
 use super::{MIN_DIRECTION, SLAB_SLACK};
+use crate::math::{fold, larger, smaller};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
 /// A value for each ray.
@@ -47,32 +48,6 @@ pub(in super::super) struct Beam {
     pub(super) spread: f32,
     /// How much farther rays get from the middle ray with every unit along it.
     pub(super) growth: f32,
-}
-
-/// As SIMD has it: `b` where one is NaN.
-#[inline(always)]
-pub(super) fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// As SIMD has it: `b` where one is NaN.
-#[inline(always)]
-pub(in super::super) fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
-}
-
-/// All lanes made one by halves, which compilers turn into whole registers.
-#[inline(always)]
-pub(in super::super) fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
-    macro_rules! halve {
-        ($($half:literal)*) => {$(
-            for lane in 0..$half {
-                lanes[lane] = of(lanes[lane], lanes[lane + $half]);
-            }
-        )*};
-    }
-    halve!(8 4 2 1);
-    lanes[0]
 }
 
 /// Inverse directions with every component finite: [`super::finite_inverse`] of all lanes.

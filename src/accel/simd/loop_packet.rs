@@ -1,10 +1,9 @@
 //! Packets in plain loops, for kernels that have no packet tests of their own.
 
 use super::super::hits::TreeHits;
-use super::beam::{fold, larger, smaller};
 use super::packet::{EnteredChildren, LaneSlabs, key_of};
-use super::portable::keys_of;
 use super::{Beam, Kernel, PacketKernel, PacketSphere, SLAB_SLACK};
+use crate::math::{fold, larger, smaller};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
@@ -235,4 +234,24 @@ impl<K: LoopPackets> PacketKernel for K {
             any::<false>(packet, sphere, hits)
         }
     }
+}
+
+/// Keys of the children whose boxes are entered no later than left, and how many they are.
+pub(super) fn keys_of(
+    node: &Node,
+    near: &[f32; WIDTH],
+    far: &[f32; WIDTH],
+) -> (usize, [u32; WIDTH]) {
+    let mut keys = [0; WIDTH];
+    let mut found = 0;
+    for slot in 0..node.child_count() {
+        if near[slot] <= far[slot] {
+            #[expect(clippy::cast_possible_truncation, reason = "slots are under eight")]
+            {
+                keys[found] = (near[slot].to_bits() & !7) | slot as u32;
+            }
+            found += 1;
+        }
+    }
+    (found, keys)
 }

@@ -22,7 +22,7 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(super) use beam::{Beam, fold, lanes_near, larger};
+pub(super) use beam::{Beam, lanes_near};
 pub(super) use packet::{EnteredChildren, LaneSlabs, PacketKernel, PacketSphere};
 
 /// Slack of the slab test, as a fraction of the larger terms: covers the rounding of planes,

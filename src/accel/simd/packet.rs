@@ -1,8 +1,9 @@
 //! What tracing 16 rays together needs of the machine.
 
 use super::super::hits::TreeHits;
-use super::beam::{inverses, larger};
+use super::beam::inverses;
 use super::{Beam, Kernel};
+use crate::math::larger;
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{Block, BlockRadii, Node, WIDTH};
 

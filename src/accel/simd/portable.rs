@@ -3,7 +3,7 @@
 
 use glam::Vec3;
 
-use super::loop_packet::LoopPackets;
+use super::loop_packet::{LoopPackets, keys_of};
 use super::{BlockCrossings, Kernel, SLAB_SLACK, finite_inverse};
 use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
@@ -52,26 +52,6 @@ impl PreparedRay {
             }
         })
     }
-}
-
-/// Keys of the children whose boxes are entered no later than left, and how many they are.
-pub(super) fn keys_of(
-    node: &Node,
-    near: &[f32; WIDTH],
-    far: &[f32; WIDTH],
-) -> (usize, [u32; WIDTH]) {
-    let mut keys = [0; WIDTH];
-    let mut found = 0;
-    for slot in 0..node.child_count() {
-        if near[slot] <= far[slot] {
-            #[expect(clippy::cast_possible_truncation, reason = "slots are under eight")]
-            {
-                keys[found] = (near[slot].to_bits() & !7) | slot as u32;
-            }
-            found += 1;
-        }
-    }
-    (found, keys)
 }
 
 impl LoopPackets for Portable {

@@ -1,7 +1,7 @@
 //! Packets against single rays: the same to the bit.
 
 use super::*;
-use crate::accel::topology::{Implicit, Link};
+use crate::accel::topology::Link;
 use crate::accel::traverse::TreeHit;
 use crate::accel::wide::WideTree;
 use crate::accel::{Coherence, TreeHits};
@@ -128,7 +128,7 @@ fn linked(tree: &WideTree) -> Vec<Link> {
     for (level, end) in ends.enumerate() {
         let start = tree.level_starts[level] as usize;
         for (index, node) in tree.nodes[start..end].iter().enumerate() {
-            let first = Implicit::of(&view).first_child(level as u32, index);
+            let first = view.implicit().first_child(level as u32, index);
             links.push(match tree.level_starts.get(level + 1) {
                 Some(below) => Link::new(*below as usize + first, Node::child_count(node), 0),
                 None => Link::new(0, 0, first),

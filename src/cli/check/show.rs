@@ -9,8 +9,8 @@ use crate::accel::Structure;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
 use crate::cli::work::list;
+use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
-use crate::report::Bytes;
 use crate::survey::Survey;
 
 impl Check<'_> {
@@ -70,6 +70,7 @@ impl Check<'_> {
             "time",
             json!({
                 "estimate": self.seconds(),
+                "survey": self.survey_time.as_secs_f64(),
                 "is_lower_bound": self.probe.map(|probe| probe.is_lower_bound),
                 "probe": self.probe,
             }),
@@ -161,7 +162,7 @@ impl Check<'_> {
         if probe.is_lower_bound {
             return Some(format!(
                 "time       more than {}, a lower bound: frame {} read in {:.3} s and built in {:.3} s just now; \
-                 tracing a small image of it took longer than {:.0} s and was given up",
+                 tracing a few tiles of it took longer than {:.0} s and was given up",
                 duration(self.seconds()?),
                 probe.frame,
                 probe.read,
@@ -169,9 +170,13 @@ impl Check<'_> {
                 Probe::TIME_BOX.as_secs_f64()
             ));
         }
+        let others = match probe.frames {
+            1 => String::new(),
+            frames => format!(", and of {} others", frames - 1),
+        };
         Some(format!(
             "time       about {}, an estimate: frame {} read in {:.3} s and built in {:.3} s just \
-             now, {:.2} % of its rays traced",
+             now, {:.2} % of its rays traced{others}",
             duration(self.seconds()?),
             probe.frame,
             probe.read,

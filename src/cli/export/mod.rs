@@ -8,11 +8,12 @@ use clap::{Args, Subcommand};
 use spherule_jobs::export::{Chunks, ExportError};
 use spherule_jobs::{Mode, publish};
 
-use super::job::{Asked, absolute, is_manifest, read_manifest};
+use super::job::{Asked, is_manifest, read_manifest};
+use super::paths::absolute;
 use super::plan::Plan;
 use super::{CliError, Outcome, print};
 use crate::manifest::{Manifest, Override, named_place};
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 
 mod openjd;
 mod place;
@@ -175,8 +176,12 @@ fn asked(args: &CommonArgs) -> Result<Asked, CliError> {
         Override::new("input.frames", range.clone(), "--frames").map_err(CliError::Other)
     });
     let overrides = frames.transpose()?.into_iter().collect();
+    let (manifest, warnings) = Manifest::parse_with_warnings(&content, path, overrides)?;
+    for warning in warnings {
+        note!("{warning}");
+    }
     Ok(Asked {
-        manifest: Manifest::parse_with(&content, path, overrides)?,
+        manifest,
         base: path.parent().map_or_else(PathBuf::new, Path::to_owned),
         file: Some(path.clone()),
         unchanged: Manifest::parse(&content, path).ok(),

@@ -9,7 +9,7 @@ use spherule_jobs::export::openjd::{
     parameter,
 };
 
-use super::super::job::absolute;
+use super::super::paths::absolute;
 use super::super::{CliError, Outcome};
 use super::place::inside;
 use super::{CommonArgs, Work, deliver, grace, text, tidy};

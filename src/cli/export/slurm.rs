@@ -8,11 +8,11 @@ use clap::Args;
 use spherule_jobs::export::TimeLimit;
 use spherule_jobs::export::slurm::{ArrayScript, FrameCommand, MOST_TASKS, Resources};
 
-use super::super::job::absolute;
+use super::super::paths::absolute;
 use super::super::{CliError, Outcome};
 use super::{CommonArgs, Work, deliver, grace, text, tidy};
 use crate::manifest::MAX_THREADS;
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 
 #[derive(Debug, Args)]
 pub(super) struct SlurmArgs {

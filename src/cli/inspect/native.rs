@@ -11,7 +11,7 @@ use spherule_formats::stats::FrameStats;
 use spherule_formats::{FrameError, ScalarType};
 
 use super::Inspected;
-use crate::report::scale::thesis;
+use crate::report::THESIS_BYTES_PER_PARTICLE;
 
 /// Particles up to which a frame is read whole; of larger ones a sample is.
 const LARGEST_READ: u64 = 4_000_000;
@@ -198,7 +198,7 @@ impl NativeFacts {
                 "rest": self.each(parts.rest),
                 "all": self.each(parts.all),
                 "positions_and_nodes": self.each(parts.positions + parts.nodes),
-                "thesis_positions_and_structure": thesis::BYTES,
+                "thesis_positions_and_structure": THESIS_BYTES_PER_PARTICLE,
             },
             "sample": self.sample,
         })
@@ -274,7 +274,7 @@ impl NativeFacts {
             format!(
                 "  positions and nodes: {:.2} bytes per particle (thesis: {} bytes per particle)",
                 each(parts.positions + parts.nodes),
-                thesis::BYTES
+                THESIS_BYTES_PER_PARTICLE
             ),
         ]
     }

@@ -54,10 +54,10 @@ pub(super) fn run(args: &WorkArgs, asked: Asked, signals: &Listener) -> Result<O
         None => work.stop_file_in(&real_dir(&base.join(asked.manifest.output.path.dir()))),
     };
     let mut follower = Follower {
-        arrivals: Arrivals::new(work.settle.duration()),
+        arrivals: Arrivals::new(work.settle),
         stop_file,
-        idle: work.idle.duration(),
-        interrupt: signals.at_work_within(work.grace.duration()),
+        idle: work.idle,
+        interrupt: signals.at_work_within(work.grace),
         busy: Instant::now(),
         is_waiting: false,
         asked: asked.clone(),

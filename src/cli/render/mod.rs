@@ -47,7 +47,7 @@ pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     if asked.manifest.job.follow {
         return follow::run(&args.run.work, asked, &signals);
     }
-    let grace = asked.manifest.job.grace.duration();
+    let grace = asked.manifest.job.grace;
     let sequence = asked.sequence()?;
     for note in sequence.notes() {
         note!("{note}");

@@ -103,7 +103,7 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
             let radius = short(f64::from(*radius));
             let why = match (setup.picture.surface.kind, survey.packed_radius) {
                 (SurfaceKind::Spheres, _) | (_, None) => "half the usual distance of neighbours",
-                (SurfaceKind::Medium, _) => {
+                (SurfaceKind::Union, _) => {
                     "by how densely particles lie, enlarged so that spheres overlap"
                 }
                 (SurfaceKind::Smooth, _) => "by how densely particles lie",

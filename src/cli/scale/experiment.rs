@@ -9,9 +9,9 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 use super::ScaleArgs;
 use crate::accel::Structure;
 use crate::cli::CliError;
-use crate::cli::job::absolute;
+use crate::cli::paths::absolute;
 use crate::cli::work::useful_threads;
-use crate::report::scale::{InputSummary, ScaleSettings};
+use crate::scale::report::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 
 /// Seconds a cell where nothing else is said: the thesis's minute.

@@ -10,7 +10,7 @@ use spherule_jobs::Interrupt;
 
 use super::measure::COMMAND;
 use crate::cli::child::{self, Ended};
-use crate::report::scale::Conversion;
+use crate::scale::report::Conversion;
 use crate::scale::{CellRequest, Representation, Task};
 
 /// Name of the directory.

@@ -16,8 +16,8 @@ use crate::cli::child::{self, Ended};
 use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
-use crate::report::scale::{
-    CellMeasurement, CellOutcome, CellReport, MADE_BY, ScaleReport, files, table,
+use crate::scale::report::{
+    CSV, CellMeasurement, CellOutcome, CellReport, HTML, JSON, MADE_BY, ScaleReport, files, table,
 };
 use crate::scale::{Budget, CellRequest, Motion, Representation, Task};
 
@@ -156,7 +156,7 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         events::at_end(json!({"errors": [error.to_string()]}));
         return Ok(Outcome::SomeFailed);
     }
-    let [json, csv, html] = [files::JSON, files::CSV, files::HTML];
+    let [json, csv, html] = [JSON, CSV, HTML];
     say!("{json}, {csv} and {html} are in {}", args.output.display());
     Ok(if ended.interrupted {
         Outcome::Interrupted

@@ -75,8 +75,8 @@ fn what_the_program_writes_is_valid() {
     both_take(&read(EVERYTHING).unwrap().to_commented_toml());
     let mut fixed = plain;
     fixed.camera.mode = crate::manifest::CameraMode::Fixed;
-    fixed.camera.eye = Some([1.0; 3]);
-    fixed.camera.look_at = Some([0.0; 3]);
+    fixed.camera.eye = Some(glam::DVec3::ONE);
+    fixed.camera.look_at = Some(glam::DVec3::ZERO);
     both_take(&fixed.to_commented_toml());
 }
 
@@ -150,13 +150,9 @@ fn count_tables(schema: &Value) -> usize {
 fn comments_defaults_and_examples_are_those_of_init() {
     let schema = job_schema();
     for entry in Manifest::new("").entries().list() {
-        let at = format!(
-            "/properties/{}/properties/{}",
-            entry.section(),
-            entry.name()
-        );
+        let at = format!("/properties/{}/properties/{}", entry.section, entry.name());
         let property = schema.pointer(&at).expect(&at);
-        assert_eq!(property["description"], entry.comment, "{at}");
+        assert_eq!(property["description"], entry.comment(), "{at}");
         let sample = json_of(entry.sample());
         let wanted = match (&*entry.key, &entry.value) {
             ("input.path", _) => (Value::Null, Value::Null),

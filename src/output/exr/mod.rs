@@ -14,6 +14,8 @@ use thiserror::Error;
 use crate::render::Film;
 
 mod blocks;
+mod deflate;
+mod differences;
 mod layout;
 mod lines;
 mod pack;

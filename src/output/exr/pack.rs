@@ -1,20 +1,18 @@
 //! One block of rows into the bytes that its file has for it.
 //!
-//! ZIP of OpenEXR ("Technical Introduction to OpenEXR", and `ImfZip.cpp` of the reference library): the bytes of
-//! little-endian samples, row by row and in each row plane by plane, are parted into those at even and those at
-//! odd places; each byte becomes its difference to the one before, plus 128; what comes of it is a zlib stream.
-//! The loops go from one buffer into another, so that they vectorise.
-//!
-//! Bytes depend on samples and layout alone: every block starts a new stream, and `zlib-rs` finds the same
-//! matches with and without vector instructions.
+//! ZIP is [`Differences`] of the samples' bytes, compressed by [`Deflater`]. Bytes depend on samples and layout
+//! alone: every block starts a new stream.
 
 use exr::math::Vec2;
 use exr::prelude::IntegerBounds;
-use zlib_rs::{DeflateConfig, ReturnCode, Strategy, compress_slice};
 
+use super::deflate::{Deflater, Piece, WINDOW};
+use super::differences::Differences;
 use super::layout::ExrLayout;
 use super::lines::LineBuffer;
+use super::planes::PlaneKind;
 use super::{Compression, OutputError};
+use crate::math::Supported;
 use crate::render::FilmRows;
 
 /// A block as it is written.
@@ -28,13 +26,19 @@ pub struct PackedBlock {
     pub clamped: u64,
 }
 
-/// Memory for packing, to be used again for the next block: about twice the bytes of a block's samples.
+/// Memory for packing, to be used again for the next block.
 #[derive(Debug, Default)]
 pub struct PackBuffers {
     line: LineBuffer,
-    /// Bytes at even places, then those at odd places; later the zlib stream.
-    parted: Vec<u8>,
     differences: Vec<u8>,
+    deflater: Deflater,
+}
+
+impl PackBuffers {
+    /// Bytes that the buffers take at most, once they have packed a block of `samples` bytes.
+    pub fn predicted_bytes(samples: u64) -> u64 {
+        samples + Deflater::predicted_bytes(samples)
+    }
 }
 
 /// Packs the block `rows`, as [`ExrLayout::blocks`] gives it.
@@ -120,75 +124,47 @@ fn by_codec(
 }
 
 /// The zlib stream of `rows`, or None if it is no shorter than the samples.
-fn zip<'b>(
-    rows: &FilmRows,
-    layout: &ExrLayout,
-    buffers: &'b mut PackBuffers,
-) -> Option<&'b mut [u8]> {
+fn zip<'b>(rows: &FilmRows, layout: &ExrLayout, buffers: &'b mut PackBuffers) -> Option<&'b [u8]> {
     let PackBuffers {
         line,
-        parted,
         differences,
+        deflater,
     } = buffers;
-    let length = layout.bytes(rows.height);
-    parted.resize(length, 0);
-    differences.resize(length, 0);
-    // All samples have an even number of bytes, so both halves are of one length.
-    let (even, odd) = parted.split_at_mut(length / 2);
-    for_each_line(rows, layout, line, |at, line, _| {
-        let places = at / 2..(at + line.len()) / 2;
-        part(line, &mut even[places.clone()], &mut odd[places]);
-    });
-    differ(parted, differences);
-    let room = length.checked_sub(1)?;
-    let (stream, code) = compress_slice(&mut parted[..room], differences, layout.deflate());
-    (code == ReturnCode::Ok).then_some(stream)
+    differences.resize(layout.bytes(rows.height), 0);
+    let mut block = Differences::new(differences, Supported::default());
+    for_each_line(rows, layout, line, |_, line, _| block.push(line));
+    block.end();
+    deflater.compress(differences, layout.pieces(rows.height))
 }
-
-/// Bytes at even places and bytes at odd places.
-fn part(bytes: &[u8], even: &mut [u8], odd: &mut [u8]) {
-    let (pairs, _) = bytes.as_chunks::<2>();
-    for ((even, odd), pair) in even.iter_mut().zip(odd).zip(pairs) {
-        [*even, *odd] = *pair;
-    }
-}
-
-/// What each byte is more than the one before, around 128; the first stays as it is.
-fn differ(bytes: &[u8], differences: &mut [u8]) {
-    let Some((first, others)) = differences.split_first_mut() else {
-        return;
-    };
-    *first = bytes[0];
-    for ((difference, before), byte) in others.iter_mut().zip(bytes).zip(&bytes[1..]) {
-        *difference = byte.wrapping_sub(*before).wrapping_add(128);
-    }
-}
-
-/// Farthest match of deflate.
-const WINDOW: usize = 32 << 10;
 
 impl ExrLayout {
-    /// What deflate does for these planes, chosen by size and time over images of the thesis's box and of a
-    /// splashing dam break (`benches/encode.rs`).
-    fn deflate(&self) -> DeflateConfig {
-        let fast = DeflateConfig::default();
-        let colors_alone = self.planes.len() == 4;
-        if colors_alone {
-            // Differences of shaded pixels repeat nothing but themselves: to look only for runs is quicker, and
-            // gives 4 to 5 % less than to look for any match, as it leaves Huffman's code alone with the rest.
-            return DeflateConfig {
-                strategy: Strategy::Rle,
-                ..fast
-            };
-        }
-        // Ids and normals repeat what is in the row above, which is a row's half away. Where it is out of
-        // reach, more has to be tried for the same size.
-        let is_row_above_in_reach = self.bytes(1) / 2 < WINDOW;
-        DeflateConfig {
-            level: if is_row_above_in_reach { 2 } else { 3 },
-            mem_level: 9,
-            ..fast
-        }
+    /// The stretches of alike planes among the differences of a block of `rows` rows.
+    fn pieces(&self, rows: u32) -> impl Iterator<Item = Piece> {
+        let width = self.header.layer_size.x();
+        // What a particle has is the same in the row above, which is the half of a row away.
+        let is_row_above_in_reach = rows > 1 && self.bytes(1) / 2 <= WINDOW;
+        let groups = self.planes.chunk_by(|a, b| a.kind() == b.kind());
+        let groups: Vec<(PlaneKind, usize)> = groups
+            .map(|group| {
+                let bytes = group
+                    .iter()
+                    .map(|plane| plane.sample_type().bytes_per_sample());
+                (group[0].kind(), bytes.sum::<usize>() * width / 2)
+            })
+            .collect();
+        let pieces = move |is_odd: bool| {
+            let row = groups.clone().into_iter().map(move |(kind, length)| Piece {
+                length,
+                is_searched: match kind {
+                    PlaneKind::Color | PlaneKind::Normal => false,
+                    // Their exponents hardly change, so that the differences to and from them come in pairs.
+                    PlaneKind::Place => is_odd,
+                    PlaneKind::Particle => is_row_above_in_reach,
+                },
+            });
+            std::iter::repeat_n(row, rows as usize).flatten()
+        };
+        pieces(false).chain(pieces(true))
     }
 }
 

@@ -25,9 +25,32 @@ pub(super) enum Source {
     Id,
 }
 
+/// Planes whose samples look alike to a compressor.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum PlaneKind {
+    /// Halves that change from pixel to pixel.
+    Color,
+    /// Floats that do, and their exponents with them.
+    Normal,
+    /// Floats whose exponents stay the same: where the place is that a pixel shows.
+    Place,
+    /// What all pixels of a particle share.
+    Particle,
+}
+
 impl Plane {
     const fn new(name: &'static str, source: Source) -> Self {
         Self { name, source }
+    }
+
+    /// What its samples are like.
+    pub(super) const fn kind(&self) -> PlaneKind {
+        match self.source {
+            Source::Color(_) => PlaneKind::Color,
+            Source::Normal(_) => PlaneKind::Normal,
+            Source::Depth | Source::Position(_) => PlaneKind::Place,
+            Source::Velocity(_) | Source::Albedo(_) | Source::Id => PlaneKind::Particle,
+        }
     }
 
     /// Colours are half: a display has no use for more. Data keep all of their bits.

@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::{Light, LightSamples};
+use super::light::{Light, LightSamples};
 use crate::math::{Lanes3, Supported, splat, splat3};
 
 /// Parallel light.

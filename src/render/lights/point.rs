@@ -7,7 +7,7 @@
 
 use glam::Vec3;
 
-use super::{Light, LightSamples};
+use super::light::{Light, LightSamples};
 use crate::math::{LANES, Lanes3, Supported, lane_kernel};
 use crate::scene::Falloff;
 
@@ -58,4 +58,35 @@ fn sample_point_light_body(light: &PointLight, start: &Lanes3, samples: &mut Lig
 
 lane_kernel! {
     fn sample_point_light(light: &PointLight, start: &Lanes3, samples: &mut LightSamples) = sample_point_light_body;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::math::{lane3, splat3};
+
+    #[test]
+    fn a_point_light_keeps_or_loses_strength() {
+        let sample = |falloff, start| {
+            let light = PointLight {
+                position: Vec3::new(1.0, 0.0, 4.0),
+                falloff,
+                intensity: Vec3::splat(8.0),
+                casts_shadow: true,
+            };
+            let mut samples = LightSamples::default();
+            light.sample_li(Supported::default(), &splat3(start), &mut samples);
+            let rays = &samples.rays;
+            (
+                lane3(&rays.direction, 3),
+                rays.t_max[3],
+                samples.radiance[2][3],
+            )
+        };
+        let below = Vec3::new(1.0, 0.0, 0.0);
+        assert_eq!(sample(Falloff::None, below), (Vec3::Z, 4.0, 8.0));
+        assert_eq!(sample(Falloff::InverseSquare, below), (Vec3::Z, 4.0, 0.5));
+        let (direction, distance, _) = sample(Falloff::None, Vec3::new(1.0, 0.0, 4.0));
+        assert!(direction.is_nan() && distance == 0.0);
+    }
 }

@@ -1,6 +1,7 @@
 //! Eq. 4.2: what surfaces send on of the light of a light, by Blinn and Phong.
 
-use super::{ShadingPoints, WhittedMaterial};
+use super::points::ShadingPoints;
+use super::whitted::WhittedMaterial;
 use crate::math::functions::pow;
 use crate::math::{LANES, Lanes3, lane_kernel};
 use crate::ray::RayPacket;

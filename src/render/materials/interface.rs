@@ -1,7 +1,9 @@
 //! The surface of one connected transmissive body. It is lit from outside alone; from inside it only reflects and
 //! refracts.
 
-use super::{Material, ShadingPoints, WhittedMaterial};
+use super::material::Material;
+use super::points::ShadingPoints;
+use super::whitted::WhittedMaterial;
 use crate::math::{LANES, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::surface::Intersections;
@@ -75,11 +77,11 @@ fn interface_points_body(
         // Both rays.
         let cosine = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]);
         let ratio = if is_inside {
-            material.ior
+            material.dielectric.ior
         } else {
-            1.0 / material.ior
+            1.0 / material.dielectric.ior
         };
-        let (r, sin2_out) = material.fresnel(cosine, ratio);
+        let (r, sin2_out) = material.dielectric.fresnel(cosine, ratio);
         let rest = 1.0 - sin2_out;
         let along_normal = ratio * cosine - (if rest > 0.0 { rest } else { 0.0 }).sqrt();
         let mut onward = [0.0; 3];
@@ -104,7 +106,7 @@ fn interface_points_body(
             points.refracted.direction[axis][l] = if has_onward { onward } else { d[axis] };
         }
         points.reflected.weight[l] = material.reflection * r;
-        points.refracted.weight[l] = material.transmission * (1.0 - r);
+        points.refracted.weight[l] = material.dielectric.transmission * (1.0 - r);
     }
 }
 

@@ -5,8 +5,8 @@ use spherule_jobs::FrameRange;
 use super::numbers::{bytes, count, duration, seconds as time, short, shortened};
 use super::{JobReport, Status};
 use crate::report::FrameReport;
+use crate::report::THESIS_BYTES_PER_PARTICLE;
 use crate::report::page::{Page, Table};
-use crate::report::scale::thesis;
 
 /// Characters of a list of frame numbers, or of a setting.
 const MOST_TEXT: usize = 300;
@@ -179,5 +179,9 @@ fn list_of(frames: &[i64]) -> String {
 fn per_particle(report: &FrameReport) -> String {
     let each = |bytes: u64| short(bytes as f64 / report.particles.max(1) as f64);
     let held = [report.bytes.anonymous(), report.bytes.file.total()].map(each);
-    format!("{} B (thesis: about {} B)", held.join(", "), thesis::BYTES)
+    format!(
+        "{} B (thesis: about {} B)",
+        held.join(", "),
+        THESIS_BYTES_PER_PARTICLE
+    )
 }

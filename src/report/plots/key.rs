@@ -7,9 +7,9 @@
 use std::fmt::Write as _;
 
 use super::Line;
-use super::draw::Drawn;
+use super::drawn::Drawn;
 use super::svg::FINE;
-use crate::report::page::escaped;
+use crate::report::escape::escaped;
 
 /// Colours on white, by hue.
 const COLORS: [&str; 7] = [

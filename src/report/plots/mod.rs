@@ -12,6 +12,7 @@ mod axis;
 #[cfg(test)]
 mod axis_tests;
 mod draw;
+mod drawn;
 mod key;
 mod svg;
 #[cfg(test)]
@@ -20,7 +21,7 @@ mod tests;
 pub use axis::{Axis, Scale};
 pub use key::CSS;
 
-use super::page::escaped;
+use super::escape::escaped;
 
 /// How the points of a series are joined.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -103,11 +104,11 @@ impl Plot {
     /// Series of over 800 points are thinned to the least and the largest value of each stretch.
     pub fn figure(&self) -> String {
         let mut notes = String::new();
-        let drawn: Vec<draw::Drawn> = self
+        let drawn: Vec<drawn::Drawn> = self
             .series
             .iter()
             .enumerate()
-            .map(|(place, series)| draw::Drawn::new(self, series, series.hue.unwrap_or(place)))
+            .map(|(place, series)| drawn::Drawn::new(self, series, series.hue.unwrap_or(place)))
             .filter(|drawn| drawn.point_count() > 0)
             .collect();
         let left_out = self.count_off_log_axis();

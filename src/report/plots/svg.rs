@@ -13,7 +13,7 @@ use plotters_backend::{
     BackendColor, BackendCoord, BackendStyle, BackendTextStyle, DrawingBackend, DrawingErrorKind,
 };
 
-use crate::report::page::escaped;
+use crate::report::escape::escaped;
 
 /// Stands for the colour of text.
 pub(super) const INK: RGBColor = RGBColor(0, 0, 0);

@@ -15,7 +15,7 @@ use super::raw::{Codes, Gather, RawBrick};
 use super::tree::{Block, BrickTree, Node};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
 use crate::accel::{Phase, PhaseClock};
-use crate::report::Bytes;
+use crate::metrics::Bytes;
 use crate::surface::SurfaceSettings;
 use crate::surface::field::FieldParticles;
 

@@ -8,7 +8,8 @@
 use glam::Vec3;
 
 use super::field::FieldParticles;
-use super::{Intersection, Intersections, MaterialId, Shape, Side, SurfaceSettings};
+use super::shape::crossing_of_packet;
+use super::{Intersection, Intersections, Shape, Side, SurfaceSettings};
 use crate::accel::Coherence;
 use crate::math::{Supported, first_lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
@@ -103,7 +104,6 @@ impl SmoothSurface<'_> {
             particle: 0,
             offset: (OFFSET * tree.voxel()).max(OFFSET_OF_ROUNDING * largest),
             anchor: point,
-            material: MaterialId::PARTICLES,
         };
         match (&self.built.field, &self.built.exact) {
             (Some(field), Some(layout)) => exact::refined(field, layout, ray, hit),
@@ -118,12 +118,7 @@ impl SmoothSurface<'_> {
 
 impl Shape for SmoothSurface<'_> {
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection> {
-        let mut packet = RayPacket::default();
-        packet.push(ray);
-        let mut hits = Intersections::default();
-        let inside = u32::from(side == Side::Inside);
-        self.intersect(&mut packet, Coherence::Incoherent, inside, &mut hits);
-        (hits.mask == 1).then(|| hits.get(0))
+        crossing_of_packet(self, ray, side)
     }
 
     fn is_connected(&self) -> bool {
@@ -148,8 +143,7 @@ impl Shape for SmoothSurface<'_> {
         for lane in lanes_in(crossings.mask) {
             let from = Side::of_lane(inside, lane);
             let hit = self.hit(&rays.ray(lane), &crossings, lane, from);
-            hits.set(lane, &hit);
-            rays.t_max[lane] = hit.t;
+            hits.end_ray(rays, lane, &hit, self.material());
         }
     }
 

@@ -7,8 +7,7 @@
     reason = "loops over lanes, each of many arrays"
 )]
 
-use super::steps::Integers;
-use crate::math::{LANES, Lanes, Lanes3, splat};
+use crate::math::{Integers, LANES, Lanes, Lanes3, splat};
 
 /// Rounds of the search in a bracket; false position with Illinois steps gains more than a digit each.
 const ROUNDS: usize = 6;
@@ -26,8 +25,9 @@ pub(super) struct Segments {
     pub(super) sign: Lanes,
 }
 
-/// The part of the way along each segment at which the field, of which these are the values at the corners of the
-/// voxel, first gets to `threshold`. A ray that starts beyond crosses at 0. The first result has a bit for each ray of `lanes` that crosses.
+/// Finds the first crossing of each segment: the fraction of its length at which the field reaches `threshold`. The field
+/// is given by its values at the `corners` of the voxels. A ray that starts beyond the surface crosses it at 0. The first
+/// result has a bit for each ray of `lanes` that crosses.
 #[inline(always)]
 pub(super) fn first_roots(
     corners: &[Integers; 8],

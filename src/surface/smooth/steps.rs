@@ -7,14 +7,11 @@
 use super::brick::{VOXEL_BITS, VOXELS, VOXELS_I32};
 use super::root::{Segments, first_roots};
 use super::tree::BrickTree;
-use crate::math::{LANES, Lanes, Lanes3, lane_kernel, splat};
+use crate::math::{Integers, LANES, Lanes, Lanes3, lane_kernel, larger, smaller, splat};
 use crate::ray::RayPacket;
 
 /// Components of directions are kept this far from zero, so that their inverses are finite.
 const MIN_DIRECTION: f32 = 1e-9;
-
-/// Integers for each lane.
-pub(super) type Integers = [i32; LANES];
 
 /// Rays in voxels from the root's corner; distances stay those of the rays.
 #[derive(Default)]
@@ -181,7 +178,7 @@ fn find_exits_body(grid: &GridRays, progress: &mut Progress) {
             next[a] = (far - grid.origin[a][l]) * grid.inverse[a][l];
             progress.local[a][l] = grid.origin[a][l] - corner;
         }
-        let nearest = smaller(smaller(next[0], next[1]), next[2]);
+        let nearest = least(&next);
         progress.t_exit[l] = nearest;
         let bit = |a: usize| i32::from(next[a] <= nearest) << a;
         progress.exit_axes[l] = bit(0) | bit(1) | bit(2);
@@ -243,7 +240,7 @@ fn step_voxels_body(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32
             progress.next[1][l],
             progress.next[2][l],
         ];
-        let nearest = smaller(smaller(next[0], next[1]), next[2]);
+        let nearest = least(&next);
         let steps = lanes >> l & 1 == 1;
         let t = larger(nearest, progress.t[l]);
         progress.t[l] = if steps { t } else { progress.t[l] };
@@ -289,7 +286,7 @@ fn cross_voxels_body(
             progress.next[1][l],
             progress.next[2][l],
         ];
-        let nearest = smaller(smaller(next[0], next[1]), next[2]);
+        let nearest = least(&next);
         end[l] = larger(smaller(nearest, progress.until[l]), progress.t[l]);
         segments.sign[l] = if inside >> l & 1 == 1 { -1.0 } else { 1.0 };
         for a in 0..3 {
@@ -324,6 +321,12 @@ lane_kernel! {
     ) -> u32 = cross_voxels_body;
 }
 
+/// The least of three numbers.
+#[inline(always)]
+fn least([x, y, z]: &[f32; 3]) -> f32 {
+    smaller(smaller(*x, *y), *z)
+}
+
 /// The integer part of a number from 0 to 2^22. (`as`, which saturates, is compiled lane by lane.)
 #[inline(always)]
 fn integer_part(x: f32) -> i32 {
@@ -337,16 +340,4 @@ fn integer_part(x: f32) -> i32 {
 #[inline(always)]
 pub(super) fn in_lane(v: &[Integers; 3], lane: usize) -> [i32; 3] {
     [v[0][lane], v[1][lane], v[2][lane]]
-}
-
-/// The smaller number, by one instruction.
-#[inline(always)]
-fn smaller(a: f32, b: f32) -> f32 {
-    if a < b { a } else { b }
-}
-
-/// The larger number, by one instruction.
-#[inline(always)]
-fn larger(a: f32, b: f32) -> f32 {
-    if a > b { a } else { b }
 }

@@ -51,7 +51,7 @@ fn typing_errors_get_the_nearest_word() {
         &workshop,
         &["--surface", "smoth"],
         &[
-            "--surface: render.surface: wants one of spheres, medium, smooth",
+            "--surface: render.surface: wants one of spheres, union, smooth",
             "did you mean smooth?",
         ],
     );
@@ -68,7 +68,7 @@ fn surfaces_that_make_no_sense_are_refused() {
     let workshop = one_frame();
     for (options, wanted) in [
         (
-            ["--exact-surface", "--surface=medium"],
+            ["--exact-surface", "--surface=union"],
             "surface.exact: is for the smooth surface alone",
         ),
         (

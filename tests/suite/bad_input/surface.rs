@@ -78,7 +78,7 @@ fn radii_that_vary_a_thousandfold() {
         .expect(0)
         .tells("radii differ; a smooth surface has one for all, here their median")
         .tells("(--radius gives another)");
-    let options = [&["--surface", "medium", "--force"][..], &BACKGROUND].concat();
+    let options = [&["--surface", "union", "--force"][..], &BACKGROUND].concat();
     let ran = workshop.render(&options).expect(0);
     assert!(!ran.errors().contains("radii differ"), "{}", ran.errors());
     assert!(!is_empty(&workshop, 1));

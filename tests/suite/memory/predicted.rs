@@ -1,5 +1,5 @@
-//! What `check` predicts is what `render` takes: within 15 % of the peak of anonymous memory. Of a smooth
-//! surface it is told as if the particles splashed, and may be more.
+//! What `check` predicts is what `render` takes: within 15 % and 2 MiB of the peak of anonymous memory. The prediction of a
+//! smooth surface assumes particles that splash, and may be higher.
 
 use std::fmt::Write as _;
 use std::fs;
@@ -17,16 +17,25 @@ use crate::harness::Workshop;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Runs both over three frames like `first` and compares.
+/// How far predictions may be off: a part of the peak, and bytes. The stacks of threads and the small pieces that the
+/// allocator keeps differ from run to run by up to 2 MiB, whatever the frame.
+const TOLERANCE: (f64, f64) = (0.15, 2.0 * 1024.0 * 1024.0);
+
+/// Runs `check` and `render` over three frames like the one that `make` makes, and compares.
 #[track_caller]
 fn compare(name: &str, make: impl Fn(&Path), options: &[&str]) {
-    let part = predicted_part(name, make, options);
-    assert!((0.85..=1.15).contains(&part), "{name} {options:?}: {part}");
+    let (predicted, measured) = peaks(name, make, options);
+    let difference = (predicted - measured).abs();
+    let limit = TOLERANCE.0 * measured + TOLERANCE.1;
+    assert!(
+        difference <= limit,
+        "{name} {options:?}: predicted {predicted}, measured {measured}"
+    );
 }
 
-/// What is predicted, in parts of what is measured, over three frames like the one that `make` makes.
+/// The predicted and the measured peak in bytes, over three frames like the one that `make` makes.
 #[track_caller]
-fn predicted_part(name: &str, make: impl Fn(&Path), options: &[&str]) -> f64 {
+fn peaks(name: &str, make: impl Fn(&Path), options: &[&str]) -> (f64, f64) {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("in")).expect("a directory");
     let first = workshop.join(format!("in/f_1.{name}"));
@@ -52,7 +61,7 @@ fn predicted_part(name: &str, make: impl Fn(&Path), options: &[&str]) -> f64 {
     let total = predicted["total"].as_f64().expect("bytes");
     let measured = report(&workshop)["totals"]["rss"]["anonymous_peak"].as_f64();
     let measured = measured.expect("bytes");
-    total / measured
+    (total, measured)
 }
 
 /// A block of water of particles of radius 0.01.
@@ -191,7 +200,7 @@ fn many_particles_in_a_small_image() {
 fn every_structure() {
     for structure in ["lbvh", "bvh", "sbvh", "kdtree"] {
         let options = [&SMALL[..], &["--accelerator", structure]].concat();
-        compare("npy", |path| npy(path, 400_000), &options);
+        compare("npy", |path| npy(path, 1_000_000), &options);
     }
 }
 
@@ -235,19 +244,24 @@ fn every_way_to_write_text() {
 
 #[test]
 fn one_medium_takes_what_spheres_take() {
-    let options = [&SMALL[..], &["--surface", "medium"]].concat();
+    let options = [&SMALL[..], &["--surface", "union"]].concat();
     compare("npy", |path| block(path, 500_000), &options);
+}
+
+/// Splashing particles would need up to 2.5 times as much as a block.
+#[track_caller]
+fn assert_enough((predicted, measured): (f64, f64)) {
+    let part = predicted / measured;
+    assert!((0.9..2.5).contains(&part), "{part}");
 }
 
 #[test]
 fn a_smooth_surface_takes_no_more_than_predicted() {
     let smooth = ["--surface", "smooth", "--radius", "0.01"];
     let options = [&SMALL[..], &smooth].concat();
-    let part = predicted_part("npy", |path| block(path, 200_000), &options);
-    assert!((0.9..2.5).contains(&part), "{part}");
+    assert_enough(peaks("npy", |path| block(path, 200_000), &options));
     let options = [&SMALL[..4], &smooth].concat();
-    let part = predicted_part("npy", |path| block(path, 200_000), &options);
-    assert!((0.9..2.5).contains(&part), "with ids: {part}");
+    assert_enough(peaks("npy", |path| block(path, 200_000), &options));
 }
 
 #[test]

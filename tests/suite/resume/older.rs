@@ -79,6 +79,21 @@ fn colours_by_an_attribute_go_on() {
 }
 
 #[test]
+fn unions_that_were_called_medium_go_on() {
+    let spray = ["--set", "surface.spray=true"];
+    goes_on("medium", &[&["--surface", "union"], &spray[..]].concat());
+    goes_on("medium", &[&["--surface", "medium"], &spray[..]].concat());
+    older("medium")
+        .render(&["--surface", "medium", "--force"])
+        .expect(0)
+        .tells("--surface: render.surface: \"medium\" is now called \"union\"; the old name still works");
+    older("medium")
+        .render(&["--surface", "smooth"])
+        .expect(2)
+        .tells("render.surface: \"medium\" -> \"smooth\"");
+}
+
+#[test]
 fn glass_that_would_look_otherwise_is_refused() {
     const GLASS: [&str; 2] = ["--set", "material.transmission=1"];
     let refused = older("glass").render(&GLASS).expect(2);

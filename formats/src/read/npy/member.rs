@@ -133,7 +133,7 @@ fn place(offset: u64) -> usize {
 /// Names the member that an error is about; its offsets count from the start of the member.
 pub(super) fn in_member(error: ParseError, name: &str) -> ParseError {
     let begin = match error {
-        ParseError::Malformed { .. } => "of member",
+        ParseError::Malformed { .. } => "in member",
         ParseError::Unsupported { .. } | ParseError::TooLarge { .. } => "npz member",
     };
     error.retold(|what| format!("{begin} {name}: {what}"))

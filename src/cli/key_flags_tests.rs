@@ -1,0 +1,144 @@
+//! That every option of `render` is a key of the manifest, or says why it is none.
+
+use std::collections::BTreeSet;
+
+use super::*;
+use crate::cli::plan::RunArgs;
+use crate::manifest::Manifest;
+
+/// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
+/// there.
+const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard"];
+
+/// Options for parts of `material.color`.
+const COLORS: [&str; 3] = ["color_by", "map", "range"];
+
+/// Other options with a value that is not the default, and the key that it is laid over.
+const FLAGS: [(&str, &str); 32] = [
+    ("--output x.####.exr", "output.path = \"x.####.exr\""),
+    ("--frames 3-4", "input.frames = \"3-4\""),
+    ("--width 7", "image.width = 7"),
+    ("--height 7", "image.height = 7"),
+    ("--samples 7", "image.samples = 7"),
+    ("--radius 0.5", "input.radius = 0.5"),
+    ("--up -y", "input.up = \"-y\""),
+    (
+        "--color-by v --map turbo --range 0 2",
+        "material.color = { attribute = \"v\", map = \"turbo\", range = [0.0, 2.0] }",
+    ),
+    ("--map turbo", "material.color.map = \"turbo\""),
+    ("--range 0 2", "material.color.range = [0.0, 2.0]"),
+    ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
+    ("--max-depth 7", "render.max_depth = 7"),
+    ("--ground", "render.ground = true"),
+    ("--surface union", "render.surface = \"union\""),
+    ("--smoothing 0.5", "surface.smoothing = 0.5"),
+    ("--exact-surface", "surface.exact = true"),
+    ("--spray", "surface.spray = true"),
+    ("--no-mmap", "input.mmap = false"),
+    ("--parts a,b", "input.parts = [\"a\", \"b\"]"),
+    ("--accelerator bvh", "render.accelerator = \"bvh\""),
+    ("--memory-limit 4GiB", "render.memory_limit = \"4GiB\""),
+    ("--threads 7", "job.threads = 7"),
+    ("--progress json", "job.progress = \"json\""),
+    ("--isolate", "job.isolate = true"),
+    (
+        "--isolate --memory-ceiling 4GiB",
+        "job.memory_ceiling = \"4GiB\"",
+    ),
+    ("--retries 7", "job.retries = 7"),
+    ("--takeover-after 7", "job.takeover_after = 7.0"),
+    ("--grace 7", "job.grace = 7.0"),
+    ("--follow", "job.follow = true"),
+    ("--idle 7", "job.idle = 7.0"),
+    ("--settle 7", "job.settle = 7.0"),
+    ("--stop-file stop", "job.stop_file = \"stop\""),
+];
+
+fn command() -> Command {
+    RunArgs::augment_args(Command::new("render"))
+}
+
+fn manifest(flags: &str) -> Manifest {
+    let arguments = format!("render data {flags}");
+    let matches = command().get_matches_from(arguments.split_whitespace());
+    let run = RunArgs::from_arg_matches(&matches).unwrap();
+    run.manifest.manifest().unwrap().manifest
+}
+
+#[test]
+fn every_option_is_a_key() {
+    for (flags, wanted) in FLAGS.iter() {
+        let (key, value) = wanted.split_once(" = ").unwrap();
+        let mut plain = Manifest::new("data");
+        assert_ne!(manifest(flags), plain, "{flags}");
+        let mut sets = vec![format!("{key}={value}")];
+        if flags.contains("--isolate --") {
+            sets.push("job.isolate=true".to_owned());
+        }
+        let sets = sets
+            .iter()
+            .map(|set| format!(" --set {}", set.replace(' ', "")));
+        plain = manifest(&sets.collect::<String>());
+        assert_eq!(manifest(flags), plain, "{flags}");
+    }
+}
+
+/// Options whose `[default: ...]` is no value that could be given.
+const WORDS: [&str; 6] = [
+    "memory-limit",
+    "memory-ceiling",
+    "parts",
+    "color_by",
+    "range",
+    "stop-file",
+];
+
+#[test]
+fn defaults_in_the_help_are_those_of_the_manifest() {
+    let mut checked = 0;
+    for argument in command().get_arguments() {
+        let help = argument.get_help().map(ToString::to_string);
+        let help = help.unwrap_or_default();
+        let Some((_, rest)) = help.split_once("[default: ") else {
+            continue;
+        };
+        if WORDS.contains(&argument.get_id().as_str()) {
+            continue;
+        }
+        let default = rest.trim_end_matches(']');
+        let flag = argument.get_long().unwrap();
+        let given = manifest(&format!("--{flag} {default}"));
+        // A map of its own is another setting, though it is the same one.
+        if flag == "map" {
+            assert_eq!(given, manifest("--set material.color.map=viridis"));
+        } else {
+            assert_eq!(given, Manifest::new("data"), "--{flag} {default}");
+        }
+        checked += 1;
+    }
+    assert!(checked >= 15, "{checked}");
+}
+
+#[test]
+fn no_option_is_forgotten() {
+    let of_keys: Vec<&str> = key_flags().iter().map(|key| key.flag.name).collect();
+    let tried = FLAGS.iter().flat_map(|(flags, _)| flags.split_whitespace());
+    let tried: BTreeSet<&str> = tried.filter_map(|flag| flag.strip_prefix("--")).collect();
+    for argument in command().get_arguments() {
+        let name = argument.get_id().as_str();
+        assert!(
+            ACTIONS.contains(&name) || COLORS.contains(&name) || of_keys.contains(&name),
+            "{name}"
+        );
+        assert!(
+            !COLORS.contains(&name) || tried.contains(&*name.replace('_', "-")),
+            "{name}"
+        );
+    }
+    // Every kind of value is tried.
+    for key in key_flags() {
+        let is_tried = |other: &KeyFlag| other.kind == key.kind && tried.contains(other.flag.name);
+        assert!(key_flags().iter().any(is_tried), "{key:?}");
+    }
+}

@@ -1,0 +1,46 @@
+//! What the command line needs to know of the keys that have an option.
+
+use super::Manifest;
+use super::key::Flag;
+use super::value::FlagKind;
+
+/// An option of the command line that sets a key.
+#[derive(Debug, Clone)]
+pub struct KeyFlag {
+    /// The dotted key.
+    pub key: String,
+    /// The option.
+    pub flag: Flag,
+    /// How it takes its value.
+    pub kind: FlagKind,
+    /// What the value counts.
+    pub unit: Option<&'static str>,
+    /// One line of help.
+    pub help: String,
+    /// More paragraphs of help.
+    pub details: Vec<String>,
+    /// The default as one would type it, or in words.
+    pub default: Option<String>,
+}
+
+/// The options of all keys that have one, in the order of the manifest.
+pub fn key_flags() -> Vec<KeyFlag> {
+    let entries = Manifest::new("").entries();
+    let flags = entries.list().iter().filter_map(|entry| {
+        let typed = |value: &String| {
+            let typed = value.replace(['"', '[', ']', ' '], "");
+            typed.strip_suffix(".0").unwrap_or(&typed).to_owned()
+        };
+        let unset = entry.declared.unset.map(str::to_owned);
+        Some(KeyFlag {
+            key: entry.key.clone(),
+            flag: entry.declared.flag?,
+            kind: entry.flag_kind,
+            unit: entry.declared.unit,
+            help: entry.declared.comment(),
+            details: entry.declared.details(),
+            default: unset.or_else(|| entry.value.as_ref().map(typed)),
+        })
+    });
+    flags.collect()
+}

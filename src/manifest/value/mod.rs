@@ -1,0 +1,238 @@
+//! Kinds of values: how each is read, written and described. What restricts them is in the [`Key`].
+
+use serde_json::{Value as Json, json};
+use spherule_formats::is_control;
+
+use super::key::Key;
+use super::reader::Field;
+
+mod numbers;
+mod text;
+
+pub(super) use numbers::numbers_schema;
+
+/// Why a value is not accepted.
+pub(super) enum Fault {
+    /// It is not of the kind that [`Value::kind`] describes.
+    Unwanted,
+    /// As the text says.
+    Because(String),
+    /// The problems are already noted.
+    Noted,
+}
+
+/// How an option of the command line takes a value.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FlagKind {
+    /// It takes none.
+    Switch,
+    /// A whole number.
+    Integer,
+    /// A number.
+    Number,
+    /// A number of seconds.
+    Seconds,
+    /// Text; it may begin with a hyphen if `true`.
+    Text(bool),
+    /// A number or a word.
+    NumberOrText,
+    /// Text, with commas between items.
+    List,
+}
+
+/// A kind of value.
+pub(super) trait Value: Sized {
+    /// How an option takes it.
+    const FLAG: FlagKind = FlagKind::Text(false);
+
+    /// What it is, with its range, as in "wants a number from 0 to 1".
+    fn kind(key: &Key) -> String;
+
+    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault>;
+
+    /// As TOML.
+    fn toml(&self) -> String;
+
+    /// As JSON schema.
+    fn schema(key: &Key) -> Json;
+
+    /// What stands for it among the settings that images depend on.
+    fn setting(&self) -> String {
+        self.toml()
+    }
+
+    /// All words that are values.
+    fn words() -> Vec<&'static str> {
+        Vec::new()
+    }
+}
+
+/// What a key sets: a value, or perhaps one.
+pub(super) trait Slot {
+    type Value: Value;
+
+    fn get(&self) -> Option<&Self::Value>;
+
+    fn set(&mut self, value: Option<Self::Value>);
+}
+
+impl<T: Value> Slot for T {
+    type Value = T;
+
+    fn get(&self) -> Option<&T> {
+        Some(self)
+    }
+
+    fn set(&mut self, value: Option<T>) {
+        if let Some(value) = value {
+            *self = value;
+        }
+    }
+}
+
+impl<T: Value> Slot for Option<T> {
+    type Value = T;
+
+    fn get(&self) -> Option<&T> {
+        self.as_ref()
+    }
+
+    fn set(&mut self, value: Self) {
+        *self = value;
+    }
+}
+
+/// A value that is one of some words.
+pub(super) trait Named: Copy + PartialEq + 'static {
+    /// All, with the names that users type.
+    fn names() -> Vec<(Self, &'static str)>;
+}
+
+/// Declares an enum whose variants have the names that users type; or names those of an enum that is elsewhere.
+macro_rules! named {
+    ($(#[$meta:meta])* $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $text:literal,)+ }) => {
+        $(#[$meta])*
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
+        pub enum $name {
+            $($(#[$variant_meta])* $variant,)+
+        }
+
+        impl $name {
+            /// All, with the names that users type.
+            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
+
+            /// As users type it.
+            pub const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$variant => $text,)+
+                }
+            }
+        }
+
+        $crate::manifest::value::named!($name: $($variant = $text),+);
+    };
+    ($name:ident: $($variant:ident = $text:literal),+) => {
+        impl $crate::manifest::value::Named for $name {
+            fn names() -> Vec<(Self, &'static str)> {
+                vec![$((Self::$variant, $text)),+]
+            }
+        }
+    };
+}
+pub(super) use named;
+
+impl<T: Named> Value for T {
+    fn kind(_: &Key) -> String {
+        format!("one of {}", Self::words().join(", "))
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        let names = Self::names().into_iter();
+        let mut found = names.filter(|(_, name)| field.as_text() == Some(name));
+        found.next().map(|(value, _)| value).ok_or(Fault::Unwanted)
+    }
+
+    fn toml(&self) -> String {
+        let found = Self::names().into_iter().find(|(value, _)| value == self);
+        quoted(found.map_or("", |(_, name)| name))
+    }
+
+    fn schema(_: &Key) -> Json {
+        json!({ "enum": Self::words() })
+    }
+
+    fn words() -> Vec<&'static str> {
+        Self::names().into_iter().map(|(_, name)| name).collect()
+    }
+}
+
+/// Each at most once, and at least one.
+impl<T: Named> Value for Vec<T> {
+    const FLAG: FlagKind = FlagKind::List;
+
+    fn kind(key: &Key) -> String {
+        format!("a list of {}, as {}", key.name, key.example)
+    }
+
+    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
+        let items = field.items().filter(|items| !items.is_empty());
+        let mut values = Self::new();
+        for item in items.ok_or(Fault::Unwanted)? {
+            let value = item.value::<T>(key).ok_or(Fault::Noted)?;
+            if values.contains(&value) {
+                item.fail(&format!(
+                    "{} is there twice",
+                    value.toml().trim_matches('"')
+                ));
+                return Err(Fault::Noted);
+            }
+            values.push(value);
+        }
+        Ok(values)
+    }
+
+    fn toml(&self) -> String {
+        list(self.iter().map(Value::toml))
+    }
+
+    fn schema(key: &Key) -> Json {
+        json!({ "type": "array", "items": T::schema(key), "minItems": 1, "uniqueItems": true })
+    }
+}
+
+impl Value for bool {
+    const FLAG: FlagKind = FlagKind::Switch;
+
+    fn kind(_: &Key) -> String {
+        "true or false".to_owned()
+    }
+
+    fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
+        field.as_bool().ok_or(Fault::Unwanted)
+    }
+
+    fn toml(&self) -> String {
+        self.to_string()
+    }
+
+    fn schema(_: &Key) -> Json {
+        json!({ "type": "boolean" })
+    }
+}
+
+fn list(items: impl Iterator<Item = String>) -> String {
+    format!("[{}]", items.collect::<Vec<_>>().join(", "))
+}
+
+/// `text` as a TOML string on one line. What controls a terminal is escaped in it: manifests are printed.
+pub(super) fn quoted(text: &str) -> String {
+    if !text.contains(is_control) {
+        return toml::Value::from(text).to_string();
+    }
+    let escaped = text.chars().map(|c| match c {
+        '"' | '\\' => format!("\\{c}"),
+        c if is_control(c) => format!("\\U{:08X}", u32::from(c)),
+        c => c.to_string(),
+    });
+    format!("\"{}\"", escaped.collect::<String>())
+}

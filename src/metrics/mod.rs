@@ -1,0 +1,7 @@
+//! Byte counts and the memory of the process. Knows nothing of what is measured.
+
+mod bytes;
+pub mod memory;
+
+pub use bytes::Bytes;
+pub use memory::{MemoryPeaks, MemoryUse};

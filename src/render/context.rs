@@ -1,0 +1,113 @@
+//! What all integrators share: the scene as packets of rays see it, and the settings. Each stage that integrators
+//! have in common is a file with methods of [`RenderContext`]: `generate`, `intersect`, `attributes`, `visibility`.
+
+use glam::Vec3;
+
+use super::{
+    lights::{Light, light_of},
+    materials::Dielectric,
+    sampler::FilmSampler,
+    scratch::SEGMENTS,
+    settings::RenderSettings,
+    shading::{BackgroundLanes, CameraLanes},
+    source::ShadeSource,
+};
+use crate::accel::Coherence;
+use crate::math::Supported;
+use crate::scene::{self, Scene};
+use crate::surface::{MaterialId, Shape, Side};
+
+/// A scene ready to be rendered.
+pub(super) struct RenderContext<'a> {
+    /// All shapes; the floor is first, as it is the cheapest.
+    pub(super) shapes: Vec<&'a dyn Shape>,
+    /// The particles, opaque or transmissive; all other shapes are opaque.
+    pub(super) particles: Option<&'a dyn Shape>,
+    pub(super) source: &'a dyn ShadeSource,
+    pub(super) scene: &'a Scene,
+    pub(super) settings: &'a RenderSettings,
+    pub(super) simd: Supported,
+    pub(super) camera: CameraLanes,
+    pub(super) background: BackgroundLanes,
+    pub(super) lights: Vec<Box<dyn Light>>,
+    /// Base colour of all particles, if they share one.
+    pub(super) color: Option<Vec3>,
+    pub(super) interior: Interior,
+    /// The boundary of the particles, unless they are opaque.
+    pub(super) boundary: Dielectric,
+    /// Whether the camera is inside of a connected body.
+    pub(super) is_camera_inside: bool,
+    pub(super) sampler: FilmSampler,
+    /// Path segments of one depth, see [`SEGMENTS`].
+    pub(super) max_segments: usize,
+}
+
+/// What lies behind the surface of the particles.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Interior {
+    /// Nothing that light reaches.
+    Opaque,
+    /// The inside of a sphere, each a body of its own. The angle between ray and normal tells whether a ray enters or
+    /// leaves.
+    Spheres,
+    /// One connected body. Each ray knows on which side of its surface it is; the depth counts crossings of the surface,
+    /// and particles between two crossings do not matter.
+    Body,
+}
+
+impl Interior {
+    pub(super) fn of(material: &scene::Material, is_connected: bool) -> Self {
+        match (material.transmission > 0.0, is_connected) {
+            (false, _) => Self::Opaque,
+            (true, false) => Self::Spheres,
+            (true, true) => Self::Body,
+        }
+    }
+}
+
+impl<'a> RenderContext<'a> {
+    pub(super) fn new(
+        shapes: Vec<&'a dyn Shape>,
+        scene: &'a Scene,
+        source: &'a dyn ShadeSource,
+        settings: &'a RenderSettings,
+    ) -> Self {
+        let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
+        let particles = shapes.iter().find(is_particles).copied();
+        let is_connected = particles.is_some_and(|shape| shape.is_connected());
+        let interior = Interior::of(&scene.material, is_connected);
+        let eye = scene.camera.eye();
+        let [width, height] = settings.full_size();
+        let is_eye_inside = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
+        Self {
+            is_camera_inside: interior == Interior::Body && particles.is_some_and(is_eye_inside),
+            shapes,
+            particles,
+            source,
+            scene,
+            settings,
+            simd: Supported::default(),
+            camera: CameraLanes::new(&scene.camera, width, height),
+            background: BackgroundLanes::from(&scene.background),
+            lights: scene.lights.iter().map(light_of).collect(),
+            color: source.constant_color(),
+            interior,
+            boundary: Dielectric::new(&scene.material),
+            sampler: FilmSampler::new(settings.samples),
+            max_segments: SEGMENTS,
+        }
+    }
+
+    /// The particles, if they bound one connected body.
+    pub(super) fn connected_particles(&self) -> Option<&'a dyn Shape> {
+        self.particles.filter(|shape| shape.is_connected())
+    }
+
+    /// How the rays of a packet at `depth` lie.
+    pub(super) fn coherence(depth: u32) -> Coherence {
+        match depth {
+            1 => Coherence::Coherent,
+            _ => Coherence::Incoherent,
+        }
+    }
+}

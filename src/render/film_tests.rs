@@ -1,0 +1,135 @@
+//! Whoever renders sets every pixel of every plane: films are never cleared before.
+
+use std::sync::atomic::AtomicBool;
+
+use glam::{DVec3, Vec3};
+
+use super::super::brute::Balls;
+use super::super::{ParticleShading, RenderSettings, render_into};
+use super::{Channels, Film};
+use crate::scene::{Background, Bounds, Camera, Framing, Ground, Material, Scene, default_lights};
+
+/// Bits that no renderer makes: of a float, a NaN with a payload.
+const POISON: u32 = 0x7fad_beef;
+
+fn poisoned(width: u32, height: u32, channels: Channels) -> Film {
+    let mut film = Film::new(width, height, channels);
+    let poison = f32::from_bits(POISON);
+    film.color.fill([poison; 4]);
+    if let Some(plane) = &mut film.depth {
+        plane.fill(poison);
+    }
+    if let Some(plane) = &mut film.id {
+        plane.fill(POISON);
+    }
+    let vectors = [
+        &mut film.normal,
+        &mut film.position,
+        &mut film.velocity,
+        &mut film.albedo,
+    ];
+    for plane in vectors.into_iter().flatten() {
+        plane.fill(Vec3::splat(poison));
+    }
+    film
+}
+
+/// All numbers of all planes.
+fn bits(film: &Film) -> Vec<u32> {
+    let vectors = [&film.normal, &film.position, &film.velocity, &film.albedo];
+    let vectors = vectors.into_iter().flatten().flatten();
+    let floats = film
+        .color
+        .iter()
+        .flatten()
+        .chain(film.depth.iter().flatten());
+    let floats = floats.copied().chain(vectors.flat_map(|v| v.to_array()));
+    let floats = floats.map(f32::to_bits);
+    floats.chain(film.id.iter().flatten().copied()).collect()
+}
+
+/// A ball in the middle of nothing, or of a plane.
+fn scene(has_ground: bool) -> Scene {
+    let bounds = Bounds {
+        min: DVec3::NEG_ONE,
+        max: DVec3::ONE,
+    };
+    let view = Camera::framing(&bounds, &Framing::three_quarter(DVec3::Z, 1.5));
+    Scene {
+        origin: DVec3::ZERO,
+        camera: Camera::new(&view, 1.5, DVec3::ZERO).unwrap(),
+        lights: default_lights(&bounds, DVec3::Z, &view),
+        ambient_light: Vec3::ONE,
+        material: Material::DEFAULT,
+        background: Background::default_for(Vec3::Z),
+        ground: has_ground.then(|| Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+    }
+}
+
+/// Renders into new planes and into poisoned ones, and compares.
+#[track_caller]
+fn check(settings: &RenderSettings, scene: &Scene) {
+    let ball = Balls::one(Vec3::ZERO, 1.0);
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    let never = AtomicBool::new(false);
+    let (width, height, channels) = (settings.width, settings.height, settings.channels);
+    let what = (width, height, settings.samples, channels);
+    let into = |mut film: Film| {
+        render_into(&mut film, &[&ball], scene, &source, settings, &never).unwrap();
+        film
+    };
+    let poisoned = poisoned(width, height, channels);
+    let memory = poisoned.color.as_ptr();
+    let film = into(poisoned);
+    assert_eq!(film.color.as_ptr(), memory, "{what:?}");
+    let bits = bits(&film);
+    assert!(!bits.contains(&POISON), "{what:?}");
+    assert!(bits == self::bits(&into(Film::default())), "{what:?}");
+    assert_eq!(film.channels(), channels);
+}
+
+#[test]
+fn every_set_of_planes_is_written_whole() {
+    for bits in 0..64_u32 {
+        let settings = RenderSettings {
+            channels: Channels {
+                depth: bits & 1 != 0,
+                normal: bits & 2 != 0,
+                position: bits & 4 != 0,
+                velocity: bits & 8 != 0,
+                albedo: bits & 16 != 0,
+                id: bits & 32 != 0,
+            },
+            ..RenderSettings::new(19, 18)
+        };
+        check(&settings, &scene(bits % 3 == 0));
+    }
+}
+
+#[test]
+fn tiles_of_every_shape_are_written_whole() {
+    let sizes = [
+        (1, 1),
+        (2, 1),
+        (1, 40),
+        (15, 15),
+        (16, 16),
+        (17, 17),
+        (31, 33),
+        (48, 16),
+        (16, 49),
+        (65, 3),
+    ];
+    for (width, height) in sizes {
+        for samples in [1, 3, 16] {
+            for has_ground in [false, true] {
+                let settings = RenderSettings {
+                    samples,
+                    channels: Channels::ALL,
+                    ..RenderSettings::new(width, height)
+                };
+                check(&settings, &scene(has_ground));
+            }
+        }
+    }
+}

@@ -1,0 +1,83 @@
+//! The intersect stage: the nearest intersections, what of the throughput is left there, and the background behind.
+
+use glam::Vec3;
+
+use super::{
+    context::{Interior, RenderContext},
+    materials::{attenuate, leaving},
+    scratch::PacketScratch,
+    shading::{add_background, scale},
+    stream::SegmentPacket,
+};
+use crate::surface::MaterialId;
+
+impl RenderContext<'_> {
+    /// Finds the nearest intersection of each ray with the shapes of the scene, ends the ray there, and sets the
+    /// throughput up to there.
+    pub(super) fn intersect(
+        &self,
+        segments: &mut SegmentPacket,
+        depth: u32,
+        packet: &mut PacketScratch,
+    ) {
+        packet.hits.clear();
+        let (coherence, inside) = (Self::coherence(depth), segments.inside);
+        for shape in &self.shapes {
+            shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
+        }
+        packet.throughput = segments.throughput;
+        self.absorb(segments, packet);
+    }
+
+    /// Multiplies the throughput by the transmittance of the medium between the origins of the rays and their
+    /// intersections.
+    fn absorb(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+        let extinction = &self.boundary.extinction;
+        if *extinction == Vec3::ZERO {
+            return;
+        }
+        let hits = &packet.hits;
+        let lanes = match self.interior {
+            Interior::Opaque => 0,
+            // A ray that leaves a sphere has come through it.
+            Interior::Spheres => {
+                hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)
+            }
+            // A ray inside without an intersection left by a crack in the surface; its length inside is unknown.
+            Interior::Body => segments.inside & hits.mask,
+        };
+        if lanes != 0 {
+            let throughput = &mut packet.throughput;
+            attenuate(self.simd, extinction, &hits.t, lanes, throughput);
+        }
+    }
+
+    /// Whether rays of `depth` without an intersection see the background.
+    pub(super) fn sees_background(&self, depth: u32) -> bool {
+        depth > 1 || !self.settings.transparent_background
+    }
+
+    /// Adds the background of rays without an intersection, and that behind surfaces that are not fully opaque.
+    pub(super) fn add_background(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+        let hits = &packet.hits;
+        let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        if lanes == 0 {
+            return;
+        }
+        let seen = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
+            0 => 1.0,
+            _ => 1.0 - hits.opacity[lane],
+        });
+        scale(self.simd, &packet.throughput, &seen, &mut packet.weight);
+        let direction = &segments.rays.direction;
+        let (weight, radiance) = (&packet.weight, &mut packet.radiance);
+        add_background(
+            self.simd,
+            &self.background,
+            direction,
+            weight,
+            lanes,
+            radiance,
+        );
+    }
+}

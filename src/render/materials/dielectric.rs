@@ -1,0 +1,130 @@
+//! The smooth boundary of a transmissive medium, and absorption within.
+
+use glam::Vec3;
+
+use crate::math::functions::exp;
+use crate::math::{LANES, Lanes, Lanes3, lane_kernel};
+use crate::ray::RayPacket;
+use crate::scene::material::{dielectric, schlick};
+use crate::scene::{self, Fresnel};
+use crate::surface::Intersections;
+
+/// The boundary of the particles, and the medium behind it.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::render) struct Dielectric {
+    /// Index of refraction inside over that outside.
+    pub(super) ior: f32,
+    r0: f32,
+    is_exact: bool,
+    /// Weight of the refracted ray; 0 is opaque.
+    pub(in crate::render) transmission: f32,
+    /// Extinction coefficient of the medium, linear RGB, per scene unit.
+    pub(in crate::render) extinction: Vec3,
+}
+
+impl Dielectric {
+    pub(in crate::render) fn new(material: &scene::Material) -> Self {
+        Self {
+            ior: material.ior,
+            r0: material.r0(),
+            is_exact: material.fresnel == Fresnel::Exact,
+            transmission: material.transmission,
+            extinction: material.extinction,
+        }
+    }
+
+    /// The Fresnel reflectance at the absolute `cosine` between ray and normal, and the squared sine of the refracted
+    /// ray, which is 1 or more under total internal reflection. `ratio` is the index of refraction on the ray's side over
+    /// the one beyond.
+    #[inline(always)]
+    pub(super) fn fresnel(&self, cosine: f32, ratio: f32) -> (f32, f32) {
+        let rest = 1.0 - cosine * cosine;
+        let sin2_out = ratio * ratio * if rest > 0.0 { rest } else { 0.0 };
+        let r = self.reflectance(cosine, ratio);
+        (if sin2_out >= 1.0 { 1.0 } else { r }, sin2_out)
+    }
+
+    /// What a shadow ray keeps that crosses the boundary without a bend, at the absolute `cosine` with the normal: as
+    /// seen from outside, whichever side it comes from.
+    #[inline(always)]
+    pub(in crate::render) fn straight_transmittance(&self, cosine: f32) -> f32 {
+        self.transmission * (1.0 - self.reflectance(cosine, 1.0 / self.ior))
+    }
+
+    #[inline(always)]
+    fn reflectance(&self, cosine: f32, ratio: f32) -> f32 {
+        if self.is_exact {
+            dielectric(cosine, ratio)
+        } else {
+            schlick(self.r0, cosine)
+        }
+    }
+}
+
+/// Multiplies `throughput` by the transmittance of a medium over `length` (Beer-Lambert), for `lanes` alone.
+#[inline(always)]
+fn attenuate_body(extinction: &Vec3, length: &Lanes, lanes: u32, throughput: &mut Lanes3) {
+    for axis in 0..3 {
+        for l in 0..LANES {
+            let length = if length[l] > 0.0 { length[l] } else { 0.0 };
+            let kept = throughput[axis][l] * exp(-length * extinction[axis]);
+            let is_inside = lanes >> l & 1 == 1;
+            throughput[axis][l] = if is_inside { kept } else { throughput[axis][l] };
+        }
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn attenuate(
+        extinction: &Vec3,
+        length: &Lanes,
+        lanes: u32,
+        throughput: &mut Lanes3,
+    ) = attenuate_body;
+}
+
+/// The lanes whose rays leave a sphere at their intersection.
+#[inline(always)]
+fn leaving_body(rays: &RayPacket, hits: &Intersections) -> u32 {
+    let (d, n) = (&rays.direction, &hits.normal);
+    let mut leaving = 0;
+    for l in 0..LANES {
+        let along = d[0][l] * n[0][l] + d[1][l] * n[1][l] + d[2][l] * n[2][l];
+        leaving |= u32::from(along >= 0.0) << l;
+    }
+    leaving
+}
+
+lane_kernel! {
+    pub(in crate::render) fn leaving(rays: &RayPacket, hits: &Intersections) -> u32 = leaving_body;
+}
+
+/// Multiplies `transmittance` by what shadow rays keep where they cross the boundary, for `lanes` alone.
+#[inline(always)]
+fn cross_straight_body(
+    boundary: &Dielectric,
+    rays: &RayPacket,
+    hits: &Intersections,
+    lanes: u32,
+    transmittance: &mut Lanes3,
+) {
+    let (d, n) = (&rays.direction, &hits.normal);
+    for l in 0..LANES {
+        let along = d[0][l] * n[0][l] + d[1][l] * n[1][l] + d[2][l] * n[2][l];
+        let passed = boundary.straight_transmittance(along.abs());
+        let passed = if lanes >> l & 1 == 1 { passed } else { 1.0 };
+        for transmittance in &mut *transmittance {
+            transmittance[l] *= passed;
+        }
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn cross_straight(
+        boundary: &Dielectric,
+        rays: &RayPacket,
+        hits: &Intersections,
+        lanes: u32,
+        transmittance: &mut Lanes3,
+    ) = cross_straight_body;
+}

@@ -1,0 +1,156 @@
+//! Memory that a thread keeps from tile to tile: the samples of a group of pixels, the rays of two depths, and what
+//! one packet needs.
+
+use super::{
+    aov::DataSample,
+    lights::LightSamples,
+    materials::ShadingPoints,
+    ray_counts::RayCounts,
+    sampler::PathSeed,
+    settings::RenderSettings,
+    stream::{RayStreams, SegmentPacket},
+    tile::SIDE,
+};
+use crate::math::{LANES, Lanes, Lanes3, lanes_in, splat};
+use crate::surface::Intersections;
+
+/// Samples of a group of pixels, unless one pixel has more.
+pub(super) const GROUP: u32 = 4096;
+
+/// Path segments of one depth, as far as batches of at least one packet of samples allow.
+pub(super) const SEGMENTS: usize = 16_384;
+
+/// The memory of one thread.
+#[derive(Default)]
+pub(super) struct Scratch {
+    pub(super) group: SampleGroup,
+    pub(super) camera: Box<SegmentPacket>,
+    /// The depth that is traced, and the one after it.
+    pub(super) current: RayStreams,
+    pub(super) next: RayStreams,
+    pub(super) packet: Box<PacketScratch>,
+}
+
+/// The samples of a group of pixels, pixel by pixel.
+#[derive(Default)]
+pub(super) struct SampleGroup {
+    pub(super) pixels: Vec<Pixel>,
+    /// Samples in the group.
+    pub(super) len: usize,
+    /// Position of each sample on the film, pixels.
+    pub(super) film: Vec<[Lanes; 2]>,
+    /// Radiance that arrives at each sample, linear RGB.
+    pub(super) radiance: Vec<Lanes3>,
+    /// Part of each sample that surfaces cover.
+    pub(super) coverage: Vec<Lanes>,
+}
+
+/// A pixel of a group, and its data.
+pub(super) struct Pixel {
+    pub(super) column: u32,
+    pub(super) row: u32,
+    pub(super) path: PathSeed,
+    pub(super) data: DataSample,
+}
+
+/// Memory for the stages of one packet.
+#[derive(Default)]
+pub(super) struct PacketScratch {
+    /// The nearest intersections.
+    pub(super) hits: Intersections,
+    /// Part of the radiance at the intersections that arrives at the samples.
+    pub(super) throughput: Lanes3,
+    /// Radiance that arrives at the samples: the result.
+    pub(super) radiance: Lanes3,
+    /// Base colours of the surfaces.
+    pub(super) base: Lanes3,
+    pub(super) points: ShadingPoints,
+    pub(super) light: LightSamples,
+    /// Surfaces that shadow rays cross.
+    pub(super) crossings: Intersections,
+    pub(super) weight: Lanes3,
+    /// Particles, with weights, from which a point takes its colour.
+    pub(super) blend: Vec<(u32, f32)>,
+    /// Rays traced for the tile.
+    pub(super) counts: RayCounts,
+}
+
+impl SampleGroup {
+    /// Removes all pixels and samples.
+    pub(super) fn clear(&mut self) {
+        self.pixels.clear();
+        self.len = 0;
+        self.film.clear();
+        self.radiance.clear();
+        self.coverage.clear();
+    }
+
+    /// Adds samples at these offsets, across and down, from the corner of a pixel.
+    pub(super) fn push_pixel(&mut self, x: f32, y: f32, (across, down): (&[f32], &[f32])) {
+        if !self.len.is_multiple_of(LANES) || !across.len().is_multiple_of(LANES) {
+            for (across, down) in across.iter().zip(down) {
+                self.push(x + across, y + down);
+            }
+            return;
+        }
+        let (across, down) = (across.as_chunks().0, down.as_chunks().0);
+        for (across, down) in across.iter().zip(down) {
+            self.push_packet([
+                across.map(|offset| x + offset),
+                down.map(|offset| y + offset),
+            ]);
+            self.len += LANES;
+        }
+    }
+
+    fn push_packet(&mut self, film: [Lanes; 2]) {
+        self.film.push(film);
+        self.radiance.push([splat(0.0); 3]);
+        self.coverage.push(splat(0.0));
+    }
+
+    /// Adds a sample at a position on the film, pixels.
+    pub(super) fn push(&mut self, x: f32, y: f32) {
+        let lane = self.len % LANES;
+        if lane == 0 {
+            self.push_packet([splat(0.0); 2]);
+        }
+        if let Some(film) = self.film.last_mut() {
+            film[0][lane] = x;
+            film[1][lane] = y;
+        }
+        self.len += 1;
+    }
+
+    /// Adds `radiance` to the samples of `segments`, in order, as several rays of a packet may belong to one sample.
+    pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3) {
+        for lane in lanes_in(segments.lanes()) {
+            let sample = segments.sample[lane] as usize;
+            let sum = &mut self.radiance[sample / LANES];
+            for (sum, radiance) in sum.iter_mut().zip(radiance) {
+                sum[sample % LANES] += radiance[lane];
+            }
+        }
+    }
+}
+
+/// Samples, in whole packets, that are traced together where each has up to `max_paths` path segments at one depth,
+/// and all together at most `segments`.
+pub(super) fn batch_len(segments: usize, max_paths: usize) -> usize {
+    (segments / max_paths).min(GROUP as usize).max(LANES) / LANES * LANES
+}
+
+/// Bytes of the [`Scratch`] of one thread, rounded up, where each sample has up to `max_paths` path segments at one
+/// depth.
+pub(super) fn scratch_bytes(settings: &RenderSettings, max_paths: usize) -> u64 {
+    let tile = (SIDE * SIDE) as usize * settings.samples as usize;
+    let held = tile.min(GROUP.max(settings.samples) as usize);
+    let rays = match settings.max_depth {
+        1 => 0,
+        _ => batch_len(SEGMENTS, max_paths).min(held) * max_paths,
+    };
+    let samples = held.div_ceil(LANES) * 6 * size_of::<Lanes>();
+    let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
+    let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>();
+    (samples + segments + packet) as u64 + 32_768
+}

@@ -1,0 +1,76 @@
+//! The files that a run leaves: `scale.json`, `scale.csv`, `scale.html`. Each appears whole or not
+//! at all.
+
+use std::fs;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+use serde_json::Value;
+use spherule_jobs::{Publisher, publish};
+
+use super::{CSV, HTML, JSON, MADE_BY, ScaleReport, csv, page};
+
+/// How a file under one of the names is known to be ours.
+type Mark = fn(&str) -> bool;
+
+const OURS: [(&str, Mark); 3] = [(JSON, is_our_json), (CSV, is_our_csv), (HTML, is_our_page)];
+
+/// Writes all files into `dir`, over older ones.
+///
+/// # Errors
+/// With the file that cannot be written.
+pub fn write(dir: &Path, report: &ScaleReport) -> Result<(), (PathBuf, io::Error)> {
+    let json = format!("{:#}\n", serde_json::json!(report));
+    for (name, text) in [
+        (JSON, json),
+        (CSV, csv::text(report)),
+        (HTML, page::html(report)),
+    ] {
+        let path = dir.join(name);
+        publish(&path, text.as_bytes()).map_err(|e| (path, e))?;
+    }
+    Ok(())
+}
+
+/// Makes `dir` and sees whether files can be made in it; leaves nothing else behind.
+///
+/// # Errors
+/// What the file system says.
+pub fn prepare(dir: &Path) -> io::Result<()> {
+    fs::create_dir_all(dir)?;
+    Publisher::create(&dir.join(JSON)).map(drop)
+}
+
+/// A file in `dir` under one of our names that we have not made.
+pub fn foreign(dir: &Path) -> Option<PathBuf> {
+    OURS.into_iter().find_map(|(name, is_ours)| {
+        let path = dir.join(name);
+        let foreign = path.symlink_metadata().is_ok() && !read(&path).is_some_and(|t| is_ours(&t));
+        foreign.then_some(path)
+    })
+}
+
+/// Text up to a length that no report of ours has.
+fn read(path: &Path) -> Option<String> {
+    const MOST: u64 = 64 << 20;
+    let mut text = String::new();
+    let file = fs::File::open(path).ok()?;
+    if !file.metadata().ok()?.is_file() {
+        return None;
+    }
+    file.take(MOST).read_to_string(&mut text).ok()?;
+    Some(text)
+}
+
+fn is_our_json(text: &str) -> bool {
+    serde_json::from_str::<Value>(text).is_ok_and(|v| v["made_by"] == MADE_BY)
+}
+
+fn is_our_csv(text: &str) -> bool {
+    // Older versions may have had other numbers.
+    text.starts_with("particles,structure,motion,")
+}
+
+fn is_our_page(text: &str) -> bool {
+    text.contains(&format!("<title>{MADE_BY}"))
+}

@@ -1,0 +1,374 @@
+//! `scale.html`: the tables with the thesis's figures beside ours, and plots against the particle
+//! count on logarithmic axes.
+
+use super::table;
+use super::{
+    CSV, CellMeasurement, Column, FAILED, JSON, MADE_BY, MIB, MISSING, ScaleReport, parts, thesis,
+};
+use crate::report::page::{Page, Table};
+use crate::report::plots::{Axis, Line, Plot, Series};
+use crate::scale::Motion;
+
+/// The whole file.
+pub fn html(report: &ScaleReport) -> String {
+    let mut page = Page::new(&format!(
+        "{MADE_BY}: frame rate, build time and memory by particle count"
+    ));
+    introduce(&mut page, report);
+    page.section("plots", "Against the particle count");
+    page.text(
+        "An image's time is one over the mean rate, which is what is known of the thesis. Bytes a \
+         particle are those of the tree, in memory or in the mapped file, not of the process; the \
+         thesis's are of its process.",
+    );
+    page.plots(&plots(report));
+    for motion in &report.settings.motions {
+        let heading = format!("Images per second: {motion}");
+        page.section(&format!("rate-{motion}"), &heading);
+        page.text(
+            "Mean over the images of a cell, in brackets the standard deviation: the spread over \
+             the camera's way, not an error.",
+        );
+        page.table(&rates(report, *motion));
+    }
+    page.section("build", "Build time, s");
+    page.text(
+        "Median of the builds of a cell, and of its motions. The thesis says about 2.5 s for lbvh \
+         and kdtree, more than 80 s for sbvh.",
+    );
+    page.table(&figures(
+        report,
+        "build-table",
+        table::build_seconds,
+        &thesis::BUILD_SECONDS,
+    ));
+    page.section("memory", "Peak memory, MB");
+    page.text(
+        "Everything that the process has had resident at once (VmHWM), the program itself \
+         included, in units of 1024 x 1024 bytes, which the thesis's MB are too. The thesis's \
+         figures are of its own program on a graphics card.",
+    );
+    page.table(&figures(
+        report,
+        "memory-table",
+        table::peak,
+        &thesis::PEAK_MIB,
+    ));
+    put_parts(&mut page, report);
+    page.section("cells", "All cells");
+    page.fold("Every cell, with its rays and its memory by purpose");
+    page.table(&cells(report));
+    page.end_fold();
+    page.link("The same for programs:", JSON);
+    page.link("And for spreadsheets:", CSV);
+    page.html()
+}
+
+/// Memory by part, and the native frames if there are some.
+fn put_parts(page: &mut Page, report: &ScaleReport) {
+    page.section("parts", "Memory by part");
+    page.text(&format!(
+        "In {}. Positions include radii. What lies in a mapped file is no anonymous memory: pages are \
+         read when rays come to them, and the system may drop them. The peaks are the highest RssAnon and \
+         RssFile, looked at every few milliseconds while loading and building and after each image. The \
+         thesis's figure is that of its whole process.",
+        parts::NOTE
+    ));
+    put_rows(page, "parts-table", &parts::HEADS, parts::rows(report));
+    let conversions = parts::conversions(report);
+    if !conversions.is_empty() {
+        page.section("conversions", "Native frames");
+        page.text(
+            "Particles traced in place were written to a native frame first, once for all motions, in a \
+             process of its own; compact positions are kept within 0.02 radius. Times do not count above.",
+        );
+        put_rows(
+            page,
+            "conversions-table",
+            &parts::CONVERSION_HEADS,
+            conversions,
+        );
+    }
+}
+
+fn put_rows(page: &mut Page, id: &str, heads: &[&str], rows: Vec<Vec<String>>) {
+    let mut table = Table::new(id, heads);
+    for row in rows {
+        table.row(row);
+    }
+    page.table(&table);
+}
+
+fn introduce(page: &mut Page, report: &ScaleReport) {
+    page.key_values(&[
+        ("measured", table::subject(report)),
+        ("on", table::conditions(report)),
+        ("the thesis measured on", thesis::MACHINE.to_owned()),
+    ]);
+    for (cell, reason) in report.failed() {
+        page.warning(&format!("failed: {}: {reason}", table::cell_name(cell)));
+    }
+    let missing = report.planned.saturating_sub(report.cells.len());
+    if missing > 0 {
+        page.warning(&format!(
+            "{missing} of {} cells were not measured: the run goes on or was interrupted",
+            report.planned
+        ));
+    }
+    page.text(
+        "Rotation takes the camera once around the particles; translation straight along its view, \
+         from twice the distance to the point looked at, to it and as far again beyond; both does \
+         both at once. Every cell ran in a process of its own.",
+    );
+}
+
+/// Rows are counts; our columns, then the thesis's.
+fn rates(report: &ScaleReport, motion: Motion) -> Table {
+    let columns = report.columns();
+    let theirs: Vec<_> = thesis::RATES
+        .iter()
+        .filter(|r| r.motion == motion)
+        .collect();
+    let names: Vec<&str> = theirs.iter().map(|r| r.structure).collect();
+    let mut table = table_with(&format!("rate-{motion}-table"), &columns, &names);
+    for particles in counts(report, thesis::RATE_PARTICLES) {
+        let ours = columns
+            .iter()
+            .map(|c| table::rate(report, particles, c, motion));
+        let theirs = theirs.iter().map(|r| {
+            if particles == thesis::RATE_PARTICLES {
+                format!("{:.2} ({:.2})", r.mean, r.sd)
+            } else {
+                MISSING.to_owned()
+            }
+        });
+        table.row(
+            std::iter::once(particles.to_string())
+                .chain(ours)
+                .chain(theirs),
+        );
+    }
+    table
+}
+
+/// The same for a figure that motions share.
+fn figures(
+    report: &ScaleReport,
+    id: &str,
+    value: fn(&ScaleReport, usize, &Column) -> Option<String>,
+    theirs: &[thesis::Figure],
+) -> Table {
+    let columns = report.columns();
+    let mut names: Vec<&str> = Vec::new();
+    for figure in theirs {
+        if !names.contains(&figure.structure) {
+            names.push(figure.structure);
+        }
+    }
+    let mut table = table_with(id, &columns, &names);
+    for particles in counts(report, thesis::RATE_PARTICLES) {
+        let ours = columns
+            .iter()
+            .map(|c| table::summed(report, particles, c, value(report, particles, c)));
+        let theirs = names.iter().map(|name| {
+            let found = theirs
+                .iter()
+                .find(|f| f.particles == particles && f.structure == *name);
+            found.map_or_else(|| MISSING.to_owned(), |f| format!("{:.1}", f.value))
+        });
+        table.row(
+            std::iter::once(particles.to_string())
+                .chain(ours)
+                .chain(theirs),
+        );
+    }
+    table
+}
+
+/// What was asked for, and what the thesis has on top.
+fn counts(report: &ScaleReport, theirs: usize) -> Vec<usize> {
+    let mut counts = report.settings.particles.clone();
+    if report.settings.input.is_none() && !counts.contains(&theirs) {
+        counts.push(theirs);
+    }
+    counts
+}
+
+/// Columns for the count, for ours and for the thesis's.
+fn table_with(id: &str, columns: &[Column], theirs: &[&str]) -> Table {
+    let theirs: Vec<String> = theirs
+        .iter()
+        .map(|name| format!("thesis\n{name}"))
+        .collect();
+    let heads: Vec<&str> = std::iter::once("particles")
+        .chain(columns.iter().map(|c| c.title.as_str()))
+        .chain(theirs.iter().map(String::as_str))
+        .collect();
+    Table::new(id, &heads)
+}
+
+fn plots(report: &ScaleReport) -> Vec<Plot> {
+    let mut all = vec![
+        plot(
+            report,
+            "plot-build",
+            "Build time",
+            "time, s",
+            |r, n, c| r.build_seconds(n, c),
+            &thesis::BUILD_SECONDS,
+        ),
+        plot(
+            report,
+            "plot-memory",
+            "Peak memory of the process",
+            "memory, MB",
+            |r, n, c| Some(r.peak_bytes(n, c)? as f64 / MIB),
+            &thesis::PEAK_MIB,
+        ),
+        plot(
+            report,
+            "plot-bytes",
+            "Positions and structure",
+            "bytes a particle",
+            |r, n, c| {
+                let share = measured(r, n, c, None)?.bytes_per_particle?;
+                Some(share.positions + share.structure)
+            },
+            &thesis::BYTES_PER_PARTICLE,
+        ),
+    ];
+    for &motion in &report.settings.motions {
+        let theirs: Vec<thesis::Figure> = thesis::RATES
+            .iter()
+            .filter(|r| r.motion == motion)
+            .map(|r| thesis::Figure {
+                structure: r.structure,
+                particles: thesis::RATE_PARTICLES,
+                value: 1e3 / r.mean,
+            })
+            .collect();
+        all.push(plot(
+            report,
+            &format!("plot-image-{motion}"),
+            &format!("Time of an image: {motion}"),
+            "time, ms",
+            |r, n, c| {
+                let rate = measured(r, n, c, Some(motion))?.images_per_second.mean;
+                (rate > 0.0).then(|| 1e3 / rate)
+            },
+            &theirs,
+        ));
+    }
+    all
+}
+
+/// A line a column, and the thesis's beside it in the same colour.
+fn plot(
+    report: &ScaleReport,
+    id: &str,
+    title: &str,
+    unit: &str,
+    value: impl Fn(&ScaleReport, usize, &Column) -> Option<f64>,
+    theirs: &[thesis::Figure],
+) -> Plot {
+    let mut plot = Plot::new(id, title, Axis::log("particles"), Axis::log(unit));
+    let columns = report.columns();
+    let mut counts: Vec<usize> = report.settings.particles.clone();
+    counts.sort_unstable();
+    for (hue, column) in columns.iter().enumerate() {
+        let points = counts.iter().filter(|n| **n > 0).map(|&n| {
+            let value = value(report, n, column);
+            (n as f64, value.unwrap_or(f64::NAN))
+        });
+        plot = plot.with(Series::new(&column.title, points).hue(hue));
+    }
+    // A user's own particles are no comparison.
+    if report.settings.input.is_some() {
+        return plot;
+    }
+    for (hue, column) in columns.iter().enumerate() {
+        let is_first = columns.iter().position(|c| c.structure == column.structure) == Some(hue);
+        let points: Vec<(f64, f64)> = theirs
+            .iter()
+            .filter(|f| is_first && f.structure == column.structure)
+            .map(|f| (f.particles as f64, f.value))
+            .collect();
+        if !points.is_empty() {
+            let name = format!("thesis, {}", column.structure);
+            plot = plot.with(Series::new(name, points).hue(hue).line(Line::Dashed));
+        }
+    }
+    plot
+}
+
+/// What was measured of a count and a column, with one motion or the first that was.
+fn measured<'a>(
+    report: &'a ScaleReport,
+    particles: usize,
+    column: &'a Column,
+    motion: Option<Motion>,
+) -> Option<&'a CellMeasurement> {
+    report
+        .cells_of(particles, column)
+        .filter(|cell| motion.is_none_or(|m| cell.motion == m))
+        .find_map(|cell| cell.measured())
+}
+
+const CELL_HEADS: [&str; 18] = [
+    "particles",
+    "structure",
+    "positions",
+    "motion",
+    "images",
+    "images a second",
+    "fewest",
+    "most",
+    "first build, s",
+    "build, s",
+    "Mrays a second",
+    "primary",
+    "shadow",
+    "reflection",
+    "refraction",
+    "peak, MB",
+    "anonymous, MB",
+    "files, MB",
+];
+
+fn cells(report: &ScaleReport) -> Table {
+    let mut table = Table::new("cells-table", &CELL_HEADS);
+    for cell in &report.cells {
+        let names = [
+            cell.particles.to_string(),
+            cell.structure.clone(),
+            cell.representation.place().to_owned(),
+            cell.motion.to_string(),
+        ];
+        match cell.measured() {
+            Some(measured) => table.row(names.into_iter().chain(numbers(measured))),
+            None => table.bad_row(names.into_iter().chain([FAILED.to_owned()])),
+        }
+    }
+    table
+}
+
+fn numbers(m: &CellMeasurement) -> [String; 14] {
+    let millions = |rate: f64| format!("{:.2}", rate * 1e-6);
+    let mib = |bytes: u64| format!("{:.1}", bytes as f64 / MIB);
+    [
+        m.images.to_string(),
+        table::spread(&m.images_per_second),
+        format!("{:.2}", m.images_per_second.min),
+        format!("{:.2}", m.images_per_second.max),
+        format!("{:.4}", m.build_seconds.first),
+        format!("{:.4}", m.build_seconds.median),
+        millions(m.rays_per_second.total),
+        millions(m.rays_per_second.primary),
+        millions(m.rays_per_second.shadow),
+        millions(m.rays_per_second.reflection),
+        millions(m.rays_per_second.refraction),
+        mib(m.rss.total_peak),
+        mib(m.rss.anonymous_peak),
+        mib(m.rss.file_peak),
+    ]
+}

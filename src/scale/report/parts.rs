@@ -1,0 +1,126 @@
+//! Memory by part: rows are counts in a column of the other tables, columns parts. And what the native
+//! frames took to make.
+
+use super::{CellMeasurement, Column, Conversion, ScaleReport, thesis};
+use super::{FAILED, MIB, MISSING};
+
+/// Heads of the table of bytes.
+pub(super) const HEADS: [&str; 11] = [
+    "particles",
+    "tree",
+    "positions",
+    "attributes",
+    "nodes",
+    "together",
+    "in memory",
+    "in the file",
+    "scratch",
+    "peak anonymous, MB",
+    "peak mapped, MB",
+];
+
+/// Heads of the table of conversions.
+pub(super) const CONVERSION_HEADS: [&str; 7] = [
+    "particles",
+    "tree",
+    "particles made, s",
+    "converted, s",
+    "file, MB",
+    "largest error, of the radius",
+    "peak anonymous, MB",
+];
+
+/// What the columns of bytes mean.
+pub(super) const NOTE: &str = "bytes a particle while tracing (positions to in the file) and while building \
+    (scratch); peaks of the process as seen, with images and the program itself";
+
+/// The rows of the table of bytes, the thesis's in the end.
+pub(super) fn rows(report: &ScaleReport) -> Vec<Vec<String>> {
+    let mut rows = our_rows(report);
+    if report.settings.input.is_none() {
+        let mut theirs = vec![MISSING.to_owned(); HEADS.len()];
+        theirs[0] = thesis::RATE_PARTICLES.to_string();
+        theirs[1] = "the thesis, about".to_owned();
+        theirs[5] = format!("{:.0}", thesis::BYTES_PER_PARTICLE[0].value);
+        rows.push(theirs);
+    }
+    rows
+}
+
+fn our_rows(report: &ScaleReport) -> Vec<Vec<String>> {
+    rows_of(report, |particles, column| {
+        let mut cells = report.cells_of(particles, column).peekable();
+        let empty = match cells.peek() {
+            Some(_) => FAILED,
+            None => MISSING,
+        };
+        let Some(measured) = cells.find_map(|c| c.measured()) else {
+            return Some(vec![empty.to_owned(); HEADS.len() - 2]);
+        };
+        let peaks = [
+            report.anonymous_peak_bytes(particles, column),
+            report.file_peak_bytes(particles, column),
+        ];
+        let peaks = peaks.map(|bytes| bytes.map_or_else(|| MISSING.to_owned(), mib));
+        Some(shares(measured).into_iter().chain(peaks).collect())
+    })
+}
+
+/// Bytes a particle; none without particles.
+fn shares(measured: &CellMeasurement) -> Vec<String> {
+    let Some(share) = measured.bytes_per_particle else {
+        return vec![MISSING.to_owned(); 7];
+    };
+    let all = [
+        share.positions,
+        share.attributes,
+        share.structure,
+        share.anonymous + share.file,
+        share.anonymous,
+        share.file,
+        share.scratch,
+    ];
+    all.iter().map(|bytes| format!("{bytes:.2}")).collect()
+}
+
+/// The rows of the table of conversions, one a native frame.
+pub(super) fn conversions(report: &ScaleReport) -> Vec<Vec<String>> {
+    rows_of(report, |particles, column| {
+        let mut cells = report.cells_of(particles, column);
+        let conversion = cells.find_map(|c| c.measured()?.conversion)?;
+        Some(conversion_cells(&conversion).to_vec())
+    })
+}
+
+fn conversion_cells(conversion: &Conversion) -> [String; 5] {
+    let error = conversion.max_error_of_radius;
+    [
+        format!("{:.3}", conversion.load_seconds),
+        format!("{:.3}", conversion.seconds),
+        mib(conversion.file_bytes),
+        error.map_or_else(|| MISSING.to_owned(), |error| format!("{error:.4}")),
+        mib(conversion.rss.anonymous_peak),
+    ]
+}
+
+/// A row for every count and column that has one, both named in front.
+fn rows_of(
+    report: &ScaleReport,
+    row: impl Fn(usize, &Column) -> Option<Vec<String>>,
+) -> Vec<Vec<String>> {
+    let columns = report.columns();
+    let mut rows = Vec::new();
+    for &particles in &report.settings.particles {
+        for column in &columns {
+            if let Some(row) = row(particles, column) {
+                let names = [particles.to_string(), column.title.clone()];
+                rows.push(names.into_iter().chain(row).collect());
+            }
+        }
+    }
+    rows
+}
+
+fn mib(bytes: u64) -> String {
+    format!("{:.1}", bytes as f64 / MIB)
+}
