@@ -39,7 +39,7 @@ pub(super) fn each_neighbour(
     if tree.has_copies() {
         each_once(tree, point, reach, add);
     } else {
-        tree.visit_near(point, reach, |_, center| add(center));
+        tree.visit_neighbours(point, reach, |_, center| add(center));
     }
     count <= MOST_NEIGHBOURS
 }
@@ -53,7 +53,7 @@ fn each_once(tree: &TreeView, point: Vec3, reach: f32, mut add: impl FnMut(Vec3)
     }
     FOUND.with_borrow_mut(|found| {
         found.clear();
-        tree.visit_near(point, reach, |slot, center| {
+        tree.visit_neighbours(point, reach, |slot, center| {
             found.push((tree.particle(slot), center));
             found.len() <= COPIES * MOST_NEIGHBOURS
         });

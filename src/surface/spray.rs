@@ -14,7 +14,7 @@ pub const DROP_RADIUS: f32 = 0.5;
 /// The tree must know its particles' indices.
 #[must_use]
 pub fn spray_of(tree: &TreeView, support: f32) -> Vec<u32> {
-    tree.lonely(support, ENOUGH_NEIGHBOURS)
+    tree.isolated(support, ENOUGH_NEIGHBOURS)
 }
 
 #[cfg(test)]
