@@ -124,7 +124,7 @@ mod tests {
         assert!((1..POINTS).all(|i| !all[..i].contains(&all[i])));
     }
 
-    /// Large spheres among small ones are cut; one then loses a part.
+    /// Large spheres among small ones are cut; the test removes one part.
     #[test]
     fn a_lost_part_is_found() {
         let centers: Vec<Vec3> = (0..1000_u16)

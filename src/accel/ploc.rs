@@ -267,7 +267,7 @@ mod tests {
 
     const COUNT: usize = 3000;
 
-    /// Clusters spheres of radius 1 about `centers`.
+    /// Clusters spheres of radius 1 around `centers`.
     fn clustered(centers: &[Vec3], preset: BvhPreset) -> Clustered {
         let bounds_of = |place: usize| Aabb {
             min: centers[place] - 1.0,
@@ -293,7 +293,7 @@ mod tests {
         levels.into_iter().max().unwrap_or(0)
     }
 
-    /// Else merging is one pair a pass, and time grows with the square of the particles.
+    /// Otherwise a pass merges one pair, and time grows with the square of the particle count.
     #[test]
     fn equal_distances_do_not_make_chains() {
         let line = (0..COUNT).map(|i| Vec3::X * i as f32).collect();

@@ -221,7 +221,7 @@ mod tests {
     use super::*;
     use crate::accel::{BvhSettings, SphereRadius, Spheres, TreeBuilder};
 
-    /// Builds over an even spread and compares with what the builder says.
+    /// Builds over an even distribution and compares with the report of the builder.
     #[track_caller]
     fn compare(settings: &BuildSettings, particles: usize, own_radii: bool) {
         let centers = fill_box(&BoxSettings::thesis(particles, 1));
@@ -240,7 +240,7 @@ mod tests {
         let report = TreeBuilder::new().build(&spheres, settings);
         let predicted = predicted_bytes(settings, particles as u64, own_radii);
         let built = report.position_bytes + report.structure_bytes;
-        // Few blocks are filled by chance.
+        // The fill of few blocks varies.
         let slack = if particles < 10_000 {
             1024 + particles as u64 * 12
         } else {

@@ -157,8 +157,8 @@ impl SurfaceBuilder {
     ) -> Result<RayCounts, RenderError> {
         let normals = shading_normals(&setup.picture.surface);
         let body: Box<dyn Shape + '_> = match setup.picture.surface.kind {
-            SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
-            SurfaceKind::Union => Box::new(UnionSurface::new(tree).shaded_by(normals)),
+            SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).with_normals(normals)),
+            SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),
             SurfaceKind::Smooth => Box::new(self.smooth.surface()),
         };
         let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);

@@ -295,7 +295,7 @@ mod tests {
     }
 
     proptest! {
-        /// Points of the sphere in the cell are in its part, however often it was cut.
+        /// Points of the sphere in the cell are in its part after any number of cuts.
         #[test]
         fn parts_hold_what_of_the_sphere_is_in_their_cells(
             center in prop::array::uniform3(-1e3_f32..1e3),

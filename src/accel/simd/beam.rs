@@ -232,7 +232,7 @@ mod tests {
         assert!(beam.growth > 0.5 * apart && beam.growth < apart);
         assert!(around(&[one, turned], 0b11).is_none());
         assert!(around(&[one, across], 0b11).is_none());
-        // Lanes out of use do not count.
+        // Inactive lanes do not matter.
         assert!(around(&[turned, one, across, other], 0b1010).is_some());
     }
 
