@@ -92,7 +92,9 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
     let Some(onward) = refract(ray.direction, normal, ratio) else {
         return AMBIENT + mirrored;
     };
-    let r = scene.material.mirrored(-ray.direction.dot(normal), ratio);
+    let r = scene
+        .material
+        .fresnel_reflectance(-ray.direction.dot(normal), ratio);
     AMBIENT + r * mirrored + (1.0 - r) * below(hit.anchor - step, onward)
 }
 
