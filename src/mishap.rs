@@ -1,11 +1,11 @@
-//! What may befall the work on one frame, and how far it reaches.
+//! Failures of the work on one frame, and their scope.
 
 use std::io;
 use std::panic::{self, AssertUnwindSafe};
 
 use spherule_formats::{FrameError, Sequence};
 
-/// Runs the work of one frame; a panic in it is a fault of ours that costs this frame and no other.
+/// Runs the work of one frame. A panic in it is a bug in this program, and fails only this frame.
 pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
     panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|fault| {
         let text = fault
@@ -19,8 +19,8 @@ pub(crate) fn guarded<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, 
     })
 }
 
-/// Whether all further files would fail for the same reason: the disk is full, or the directory cannot be
-/// written any more, or is gone.
+/// Whether all further files would fail for the same reason: the disk is full, or the directory is no longer writable
+/// or has been removed.
 pub(crate) fn is_place_at_fault(error: &io::Error) -> bool {
     matches!(
         error.kind(),
@@ -33,8 +33,8 @@ pub(crate) fn is_place_at_fault(error: &io::Error) -> bool {
     )
 }
 
-/// Whether frame `index` may be damaged only because the simulation is still writing it, and the
-/// `error` does not say so itself.
+/// Whether frame `index` may be damaged only because the simulation is still writing it, unless the `error` states
+/// that already.
 pub(crate) fn may_be_unfinished(sequence: &Sequence, index: usize, error: &FrameError) -> bool {
     let is_newest = index + 1 == sequence.frames().len();
     let is_damage = matches!(error, FrameError::Malformed { .. });

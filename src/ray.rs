@@ -1,22 +1,22 @@
-//! Rays: where, which way, how far.
+//! Rays and packets of rays.
 
 use glam::Vec3;
 
-/// A half-open piece of a line. Lengths are scene units.
+/// A ray with a half-open range of distances. Lengths are in scene units.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ray {
-    /// Start, relative to the sequence's origin.
+    /// Origin, relative to the origin of the sequence.
     pub origin: Vec3,
     /// Unit direction.
     pub direction: Vec3,
-    /// Nearest distance that counts.
+    /// Lower end of the range, inclusive.
     pub t_min: f32,
-    /// Farthest distance that counts.
+    /// Upper end of the range, exclusive.
     pub t_max: f32,
 }
 
 impl Ray {
-    /// A ray from `origin` along the unit vector `direction` without an end.
+    /// An unbounded ray from `origin` along the unit vector `direction`.
     pub const fn new(origin: Vec3, direction: Vec3) -> Self {
         Self {
             origin,
@@ -32,11 +32,11 @@ impl Ray {
     }
 }
 
-/// Rays of a packet: as many as a 512-bit register has lanes.
+/// Rays per packet, the number of lanes of a 512-bit register.
 pub const PACKET_SIZE: usize = 16;
 
-/// Up to 16 rays to be traced together, one array per component. [`Coherence`] tells how they lie: close
-/// together and nearly the same way is fastest, any others are just as right.
+/// Up to 16 rays to be traced together, one array per component. Their [`Coherence`] affects speed only: rays that
+/// are close together and in nearly the same direction are fastest.
 ///
 /// [`Coherence`]: crate::accel::Coherence
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -79,14 +79,14 @@ impl RayPacket {
         self.len += 1;
     }
 
-    /// Makes it a packet of `len` rays, whose components are set one by one.
+    /// Sets the number of rays; the caller sets their components.
     #[inline(always)]
     pub(crate) fn set_len(&mut self, len: usize) {
         debug_assert!(len <= PACKET_SIZE);
         self.len = len;
     }
 
-    /// Rays to be filled in: without an end, and none of them counts yet.
+    /// Prepares an empty packet for rays that are added component by component: all lanes get an unbounded range.
     #[inline(always)]
     pub(crate) fn reset(&mut self) {
         self.t_min = [0.0; PACKET_SIZE];
@@ -99,7 +99,7 @@ impl RayPacket {
         self.len = 0;
     }
 
-    /// Rays in the packet.
+    /// Number of rays in the packet.
     pub fn len(&self) -> usize {
         self.len
     }
@@ -109,7 +109,7 @@ impl RayPacket {
         self.len == 0
     }
 
-    /// Whether there is no room for another ray.
+    /// Whether all lanes are in use.
     pub fn is_full(&self) -> bool {
         self.len == PACKET_SIZE
     }
@@ -117,7 +117,7 @@ impl RayPacket {
     /// The ray in `lane`.
     ///
     /// # Panics
-    /// If there are not as many.
+    /// If the packet has fewer rays.
     #[inline]
     pub fn ray(&self, lane: usize) -> Ray {
         assert!(lane < self.len, "the packet has fewer rays");

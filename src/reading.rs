@@ -1,16 +1,15 @@
-//! How much memory reading a file may take: what a limit of the job, a limit of the process and the machine
-//! leave.
+//! Memory budget for reading a file, from the limits of the job, the process and the machine.
 
 use spherule_formats::MemoryBudget;
 
 use crate::metrics::memory::{available, process_room};
 
-/// Files that take no more are always read: a job with a tiny limit is refused for what its frames need and
-/// not for what a look at them takes.
+/// Minimum budget: with a tiny limit, a job should be rejected because of what its frames need, not because they
+/// cannot be surveyed.
 const LEAST: u64 = 8 << 20;
 
-/// What reading one file may take in a job with `limit` on its memory whose frames are made in processes with
-/// a `ceiling`.
+/// Budget for reading one file in a job with a memory `limit`, and with a `ceiling` for the processes that make its
+/// frames.
 pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
     let of_job = limit.map(|bytes| {
         let remedy = "raise render.memory_limit (--memory-limit) if there is more memory";
@@ -23,7 +22,7 @@ pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
     least([of_job, of_frame])
 }
 
-/// What reading one file may take in a conversion that may hold `memory`.
+/// Budget for reading one file in a conversion with the limit `memory`.
 pub fn conversion_budget(memory: Option<u64>) -> MemoryBudget {
     let of_conversion = memory.map(|bytes| {
         let remedy = "raise --memory if there is more memory";
@@ -32,7 +31,7 @@ pub fn conversion_budget(memory: Option<u64>) -> MemoryBudget {
     least([of_conversion, None])
 }
 
-/// The least of `asked` and of what the process and the machine have.
+/// The least of `asked` and of the budgets of process and machine.
 fn least(asked: [Option<MemoryBudget>; 2]) -> MemoryBudget {
     let of_process = process_room().map(|bytes| {
         let remedy = "raise the memory limit of the process (ulimit, --memory-ceiling)";
@@ -47,7 +46,7 @@ fn least(asked: [Option<MemoryBudget>; 2]) -> MemoryBudget {
     least.map_or(MemoryBudget::UNLIMITED, |budget| budget.at_least(LEAST))
 }
 
-/// The part of `free` memory that reading may take: something is left for the tree and the image.
+/// The fraction of `free` memory for reading; the rest is for the tree and the image.
 const fn part(free: u64) -> u64 {
     free / 4 * 3
 }

@@ -25,73 +25,73 @@ mod surface;
 
 pub use camera::check_views;
 
-/// A radius under this part of the bounds' diagonal vanishes in f32.
+/// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
 
-/// About this part of the bounds' diagonal is the edge of a square on the floor: some can be counted
-/// through the particles, and none is a few pixels.
+/// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
+/// through the particles, and none is only a few pixels wide.
 const TILE: f64 = 1.0 / 8.0;
 
-/// Why there can be no images.
+/// Reasons why there can be no images.
 #[derive(Debug, thiserror::Error)]
 pub enum ResolveError {
-    /// A value is understood but not drawn by this version.
+    /// This version does not support a value.
     #[error("{key}: {what}")]
     Unsupported {
         /// The manifest's key.
         key: &'static str,
-        /// What is wrong and what to do.
+        /// The problem and its remedy.
         what: String,
     },
-    /// The attribute that is asked for is nowhere in the sequence.
+    /// No frame has the requested attribute.
     #[error("{key}: no attribute `{name}` in any frame looked at; there are {has}")]
     MissingAttribute {
         /// The manifest's key.
         key: &'static str,
-        /// The attribute.
+        /// Name of the attribute.
         name: String,
-        /// What there is.
+        /// The existing attributes.
         has: String,
     },
-    /// The radius follows neither from the frames nor from the spacing of particles.
+    /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
         "input.radius: the frames bring none, and particles that are few, in one place or far apart \
          do not tell it; give a length with --radius"
     )]
     NoRadius,
-    /// Squares of lengths would be no numbers any more.
+    /// The radius is too small: squares of lengths would underflow.
     #[error(
         "input.radius: {0:e} is too small to trace in single precision, whose squares end at 1e-38; \
          write the particles in a smaller unit of length"
     )]
     TinyRadius(f32),
-    /// The image would not fit into memory.
+    /// The image does not fit into memory.
     #[error(
         "image.width, image.height: an image of {width}x{height} needs about {need} MiB, \
          {available} MiB of memory are free; make it smaller or ask for fewer channels"
     )]
     ImageTooLarge {
-        /// Pixels across.
+        /// Width in pixels.
         width: u32,
-        /// Pixels down.
+        /// Height in pixels.
         height: u32,
-        /// What its planes and encoding need.
+        /// Memory for its planes and encoding.
         need: u64,
-        /// What there is.
+        /// Available memory.
         available: u64,
     },
-    /// The camera sees nothing.
+    /// The camera is invalid.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
-    /// The keys make no path.
+    /// The keys do not define a path.
     #[error("camera.key: {0}")]
     Path(#[from] PathError),
-    /// The camera sees nothing at some frame.
+    /// The camera is invalid at some frame.
     #[error("{place}: {source}")]
     View {
-        /// The manifest's key and the frame.
+        /// Key and frame.
         place: String,
-        /// What is wrong with the view.
+        /// The error.
         source: CameraError,
     },
 }
@@ -122,6 +122,7 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
 pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError> {
+    // Determine surface, radius and colours
     let surface = surface::settings(manifest)?;
     let radius = radius_rule(manifest, survey)?;
     check_radius(&radius)?;
@@ -133,10 +134,12 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         min: survey.min - reach,
         max: survey.max + reach,
     };
+    // Place the camera
     let image = &manifest.image;
     let aspect = f64::from(image.width) / f64::from(image.height);
     let path = camera::path(manifest, &bounds, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
+    // Set up lights and ground
     let lights = if manifest.lights.is_empty() {
         default_lights(&bounds, up, &path.start())
     } else {
@@ -147,8 +150,8 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         && manifest.render.ground_height.is_none()
         && let Some(ground) = &mut ground
     {
-        // Through the lowest centres: a body that only touched the floor would lie on a film of air, which
-        // mirrors all that comes from the side.
+        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
+        // a thin layer of air, which reflects all light at grazing angles.
         ground.raise(narrow(reach.x));
     }
     let scene = Scene {
@@ -160,6 +163,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         background: background(manifest, up.as_vec3()),
         ground,
     };
+    // Collect the settings of the images
     let output = &manifest.output;
     let channels = Channels::from_names(output.channels.iter().map(|c| c.name())).map_err(|e| {
         ResolveError::Unsupported {
@@ -196,6 +200,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
             backdrop: None,
         },
     };
+    // Collect the settings of the run
     let run = RunSettings {
         memory_limit: manifest.render.memory_limit.map(|limit| limit.0),
         accelerator: manifest.render.accelerator,
@@ -219,7 +224,7 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     Ok(setup)
 }
 
-/// Refuses images that cannot fit, whatever the particles.
+/// Rejects images that cannot fit into memory, whatever the particles.
 fn check_image_size(setup: &Setup) -> Result<(), ResolveError> {
     let need = MemoryModel::new(setup).alone(&FrameSize::default()).total();
     match available() {
@@ -233,7 +238,7 @@ fn check_image_size(setup: &Setup) -> Result<(), ResolveError> {
     }
 }
 
-/// For whoever opens an image years later.
+/// Metadata that explain the channels of an image.
 const COMMENTS: &str = "linear RGB premultiplied by A; A is coverage by particles and ground; \
 Z is the distance along the view axis (infinite where nothing is hit); N is the world-space \
 normal; id.I is the particle's id, 4294967295 where there is none; Z, N and id come from the \
@@ -261,14 +266,14 @@ fn radius_rule(manifest: &Manifest, survey: &Survey) -> Result<RadiusRule, Resol
         }
         RadiusSetting::Auto => match surface::radius(manifest.surface.kind, survey) {
             Some(radius) => RadiusRule::FileOr(radius),
-            // Every frame brings its own, or there are no particles to need one.
+            // All frames contain radii, or there are no particles.
             None if survey.has_radii || survey.most_particles == 0 => RadiusRule::FileOr(0.0),
             None => return Err(ResolveError::NoRadius),
         },
     })
 }
 
-/// Least radius whose square, and that of distances a little smaller, f32 still tells from zero.
+/// Minimum radius: its square, and the squares of slightly smaller distances, do not underflow in f32.
 const TRACEABLE_RADIUS: f32 = 1e-16;
 
 fn check_radius(rule: &RadiusRule) -> Result<(), ResolveError> {
@@ -282,7 +287,7 @@ fn check_radius(rule: &RadiusRule) -> Result<(), ResolveError> {
     }
 }
 
-/// How far the spheres reach beyond their centres.
+/// Extent of the spheres beyond their centres.
 fn reach(rule: &RadiusRule, survey: &Survey) -> f32 {
     match rule {
         RadiusRule::Common(radius) => *radius,
@@ -346,7 +351,7 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
             range,
         } => {
             require_attribute(survey, "material.color.attribute", attribute)?;
-            // Whoever names a map or a range means lengths.
+            // A map or a range means that vectors are mapped by their length.
             if map.is_none() && range.is_none() && survey.rgb.is_some() {
                 return Ok(ColorRule::Rgb {
                     name: attribute.clone(),

@@ -1,5 +1,5 @@
-//! Binary trees on their way to 8-wide ones: what the builders that choose their splits by cost
-//! agree on.
+//! Binary trees, the intermediate result of all builders that choose their splits by cost. They are collapsed into
+//! 8-wide trees.
 
 use super::Aabb;
 
@@ -8,23 +8,23 @@ use super::Aabb;
 pub(super) struct BinaryTree {
     /// Root first; the two children of an inner node lie side by side, after their parent.
     pub(super) nodes: Vec<BinaryNode>,
-    /// What the leaves hold, by runs.
+    /// References of the leaves; the references of one leaf are consecutive.
     pub(super) references: Vec<u32>,
 }
 
 /// A node of a [`BinaryTree`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct BinaryNode {
-    /// Box of everything in it, in the space of the wide tree's boxes (see `WideTree::padding`).
+    /// Bounding box of the subtree, padded as the boxes of the wide tree are (see `WideTree::padding`).
     pub(super) bounds: Aabb,
-    /// Inner nodes: the left child; the right one follows. Leaves: the first reference.
+    /// Index of the left child of an inner node (the right child follows it), or of the first reference of a leaf.
     pub(super) first: u32,
-    /// References of a leaf; 0 for an inner node.
+    /// Reference count of a leaf; 0 for an inner node.
     pub(super) count: u32,
 }
 
 impl BinaryNode {
-    /// Whether it has references instead of children.
+    /// Whether the node has references instead of children.
     pub(super) fn is_leaf(&self) -> bool {
         self.count > 0
     }

@@ -1,4 +1,5 @@
-//! The builders behind one door: which one, told what, in memory that lives on from frame to frame.
+//! One interface for all builders: the choice of structure, its settings, and the memory that is reused from frame to
+//! frame.
 
 use std::fmt;
 use std::str::FromStr;
@@ -6,7 +7,7 @@ use std::str::FromStr;
 use super::wide::WideTree;
 use super::{BuildReport, BvhSettings, SbvhSettings, Spheres, bvh, kdtree, lbvh, sbvh};
 
-/// How particles are ordered and grouped. The picture is the same with each.
+/// How particles are ordered and grouped. The structure affects speed and memory, not the picture.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Structure {
     /// Along a space-filling curve (`lbvh.rs`): the fastest build.
@@ -21,10 +22,10 @@ pub enum Structure {
 }
 
 impl Structure {
-    /// All there are.
+    /// All structures.
     pub const ALL: [Self; 4] = [Self::Lbvh, Self::Kdtree, Self::Bvh, Self::Sbvh];
 
-    /// Its name on the command line and in files.
+    /// The name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Lbvh => "lbvh",
@@ -53,22 +54,22 @@ impl FromStr for Structure {
     }
 }
 
-/// What the builders may be told.
+/// Settings of a build.
 #[derive(Debug, Clone, Copy)]
 pub struct BuildSettings {
-    /// Who builds.
+    /// The structure to build.
     pub structure: Structure,
-    /// Keep the way back to the particle's index in the frame (4 bytes a particle): needed for
-    /// attributes and ids. Structures that may have a particle twice keep it anyway.
+    /// Keep the index in the frame for each particle (4 bytes per particle). Attributes and ids need it. Structures
+    /// that may store a particle more than once always keep it.
     pub keep_indices: bool,
-    /// What [`Structure::Bvh`] is told.
+    /// Settings of [`Structure::Bvh`].
     pub bvh: BvhSettings,
-    /// What [`Structure::Sbvh`] is told.
+    /// Settings of [`Structure::Sbvh`].
     pub sbvh: SbvhSettings,
 }
 
 impl BuildSettings {
-    /// `structure` with everything else as usual.
+    /// Default settings for `structure`.
     pub fn new(structure: Structure) -> Self {
         Self {
             structure,
@@ -92,7 +93,7 @@ pub struct TreeBuilder {
 }
 
 impl TreeBuilder {
-    /// A builder without memory yet.
+    /// A builder that has not allocated memory yet.
     pub fn new() -> Self {
         Self::default()
     }
@@ -102,7 +103,7 @@ impl TreeBuilder {
         &self.tree
     }
 
-    /// The tree, to change how it is traced.
+    /// The tree of the last build, for changes of how it is traced.
     pub fn tree_mut(&mut self) -> &mut WideTree {
         &mut self.tree
     }

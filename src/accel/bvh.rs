@@ -1,14 +1,14 @@
-//! `bvh`: a bounding volume hierarchy from the leaves up, by clustering and reinsertion (`ploc.rs`),
+//! `bvh`: a bounding volume hierarchy built from the leaves up by clustering and reinsertion (`ploc.rs`), then
 //! collapsed into 8-wide nodes (`collapse.rs`).
 //!
-//! By default the leaves are the blocks that lbvh's sort makes: a sixteenth of the particles' number,
-//! and clustering costs that much less. Over the particles themselves blocks follow from the tree.
+//! By default the leaves are the blocks that the sort of `lbvh` makes. There are 16 times fewer blocks than
+//! particles, so clustering is cheaper by about that factor. If single particles are clustered, blocks are formed
+//! from the resulting tree.
 //!
-//! What it buys on equal spheres: the thesis's box with 1e6 particles, against lbvh in turns, 2 threads
-//! of an AMD Zen 5 with AVX-512. Times of the last row are those of a busy machine, its ratios of
-//! turns side by side.
+//! Measured on equal spheres: the thesis's box with 1e6 particles, alternating with `lbvh`, 2 threads of an AMD Zen 5
+//! with AVX-512. The machine was busy during the runs of the last row; its ratios are from runs side by side.
 //!
-//! | leaves, preset | build | primary | shadow | reflection | bytes a particle, peak |
+//! | leaves, preset | build | primary | shadow | reflection | bytes per particle, peak |
 //! |---|---|---|---|---|---|
 //! | lbvh | 0.033 s | 1 | 1 | 1 | 12.6, 14.9 |
 //! | blocks, fast | 0.060 s | 1.04 | 1.09 | 1.09 | 13.6, 27 |
@@ -16,7 +16,7 @@
 //! | blocks, high | 0.080 s | 1.05 | 1.10 | 1.08 | 13.5, 27 |
 //! | particles, medium | 15 to 32 x lbvh | 1.07 to 1.12 | 0.97 to 1.20 | 1.08 to 1.22 | 25.8, 208 |
 //!
-//! So over blocks more than the first preset does not pay.
+//! So over blocks, presets above the first do not pay off.
 
 use rayon::prelude::*;
 
@@ -34,24 +34,24 @@ pub enum BvhLeaves {
     /// Blocks of 16 particles along a space-filling curve.
     #[default]
     Blocks,
-    /// Single particles: some 200 bytes each while building, and blocks that are not full.
+    /// Single particles: about 200 bytes per particle during the build, and blocks that are not full.
     Particles,
 }
 
-/// What [`Structure::Bvh`] may be told.
+/// Settings of [`Structure::Bvh`].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub struct BvhSettings {
-    /// How much is spent.
+    /// Effort of the build.
     pub preset: BvhPreset,
     /// What the tree is built over.
     pub leaves: BvhLeaves,
 }
 
 impl BvhLeaves {
-    /// All there are.
+    /// All kinds of leaves.
     pub const ALL: [Self; 2] = [Self::Blocks, Self::Particles];
 
-    /// Its name in files.
+    /// The name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Blocks => "blocks",
@@ -60,7 +60,7 @@ impl BvhLeaves {
     }
 }
 
-/// Builds over `spheres` in the memory of `tree`.
+/// Builds a tree over `spheres` in the memory of `tree`.
 pub(super) fn build(
     tree: &mut WideTree,
     spheres: &Spheres,
@@ -78,12 +78,14 @@ fn build_over_blocks(
     settings: &BuildSettings,
 ) -> BuildReport {
     let mut clock = PhaseClock::new();
+    // Sort the particles into blocks along the Hilbert curve
     let sort_bytes = lbvh::sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
     tree.blocks
         .par_iter_mut()
         .with_min_len(256)
         .for_each(Block::transpose_points);
 
+    // Cluster the boxes of the blocks into a binary tree
     let padding = tree.padding;
     let bounds_of = |block: usize| match tree.radii.get(block) {
         Some(radii) => tree.blocks[block].sphere_bounds(radii),
@@ -96,6 +98,7 @@ fn build_over_blocks(
         settings.bvh.preset,
         &mut clock,
     );
+    // Collapse the binary tree into 8-wide nodes
     let held = clustered.peak_bytes.max(sort_bytes);
     let Collapsed {
         sah_cost,
@@ -119,6 +122,7 @@ fn build_over_particles(
     settings: &BuildSettings,
 ) -> BuildReport {
     let mut clock = PhaseClock::new();
+    // Cluster the boxes of the particles into a binary tree
     let (common, each): (f32, &[f32]) = match spheres.radius {
         SphereRadius::Common(radius) => (radius, &[]),
         SphereRadius::Each(radii) => (0.0, radii),
@@ -141,6 +145,7 @@ fn build_over_particles(
         settings.bvh.preset,
         &mut clock,
     );
+    // Pack the particles into blocks and collapse the binary tree into 8-wide nodes
     let collapsed = collapse(tree, binary, &Content::Particles(*spheres), &mut clock);
     let mut report = tree.report(
         Structure::Bvh,
@@ -149,7 +154,7 @@ fn build_over_particles(
         collapsed.scratch_bytes,
         clock.finish(),
     );
-    // Nothing of the tree is there yet while particles are clustered.
+    // The clustering ends before any memory of the tree is in use, so its peak is not added to the tree.
     report.peak_bytes = report.peak_bytes.max(peak_bytes);
     report
 }

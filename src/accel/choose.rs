@@ -1,12 +1,12 @@
-//! `auto`: which structure a frame is traced with.
+//! `auto`: chooses the structure that a frame is traced with.
 //!
-//! A k-d tree takes longer to build than an LBVH and gives every ray some of that back, so what
-//! counts is the number of rays for each particle. Measured on the thesis's box with radii of
-//! half the spacing, 16 cores of an Intel Xeon with AVX-512, CPU time in ns (wall-clock time times
-//! threads), the k-d tree's additional build per particle against what it saves for each ray of
-//! an image of 1920x1080 (2.07 million primary rays; 0.6 million each for shadow and reflection):
+//! A k-d tree takes longer to build than an LBVH, but makes every ray faster. The number of rays per particle decides
+//! which of the two is better. The table shows measurements on the thesis's box with radii of half the spacing, on 16
+//! cores of an Intel Xeon with AVX-512, as CPU time in ns (wall-clock time times threads): the additional build time
+//! of the k-d tree per particle, and the time it saves per ray of an image of 1920x1080 (2.07 million primary rays;
+//! 0.6 million each for shadow and reflection).
 //!
-//! | particles | threads | build, more per particle | saved per ray | even at rays per particle |
+//! | particles | threads | additional build per particle | saved per ray | break-even, rays per particle |
 //! |---|---|---|---|---|
 //! | 1e7 | 1 | 75 | 53 | 1.4 |
 //! | 1e7 | 2 | 77 | 53 | 1.5 |
@@ -16,22 +16,22 @@
 //! | 1e6 | 16 | 85 | 40 | 2.1 |
 //! | 1e5 | 2 | 44 | 30 | 1.5 |
 //!
-//! What a ray saves was measured with 16 threads and single rays and is taken for all rows; camera and shadow
-//! rays in packets save less, so the rule asks for a little more than the table says.
+//! The saving per ray was measured with 16 threads and single rays, and is used in all rows. Camera and shadow rays
+//! in packets save less, so the thresholds are a little above the table.
 //!
-//! Fewer particles do not matter: either tree is built within a few milliseconds.
+//! For fewer particles the choice does not matter: both trees are built within a few milliseconds.
 
 use super::Structure;
 
-/// Rays per particle from which on a k-d tree pays, with few threads.
+/// Rays per particle above which a k-d tree pays off, with few threads.
 const RAYS_PER_PARTICLE: f64 = 1.4;
-/// The same for each thread more: building scales a little worse than tracing.
+/// Increase of that threshold per thread: building scales a little worse than tracing.
 const MORE_PER_THREAD: f64 = 0.04;
-/// Threads beyond which nothing was measured.
+/// Largest number of threads with measurements.
 const MEASURED_THREADS: usize = 16;
 
-/// The structure with which building over `particles` and tracing `expected_rays` by `threads` threads
-/// takes the least time. The picture is the same with each.
+/// The structure with the least total time for building over `particles` and tracing `expected_rays` on `threads`
+/// threads. The choice does not affect the picture.
 pub fn choose(particles: usize, expected_rays: f64, threads: usize) -> Structure {
     let threads = threads.min(MEASURED_THREADS);
     let least = RAYS_PER_PARTICLE + MORE_PER_THREAD * threads as f64;

@@ -1,45 +1,42 @@
-//! From binary trees to 8-wide ones with links: where every builder ends that chooses its splits by
-//! cost.
+//! Collapses binary trees into 8-wide ones with links. All builders that choose their splits by cost end here.
 //!
-//! Three steps: subtrees that fit a block become one (`trim.rs`), wide nodes take the place of
-//! several binary ones (`widen.rs`), and blocks and nodes are written where they belong
+//! There are three steps: subtrees that fit into one block become a block (`pack_leaves.rs`), wide nodes replace
+//! groups of binary nodes (`collapse_nodes.rs`), and blocks and nodes are written to their final positions
 //! (`linked.rs`).
 
 use super::binary::BinaryTree;
-use super::linked::{block_boxes, build_nodes, gather_blocks, permute_blocks};
+use super::collapse_nodes::collapse_nodes;
+use super::linked::{block_boxes, build_nodes, gather_blocks, reorder_blocks};
+use super::pack_leaves::{LeafPacking, PackedTree};
 use super::report::PhaseClock;
-use super::trim::{Trim, TrimmedTree};
 use super::wide::WideTree;
-use super::widen::widen;
 use super::{SphereRadius, Spheres};
 use spherule_formats::blocks::BLOCK_SIZE;
 use spherule_formats::order::index_u32;
 
-/// What the references of a binary tree stand for.
+/// What the references of a binary tree refer to.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Content<'a> {
-    /// Particles of the frame. Boxes are made anew from them.
+    /// Particles of the frame. Boxes are recomputed from them.
     Particles(Spheres<'a>),
-    /// Particles of the frame, each perhaps in several leaves: the leaves' boxes, which bound
-    /// spheres, tell which part of them counts.
+    /// Particles of the frame, possibly several times. The box of a leaf, which bounds spheres, defines the part of
+    /// the sphere that the leaf holds.
     Clipped(Spheres<'a>),
-    /// Blocks that are in the wide tree already, as arrays, all but the last of them full. Boxes
-    /// are made anew from them.
+    /// Blocks that the wide tree already holds, as arrays; all but the last are full. Boxes are recomputed from them.
     Blocks,
 }
 
-/// What a collapse came to.
+/// Result of a collapse.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Collapsed {
     /// See `BuildReport::sah_cost`.
     pub(super) sah_cost: f64,
-    /// Most bytes held beside the tree, the binary one counted.
+    /// Peak memory in bytes next to the wide tree; includes the binary tree.
     pub(super) scratch_bytes: u64,
 }
 
-/// Makes `tree` of `binary`. With [`Content::Blocks`] its blocks must be there and only change
-/// places; otherwise all of it is replaced, and the indices stay (`has_copies`). Laps the phases
-/// `collapse` and `nodes`.
+/// Collapses `binary` into `tree`. With [`Content::Blocks`], the blocks of `tree` are kept and reordered; otherwise
+/// all of it is replaced, and the indices are kept (`has_copies`). Records the phases `collapse` and `nodes`.
 pub(super) fn collapse(
     tree: &mut WideTree,
     binary: BinaryTree,
@@ -56,9 +53,10 @@ pub(super) fn collapse(
     if matches!(content, Content::Clipped(_)) {
         tree.padding = 0.0;
     }
-    let trimmed = TrimmedTree::new(
+    // Turn subtrees that fit into one block into leaves
+    let packed = PackedTree::new(
         &binary,
-        Trim {
+        LeafPacking {
             capacity: match content {
                 Content::Blocks => 1,
                 _ => BLOCK_SIZE,
@@ -67,29 +65,32 @@ pub(super) fn collapse(
             keep_boxes: matches!(content, Content::Clipped(_)),
         },
     );
-    let mut scratch_bytes = binary_bytes(&binary) + trimmed.bytes();
+    let mut scratch_bytes = binary_bytes(&binary) + packed.bytes();
     drop(binary);
-    let unfilled = match content {
-        Content::Blocks => unfilled_block(tree, &trimmed),
+    // Choose the children of each wide node
+    let partial_index = match content {
+        Content::Blocks => partial_block(tree, &packed),
         _ => None,
     };
-    let layout = widen(&trimmed, unfilled);
+    let layout = collapse_nodes(&packed, partial_index);
+    // Write the particles to their blocks
     match content {
         Content::Blocks => {
             let copy = size_of_val(&tree.blocks[..]) as u64;
-            scratch_bytes = scratch_bytes.max(trimmed.bytes() + layout.bytes() + copy);
-            permute_blocks(tree, &trimmed, &layout);
+            scratch_bytes = scratch_bytes.max(packed.bytes() + layout.bytes() + copy);
+            reorder_blocks(tree, &packed, &layout);
         }
         Content::Particles(spheres) | Content::Clipped(spheres) => {
-            tree.make_room_for_copies(layout.blocks.len());
-            gather_blocks(tree, spheres, &trimmed, &layout);
+            tree.resize_with_copies(layout.blocks.len());
+            gather_blocks(tree, spheres, &packed, &layout);
         }
     }
     clock.lap("collapse");
-    let boxes = block_boxes(tree, &trimmed.boxes, &layout);
+    // Compute boxes from the blocks up and encode the nodes
+    let boxes = block_boxes(tree, &packed.boxes, &layout);
     scratch_bytes =
-        scratch_bytes.max(trimmed.bytes() + layout.bytes() + size_of_val(&boxes[..]) as u64);
-    drop(trimmed);
+        scratch_bytes.max(packed.bytes() + layout.bytes() + size_of_val(&boxes[..]) as u64);
+    drop(packed);
     let sah_cost = build_nodes(tree, layout, &boxes);
     clock.lap("nodes");
     Collapsed {
@@ -98,15 +99,15 @@ pub(super) fn collapse(
     }
 }
 
-/// Which block of the trimmed tree is the one that is not full. Slots are counted through to the
-/// number of particles, so that one must come last.
-fn unfilled_block(tree: &WideTree, trimmed: &TrimmedTree) -> Option<u32> {
+/// The block of the packed tree that is not full. Slots up to the number of particles hold particles, so this block
+/// must come last.
+fn partial_block(tree: &WideTree, packed: &PackedTree) -> Option<u32> {
     if tree.count.is_multiple_of(BLOCK_SIZE) {
         return None;
     }
     let last = index_u32(tree.blocks.len() - 1);
-    // Here blocks have one member each.
-    let place = trimmed.members.iter().position(|block| *block == last);
+    // With `Content::Blocks`, each packed block has one member.
+    let place = packed.members.iter().position(|block| *block == last);
     place.map(index_u32)
 }
 

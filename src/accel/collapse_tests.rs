@@ -1,4 +1,4 @@
-//! Binary trees of awkward shapes must become sound wide ones.
+//! Binary trees of awkward shapes must become valid wide ones.
 
 use glam::Vec3;
 
@@ -36,8 +36,7 @@ fn spheres(centers: &[Vec3]) -> Spheres<'_> {
     }
 }
 
-/// A tree over leaves of which each holds a run of references; `split` says how many leaves of a run
-/// go to the left.
+/// A tree over leaves that each hold a run of references; `split` returns how many leaves of a run go to the left.
 fn binary(leaves: &[(Aabb, Vec<u32>)], split: impl Fn(usize) -> usize) -> BinaryTree {
     let mut tree = BinaryTree::default();
     if leaves.is_empty() {
@@ -144,7 +143,7 @@ fn blocks_change_places_and_the_unfilled_one_comes_last() {
     }
 }
 
-/// Every sphere cut in two at a plane: as if spatial splits had done it.
+/// Every sphere is cut in two at a plane, as by spatial splits.
 #[test]
 fn clipped_spheres_are_found_from_either_side_and_once() {
     let centers = points(700);

@@ -1,22 +1,22 @@
-//! Proof for trees of clipped spheres: a ray that meets a sphere comes to a leaf that has it.
+//! Validates trees of clipped spheres: a ray that hits a sphere must reach a leaf that holds it.
 //!
-//! Such a ray meets a point of the surface, so each point must be in all boxes on the way to some
-//! leaf with the particle. Sampled: the six extremes of each sphere, the diagonals of its faces and
-//! of its box.
+//! Such a ray hits a point of the surface, so each point of the surface must be inside all boxes on the path to some
+//! leaf with this particle. The check uses sample points: the six extremes of each sphere, and the directions to the
+//! edges and corners of its box.
 
 use glam::DVec3;
 
-use super::topology::{Linked, Place, Topology};
+use super::topology::{Linked, NodeRef, Topology};
 use super::wide::WideTree;
 use super::{SphereRadius, Spheres};
 use spherule_formats::blocks::BLOCK_SIZE;
 
-/// Sampled points of a sphere.
+/// Sample points per sphere.
 const POINTS: usize = 26;
-/// A bit for each point.
+/// One bit per sample point.
 type Points = u32;
 
-/// What all boxes from the root to a node have in common.
+/// Intersection of all boxes from the root to a node.
 #[derive(Debug, Clone, Copy)]
 struct Cell {
     min: DVec3,
@@ -27,26 +27,27 @@ impl WideTree {
     /// Checks that the parts of each sphere cover it.
     ///
     /// # Errors
-    /// The first sphere with a bare point, in words.
+    /// Describes the first sphere with an uncovered point.
     pub(super) fn validate_coverage(&self, spheres: &Spheres) -> Result<(), String> {
         let mut covered: Vec<Points> = vec![0; self.count];
         let everywhere = Cell {
             min: DVec3::NEG_INFINITY,
             max: DVec3::INFINITY,
         };
+        // Walk down the tree; intersect the boxes on the path and mark the points that each leaf covers
         let mut pending = Vec::new();
         pending.extend((!self.nodes.is_empty()).then_some((Linked::ROOT, everywhere)));
         let (view, directions) = (self.view(), directions());
         let topology = view.linked();
         while let Some((code, cell)) = pending.pop() {
-            match Linked::number(code) {
-                Place::Block(block) => {
+            match Linked::decode(code) {
+                NodeRef::Block(block) => {
                     for index in &self.indices[block * BLOCK_SIZE..][..BLOCK_SIZE] {
                         let index = *index as usize;
                         covered[index] |= points_within(spheres, index, cell, &directions);
                     }
                 }
-                Place::Node(node) => {
+                NodeRef::Node(node) => {
                     for slot in 0..self.nodes[node].child_count() {
                         let child = topology.child(
                             topology.children(code),
@@ -57,6 +58,7 @@ impl WideTree {
                 }
             }
         }
+        // Report the first sphere with an uncovered point
         let all = (1 << POINTS) - 1;
         match covered.iter().position(|points| *points != all) {
             None => Ok(()),
@@ -84,8 +86,8 @@ fn directions() -> [DVec3; POINTS] {
     std::array::from_fn(|_| next().normalize())
 }
 
-/// The points of sphere `index` in `cell`. Boxes of leaves are rounded to the nearest f32; rays allow
-/// for that.
+/// The sample points of sphere `index` inside `cell`. The boxes of leaves are rounded to the nearest f32; ray tests
+/// have a tolerance for that.
 fn points_within(
     spheres: &Spheres,
     index: usize,
@@ -122,7 +124,7 @@ mod tests {
         assert!((1..POINTS).all(|i| !all[..i].contains(&all[i])));
     }
 
-    /// Large spheres among small ones are cut; one then loses a part.
+    /// Large spheres among small ones are cut; the test removes one part.
     #[test]
     fn a_lost_part_is_found() {
         let centers: Vec<Vec3> = (0..1000_u16)

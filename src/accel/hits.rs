@@ -1,25 +1,24 @@
-//! What the rays of a packet hit, lane by lane.
+//! Hits of the rays of a packet, lane by lane.
 
 use crate::math::{fold, larger};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
-/// How the rays of a packet lie. It decides how they are traced, never what they hit.
+/// Coherence of the rays of a packet. It selects the traversal, and never affects what the rays hit.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Coherence {
-    /// Close together and nearly the same direction: one beam around them tests boxes and spheres.
+    /// Close together and in nearly the same direction: boxes and spheres are tested with one beam around the rays.
     Coherent,
     /// Any rays: each box is tested with each ray.
     Incoherent,
 }
 
-/// What each ray of a packet hits first: distance and slot in tree order.
+/// The first hit of each ray of a packet: distance and slot in tree order.
 ///
-/// During a traversal `t` is the farthest distance that still counts, inclusive, and negative for
-/// rays that are finished.
+/// During a traversal, `t` is the largest distance of interest (inclusive), and negative for rays that are finished.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(64))]
 pub struct TreeHits {
-    /// Distances along the rays; unspecified where nothing was hit.
+    /// Distances along the rays; unspecified for rays without a hit.
     pub t: [f32; PACKET_SIZE],
     /// Slots of the particles in tree order, or [`TreeHits::NO_SLOT`].
     pub slot: [u32; PACKET_SIZE],
@@ -35,10 +34,10 @@ impl Default for TreeHits {
 }
 
 impl TreeHits {
-    /// The slot of a ray that hits nothing.
+    /// The slot of a ray without a hit.
     pub const NO_SLOT: u32 = u32::MAX;
 
-    /// The lanes that hit, a bit each.
+    /// Bit mask of the lanes with a hit.
     #[inline(always)]
     pub fn mask(&self) -> u32 {
         let mut mask = 0;
@@ -48,24 +47,24 @@ impl TreeHits {
         mask
     }
 
-    /// Before a traversal: the rays in `lanes` count up to their ends, the others are finished.
+    /// Starts a traversal: the rays in `lanes` are limited by their `t_max`, all others are finished.
     #[inline(always)]
     pub(super) fn start(&mut self, packet: &RayPacket, lanes: u32) {
         for (lane, limit) in self.t.iter_mut().enumerate() {
-            // The end is exclusive for the ray and inclusive for ties.
+            // `t_max` is exclusive, but limits are inclusive because of ties.
             let end = packet.t_max[lane].next_down();
             *limit = if lanes >> lane & 1 == 1 { end } else { -1.0 };
         }
         self.slot = [Self::NO_SLOT; PACKET_SIZE];
     }
 
-    /// The farthest distance that counts for any ray.
+    /// The largest limit of all rays.
     #[inline(always)]
     pub(super) fn farthest(&self) -> f32 {
         fold(self.t, larger)
     }
 
-    /// Nothing counts any more for the rays in `lanes`.
+    /// Marks the rays in `lanes` as finished.
     #[inline(always)]
     pub(super) fn finish(&mut self, lanes: u32) {
         for (lane, limit) in self.t.iter_mut().enumerate() {

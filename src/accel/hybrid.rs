@@ -1,31 +1,31 @@
-//! The traversal for packets of any rays: each child box is tested with all rays at once while many of
-//! them enter a node together, and each goes on alone from where only few are left.
+//! Hybrid traversal for packets of any rays: each child box is tested with all rays at once while many of them enter
+//! the same node; a subtree that only few rays enter is traversed by each of them alone.
 //!
-//! Hybrid traversal as in Embree (Wald et al. 2014, "Embree: a kernel framework for efficient CPU ray
-//! tracing", section 4.2). Boxes are tested conservatively and rays meet spheres by the tests of single
-//! rays, so that each finds what it finds alone, to the bit.
+//! Follows Embree (Wald et al. 2014, "Embree: a kernel framework for efficient CPU ray tracing", section 4.2). Box
+//! tests are conservative, and spheres are tested with the code for single rays. So each ray finds exactly what it
+//! would find alone, to the bit.
 
 use super::hits::TreeHits;
 use super::leaves::Leaves;
-use super::simd::{EnteredChildren, LaneSlabs, PacketKernel, lanes_near};
-use super::topology::{Place, Topology};
+use super::simd::{EnteredChildren, LaneSlabs, PacketKernel, lanes_entering};
+use super::topology::{NodeRef, Topology};
 use super::traverse::{AnyOfRay, ChordsOfRay, NearestOfRay, TreeChord, TreeHit};
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::{Below, STACK_SIZE, WalkStack, Walker, sort_descending, walk_from};
 use crate::math::{first_lanes, lanes_in};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
-/// Rays that go on alone from a node when no more than these are alive there. Reflections and shadow rays
-/// of the thesis's box with 1e5 and 1e6 particles (k-d tree): times faster than single rays by this number
-/// on AVX-512 are, for reflections in the smaller box, 0: 2.02, 2: 2.07, 4: 2.11, 5: 2.08, 6: 2.03, 8: 2.00,
-/// 10: 1.92. AVX2 and the portable kernel are as flat, so that one number does for all.
-const MOST_ALONE: u32 = 5;
+/// A subtree that at most this many rays enter is traversed by each of them alone. Measured with reflection and
+/// shadow rays of the thesis's box with 1e5 and 1e6 particles (k-d tree). The speedup over single rays on AVX-512,
+/// for reflections in the smaller box, is 0: 2.02, 2: 2.07, 4: 2.11, 5: 2.08, 6: 2.03, 8: 2.00, 10: 1.92. AVX2 and
+/// the portable kernel have an equally flat optimum, so one value serves all.
+const MAX_SINGLE_RAYS: u32 = 5;
 
 impl TreeView<'_> {
-    /// [`TreeView::nearest`] of the rays in `lanes`; the others hit nothing.
+    /// [`TreeView::nearest`] for the rays in `lanes`; the other rays hit nothing.
     pub(super) fn nearest_by_lanes(&self, rays: &RayPacket, lanes: u32, hits: &mut TreeHits) {
         let backward = backward_lanes(rays) & lanes;
-        self.run(ByLanes {
+        self.run(LaneQuery {
             rays,
             lanes: lanes & !backward,
             query: Nearest,
@@ -38,11 +38,11 @@ impl TreeView<'_> {
         }
     }
 
-    /// [`TreeView::any_hit`] of the rays in `lanes`.
+    /// [`TreeView::any_hit`] for the rays in `lanes`.
     pub(super) fn occluded_by_lanes(&self, rays: &RayPacket, lanes: u32) -> u32 {
         let backward = backward_lanes(rays) & lanes;
         let mut hits = TreeHits::default();
-        self.run(ByLanes {
+        self.run(LaneQuery {
             rays,
             lanes: lanes & !backward,
             query: Any,
@@ -57,15 +57,16 @@ impl TreeView<'_> {
 }
 
 impl TreeView<'_> {
-    /// Gives `visit` every sphere on the lines of the rays in `lanes` that may lie before their ends, in the order of
-    /// the walk, until it returns false for a ray. Rays count from their origin on.
+    /// Calls `visit` for every sphere that the lines of the rays in `lanes` pass through and that may begin before
+    /// the end of the ray, in traversal order, until it returns false for a ray. Spheres behind the origin are not
+    /// visited.
     pub(crate) fn visit_chords(
         &self,
         rays: &RayPacket,
         lanes: u32,
         visit: impl FnMut(usize, TreeChord) -> bool,
     ) {
-        self.run(ByLanes {
+        self.run(LaneQuery {
             rays,
             lanes,
             query: Chords { visit },
@@ -74,8 +75,7 @@ impl TreeView<'_> {
     }
 }
 
-/// The rays that count from behind their origin on. Distances on the stack are not negative, so they are
-/// traced alone.
+/// Rays with a negative `t_min`. They are traced alone, because distances on the stack must not be negative.
 #[inline]
 fn backward_lanes(rays: &RayPacket) -> u32 {
     let mut lanes = 0;
@@ -85,15 +85,15 @@ fn backward_lanes(rays: &RayPacket) -> u32 {
     lanes & first_lanes(rays.len())
 }
 
-/// Brings the rays in `lanes` to what they look for.
-struct ByLanes<'r, 'h, Q> {
+/// A query for the rays in `lanes`.
+struct LaneQuery<'r, 'h, Q> {
     rays: &'r RayPacket,
     lanes: u32,
     query: Q,
     hits: &'h mut TreeHits,
 }
 
-impl<Q: Query> TreeTask for ByLanes<'_, '_, Q> {
+impl<Q: Query> TreeTask for LaneQuery<'_, '_, Q> {
     type Output = ();
 
     #[inline(always)]
@@ -102,13 +102,13 @@ impl<Q: Query> TreeTask for ByLanes<'_, '_, Q> {
         kernel: K,
         tree: Resolved<'a, T, L>,
     ) {
-        let lanes = self.lanes & lanes_near(self.rays, &tree.view.bounds);
+        let lanes = self.lanes & lanes_entering(self.rays, &tree.view.bounds);
         self.hits.start(self.rays, lanes);
         walk_lanes(kernel, tree, self.rays, lanes, &mut self.query, self.hits);
     }
 }
 
-/// A part of a tree that a ray goes through alone.
+/// A subtree that one ray traverses alone.
 struct Subtree<'s, 'a, K, T, L> {
     kernel: K,
     tree: Resolved<'a, T, L>,
@@ -117,17 +117,17 @@ struct Subtree<'s, 'a, K, T, L> {
 }
 
 impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Subtree<'_, 'a, K, T, L> {
-    /// Visits its blocks up to `limit`.
+    /// Visits the blocks of the subtree up to `limit`.
     #[inline(always)]
     fn walk(self, walker: &mut impl Walker<K>, limit: f32) {
         walk_from(self.kernel, self.tree, self.code, self.stack, walker, limit);
     }
 }
 
-/// What rays look for. A trait instead of a closure, because all of it must be inlined to get the
-/// kernel's instructions.
+/// What the rays search for. This is a trait and not a closure, because all of it must be inlined to be compiled with
+/// the instructions of the kernel.
 trait Query {
-    /// Looks for it in a subtree, and keeps what `ray` finds in its `lane`.
+    /// Searches a subtree, and stores the result of `ray` in its `lane` of `hits`.
     fn search<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
         &mut self,
         subtree: Subtree<'_, 'a, K, T, L>,
@@ -137,7 +137,7 @@ trait Query {
     );
 }
 
-/// The nearest hit.
+/// Searches for the nearest hit.
 struct Nearest;
 
 impl Query for Nearest {
@@ -160,7 +160,7 @@ impl Query for Nearest {
     }
 }
 
-/// Any hit, which finishes the ray.
+/// Searches for any hit, which finishes the ray.
 struct Any;
 
 impl Query for Any {
@@ -181,9 +181,9 @@ impl Query for Any {
     }
 }
 
-/// All spheres on the lines of the rays.
+/// Visits all spheres on the lines of the rays.
 struct Chords<F> {
-    /// Gets a lane and a chord; false finishes the ray.
+    /// Called with a lane and a chord; false finishes the ray.
     visit: F,
 }
 
@@ -210,14 +210,14 @@ impl<F: FnMut(usize, TreeChord) -> bool> Query for Chords<F> {
     }
 }
 
-/// Nodes and blocks still to visit, and where each ray enters them.
+/// Nodes and blocks still to be visited, with the entry distance of each ray.
 struct LaneStack {
     near: [[f32; PACKET_SIZE]; STACK_SIZE],
     code: [u32; STACK_SIZE],
     depth: usize,
 }
 
-/// Brings the rays in `lanes` to what they look for; `hits` has their limits.
+/// Runs `query` for the rays in `lanes`; `hits` holds their limits.
 #[inline(always)]
 fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
@@ -231,6 +231,7 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
     if lanes == 0 || view.is_empty() {
         return;
     }
+    // Start at the root with all rays
     let slabs = LaneSlabs::new(rays, view.padding);
     let mut entered = EnteredChildren::NONE;
     let mut single_stack = WalkStack::new();
@@ -241,9 +242,9 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
     };
     let (mut code, mut alive) = (T::ROOT, lanes);
     loop {
-        match tree.topology.place(code) {
-            // Many rays: find the children that they enter, the nearest last
-            Place::Node(node) if alive.count_ones() > MOST_ALONE => {
+        match tree.topology.resolve(code) {
+            // Many rays enter the node: test its children with all of them, and push the nearest child last
+            NodeRef::Node(node) if alive.count_ones() > MAX_SINGLE_RAYS => {
                 let found = kernel.test_node_with_lanes(&slabs, node, alive, &hits.t, &mut entered);
                 let below = Below {
                     tree,
@@ -259,7 +260,7 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
                     stack.depth += 1;
                 }
             }
-            // Few rays, or a block: each goes on alone
+            // Few rays enter the node, or it is a block: traverse the subtree with each ray alone
             _ => {
                 for lane in lanes_in(alive) {
                     let ray = kernel.prepare(&rays.ray(lane), view.radius, view.padding);
@@ -273,7 +274,7 @@ fn walk_lanes<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
                 }
             }
         }
-        // Go on where the next place is still of use to a ray
+        // Pop the next node that still begins before the limit of some ray
         loop {
             if stack.depth == 0 {
                 return;

@@ -1,10 +1,10 @@
-//! The union of a tree's spheres along a ray: where it is entered, and where it is left.
+//! The union of the spheres of a tree along a ray: where the ray enters it, and where it leaves it.
 //!
-//! Each sphere that a ray passes through covers an interval of it; the union ends where the intervals
-//! that overlap one another from the ray's start on end together. They are gathered from the front: what
-//! begins before the end that is known may move it on, and what ends before it is passed over, so that a
-//! ray sees no more of a deep body than it crosses. Which end comes out is a matter of the intervals
-//! alone, not of the order in which they are found, nor of how often one is.
+//! Each sphere covers an interval of the ray. The union around the start of the ray ends where the last of a chain of
+//! overlapping intervals ends. Intervals are collected from the front: an interval that begins before the current end
+//! may extend it. Intervals that end before the current end are skipped, so a ray visits only the part of a deep body
+//! that it crosses. The result depends only on the intervals, not on the order in which they are found, nor on
+//! duplicates.
 
 use std::borrow::Borrow;
 use std::cell::RefCell;
@@ -15,45 +15,45 @@ use glam::Vec3;
 
 use super::leaves::{Leaves, LoadedRadii};
 use super::simd::{BlockCrossings, PacketKernel};
-use super::topology::{Place, Topology};
+use super::topology::{NodeRef, Topology};
 use super::traverse::TreeHit;
 use super::view::{Resolved, TreeTask, TreeView};
 use super::walk::{STACK_SIZE, walk};
 use crate::ray::Ray;
 use spherule_formats::blocks::BLOCK_SIZE;
 
-/// Where a ray that starts inside spheres comes out of all of them.
+/// Where a ray that starts inside spheres leaves their union.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum TreeExit {
-    /// Out of this sphere, the last one.
+    /// At the surface of this sphere, the last one.
     Here(TreeHit),
     /// Not before `ray.t_max`.
     Beyond,
-    /// It does not start inside any.
+    /// The ray does not start inside a sphere.
     NotInside,
 }
 
 impl TreeView<'_> {
-    /// Where a ray that starts outside all spheres enters the first, within `ray.t_min..ray.t_max`; equal
-    /// distances go to the lower particle index. A ray that starts inside a sphere all the same enters it
-    /// at `ray.t_min` if it goes deeper, and leaves it unnoticed if not.
+    /// Where a ray that starts outside all spheres enters the first one, within `ray.t_min..ray.t_max`. Ties in
+    /// distance go to the lower particle index. If a ray starts inside a sphere nevertheless, it enters the sphere at
+    /// `ray.t_min` if it is in the first half of the chord, and ignores the sphere otherwise.
     pub fn entry(&self, ray: &Ray) -> Option<TreeHit> {
-        if !self.may_be_met_by(ray) {
+        if !self.may_intersect(ray) {
             return None;
         }
         self.run(Entry { ray })
     }
 
-    /// Where a ray that is inside spheres at `ray.t_min` comes out of their union. Of spheres that end
-    /// there together, the one with the lowest particle index.
+    /// Where a ray that is inside spheres at `ray.t_min` leaves their union. If several spheres end there, the result
+    /// is the one with the lowest particle index.
     pub fn exit(&self, ray: &Ray) -> TreeExit {
         thread_local! {
-            /// Rays of a thread follow one another: one buffer serves them all.
-            static LATER: RefCell<Later> = const { RefCell::new(Later::new()) };
+            /// The rays of a thread are traced one after another, so they share one buffer.
+            static DEFERRED: RefCell<DeferredQueue> = const { RefCell::new(DeferredQueue::new()) };
         }
-        LATER.with_borrow_mut(|later| {
-            later.clear();
-            self.run(Exit { ray, later })
+        DEFERRED.with_borrow_mut(|deferred| {
+            deferred.clear();
+            self.run(Exit { ray, deferred })
         })
     }
 
@@ -71,7 +71,7 @@ impl TreeView<'_> {
     }
 }
 
-/// The lanes that are set, with their slots as far as they hold particles.
+/// The lanes that are set in `lanes`, with their slots. Stops at the first slot without a particle.
 #[inline(always)]
 fn slots_of(block: usize, mut lanes: u32, slots: usize) -> impl Iterator<Item = (usize, u32)> {
     std::iter::from_fn(move || {
@@ -89,7 +89,7 @@ fn slots_of(block: usize, mut lanes: u32, slots: usize) -> impl Iterator<Item = 
     })
 }
 
-/// The intervals that the spheres of a block cover of the line of `ray`.
+/// The intervals of the line of `ray` that the spheres of a block cover.
 #[inline(always)]
 fn intervals<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
@@ -127,9 +127,12 @@ impl TreeTask for Entry<'_> {
             |block, mut limit| {
                 let found = intervals(kernel, &tree, &prepared, block);
                 for (lane, slot) in slots_of(block, found.lanes, slots) {
-                    let Some(t) = entered(found.near[lane], found.far[lane], ray.t_min) else {
+                    // Skip spheres that do not count as entered
+                    let Some(t) = entry_distance(found.near[lane], found.far[lane], ray.t_min)
+                    else {
                         continue;
                     };
+                    // Keep the nearest entry; break ties by particle order
                     let wins = t < limit
                         || t == limit
                             && best.is_none_or(|held| {
@@ -147,11 +150,11 @@ impl TreeTask for Entry<'_> {
     }
 }
 
-/// Where a ray that begins at `t_min` enters a sphere that covers `near..far` of its line. Of a sphere that
-/// it starts in, though it should not, only the first half counts; one that is merely touched has no inside,
-/// so that what is entered is left farther on.
+/// Where a ray that begins at `t_min` enters a sphere that covers `near..far` of its line. If the ray starts inside
+/// the sphere, it counts as entered in the first half of the chord only. A sphere that is only touched has no inside,
+/// so an entry is always followed by an exit that is farther along the ray.
 #[inline(always)]
-fn entered(near: f32, far: f32, t_min: f32) -> Option<f32> {
+fn entry_distance(near: f32, far: f32, t_min: f32) -> Option<f32> {
     if near >= t_min {
         (far > near).then_some(near)
     } else {
@@ -160,7 +163,7 @@ fn entered(near: f32, far: f32, t_min: f32) -> Option<f32> {
 }
 
 struct Contains<'r> {
-    /// Of no length.
+    /// A ray of length zero.
     ray: &'r Ray,
 }
 
@@ -193,21 +196,21 @@ impl TreeTask for Contains<'_> {
     }
 }
 
-/// What begins beyond the end that is known, nearest first.
+/// Nodes and blocks with intervals that begin beyond the current end, nearest first.
 #[derive(Debug)]
-struct Later(BinaryHeap<Reverse<Begins>>);
+struct DeferredQueue(BinaryHeap<Reverse<Deferred>>);
 
-/// A block, or the rest of a node.
+/// A block, or a node with some children still to be visited.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-struct Begins {
-    /// Bits of the distance at which the next of it begins above, which order like integers as they are not
-    /// negative; the code below.
-    place: u64,
-    /// The children of a node that are done with.
-    done: u8,
+struct Deferred {
+    /// In the upper half, the bits of the distance at which its next interval begins, which order like integers
+    /// because they are not negative. In the lower half, the code of the node or block.
+    key: u64,
+    /// Bit mask of the children of a node that have been visited.
+    visited: u8,
 }
 
-impl Later {
+impl DeferredQueue {
     const fn new() -> Self {
         Self(BinaryHeap::new())
     }
@@ -217,65 +220,66 @@ impl Later {
     }
 
     #[inline(always)]
-    fn push(&mut self, distance: u32, code: u32, done: u8) {
-        let place = (u64::from(distance) << 32) | u64::from(code);
-        self.0.push(Reverse(Begins { place, done }));
+    fn push(&mut self, distance: u32, code: u32, visited: u8) {
+        let key = (u64::from(distance) << 32) | u64::from(code);
+        self.0.push(Reverse(Deferred { key, visited }));
     }
 
-    /// The nearest one, if it begins no later than `end`: its code and the children that are done with.
+    /// The nearest item if it begins no later than `end`: its code and the mask of visited children.
     #[inline(always)]
     #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
     fn pop_before(&mut self, end: f32) -> Option<(u32, u8)> {
-        let Reverse(Begins { place, .. }) = self.0.peek()?;
-        let begins = f32::from_bits((place >> 32) as u32);
+        let Reverse(Deferred { key, .. }) = self.0.peek()?;
+        let begins = f32::from_bits((key >> 32) as u32);
         if begins > end {
             return None;
         }
-        let Reverse(Begins { place, done }) = self.0.pop()?;
-        Some((place as u32, done))
+        let Reverse(Deferred { key, visited }) = self.0.pop()?;
+        Some((key as u32, visited))
     }
 }
 
 struct Exit<'r> {
     ray: &'r Ray,
-    later: &'r mut Later,
+    deferred: &'r mut DeferredQueue,
 }
 
-/// How far the union is known to reach.
-struct Reach {
+/// The end of the union as far as it is known.
+struct UnionEnd {
     end: f32,
-    /// The last sphere; none while it is that of no sphere.
+    /// The sphere that ends there; none before the first interval.
     slot: Option<u32>,
 }
 
-impl Reach {
-    /// Takes the intervals of a block in. Returns the least distance at which one begins beyond the end, or
-    /// infinity.
+impl UnionEnd {
+    /// Adds the intervals of a block. Returns the least distance at which an interval of the block begins beyond the
+    /// end, or infinity.
     #[inline(always)]
     fn extend(&mut self, view: &TreeView, block: usize, found: &BlockCrossings) -> f32 {
         loop {
+            // Extend the end by every interval that begins before it
             let before = self.end;
             let mut next = f32::INFINITY;
             for (lane, slot) in slots_of(block, found.lanes, view.slot_count()) {
                 let (near, far) = (found.near[lane], found.far[lane]);
                 if near > self.end {
                     next = next.min(near);
-                } else if far > self.end || (far == self.end && self.gives_way_to(view, slot)) {
+                } else if far > self.end || (far == self.end && self.precedes_current(view, slot)) {
                     *self = Self {
                         end: far,
                         slot: Some(slot),
                     };
                 }
             }
-            // An end that moved on may have come to others of the block.
+            // Repeat if the end has moved past the beginning of a skipped interval of the block.
             if self.end == before || next > self.end {
                 return next;
             }
         }
     }
 
-    /// Whether `slot`, which ends where the union does, comes before the one that is known.
-    fn gives_way_to(&self, view: &TreeView, slot: u32) -> bool {
+    /// Whether `slot`, which ends where the union ends, precedes the current slot.
+    fn precedes_current(&self, view: &TreeView, slot: u32) -> bool {
         self.slot
             .is_none_or(|held| view.tie_order(slot, held).is_lt())
     }
@@ -290,73 +294,77 @@ impl TreeTask for Exit<'_> {
         kernel: K,
         tree: Resolved<'a, T, L>,
     ) -> TreeExit {
-        let Self { ray, later } = self;
+        let Self { ray, deferred } = self;
         let (view, topology) = (tree.view, tree.topology);
         if view.is_empty() {
             return TreeExit::NotInside;
         }
-        // Boxes that are left before the end count no longer.
+        // Prepare the ray with the current end as `t_min`, so that boxes that lie before it are culled.
         let from = |t_min: f32| kernel.prepare(&Ray { t_min, ..*ray }, view.radius, view.padding);
         let limit = ray.t_max.next_down();
-        let mut reach = Reach {
+        let mut union = UnionEnd {
             end: ray.t_min,
             slot: None,
         };
-        let mut prepared = from(reach.end);
-        // What begins before the end; no more of it than below one code at a time.
+        let mut prepared = from(union.end);
+        // Nodes and blocks that begin before the end; at most the children of one node per level.
         let mut stack = [0_u32; STACK_SIZE];
         let mut depth = 0;
-        let (mut code, mut done) = (T::ROOT, 0_u8);
+        let (mut code, mut visited) = (T::ROOT, 0_u8);
         loop {
-            match topology.place(code) {
-                Place::Block(block) => {
-                    let before = reach.end;
+            match topology.resolve(code) {
+                NodeRef::Block(block) => {
+                    // Extend the union by the spheres of the block
+                    let before = union.end;
                     let found = intervals(kernel, &tree, &prepared, block);
-                    let next = reach.extend(view, block, &found);
-                    if reach.end > limit {
+                    let next = union.extend(view, block, &found);
+                    if union.end > limit {
                         return TreeExit::Beyond;
                     }
+                    // Defer the spheres of the block that begin beyond the end
                     if next <= limit {
-                        later.push(next.to_bits(), code, 0);
+                        deferred.push(next.to_bits(), code, 0);
                     }
-                    if reach.end > before {
-                        prepared = from(reach.end);
+                    if union.end > before {
+                        prepared = from(union.end);
                     }
                 }
-                Place::Node(node) => {
+                NodeRef::Node(node) => {
+                    // Push the children that begin before the end, and find the nearest one beyond it
                     let (found, keys) = kernel.test_node(&prepared, node, limit);
                     let children = topology.children(code);
                     let mut next = u32::MAX;
                     for key in &kernel.all_keys(keys)[..found] {
                         let (begins, slot) = (key & !7, key & 7);
-                        if done >> slot & 1 == 1 {
+                        if visited >> slot & 1 == 1 {
                             continue;
                         }
-                        if f32::from_bits(begins) <= reach.end {
-                            done |= 1 << slot;
+                        if f32::from_bits(begins) <= union.end {
+                            visited |= 1 << slot;
                             stack[depth] = topology.child(children, slot);
                             depth += 1;
                         } else {
                             next = next.min(begins);
                         }
                     }
-                    // The rest is looked at again: by then some of it may end before the end.
+                    // Defer the other children: when the end reaches them, some of them may be skipped.
                     if next < u32::MAX {
-                        later.push(next, code, done);
+                        deferred.push(next, code, visited);
                     }
                 }
             }
+            // Continue with the stack, then with deferred nodes that the end has reached
             if depth > 0 {
                 depth -= 1;
-                (code, done) = (stack[depth], 0);
-            } else if let Some(next) = later.pop_before(reach.end) {
-                (code, done) = next;
+                (code, visited) = (stack[depth], 0);
+            } else if let Some(next) = deferred.pop_before(union.end) {
+                (code, visited) = next;
             } else {
                 break;
             }
         }
-        match reach.slot {
-            Some(slot) => TreeExit::Here(TreeHit { t: reach.end, slot }),
+        match union.slot {
+            Some(slot) => TreeExit::Here(TreeHit { t: union.end, slot }),
             None => TreeExit::NotInside,
         }
     }

@@ -1,16 +1,16 @@
-//! `kdtree`: a k-d tree (Bentley 1975) with medians of the widest axis down to a block, folded into
-//! implicit 8-wide levels: the fastest to trace.
+//! `kdtree`: a k-d tree (Bentley 1975), split at the median of the widest axis down to one block, and folded into
+//! implicit 8-wide levels. It is the fastest structure to trace.
 //!
-//! The order is all there is to find (`order/kd` in `spherule-formats`); nodes are arithmetic.
+//! The build only orders the particles (`order/kd` in `spherule-formats`); the positions of nodes follow by arithmetic.
 
 use spherule_formats::order::kd;
 
-use super::levels::UpperLevels;
+use super::levels::TopLevels;
 use super::report::PhaseClock;
 use super::wide::WideTree;
 use super::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
 
-/// Builds over `spheres` in the memory of `tree`.
+/// Builds a tree over `spheres` in the memory of `tree`.
 pub(super) fn build(
     tree: &mut WideTree,
     spheres: &Spheres,
@@ -21,19 +21,21 @@ pub(super) fn build(
         SphereRadius::Common(radius) => Some(radius),
         SphereRadius::Each(_) => None,
     };
-    // Radii of their own follow by index, so then the indices are needed while building.
+    // Radii per particle are gathered by index, so the build needs the indices then.
     let indexed = settings.keep_indices || common.is_none();
     tree.reset(spheres.centers.len(), common, indexed);
 
+    // Order the particles in the memory of the blocks
     let (points, indices) = tree.points_mut();
     let lap = |phase| clock.lap(phase);
     let scratch_bytes = kd::order_into(spheres.centers, points, indices, lap);
 
+    // Complete the blocks and build the nodes over them
     tree.pad_last_block();
     if let SphereRadius::Each(radii) = spheres.radius {
         tree.gather_radii(radii);
     }
-    let sah_cost = tree.finish(UpperLevels::InOrder);
+    let sah_cost = tree.finish(TopLevels::InOrder);
     if !settings.keep_indices {
         tree.drop_indices();
     }

@@ -1,30 +1,31 @@
-//! `lbvh`: the linear bounding volume hierarchy (Lauterbach et al. 2009) with blocks as leaves and
-//! implicit 8-wide levels: Hilbert order, then nothing but arithmetic. The fastest build.
+//! `lbvh`: the linear bounding volume hierarchy (Lauterbach et al. 2009) with blocks as leaves and implicit 8-wide
+//! levels. Particles are sorted along a Hilbert curve; everything else is arithmetic. It is the fastest build.
 //!
-//! Sort: one parallel scatter into the cells of the curve's top levels (`partition.rs`), then
-//! each cell on its own inside the cache. Everything happens in the memory that the finished tree
-//! keeps, so building needs almost nothing beside it.
+//! The sort is one parallel scatter into the cells of the top levels of the curve (`partition.rs`), followed by a
+//! sort of each cell inside the cache. Both run in the memory of the finished tree, so the build needs almost no
+//! additional memory.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::levels::UpperLevels;
+use super::levels::TopLevels;
 use super::report::PhaseClock;
 use super::wide::WideTree;
 use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure};
 use spherule_formats::order::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
 use spherule_formats::order::partition::{Cells, scatter};
 
-/// Curve levels that the sort inside a cell looks at; finer differences keep the input's order.
+/// Curve levels that the sort inside a cell uses; particles that differ only in finer levels keep the order of the
+/// input.
 const CELL_LEVELS: u32 = 12;
-/// Bits left for the index of a particle in its cell, beside 3 * `CELL_LEVELS` bits of key.
+/// Bits for the index of a particle in its cell, next to 3 * `CELL_LEVELS` bits of the key.
 const CELL_INDEX_BITS: u32 = 64 - 3 * CELL_LEVELS;
-/// Cells above this are sorted by all threads together: a clustered frame must not end on one.
+/// Larger cells are sorted by all threads together, so that a clustered frame is not sorted by one thread.
 const LARGE_CELL: usize = 1 << 18;
-/// Positions looked at to place the grid.
+/// Number of positions sampled to place the grid.
 const SAMPLE: usize = 4096;
 
-/// Builds over `spheres` in the memory of `tree`.
+/// Builds a tree over `spheres` in the memory of `tree`.
 pub(super) fn build(
     tree: &mut WideTree,
     spheres: &Spheres,
@@ -32,7 +33,7 @@ pub(super) fn build(
 ) -> BuildReport {
     let mut clock = PhaseClock::new();
     let scratch_bytes = sort_into_blocks(tree, spheres, settings.keep_indices, &mut clock);
-    let sah_cost = tree.finish(UpperLevels::Mapped);
+    let sah_cost = tree.finish(TopLevels::Mapped);
     if !settings.keep_indices {
         tree.drop_indices();
     }
@@ -46,9 +47,9 @@ pub(super) fn build(
     )
 }
 
-/// Brings the particles along the curve into the blocks of `tree`, as points yet. Indices are there
-/// afterwards if they are to be kept or radii follow by them. Returns the most bytes held beside the
-/// tree. Laps `bounds`, `scatter` and `sort`.
+/// Sorts the particles along the curve into the blocks of `tree`, which then hold points (not yet transposed). The
+/// indices are available afterwards if they are to be kept or if radii need them. Returns the peak memory in bytes
+/// next to the tree. Records the phases `bounds`, `scatter` and `sort`.
 pub(super) fn sort_into_blocks(
     tree: &mut WideTree,
     spheres: &Spheres,
@@ -60,21 +61,24 @@ pub(super) fn sort_into_blocks(
         SphereRadius::Common(radius) => Some(radius),
         SphereRadius::Each(_) => None,
     };
-    // Radii of their own follow by index, so then the indices are needed while building.
+    // Radii per particle are gathered by index, so the build needs the indices then.
     let indexed = keep_indices || common.is_none();
     tree.reset(centers.len(), common, indexed);
 
+    // Place the grid of the curve over the bulk of the particles
     let bounds = bounds_of(centers);
     let (min, size) = grid_placement(centers, bounds);
     let grid = Grid::new(min, size);
     clock.lap("bounds");
 
+    // Scatter the particles into the cells of the top levels of the curve
     let (points, indices) = tree.points_mut();
     let top = TopCells::new(grid, Cells::levels_for(centers.len()));
     let cell_of = |_, center| top.cell_of(center);
     let cells = scatter(centers, top.len(), cell_of, points, indices);
     clock.lap("scatter");
 
+    // Sort each cell along the curve and complete the blocks
     let scratch_bytes = sort_scratch_bytes(&cells, indexed);
     sort_cells(&grid, top.levels(), &cells, points, indices);
     tree.pad_last_block();
@@ -92,8 +96,8 @@ fn bounds_of(centers: &[Vec3]) -> Aabb {
         .reduce(|| Aabb::EMPTY, Aabb::union)
 }
 
-/// Where the key grid goes: the box of the bulk of the particles, so that a few that escaped do
-/// not leave all others in one cell.
+/// Position and size of the grid: the box of the bulk of the particles, so that a few outliers do not put all others
+/// into one cell.
 fn grid_placement(centers: &[Vec3], bounds: Aabb) -> (Vec3, Vec3) {
     if centers.is_empty() {
         return (Vec3::ZERO, Vec3::ZERO);
@@ -103,6 +107,7 @@ fn grid_placement(centers: &[Vec3], bounds: Aabb) -> (Vec3, Vec3) {
     for axis in 0..3 {
         let mut values: Vec<f32> = centers.iter().step_by(stride).map(|c| c[axis]).collect();
         values.sort_unstable_by(f32::total_cmp);
+        // Clip the box to the 1st and 99th percentile, with a margin of half their distance
         let low = values[values.len() / 100];
         let high = values[values.len() - 1 - values.len() / 100];
         let margin = 0.5 * (high - low);
@@ -132,8 +137,8 @@ fn sort_cells(
         });
 }
 
-/// Most bytes that sorting holds beside the particles: crowded cells are copied with their keys, the
-/// others fit the caches.
+/// Peak memory of the sort in bytes next to the particles. Crowded cells are copied with their keys; all other cells
+/// fit into the cache.
 fn sort_scratch_bytes(cells: &Cells, indexed: bool) -> u64 {
     let each = size_of::<(u64, u32)>() + size_of::<Vec3>() + if indexed { 4 } else { 0 };
     let lens = cells.starts.windows(2).map(|pair| pair[1] - pair[0]);
@@ -141,7 +146,7 @@ fn sort_scratch_bytes(cells: &Cells, indexed: bool) -> u64 {
     (crowded * each) as u64
 }
 
-/// Memory of one thread for sorting cells; a cell fits the cache.
+/// Buffers of one thread for sorting cells; a cell fits into the cache.
 #[derive(Default)]
 struct CellScratch {
     keys: Vec<u64>,
@@ -151,11 +156,12 @@ struct CellScratch {
     starts: Vec<u32>,
 }
 
-/// Curve levels that the counting pass inside a cell distributes by.
+/// Curve levels used by the counting sort inside a cell.
 const BIN_LEVELS: u32 = 4;
 
 impl CellScratch {
     fn sort(&mut self, grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &mut [u32]) {
+        // Compute the key of each particle: its position along the curve, then its index in the cell
         let Some(first) = points.first() else { return };
         let (_, state) = hilbert(grid.morton(*first), 0, top_levels, CurveState::default());
         self.keys.clear();
@@ -164,6 +170,7 @@ impl CellScratch {
             (place << CELL_INDEX_BITS) | i as u64
         }));
         self.sort_keys();
+        // Move points and indices into the sorted order
         self.points.clear();
         self.points.extend_from_slice(points);
         self.indices.clear();
@@ -177,12 +184,13 @@ impl CellScratch {
         }
     }
 
-    /// A counting pass over the top bits of the keys, then each bin by comparison: the bins of an
-    /// even spread hold a handful.
+    /// Sorts the keys: a counting sort by their top bits, then a comparison sort in each bin. In an even
+    /// distribution, bins hold a handful of keys.
     fn sort_keys(&mut self) {
         const BINS: usize = 1 << (3 * BIN_LEVELS);
         const SHIFT: u32 = 64 - 3 * BIN_LEVELS;
         let bin = |key: u64| (key >> SHIFT) as usize;
+        // Count the keys of each bin, and sum the counts up to the start of each bin
         self.starts.clear();
         self.starts.resize(BINS + 1, 0);
         for key in &self.keys {
@@ -191,13 +199,14 @@ impl CellScratch {
         for b in 0..BINS {
             self.starts[b + 1] += self.starts[b];
         }
+        // Move each key to its bin
         self.sorted.resize(self.keys.len(), 0);
         for key in &self.keys {
             let slot = &mut self.starts[bin(*key)];
             self.sorted[*slot as usize] = *key;
             *slot += 1;
         }
-        // Now starts[b] is the end of bin b.
+        // Sort each bin; `starts[b]` is now the end of bin `b`
         let mut begin = 0;
         for end in &self.starts[..BINS] {
             let end = *end as usize;
@@ -207,7 +216,7 @@ impl CellScratch {
     }
 }
 
-/// Insertion sort for the handful that a bin usually holds.
+/// Insertion sort for small bins, which are the usual case.
 fn sort_bin(keys: &mut [u64]) {
     if keys.len() > 24 {
         return keys.sort_unstable();
@@ -227,8 +236,9 @@ fn local_index(key: u64) -> usize {
     (key & ((1 << CELL_INDEX_BITS) - 1)) as usize
 }
 
-/// One crowded cell by all threads, with all levels of the curve.
+/// Sorts a crowded cell with all threads, by all levels of the curve.
 fn sort_large_cell(grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &mut [u32]) {
+    // Sort the keys; ties go to the earlier particle
     let (_, state) = hilbert(grid.morton(points[0]), 0, top_levels, CurveState::default());
     let mut keys: Vec<(u64, u32)> = points
         .par_iter()
@@ -240,6 +250,7 @@ fn sort_large_cell(grid: &Grid, top_levels: u32, points: &mut [Vec3], indices: &
         })
         .collect();
     keys.par_sort_unstable();
+    // Move points and indices into the sorted order
     let old = points.to_vec();
     points
         .par_iter_mut()

@@ -1,6 +1,6 @@
-//! The leaves of a tree as kernels take them: a block where it lies, or decoded on the way.
+//! The leaves of a tree in the form that kernels use: a reference to a block, or a block decoded on the fly.
 //!
-//! A decoded block is meant to stay in registers: everything here is inlined into the walk.
+//! A decoded block should stay in registers, so everything here is inlined into the traversal.
 
 use std::borrow::Borrow;
 
@@ -12,19 +12,19 @@ use spherule_formats::blocks::{
     StoredRadii, WIDTH,
 };
 
-/// Positions by block.
+/// Access to the positions of a tree, by block.
 pub(super) trait Leaves: Copy {
-    /// A block, there or decoded.
+    /// A reference to a block, or a decoded block.
     type Loaded: Borrow<Block>;
 
     /// Block `index`.
     fn load<K: Kernel>(self, kernel: K, index: usize) -> Self::Loaded;
 
-    /// Asks for the memory of block `index` ahead of time.
+    /// Prefetches block `index`.
     fn prefetch<K: Kernel>(self, kernel: K, index: usize);
 }
 
-/// Blocks as they are.
+/// Blocks that are not coded.
 #[derive(Clone, Copy)]
 pub(super) struct Exact<'a>(pub(super) &'a [Block]);
 
@@ -42,7 +42,7 @@ impl<'a> Leaves for Exact<'a> {
     }
 }
 
-/// Coded blocks on the grids of the nodes above them.
+/// Coded blocks, on the grids of the nodes above them.
 #[derive(Clone, Copy)]
 pub(super) struct Coded<'a, B> {
     stored: CompactBlocks<'a, B>,
@@ -54,8 +54,8 @@ impl<'a, B: CompactBlock> Coded<'a, B> {
         Self { stored, nodes }
     }
 
-    /// The block as it is, where it could not be coded. None for one that is not there, which only a
-    /// damaged file refers to.
+    /// The uncoded copy of a block that could not be coded. None if the index is invalid, which happens only in
+    /// damaged files.
     #[inline(always)]
     fn wide(self, block: &B) -> Option<&'a Block> {
         let index = block.wide_index()?;
@@ -67,7 +67,7 @@ impl<'a, B: CompactBlock> Coded<'a, B> {
         self.nodes[index / WIDTH].child_frame(index % WIDTH)
     }
 
-    /// One particle of block `index`, as [`Leaves::load`] has it.
+    /// The centre of one particle of block `index`, equal to that of [`Leaves::load`].
     pub(super) fn center(self, index: usize, lane: usize) -> Vec3 {
         let block = &self.stored.blocks[index];
         match self.wide(block) {
@@ -95,9 +95,9 @@ impl<B: DecodedBlock> Leaves for Coded<'_, B> {
     }
 }
 
-/// A coded block that kernels decode.
+/// A coded block with a decoder in each kernel.
 pub(super) trait DecodedBlock: CompactBlock {
-    /// [`CompactBlock::decode`] by `kernel`, the same to the bit.
+    /// [`CompactBlock::decode`] with the instructions of `kernel`; the same result to the bit.
     fn decode_with<K: Kernel>(&self, kernel: K, frame: &BlockFrame) -> Block;
 }
 
@@ -115,33 +115,33 @@ impl DecodedBlock for Q16Block {
     }
 }
 
-/// Radii of a block.
+/// The radii of a block.
 pub(super) enum LoadedRadii<'a> {
-    /// The common radius is meant.
+    /// All spheres have the common radius.
     Common,
-    /// Where they lie.
-    There(&'a BlockRadii),
-    /// Decoded.
+    /// A reference to stored radii.
+    Stored(&'a BlockRadii),
+    /// Radii decoded on the fly.
     Decoded(BlockRadii),
 }
 
 impl<'a> LoadedRadii<'a> {
-    /// Those of block `index`.
+    /// The radii of block `index`.
     #[inline(always)]
     pub(super) fn of(radii: &StoredRadii<'a>, index: usize) -> Self {
         match radii {
             StoredRadii::None => Self::Common,
-            StoredRadii::F32(radii) => Self::There(&radii[index]),
+            StoredRadii::F32(radii) => Self::Stored(&radii[index]),
             coded => coded.load(index).map_or(Self::Common, Self::Decoded),
         }
     }
 
-    /// As kernels take them.
+    /// The radii as kernels expect them; None for the common radius.
     #[inline(always)]
     pub(super) fn as_ref(&self) -> Option<&BlockRadii> {
         match self {
             Self::Common => None,
-            Self::There(radii) => Some(radii),
+            Self::Stored(radii) => Some(radii),
             Self::Decoded(radii) => Some(radii),
         }
     }

@@ -1,31 +1,31 @@
-//! Whole levels of nodes over whatever lies below them, from the lowest up.
+//! Builds complete levels of nodes over blocks or stored nodes, from the lowest level up.
 
 use rayon::prelude::*;
 
 use super::Aabb;
-use super::upper::kd_order;
+use super::top_levels::kd_order;
 use spherule_formats::blocks::{Node, WIDTH};
 use spherule_formats::order::index_u32;
 
-/// Node levels at most. Whole levels need ten: 8^10 blocks of 16 are more particles than 32 bits
-/// count. Builders of other shapes keep to it by balancing what would grow deeper.
+/// Maximum number of node levels. Complete levels need ten: 8^10 blocks of 16 are more particles than 32 bits can
+/// count. Builders of other shapes stay within it by balancing subtrees that would be deeper.
 pub(super) const MAX_LEVELS: usize = 12;
 
-/// The order of the levels above subtrees of about a thousand particles.
+/// Order of the levels above subtrees of about a thousand particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum UpperLevels {
-    /// That of the particles.
+pub(super) enum TopLevels {
+    /// The order of the particles.
     InOrder,
-    /// One of their own, where that of the particles makes no compact nodes (see `upper.rs`).
+    /// An order of their own, for particle orders that do not give compact nodes (see `top_levels.rs`).
     Mapped,
 }
 
 /// Levels of nodes that stay in the order of the particles: subtrees of 8 * 8 blocks.
 const LOWER_LEVELS: usize = 2;
 
-impl UpperLevels {
-    /// The level of the roots of those subtrees out of so many, if there are levels above it to gain by
-    /// another order.
+impl TopLevels {
+    /// The level of the roots of those subtrees in a tree of `levels` levels, if there are levels above it that
+    /// another order would improve.
     pub(super) fn mapped_level(self, levels: usize) -> Option<usize> {
         match self {
             Self::InOrder => None,
@@ -34,7 +34,7 @@ impl UpperLevels {
     }
 }
 
-/// Nodes of each level, root level first; empty without blocks.
+/// Node count of each level, root level first; empty without blocks.
 pub(super) fn level_counts(blocks: usize) -> Vec<usize> {
     let mut counts = Vec::new();
     let mut count = blocks;
@@ -46,7 +46,7 @@ pub(super) fn level_counts(blocks: usize) -> Vec<usize> {
     counts
 }
 
-/// Number of the first node of each level.
+/// Index of the first node of each level.
 pub(super) fn level_starts(counts: &[usize]) -> Vec<u32> {
     let mut total = 0;
     let start = |count: &usize| {
@@ -57,28 +57,28 @@ pub(super) fn level_starts(counts: &[usize]) -> Vec<u32> {
     counts.iter().map(start).collect()
 }
 
-/// Something that a node encloses.
+/// A child of a node.
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Child {
-    /// Its box.
+    /// Its bounding box.
     pub(super) bounds: Aabb,
-    /// Areas of the padded boxes that are inside it but in no node that is built here.
+    /// Total area of the padded boxes inside the child whose nodes were not built here.
     pub(super) inner_area: f64,
 }
 
-/// What comes of building levels, beside the nodes.
+/// Result of building levels, apart from the nodes.
 #[derive(Debug, Default)]
 pub(super) struct BuiltLevels {
     /// Box of the root, not padded; empty without levels.
     pub(super) bounds: Aabb,
-    /// Summed areas of the padded boxes of all children.
+    /// Total area of the padded boxes of all children.
     pub(super) child_areas: f64,
     /// Order of the mapped level.
     pub(super) mapped: Vec<u32>,
 }
 
-/// Fills `nodes`, of which there are `counts` on each level, root level first. `child` gives what the
-/// nodes of the last level enclose, and nothing beyond the end. Areas are of boxes with `padding`.
+/// Fills `nodes`, which has `counts` nodes on each level, root level first. `child` returns the children of the nodes
+/// on the last level, and None past the end. Areas are those of boxes with `padding`.
 pub(super) fn build_levels(
     mut nodes: &mut [Node],
     counts: &[usize],
@@ -91,6 +91,7 @@ pub(super) fn build_levels(
     for (depth, count) in counts.iter().enumerate().rev() {
         let (upper, level) = nodes.split_at_mut(nodes.len() - count);
         nodes = upper;
+        // Build the level over the caller's children or over the level below it
         let below = std::mem::take(&mut boxes);
         let area;
         (boxes, area) = if depth + 1 == counts.len() {
@@ -104,9 +105,10 @@ pub(super) fn build_levels(
             })
         };
         built.child_areas += area;
+        // Reorder the roots of the subtrees, so that the levels above have compact nodes
         if Some(depth) == mapped_level {
             built.mapped = kd_order(&boxes);
-            bring_into_order(level, &mut boxes, &built.mapped);
+            reorder(level, &mut boxes, &built.mapped);
         }
     }
     if let Some(root) = boxes.first() {
@@ -115,8 +117,8 @@ pub(super) fn build_levels(
     built
 }
 
-/// Puts the nodes of a level and their boxes into `order`.
-fn bring_into_order(level: &mut [Node], boxes: &mut Vec<Aabb>, order: &[u32]) {
+/// Reorders the nodes of a level and their boxes by `order`.
+fn reorder(level: &mut [Node], boxes: &mut Vec<Aabb>, order: &[u32]) {
     let old = level.to_vec();
     for (node, place) in level.iter_mut().zip(order) {
         *node = old[*place as usize];
@@ -124,13 +126,13 @@ fn bring_into_order(level: &mut [Node], boxes: &mut Vec<Aabb>, order: &[u32]) {
     *boxes = order.iter().map(|place| boxes[*place as usize]).collect();
 }
 
-/// Fills `level`; returns the box of each node and the summed area of the children.
+/// Fills `level`. Returns the box of each node and the total area of the children.
 fn build_level(
     level: &mut [Node],
     padding: f32,
     child: impl Fn(usize) -> Option<Child> + Sync,
 ) -> (Vec<Aabb>, f64) {
-    // Areas are summed by runs of a fixed length, so that the sum does not depend on the threads.
+    // Areas are summed over runs of a fixed length, so that the sum does not depend on the number of threads.
     const RUN: usize = 1024;
     let mut boxes = vec![Aabb::EMPTY; level.len()];
     let areas: Vec<f64> = level
@@ -140,6 +142,7 @@ fn build_level(
         .map(|(run, (nodes, boxes))| {
             let mut area = 0.0;
             for (offset, (node, own)) in nodes.iter_mut().zip(boxes).enumerate() {
+                // Collect the boxes of up to eight children, and encode them
                 let first = (run * RUN + offset) * WIDTH;
                 let mut bounds = [Aabb::EMPTY; WIDTH];
                 let mut used = 0;
@@ -157,7 +160,7 @@ fn build_level(
     (boxes, areas.iter().sum())
 }
 
-/// Expected tests of a ray that meets the `root` box, over children whose areas are summed up.
+/// Expected number of tests for a ray that hits the `root` box, given the total area of all children.
 pub(super) fn sah_cost(child_areas: f64, root: Aabb) -> f64 {
     let root_area = root.area();
     if root_area > 0.0 {

@@ -1,25 +1,25 @@
-//! Writes a tree with links: blocks and nodes to their places, boxes made anew from the blocks up.
+//! Writes a tree with links: moves blocks and nodes to their final positions and recomputes boxes from the blocks up.
 
 use rayon::prelude::*;
 
+use super::collapse_nodes::Layout;
 use super::levels::sah_cost;
+use super::pack_leaves::PackedTree;
 use super::topology::Link;
-use super::trim::TrimmedTree;
 use super::wide::WideTree;
-use super::widen::Layout;
 use super::{Aabb, SphereRadius, Spheres};
 use spherule_formats::blocks::BLOCK_SIZE;
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// Brings the blocks of `tree` into the order of `layout`.
-pub(super) fn permute_blocks(tree: &mut WideTree, trimmed: &TrimmedTree, layout: &Layout) {
-    let order = |place: usize| trimmed.members(layout.blocks[place])[0] as usize;
+/// Reorders the blocks of `tree` by `layout`.
+pub(super) fn reorder_blocks(tree: &mut WideTree, packed: &PackedTree, layout: &Layout) {
+    let order = |place: usize| packed.members(layout.blocks[place])[0] as usize;
     permute(&mut tree.blocks, 1, order);
     permute(&mut tree.radii, 1, order);
     permute(&mut tree.indices, BLOCK_SIZE, order);
 }
 
-/// Brings runs of `run` values into the order in which `from` names them; does nothing to none.
+/// Reorders runs of `run` values: run `i` of the result is run `from(i)` of the input. Accepts an empty vector.
 fn permute<T: Copy + Send + Sync + bytemuck::Zeroable>(
     values: &mut Vec<T>,
     run: usize,
@@ -34,15 +34,15 @@ fn permute<T: Copy + Send + Sync + bytemuck::Zeroable>(
     *values = ordered;
 }
 
-/// Fills the blocks of `tree`, which has room, with the particles that the trimmed tree names.
-/// Lanes that are left over repeat the last particle.
+/// Fills the blocks of `tree`, which are allocated, with the particles of the packed tree. Unused lanes repeat the
+/// last particle of the block.
 pub(super) fn gather_blocks(
     tree: &mut WideTree,
     spheres: &Spheres,
-    trimmed: &TrimmedTree,
+    packed: &PackedTree,
     layout: &Layout,
 ) {
-    let members = |place: usize| trimmed.members(layout.blocks[place]);
+    let members = |place: usize| packed.members(layout.blocks[place]);
     let lanes = |place: usize| {
         let members = members(place);
         std::array::from_fn::<u32, BLOCK_SIZE, _>(|lane| members[lane.min(members.len() - 1)])
@@ -63,12 +63,12 @@ pub(super) fn gather_blocks(
     }
 }
 
-/// Box of each block in the space of the tree's boxes; where there are given ones, what they have
-/// in common with the spheres' own.
+/// Box of each block, padded as the boxes of the tree are. If there are `given` boxes, the result is their
+/// intersection with the boxes of the spheres.
 pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> Vec<Aabb> {
     let own = |place: usize| match tree.radii.get(place) {
         Some(radii) => tree.blocks[place].sphere_bounds(radii),
-        // Padded only where boxes hold spheres.
+        // Pad by the radius only if boxes bound spheres.
         None if tree.padding == 0.0 && tree.radius > 0.0 => tree.blocks[place]
             .bounds()
             .padded(tree.radius)
@@ -83,6 +83,7 @@ pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> V
             match given.get(layout.blocks[place] as usize) {
                 None => own,
                 Some(given) => {
+                    // Intersect the boxes; keep the given one if rounding leaves nothing
                     let common = given.intersection(own);
                     if common.is_empty() { *given } else { common }
                 }
@@ -91,7 +92,7 @@ pub(super) fn block_boxes(tree: &WideTree, given: &[Aabb], layout: &Layout) -> V
         .collect()
 }
 
-/// Makes the nodes of `tree` over its blocks, whose boxes are given. Returns the SAH cost.
+/// Builds the nodes of `tree` over blocks with the boxes `block_boxes`. Returns the SAH cost.
 pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aabb]) -> f64 {
     let Layout {
         links,
@@ -99,9 +100,11 @@ pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aa
         level_starts,
         ..
     } = layout;
+    // Reuse the memory of the previous nodes
     let mut nodes = std::mem::take(&mut tree.nodes);
     nodes.clear();
     nodes.resize(links.len(), bytemuck::Zeroable::zeroed());
+    // Encode the nodes level by level, from the lowest one up
     let mut boxes = vec![Aabb::EMPTY; links.len()];
     let mut areas = 0.0;
     let mut end = links.len();
@@ -118,6 +121,7 @@ pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aa
         areas += level.fill(&mut nodes[start..end], own);
         end = start;
     }
+    // Store the nodes and the bounds of the root
     tree.nodes = nodes;
     tree.links = links;
     tree.level_starts = level_starts;
@@ -129,11 +133,11 @@ pub(super) fn build_nodes(tree: &mut WideTree, layout: Layout, block_boxes: &[Aa
     sah_cost(areas, tree.bounds)
 }
 
-/// What the nodes of one level are made from.
+/// Input for the nodes of one level.
 struct Level<'a> {
     links: &'a [Link],
     child_counts: &'a [u8],
-    /// Boxes of all nodes from `first_below` on.
+    /// Boxes of all nodes from index `first_below` on.
     below: &'a [Aabb],
     first_below: usize,
     block_boxes: &'a [Aabb],
@@ -141,9 +145,9 @@ struct Level<'a> {
 }
 
 impl Level<'_> {
-    /// Fills `nodes` and their `boxes`; returns the summed area of the children.
+    /// Fills `nodes` and their `boxes`. Returns the total area of the children.
     fn fill(&self, nodes: &mut [Node], boxes: &mut [Aabb]) -> f64 {
-        // Areas are summed by runs of a fixed length, so that the sum does not depend on the threads.
+        // Areas are summed over runs of a fixed length, so that the sum does not depend on the number of threads.
         const RUN: usize = 1024;
         let areas: Vec<f64> = nodes
             .par_chunks_mut(RUN)

@@ -1,8 +1,9 @@
-//! Acceleration structures: particles in, a tree that answers nearest and any hit out.
+//! Acceleration structures: they take particles and return a tree that answers nearest-hit and any-hit queries.
 //!
-//! One traversal, several builders: every structure ends as a [`wide::WideTree`] (8-wide nodes of
-//! one cache line over blocks of 16 particles), is rebuilt for every frame in buffers that live on,
-//! is traced through a [`view::TreeView`] and reports itself in one [`BuildReport`]. Shading, files and jobs are none of its business.
+//! There are several builders and one traversal. Every structure ends as a [`wide::WideTree`]: 8-wide nodes of one
+//! cache line over blocks of 16 particles. It is rebuilt for every frame in buffers that are reused, it is traced
+//! through a [`view::TreeView`], and it is described by one [`BuildReport`]. This module knows nothing about shading,
+//! files or jobs.
 
 use glam::Vec3;
 
@@ -11,17 +12,19 @@ mod builder;
 mod bvh;
 mod choose;
 mod collapse;
+mod collapse_nodes;
 mod coverage;
 mod hits;
 mod hybrid;
 pub mod intervals;
+mod isolated;
 mod kdtree;
 mod lbvh;
 mod leaves;
 mod levels;
 mod linked;
-mod lonely;
-mod near;
+mod neighbours;
+mod pack_leaves;
 mod packet;
 mod ploc;
 mod predict;
@@ -30,15 +33,13 @@ mod report;
 mod sbvh;
 pub mod simd;
 pub mod stored;
+mod top_levels;
 mod topology;
 pub mod traverse;
-mod trim;
-mod upper;
 mod validate;
 pub mod view;
 mod walk;
 pub mod wide;
-mod widen;
 
 pub use builder::{BuildSettings, Structure, TreeBuilder};
 pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
@@ -50,20 +51,20 @@ pub use report::{BuildReport, Phase};
 pub use sbvh::SbvhSettings;
 pub use spherule_formats::blocks::Aabb;
 
-/// Index of a particle in the frame that was built over.
+/// Index of a particle in the frame that the tree was built over.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct PrimIdx(pub u32);
 
 /// Radii of the spheres of a frame, scene units.
 #[derive(Debug, Clone, Copy)]
 pub enum SphereRadius<'a> {
-    /// One for all.
+    /// One radius for all spheres.
     Common(f32),
-    /// One each, in particle order.
+    /// One radius per sphere, in particle order.
     Each(&'a [f32]),
 }
 
-/// What a structure is built over.
+/// Input of a builder: the spheres of a frame.
 #[derive(Debug, Clone, Copy)]
 pub struct Spheres<'a> {
     /// Centres, all finite.

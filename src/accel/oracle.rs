@@ -1,5 +1,5 @@
-//! An independent opinion for the tests: a left-balanced particle k-d tree in one array (Wald 2015),
-//! scalar and in f64. It shares nothing with the trees that it judges.
+//! An independent reference for the tests: a left-balanced particle k-d tree in one array (Wald 2015), scalar and in
+//! f64. It shares no code with the trees under test.
 
 use glam::{DVec3, Vec3};
 
@@ -30,8 +30,8 @@ impl ParticleTree {
         }
     }
 
-    /// Distance and particle of the nearest crossing not behind the origin, and how near the ray
-    /// comes to a decision that rounding could turn: grazing a sphere, or starting on one.
+    /// Distance and particle of the nearest crossing not behind the origin, and the margin of the closest decision
+    /// that rounding could change: grazing a sphere, or starting on one.
     pub(super) fn nearest(&self, ray: &Ray) -> (Option<(f64, usize)>, f64) {
         let mut search = Search {
             origin: ray.origin.as_dvec3(),
@@ -43,7 +43,7 @@ impl ParticleTree {
         (search.best, search.closeness)
     }
 
-    /// Looks through the subtree of `index` where the ray is between the distances `span`.
+    /// Searches the subtree of `index` for the part of the ray between the distances `span`.
     fn visit(&self, index: usize, span: [f64; 2], search: &mut Search) {
         let Some(node) = self.nodes.get(index) else {
             return;
@@ -51,7 +51,7 @@ impl ParticleTree {
         search.meet(node, self.radius);
         let (o, d) = (search.origin[node.axis], search.direction[node.axis]);
         for (child, side) in [(2 * index + 1, -1.0), (2 * index + 2, 1.0)] {
-            // Spheres of that side reach a radius and a little beyond the plane.
+            // Spheres of that side extend a radius and a little more beyond the plane.
             let border = node.center[node.axis] - side * self.radius * 1.01;
             if let Some(inside) = clip(span, side * (o - border), side * d) {
                 self.visit(child, inside, search);
@@ -71,7 +71,7 @@ fn clip([from, to]: [f64; 2], offset: f64, slope: f64) -> Option<[f64; 2]> {
     } else {
         [from, to.min(t)]
     };
-    // A little more, so that rounding loses nothing.
+    // Extended a little, so that rounding loses nothing.
     (inside[0] <= inside[1] + 1e-9).then_some(inside)
 }
 

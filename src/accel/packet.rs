@@ -1,14 +1,14 @@
-//! The traversals for packets, and the one for rays that lie close together: one walk for up to 16 rays,
-//! as wide as the beam around them. Packets without a beam go the way of [`super::hybrid`].
+//! Packet queries, and the traversal for coherent packets: one traversal for up to 16 rays, with a beam around them.
+//! Packets without a beam use [`super::hybrid`].
 //!
-//! Nodes and blocks are tested with the beam, and only the spheres inside it with the rays, all of them
-//! at once. What each ray finds is what it would find alone, to the bit.
+//! Nodes and blocks are tested with the beam. Only spheres inside the beam are tested with the rays, all rays at
+//! once. Each ray finds exactly what it would find alone, to the bit.
 
 use std::borrow::Borrow;
 
 use super::hits::{Coherence, TreeHits};
 use super::leaves::{Leaves, LoadedRadii};
-use super::simd::{Beam, PacketKernel, PacketSphere, lanes_near};
+use super::simd::{Beam, PacketKernel, PacketSphere, lanes_entering};
 use super::topology::Topology;
 use super::traverse::TreeHit;
 use super::view::{Resolved, TreeTask, TreeView};
@@ -18,7 +18,7 @@ use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii, Node};
 
 impl TreeView<'_> {
-    /// [`TreeView::nearest`] of each ray.
+    /// [`TreeView::nearest`] for each ray.
     pub fn nearest_lanes(&self, rays: &RayPacket, coherence: Coherence, hits: &mut TreeHits) {
         let lanes = match coherence {
             Coherence::Coherent => self.run(NearestInBeam { rays, hits }),
@@ -29,7 +29,7 @@ impl TreeView<'_> {
         }
     }
 
-    /// [`TreeView::any_hit`] of each ray, a bit for each lane.
+    /// [`TreeView::any_hit`] for each ray, as a bit mask of lanes.
     pub fn occluded_lanes(&self, rays: &RayPacket, coherence: Coherence) -> u32 {
         let (occluded, lanes) = match coherence {
             Coherence::Coherent => self.run(AnyInBeam { rays }),
@@ -42,7 +42,7 @@ impl TreeView<'_> {
         }
     }
 
-    /// [`TreeView::nearest_lanes`] of coherent rays.
+    /// [`TreeView::nearest_lanes`] for coherent rays.
     pub fn nearest_packet(&self, packet: &RayPacket) -> [Option<TreeHit>; PACKET_SIZE] {
         let mut hits = TreeHits::default();
         self.nearest_lanes(packet, Coherence::Coherent, &mut hits);
@@ -52,21 +52,21 @@ impl TreeView<'_> {
         })
     }
 
-    /// [`TreeView::occluded_lanes`] of coherent rays.
+    /// [`TreeView::occluded_lanes`] for coherent rays.
     pub fn any_hit_packet(&self, packet: &RayPacket) -> u32 {
         self.occluded_lanes(packet, Coherence::Coherent)
     }
 }
 
-/// Every ray of a packet.
+/// All rays of a packet.
 const ALL_LANES: u32 = first_lanes(PACKET_SIZE);
 
-/// Blocks after which the rays of a beam are traced anew without it: such a beam is too wide for the spheres (its
-/// rays start far apart), and tests many that few of its rays meet. Measured on the thesis's box: beams
-/// around pixels that are neighbours seldom need half as many.
-const MOST_BLOCKS: u32 = 64;
+/// Number of blocks after which the rays of a beam are traced again without it. Such a beam is too wide for the
+/// spheres (its rays start far apart), and tests many spheres that few of its rays hit. On the thesis's box, beams
+/// around neighbouring pixels rarely need half as many blocks.
+const MAX_BEAM_BLOCKS: u32 = 64;
 
-/// A block for a packet.
+/// A block in a form for tests with packets.
 struct PacketBlock<'a> {
     index: usize,
     centers: &'a Block,
@@ -96,9 +96,9 @@ impl PacketBlock<'_> {
     }
 }
 
-/// Finds the nearest hits, if there is a beam for the rays. Returns the lanes for which it did not; what
-/// `hits` has of these means nothing then: where boxes are rounded, to be shortened by it could lose a
-/// hit just in front of one.
+/// Finds the nearest hits with a beam around the rays. Returns the lanes that must be traced without a beam. Their
+/// entries in `hits` must not be used as limits: boxes are rounded, so a shortened ray could miss a hit just in front
+/// of the one found.
 struct NearestInBeam<'r, 'h> {
     rays: &'r RayPacket,
     hits: &'h mut TreeHits,
@@ -114,7 +114,8 @@ impl TreeTask for NearestInBeam<'_, '_> {
         tree: Resolved<'a, T, L>,
     ) -> u32 {
         let (rays, hits, view) = (self.rays, self.hits, tree.view);
-        let lanes = lanes_near(rays, &view.bounds);
+        // Select the rays that reach the tree
+        let lanes = lanes_entering(rays, &view.bounds);
         hits.start(rays, lanes);
         if lanes == 0 {
             return 0;
@@ -122,20 +123,21 @@ impl TreeTask for NearestInBeam<'_, '_> {
         let Some(beam) = Beam::around(rays, lanes, view.radius, view.padding) else {
             return lanes;
         };
+        // Traverse the tree with the beam; give up after too many blocks
         let limit = hits.farthest();
         let mut search = NearestOfBeam {
             tree,
             beam: &beam,
             rays,
             hits,
-            blocks_left: MOST_BLOCKS,
+            blocks_left: MAX_BEAM_BLOCKS,
         };
         walk_with(kernel, tree, &mut search, limit);
         if search.blocks_left == 0 { lanes } else { 0 }
     }
 }
 
-/// A beam whose rays look for their nearest hits.
+/// A beam of rays that search for their nearest hits.
 struct NearestOfBeam<'r, 'a, T, L> {
     tree: Resolved<'a, T, L>,
     beam: &'r Beam,
@@ -152,6 +154,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBea
 
     #[inline(always)]
     fn visit(&mut self, kernel: K, index: usize, limit: f32) -> f32 {
+        // Find the spheres of the block that the beam touches
         let view = self.tree.view;
         let centers = self.tree.leaves.load(kernel, index);
         let radii = LoadedRadii::of(&view.radii, index);
@@ -163,13 +166,15 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBea
             radii,
             radius: view.radius,
         };
+        // Test each of these spheres with all rays
         for lane in lanes_in(found) {
             let sphere = block.sphere(lane);
             let tied = kernel.nearest_of_packet(self.rays, &sphere, self.hits);
             if tied != 0 {
-                settle_ties(view, tied, sphere.slot, self.hits);
+                resolve_ties(view, tied, sphere.slot, self.hits);
             }
         }
+        // Stop if the beam visits too many blocks
         self.blocks_left -= 1;
         if self.blocks_left == 0 {
             return -1.0;
@@ -178,9 +183,9 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for NearestOfBea
     }
 }
 
-/// Gives `slot` to those of the `tied` lanes in which it comes before what they have.
+/// Stores `slot` in those of the `tied` lanes whose current slot it precedes.
 #[cold]
-fn settle_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut TreeHits) {
+fn resolve_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut TreeHits) {
     for lane in lanes_in(tied) {
         let held = &mut hits.slot[lane];
         if tree.tie_order(slot, *held).is_lt() {
@@ -189,8 +194,8 @@ fn settle_ties(tree: &TreeView, tied: u32, slot: u32, hits: &mut TreeHits) {
     }
 }
 
-/// Finds the rays that hit anything, if there is a beam for them. Returns their lanes, and those that are
-/// still undecided.
+/// Finds the rays with any hit, with a beam around the rays. Returns their lanes, and the lanes that must be traced
+/// without a beam.
 struct AnyInBeam<'r> {
     rays: &'r RayPacket,
 }
@@ -205,7 +210,7 @@ impl TreeTask for AnyInBeam<'_> {
         tree: Resolved<'a, T, L>,
     ) -> (u32, u32) {
         let (rays, view) = (self.rays, tree.view);
-        let lanes = lanes_near(rays, &view.bounds);
+        let lanes = lanes_entering(rays, &view.bounds);
         if lanes == 0 {
             return (0, 0);
         }
@@ -214,6 +219,7 @@ impl TreeTask for AnyInBeam<'_> {
         let Some(beam) = Beam::around(rays, lanes, view.radius, view.padding) else {
             return (0, lanes);
         };
+        // Traverse the tree with the beam; give up after too many blocks
         let limit = hits.farthest();
         let mut search = AnyOfBeam {
             tree,
@@ -221,7 +227,7 @@ impl TreeTask for AnyInBeam<'_> {
             rays,
             hits,
             occluded: 0,
-            blocks_left: MOST_BLOCKS,
+            blocks_left: MAX_BEAM_BLOCKS,
         };
         walk_with(kernel, tree, &mut search, limit);
         let occluded = search.occluded;
@@ -230,7 +236,7 @@ impl TreeTask for AnyInBeam<'_> {
     }
 }
 
-/// A beam whose rays look for any hit.
+/// A beam of rays that search for any hit.
 struct AnyOfBeam<'r, 'a, T, L> {
     tree: Resolved<'a, T, L>,
     beam: &'r Beam,
@@ -252,6 +258,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfBeam<'_
         let centers = self.tree.leaves.load(kernel, index);
         let radii = LoadedRadii::of(&view.radii, index);
         let (centers, radii) = (centers.borrow(), radii.as_ref());
+        // Find the spheres of the block that the beam touches
         let inside = kernel.spheres_in_beam(self.beam, centers, radii, limit);
         let block = PacketBlock {
             index,
@@ -259,6 +266,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfBeam<'_
             radii,
             radius: view.radius,
         };
+        // Test each of these spheres with all rays that are not occluded yet
         let mut found = 0;
         for lane in lanes_in(inside) {
             found |= kernel.any_of_packet(self.rays, &block.sphere(lane), &self.hits);

@@ -1,15 +1,14 @@
-//! Binary trees by `obvhs`: locally ordered clustering (PLOC, Meister & Bittner 2018) and its
-//! optimiser, which takes subtrees out and puts them where they cost less (parallel reinsertion,
-//! Meister & Bittner 2018).
+//! Binary trees by `obvhs`: locally ordered clustering (PLOC, Meister & Bittner 2018) and its optimiser, which moves
+//! subtrees to positions where they cost less (parallel reinsertion, Meister & Bittner 2018).
 //!
-//! Here is what it needs to be told, so that any scene comes back as one tree, the same whatever the
-//! number of threads:
-//! - Clustering merges neighbours that are each other's nearest. Where all are equally near
-//!   (coincident or equally spaced particles) that is one pair a pass, so boxes are shifted by a
-//!   small pseudo-random distance each.
-//! - It knows no infinite areas: coordinates are scaled by a power of two into -2..2.
-//! - Its own choice of what to reinsert depends on threads where areas are equal; ours does not.
-//! - Its stack has a fixed size, which we set by the depth that the tree has.
+//! This module adapts the input so that every scene gives a single tree, which does not depend on the number of
+//! threads:
+//! - Clustering merges pairs that are each other's nearest neighbours. If all distances are equal (coincident or
+//!   equally spaced particles), a pass merges only one pair. So each box is shifted by a small pseudo-random
+//!   distance.
+//! - `obvhs` does not handle infinite areas: coordinates are scaled by a power of two into -2..2.
+//! - Its choice of nodes to reinsert depends on threads if areas are equal; the one here does not.
+//! - Its stack has a fixed size, which is set here from the depth of the tree.
 
 use glam::{Vec3, Vec3A};
 use obvhs::bvh2::Bvh2;
@@ -24,27 +23,27 @@ use super::preset::{BvhPreset, Effort};
 use super::report::PhaseClock;
 use spherule_formats::order::index_u32;
 
-/// Shift of a box, as a part of its longest edge: far below what matters to the cost, far above
-/// where areas are rounded.
+/// Shift of a box as a fraction of its longest edge: far too small to affect the cost, and far above the rounding of
+/// areas.
 const SHIFT: f32 = 1.0 / 512.0;
-/// The least shift, as a part of the coordinates: what f32 still tells apart.
+/// Minimum shift as a fraction of the coordinates, from the resolution of f32.
 const LEAST_SHIFT: f32 = 1.0 / (1 << 21) as f32;
-/// The least shift of all, in scaled coordinates.
+/// Absolute minimum of the shift, in scaled coordinates.
 const SMALLEST_SHIFT: f32 = 1e-12;
-/// Passes of reinsertion: over the whole batch first, then over 1/3, 1/5... of it, as obvhs does.
+/// Passes of reinsertion: over the whole batch first, then over 1/3, 1/5... of it, as in obvhs.
 const PASSES: usize = 16;
 
-/// A tree and what it took.
+/// A binary tree and the memory of its build.
 #[derive(Debug)]
 pub(super) struct Clustered {
-    /// Each leaf has one reference, the box's number.
+    /// Each leaf has one reference, the index of the box.
     pub(super) tree: BinaryTree,
-    /// Most bytes held at any time, the boxes not counted where they are computed.
+    /// Peak memory in bytes; input boxes that are computed on the fly do not count.
     pub(super) peak_bytes: u64,
 }
 
-/// Clusters `count` boxes of spheres, each of which `bounds_of` tells; `padding` is what boxes of
-/// the result are smaller by on every side. Laps the phases `ploc` and `reinsert`.
+/// Clusters `count` boxes of spheres, which `bounds_of` returns. The boxes of the result are smaller by `padding` on
+/// every side. Records the phases `ploc` and `reinsert`.
 pub(super) fn cluster(
     count: usize,
     bounds_of: impl Fn(usize) -> Aabb + Sync,
@@ -52,6 +51,7 @@ pub(super) fn cluster(
     preset: BvhPreset,
     clock: &mut PhaseClock,
 ) -> Clustered {
+    // Merge the scaled and shifted boxes into one tree
     let scale = Scale::of((0..count).into_par_iter().map(&bounds_of));
     let effort = preset.effort();
     let mut bvh = Bvh2::default();
@@ -62,6 +62,7 @@ pub(super) fn cluster(
         .map(|place| leaf(scale.shifted(bounds_of(place), place), place))
         .collect_into_vec(&mut ploc.current_nodes);
     merge(&mut ploc, &mut bvh, preset);
+    // Improve the tree by reinsertion
     let ploc_bytes = bytes(&ploc.current_nodes)
         + bytes(&ploc.next_nodes)
         + bytes(&ploc.mortons)
@@ -70,6 +71,7 @@ pub(super) fn cluster(
     clock.lap("ploc");
     let reinsert_bytes = bytes(&bvh.nodes) + reinsert(&mut bvh, effort.reinsertion);
     clock.lap("reinsert");
+    // Convert the tree to the original coordinates
     bvh.parents = Vec::new();
     let tree = scale.binary(&bvh.nodes, padding);
     let convert_bytes = bytes(&bvh.nodes) + bytes(&tree.nodes) + bytes(&tree.references);
@@ -88,7 +90,7 @@ fn leaf(bounds: Aabb, place: usize) -> Bvh2Node {
     Bvh2Node::new(bounds, 1, index_u32(place))
 }
 
-/// Merges the builder's nodes into one tree.
+/// Clusters the nodes of the builder into one tree.
 fn merge(ploc: &mut PlocBuilder, bvh: &mut Bvh2, preset: BvhPreset) {
     bvh.reset_for_reuse(ploc.current_nodes.len(), Some(Vec::new()));
     let leaves = ploc.current_nodes.par_iter().map(|node| *node.aabb());
@@ -98,7 +100,7 @@ fn merge(ploc: &mut PlocBuilder, bvh: &mut Bvh2, preset: BvhPreset) {
         precision,
         ..
     } = preset.effort();
-    // How far clustering looks is a constant of the code it is compiled to.
+    // The search radius is a compile-time constant.
     match preset {
         BvhPreset::Fast => {
             ploc.build_ploc_from_leaves::<6, false>(bvh, total, precision, near_passes);
@@ -112,7 +114,7 @@ fn merge(ploc: &mut PlocBuilder, bvh: &mut Bvh2, preset: BvhPreset) {
     }
 }
 
-/// Places `share` of the nodes better, again and again. Returns the bytes that took.
+/// Reinserts a fraction `share` of the nodes, in several passes. Returns the memory used, in bytes.
 fn reinsert(bvh: &mut Bvh2, share: f32) -> u64 {
     if bvh.nodes.len() < 3 {
         return 0;
@@ -120,19 +122,21 @@ fn reinsert(bvh: &mut Bvh2, share: f32) -> u64 {
     let mut optimizer = ReinsertionOptimizer::default();
     let mut most_candidates = 0;
     for pass in 0..PASSES {
+        // Select the largest nodes, fewer in each pass
         let part = share / (2 * pass + 1) as f32;
         let candidates = largest_nodes(&bvh.nodes, part);
         most_candidates = most_candidates.max(candidates.len());
+        // Reinsert them with a stack that suits the current depth
         bvh.max_depth = depth(&bvh.nodes) + 1;
         optimizer.run_with_candidates(bvh, &candidates, 1);
     }
-    // For each node its parent and a mark, for each candidate itself, a cost and what became of it.
+    // Each node has a parent and a mark; each candidate has an index, a cost and a result.
     let per_candidate = 4 + 8 + size_of::<obvhs::bvh2::reinsertion::Reinsertion>();
     bytes(&bvh.parents) + (bvh.nodes.len() + per_candidate * most_candidates) as u64
 }
 
-/// The nodes of largest area among twice as many that lie first, where the upper ones are; as obvhs
-/// chooses, but nodes of equal area by number.
+/// The nodes of largest area among the first nodes of the tree, twice as many as requested, which are the upper ones.
+/// Follows obvhs, except that ties in area are broken by index.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -149,7 +153,7 @@ fn largest_nodes(nodes: &[Bvh2Node], part: f32) -> Vec<u32> {
     found.into_iter().map(|(_, index)| index).collect()
 }
 
-/// Levels below the root.
+/// Number of levels below the root.
 fn depth(nodes: &[Bvh2Node]) -> usize {
     let mut deepest = 0;
     let mut pending = vec![(0_u32, 0_usize)];
@@ -163,7 +167,7 @@ fn depth(nodes: &[Bvh2Node]) -> usize {
     deepest
 }
 
-/// The way into the coordinates that obvhs sees and back.
+/// Conversion to the coordinates of obvhs and back.
 #[derive(Debug, Clone, Copy)]
 struct Scale {
     factor: f32,
@@ -171,7 +175,7 @@ struct Scale {
 }
 
 impl Scale {
-    /// Brings all boxes into -2..2 by a power of two, which loses nothing.
+    /// Scales all boxes into -2..2 by a power of two, which is exact.
     fn of(bounds: impl ParallelIterator<Item = Aabb>) -> Self {
         let largest = bounds
             .map(|b| b.min.abs().max(b.max.abs()).max_element())
@@ -203,7 +207,7 @@ impl Scale {
         }
     }
 
-    /// The tree of obvhs in our order and coordinates, boxes smaller by `padding`.
+    /// Converts a tree of obvhs to the order and coordinates of this crate; boxes shrink by `padding`.
     fn binary(self, nodes: &[Bvh2Node], padding: f32) -> BinaryTree {
         let mut tree = BinaryTree::default();
         let Some(root) = nodes.first() else {
@@ -212,6 +216,7 @@ impl Scale {
         tree.nodes.reserve_exact(nodes.len());
         tree.references.reserve_exact(nodes.len().div_ceil(2));
         tree.nodes.push(self.node(root, padding));
+        // Copy the nodes depth first; the children of a node are adjacent
         let mut pending = vec![(0_usize, 0_usize)];
         while let Some((from, to)) = pending.pop() {
             let node = &nodes[from];
@@ -245,8 +250,8 @@ impl Scale {
     }
 }
 
-/// A vector with edges from 0 to 1 that looks random and depends on `place` alone (the finaliser of
-/// splitmix64, Steele, Lea & Flood 2014).
+/// A pseudo-random vector with components from 0 to 1 that depends only on `place` (the finaliser of splitmix64,
+/// Steele, Lea & Flood 2014).
 fn unit_vector(place: usize) -> Vec3 {
     let mut bits = (place as u64 + 1).wrapping_mul(0x9e37_79b9_7f4a_7c15);
     bits = (bits ^ (bits >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -262,7 +267,7 @@ mod tests {
 
     const COUNT: usize = 3000;
 
-    /// Clusters spheres of radius 1 about `centers`.
+    /// Clusters spheres of radius 1 around `centers`.
     fn clustered(centers: &[Vec3], preset: BvhPreset) -> Clustered {
         let bounds_of = |place: usize| Aabb {
             min: centers[place] - 1.0,
@@ -288,7 +293,7 @@ mod tests {
         levels.into_iter().max().unwrap_or(0)
     }
 
-    /// Else merging is one pair a pass, and time grows with the square of the particles.
+    /// Otherwise a pass merges one pair, and time grows with the square of the particle count.
     #[test]
     fn equal_distances_do_not_make_chains() {
         let line = (0..COUNT).map(|i| Vec3::X * i as f32).collect();

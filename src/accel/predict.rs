@@ -1,7 +1,7 @@
-//! How much memory a build will take, before there are particles to build over.
+//! Predicts the memory of a build from the particle count.
 //!
-//! The same sums that [`super::BuildReport`] makes afterwards, from counts alone. Where a builder's
-//! need depends on where the particles are, an even spread is assumed.
+//! The sums are those of [`super::BuildReport`], computed from counts alone. If the memory of a builder depends on
+//! the distribution of the particles, an even distribution is assumed.
 
 use super::topology::Link;
 use super::{Aabb, BuildSettings, BvhLeaves, BvhPreset, Structure};
@@ -9,16 +9,16 @@ use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
 use spherule_formats::order::{kd, partition};
 
-/// Bytes of a build.
+/// Memory of a build, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct BuildBytes {
     /// The finished tree.
     pub tree: u64,
-    /// Held beside it at the peak of the build, the input not counted.
+    /// Memory next to the tree at the peak of the build, without the input.
     pub scratch: u64,
 }
 
-/// What a build over `particles`, each with a radius of its own or not, will hold.
+/// Predicted memory of a build over `particles`, with or without a radius per particle (`own_radii`).
 pub fn predicted_bytes(settings: &BuildSettings, particles: u64, own_radii: bool) -> BuildBytes {
     let size = Size {
         particles,
@@ -36,7 +36,7 @@ pub fn predicted_bytes(settings: &BuildSettings, particles: u64, own_radii: bool
     }
 }
 
-/// What a [`super::stored::StoredTree`] over `particles` will hold beside the frame.
+/// Predicted memory of a [`super::stored::StoredTree`] over `particles`, without the frame.
 pub fn predicted_stored_bytes(particles: u64) -> BuildBytes {
     let blocks = particles.div_ceil(BLOCK_SIZE as u64);
     let stored = blocks.div_ceil(WIDTH as u64);
@@ -49,22 +49,25 @@ pub fn predicted_stored_bytes(particles: u64) -> BuildBytes {
     }
 }
 
-/// Nodes for each block of a tree of links: eight blocks or nodes under each would be 0.14, but
-/// nodes made of binary ones have 3.8 children on average (thesis's box, 1e5 to 1e7).
+/// Nodes per block of a tree with links. With eight children per node it would be 0.14, but nodes collapsed from
+/// binary ones have 3.8 children on average (thesis's box, 1e5 to 1e7).
 const NODES_PER_BLOCK: f64 = 0.357;
-/// Bytes that clustering (`ploc.rs`) holds for each thing clustered, and with 128-bit codes.
+/// Bytes that clustering (`ploc.rs`) needs per item, with 64-bit codes.
 const CLUSTER_BYTES: u64 = 208;
+/// The same with 128-bit codes.
 const CLUSTER_BYTES_HIGH: u64 = 224;
-/// Particles in a block of clustered particles, on average; and where splits go by cost.
+/// Average number of particles in a block of clustered particles.
 const CLUSTERED_FILL: f64 = 10.9;
+/// Average number of particles in a block of a tree with splits by cost.
 const SPLIT_FILL: f64 = 15.0;
-/// Bytes of a reference while splits are looked for, and of the binary tree for each.
+/// Bytes per reference while splits are searched.
 const REFERENCE_BYTES: f64 = 28.0;
+/// Bytes of the binary tree per reference.
 const SPLIT_TREE_BYTES: f64 = 8.5;
-/// Bytes of a particle while upper medians are found: its cell, and the part that is undecided.
+/// Bytes per particle while the upper medians are found: its cell, and the undecided part.
 const CUT_BYTES: u64 = 4;
 
-/// What a tree is to be built over.
+/// Size of the input of a build.
 struct Size {
     particles: u64,
     own_radii: bool,
@@ -72,16 +75,16 @@ struct Size {
 }
 
 impl Size {
-    /// Sorting happens in the memory of the tree (`lbvh.rs`); beside it there are the tables of the
-    /// scatter, and then the boxes of the lowest level (`wide.rs`). Crowded cells, of which an even
-    /// spread has none, take up to 32 bytes a particle of theirs on top.
+    /// The sort works in the memory of the tree (`lbvh.rs`). Additional memory holds the tables of the scatter, then
+    /// the boxes of the lowest level (`wide.rs`). Crowded cells, which do not occur in an even distribution, need up
+    /// to 32 bytes for each of their particles.
     fn lbvh(&self) -> BuildBytes {
         let tables = partition::table_bytes(self.particles);
         let (levels, places) = whole_levels(self.blocks());
         self.in_place(levels + places, tables)
     }
 
-    /// As lbvh, without another order of the upper levels; but first the upper cuts are found.
+    /// As lbvh, but without reordered top levels, and with a search for the upper cuts.
     fn kdtree(&self) -> BuildBytes {
         let cuts = if self.particles > kd::CELL_LEN as u64 {
             CUT_BYTES * self.particles
@@ -91,28 +94,29 @@ impl Size {
         self.in_place(whole_levels(self.blocks()).0, cuts)
     }
 
-    /// Sorted in the memory of the tree.
+    /// A build that sorts in the memory of the tree.
     fn in_place(&self, nodes: u64, sorting: u64) -> BuildBytes {
         let boxes = self.blocks().div_ceil(WIDTH as u64) * size_of::<Aabb>() as u64;
         BuildBytes {
             tree: nodes + self.leaves(self.blocks(), self.keep_indices),
-            scratch: self.lent() + boxes.max(sorting),
+            scratch: self.temporary_index_bytes() + boxes.max(sorting),
         }
     }
 
-    /// Blocks as those of lbvh, clustered.
+    /// Clusters the same blocks as lbvh.
     fn bvh_of_blocks(&self) -> BuildBytes {
         let blocks = self.blocks();
         let tables = partition::table_bytes(self.particles);
         BuildBytes {
             tree: linked_nodes(blocks) + self.leaves(blocks, self.keep_indices),
-            scratch: self.lent() + tables.max(blocks * (CLUSTER_BYTES + size_of::<Aabb>() as u64)),
+            scratch: self.temporary_index_bytes()
+                + tables.max(blocks * (CLUSTER_BYTES + size_of::<Aabb>() as u64)),
         }
     }
 
-    /// Nothing of the tree is there yet while particles are clustered.
+    /// The clustering ends before any memory of the tree is in use.
     fn bvh_of_particles(&self, preset: BvhPreset) -> BuildBytes {
-        let tree = self.gathered(CLUSTERED_FILL);
+        let tree = self.linked_tree_bytes(CLUSTERED_FILL);
         let each = match preset {
             BvhPreset::High => CLUSTER_BYTES_HIGH,
             BvhPreset::Fast | BvhPreset::Medium => CLUSTER_BYTES,
@@ -123,15 +127,15 @@ impl Size {
         }
     }
 
-    /// Of equal spheres hardly any are split. Where radii differ the whole budget may be used, for
-    /// which there is room in the scratch.
+    /// With equal spheres almost no references are split. With a radius per particle the whole budget may be used;
+    /// the scratch includes it.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "an estimate; the budget is at least 0"
     )]
     fn sbvh(&self, budget: f32) -> BuildBytes {
-        let tree = self.gathered(SPLIT_FILL);
+        let tree = self.linked_tree_bytes(SPLIT_FILL);
         let budget = f64::from(budget);
         let references = self.particles as f64 * (1.0 + budget) * REFERENCE_BYTES;
         let binary = self.particles as f64 * SPLIT_TREE_BYTES;
@@ -146,12 +150,12 @@ impl Size {
         }
     }
 
-    /// Blocks of which the last may be unfilled.
+    /// Number of full blocks, plus one if particles are left over.
     fn blocks(&self) -> u64 {
         self.particles.div_ceil(BLOCK_SIZE as u64)
     }
 
-    /// Blocks with what belongs to their particles.
+    /// Bytes of blocks with the radii and indices of their particles.
     fn leaves(&self, blocks: u64, indexed: bool) -> u64 {
         let radii = if self.own_radii {
             size_of::<BlockRadii>()
@@ -162,8 +166,8 @@ impl Size {
         blocks * (size_of::<Block>() + radii + indices) as u64
     }
 
-    /// Radii follow by index, so indices that are not kept are there until the end.
-    fn lent(&self) -> u64 {
+    /// Bytes of indices that exist only during the build, because radii are gathered by index.
+    fn temporary_index_bytes(&self) -> u64 {
         if self.own_radii && !self.keep_indices {
             self.blocks() * 4 * BLOCK_SIZE as u64
         } else {
@@ -171,19 +175,19 @@ impl Size {
         }
     }
 
-    /// A tree of links over blocks of `fill` particles, which always has indices.
+    /// Bytes of a tree with links over blocks of `fill` particles; such a tree always has indices.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "an estimate of what is not negative"
     )]
-    fn gathered(&self, fill: f64) -> u64 {
+    fn linked_tree_bytes(&self, fill: f64) -> u64 {
         let blocks = (self.particles as f64 / fill).ceil() as u64;
         linked_nodes(blocks) + self.leaves(blocks, true)
     }
 }
 
-/// Nodes and links over so many blocks.
+/// Bytes of nodes and links over `blocks`.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -194,7 +198,7 @@ fn linked_nodes(blocks: u64) -> u64 {
     nodes * (size_of::<Node>() + size_of::<Link>()) as u64
 }
 
-/// Nodes of an implicit tree over so many blocks, and its table of places (see `upper.rs`).
+/// Bytes of the nodes of an implicit tree over `blocks`, and of its order table (see `top_levels.rs`).
 fn whole_levels(blocks: u64) -> (u64, u64) {
     let (mut nodes, mut places) = (0, 0);
     let (mut count, mut level) = (blocks, 0);
@@ -202,7 +206,7 @@ fn whole_levels(blocks: u64) -> (u64, u64) {
         count = count.div_ceil(WIDTH as u64);
         level += 1;
         nodes += count * size_of::<Node>() as u64;
-        // The roots of the subtrees that are reordered: two levels up, if there is one above.
+        // The reordered subtrees have their roots two levels above the blocks, if there is a level above that.
         if level == 2 && count > 1 {
             places = 4 * count;
         }
@@ -217,7 +221,7 @@ mod tests {
     use super::*;
     use crate::accel::{BvhSettings, SphereRadius, Spheres, TreeBuilder};
 
-    /// Builds over an even spread and compares with what the builder says.
+    /// Builds over an even distribution and compares with the report of the builder.
     #[track_caller]
     fn compare(settings: &BuildSettings, particles: usize, own_radii: bool) {
         let centers = fill_box(&BoxSettings::thesis(particles, 1));
@@ -236,7 +240,7 @@ mod tests {
         let report = TreeBuilder::new().build(&spheres, settings);
         let predicted = predicted_bytes(settings, particles as u64, own_radii);
         let built = report.position_bytes + report.structure_bytes;
-        // Few blocks are filled by chance.
+        // The fill of few blocks varies.
         let slack = if particles < 10_000 {
             1024 + particles as u64 * 12
         } else {

@@ -1,26 +1,25 @@
-//! How much effort goes into a BVH.
+//! Effort of a BVH build.
 
 use obvhs::ploc::SortPrecision;
 
-/// How much is spent on the tree. Each stands for parameters of `obvhs`, whose presets of about the
-/// same names they follow.
+/// Effort of the build. Each preset selects parameters of `obvhs`, and follows the preset of obvhs with a similar name.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum BvhPreset {
-    /// As `fast_build`: 6 neighbours to either side are looked at from the third pass on; 2 % of
-    /// the nodes are reinserted at a time.
+    /// As `fast_build`: a search radius of 6 neighbours to either side from the third pass on; 2 % of the nodes are
+    /// reinserted at a time.
     #[default]
     Fast,
-    /// As `medium_build`: 14 neighbours from the fourth pass on; 5 %.
+    /// As `medium_build`: a search radius of 14 neighbours from the fourth pass on; 5 %.
     Medium,
-    /// As `slow_build`: 24 neighbours from the third pass on, codes of 128 bits; 20 %.
+    /// As `slow_build`: a search radius of 24 neighbours from the third pass on, codes of 128 bits; 20 %.
     High,
 }
 
 impl BvhPreset {
-    /// All there are.
+    /// All presets.
     pub const ALL: [Self; 3] = [Self::Fast, Self::Medium, Self::High];
 
-    /// Its name in files.
+    /// The name in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Fast => "fast",
@@ -50,12 +49,12 @@ impl BvhPreset {
     }
 }
 
-/// What a preset asks of obvhs.
+/// Parameters of obvhs.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Effort {
-    /// Passes in which only direct neighbours are looked at.
+    /// Number of first passes that search only direct neighbours.
     pub(super) near_passes: usize,
-    /// Part of the nodes that each round of reinsertion tries to place better.
+    /// Fraction of the nodes that each round of reinsertion tries to move.
     pub(super) reinsertion: f32,
     /// Bits of the Morton codes.
     pub(super) precision: SortPrecision,

@@ -1,4 +1,4 @@
-//! What a build cost and what came out, the same for every structure.
+//! Cost and result of a build, in the same form for every structure.
 
 use std::time::{Duration, Instant};
 
@@ -7,50 +7,49 @@ use super::Structure;
 /// One named piece of the build time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Phase {
-    /// What was done.
+    /// Name of the phase.
     pub name: &'static str,
     /// Wall-clock time.
     pub time: Duration,
 }
 
-/// What a build cost and what came out; the same for every structure.
+/// Cost and result of a build, in the same form for every structure.
 #[derive(Debug, Clone)]
 pub struct BuildReport {
-    /// Who built it.
+    /// The structure that was built.
     pub structure: Structure,
-    /// The order that the particles were brought into.
+    /// The order of the particles.
     pub order: &'static str,
     /// Wall-clock time of the whole build.
     pub total: Duration,
-    /// The same by phase.
+    /// Wall-clock time by phase.
     pub phases: Vec<Phase>,
-    /// Particles.
+    /// Particle count.
     pub particles: u64,
-    /// Places of particles in leaves: one for each, and more where spatial splits have cut some.
+    /// References in leaves: one per particle, and more if spatial splits have cut spheres.
     pub references: u64,
-    /// 8-wide nodes.
+    /// Count of 8-wide nodes.
     pub nodes: u64,
-    /// Leaves (blocks).
+    /// Leaf count (blocks).
     pub leaves: u64,
-    /// Node levels from the root to the leaves' parents.
+    /// Node levels from the root to the parents of the leaves.
     pub depth: u32,
-    /// Expected nodes and blocks tested by a ray that hits the root box (surface area heuristic,
-    /// Goldsmith & Salmon 1987, with the radius added to every box and one unit for either test).
+    /// Expected number of node and block tests for a ray that hits the root box (surface area heuristic, Goldsmith &
+    /// Salmon 1987; boxes padded by the radius, cost 1 for either test).
     pub sah_cost: f64,
     /// Bytes of the positions and radii in blocks.
     pub position_bytes: u64,
-    /// Bytes of the nodes and of the way back to the frame's order.
+    /// Bytes of the nodes and of the particle indices.
     pub structure_bytes: u64,
-    /// The part of these two that lies in a mapped file, whose pages the system may drop.
+    /// Bytes of these two that are in a mapped file; the system may drop their pages.
     pub file_bytes: u64,
-    /// Most bytes held at any time while building, the input not counted unless it is traced where it
-    /// lies.
+    /// Peak memory of the build in bytes. Includes the input only if the input itself is traced, as stored leaves are.
     pub peak_bytes: u64,
     /// The instruction set that rays are traced with.
     pub simd: &'static str,
 }
 
-/// Wall-clock laps.
+/// Measures the wall-clock time of consecutive phases.
 pub(crate) struct PhaseClock {
     last: Instant,
     phases: Vec<Phase>,

@@ -1,14 +1,14 @@
-//! Trees whose leaves lie in a native frame: they are traced there, and only the levels of nodes above
-//! them are built, one node of eight for eight that are stored.
+//! Trees with leaves in a native frame. Rays are traced through the frame itself; only the node levels above the
+//! stored ones are built, one node per eight stored nodes.
 //!
-//! What is stored is the content of a file and may be anything. Every stored node is looked at once, so
-//! that rays come to blocks that are there and to boxes that are numbers; positions and radii are not
-//! looked at, and damaged ones make a wrong picture at worst.
+//! Stored data come from a file and may contain anything. Every stored node is checked once, so that rays only reach
+//! blocks that exist and boxes that are finite. Positions and radii are not checked: at worst, damaged ones give a
+//! wrong picture.
 
 use std::fmt;
 use std::sync::atomic::{AtomicU64, Ordering};
 
-use super::levels::{Child, UpperLevels, build_levels, level_counts, level_starts, sah_cost};
+use super::levels::{Child, TopLevels, build_levels, level_counts, level_starts, sah_cost};
 use super::report::PhaseClock;
 use super::simd::{SimdLevel, Supported};
 use super::topology::LEVEL_CODES;
@@ -19,46 +19,46 @@ use spherule_formats::blocks::{
 };
 use spherule_formats::order::index_u32;
 
-/// What the build of a [`StoredTree`] may be told.
+/// Settings for the build of a [`StoredTree`].
 #[derive(Debug, Clone, Copy)]
 pub struct StoredSettings {
-    /// Who brought the particles into their order, for the report.
+    /// The structure that ordered the particles, for the report.
     pub structure: Structure,
-    /// Radius of all spheres, scene units; stored ones then do not count.
+    /// Radius of all spheres, scene units; replaces stored radii.
     pub radius: Option<f32>,
-    /// Whether particles are told apart by their index, which is their place in the frame. Else the one
-    /// with the lower centre comes first at equal distance, as in built trees without indices.
+    /// Whether particles are identified by their index, which is their position in the frame. If not, ties in
+    /// distance go to the lower centre, as in built trees without indices.
     pub keep_indices: bool,
 }
 
-/// Why stored leaves cannot be traced.
+/// Reasons why stored leaves cannot be traced.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoredFault {
-    /// More particles than a tree tells apart.
+    /// More particles than a tree can number.
     TooMany {
-        /// So many.
+        /// Number of particles.
         count: u64,
     },
-    /// An array is longer or shorter than the number of particles asks for.
+    /// The length of an array does not match the number of particles.
     Length {
-        /// Of what.
+        /// Content of the array.
         what: &'static str,
-        /// What is there.
+        /// Actual length.
         found: usize,
-        /// What should be.
+        /// Expected length.
         expected: u64,
     },
-    /// A node is for more or fewer blocks than lie below it.
+    /// The child mask of a node does not match the number of blocks below it.
     ChildMask {
-        /// Its number.
+        /// Index of the node.
         node: u64,
     },
-    /// A plane of a node is no number, or so large that rays cannot be reckoned with it.
+    /// A plane of a node is not finite, or too large for the arithmetic of rays.
     Plane {
-        /// The node's number.
+        /// Index of the node.
         node: u64,
     },
-    /// Neither stored nor given.
+    /// There is neither a stored radius nor a given one.
     NoRadius,
 }
 
@@ -89,18 +89,18 @@ impl fmt::Display for StoredFault {
 
 impl std::error::Error for StoredFault {}
 
-/// The levels above stored leaves. Rays see [`StoredTree::view`].
+/// The levels above stored leaves. Rays use [`StoredTree::view`].
 #[derive(Debug, Default)]
 pub struct StoredTree {
     /// Nodes of the levels above the stored ones, root level first.
     nodes: Vec<Node>,
-    /// Number of the first node of each of those levels.
+    /// Index of the first node of each of those levels.
     level_starts: Vec<u32>,
     /// See [`TreeView`].
     mapped_level: u32,
     mapped: Vec<u32>,
     shape: Shape,
-    /// The common radius, where stored ones do not count.
+    /// The common radius, if it replaces stored ones.
     radius: Option<f32>,
     ties: TieOrder,
     bounds: Aabb,
@@ -108,22 +108,22 @@ pub struct StoredTree {
 }
 
 impl StoredTree {
-    /// A tree without memory yet, over nothing.
+    /// An empty tree that has not allocated memory yet.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Builds over `leaves`, replacing the last tree in its memory. After a fault it is over nothing.
+    /// Builds a tree over `leaves`, replacing the previous tree in its memory. After an error the tree is empty.
     ///
     /// # Errors
-    /// The first fault found; of several faulty nodes that with the lowest number.
+    /// The first fault found; among faulty nodes, the one with the lowest index.
     pub fn build(
         &mut self,
         leaves: &StoredLeaves,
         settings: StoredSettings,
     ) -> Result<BuildReport, StoredFault> {
         let mut clock = PhaseClock::new();
-        self.forget();
+        self.clear();
         let shape = Shape::of(leaves)?;
         let padding = match (settings.radius, &leaves.radii) {
             (Some(radius), _) => radius,
@@ -142,10 +142,10 @@ impl StoredTree {
         Ok(self.report(leaves, settings.structure, cost, clock))
     }
 
-    /// The tree as rays see it, over the `leaves` that it was built over.
+    /// The tree in the form that rays use, over the `leaves` that it was built over.
     ///
     /// # Panics
-    /// If those were not as many.
+    /// If the number of leaves differs from that of the build.
     pub fn view<'a>(&'a self, leaves: &StoredLeaves<'a>) -> TreeView<'a> {
         assert!(
             Shape::of(leaves) == Ok(self.shape),
@@ -179,13 +179,13 @@ impl StoredTree {
         }
     }
 
-    /// Traces with `level` from now on, or with the best the machine has if it lacks that.
+    /// Traces with `level` from now on, or with the best instruction set of the machine if `level` is not supported.
     pub fn set_simd(&mut self, level: SimdLevel) {
         self.simd = Supported::or_best(level);
     }
 
-    /// Makes it a tree over nothing; memory stays.
-    fn forget(&mut self) {
+    /// Empties the tree; its memory is kept.
+    fn clear(&mut self) {
         self.nodes.clear();
         self.level_starts.clear();
         self.mapped.clear();
@@ -195,8 +195,7 @@ impl StoredTree {
         self.bounds = Aabb::EMPTY;
     }
 
-    /// Builds the levels above the stored nodes, which are the last of the `counts`. Returns the SAH
-    /// cost.
+    /// Builds the levels above the stored nodes, which are the last of the `counts`. Returns the SAH cost.
     fn build_levels(
         &mut self,
         leaves: &StoredLeaves,
@@ -207,22 +206,25 @@ impl StoredTree {
         let Some((_, upper)) = counts.split_last() else {
             return Ok(sah_cost(0.0, Aabb::EMPTY));
         };
-        let mapped_level = UpperLevels::Mapped.mapped_level(counts.len());
+        let mapped_level = TopLevels::Mapped.mapped_level(counts.len());
         let lowest_fault = LowestFault::default();
+        // Build the levels above the stored nodes, and check each stored node on the way
         let child = |index: usize| {
             let node = leaves.nodes.get(index)?;
             let read = read_node(node, shape.children_of(index), padding);
-            Some(read.unwrap_or_else(|fault| lowest_fault.note(index, fault)))
+            Some(read.unwrap_or_else(|fault| lowest_fault.record(index, fault)))
         };
         self.nodes
             .resize(upper.iter().sum(), bytemuck::Zeroable::zeroed());
         let built = build_levels(&mut self.nodes, upper, mapped_level, padding, child);
+        // A single stored node is the root itself
         let (bounds, areas) = match upper {
             [] => child(0).map_or((Aabb::EMPTY, 0.0), |root| (root.bounds, root.inner_area)),
             _ => (built.bounds, built.child_areas),
         };
+        // Reject the whole tree if any node is faulty
         if let Some(fault) = lowest_fault.found() {
-            self.forget();
+            self.clear();
             return Err(fault);
         }
         self.level_starts = level_starts(upper);
@@ -243,7 +245,7 @@ impl StoredTree {
         let position_bytes = position_bytes(&leaves.blocks) + radius_bytes(&leaves.radii);
         let stored_node_bytes = size_of_val(leaves.nodes) as u64;
         let built_bytes = (size_of_val(&self.nodes[..]) + size_of_val(&self.mapped[..])) as u64;
-        // Brought into order are a copy of the level above the stored ones and its boxes, twice.
+        // The reordering needs a copy of the level above the stored one, and its boxes twice.
         let ordered = leaves.nodes.len().div_ceil(WIDTH) as u64;
         let scratch_bytes = ordered * (size_of::<Node>() + 2 * size_of::<Aabb>()) as u64;
         BuildReport {
@@ -266,7 +268,7 @@ impl StoredTree {
     }
 }
 
-/// How many there are of everything.
+/// Number of particles and blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 struct Shape {
     count: usize,
@@ -274,7 +276,7 @@ struct Shape {
 }
 
 impl Shape {
-    /// That of `leaves`, all of whose lengths fit.
+    /// The shape of `leaves`, after a check of the lengths of all arrays.
     fn of(leaves: &StoredLeaves) -> Result<Self, StoredFault> {
         let too_many = |_| StoredFault::TooMany {
             count: leaves.count,
@@ -299,12 +301,12 @@ impl Shape {
         })
     }
 
-    /// Nodes of each level, root level first; the last are the stored ones.
+    /// Node count of each level, root level first; the last level is the stored one.
     fn level_counts(&self) -> Vec<usize> {
         level_counts(self.blocks)
     }
 
-    /// Blocks below stored node `index`.
+    /// Number of blocks below stored node `index`.
     fn children_of(&self, index: usize) -> usize {
         self.blocks.saturating_sub(index * WIDTH).min(WIDTH)
     }
@@ -321,14 +323,14 @@ fn expect_length(what: &'static str, found: usize, expected: u32) -> Result<(), 
     })
 }
 
-/// What may be wrong with a stored node.
+/// Faults of a stored node.
 #[derive(Debug, Clone, Copy)]
 enum NodeFault {
     ChildMask,
     Plane,
 }
 
-/// What a stored node over so many blocks encloses.
+/// Checks a stored node over `children` blocks, and returns its bounds.
 fn read_node(node: &Node, children: usize, padding: f32) -> Result<Child, NodeFault> {
     if u32::from(node.child_mask) != (1 << children) - 1 {
         return Err(NodeFault::ChildMask);
@@ -338,11 +340,11 @@ fn read_node(node: &Node, children: usize, padding: f32) -> Result<Child, NodeFa
         let mut bounds = Aabb::EMPTY;
         for axis in 0..3 {
             let planes = node.interval(slot, axis);
-            // Said so that NaN is beyond, too.
+            // Written as `!(a <= b)` so that NaN is rejected as well.
             if !planes.iter().all(|plane| plane.abs() <= FARTHEST_PLANE) {
                 return Err(NodeFault::Plane);
             }
-            // The two of a damaged node may have changed places.
+            // The planes of a damaged node may be swapped.
             bounds.min[axis] = rounded_down(planes[0].min(planes[1]));
             bounds.max[axis] = -rounded_down(-planes[0].max(planes[1]));
         }
@@ -352,7 +354,7 @@ fn read_node(node: &Node, children: usize, padding: f32) -> Result<Child, NodeFa
     Ok(own)
 }
 
-/// The largest f32 that is not above `value`.
+/// The largest f32 that is not greater than `value`.
 #[expect(clippy::cast_possible_truncation, reason = "rounded, then put right")]
 fn rounded_down(value: f64) -> f32 {
     let nearest = value as f32;
@@ -363,7 +365,7 @@ fn rounded_down(value: f64) -> f32 {
     }
 }
 
-/// The faulty node with the lowest number, whoever comes to it first.
+/// The faulty node with the lowest index, whatever the order of the checks.
 struct LowestFault(AtomicU64);
 
 impl Default for LowestFault {
@@ -373,9 +375,8 @@ impl Default for LowestFault {
 }
 
 impl LowestFault {
-    /// Notes the `fault` of node `index`. Returns what goes on in its place, in a tree that nobody will
-    /// see.
-    fn note(&self, index: usize, fault: NodeFault) -> Child {
+    /// Records the `fault` of node `index`. Returns a child that takes its place; the tree is discarded anyway.
+    fn record(&self, index: usize, fault: NodeFault) -> Child {
         let word = (index as u64) << 1 | fault as u64;
         self.0.fetch_min(word, Ordering::Relaxed);
         Child {

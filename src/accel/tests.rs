@@ -20,7 +20,7 @@ mod intervals;
 mod packets;
 mod stored;
 
-/// A scene that owns its numbers.
+/// A scene that owns its data.
 #[derive(Debug, Clone)]
 struct Scene {
     name: &'static str,
@@ -154,7 +154,7 @@ fn rays(scene: &Scene, count: usize, seed: u64) -> Vec<Ray> {
         .collect()
 }
 
-/// Crossings of one sphere in f64, and how near the ray is to touching without crossing.
+/// Crossings of one sphere in f64, and the distance of the ray from grazing the sphere.
 fn exact(ray: &Ray, center: Vec3, radius: f32) -> (Vec<f64>, f64) {
     let (o, d) = (ray.origin.as_dvec3(), ray.direction.as_dvec3());
     let d = d.normalize();
@@ -176,7 +176,7 @@ fn every_bvh() -> impl Iterator<Item = BvhSettings> {
         .flat_map(|leaves| BvhPreset::ALL.map(|preset| BvhSettings { preset, leaves }))
 }
 
-/// As usual, with spatial splits wherever they pay at all, and without any.
+/// Default settings, spatial splits wherever they reduce the cost, and no spatial splits.
 fn every_sbvh() -> [SbvhSettings; 3] {
     let none = SbvhSettings {
         budget: 0.0,
@@ -185,7 +185,7 @@ fn every_sbvh() -> [SbvhSettings; 3] {
     [SbvhSettings::DEFAULT, EAGER, none]
 }
 
-/// Every structure in every way that it can be built.
+/// Every structure with all of its settings.
 fn all_settings() -> Vec<BuildSettings> {
     let mut all = Vec::new();
     for structure in Structure::ALL {
@@ -199,13 +199,13 @@ fn all_settings() -> Vec<BuildSettings> {
     all
 }
 
-/// Spatial splits wherever they pay at all.
+/// Spatial splits wherever they reduce the cost.
 const EAGER: SbvhSettings = SbvhSettings {
     alpha: 0.0,
     budget: 2.0,
 };
 
-/// Returns how many rays were judged: too near to call are left out.
+/// Returns the number of rays that were compared; rays whose result may change by rounding are skipped.
 #[track_caller]
 fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
     let mut judged = 0;
@@ -229,8 +229,8 @@ fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
     judged
 }
 
-/// The distances where f32 and f64 may differ: rounding of coordinates of this size, which a grazing
-/// ray turns into the root of it.
+/// The distances at which f32 and f64 may differ: the rounding of coordinates of this size, or its square root for a
+/// grazing ray.
 fn check_ray(scene: &Scene, tree: &TreeView, ray: &Ray, indexed: bool, level: SimdLevel) -> bool {
     let mut nearest: Option<(f64, usize)> = None;
     let mut doubtful = false;
@@ -335,7 +335,7 @@ fn levels_with_fused_multiply_add_agree_to_the_bit() {
     }
 }
 
-/// On every machine: what the kernels with fused multiply-add find, as one number.
+/// The result of the kernels with fused multiply-add as one number, which is the same on every machine.
 #[test]
 fn fused_kernels_of_all_processors_agree_to_the_bit() {
     const EXPECTED: u64 = 0x2bde_12a7_9f9a_49b3;
@@ -423,7 +423,7 @@ fn tree_by_threads(
     })
 }
 
-/// Also when the last frame was built by another structure.
+/// Also if the last frame was built with another structure.
 #[test]
 fn a_builder_forgets_the_last_frame() {
     let mut builder = TreeBuilder::new();
@@ -441,7 +441,7 @@ fn a_builder_forgets_the_last_frame() {
     }
 }
 
-/// Large spheres among small ones: what spatial splits are for.
+/// Large spheres among small ones: the case that spatial splits are for.
 fn large_among_small(count: usize) -> Scene {
     let radii = (0..count).map(|i| if i % 7 == 0 { 0.2 } else { 1e-3 });
     Scene {
@@ -490,8 +490,8 @@ fn a_crowded_cell_is_sorted_by_all_threads() {
     }
 }
 
-/// Where brute force is too slow: uniform, crowded, and on few planes, so that most coordinates are
-/// equal to many others.
+/// Scenes that are too large for brute force: uniform, crowded, and on few planes, so that most coordinates equal
+/// many others.
 #[test]
 fn large_scenes_match_a_particle_tree() {
     let cloud = random_points(100_000, 21);

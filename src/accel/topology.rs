@@ -1,52 +1,52 @@
-//! Where the children of a node are: by arithmetic in trees of whole levels, by links in trees of
-//! any shape.
+//! Topology of a tree: the positions of the children of a node. Trees of complete levels compute them, trees of any
+//! other shape store links.
 //!
-//! A walk holds places as 32-bit codes that only the topology understands, so that the traversal
-//! is one whatever the tree.
+//! A traversal refers to nodes and blocks by 32-bit codes that only the topology interprets, so one traversal serves
+//! all trees.
 
 use bytemuck::{Pod, Zeroable};
 
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// What a code stands for.
+/// The node or block that a code refers to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Place<N> {
+pub(super) enum NodeRef<N> {
     /// A node.
     Node(N),
-    /// A block, by its number.
+    /// A block, by its index.
     Block(usize),
 }
 
-/// The shape of a tree.
+/// The topology of a tree.
 pub(super) trait Topology<'a>: Copy {
-    /// What is known of a node's children before one is chosen.
+    /// The children of a node, before one of them is chosen.
     type Children: Copy;
 
     /// Code of the root.
     const ROOT: u32 = 0;
 
-    /// What `code` stands for.
-    fn place(self, code: u32) -> Place<&'a Node>;
+    /// The node or block that `code` refers to.
+    fn resolve(self, code: u32) -> NodeRef<&'a Node>;
 
     /// The children of the node with `code`.
     fn children(self, code: u32) -> Self::Children;
 
-    /// Code of the child in `slot`, under eight.
+    /// Code of the child in `slot`, which is less than eight.
     fn child(self, children: Self::Children, slot: u32) -> u32;
 }
 
-/// Levels that a code of an implicit tree can tell apart.
+/// Number of levels that a code of an implicit tree can represent.
 pub(super) const LEVEL_CODES: usize = 16;
 
-/// Bits of an implicit code below the level, and of a node's number in a link.
+/// Bits below the level in a code of an implicit tree, and bits of a node index in a link.
 const INDEX_BITS: u32 = 28;
 const INDEX_MASK: u32 = (1 << INDEX_BITS) - 1;
-/// Most nodes or blocks that a code can tell apart.
+/// Number of nodes or blocks that a code can represent.
 pub(super) const MAX_INDEX: usize = 1 << INDEX_BITS;
 const _: () = assert!(LEVEL_CODES == 1 << (u32::BITS - INDEX_BITS));
 
-/// Whole levels: child `c` of node `i` is node `8 i + c` one level down, but on the one level that is
-/// mapped. A code is the level in the upper bits, the number in the level under it.
+/// Complete levels: child `c` of node `i` is node `8 i + c` on the next level, except on one level, which is mapped.
+/// A code has the level in its upper bits, and the index in the level below them.
 #[derive(Clone, Copy)]
 pub(super) struct Implicit<'a> {
     pub(super) levels: &'a [&'a [Node]; LEVEL_CODES],
@@ -56,7 +56,7 @@ pub(super) struct Implicit<'a> {
 }
 
 impl<'a> Implicit<'a> {
-    /// Number of the first child of node `index` on `level`, among the nodes (or blocks) below.
+    /// Index of the first child of node `index` on `level`, among the nodes or blocks of the next level.
     #[inline(always)]
     pub(super) fn first_child(self, level: u32, index: usize) -> usize {
         if level == self.mapped_level {
@@ -68,16 +68,16 @@ impl<'a> Implicit<'a> {
 }
 
 impl<'a> Topology<'a> for Implicit<'a> {
-    /// Code of the first child.
+    /// The code of the first child.
     type Children = u32;
 
     #[inline(always)]
-    fn place(self, code: u32) -> Place<&'a Node> {
+    fn resolve(self, code: u32) -> NodeRef<&'a Node> {
         let (level, index) = (code >> INDEX_BITS, (code & INDEX_MASK) as usize);
         if level == self.depth {
-            Place::Block(index)
+            NodeRef::Block(index)
         } else {
-            Place::Node(&self.levels[level as usize][index])
+            NodeRef::Node(&self.levels[level as usize][index])
         }
     }
 
@@ -95,23 +95,21 @@ impl<'a> Topology<'a> for Implicit<'a> {
     }
 }
 
-/// Where the children of one node are. They lie together, nodes first and then blocks, in slot
-/// order.
+/// Positions of the children of one node. They are contiguous in slot order: nodes first, then blocks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Link {
-    /// Children that are nodes in the upper four bits, place of the first of them below.
+    /// Number of children that are nodes in the upper four bits, index of the first one below them.
     nodes: u32,
-    /// Place of the first child that is a block.
+    /// Index of the first child that is a block.
     first_block: u32,
 }
 
 impl Link {
-    /// The first `node_count` slots are nodes from `first_node` on, the others blocks from
-    /// `first_block` on.
+    /// The first `node_count` slots are nodes from `first_node` on, the other slots are blocks from `first_block` on.
     ///
     /// # Panics
-    /// If there are more nodes or blocks than can be numbered.
+    /// If an index is too large for its bits.
     #[expect(clippy::cast_possible_truncation, reason = "checked just above")]
     pub(super) fn new(first_node: usize, node_count: usize, first_block: usize) -> Self {
         assert!(
@@ -124,27 +122,26 @@ impl Link {
         }
     }
 
-    /// Children that are nodes.
+    /// Number of children that are nodes.
     pub(super) fn node_count(self) -> usize {
         (self.nodes >> INDEX_BITS) as usize
     }
 
-    /// Place of the first of them.
+    /// Index of the first child that is a node.
     pub(super) fn first_node(self) -> usize {
         (self.nodes & INDEX_MASK) as usize
     }
 
-    /// Place of the first child that is a block.
+    /// Index of the first child that is a block.
     pub(super) fn first_block(self) -> usize {
         self.first_block as usize
     }
 }
 
-/// The bit that tells the code of a block from that of a node.
+/// The bit that is set in codes of blocks.
 const BLOCK: u32 = 1 << 31;
 
-/// Any shape: a link for each node. A code is the number of a node, or of a block with the top bit
-/// set.
+/// Any topology, with one link per node. A code is the index of a node, or the index of a block with the top bit set.
 #[derive(Clone, Copy)]
 pub(super) struct Linked<'a> {
     pub(super) nodes: &'a [Node],
@@ -152,13 +149,13 @@ pub(super) struct Linked<'a> {
 }
 
 impl<'a> Linked<'a> {
-    /// What `code` stands for, a node by its number.
+    /// The node or block that `code` refers to, by its index.
     #[inline(always)]
-    pub(super) fn number(code: u32) -> Place<usize> {
+    pub(super) fn decode(code: u32) -> NodeRef<usize> {
         if code & BLOCK != 0 {
-            Place::Block((code & !BLOCK) as usize)
+            NodeRef::Block((code & !BLOCK) as usize)
         } else {
-            Place::Node(code as usize)
+            NodeRef::Node(code as usize)
         }
     }
 }
@@ -167,10 +164,10 @@ impl<'a> Topology<'a> for Linked<'a> {
     type Children = Link;
 
     #[inline(always)]
-    fn place(self, code: u32) -> Place<&'a Node> {
-        match Self::number(code) {
-            Place::Block(block) => Place::Block(block),
-            Place::Node(node) => Place::Node(&self.nodes[node]),
+    fn resolve(self, code: u32) -> NodeRef<&'a Node> {
+        match Self::decode(code) {
+            NodeRef::Block(block) => NodeRef::Block(block),
+            NodeRef::Node(node) => NodeRef::Node(&self.nodes[node]),
         }
     }
 
@@ -204,15 +201,19 @@ mod tests {
         let view = tree.view();
         let linked = view.linked();
         let places = |code: u32| {
-            [0, 1, 2].map(|slot| Linked::number(linked.child(linked.children(code), slot)))
+            [0, 1, 2].map(|slot| Linked::decode(linked.child(linked.children(code), slot)))
         };
         assert_eq!(
             places(0),
-            [Place::Node(MAX_INDEX - 1), Place::Block(7), Place::Block(8)]
+            [
+                NodeRef::Node(MAX_INDEX - 1),
+                NodeRef::Block(7),
+                NodeRef::Block(8)
+            ]
         );
         assert_eq!(
             places(1),
-            [Place::Block(3), Place::Block(4), Place::Block(5)]
+            [NodeRef::Block(3), NodeRef::Block(4), NodeRef::Block(5)]
         );
     }
 }

@@ -1,4 +1,4 @@
-//! What single rays find in a tree: the nearest hit, any hit, all crossings.
+//! Queries of single rays: the nearest hit, any hit, all crossings.
 
 use std::borrow::Borrow;
 
@@ -11,46 +11,46 @@ use super::walk::{Walker, walk_with};
 use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Node};
 
-/// A ray's meeting with a sphere of the tree.
+/// Intersection of a ray with a sphere of the tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TreeHit {
     /// Distance along the ray.
     pub t: f32,
-    /// Place of the particle in tree order.
+    /// Slot of the particle in tree order.
     pub slot: u32,
 }
 
-/// Where a ray passes through the surface of a sphere.
+/// Intersection of a ray with the surface of a sphere, on the way in or out.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TreeCrossing {
     /// Distance along the ray.
     pub t: f32,
-    /// Place of the particle in tree order.
+    /// Slot of the particle in tree order.
     pub slot: u32,
-    /// Half the way through the sphere: the radius times the absolute cosine between ray and normal.
+    /// Half the length of the chord through the sphere: the radius times the absolute cosine between ray and normal.
     pub half_chord: f32,
 }
 
 impl TreeView<'_> {
-    /// The nearest crossing of a sphere's surface (entering, or leaving when the ray starts inside)
-    /// with `t` in `ray.t_min..ray.t_max`. Equal distances go to the lower particle index.
+    /// The nearest intersection with the surface of a sphere (from outside, or from inside if the ray starts there)
+    /// with `t` in `ray.t_min..ray.t_max`. Ties in distance go to the lower particle index.
     pub fn nearest(&self, ray: &Ray) -> Option<TreeHit> {
-        // Most rays of a picture miss everything: that is cheap to see before anything is prepared.
-        if !self.may_be_met_by(ray) {
+        // Most rays of a picture miss everything. This test rejects them before any setup.
+        if !self.may_intersect(ray) {
             return None;
         }
         self.run(Nearest { ray })
     }
 
-    /// Whether the ray comes near the box of all spheres; a superset of the rays that meet any.
-    pub(super) fn may_be_met_by(&self, ray: &Ray) -> bool {
+    /// Whether the ray enters the box of all spheres: true for all rays that hit any sphere, and for some others.
+    pub(super) fn may_intersect(&self, ray: &Ray) -> bool {
         let inverse = finite_inverse(ray.direction);
         let a = (self.bounds.min - ray.origin) * inverse;
         let b = (self.bounds.max - ray.origin) * inverse;
         let slack = a.abs().max(b.abs()) * SLAB_SLACK;
         let near = (a.min(b) - slack).max_element();
         let far = (a.max(b) + slack).min_element();
-        // Said so that NaN (bounds beyond the range of f32) counts as met.
+        // Written as `!(a > b)` so that NaN (bounds beyond the range of f32) counts as a hit.
         !(near > far.min(ray.t_max) || far < ray.t_min)
     }
 
@@ -59,8 +59,8 @@ impl TreeView<'_> {
         self.run(AnyHit { ray })
     }
 
-    /// Replaces `crossings` by every crossing within `ray.t_min..ray.t_max`, by distance; equal
-    /// distances by particle index.
+    /// Replaces the content of `crossings` by every crossing within `ray.t_min..ray.t_max`, sorted by distance, then
+    /// by particle index.
     pub fn crossings(&self, ray: &Ray, crossings: &mut Vec<TreeCrossing>) {
         crossings.clear();
         self.visit_crossings(ray, |crossing| {
@@ -77,15 +77,14 @@ impl TreeView<'_> {
         }
     }
 
-    /// Gives `visit` every crossing within `ray.t_min..ray.t_max`, in the order of the walk, until it
-    /// returns false.
+    /// Calls `visit` for every crossing within `ray.t_min..ray.t_max`, in traversal order, until it returns false.
     pub(crate) fn visit_crossings(&self, ray: &Ray, visit: impl FnMut(TreeCrossing) -> bool) {
         self.run(Crossings { ray, visit });
     }
 
-    /// Leaves one of several copies of a particle: all of them have the same crossings, next to each
-    /// other in `crossings`. A ray that touches a sphere crosses it twice at one distance, so it is
-    /// the slot that tells copies from crossings.
+    /// Removes duplicates of particles that are stored in several slots. They have the same crossings, which are
+    /// adjacent in `crossings`. A ray that touches a sphere crosses it twice at the same distance, so slots
+    /// distinguish duplicates from such crossings.
     fn keep_first_copies(&self, crossings: &mut Vec<TreeCrossing>) {
         let mut first: Option<TreeCrossing> = None;
         crossings.retain(|crossing| match first {
@@ -121,7 +120,7 @@ impl TreeTask for Nearest<'_> {
             tree,
             ray: &kernel.prepare(ray, view.radius, view.padding),
             best: TreeHit {
-                // The end is exclusive for the ray and inclusive for ties.
+                // `t_max` is exclusive, but limits are inclusive because of ties.
                 t: ray.t_max.next_down(),
                 slot: TreeHits::NO_SLOT,
             },
@@ -132,11 +131,11 @@ impl TreeTask for Nearest<'_> {
     }
 }
 
-/// A ray that looks for its nearest hit.
+/// A ray that searches for its nearest hit.
 pub(super) struct NearestOfRay<'r, 'a, R, T, L> {
     pub(super) tree: Resolved<'a, T, L>,
     pub(super) ray: &'r R,
-    /// The best so far; without any, [`TreeHits::NO_SLOT`] and the farthest distance that counts.
+    /// The nearest hit so far; before the first hit, [`TreeHits::NO_SLOT`] and the largest valid distance.
     pub(super) best: TreeHit,
 }
 
@@ -153,11 +152,13 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K>
         let view = self.tree.view;
         let centers = self.tree.leaves.load(kernel, block);
         let radii = LoadedRadii::of(&view.radii, block);
+        // Find the nearest hit in the block
         let Some((t, lanes)) =
             kernel.nearest_in_block(self.ray, centers.borrow(), radii.as_ref(), limit)
         else {
             return limit;
         };
+        // Break ties within the block, then with the current hit
         let slot = first_of_tied(view, block, lanes);
         let is_tied = self.best.t == t && self.best.slot != TreeHits::NO_SLOT;
         if !(is_tied && view.tie_order(self.best.slot, slot).is_le()) {
@@ -167,7 +168,7 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K>
     }
 }
 
-/// The slot among the `lanes` of `block` that wins at equal distance.
+/// The slot among the `lanes` of `block` that wins a tie in distance.
 #[inline(always)]
 fn first_of_tied(tree: &TreeView, block: usize, lanes: u32) -> u32 {
     #[expect(
@@ -211,7 +212,7 @@ impl TreeTask for AnyHit<'_> {
     }
 }
 
-/// A ray that looks for any hit.
+/// A ray that searches for any hit.
 pub(super) struct AnyOfRay<'r, 'a, R, T, L> {
     pub(super) tree: Resolved<'a, T, L>,
     pub(super) ray: &'r R,
@@ -233,17 +234,17 @@ impl<'a, K: PacketKernel, T: Topology<'a>, L: Leaves> Walker<K> for AnyOfRay<'_,
     }
 }
 
-/// The way of a ray's line through a sphere.
+/// Intersection of the line of a ray with a sphere.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct TreeChord {
-    /// Place of the particle in tree order.
+    /// Slot of the particle in tree order.
     pub(crate) slot: u32,
-    /// Distances along the ray at which it enters and leaves.
+    /// Distances along the ray where it enters and leaves the sphere.
     pub(crate) ends: [f32; 2],
 }
 
 impl TreeChord {
-    /// Half of its length.
+    /// Half the length.
     #[inline(always)]
     pub(crate) fn half(&self) -> f32 {
         0.5 * (self.ends[1] - self.ends[0])
@@ -252,7 +253,7 @@ impl TreeChord {
 
 struct Crossings<'r, F> {
     ray: &'r Ray,
-    /// Gets every crossing; false ends the walk.
+    /// Called with every crossing; false ends the traversal.
     visit: F,
 }
 
@@ -266,6 +267,7 @@ impl<F: FnMut(TreeCrossing) -> bool> TreeTask for Crossings<'_, F> {
         tree: Resolved<'a, T, L>,
     ) {
         let Self { ray, mut visit } = self;
+        // Visit both ends of each chord that lie within the ray
         let mut search = ChordsOfRay {
             tree,
             ray: &kernel.prepare(ray, tree.view.radius, tree.view.padding),
@@ -285,11 +287,11 @@ impl<F: FnMut(TreeCrossing) -> bool> TreeTask for Crossings<'_, F> {
     }
 }
 
-/// A ray that looks for all spheres on its line, as far as boxes before its end hold them.
+/// A ray that searches for all spheres on its line, in boxes that begin before its end.
 pub(super) struct ChordsOfRay<'r, 'a, R, T, L, F> {
     pub(super) tree: Resolved<'a, T, L>,
     pub(super) ray: &'r R,
-    /// Gets every chord; false ends the walk.
+    /// Called with every chord; false ends the traversal.
     pub(super) visit: F,
 }
 
@@ -310,6 +312,7 @@ where
         let view = self.tree.view;
         let centers = self.tree.leaves.load(kernel, block);
         let radii = LoadedRadii::of(&view.radii, block);
+        // Visit the chords through the spheres of the block
         let found = kernel.all_in_block(self.ray, centers.borrow(), radii.as_ref());
         let mut lanes = found.lanes;
         while lanes != 0 {

@@ -1,8 +1,8 @@
-//! Proof that a tree is sound: every child inside its own parent, every particle in the tree
-//! exactly once, or its parts covering it (`coverage.rs`). Debug builds run it after each build.
+//! Validates a tree: every child is inside its own parent, and every particle is in the tree exactly once, or its
+//! parts cover it (`coverage.rs`). Debug builds validate every tree that is built.
 
 use super::levels::MAX_LEVELS;
-use super::topology::{Implicit, Linked, Place, Topology};
+use super::topology::{Implicit, Linked, NodeRef, Topology};
 use super::view::TreeView;
 use super::wide::WideTree;
 use super::{Aabb, SphereRadius, Spheres};
@@ -12,7 +12,7 @@ impl WideTree {
     /// Checks the tree against the spheres that it was built over.
     ///
     /// # Errors
-    /// The first fault found, in words.
+    /// Describes the first fault.
     pub fn validate(&self, spheres: &Spheres) -> Result<(), String> {
         if self.count != spheres.centers.len() {
             return Err(format!(
@@ -33,7 +33,7 @@ impl WideTree {
         }
     }
 
-    /// The box that a block's own parent must hold.
+    /// The box of a block that its own parent must contain.
     fn block_bounds(&self, block: usize) -> Aabb {
         match self.radii.get(block) {
             Some(radii) => self.blocks[block].sphere_bounds(radii),
@@ -41,7 +41,7 @@ impl WideTree {
         }
     }
 
-    /// Checks whole levels from the blocks up.
+    /// Checks complete levels from the blocks up.
     fn validate_levels(&self) -> Result<(), String> {
         let view = self.view();
         let topology = view.implicit();
@@ -58,7 +58,7 @@ impl WideTree {
         Ok(())
     }
 
-    /// Checks one level over the boxes of the next, and returns its own boxes.
+    /// Checks one level against the boxes of the next level, and returns the boxes of its nodes.
     fn validate_level(
         &self,
         level: usize,
@@ -72,6 +72,7 @@ impl WideTree {
             .map_or(self.nodes.len(), |s| *s as usize);
         let mut own = Vec::with_capacity(end - start);
         let mut reached = vec![false; below.len()];
+        // Check that each child exists, has one parent, and is inside it
         let number = spherule_formats::order::index_u32(level);
         for (index, node) in self.nodes[start..end].iter().enumerate() {
             let mut bounds = Aabb::EMPTY;
@@ -94,13 +95,14 @@ impl WideTree {
             }
             own.push(bounds);
         }
+        // Check that each child has a parent
         if let Some(lost) = reached.iter().position(|r| !r) {
             return Err(format!("level {level}: nobody has child {lost}"));
         }
         Ok(own)
     }
 
-    /// Checks a tree of links from the root down.
+    /// Checks a tree with links from the root down.
     fn validate_links(&self) -> Result<(), String> {
         if self.links.len() != self.nodes.len() {
             return Err(format!(
@@ -121,8 +123,8 @@ impl WideTree {
         reached.all()
     }
 
-    /// Checks the subtree of the node with `code`, which has `levels` left to grow, and returns the
-    /// box of what is in it.
+    /// Checks the subtree of the node with `code`, which may have up to `levels` levels, and returns the box of its
+    /// content.
     fn validate_below(
         &self,
         view: &TreeView,
@@ -131,7 +133,7 @@ impl WideTree {
         reached: &mut Reached,
     ) -> Result<Aabb, String> {
         let topology = view.linked();
-        let Place::Node(index) = Linked::number(code) else {
+        let NodeRef::Node(index) = Linked::decode(code) else {
             return Err(format!("code {code} is no node"));
         };
         if levels == 0 {
@@ -140,16 +142,18 @@ impl WideTree {
         let node = &self.nodes[index];
         let mut own = Aabb::EMPTY;
         for slot in 0..spherule_formats::order::index_u32(node.child_count()) {
+            // Check that the child exists and has one parent
             let child = topology.child(topology.children(code), slot);
-            let place = Linked::number(child);
+            let node_ref = Linked::decode(child);
             reached
-                .mark(place)
+                .mark(node_ref)
                 .map_err(|fault| format!("node {index}, child {slot}: {fault}"))?;
-            let bounds = match place {
-                Place::Block(block) => self.block_bounds(block),
-                Place::Node(_) => self.validate_below(view, child, levels - 1, reached)?,
+            // Check the subtree of the child
+            let bounds = match node_ref {
+                NodeRef::Block(block) => self.block_bounds(block),
+                NodeRef::Node(_) => self.validate_below(view, child, levels - 1, reached)?,
             };
-            // Of clipped spheres, whether parts cover them is seen from above (`coverage.rs`).
+            // The parts of clipped spheres are checked from above (`coverage.rs`).
             if !self.is_clipped && !node.child_holds(slot as usize, &bounds) {
                 return Err(format!("node {index}: child {slot} sticks out"));
             }
@@ -158,7 +162,7 @@ impl WideTree {
         Ok(own)
     }
 
-    /// Every particle once, or several times where there may be copies, with its own centre and
+    /// Checks that every particle is stored once, or several times if there may be copies, with its own centre and
     /// radius.
     fn validate_particles(&self, spheres: &Spheres) -> Result<(), String> {
         if self.indices.is_empty() {
@@ -168,14 +172,16 @@ impl WideTree {
                 Ok(())
             };
         }
-        let mut seen = vec![false; self.count];
+        let mut is_stored = vec![false; self.count];
         for slot in 0..self.view().slot_count() {
+            // Check that the particle exists and is not a duplicate
             let index = self.indices[slot] as usize;
-            match seen.get_mut(index) {
-                Some(seen) if self.has_copies || !*seen => *seen = true,
+            match is_stored.get_mut(index) {
+                Some(is_stored) if self.has_copies || !*is_stored => *is_stored = true,
                 Some(_) => return Err(format!("particle {index} twice")),
                 None => return Err(format!("slot {slot}: particle {index} does not exist")),
             }
+            // Compare centre and radius with the input
             let (block, lane) = (slot / BLOCK_SIZE, slot % BLOCK_SIZE);
             if self.blocks[block].center(lane) != spheres.centers[index] {
                 return Err(format!("slot {slot}: not the centre of particle {index}"));
@@ -186,28 +192,29 @@ impl WideTree {
                 return Err(format!("slot {slot}: not the radius of particle {index}"));
             }
         }
-        if let Some(lost) = seen.iter().position(|seen| !seen) {
+        // Check that no particle is missing
+        if let Some(lost) = is_stored.iter().position(|seen| !seen) {
             return Err(format!("particle {lost} is nowhere"));
         }
         Ok(())
     }
 }
 
-/// What a walk has come to.
+/// Nodes and blocks that a traversal has reached.
 struct Reached {
     nodes: Vec<bool>,
     blocks: Vec<bool>,
 }
 
 impl Reached {
-    fn mark(&mut self, place: Place<usize>) -> Result<(), String> {
-        let mark = match place {
-            Place::Node(node) => self.nodes.get_mut(node),
-            Place::Block(block) => self.blocks.get_mut(block),
+    fn mark(&mut self, node_ref: NodeRef<usize>) -> Result<(), String> {
+        let mark = match node_ref {
+            NodeRef::Node(node) => self.nodes.get_mut(node),
+            NodeRef::Block(block) => self.blocks.get_mut(block),
         };
         match mark {
-            None => Err(format!("{place:?} does not exist")),
-            Some(true) => Err(format!("{place:?} has two parents")),
+            None => Err(format!("{node_ref:?} does not exist")),
+            Some(true) => Err(format!("{node_ref:?} has two parents")),
             Some(mark) => {
                 *mark = true;
                 Ok(())

@@ -1,5 +1,6 @@
-//! A tree as rays see it: slices, wherever they lie. Built trees ([`super::wide::WideTree`]) give a view
-//! of what they own, stored ones ([`super::stored::StoredTree`]) of what they own and of a frame's leaves.
+//! A tree in the form that rays use: slices of memory that others own. A built tree ([`super::wide::WideTree`]) gives
+//! a view of its own memory, a stored one ([`super::stored::StoredTree`]) of its own memory and the leaves of a
+//! frame.
 
 use std::cmp::Ordering;
 
@@ -13,59 +14,58 @@ use super::topology::{Implicit, LEVEL_CODES, Link, Linked, Topology};
 use crate::math::{LANES, Lanes, Lanes3, lanes_in, set_lane3};
 use spherule_formats::blocks::{BLOCK_SIZE, Node, StoredBlocks, StoredRadii};
 
-/// A tree over spheres, to be traced. See [`TreeView::nearest`] and its neighbours.
+/// A tree over spheres for ray queries, see [`TreeView::nearest`] and the methods like it.
 #[derive(Debug, Clone, Copy)]
 pub struct TreeView<'a> {
-    /// Nodes of each level, root level first; all of them in the first where there are links.
+    /// Nodes of each level, root level first. A tree with links has all nodes in the first element.
     pub(super) levels: [&'a [Node]; LEVEL_CODES],
-    /// Levels of nodes.
+    /// Number of node levels.
     pub(super) depth: u32,
-    /// The level whose nodes are in another order than their children; none if beyond all levels.
+    /// The level with a node order that differs from the order of the children; beyond all levels if there is none.
     pub(super) mapped_level: u32,
-    /// For each node of that level, the node whose place its children have.
+    /// For each node of that level, an index; its children begin at 8 times this index on the next level.
     pub(super) mapped: &'a [u32],
-    /// Where the children of each node are; empty if levels are whole. Then leaves are exact.
+    /// Positions of the children of each node; empty for complete levels. A tree with links has uncoded leaves.
     pub(super) links: &'a [Link],
     /// Positions.
     pub(super) blocks: StoredBlocks<'a>,
-    /// Radii, unless common.
+    /// Radii, unless there is a common radius.
     pub(super) radii: StoredRadii<'a>,
     /// The common radius, or 0.
     pub(super) radius: f32,
-    /// Distance that rays pass outside the boxes of nodes and still meet spheres: the radius where
-    /// boxes bound centres, 0 where they bound spheres.
+    /// Length by which the boxes of nodes must be extended: the radius if boxes bound centres, 0 if they bound spheres.
     pub(super) padding: f32,
-    /// Whether a particle may lie in several slots. Only with indices.
+    /// Whether a particle may be stored in several slots. Only with indices.
     pub(super) has_copies: bool,
-    /// Index in the frame of the particle in each slot; if empty, the slot is the index, or nobody asks.
+    /// Index in the frame of the particle in each slot. If empty, the slot is the index, or indices are not needed.
     pub(super) indices: &'a [u32],
-    /// Who comes first at equal distance.
+    /// Order of particles at equal distance.
     pub(super) ties: TieOrder,
-    /// Particles.
+    /// Particle count.
     pub(super) count: usize,
-    /// Box of the spheres.
+    /// Bounding box of the spheres.
     pub(super) bounds: Aabb,
     pub(super) simd: Supported,
 }
 
 /// Block and lane of a slot.
 #[inline(always)]
-fn place_of(slot: u32) -> (usize, usize) {
+fn block_and_lane(slot: u32) -> (usize, usize) {
     (slot as usize / BLOCK_SIZE, slot as usize % BLOCK_SIZE)
 }
 
-/// Who comes first of two particles at equal distance.
+/// Order of two particles at equal distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) enum TieOrder {
-    /// The lower index in the frame.
+    /// The lower index in the frame comes first.
     #[default]
     Index,
-    /// The lower centre, where indices are not known: so that it never depends on the structure.
+    /// The lower centre comes first. Used without indices, so that the order does not depend on the structure.
     Center,
 }
 
 impl<'a> TreeView<'a> {
-    /// Whole levels; only of a tree without links.
+    /// The topology of complete levels; only for trees without links.
     pub(super) fn implicit(&'a self) -> Implicit<'a> {
         Implicit {
             levels: &self.levels,
@@ -75,7 +75,7 @@ impl<'a> TreeView<'a> {
         }
     }
 
-    /// Any shape; only of a tree with links.
+    /// The topology of links; only for trees with links.
     pub(super) fn linked(&self) -> Linked<'a> {
         Linked {
             nodes: self.levels[0],
@@ -83,17 +83,17 @@ impl<'a> TreeView<'a> {
         }
     }
 
-    /// Box of the spheres; empty without particles.
+    /// Bounding box of the spheres; empty without particles.
     pub fn bounds(&self) -> Aabb {
         self.bounds
     }
 
-    /// Particles.
+    /// Particle count.
     pub fn len(&self) -> usize {
         self.count
     }
 
-    /// True if there is nothing to hit.
+    /// Whether there are no particles.
     pub fn is_empty(&self) -> bool {
         self.count == 0
     }
@@ -103,31 +103,30 @@ impl<'a> TreeView<'a> {
         self.simd.level()
     }
 
-    /// Index in the frame of the particle in `slot` (tree order), or the slot itself when the way
-    /// back was not kept.
+    /// Index in the frame of the particle in `slot` (tree order), or the slot itself if indices were not kept.
     pub fn particle(&self, slot: u32) -> u32 {
         match self.indices.get(slot as usize) {
             Some(index) => *index,
-            None => self.existing(slot),
+            None => self.clamped_slot(slot),
         }
     }
 
-    /// `slot`, or the last one that holds a particle: what fills the last block of a damaged file up need
-    /// not repeat its last particle, and may be hit.
+    /// `slot`, or the last slot with a particle. In a damaged file, the padding of the last block need not repeat the
+    /// last particle, so rays may hit it.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "slots are counted in 32 bits"
     )]
-    fn existing(&self, slot: u32) -> u32 {
+    fn clamped_slot(&self, slot: u32) -> u32 {
         slot.min(self.count.saturating_sub(1) as u32)
     }
 
     /// Centre and radius of the particle in `slot`.
     ///
     /// # Panics
-    /// If there is no such slot.
+    /// If the slot does not exist.
     pub fn sphere(&self, slot: u32) -> (Vec3, f32) {
-        let (block, lane) = place_of(slot);
+        let (block, lane) = block_and_lane(slot);
         let center = match self.blocks {
             StoredBlocks::F32(blocks) => blocks[block].center(lane),
             StoredBlocks::Q16(blocks) => Coded::new(blocks, self.leaf_nodes()).center(block, lane),
@@ -142,10 +141,10 @@ impl<'a> TreeView<'a> {
         (center, radius)
     }
 
-    /// Centres and radii of the spheres in the slots of `lanes`.
+    /// Centres and radii of the spheres hit in `lanes`.
     ///
     /// # Panics
-    /// If there is no such slot.
+    /// If a slot does not exist.
     pub(crate) fn gather_spheres(
         &self,
         hits: &TreeHits,
@@ -153,10 +152,11 @@ impl<'a> TreeView<'a> {
         centers: &mut Lanes3,
         radii: &mut Lanes,
     ) {
+        // Common case: uncoded positions and one radius
         if let (StoredBlocks::F32(blocks), StoredRadii::None) = (self.blocks, self.radii) {
             *radii = [self.radius; LANES];
             for lane in lanes_in(lanes) {
-                let (block, place) = place_of(hits.slot[lane]);
+                let (block, place) = block_and_lane(hits.slot[lane]);
                 set_lane3(centers, lane, blocks[block].center(place));
             }
             return;
@@ -168,13 +168,13 @@ impl<'a> TreeView<'a> {
         }
     }
 
-    /// Whether a particle may be met in several slots, so that [`TreeView::visit_crossings`] brings the
-    /// same crossing several times.
+    /// Whether a particle may be stored in several slots, so that [`TreeView::visit_crossings`] may visit the same
+    /// crossing several times.
     pub(crate) fn has_copies(&self) -> bool {
         self.has_copies
     }
 
-    /// Slots that hold particles to be told apart: all, or those before the last block's padding.
+    /// Number of slots in use: all, or those before the padding of the last block.
     pub(super) fn slot_count(&self) -> usize {
         if self.has_copies {
             self.indices.len()
@@ -183,7 +183,7 @@ impl<'a> TreeView<'a> {
         }
     }
 
-    /// Nodes over the blocks, in a tree of whole levels.
+    /// Nodes above the blocks, in a tree of complete levels.
     pub(super) fn leaf_nodes(&self) -> &'a [Node] {
         match self.depth {
             0 => &[],
@@ -191,8 +191,8 @@ impl<'a> TreeView<'a> {
         }
     }
 
-    /// Who comes first of two particles hit at the same distance. Equal ones go by slot, so that it
-    /// does not depend on the order of visits either.
+    /// Order of two particles hit at the same distance. Equal particles are ordered by slot, so that the order does
+    /// not depend on the traversal.
     #[cold]
     pub(super) fn tie_order(&self, a: u32, b: u32) -> Ordering {
         if self.ties == TieOrder::Index {
@@ -206,7 +206,7 @@ impl<'a> TreeView<'a> {
             .then(a.cmp(&b))
     }
 
-    /// Does `task` in code made for the tree's shape, its leaves and the machine.
+    /// Runs `task` in code compiled for the topology, the leaves and the instruction set.
     #[inline]
     pub(super) fn run<W: TreeTask>(&self, task: W) -> W::Output {
         match self.blocks {
@@ -241,7 +241,7 @@ impl<'a> TreeView<'a> {
     }
 }
 
-/// Puts the levels of `nodes`, of which the first nodes have the numbers `starts`, into `levels`.
+/// Splits `nodes` into `levels`; `starts` are the indices of their first nodes.
 pub(super) fn split_levels<'a>(
     nodes: &'a [Node],
     starts: &[u32],
@@ -254,7 +254,7 @@ pub(super) fn split_levels<'a>(
     }
 }
 
-/// A tree of which the compiler knows the shape and the leaves.
+/// A tree with topology and leaves of static types.
 #[derive(Clone, Copy)]
 pub(super) struct Resolved<'a, T, L> {
     pub(super) view: &'a TreeView<'a>,
@@ -262,13 +262,12 @@ pub(super) struct Resolved<'a, T, L> {
     pub(super) leaves: L,
 }
 
-/// Something to be done with a tree, compiled for each shape, form of leaves and kernel. `run` should be
-/// `inline(always)`.
+/// Code that uses a tree, compiled for each topology, kind of leaves and kernel. `run` should be `inline(always)`.
 pub(super) trait TreeTask {
-    /// What comes of it.
+    /// The result.
     type Output;
 
-    /// Does it.
+    /// Runs the task.
     fn run<'a, K: PacketKernel, T: Topology<'a>, L: Leaves>(
         self,
         kernel: K,

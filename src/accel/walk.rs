@@ -1,18 +1,18 @@
-//! The one walk through a tree, whatever built it, wherever its leaves lie and whatever instructions test
-//! nodes and blocks.
+//! The tree traversal that all queries share. It does not depend on the builder, on the storage of the leaves, or on
+//! the instruction set that tests nodes and blocks.
 
 use super::leaves::Leaves;
 use super::levels::MAX_LEVELS;
 use super::simd::Kernel;
-use super::topology::{Place, Topology};
+use super::topology::{NodeRef, Topology};
 use super::view::Resolved;
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// Every level can leave all children but one on the stack.
+/// On every level, all children except one can be on the stack.
 pub(super) const STACK_SIZE: usize = MAX_LEVELS * (WIDTH - 1) + 1;
 
-/// A node or block still to visit, as one word so that it is stored and loaded whole: the bits of
-/// the distance at which the ray enters its box (rounded down) above, and below them its code.
+/// A node or block still to be visited, as one word so that it is stored and loaded at once. The upper half has the
+/// bits of the distance at which the ray enters its box (rounded down), the lower half its code.
 #[derive(Clone, Copy, Default)]
 struct Pending(u64);
 
@@ -29,7 +29,7 @@ impl Pending {
     }
 }
 
-/// What a walk has still to visit. One serves several walks, one after another.
+/// The stack of a traversal. It can be reused for several traversals, one after another.
 pub(super) struct WalkStack([Pending; STACK_SIZE]);
 
 impl WalkStack {
@@ -39,20 +39,19 @@ impl WalkStack {
     }
 }
 
-/// What goes through a tree: a ray or a beam of them, and what it does in blocks.
+/// A visitor of the tree: the node test of a ray or a beam, and its work in blocks.
 ///
-/// Implementations must be `inline(always)`: only what is inlined gets the kernel's instructions, and
-/// closures that are used in two places may not be.
+/// Implementations must be `inline(always)`: only inlined code is compiled with the instructions of the kernel, and
+/// closures that are called in two places may not be inlined.
 pub(super) trait Walker<K: Kernel> {
-    /// [`Kernel::test_node`], for whatever walks.
+    /// [`Kernel::test_node`] for a ray or a beam.
     fn test(&self, kernel: K, node: &Node, limit: f32) -> (usize, K::Keys);
 
-    /// Gets the number of a block that may be reached up to `limit`, and returns the new limit; negative
-    /// ends the walk.
+    /// Visits a block that may be reached before `limit`, and returns the new limit; a negative one ends the traversal.
     fn visit(&mut self, kernel: K, block: usize, limit: f32) -> f32;
 }
 
-/// A walker of two closures, for what is walked in one place only.
+/// A visitor made of two closures, for queries with a single traversal.
 struct OfClosures<A, B> {
     test: A,
     visit: B,
@@ -74,7 +73,7 @@ where
     }
 }
 
-/// [`walk_with`] two closures, as in [`Walker`].
+/// [`walk_with`] with two closures in place of a [`Walker`].
 #[inline(always)]
 pub(super) fn walk<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
@@ -86,7 +85,7 @@ pub(super) fn walk<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     walk_with(kernel, tree, &mut OfClosures { test, visit }, limit);
 }
 
-/// Visits the blocks whose boxes are entered before `limit`, nearest boxes first.
+/// Visits the blocks with boxes that the ray enters before `limit`, nearest boxes first.
 #[inline(always)]
 pub(super) fn walk_with<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
@@ -99,7 +98,7 @@ pub(super) fn walk_with<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     }
 }
 
-/// [`walk_with`] through the subtree with `code`, which must be one of the tree.
+/// [`walk_with`] for the subtree with `code`.
 #[inline(always)]
 pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     kernel: K,
@@ -112,23 +111,27 @@ pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     let topology = tree.topology;
     let mut depth = 0;
     loop {
-        match topology.place(code) {
-            Place::Block(block) => {
+        match topology.resolve(code) {
+            NodeRef::Block(block) => {
+                // Visit the block, which may shorten the ray
                 limit = walker.visit(kernel, block, limit);
                 if limit < 0.0 {
                     return;
                 }
             }
-            Place::Node(node) => {
+            NodeRef::Node(node) => {
+                // Test all children of the node
                 let (found, keys) = walker.test(kernel, node, limit);
                 let below = Below {
                     tree,
                     children: topology.children(code),
                 };
+                // One child: continue with it
                 if found == 1 {
                     code = below.code(kernel.first_two(keys)[0]);
                     continue;
                 }
+                // Two children: push the farther one, continue with the nearer one
                 if found == 2 {
                     let [a, b] = kernel.first_two(keys);
                     let (near, far) = (a.min(b), a.max(b));
@@ -139,6 +142,7 @@ pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
                     code = below.code(near);
                     continue;
                 }
+                // More children: sort them by distance, push all but the nearest, continue with the nearest
                 if found > 2 {
                     let mut keys = kernel.all_keys(keys);
                     for key in &keys[..found] {
@@ -154,6 +158,7 @@ pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
                 }
             }
         }
+        // Pop the next node or block that begins before the limit
         loop {
             if depth == 0 {
                 return;
@@ -168,31 +173,31 @@ pub(super) fn walk_from<'a, K: Kernel, T: Topology<'a>, L: Leaves>(
     }
 }
 
-/// What is below a node, seen from it.
+/// The children of a node.
 pub(super) struct Below<'a, T: Topology<'a>, L> {
     pub(super) tree: Resolved<'a, T, L>,
     pub(super) children: T::Children,
 }
 
 impl<'a, T: Topology<'a>, L: Leaves> Below<'a, T, L> {
-    /// Code of the child that a key is for.
+    /// Code of the child that a key belongs to.
     #[inline(always)]
     pub(super) fn code(&self, key: u32) -> u32 {
         self.tree.topology.child(self.children, key & 7)
     }
 
-    /// Asks for the memory of a child that will be visited, well before it is.
+    /// Prefetches a child long before it is visited.
     #[inline(always)]
     pub(super) fn prefetch<K: Kernel>(&self, kernel: K, code: u32) {
-        match self.tree.topology.place(code) {
-            Place::Block(block) => self.tree.leaves.prefetch(kernel, block),
-            Place::Node(node) => kernel.prefetch(node),
+        match self.tree.topology.resolve(code) {
+            NodeRef::Block(block) => self.tree.leaves.prefetch(kernel, block),
+            NodeRef::Node(node) => kernel.prefetch(node),
         }
     }
 }
 
-/// Insertion sort: two or three keys are usual, eight the most. Keys are the bits of distances that
-/// are not negative, which order like integers.
+/// Insertion sort: two or three keys are usual, eight is the maximum. Keys are the bits of distances that are not
+/// negative, which order like integers.
 #[inline(always)]
 pub(super) fn sort_descending(keys: &mut [u32]) {
     for i in 1..keys.len() {

@@ -1,17 +1,17 @@
-//! The tree that every builder ends with: 8-wide nodes over blocks.
+//! The tree that every builder produces: 8-wide nodes over blocks.
 //!
-//! In whole levels, child `c` of node `i` on one level is node `8 i + c` on the next, and the
-//! children of the last level are the blocks themselves: no pointers. One level may be in another
-//! order than the one below it (see `upper.rs`): there a table says where the children of node `i`
-//! begin. Trees of any other shape have a link for each node (see `topology.rs`).
+//! In complete levels, child `c` of node `i` on one level is node `8 i + c` on the next, and the children of the last
+//! level are the blocks: there are no pointers. One level may have an order that differs from the level below it (see
+//! `top_levels.rs`); a table then gives the position of the first child of node `i`. Trees of any other shape have a
+//! link for each node (see `topology.rs`).
 //!
-//! With one radius for all, boxes bound the centres and the radius is added per ray; with radii of
-//! their own, boxes hold the spheres.
+//! With a common radius, boxes bound the centres and the tests of a ray add the radius. With a radius per particle,
+//! boxes bound the spheres.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-use super::levels::{Child, UpperLevels, build_levels, level_counts, level_starts, sah_cost};
+use super::levels::{Child, TopLevels, build_levels, level_counts, level_starts, sah_cost};
 use super::simd::{SimdLevel, Supported};
 use super::topology::LEVEL_CODES;
 use super::topology::Link;
@@ -22,32 +22,31 @@ use spherule_formats::blocks::{
 };
 use spherule_formats::order::index_u32;
 
-/// A tree over spheres that owns all of it. Rays see its [`WideTree::view`].
+/// A tree over spheres that owns all of its memory. Rays use its [`WideTree::view`].
 #[derive(Debug, Default)]
 pub struct WideTree {
     pub(super) nodes: Vec<Node>,
-    /// Number of the first node of each level in `nodes`, root level first.
+    /// Index of the first node of each level in `nodes`, root level first.
     pub(super) level_starts: Vec<u32>,
-    /// The level whose nodes are in another order than their children; none if beyond all levels.
+    /// The level with a node order that differs from the order of the children; beyond all levels if there is none.
     pub(super) mapped_level: u32,
-    /// For each node of that level, the node whose place its children have.
+    /// For each node of that level, an index; its children begin at 8 times this index on the next level.
     pub(super) mapped: Vec<u32>,
-    /// Where the children of each node are; empty if levels are whole.
+    /// Positions of the children of each node; empty for complete levels.
     pub(super) links: Vec<Link>,
     pub(super) blocks: Vec<Block>,
-    /// Empty when the radius is common.
+    /// Empty if there is a common radius.
     pub(super) radii: Vec<BlockRadii>,
     /// The common radius, or 0.
     pub(super) radius: f32,
-    /// Distance that rays pass outside the boxes of nodes and still meet spheres: the radius where
-    /// boxes bound centres, 0 where they bound spheres.
+    /// Length by which the boxes of nodes must be extended: the radius if boxes bound centres, 0 if they bound spheres.
     pub(super) padding: f32,
-    /// Whether a particle may lie in several slots (a sphere in several leaves, or the last one of
-    /// a block repeated to fill it). Only with indices.
+    /// Whether a particle may be stored in several slots (a sphere in several leaves, or the last one of a block
+    /// repeated as padding). Only with indices.
     pub(super) has_copies: bool,
-    /// Whether boxes bound parts of spheres, which only together cover them.
+    /// Whether boxes bound parts of spheres, which cover the spheres only together.
     pub(super) is_clipped: bool,
-    /// Index in the frame of the particle in each lane; empty when not kept.
+    /// Index in the frame of the particle in each lane; empty if indices are not kept.
     pub(super) indices: Vec<u32>,
     pub(super) count: usize,
     pub(super) bounds: Aabb,
@@ -55,7 +54,7 @@ pub struct WideTree {
 }
 
 impl WideTree {
-    /// The tree as rays see it.
+    /// The tree in the form that rays use.
     pub fn view(&self) -> TreeView<'_> {
         let mut levels: [&[Node]; LEVEL_CODES] = [&[]; LEVEL_CODES];
         if self.links.is_empty() {
@@ -95,13 +94,13 @@ impl WideTree {
         self.simd.level()
     }
 
-    /// Traces with `level` from now on, or with the best the machine has if it lacks that.
+    /// Traces with `level` from now on, or with the best instruction set of the machine if `level` is not supported.
     pub fn set_simd(&mut self, level: SimdLevel) {
         self.simd = Supported::or_best(level);
     }
 
-    /// Lanes in use. Where there may be copies, those that fill a block up repeat its last particle,
-    /// and before them no particle is in a block twice.
+    /// Number of lanes in use. If there may be copies, the padding of a block repeats its last particle, and all
+    /// particles before it are distinct.
     fn reference_count(&self) -> u64 {
         if !self.has_copies {
             return self.count as u64;
@@ -115,7 +114,7 @@ impl WideTree {
         blocks.map(|block| used(block) as u64).sum()
     }
 
-    /// Makes room for `count` particles; what was there is gone, memory stays.
+    /// Resizes for `count` particles. The content is replaced, allocated memory is kept.
     pub(super) fn reset(&mut self, count: usize, radius: Option<f32>, indexed: bool) {
         let blocks = count.div_ceil(BLOCK_SIZE);
         self.count = count;
@@ -133,8 +132,8 @@ impl WideTree {
         self.indices.resize(lanes, 0);
     }
 
-    /// Makes room for `blocks` that may hold particles several times.
-    pub(super) fn make_room_for_copies(&mut self, blocks: usize) {
+    /// Resizes for `blocks` blocks that may store particles several times.
+    pub(super) fn resize_with_copies(&mut self, blocks: usize) {
         self.has_copies = blocks > 0;
         self.blocks.resize(blocks, bytemuck::Zeroable::zeroed());
         if !self.radii.is_empty() {
@@ -143,7 +142,7 @@ impl WideTree {
         self.indices.resize(blocks * BLOCK_SIZE, 0);
     }
 
-    /// The memory of the blocks as plain points, and the indices: what builders sort in.
+    /// The memory of the blocks as plain points, and the indices, for builders that sort in place.
     pub(super) fn points_mut(&mut self) -> (&mut [Vec3], &mut [u32]) {
         (
             bytemuck::cast_slice_mut(&mut self.blocks),
@@ -151,7 +150,7 @@ impl WideTree {
         )
     }
 
-    /// Brings the radii of the frame into tree order, by the indices.
+    /// Copies the radii of the frame in tree order, by the indices.
     pub(super) fn gather_radii(&mut self, radii: &[f32]) {
         self.radii
             .par_iter_mut()
@@ -181,18 +180,20 @@ impl WideTree {
         }
     }
 
-    /// Turns sorted points into blocks and builds all levels over them. Returns the SAH cost.
-    pub(super) fn finish(&mut self, upper: UpperLevels) -> f64 {
+    /// Converts sorted points to blocks and builds all levels over them. Returns the SAH cost.
+    pub(super) fn finish(&mut self, upper: TopLevels) -> f64 {
         self.blocks
             .par_iter_mut()
             .with_min_len(256)
             .for_each(Block::transpose_points);
+        // Size the levels
         let counts = level_counts(self.blocks.len());
         self.level_starts = level_starts(&counts);
         self.nodes
             .resize(counts.iter().sum(), bytemuck::Zeroable::zeroed());
         let mapped_level = upper.mapped_level(counts.len());
         self.mapped_level = mapped_level.map_or(u32::MAX, index_u32);
+        // Build the levels over the boxes of the blocks
         let (blocks, radii) = (&self.blocks, &self.radii);
         let child = |index: usize| {
             let block = blocks.get(index)?;
@@ -229,8 +230,8 @@ impl WideTree {
             + size_of_val(&self.mapped[..]) as u64
             + size_of_val(&self.links[..]) as u64
             + size_of_val(&self.indices[..]) as u64;
-        // Sorting happens in the memory of the result and what the builder says; later there are
-        // the boxes of the lowest level.
+        // The sort uses the memory of the result and the scratch memory of the builder; later the boxes of the lowest
+        // level are needed.
         let boxes = self.blocks.len().div_ceil(WIDTH) as u64 * size_of::<Aabb>() as u64;
         BuildReport {
             structure,

@@ -1,16 +1,16 @@
-//! Which attributes are stored, and how: what `--attributes` says.
+//! The value of `--attributes`: which attributes are stored, and how.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// Stands for all attributes that are not named.
+/// Name for all attributes that are not listed.
 const OTHERS: &str = "*";
 
-/// How the values of an attribute are stored.
+/// Storage of the values of an attribute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Storage {
-    /// As they are.
+    /// Unchanged.
     #[default]
     Keep,
     /// Single precision.
@@ -19,15 +19,15 @@ pub enum Storage {
     F16,
     /// 8 bits over the range of each component.
     U8,
-    /// Not at all.
+    /// Not stored.
     Off,
 }
 
 impl Storage {
-    /// All there are.
+    /// All kinds of storage.
     pub const ALL: [Self; 5] = [Self::Keep, Self::F32, Self::F16, Self::U8, Self::Off];
 
-    /// Its name on the command line.
+    /// The name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Keep => "keep",
@@ -39,8 +39,8 @@ impl Storage {
     }
 }
 
-/// How each attribute is stored. Written `velocity:f16,density:u8,*:off`, where `*` are those that are not
-/// named; without it they are kept.
+/// Storage of each attribute. Written `velocity:f16,density:u8,*:off`, where `*` stands for all attributes that are
+/// not listed; without it they are kept.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct AttributeChoices {
     named: BTreeMap<String, Storage>,
@@ -54,8 +54,7 @@ impl AttributeChoices {
         others: Storage::Off,
     };
 
-    /// How the attribute `name` is stored: as said of exactly that name, or failing that without regard to
-    /// case.
+    /// Storage of the attribute `name`. An exact match of the name is preferred over one that ignores case.
     pub fn of(&self, name: &str) -> Storage {
         let alike = || {
             let mut named = self.named.iter();
@@ -67,20 +66,20 @@ impl AttributeChoices {
         }
     }
 
-    /// Whether the attribute `name` is named.
+    /// Whether the attribute `name` is listed.
     pub fn names(&self, name: &str) -> bool {
         self.named
             .keys()
             .any(|known| known.eq_ignore_ascii_case(name))
     }
 
-    /// All that is said: attributes and how they are stored, those not named last and as `*`.
+    /// All choices: attributes and their storage, followed by `*` for the others.
     pub fn iter(&self) -> impl Iterator<Item = (&str, Storage)> {
         let named = self.named.iter().map(|(name, s)| (name.as_str(), *s));
         named.chain([(OTHERS, self.others)])
     }
 
-    /// The first name that none of the `known` attributes has.
+    /// The first listed name that is not among the `known` attributes.
     pub fn unknown(&self, known: &[String]) -> Option<&str> {
         let is_known = |name: &str| known.iter().any(|k| k.eq_ignore_ascii_case(name));
         let mut names = self.named.keys().map(String::as_str);
@@ -110,7 +109,7 @@ impl FromStr for AttributeChoices {
     }
 }
 
-/// `NAME:HOW`; a name may have colons itself.
+/// Parses `NAME:HOW`; the name may contain colons.
 fn choice(item: &str) -> Result<(&str, Storage), String> {
     let names = Storage::ALL.map(Storage::name).join(", ");
     let (name, how) = item
@@ -125,7 +124,7 @@ fn choice(item: &str) -> Result<(&str, Storage), String> {
     Ok((name, storage))
 }
 
-/// The same text for the same choices, in whatever order they were given.
+/// The text is the same for equal choices, whatever their order on input.
 impl fmt::Display for AttributeChoices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, (name, storage)) in self.iter().enumerate() {

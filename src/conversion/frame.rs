@@ -1,4 +1,4 @@
-//! One frame becomes a native one.
+//! Converts a frame to a native one.
 
 use std::fmt;
 use std::time::Instant;
@@ -15,41 +15,41 @@ use spherule_formats::{ScalarType, Sequence};
 use super::attributes::{AttributeChoices, Storage};
 use super::{Conversion, ConvertTask};
 
-/// What came of a frame.
+/// Result of converting a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConvertedFrame {
-    /// Particles stored.
+    /// Number of particles stored.
     pub particles: u64,
-    /// Particles left out because a coordinate was not finite.
+    /// Number of particles dropped because a coordinate was not finite.
     pub dropped: u64,
-    /// How positions are stored.
+    /// Encoding of positions.
     pub encoding: &'static str,
     /// Bytes of positions and nodes.
     pub bytes: u64,
-    /// No stored position is farther than this from the true one, scene units.
+    /// Maximum error of a stored position, scene units.
     pub max_error: f64,
     /// The same as a fraction of the smallest radius, if there is one.
     pub max_error_of_radius: Option<f64>,
-    /// Wall time of the conversion, seconds.
+    /// Wall-clock time of the conversion, seconds.
     pub seconds: f64,
-    /// Wall time by phase, seconds.
+    /// Wall-clock time by phase, seconds.
     pub phases: Vec<(&'static str, f64)>,
-    /// Most anonymous memory that the conversion held, by its own account.
+    /// Peak anonymous memory of the conversion, by its own accounting.
     pub peak_bytes: u64,
-    /// Bytes that were put aside on disk meanwhile.
+    /// Bytes written to temporary files.
     pub spilled_bytes: u64,
-    /// Parts that were ordered one after the other.
+    /// Number of parts that were ordered one after another.
     pub parts: usize,
-    /// What the user should know of the frame.
+    /// Notes for the user.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
 
-/// Converts the frame of `task`: its file appears whole or not at all. Binary files are mapped and pass
-/// through in runs; others are read as a whole.
+/// Converts the frame of `task`; its file appears complete or not at all. Binary files are mapped and streamed in
+/// runs; all others are read completely.
 ///
 /// # Errors
-/// [`ConvertError`] if the frame cannot be read, cannot be stored as asked, or its file not be written.
+/// [`ConvertError`] if the frame cannot be read, cannot be stored with these settings, or its file cannot be written.
 pub fn convert_frame(
     conversion: &Conversion,
     sequence: &Sequence,
@@ -62,11 +62,13 @@ pub fn convert_frame(
         let report = convert(source, &task.output, &settings, progress)?;
         Ok(ConvertedFrame::new(&report, start, notes))
     };
+    // Convert a native frame again
     if let Some(path) = sequence.native_file(task.index) {
         let file = NativeFile::open(path, Access::Map)?;
         file.frame()?.verify().map_err(|e| e.in_file(path))?;
         return convert(&NativeSource::new(&file)?, Vec::new());
     }
+    // Stream a binary file
     let streamed = sequence
         .lone_file(task.index)
         .map(open_source)
@@ -74,6 +76,7 @@ pub fn convert_frame(
     if let Some(source) = streamed.flatten() {
         return convert(&*source, Vec::new());
     }
+    // Read everything else into memory
     let loaded = sequence.load_measured(task.index)?;
     let inputs = sequence.inputs(task.index);
     let path = inputs.first().copied().unwrap_or(&task.output);
@@ -82,7 +85,7 @@ pub fn convert_frame(
 }
 
 impl Conversion {
-    /// What the engine is told of a frame from `source`.
+    /// Settings of the conversion engine for a frame from `source`.
     fn engine_settings(&self, source: &dyn ParticleSource) -> convert::ConvertSettings {
         let asked = &self.settings;
         let choice = |attribute: &SourceAttribute| {
@@ -112,8 +115,8 @@ impl Conversion {
 }
 
 impl AttributeChoices {
-    /// For an attribute of a source. What is said of all that are not named holds for none that would
-    /// suffer: whole numbers and radii.
+    /// Storage of an attribute of a source. The choice for attributes that are not listed does not apply to integers
+    /// and radii, which would lose precision.
     fn choice(&self, attribute: &SourceAttribute) -> AttributeChoice {
         let storage = self.of(&attribute.name);
         let is_float = matches!(attribute.scalar, ScalarType::F32 | ScalarType::F64);
@@ -156,7 +159,7 @@ impl ConvertedFrame {
     }
 }
 
-/// Count, bytes and error for people.
+/// Count, bytes and error for messages.
 impl fmt::Display for ConvertedFrame {
     #[expect(clippy::cast_precision_loss, reason = "for people")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {

@@ -1,8 +1,7 @@
-//! A sequence becomes native frames, one after the other, each recorded in the job once its file is in
-//! place.
+//! Converts a sequence to native frames, one after another. Each is recorded in the job after its file is complete.
 //!
-//! What holds for all frames is settled before, in [`Conversion`]; what the user is shown, the caller
-//! decides ([`Event`]).
+//! Settings that are common to all frames are in [`Conversion`]. The caller decides which [`Event`]s are shown to the
+//! user.
 
 use std::collections::HashSet;
 use std::ops::ControlFlow;
@@ -24,38 +23,38 @@ pub use settings::{Conversion, ConvertSettings};
 
 use crate::mishap::{guarded, is_place_at_fault, may_be_unfinished};
 
-/// One native frame to make.
+/// One native frame to be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConvertTask {
     /// Frame number.
     pub frame: i64,
     /// Index in the sequence.
     pub index: usize,
-    /// The native frame.
+    /// Path of the native frame.
     pub output: PathBuf,
 }
 
-/// What whoever watches is told.
+/// Events of a run.
 #[derive(Debug)]
 pub enum Event<'a> {
-    /// A frame is in hand.
+    /// The conversion of a frame has started.
     Entered(i64),
-    /// So many particles of so many have passed a phase of the frame in hand.
+    /// Progress of a phase of the current frame: particles done, and their total number.
     Advanced(i64, Phase, u64, u64),
-    /// A frame's file is in place and recorded.
+    /// The file of a frame is complete and recorded.
     Done(&'a ConvertTask, &'a ConvertedFrame),
-    /// A frame could not be converted; it is recorded with this reason and the rest goes on.
+    /// A frame could not be converted. It is recorded with this reason, and the run continues.
     Failed(i64, &'a str),
-    /// Other workers are at frames of the run.
+    /// Other workers are working on frames of the run.
     Others(QueueNews<'a>),
-    /// Something the user should know.
+    /// A note for the user.
     Note(&'a str),
 }
 
-/// Who watches; told from many threads.
+/// An event handler, called from many threads.
 pub type Watch<'a> = &'a (dyn Fn(Event) + Sync);
 
-/// A frame in hand that is watched.
+/// Reports the progress of the current frame.
 struct Watched<'a> {
     frame: i64,
     watch: Watch<'a>,
@@ -68,12 +67,11 @@ impl Progress for Watched<'_> {
     }
 }
 
-/// Converts those of `tasks` that no other worker does, in order, and records each in `job`; returns when all
-/// are ended, by whomever. Ends early, with the frame in hand finished, once
-/// `interrupt` is raised.
+/// Converts those of `tasks` that no other worker has claimed, in order, and records each in `job`. Returns when all
+/// of them are finished, by any worker. If `interrupt` is raised, finishes only the current frame.
 ///
 /// # Errors
-/// The ledger cannot be written, or the disk is full: nothing further could be recorded.
+/// The ledger cannot be written, or the disk is full: further frames could not be recorded.
 pub fn run(
     conversion: &Conversion,
     sequence: &Sequence,
@@ -83,12 +81,13 @@ pub fn run(
     watch: Watch,
 ) -> Result<(), JobError> {
     let mut told = HashSet::new();
-    // So that the job knows what a killed run has left.
+    // Mark temporary files with the owner, so that the job recognises those of a killed run.
     own_temporaries(spherule_jobs::owner());
     let frames = tasks.iter().map(|task| task.frame);
     let mut queue = Queue::new(job.claims(), frames, interrupt);
     let mut heard = |news: QueueNews| watch(Event::Others(news));
     while let Some((place, claim)) = queue.take(&mut heard)? {
+        // Convert the frame
         let task = &tasks[place];
         watch(Event::Entered(task.frame));
         let watched = Watched {
@@ -97,7 +96,7 @@ pub fn run(
         };
         match guarded(|| Ok(convert_frame(conversion, sequence, task, &watched))) {
             Ok(Ok(converted)) => {
-                // What is so in every frame is said once.
+                // A note that applies to every frame is reported once.
                 for note in &converted.notes {
                     if told.insert(note.clone()) {
                         watch(Event::Note(note));
@@ -107,7 +106,7 @@ pub fn run(
                 job.record_done(task.frame, outputs, json!(converted))?;
                 watch(Event::Done(task, &converted));
             }
-            // Not the frame's fault: it stays to be done.
+            // The disk is at fault, not the frame, which remains to be done.
             Ok(Err(ConvertError::Frame(FrameError::Io { path, source })))
                 if path.starts_with(task.output.parent().unwrap_or(&task.output))
                     && is_place_at_fault(&source) =>
@@ -127,7 +126,7 @@ fn fail(job: &mut Job, watch: Watch, task: &ConvertTask, reason: &str) -> Result
     job.record_failed(task.frame, reason, json!(null))
 }
 
-/// Why a frame cannot be converted, with what may help.
+/// The reason why a frame cannot be converted, with a remedy.
 fn reason(sequence: &Sequence, task: &ConvertTask, error: &ConvertError) -> String {
     if let ConvertError::Frame(error) = error
         && may_be_unfinished(sequence, task.index, error)

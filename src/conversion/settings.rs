@@ -1,4 +1,4 @@
-//! How a sequence is converted: what was asked for, and what was settled by a look at it.
+//! Settings of a conversion: those of the user, and those determined by a survey.
 
 use glam::DVec3;
 use spherule_formats::native::layout::VERSION;
@@ -8,26 +8,25 @@ use super::attributes::AttributeChoices;
 use crate::metrics::Bytes;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
-/// What was asked for.
+/// Settings of the user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvertSettings {
-    /// How positions are stored; `None` takes what needs the fewest bytes within the bound.
+    /// Encoding of positions; `None` selects the smallest one within the bound.
     pub encoding: Option<Encoding>,
-    /// How far stored positions may be from the true ones.
+    /// Maximum error of stored positions.
     pub bound: Bound,
     /// Replaces the radii of the files, scene units.
     pub radius: Option<f32>,
-    /// Which attributes are stored, and how.
+    /// Storage of attributes.
     pub attributes: AttributeChoices,
-    /// Whether each particle's place in its file is kept, where there is no `id`.
+    /// Whether the position of each particle in its file is stored if there is no `id`.
     pub keep_ids: bool,
-    /// Memory that a conversion may hold. Frames that do not fit in it are ordered in parts, whose places
-    /// depend on it.
+    /// Memory limit of a conversion. Larger frames are ordered in parts; the limit determines where they are divided.
     pub memory: Option<Bytes>,
 }
 
 impl ConvertSettings {
-    /// All that the frames depend on, for the plan: key and value.
+    /// All settings that the frames depend on, for the plan: key and value.
     pub fn settings(&self) -> Vec<(String, String)> {
         let encoding = match self.encoding {
             Some(encoding) => encoding.to_string(),
@@ -37,7 +36,7 @@ impl ConvertSettings {
             ("version".to_owned(), VERSION.to_string()),
             ("encoding".to_owned(), encoding),
         ];
-        // Exact positions are the same under any bound.
+        // Exact positions do not depend on the bound.
         match self.bound {
             _ if self.encoding == Some(Encoding::F32) => {}
             Bound::None => {}
@@ -59,7 +58,7 @@ impl ConvertSettings {
         settings
     }
 
-    /// What a look at the sequence must tell.
+    /// What the survey must find out.
     pub const fn question(&self) -> Question<'static> {
         Question {
             color: ColorQuestion::None,
@@ -71,24 +70,24 @@ impl ConvertSettings {
     }
 }
 
-/// How the frames of a job are converted.
+/// Settings for converting the frames of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversion {
-    /// What was asked for.
+    /// Settings of the user.
     pub settings: ConvertSettings,
     /// World position that stored positions are relative to.
     pub origin: DVec3,
-    /// Whether y points up for users of the format.
+    /// Whether y is the usual up direction of the format.
     pub is_y_up: bool,
-    /// Radius of frames that bring none, scene units.
+    /// Radius for frames without radii, scene units.
     pub estimate: Option<f32>,
 }
 
 impl Conversion {
-    /// By what was asked for and what was found when the job began.
+    /// Combines the settings of the user with the results of the survey.
     ///
     /// # Errors
-    /// If an attribute was named that none of the frames has.
+    /// If an attribute is listed that no frame has.
     pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, String> {
         if let Some(name) = settings.attributes.unknown(&survey.attributes) {
             let has = crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..]));

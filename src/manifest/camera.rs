@@ -1,4 +1,4 @@
-//! `[camera]`: where the image is taken from. World coordinates.
+//! `[camera]`: position and motion of the camera. World coordinates.
 
 use std::collections::BTreeSet;
 
@@ -11,13 +11,13 @@ use super::value::named;
 use crate::scene::camera::DEFAULT_FOV;
 
 named! {
-    /// How the camera is placed.
+    /// Placement of the camera.
     CameraMode {
         /// Framed on the bounds of the whole sequence.
         Auto = "auto",
         /// At `eye`, looking at `look_at`.
         Fixed = "fixed",
-        /// Around the bounds of the whole sequence by `degrees_per_frame`.
+        /// Rotating around the bounds of the whole sequence by `degrees_per_frame`.
         Turntable = "turntable",
         /// Through each `[[camera.key]]` at its frame.
         Keys = "keys",
@@ -52,7 +52,7 @@ section! {
     }
 }
 
-/// Why a key of the camera is refused.
+/// The message for incomplete keys of the camera.
 const KEY_NEEDS: &str = "each [[camera.key]] needs frame, eye and look_at";
 
 section! {
@@ -72,7 +72,7 @@ section! {
 }
 
 impl Camera {
-    /// All keys, and those of `[[camera.key]]`.
+    /// All keys, including those of `[[camera.key]]`.
     pub(super) fn all_keys(&mut self, keys: &mut Keys<'_>) {
         self.keys(keys);
         let (up, mut frames) = (self.up, BTreeSet::new());
@@ -136,7 +136,7 @@ impl Camera {
 }
 
 impl CameraKey {
-    /// `camera_up` is for keys without an up of their own, `frames` has the frames of the keys before.
+    /// Checks one key. `camera_up` is for keys without an up vector; `frames` contains the frames of the previous keys.
     fn check(&self, section: &Section<'_>, camera_up: Option<DVec3>, frames: &mut BTreeSet<i64>) {
         if section.has("frame") && !frames.insert(self.frame) {
             section.wrong(
@@ -161,13 +161,13 @@ impl CameraKey {
     }
 }
 
-/// Whether `up` leaves no upright image of `look_at` from `eye`.
+/// Whether `up` is parallel to the view from `eye` to `look_at`, so that the image has no upright orientation.
 fn are_parallel(up: DVec3, eye: DVec3, look_at: DVec3) -> bool {
     let (up, view) = (up.normalize_or_zero(), (look_at - eye).normalize_or_zero());
     up.cross(view).length() < 1e-9
 }
 
-/// What the keys need of one another, as JSON schema.
+/// Dependencies between keys, as JSON schema.
 pub(super) fn conditions() -> Json {
     let mode_needs = |modes: &[&str], needs: Json| {
         json!({
@@ -182,7 +182,7 @@ pub(super) fn conditions() -> Json {
             &["auto", "turntable", "keys"],
             json!({ "properties": { "eye": false, "look_at": false } }),
         ),
-        // Not given, the mode follows from the other keys.
+        // Without a mode, it follows from the other keys.
         {
             "if": { "required": ["eye"], "properties": { "mode": false } },
             "then": { "required": ["look_at"] },

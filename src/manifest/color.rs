@@ -1,4 +1,4 @@
-//! Colours: plain ones, and those that an attribute of the particles gives through a map.
+//! Colours: constant ones, and those from an attribute of the particles, possibly through a map.
 
 use glam::Vec3;
 use serde_json::{Value as Json, json};
@@ -8,38 +8,38 @@ use super::reader::{Field, nearest};
 use super::value::{Fault, Value, numbers_schema, quoted};
 use crate::scene::Background;
 
-/// Where a particle's colour comes from.
+/// Source of the colours of particles.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ColorSetting {
-    /// By speed where the particles have velocities, else their own colours, else one colour.
+    /// By speed if the particles have velocities, otherwise their own colours, otherwise one colour.
     Auto,
-    /// By speed, through a map that is not the usual one.
+    /// By speed, with a map or range that is not the default.
     AutoWith {
-        /// The map; None is the usual one.
+        /// The map; by default [`DEFAULT_MAP`].
         map: Option<MapName>,
-        /// Values at the two ends of the map; None is what the whole sequence has.
+        /// Values at the two ends of the map; by default the range of the whole sequence.
         range: Option<[f64; 2]>,
     },
-    /// Linear RGB, the same for all.
+    /// Linear RGB, the same for all particles.
     Rgb(Vec3),
-    /// An attribute: colours as they are unless a map or a range is given, anything else through a map,
+    /// An attribute: colours are used as they are unless a map or a range is given. All other values are mapped,
     /// vectors by their length.
     Attribute {
         /// Name of the attribute.
         attribute: String,
-        /// The map; None is viridis.
+        /// The map; by default [`DEFAULT_MAP`].
         map: Option<MapName>,
-        /// Values at the two ends of the map; None is what the whole sequence has.
+        /// Values at the two ends of the map; by default the range of the whole sequence.
         range: Option<[f64; 2]>,
     },
 }
 
-/// Colour maps that are offered, by the names of [`crate::scene::ColorMap`].
+/// Available colour maps, by the names of [`crate::scene::ColorMap`].
 pub const COLOR_MAPS: [&str; 8] = [
     "viridis", "turbo", "plasma", "inferno", "magma", "cividis", "red-blue", "greys",
 ];
 
-/// The map where none is named.
+/// The default map.
 pub const DEFAULT_MAP: MapName = MapName(COLOR_MAPS[0]);
 
 /// One of [`COLOR_MAPS`].
@@ -47,13 +47,13 @@ pub const DEFAULT_MAP: MapName = MapName(COLOR_MAPS[0]);
 pub struct MapName(&'static str);
 
 impl MapName {
-    /// The map of that name, if there is one.
+    /// The map with a name, if there is one.
     pub fn named(name: &str) -> Option<Self> {
         let known = COLOR_MAPS.into_iter().find(|known| *known == name);
         known.map(Self)
     }
 
-    /// As users type it.
+    /// The name in a manifest.
     pub const fn name(self) -> &'static str {
         self.0
     }
@@ -177,7 +177,7 @@ impl Value for ColorSetting {
     }
 }
 
-/// Where up is, [`Background::with_up`] says.
+/// The up direction is set by [`Background::with_up`].
 impl Value for Background {
     fn kind(_: &Key) -> String {
         "three numbers from 0, as [0.1, 0.1, 0.1], { bottom = [...], top = [...] },".to_owned()

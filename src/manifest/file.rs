@@ -1,17 +1,17 @@
-//! The file of a manifest: how it is read, and whether it is one that `render` wrote beside its images.
+//! The file of a manifest: reading, and recognising the ones that `render` writes next to its images.
 //!
-//! What a user wrote or edited is never overwritten. So a manifest that `render` writes ends with a line that
-//! has a checksum of all above it: with that, nobody has touched the file.
+//! A file that a user wrote or edited is never overwritten. So a manifest that `render` writes ends with a line that
+//! contains a checksum of everything above it; if that is valid, the file has not been edited.
 
 use std::io;
 use std::path::Path;
 
 use spherule_jobs::{read_regular_text, text_hash};
 
-/// No manifest that somebody wrote is as long.
+/// Maximum length of a manifest, longer than any real one.
 const MAX_BYTES: u64 = 16 << 20;
 
-/// The last line, around the checksum.
+/// The last line, before and after the checksum.
 const MARK: (&str, &str) = (
     "# Written by spherule, blake3 ",
     ". Once edited, this file is not overwritten any more.\n",
@@ -20,17 +20,17 @@ const MARK: (&str, &str) = (
 /// The text of the manifest at `path`.
 ///
 /// # Errors
-/// It cannot be read, is no regular file, or is too long to be a manifest.
+/// It cannot be read, is not a regular file, or is too long for a manifest.
 pub fn read_manifest(path: &Path) -> io::Result<String> {
     read_regular_text(path, MAX_BYTES)
 }
 
-/// `text` with the mark of a manifest that nobody has edited.
+/// `text` with the mark of a manifest that has not been edited.
 pub fn marked(text: &str) -> String {
     format!("{text}\n{}{}{}", MARK.0, text_hash(text), MARK.1)
 }
 
-/// Whether `text` is as [`marked`] made it.
+/// Whether `text` is unchanged since [`marked`].
 pub fn is_marked(text: &str) -> bool {
     let Some((content, rest)) = text.rsplit_once(MARK.0) else {
         return false;

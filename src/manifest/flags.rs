@@ -1,4 +1,4 @@
-//! What the command line needs to know of the keys that have an option.
+//! Options of the command line for keys.
 
 use super::Manifest;
 use super::key::Flag;
@@ -11,15 +11,15 @@ pub struct KeyFlag {
     pub key: String,
     /// The option.
     pub flag: Flag,
-    /// How it takes its value.
+    /// The kind of value.
     pub kind: FlagKind,
-    /// What the value counts.
+    /// Unit of the value.
     pub unit: Option<&'static str>,
     /// One line of help.
     pub help: String,
     /// More paragraphs of help.
     pub details: Vec<String>,
-    /// The default as one would type it, or in words.
+    /// The default as it would be typed, or a description.
     pub default: Option<String>,
 }
 

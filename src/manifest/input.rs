@@ -1,4 +1,4 @@
-//! `[input]`: which particles, and what they mean.
+//! `[input]`: the particles and the interpretation of their data.
 
 use std::ops::{Deref, DerefMut};
 
@@ -10,7 +10,7 @@ use super::reader::Field;
 use super::value::{Fault, FlagKind, Value, named};
 
 named! {
-    /// Which axis of the simulation points up.
+    /// The axis of the simulation that points up.
     UpAxis {
         /// +x
         X = "x",
@@ -28,7 +28,7 @@ named! {
 }
 
 impl UpAxis {
-    /// As a unit vector.
+    /// The unit vector.
     pub const fn vector(self) -> [f64; 3] {
         match self {
             Self::X => [1.0, 0.0, 0.0],
@@ -41,18 +41,18 @@ impl UpAxis {
     }
 }
 
-/// How large particles are.
+/// Source of the radii.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RadiusSetting {
-    /// The radius of the file, or an estimate from the spacing where it has none.
+    /// The radius of the file, or an estimate from the spacing of particles.
     Auto,
-    /// The same for all, world units.
+    /// One radius for all particles, world units.
     Length(f64),
-    /// From an attribute.
+    /// An attribute.
     Attribute {
         /// Its name.
         attribute: String,
-        /// What it is multiplied by: 0.5 for a diameter.
+        /// Factor on its values: 0.5 for a diameter.
         scale: f64,
     },
 }
@@ -89,7 +89,7 @@ section! {
 }
 
 impl Input {
-    /// All of `path`, with the defaults.
+    /// All frames at `path`, with default settings.
     pub fn new(path: impl Into<String>) -> Self {
         Self {
             path: Paths(vec![path.into()]),
@@ -98,7 +98,7 @@ impl Input {
     }
 }
 
-/// One path, or a list of them; never empty in a manifest that was read.
+/// One path or a list of paths; not empty in a manifest that was read.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct Paths(pub Vec<String>);
 

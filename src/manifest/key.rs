@@ -1,8 +1,8 @@
-//! One declaration per key: what it is called, which values it takes, what `init`, the schema, the manual and the
-//! command line say about it, and whether an image depends on it.
+//! One declaration per key: its name, its values, its description in `init`, the schema, the manual and the command
+//! line, and whether images depend on it.
 //!
-//! `section!` declares a table of the manifest as a struct, `keys!` the keys of a struct that lives elsewhere. Both
-//! expand to one call of [`Keys::key`] for each key. The same calls read a manifest and list it.
+//! `section!` declares a table of the manifest as a struct, `keys!` the keys of a struct that is defined elsewhere.
+//! Both expand to one call of [`Keys::key`] per key. The same calls read a manifest and list it.
 
 use super::list::Entries;
 use super::reader::Section;
@@ -47,7 +47,7 @@ macro_rules! section {
 }
 pub(super) use section;
 
-/// Declares the keys of values that are elsewhere: `name => place, rules;`.
+/// Declares the keys of values that are stored elsewhere: `name => place, rules;`.
 macro_rules! keys {
     ($keys:ident: $($(#[doc = $doc:literal])+ $name:ident => $place:expr
         $(, $rule:ident($($argument:expr),* $(,)?))*;)+) => {{
@@ -60,7 +60,7 @@ macro_rules! keys {
 }
 pub(super) use keys;
 
-/// When images depend on a key.
+/// Conditions under which images depend on a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Affects {
     Images,
@@ -73,7 +73,7 @@ pub(super) enum Affects {
 }
 
 impl Affects {
-    /// For the manual.
+    /// Description for the manual.
     #[cfg(test)]
     pub(super) const fn text(self) -> &'static str {
         match self {
@@ -98,13 +98,13 @@ pub(super) struct Bound {
 pub struct Flag {
     /// Without the hyphens.
     pub name: &'static str,
-    /// What the help calls its value.
+    /// Name of its value in the help.
     pub value_name: &'static str,
-    /// Heading in the help.
+    /// Its heading in the help.
     pub heading: &'static str,
 }
 
-/// Rules of a declaration: each sets one field of the [`Key`].
+/// Rules of a declaration; each sets one field of the [`Key`].
 macro_rules! rules {
     ($($(#[$doc:meta])+ $name:ident($($argument:ident: $type:ty)?) { $field:ident: $value:expr })+) => {
         impl Key {
@@ -116,44 +116,44 @@ macro_rules! rules {
 }
 
 rules! {
-    /// Least value.
+    /// Minimum, inclusive.
     from(low: impl Into<f64>) { low: Some(Bound { value: low.into(), is_excluded: false }) }
-    /// Greatest value that is too small.
+    /// Minimum, exclusive.
     above(low: impl Into<f64>) { low: Some(Bound { value: low.into(), is_excluded: true }) }
-    /// Greatest value.
+    /// Maximum, inclusive.
     to(high: impl Into<f64>) { high: Some(Bound { value: high.into(), is_excluded: false }) }
-    /// Least value that is too large.
+    /// Maximum, exclusive.
     below(high: impl Into<f64>) { high: Some(Bound { value: high.into(), is_excluded: true }) }
-    /// What a number counts, as "degrees".
+    /// Unit of a number, such as "degrees".
     unit(unit: &'static str) { unit: Some(unit) }
-    /// What a range that begins at 0 means there.
+    /// Meaning of 0 at the start of a range.
     zero(meaning: &'static str) { zero: Some(meaning) }
-    /// Allows 0 beside the range.
+    /// Allows 0 in addition to the range.
     or_zero() { or_zero: true }
     /// Refuses the zero vector.
     direction() { is_direction: true }
-    /// Requires that a number is in range in single precision, too.
+    /// Requires a number to be in range in single precision as well.
     single() { is_single: true }
-    /// The word that stands for a value that is not set, as "auto".
+    /// The word for a value that is not set, such as "auto".
     or(word: &'static str) { word: Some(word) }
-    /// A value where there is no default, as TOML.
+    /// An example in TOML, for keys without a default.
     example(example: &'static str) { example: example }
-    /// What happens where the key is not set.
+    /// The effect if the key is not set.
     unset(unset: &'static str) { unset: Some(unset) }
-    /// Why the key must be there.
+    /// Message if the key is missing.
     required(why: &'static str) { required: Some(why) }
-    /// When images depend on the key.
+    /// The condition under which images depend on the key.
     affects(affects: Affects) { affects: affects }
 }
 
 impl Key {
-    /// An old word for a value, and the new one.
+    /// An old name of a value, and the current one.
     pub(super) fn renamed(self, old: &'static str, new: &'static str) -> Self {
         let renamed = Some([old, new]);
         Self { renamed, ..self }
     }
 
-    /// The option that sets the key, what the help calls its value, and the heading there.
+    /// The option that sets the key, with the name of its value and its heading in the help.
     pub(super) fn flag(
         self,
         name: &'static str,
@@ -169,7 +169,7 @@ impl Key {
     }
 }
 
-/// The declaration of a key; the rules above say what its fields mean.
+/// The declaration of a key; its fields are documented by the rules above.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Key {
     pub(super) name: &'static str,
@@ -217,19 +217,19 @@ impl Key {
         paragraphs(self.docs).swap_remove(0)
     }
 
-    /// What the documentation says beyond the comment.
+    /// The other paragraphs of its documentation.
     pub(super) fn details(&self) -> Vec<String> {
         paragraphs(self.docs).split_off(1)
     }
 
-    /// The range of a number in words: ` from 0 to 1`.
+    /// The range of a number for messages: ` from 0 to 1`.
     pub(super) fn range(&self) -> String {
         let zero = self
             .zero
             .map(|zero| format!(" ({zero})"))
             .unwrap_or_default();
         let low = self.low.map(|b| (shown(b.value) + &zero, b.is_excluded));
-        // No finite number is beyond the limit of single precision in a meaningful way.
+        // The limit of single precision is not worth mentioning.
         let high = self.high.filter(|b| b.value < f64::from(f32::MAX));
         let high = high.map(|b| (shown(b.value), b.is_excluded));
         match (low, high) {
@@ -253,7 +253,7 @@ impl Key {
         value.is_finite() && (in_range || self.or_zero && value == 0.0)
     }
 
-    /// What a message asks for.
+    /// Description of the expected value for messages.
     pub(super) fn wants<T: Value>(&self) -> String {
         let kind = T::kind(self);
         match self.word {
@@ -264,7 +264,7 @@ impl Key {
     }
 }
 
-/// A bound in a message: bounds of single precision as they were written.
+/// A bound for messages; bounds of single precision appear as they were written.
 #[expect(clippy::cast_possible_truncation, reason = "for display")]
 fn shown(value: f64) -> String {
     let value = value as f32;
@@ -274,7 +274,7 @@ fn shown(value: f64) -> String {
     }
 }
 
-/// Lines of a doc comment as paragraphs, each on one line.
+/// The lines of a doc comment, joined into one line per paragraph.
 pub(super) fn paragraphs(docs: &[&str]) -> Vec<String> {
     let lines: Vec<&str> = docs.iter().map(|line| line.trim()).collect();
     lines
@@ -283,14 +283,14 @@ pub(super) fn paragraphs(docs: &[&str]) -> Vec<String> {
         .collect()
 }
 
-/// The keys of a table, gone through to read them or to list them.
+/// A pass over the keys of a table, to read or to list them.
 pub(super) enum Keys<'a> {
     Read(Section<'a>),
     List(&'a mut Entries),
 }
 
 impl<'a> Keys<'a> {
-    /// One key.
+    /// Visits one key.
     pub(super) fn key<S: Slot>(&mut self, key: Key, slot: &mut S) {
         match self {
             Self::Read(section) => section.read(&key, slot),
@@ -298,7 +298,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// The table under `name`.
+    /// Visits the table `name`.
     pub(super) fn section(
         &mut self,
         name: &'static str,
@@ -318,7 +318,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// The list of tables under `name`; `path` is the whole key.
+    /// Visits the list of tables `name`; `path` is the full key.
     pub(super) fn list<T: Default>(
         &mut self,
         name: &'static str,
@@ -346,7 +346,7 @@ impl<'a> Keys<'a> {
         }
     }
 
-    /// The table that is read, for what keys need of one another.
+    /// The table that is being read, for checks of dependencies between keys.
     pub(super) const fn reading(&mut self) -> Option<&mut Section<'a>> {
         match self {
             Self::Read(section) => Some(section),

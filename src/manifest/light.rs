@@ -1,4 +1,4 @@
-//! `[[light]]`: light sources. With none given, lights are placed by the camera.
+//! `[[light]]`: light sources. Without any, lights are placed relative to the camera.
 
 use glam::{DVec3, Vec3};
 
@@ -11,7 +11,7 @@ named!(Falloff: None = "none", InverseSquare = "inverse-square");
 pub(super) const ABOUT: &[&str] =
     &["Light sources; without any, a key light and a soft fill are placed by the camera"];
 
-/// `type` in the file.
+/// The key `type`.
 #[derive(Clone, Copy, PartialEq)]
 enum LightType {
     Point,
@@ -20,19 +20,19 @@ enum LightType {
 
 named!(LightType: Point = "point", Directional = "directional");
 
-/// Where light comes from. World coordinates.
+/// Kinds of light sources. World coordinates.
 #[derive(Debug, Clone, PartialEq)]
 pub enum LightKind {
-    /// From a point, in all directions.
+    /// A point light.
     Point {
-        /// The point.
+        /// Its position.
         position: DVec3,
-        /// How it fades with distance.
+        /// Falloff with distance.
         falloff: Falloff,
     },
-    /// From far away.
+    /// A light at infinite distance.
     Directional {
-        /// Direction in which the light travels; not 0, of any length.
+        /// Direction in which the light travels; not zero, of any length.
         direction: DVec3,
     },
 }
@@ -40,7 +40,7 @@ pub enum LightKind {
 /// One `[[light]]`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Light {
-    /// Where it comes from.
+    /// The kind of light.
     pub kind: LightKind,
     /// Linear RGB.
     pub color: Vec3,
@@ -73,7 +73,7 @@ impl LightKind {
 }
 
 impl Light {
-    /// One of every type.
+    /// One light of each type.
     pub(super) fn examples() -> [Self; 2] {
         [LightType::Point, LightType::Directional].map(|kind| Self {
             kind: LightKind::of(kind),
@@ -89,7 +89,7 @@ impl Light {
         let key = Key::new("type", &["point | directional"]);
         keys.key(key.required("\"point\" or \"directional\""), &mut kind);
         if let Some(section) = keys.reading() {
-            // Which keys are known depends on the type, so the rest is not judged.
+            // The type determines which keys are known, so the rest is not checked.
             if !section.has("type") {
                 section.close();
                 return;

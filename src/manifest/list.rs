@@ -1,5 +1,5 @@
-//! A manifest as one flat list of keys with their values, from which the commented file of `init`, the settings
-//! that images depend on, the JSON schema, the manual and the options of the command line are made.
+//! A manifest as one flat list of keys with values. From it the commented file of `init`, the settings that images
+//! depend on, the JSON schema, the manual and the options of the command line are made.
 
 use std::fmt::Write as _;
 
@@ -8,24 +8,24 @@ use serde_json::Value as Json;
 use super::key::{Affects, Key, paragraphs};
 use super::value::{FlagKind, Value};
 
-/// Comments begin here where the value leaves room.
+/// Column in which comments begin, unless the value is too long.
 const COMMENT_COLUMN: usize = 40;
 
 /// One key and its value.
 pub(super) struct Entry {
-    /// Dotted, as `light.0.color`.
+    /// The dotted key, such as `light.0.color`.
     pub(super) key: String,
-    /// The table that it is in, as `light.0`.
+    /// The table that contains it, such as `light.0`.
     pub(super) section: String,
-    /// The line above the table.
+    /// The heading of the table.
     header: String,
     pub(super) about: String,
     pub(super) declared: Key,
-    /// As TOML; None if it is not set.
+    /// The value as TOML; None if it is not set.
     pub(super) value: Option<String>,
-    /// The value among the settings that images depend on.
+    /// The value in the settings that images depend on.
     setting: Option<String>,
-    /// What its values are, in words, with their range.
+    /// Description of the valid values, with their range.
     #[cfg(test)]
     pub(super) kind: String,
     pub(super) schema: Json,
@@ -37,12 +37,12 @@ impl Entry {
         self.declared.name
     }
 
-    /// The value, or an example where it is not set, as TOML.
+    /// The value as TOML, or an example if it is not set.
     pub(super) fn sample(&self) -> &str {
         self.value.as_deref().unwrap_or(self.declared.example)
     }
 
-    /// An example, or the value where there is none, as TOML.
+    /// An example as TOML, or the value if there is none.
     fn example(&self) -> &str {
         match self.declared.example {
             "" => self.sample(),
@@ -55,7 +55,7 @@ impl Entry {
         format!("{line:<COMMENT_COLUMN$} # {}\n", self.comment())
     }
 
-    /// What the commented file says: what it is, and what happens where it is not set.
+    /// The comment in the file: the meaning, and the effect if the key is not set.
     pub(super) fn comment(&self) -> String {
         let comment = self.declared.comment();
         match self.declared.unset {
@@ -65,7 +65,7 @@ impl Entry {
     }
 }
 
-/// All keys in the order in which they are written.
+/// All keys in the order of the file.
 #[derive(Default)]
 pub(super) struct Entries {
     list: Vec<Entry>,
@@ -118,7 +118,7 @@ impl Entries {
         &self.list
     }
 
-    /// The keys that are set and that images depend on, where `holds` says which conditions are met.
+    /// The keys that are set and that images depend on; `holds` evaluates the conditions.
     pub(super) fn settings(&self, holds: impl Fn(Affects) -> bool) -> Vec<(String, String)> {
         let set = |e: &Entry| Some((e.key.clone(), e.setting.clone()?));
         let affect = self.list.iter().filter(|e| holds(e.declared.affects));
@@ -140,7 +140,7 @@ impl Entries {
         text
     }
 
-    /// The first item of a list with examples, commented out.
+    /// The first item of a list as an example, commented out.
     pub(super) fn commented_out(&self, list: &str) -> String {
         let section = format!("{list}.0");
         let own = self.list.iter().filter(|entry| entry.section == section);
@@ -149,7 +149,7 @@ impl Entries {
     }
 }
 
-/// `schema`, or the word of `key`, or an old one.
+/// `schema`, extended by the word of `key` and by old names.
 fn with_words(mut schema: Json, key: &Key) -> Json {
     if let (Some([old, _]), Some(Json::Array(words))) = (key.renamed, schema.get_mut("enum")) {
         words.push(old.into());

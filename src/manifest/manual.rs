@@ -1,4 +1,4 @@
-//! The manual's page of all keys, written from their declarations.
+//! Generates the manual page of all keys from their declarations.
 
 use std::fmt::Write as _;
 
@@ -21,7 +21,7 @@ fn manual() -> String {
         "<!-- Generated from src/manifest: {COMMAND} -->\n\n# Manifest\n\n{ABOUT}\n\n{INTRODUCTION}"
     );
     let mut tables: Vec<&[Entry]> = tables(&entries).collect();
-    // A list comes after the table that it belongs to, as in the file.
+    // A list follows the table that contains it, as in the file.
     tables.sort_by_key(|table| table[0].section.split('.').next() == Some("light"));
     for table in tables {
         let _ = write!(
@@ -87,7 +87,7 @@ fn row(entry: &Entry) -> String {
     format!("| {} |\n", cells.join(" | "))
 }
 
-/// What writes the page.
+/// The command that generates the page.
 const COMMAND: &str = "cargo test --lib manual::tests::write -- --ignored";
 
 #[cfg(test)]

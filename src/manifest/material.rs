@@ -1,4 +1,4 @@
-//! `[material]`: what particles are made of.
+//! `[material]`: the material of the particles.
 
 use glam::Vec3;
 
@@ -14,15 +14,16 @@ pub(super) const ABOUT: &[&str] = &["What particles are made of"];
 /// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
-    /// The particles' colour.
+    /// Source of the colours.
     pub color: ColorSetting,
-    /// The constants; `fresnel` and `extinction` are those of the fields below.
+    /// The constants, except `fresnel` and `extinction`, which follow from the fields below.
     pub constants: scene::Material,
-    /// None is Schlick's for spheres, as in the thesis, and exact for a union or a smooth surface.
+    /// The Fresnel equations; by default Schlick's approximation for spheres, as in the thesis, and the exact ones
+    /// for a union or a smooth surface.
     pub fresnel: Option<Fresnel>,
-    /// Transmitted part of white light after [`Self::absorption_length`] inside, linear RGB.
+    /// Transmittance of white light over [`Self::absorption_length`] inside, linear RGB.
     pub absorption: Vec3,
-    /// The length for that; None goes by the extent of the particles.
+    /// The length for `absorption`; by default it depends on the extent of the particles.
     pub absorption_length: Option<f64>,
 }
 

@@ -1,8 +1,8 @@
-//! The manifest: all settings of a job, typed, with their defaults, read from TOML.
+//! The manifest: all settings of a job with their types and defaults, read from TOML.
 //!
 //! Each key is declared once (`key.rs`). Options of the command line replace values of the file ([`Override`]). All
-//! problems are reported at once, each with line and column (or the option) and key. What "auto" means for given
-//! particles is decided in `resolve`.
+//! problems are reported at once, each with line and column (or the option) and key. `resolve` determines the meaning
+//! of "auto" for the given particles.
 
 use std::fmt::{self, Write as _};
 use std::path::Path;
@@ -67,37 +67,37 @@ pub use tree::Override;
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
 
-/// See the module.
+/// The settings of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Manifest {
-    /// Which particles to render.
+    /// The particles.
     pub input: Input,
-    /// Where the image is taken from.
+    /// The camera.
     pub camera: Camera,
     /// Size and sampling of the image.
     pub image: Image,
     /// How the image is traced.
     pub render: Render,
-    /// What rays hit: `render.surface` and `[surface]`.
+    /// The surface: `render.surface` and `[surface]`.
     pub surface: SurfaceSettings,
-    /// What particles are made of.
+    /// The material of the particles.
     pub material: Material,
-    /// Light sources; with none, a key light and a soft fill are placed by the camera.
+    /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
     pub lights: Vec<Light>,
-    /// Which images are written.
+    /// The images.
     pub output: Output,
     /// Execution options; no image depends on them.
     pub job: Work,
 }
 
-/// Everything that is wrong with a manifest, a line each.
+/// All problems of a manifest, one line each.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ManifestError {
     lines: Vec<String>,
 }
 
 impl ManifestError {
-    /// One message for each thing that is wrong, in the order of the file.
+    /// One message per problem, in the order of the file.
     pub fn messages(&self) -> &[String] {
         &self.lines
     }
@@ -112,7 +112,7 @@ impl fmt::Display for ManifestError {
 impl std::error::Error for ManifestError {}
 
 impl Manifest {
-    /// The defaults for the particles at `path`.
+    /// Default settings for the particles at `path`.
     pub fn new(path: impl Into<String>) -> Self {
         Self {
             input: Input::new(path),
@@ -127,7 +127,7 @@ impl Manifest {
         }
     }
 
-    /// Reads a manifest. `path` is for messages only.
+    /// Reads a manifest. `path` is used for messages only.
     ///
     /// # Errors
     /// It is not TOML, or has unknown keys or invalid values.
@@ -135,11 +135,11 @@ impl Manifest {
         Self::parse_with(text, path, Vec::new())
     }
 
-    /// Reads a manifest and applies `overrides` in order. The text may be empty if they give all that is needed
-    /// (`input.path`).
+    /// Reads a manifest and applies `overrides` in order. The text may be empty if they contain everything that is
+    /// required (`input.path`).
     ///
     /// # Errors
-    /// As [`Manifest::parse`]; problems of an override are reported by its name.
+    /// Same as [`Manifest::parse`]; problems of an override are reported under its name.
     pub fn parse_with(
         text: &str,
         path: &Path,
@@ -148,10 +148,10 @@ impl Manifest {
         Self::parse_with_warnings(text, path, overrides).map(|(manifest, _)| manifest)
     }
 
-    /// The same, with warnings about what is still read and should be written differently.
+    /// Same as [`Manifest::parse_with`], with warnings about obsolete forms that are still accepted.
     ///
     /// # Errors
-    /// As [`Manifest::parse_with`].
+    /// Same as [`Manifest::parse_with`].
     pub fn parse_with_warnings(
         text: &str,
         path: &Path,
@@ -162,13 +162,14 @@ impl Manifest {
             let key = String::new();
             ManifestError::new(vec![Problem { place, key, what }], text, path)
         })?;
-        // Defaults of a look fill the gaps that are left.
+        // Apply the defaults of a look last, to keys that are still missing
         let (under, over): (Vec<_>, Vec<_>) = overrides.into_iter().partition(Override::is_under);
         for overlay in over.into_iter().chain(under) {
             if let Err(problem) = tree.lay_over(overlay) {
                 problems.errors.borrow_mut().push(problem);
             }
         }
+        // Read all keys, then check dependencies between them
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
@@ -183,7 +184,7 @@ impl Manifest {
         }
     }
 
-    /// Goes through all keys: the one place that knows the tables, in the order of the commented file.
+    /// Visits all keys, in the order of the commented file. No other place knows the tables.
     fn keys(&mut self, keys: &mut Keys<'_>) {
         keys.section("input", Input::ABOUT, |keys| self.input.keys(keys));
         keys.section("camera", Camera::ABOUT, |keys| self.camera.all_keys(keys));
@@ -207,7 +208,7 @@ impl Manifest {
         );
     }
 
-    /// Checks what tables need of one another.
+    /// Checks dependencies between tables.
     fn check(&self, root: &mut Keys<'_>) {
         let Some(root) = root.reading() else {
             return;
@@ -227,12 +228,12 @@ impl Manifest {
         }
     }
 
-    /// Whether rays branch at spheres into reflected and refracted ones; only then `render.min_weight` matters.
+    /// Whether rays at spheres split into reflected and refracted ones; `render.min_weight` has no effect otherwise.
     fn branches_at_spheres(&self) -> bool {
         self.surface.kind == SurfaceKind::Spheres && self.material.constants.branches()
     }
 
-    /// Whether images of this manifest depend on keys that are declared with `affects`.
+    /// Whether images of this manifest depend on keys with this `affects`.
     fn depends_on(&self, affects: Affects) -> bool {
         match affects {
             Affects::Images => true,
@@ -243,10 +244,10 @@ impl Manifest {
         }
     }
 
-    /// Whether each of `frame_count` frames gets an image of its own.
+    /// Checks that each of `frame_count` frames gets a separate image.
     ///
     /// # Errors
-    /// There are several frames, or more may come, but the output's name has no number.
+    /// There are several frames, or more may follow, but the name of the output has no number.
     pub fn check_frame_count(&self, frame_count: usize) -> Result<(), ManifestError> {
         let range = self.input.frames.as_ref();
         let more_may_come = self.job.follow && range.is_none_or(FrameRange::has_several);
@@ -265,9 +266,9 @@ impl Manifest {
         })
     }
 
-    /// What images depend on besides the particles, as dotted key and TOML value, in a fixed order. Left out are keys
-    /// that do not affect images, or not those of this manifest (see `Affects`), and the directory of the images. Input
-    /// files are identified by fingerprints of their own.
+    /// All settings that images depend on, as dotted key and TOML value, in a fixed order. Excludes keys that do not
+    /// affect images, or not those of this manifest (see `Affects`), and the directory of the images. Input files are
+    /// identified by separate fingerprints.
     pub fn settings(&self) -> Vec<(String, String)> {
         let mut settings = self.entries().settings(|affects| self.depends_on(affects));
         let renderer = format!("{:?}", RendererKind::default().name());
@@ -275,10 +276,10 @@ impl Manifest {
         settings
     }
 
-    /// A complete manifest with every key, commented, that reads back equal.
+    /// A complete manifest with every key and comments; reading it gives an equal manifest.
     pub fn to_commented_toml(&self) -> String {
-        // Editors that know the first line complete and check what is written below it, and pass over it where
-        // that file is missing.
+        // Editors that know the first line complete and check the following lines, and ignore it if that file is
+        // missing.
         let mut text = format!("#:schema ./{SCHEMA_FILE}\n# {ABOUT}\n");
         text.push_str(&self.entries().file());
         let examples = Self::examples().entries();
@@ -296,12 +297,12 @@ impl Manifest {
     /// All keys with their values.
     fn entries(&self) -> Entries {
         let mut entries = Entries::default();
-        // Listing changes nothing; the same calls read.
+        // The visitor needs a mutable manifest for reading; listing does not change it.
         self.clone().keys(&mut Keys::List(&mut entries));
         entries
     }
 
-    /// A manifest with an item of every kind in each list.
+    /// A manifest with one item of each kind in each list.
     fn examples() -> Self {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
@@ -310,7 +311,7 @@ impl Manifest {
     }
 }
 
-/// What a manifest is.
+/// Description of a manifest.
 const ABOUT: &str =
     "A spherule job. Paths are relative to this file; lengths are those of the simulation.";
 
@@ -323,24 +324,24 @@ const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these 
 const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill are placed by the camera. A directional light has \
                            a direction instead of position and falloff.";
 
-/// Every key outside lists.
+/// All keys that are not in lists.
 fn known_keys() -> Vec<String> {
     let entries = Manifest::new("").entries();
     entries.list().iter().map(|e| e.key.clone()).collect()
 }
 
-/// Most problems that are shown at once.
+/// Maximum number of problems that are reported at once.
 const MOST_SHOWN: usize = 50;
 
 impl ManifestError {
-    /// In the order of the file; options come first, as what was asked for last.
+    /// Messages in the order of the file; those for options come first.
     fn new(mut problems: Vec<Problem>, text: &str, path: &Path) -> Self {
         problems.sort_by_key(|p| match p.place {
             Place::Option(_) => 0,
             Place::Byte(at) => at + 1,
             Place::Nowhere => usize::MAX,
         });
-        // Work grows with the text alone, however much is wrong with it.
+        // The work depends only on the length of the text, not on the number of problems.
         let shown = problems.iter().take(MOST_SHOWN);
         let mut lines: Vec<String> = shown.map(|problem| message(problem, text, path)).collect();
         if problems.len() > MOST_SHOWN {
@@ -350,7 +351,7 @@ impl ManifestError {
     }
 }
 
-/// Place, key and text of a problem.
+/// Location, key and text of a problem.
 fn message(problem: &Problem, text: &str, path: &Path) -> String {
     let place = match &problem.place {
         Place::Option(shown) => shown.clone(),

@@ -1,4 +1,4 @@
-//! `[output]`: which images are written, and what is in them.
+//! `[output]`: the images and their channels.
 
 use serde_json::{Value as Json, json};
 
@@ -9,7 +9,7 @@ use super::value::{Fault, Value, named, quoted};
 use crate::output::Compression;
 
 named! {
-    /// What an image can hold.
+    /// Channels of an image.
     Channel {
         /// Colour and coverage, premultiplied.
         Rgba = "RGBA",
@@ -17,7 +17,7 @@ named! {
         Z = "Z",
         /// Normal.
         N = "N",
-        /// Particle.
+        /// Particle id.
         Id = "id",
         /// Position in the world.
         P = "P",
@@ -30,7 +30,7 @@ named! {
 
 named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz = "piz");
 
-/// Names of images if the manifest gives none.
+/// Default names of images.
 const DEFAULT_PATH: &str = "out/frame.####.exr";
 
 section! {
@@ -73,7 +73,7 @@ impl Value for OutputPattern {
         json!({ "type": "string", "pattern": r"[^/\\]\.[eE][xX][rR]$" })
     }
 
-    /// A job may be moved together with its images.
+    /// Only the file name: a job may be moved together with its images.
     fn setting(&self) -> String {
         quoted(self.file_name())
     }

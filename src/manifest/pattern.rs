@@ -1,17 +1,17 @@
-//! Names of images: `out/frame.####.exr` or `out/frame.%04d.exr`, and the paths that come of it.
+//! Name patterns of images, such as `out/frame.####.exr` or `out/frame.%04d.exr`, and the resulting paths.
 
 use std::fmt;
 use std::path::{Path, PathBuf};
 
-/// Digits that a frame number can be padded to: none has more than 19.
+/// Maximum number of digits in a pattern; frame numbers have at most 19.
 const MAX_DIGITS: usize = 32;
 
-/// An output path with room for the frame's number. Its length in `#` (or `%0Nd`) is the least
-/// number of digits; larger numbers take more.
+/// An output path with a placeholder for the frame number. The length in `#` (or `%0Nd`) is the minimum number of
+/// digits; larger numbers use more.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct OutputPattern {
     text: String,
-    /// Directory and beginning of the name, up to the number.
+    /// Directory and start of the name, up to the number.
     before: String,
     after: String,
     /// None if the name has no number.
@@ -22,15 +22,17 @@ impl OutputPattern {
     /// Parses a pattern for EXR files.
     ///
     /// # Errors
-    /// It does not end in `.exr`, names no file, has a number in a directory's name or several
-    /// numbers, an unknown `%`, or a number of too many digits.
+    /// It does not end in `.exr`, does not name a file, has a number in the name of a directory or several numbers,
+    /// an unknown `%`, or a number with too many digits.
     pub fn parse(text: &str) -> Result<Self, String> {
+        // Check the extension
         let is_exr = Path::new(text)
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         if !is_exr {
             return Err("must end in .exr, as in out/frame.####.exr".to_owned());
         }
+        // Find the number in the file name
         let name_at = text.rfind(std::path::is_separator).map_or(0, |i| i + 1);
         let (dir, name) = text.split_at(name_at);
         if find_number(dir)?.is_some() {
@@ -44,6 +46,7 @@ impl OutputPattern {
                 digits: None,
             });
         };
+        // Reject a second number
         let after = &name[end..];
         if find_number(after)?.is_some() {
             return Err("has room for two numbers; one is wanted, as in frame.####.exr".into());
@@ -56,22 +59,22 @@ impl OutputPattern {
         })
     }
 
-    /// As it was written.
+    /// The pattern as it was written.
     pub fn as_str(&self) -> &str {
         &self.text
     }
 
-    /// Whether frames get names of their own.
+    /// Whether each frame gets a separate name.
     pub const fn has_number(&self) -> bool {
         self.digits.is_some()
     }
 
-    /// The directory part; empty for a bare name.
+    /// The directory; empty for a bare name.
     pub fn dir(&self) -> &Path {
         Path::new(&self.text).parent().unwrap_or(Path::new(""))
     }
 
-    /// The file's name, still with the room for the number.
+    /// The file name, with the placeholder for the number.
     pub fn file_name(&self) -> &str {
         let name_at = self
             .text
@@ -80,7 +83,7 @@ impl OutputPattern {
         &self.text[name_at..]
     }
 
-    /// The image of `frame`. A negative number keeps its sign before the padded digits.
+    /// The path of the image of `frame`. A negative number has its sign before the padded digits.
     pub fn path_for(&self, frame: i64) -> PathBuf {
         let Some(digits) = self.digits else {
             return PathBuf::from(&self.text);
@@ -93,7 +96,7 @@ impl OutputPattern {
         ))
     }
 
-    /// The preview of `frame`: the image's path with `.png`.
+    /// The path of the preview of `frame`: that of the image with `.png`.
     pub fn preview_path_for(&self, frame: i64) -> PathBuf {
         self.path_for(frame).with_extension("png")
     }
@@ -105,7 +108,7 @@ impl fmt::Display for OutputPattern {
     }
 }
 
-/// Start, end and digits of the first room for a number.
+/// Start, end and digits of the first placeholder for a number.
 fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
     let Some(start) = text.find(['#', '%']) else {
         return Ok(None);
@@ -122,7 +125,7 @@ fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
         padded => padded
             .strip_prefix('0')
             .filter(|n| !n.is_empty() && n.bytes().all(|b| b.is_ascii_digit()))
-            // More digits than any number here has.
+            // Too large to parse means too many digits.
             .map(|n| n.parse().unwrap_or(usize::MAX))
             .ok_or_else(unknown)?,
     };

@@ -1,19 +1,18 @@
-//! Looks: many settings under one name, as defaults that anything said in a manifest or an option goes
-//! before.
+//! Looks: named sets of defaults, which values in a manifest and options override.
 
 use toml::Value;
 
 use super::{Override, nearest};
 
-/// See the module.
+/// A look, see the module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
-    /// Clear water on a chequered floor, under a sky.
+    /// Clear water on a checkerboard, under a sky.
     Water,
 }
 
-/// Water: one body with a smooth surface. Nothing scatters in it, so its colour is what absorption
-/// leaves; the sky is what its walls mirror. Tuned by eye on dam breaks.
+/// Water: one body with a smooth surface. It has no diffuse reflection, so its colour comes from absorption, and its
+/// reflections from the sky. Tuned by eye on dam breaks.
 const WATER: &str = r#"
 render.surface = "smooth"
 render.max_depth = 8
@@ -33,13 +32,13 @@ material.absorption = [0.42, 0.78, 0.86]
 "#;
 
 impl Look {
-    /// All, with the names that users type.
+    /// All looks with their names.
     pub const ALL: &[(Self, &'static str)] = &[(Self::Water, "water")];
 
-    /// The look of a name.
+    /// The look with a name.
     ///
     /// # Errors
-    /// There is none; names those that there are.
+    /// The name is unknown; lists the known ones.
     pub fn named(name: &str) -> Result<Self, String> {
         let found = Self::ALL.iter().find(|(_, known)| *known == name);
         found.map(|(look, _)| *look).ok_or_else(|| {
@@ -53,7 +52,7 @@ impl Look {
         })
     }
 
-    /// What it sets.
+    /// Its defaults.
     pub fn settings(self) -> Vec<Override> {
         let (text, shown) = match self {
             Self::Water => (WATER, "--look water"),

@@ -1,5 +1,5 @@
-//! Reads typed values from a [`Node`] tree and collects everything that is wrong with it, each problem with its
-//! place and key, so that one run is enough to fix a manifest.
+//! Reads typed values from a [`Node`] tree and collects all problems with location and key, so that one run is enough
+//! to fix a manifest.
 
 use std::cell::RefCell;
 
@@ -7,16 +7,16 @@ use super::key::Key;
 use super::tree::{Kind, Node, Place};
 use super::value::{Fault, Slot, Value};
 
-/// One thing wrong with a manifest, or to be warned of.
+/// An error in a manifest, or a warning.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Problem {
     pub(super) place: Place,
-    /// Dotted; empty for the file as a whole.
+    /// The dotted key; empty for the file as a whole.
     pub(super) key: String,
     pub(super) what: String,
 }
 
-/// Everything that was found.
+/// All problems found so far.
 #[derive(Debug, Default)]
 pub(super) struct Problems {
     pub(super) errors: RefCell<Vec<Problem>>,
@@ -37,18 +37,18 @@ fn push(list: &RefCell<Vec<Problem>>, place: &Place, key: &str, what: &str) {
     });
 }
 
-/// A table being read. Keys that nobody asked for by the time of [`Section::finish`] are unknown.
+/// A table that is being read. Keys that have not been read before [`Section::finish`] are unknown.
 pub(super) struct Section<'a> {
     path: String,
     node: Option<&'a Node>,
     asked: Vec<&'static str>,
     problems: &'a Problems,
-    /// How many errors there were before the first key was read.
+    /// Number of errors before the first key was read.
     errors_before: usize,
     is_closed: bool,
 }
 
-/// One value that is there.
+/// A value that is present.
 pub(super) struct Field<'a> {
     key: String,
     node: &'a Node,
@@ -79,7 +79,7 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// The value under `key`, if there is one.
+    /// The value of `key`, if it is present.
     pub(super) fn get(&mut self, key: &'static str) -> Option<Field<'a>> {
         self.asked.push(key);
         let Some(Kind::Table(table)) = self.node.map(|n| &n.kind) else {
@@ -92,18 +92,21 @@ impl<'a> Section<'a> {
         })
     }
 
-    /// Reads `key` into `slot`, which keeps its value if the key is missing or wrong.
+    /// Reads `key` into `slot`, which keeps its value if the key is missing or invalid.
     pub(super) fn read<S: Slot>(&mut self, key: &Key, slot: &mut S) {
+        // Find the value; a required key must be present
         let Some(field) = self.get(key.name) else {
             if let Some(why) = key.required {
                 self.missing(key.name, why);
             }
             return;
         };
+        // The word for "not set" clears the slot
         if key.word.is_some() && field.as_text() == key.word {
             slot.set(None);
             return;
         }
+        // Replace an old name of a value, with a warning
         let old = key.renamed.filter(|[old, _]| field.as_text() == Some(old));
         let renamed = old.map(|[old, new]| {
             let what = format!("\"{old}\" is now called \"{new}\"; the old name still works");
@@ -118,19 +121,20 @@ impl<'a> Section<'a> {
                 place: field.node.place.clone(),
             }
         });
+        // Parse the value
         let node = renamed.as_ref().unwrap_or(field.node);
         if let Some(value) = (Field { node, ..field }).value::<S::Value>(key) {
             slot.set(Some(value));
         }
     }
 
-    /// The table under `key`; a missing one reads as empty.
+    /// The table `key`; a missing one is treated as empty.
     pub(super) fn section(&mut self, key: &'static str) -> Self {
         let missing = Self::new(self.full_key(key), None, self.problems);
         self.get(key).and_then(|f| f.section()).unwrap_or(missing)
     }
 
-    /// Every table in the list under `key`.
+    /// All tables in the list `key`.
     pub(super) fn sections(&mut self, key: &'static str) -> Vec<Self> {
         let Some(field) = self.get(key) else {
             return Vec::new();
@@ -146,7 +150,7 @@ impl<'a> Section<'a> {
         items.iter().filter_map(Field::section).collect()
     }
 
-    /// Whether there is nothing under `key`.
+    /// Whether `key` is missing.
     pub(super) fn lacks(&self, key: &str) -> bool {
         match self.node.map(|n| &n.kind) {
             Some(Kind::Table(table)) => !table.contains_key(key),
@@ -154,12 +158,12 @@ impl<'a> Section<'a> {
         }
     }
 
-    /// Notes that `key` is needed but missing.
+    /// Reports that `key` is required but missing.
     pub(super) fn missing(&self, key: &str, what: &str) {
         self.problem(self.place(), key, &format!("is missing; {what}"));
     }
 
-    /// Notes what is wrong with `key` here.
+    /// Reports a problem of `key` in this table.
     pub(super) fn wrong(&self, key: &str, what: &str) {
         let place = match self.node.map(|n| &n.kind) {
             Some(Kind::Table(table)) => table.get(key).map(|(place, _)| place.clone()),
@@ -176,7 +180,7 @@ impl<'a> Section<'a> {
         self.problems.note(&place, &self.full_key(key), what);
     }
 
-    /// Whether `key` is there and was read without a problem.
+    /// Whether `key` is present and was read without a problem.
     pub(super) fn has(&self, key: &str) -> bool {
         let full_key = self.full_key(key);
         let errors = self.problems.errors.borrow();
@@ -184,12 +188,12 @@ impl<'a> Section<'a> {
         !self.lacks(key) && own.all(|problem| problem.key != full_key)
     }
 
-    /// Gives up: which keys are known depends on one that is wrong.
+    /// Ends the checks, if an invalid key determines which keys are known.
     pub(super) const fn close(&mut self) {
         self.is_closed = true;
     }
 
-    /// Notes every key that nobody asked for.
+    /// Reports every unknown key.
     pub(super) fn finish(self) {
         if self.is_closed {
             return;
@@ -217,7 +221,7 @@ impl<'a> Section<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// The value, or None and a problem.
+    /// The value; reports a problem and returns None if it is invalid.
     pub(super) fn value<T: Value>(&self, key: &Key) -> Option<T> {
         let what = match T::parse(self, key) {
             Ok(value) => return Some(value),
@@ -234,7 +238,7 @@ impl<'a> Field<'a> {
         None
     }
 
-    /// Notes that the value is not accepted.
+    /// Reports that the value is invalid.
     pub(super) fn fail(&self, what: &str) {
         self.problems.note(&self.node.place, &self.key, what);
     }
@@ -260,7 +264,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// A finite number; whole ones may do without a point.
+    /// A finite number; integers need no decimal point.
     pub(super) fn as_number(&self) -> Option<f64> {
         match self.node.kind {
             #[expect(clippy::cast_precision_loss, reason = "what the user means by it")]
@@ -270,7 +274,7 @@ impl<'a> Field<'a> {
         }
     }
 
-    /// As many finite numbers as asked for.
+    /// A list of `N` finite numbers.
     pub(super) fn as_numbers<const N: usize>(&self) -> Option<[f64; N]> {
         let numbers: Vec<f64> = self.items()?.iter().filter_map(Self::as_number).collect();
         let all = numbers.len() == self.items()?.len();
@@ -290,7 +294,7 @@ impl<'a> Field<'a> {
         Some(items.iter().enumerate().map(item).collect())
     }
 
-    /// The table that this is.
+    /// The value as a table.
     pub(super) fn as_table(&self) -> Option<Section<'a>> {
         let is_table = matches!(self.node.kind, Kind::Table(_));
         is_table.then(|| Section::new(self.key.clone(), Some(self.node), self.problems))
@@ -313,7 +317,7 @@ pub(super) const fn narrow(value: f64) -> f32 {
     value as f32
 }
 
-/// The known word that was probably meant, if any is near enough.
+/// The known word that was probably meant, if one is similar enough.
 pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     let distance = |k: &str| strsim::damerau_levenshtein(&word.to_lowercase(), &k.to_lowercase());
     let best = known.iter().min_by_key(|k| distance(k))?;
@@ -322,7 +326,7 @@ pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
     (is_part || distance(best) <= limit).then_some(*best)
 }
 
-/// The same key in a section where it is known: `samples` belongs into `image`.
+/// The same key in another section that has it: `samples` belongs to `image`.
 fn elsewhere(key: &str, path: &str) -> Option<String> {
     super::known_keys()
         .into_iter()

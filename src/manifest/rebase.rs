@@ -1,15 +1,15 @@
-//! Paths of a manifest seen from another directory, so that the manifest can be written there.
+//! Converts the paths of a manifest to another base directory, so that the manifest can be written there.
 
 use std::path::{Component, Path, PathBuf};
 
 use super::{Manifest, OutputPattern};
 
 impl Manifest {
-    /// Rewrites the relative paths, now relative to `from`, to be relative to `to`; both must be
-    /// absolute. Absolute paths stay. The disk is asked where links lead.
+    /// Converts relative paths from the base `from` to the base `to`; both must be absolute. Absolute paths do not
+    /// change. Symbolic links on disk are followed.
     ///
     /// # Errors
-    /// A directory that would have to be named is not UTF-8, or `from` or `to` is not absolute.
+    /// A directory that would appear in a path is not UTF-8, or `from` or `to` is not absolute.
     pub fn rebase(&mut self, from: &Path, to: &Path) -> Result<(), String> {
         for dir in [from, to] {
             if !dir.is_absolute() {
@@ -37,7 +37,7 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
     }
     let target = from.join(path);
     let short = relative(&without_dots(&target), &without_dots(to))?;
-    // What links there are may stay in the path if `..` does not have to go past one.
+    // Links may remain in the path unless `..` has to pass one.
     let place = named_place(&target);
     if named_place(&real_dir(to).join(&short)) == place {
         return Ok(short);
@@ -45,14 +45,14 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
     relative(&place, &real_dir(to))
 }
 
-/// `target` as seen from `base`, both absolute and without `..`.
+/// `target` relative to `base`, both absolute and without `..`.
 fn relative(target: &Path, base: &Path) -> Result<String, String> {
     let shared = target
         .components()
         .zip(base.components())
         .take_while(|(a, b)| a == b)
         .count();
-    // Nothing shared, not even a root: another drive.
+    // Without a common root, `target` is on another drive.
     let relative: PathBuf = if shared == 0 {
         target.to_owned()
     } else {
@@ -66,10 +66,10 @@ fn relative(target: &Path, base: &Path) -> Result<String, String> {
     }
 }
 
-/// A directory without links, `.` and `..`, as far as it exists; what is to be created below is
-/// taken by its name alone. `path` must be absolute.
+/// A directory without links, `.` and `..`, as far as it exists; the part that does not exist yet is taken literally.
+/// `path` must be absolute.
 pub fn real_dir(path: &Path) -> PathBuf {
-    // `x/..` is where the system says, not `x` taken away: `x` may be a link.
+    // `x/..` must be resolved by the system and not by removing `x`, which may be a link.
     for existing in path.ancestors() {
         let Ok(real) = existing.canonicalize() else {
             continue;
@@ -80,7 +80,7 @@ pub fn real_dir(path: &Path) -> PathBuf {
     without_dots(path)
 }
 
-/// The same for a file or pattern, whose own name stays even if it is a link: names have meaning.
+/// The same for a file or pattern; its own name is kept even if it is a link, because names have a meaning.
 pub fn named_place(path: &Path) -> PathBuf {
     match (path.parent(), path.file_name()) {
         (Some(dir), Some(name)) => real_dir(dir).join(name),
@@ -88,7 +88,7 @@ pub fn named_place(path: &Path) -> PathBuf {
     }
 }
 
-/// Without `.` and, where possible, `..`, by the text alone.
+/// Removes `.` and, if possible, `..` from the text of a path.
 pub(crate) fn without_dots(path: &Path) -> PathBuf {
     let mut out = PathBuf::new();
     for component in path.components() {

@@ -1,4 +1,4 @@
-//! `[image]` and `[render]`: how large images are, and how they are traced.
+//! `[image]` and `[render]`: the size of images, and the settings of tracing.
 
 use glam::Vec3;
 
@@ -22,9 +22,9 @@ section! {
 }
 
 named! {
-    /// What is painted on the ground.
+    /// Pattern of the ground.
     GroundPattern {
-        /// Nothing.
+        /// No pattern.
         Plain = "plain",
         /// Squares, every other one darker.
         Checker = "checker",

@@ -1,7 +1,7 @@
-//! Settings of an older job that are written differently from now and make the same images.
+//! Compares settings with those of an older job, which may be written differently for the same images.
 //!
-//! Keys and values have changed between versions. A job resumes with the settings of its plan, so what makes no
-//! difference to the images must not look like a change.
+//! Keys and values have changed between versions. A job resumes with the settings of its plan, so differences without
+//! an effect on the images must not count as changes.
 
 use super::value::Value;
 use super::{ColorSetting, DEFAULT_MAP, Manifest};
@@ -9,14 +9,14 @@ use super::{ColorSetting, DEFAULT_MAP, Manifest};
 const MIN_WEIGHT: &str = "render.min_weight";
 const COLOR: &str = "material.color";
 const SURFACE: &str = "render.surface";
-/// The value of [`SURFACE`] that older versions wrote, and the one that means the same.
+/// The value of [`SURFACE`] in older versions, and the equivalent current one.
 const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
-/// Who renders; not in a manifest as long as there is one.
+/// The renderer; not a key of manifests as long as there is only one.
 pub(super) const RENDERER: &str = "renderer";
 
 impl Manifest {
-    /// The [`Manifest::settings`], each as written in the `planned` settings of a job where those make the same
-    /// images. `has_rgb` says whether the job found colours in the attribute that it is coloured by.
+    /// The [`Manifest::settings`], but written as in the `planned` settings of a job if that means the same images.
+    /// `has_rgb`: the attribute for the colours of the job contains colours.
     pub fn settings_as_planned(
         &self,
         planned: &[(String, String)],
@@ -27,19 +27,20 @@ impl Manifest {
         match (self.literal_min_weight(), value(MIN_WEIGHT)) {
             // No image depends on it. If those of the job did, the material has changed as well.
             (None, Some(old)) => settings.push((MIN_WEIGHT.to_owned(), old.clone())),
-            // Versions without the key followed both branches always.
+            // Versions without this key always traced both branches.
             (Some(0.0), None) => settings.retain(|(key, _)| key != MIN_WEIGHT),
             _ => {}
         }
-        // Versions without a key made the images that its default makes now; above are those that did not.
+        // Versions without a key made the same images as its current default; the exceptions are handled above
         let usual = Self::new("").settings();
         let is_usual =
             |setting: &(String, String)| usual.contains(setting) && setting.0 != MIN_WEIGHT;
         settings.retain(|setting| value(&setting.0).is_some() || !is_usual(setting));
-        // Versions without the key had one renderer.
+        // Versions without this key had one renderer.
         if value(RENDERER).is_none() {
             settings.retain(|(key, _)| key != RENDERER);
         }
+        // Use the old names of values
         if value(SURFACE).is_some_and(|old| old == UNION[0])
             && let Some((_, new)) = settings.iter_mut().find(|(key, _)| key == SURFACE)
             && new == UNION[1]
@@ -55,13 +56,13 @@ impl Manifest {
         settings
     }
 
-    /// [`super::Render::min_weight`], if any image depends on it.
+    /// [`super::Render::min_weight`], if images depend on it.
     fn literal_min_weight(&self) -> Option<f32> {
         self.branches_at_spheres().then_some(self.render.min_weight)
     }
 
-    /// Whether `text` is another way to write the colour by an attribute: with the usual map where none is needed, as
-    /// all older versions wrote it, or without.
+    /// Whether `text` is another form of the same colour by an attribute: with or without the default map. All older
+    /// versions wrote it.
     fn has_color_written(&self, text: &str, has_rgb: bool) -> bool {
         let ColorSetting::Attribute {
             attribute,
@@ -71,7 +72,7 @@ impl Manifest {
         else {
             return false;
         };
-        // Attributes that are colours go through a map only if one is named.
+        // Attributes with colours are only mapped if a map is given.
         let is_mapped = range.is_some() || !has_rgb;
         let written = |map| {
             let (attribute, range) = (attribute.clone(), *range);

@@ -1,16 +1,18 @@
-//! `[surface]` and `render.surface`: what rays hit.
+//! `[surface]` and `render.surface`: the surface that rays hit.
 
 use super::key::{Affects, Keys, keys};
 use super::value::named;
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 
-/// Edge of a voxel, in particle radii: finer costs memory with its third power, coarser loses drops.
+/// Edge of a voxel, in particle radii: the memory of finer voxels grows with the third power, and coarser ones lose
+/// drops.
 const VOXELS: [f32; 2] = [0.25, 4.0];
 
-/// Smoothing length, in particle radii: below, neighbours do not meet; above, every particle has thousands of them.
+/// Smoothing length, in particle radii: with a smaller one, neighbours do not overlap; with a larger one, every
+/// particle has thousands of neighbours.
 const SMOOTHING_LENGTHS: [f32; 2] = [1.0, 8.0];
 
-/// Greatest threshold; the field is about 1 inside, and seldom more.
+/// Maximum threshold; the field is about 1 inside, and rarely higher.
 const MAX_THRESHOLD: f32 = 4.0;
 
 named!(SurfaceKind: Spheres = "spheres", Union = "union", Smooth = "smooth");

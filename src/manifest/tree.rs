@@ -1,5 +1,5 @@
-//! A manifest as a tree of values that know where they came from: a place in the file, or an
-//! option of the command line that replaced it.
+//! A manifest as a tree of values with their origin: a location in the file, or an option of the command line that
+//! replaced them.
 
 use std::collections::BTreeMap;
 
@@ -8,14 +8,14 @@ use toml::de::{DeTable, DeValue};
 
 use super::Problem;
 
-/// Where a value was written.
+/// Origin of a value.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum Place {
     /// Byte in the file.
     Byte(usize),
     /// The option as the user typed it.
     Option(String),
-    /// It is missing.
+    /// The value is missing.
     Nowhere,
 }
 
@@ -32,13 +32,13 @@ pub(super) enum Kind {
     Float(f64),
     Bool(bool),
     Array(Vec<Node>),
-    /// Values under their keys, with the place of each key.
+    /// Values by key, with the location of each key.
     Table(BTreeMap<String, (Place, Node)>),
     /// Dates, and integers beyond 64 bits.
     Other,
 }
 
-/// A value that replaces one of the manifest, as by `--set render.max_depth=5`, or a default for it.
+/// A value that replaces one of the manifest, such as `--set render.max_depth=5`, or a default for it.
 #[derive(Debug, Clone)]
 pub struct Override {
     keys: Vec<String>,
@@ -47,11 +47,11 @@ pub struct Override {
 }
 
 impl Override {
-    /// Parses `render.max_depth=5`: a dotted key and a TOML value; a value that is not TOML is
-    /// taken as text, so that quotes are not needed.
+    /// Parses `render.max_depth=5`: a dotted key and a TOML value. A value that is not TOML is treated as text, so
+    /// that quotes are not needed.
     ///
     /// # Errors
-    /// There is no `=`, a key is empty, or a list, table or quoted text is not finished.
+    /// There is no `=`, a key is empty, or a list, table or quoted text is incomplete.
     pub fn parse(assignment: &str) -> Result<Self, String> {
         let shown = format!("--set {assignment}");
         let Some((key, value)) = assignment.split_once('=') else {
@@ -77,7 +77,7 @@ impl Override {
         })
     }
 
-    /// Sets the dotted `key` to `value`; `shown` is what messages call it: `--output`.
+    /// Sets the dotted `key` to `value`; `shown` is its name in messages, such as `--output`.
     ///
     /// # Errors
     /// A part of the key is empty.
@@ -90,7 +90,7 @@ impl Override {
         })
     }
 
-    /// The same as a default: a value of the manifest or of another override takes precedence.
+    /// Converts it to a default: values of the manifest and of other overrides take precedence.
     #[must_use]
     pub fn under(self) -> Self {
         Self {
@@ -176,8 +176,9 @@ impl Node {
         }
     }
 
-    /// Lays `overlay` over this tree, making tables on the way, also in the place of an `"auto"`, which says as much
-    /// as nothing; `light.0.intensity` reaches into a list. What lies under changes nothing that is there.
+    /// Applies `overlay` to this tree and creates the necessary tables, also in place of `"auto"`, which is
+    /// equivalent to a missing value. `light.0.intensity` refers to an item of a list. A default does not change
+    /// existing values.
     pub(super) fn lay_over(&mut self, overlay: Override) -> Result<(), Problem> {
         let problem = |at: usize, what: &str| Problem {
             place: overlay.node.place.clone(),
@@ -186,11 +187,13 @@ impl Node {
         };
         let mut node = self;
         for (at, key) in overlay.keys.iter().enumerate() {
+            // Replace "auto" by an empty table
             let is_last = at + 1 == overlay.keys.len();
             let is_auto = matches!(&node.kind, Kind::Text(text) if text == "auto");
             if is_auto && !overlay.is_under {
                 node.kind = Kind::Table(BTreeMap::new());
             }
+            // Descend to the next key
             let found = node.describe();
             node = match &mut node.kind {
                 Kind::Table(table) if is_last && overlay.is_under && table.contains_key(key) => {
@@ -212,7 +215,7 @@ impl Node {
                     };
                     item
                 }
-                // Whoever reads it says what is wrong.
+                // The reader reports the problem.
                 _ if overlay.is_under => return Ok(()),
                 _ => {
                     let above = overlay.keys[..at].join(".");
@@ -225,7 +228,7 @@ impl Node {
         Ok(())
     }
 
-    /// What a user would call this value.
+    /// Description of the value for messages.
     pub(super) fn describe(&self) -> String {
         match &self.kind {
             Kind::Text(text) => format!("the text {text:?}"),

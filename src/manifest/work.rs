@@ -1,8 +1,8 @@
-//! `[job]`: execution options. No image depends on them, so none is among the settings that identify a job: they may
-//! change from run to run.
+//! `[job]`: execution options. Images do not depend on them, so they are not part of the settings that identify a
+//! job, and may change from run to run.
 //!
-//! `--force`, `--keep-done` and `--shard` have no key here. They say what one run does; a manifest that
-//! always starts over would throw finished work away.
+//! `--force`, `--keep-done` and `--shard` have no key here. They apply to a single run; a manifest that always starts
+//! over would discard finished work.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -13,30 +13,30 @@ use super::key::{Affects, Keys, section};
 use super::value::named;
 use crate::metrics::Bytes;
 
-/// Name of the file that ends following if the manifest names none, beside the images.
+/// Default name of the file that ends following, next to the images.
 pub const STOP_FILE: &str = "job.stop";
 
-/// More threads than this are a typing mistake. Fewer are used where the machine has few processors.
+/// Maximum number of threads; larger numbers are probably typing errors. Machines with few processors use fewer.
 pub const MAX_THREADS: u32 = 1024;
 
-/// More retries than this are a typing mistake.
+/// Maximum number of retries; larger numbers are probably typing errors.
 const MAX_RETRIES: u32 = 100;
 
-/// Longest time that can be asked for, seconds: some thirty years.
+/// Maximum time in seconds, about thirty years.
 const MAX_SECONDS: f64 = 1e9;
 
 named! {
-    /// How progress is shown.
+    /// Display of progress.
     ProgressMode {
         /// Bars on a terminal, plain lines elsewhere.
         Auto = "auto",
-        /// One line a frame.
+        /// One line per frame.
         Plain = "plain",
-        /// One JSON object a frame.
+        /// One JSON object per frame.
         Json = "json",
-        /// The lines that Open Job Description engines read.
+        /// Messages for Open Job Description engines.
         Openjd = "openjd",
-        /// Nothing but warnings and errors.
+        /// Only warnings and errors.
         None = "none",
     }
 }
@@ -79,12 +79,13 @@ section! {
 }
 
 impl Work {
-    /// The file that ends following, of a manifest whose paths are relative to `dir`, where the images go.
+    /// The path of the file that ends following, for a manifest with paths relative to `dir`, the directory of the
+    /// images.
     pub fn stop_file_in(&self, dir: &Path) -> PathBuf {
         dir.join(self.stop_file.as_deref().unwrap_or(STOP_FILE))
     }
 
-    /// All keys, with what they need of one another.
+    /// All keys, with checks of their dependencies.
     pub(super) fn all_keys(&mut self, keys: &mut Keys<'_>) {
         self.keys(keys);
         if let Some(section) = keys.reading()
@@ -99,7 +100,7 @@ impl Work {
     }
 }
 
-/// What the keys need of one another, as JSON schema.
+/// Dependencies between keys, as JSON schema.
 pub(super) fn conditions() -> Json {
     json!([{
         "if": { "required": ["memory_ceiling"] },

@@ -1,4 +1,4 @@
-//! Instruction sets, and bodies compiled for each of them.
+//! Instruction sets, and functions compiled for each of them.
 #![allow(
     unsafe_code,
     reason = "calls of functions compiled for instructions that the machine was found to have"
@@ -7,7 +7,7 @@
 /// Instruction sets that code is compiled for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum SimdLevel {
-    /// Whatever the compiler makes of plain loops.
+    /// Plain loops, without assumptions about the instruction set.
     Portable,
     /// 128-bit NEON, which every 64-bit Arm processor has.
     Neon,
@@ -24,10 +24,10 @@ impl Default for SimdLevel {
 }
 
 impl SimdLevel {
-    /// All levels, slowest first.
+    /// All instruction sets, slowest first.
     pub const ALL: [Self; 4] = [Self::Portable, Self::Neon, Self::Avx2, Self::Avx512];
 
-    /// The best level of this machine.
+    /// The best instruction set of this machine.
     pub fn best() -> Self {
         Self::ALL
             .into_iter()
@@ -36,7 +36,7 @@ impl SimdLevel {
             .unwrap_or(Self::Portable)
     }
 
-    /// Whether this machine has the instructions.
+    /// Whether this machine supports it.
     pub fn is_supported(self) -> bool {
         match self {
             Self::Portable => true,
@@ -50,7 +50,7 @@ impl SimdLevel {
         }
     }
 
-    /// Itself where supported, else the best level.
+    /// Itself if it is supported, otherwise the best instruction set.
     #[must_use]
     pub fn or_best(self) -> Self {
         if self.is_supported() {
@@ -60,7 +60,7 @@ impl SimdLevel {
         }
     }
 
-    /// Name in reports.
+    /// The name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Portable => "portable",
@@ -88,28 +88,28 @@ fn has_avx512() -> bool {
         && is_x86_feature_detected!("avx512vl")
 }
 
-/// A level that this machine was found to have: proof that code compiled for it may run.
+/// An instruction set that this machine is known to support: proof that code compiled for it may run.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub(crate) struct Supported(SimdLevel);
 
 impl Supported {
-    /// `level` where supported, else the best one.
+    /// `level` if it is supported, otherwise the best instruction set.
     pub(crate) fn or_best(level: SimdLevel) -> Self {
         Self(level.or_best())
     }
 
-    /// The level.
+    /// The instruction set.
     pub(crate) fn level(self) -> SimdLevel {
         self.0
     }
 }
 
-/// Makes a function out of a body over lanes: `fn name(args) = body;` compiles the `#[inline(always)]` function `body`
-/// once per instruction set and takes the machine's level ([`Supported`]) as its first argument.
+/// Defines a function from a body over lanes: `fn name(args) = body;` compiles the `#[inline(always)]` function
+/// `body` once per instruction set. The first argument of the new function is the instruction set ([`Supported`]).
 ///
-/// Slices and references should be parameters of their own, not fields of a structure: the compiler knows that
-/// parameters do not overlap, and stops vectorising where it would have to check many fields. All that the body calls
-/// must be `#[inline(always)]` too, closures included, or it is compiled without the instructions.
+/// Slices and references should be separate parameters, not fields of a structure: the compiler knows that parameters
+/// do not overlap, but stops vectorising if it would have to check many fields. Everything that the body calls must
+/// be `#[inline(always)]` too, including closures, otherwise it is compiled without these instructions.
 macro_rules! lane_kernel {
     ($(#[$meta:meta])* $vis:vis fn $name:ident($($arg:ident: $type:ty),* $(,)?) $(-> $output:ty)? = $body:path;) => {
         $(#[$meta])*

@@ -1,13 +1,13 @@
 //! Elementary functions in single precision, without the C library and without branches, so that loops over lanes
-//! vectorise and every platform gives the same bits.
+//! vectorise and all platforms give the same bits.
 //!
 //! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`, `sinf`, `cosf`;
-//! "Methods and Programs for Mathematical Functions", 1989). The errors stated were measured against double precision
-//! by the tests of this file.
+//! "Methods and Programs for Mathematical Functions", 1989). The tests of this file measured the stated errors
+//! against double precision.
 
 use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, LN_2, LOG2_E, PI};
 
-/// Adding and subtracting it rounds a number of magnitude under 2^22 to a whole one, ties to even.
+/// Adding and subtracting this constant rounds a number of magnitude below 2^22 to an integer, ties to even.
 const ROUND: f32 = 12_582_912.0;
 
 /// `2^x`, relative error below 2e-7. Zero below -150, infinite from 128 on.
@@ -18,12 +18,12 @@ const ROUND: f32 = 12_582_912.0;
     reason = "whole numbers in the range of exponents; NaN becomes 0"
 )]
 pub fn exp2(x: f32) -> f32 {
-    // Keep the exponent within what two factors can express.
+    // Keep the exponent in the range of two factors.
     let y = if x > 129.0 { 129.0 } else { x };
     let y = if y < -151.0 { -151.0 } else { y };
     let whole = (y + ROUND) - ROUND;
     let f = y - whole;
-    // 2^f on -1/2..=1/2.
+    // Approximate 2^f on -1/2..=1/2
     let mut p = 1.535_336_2e-4;
     p = p * f + 1.339_887_4e-3;
     p = p * f + 9.618_437e-3;
@@ -31,7 +31,7 @@ pub fn exp2(x: f32) -> f32 {
     p = p * f + 2.402_264_8e-1;
     p = p * f + 6.931_472e-1;
     p = p * f + 1.0;
-    // Two factors, so that neither overflows where the product does not.
+    // Scale by two factors, so that neither overflows if the product does not
     let exponent = whole as i32;
     let half = exponent >> 1;
     let power = |e: i32| f32::from_bits(((e + 127) as u32) << 23);
@@ -44,8 +44,8 @@ pub fn exp(x: f32) -> f32 {
     exp2(x * LOG2_E)
 }
 
-/// The logarithm to base 2 of a positive normal number, absolute error below 2e-7 + 1e-7 of the result. Zero and
-/// denormal numbers give about -127, negative ones and NaN nothing of use.
+/// The base-2 logarithm of a positive normal number, absolute error below 2e-7 + 1e-7 of the result. Zero and
+/// denormal numbers give about -127; the results for negative numbers and NaN are meaningless.
 #[inline(always)]
 #[expect(
     clippy::cast_possible_wrap,
@@ -53,7 +53,7 @@ pub fn exp(x: f32) -> f32 {
     reason = "bits of a number, taken apart"
 )]
 pub fn log2(x: f32) -> f32 {
-    // x = 2^e * (1 + f) with 1 + f in sqrt(1/2)..sqrt(2).
+    // Split x = 2^e * (1 + f) with 1 + f in sqrt(1/2)..sqrt(2)
     let bits = x.to_bits();
     let e = (bits.wrapping_sub(0x3f35_04f3) as i32) >> 23;
     let f = f32::from_bits(bits.wrapping_sub((e << 23) as u32)) - 1.0;
@@ -67,7 +67,7 @@ pub fn log2(x: f32) -> f32 {
     p = p * f - 2.499_999_4e-1;
     p = p * f + 3.333_333e-1;
     let square = f * f;
-    // ln(1 + f) = f + rest; log2(e) - 1 is multiplied apart, so that the large part stays exact.
+    // ln(1 + f) = f + rest; multiply by log2(e) - 1 separately, so that the large part stays exact
     let rest = p * f * square - 0.5 * square;
     (rest * LOG2_E + f * (LOG2_E - 1.0)) + f + e as f32
 }
@@ -78,8 +78,8 @@ pub fn ln(x: f32) -> f32 {
     log2(x) * LN_2
 }
 
-/// `x^y` for `x` in 0..=1 and `y` from 0 to 1e4, relative error below 2e-7 + 2e-7 y |log2 x|. Below 1e-30 `x` counts
-/// as 0, and `0^0` is 1.
+/// `x^y` for `x` in 0..=1 and `y` from 0 to 1e4, relative error below 2e-7 + 2e-7 y |log2 x|. Values of `x` below
+/// 1e-30 count as 0, and `0^0` is 1.
 #[inline(always)]
 pub fn pow(x: f32, y: f32) -> f32 {
     let is_positive = x > 1e-30;
@@ -93,7 +93,7 @@ pub fn pow(x: f32, y: f32) -> f32 {
 #[inline(always)]
 pub fn asin(x: f32) -> f32 {
     let a = x.abs();
-    // Near 1: asin(a) = pi/2 - 2 asin(sqrt((1 - a) / 2)).
+    // Near 1, use asin(a) = pi/2 - 2 asin(sqrt((1 - a) / 2))
     let is_large = a > 0.5;
     let z = if is_large { 0.5 * (1.0 - a) } else { a * a };
     let s = if is_large { z.sqrt() } else { a };
@@ -125,11 +125,12 @@ pub fn acos(x: f32) -> f32 {
     reason = "quadrants are counted in few bits"
 )]
 pub fn sin_cos(x: f32) -> (f32, f32) {
-    // x = quadrant * pi/2 + r with |r| <= pi/4; pi/2 in three parts (Cody and Waite).
+    // Reduce x = quadrant * pi/2 + r with |r| <= pi/4; pi/2 in three parts (Cody and Waite)
     let quadrant = (x * (2.0 * FRAC_1_PI) + ROUND) - ROUND;
     let r = x - quadrant * 1.570_312_5;
     let r = r - quadrant * 4.837_513e-4;
     let r = r - quadrant * 7.549_789_5e-8;
+    // Approximate sine and cosine of r
     let z = r * r;
     let mut s = -1.951_529_6e-4;
     s = s * z + 8.332_161e-3;
@@ -139,6 +140,7 @@ pub fn sin_cos(x: f32) -> (f32, f32) {
     c = c * z - 1.388_731_6e-3;
     c = c * z + 4.166_664_6e-2;
     let cosine = c * z * z - 0.5 * z + 1.0;
+    // Swap and negate them depending on the quadrant
     let quarter = quadrant as i32;
     let (s, c) = if quarter & 1 == 0 {
         (sine, cosine)

@@ -1,9 +1,9 @@
-//! Arithmetic on 16 lanes at once: the elementary functions that shading needs, and the compilation of plain loops
-//! over lanes for each instruction set.
+//! Arithmetic on 16 lanes at once: elementary functions for shading, and the compilation of plain loops over lanes
+//! for each instruction set.
 //!
-//! Shading bodies are plain Rust over arrays of [`LANES`] numbers. `lane_kernel!` compiles such a body once for each
-//! instruction set and picks one at run time. No body uses fused multiply-add or the C library, so every instruction
-//! set, compiler back end and platform gives the same bits.
+//! Bodies are plain Rust over arrays of [`LANES`] numbers. `lane_kernel!` compiles a body once for each instruction
+//! set, and selects one at run time. No body uses fused multiply-add or the C library, so all instruction sets,
+//! compiler back ends and platforms give the same bits.
 
 mod dispatch;
 pub mod functions;
@@ -11,16 +11,16 @@ pub mod functions;
 pub use dispatch::SimdLevel;
 pub(crate) use dispatch::{Supported, lane_kernel};
 
-/// Numbers that are worked on together: as many as a 512-bit register holds.
+/// Number of lanes, that of a 512-bit register.
 pub const LANES: usize = 16;
 
-/// One number for each lane.
+/// One number per lane.
 pub type Lanes = [f32; LANES];
 
-/// A vector or a linear RGB colour for each lane, one array per component.
+/// A vector or a linear RGB colour per lane, one array per component.
 pub type Lanes3 = [Lanes; 3];
 
-/// An integer for each lane.
+/// An integer per lane.
 pub type Integers = [i32; LANES];
 
 /// The same number in all lanes.
@@ -36,16 +36,16 @@ pub fn splat3(value: glam::Vec3) -> Lanes3 {
 /// The vector in `lane`.
 ///
 /// # Panics
-/// If there is no such lane.
+/// If the lane does not exist.
 #[inline(always)]
 pub fn lane3(lanes: &Lanes3, lane: usize) -> glam::Vec3 {
     glam::Vec3::new(lanes[0][lane], lanes[1][lane], lanes[2][lane])
 }
 
-/// Puts `value` into `lane`.
+/// Stores `value` in `lane`.
 ///
 /// # Panics
-/// If there is no such lane.
+/// If the lane does not exist.
 #[inline(always)]
 pub fn set_lane3(lanes: &mut Lanes3, lane: usize, value: glam::Vec3) {
     for (axis, lanes) in lanes.iter_mut().enumerate() {
@@ -65,7 +65,8 @@ pub const fn larger(a: f32, b: f32) -> f32 {
     if a > b { a } else { b }
 }
 
-/// Combines all lanes into one number, halves onto halves: a fixed order, which compilers turn into whole registers.
+/// Reduces all lanes to one number by repeatedly combining halves: a fixed order that compilers turn into operations
+/// on whole registers.
 #[inline(always)]
 pub fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
     macro_rules! halve {
@@ -79,14 +80,14 @@ pub fn fold(mut lanes: Lanes, of: impl Fn(f32, f32) -> f32) -> f32 {
     lanes[0]
 }
 
-/// The numbers of the lanes whose bits are set in `mask`, ascending.
+/// Indices of the lanes that are set in `mask`, ascending.
 #[inline(always)]
 pub const fn lanes_in(mask: u32) -> LanesIn {
     LanesIn(mask)
 }
 
-/// See [`lanes_in`]. A type instead of a closure, because all of a kernel's code must be inlined to get the kernel's
-/// instructions.
+/// The iterator of [`lanes_in`]. It is a type and not a closure, because all code of a kernel must be inlined to be
+/// compiled with its instructions.
 #[derive(Debug, Clone, Copy)]
 pub struct LanesIn(u32);
 
@@ -104,7 +105,7 @@ impl Iterator for LanesIn {
     }
 }
 
-/// A bit for each of the first `count` lanes.
+/// Bit mask of the first `count` lanes.
 #[inline(always)]
 pub const fn first_lanes(count: usize) -> u32 {
     debug_assert!(count <= LANES);

@@ -1,14 +1,14 @@
-//! Sizes of memory and files as people write and read them.
+//! Parses and formats sizes of memory and files.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// A number of bytes. Shown in binary units with three digits (`1.25 GiB`).
+/// A number of bytes. Displayed in binary units with three digits (`1.25 GiB`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Bytes(pub u64);
 
-/// Names and factors, largest first: those with `i` and single letters are powers of 1024, `GB` and
-/// its like powers of 1000.
+/// Names and factors, largest first: units with `i` and single letters are powers of 1024, `GB` etc. are powers of
+/// 1000.
 const UNITS: [(&str, u64); 13] = [
     ("TiB", 1 << 40),
     ("GiB", 1 << 30),
@@ -28,7 +28,7 @@ const UNITS: [(&str, u64); 13] = [
 impl FromStr for Bytes {
     type Err = String;
 
-    /// `4GiB`, `1.5G`, `512MiB`, `4GB`, `4294967296`: without a unit they are bytes.
+    /// `4GiB`, `1.5G`, `512MiB`, `4GB`, `4294967296`: a number without a unit is in bytes.
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong =
             || format!("{text:?} is no size; write it as 4GiB, 512MiB or a number of bytes");
@@ -51,7 +51,7 @@ impl FromStr for Bytes {
         }
         let number: f64 = number.parse().map_err(|_| wrong())?;
         let bytes = number * factor as f64;
-        // Half a byte is nobody's memory.
+        // Fractions of a byte are errors.
         if factor == 1 || bytes >= u64::MAX as f64 {
             return Err(wrong());
         }

@@ -1,34 +1,32 @@
-//! Memory of this process as Linux counts it.
+//! Memory of this process as counted by Linux.
 //!
-//! `VmHWM` is the exact peak of everything resident, mapped files included; the kernel splits only
-//! the present value into anonymous and file-backed pages. As long as no data are mapped, what is
-//! file-backed is the program's own code, a few MiB that only grow, so [`MemoryPeaks`] takes the peak of
-//! anonymous memory as `VmHWM` less the largest file-backed part seen: nothing between two looks is
-//! missed. Where frames are mapped, their pages come and go and that would count them, so only looks
-//! count: the largest `RssAnon` seen ([`MemoryPeaks::looks_only`]), which is to be looked at where it is
-//! highest, at the ends of phases.
+//! `VmHWM` is the exact peak of all resident memory, including mapped files; the kernel separates only the current
+//! value into anonymous and file-backed pages. If no data are mapped, the file-backed pages are the code of the
+//! program, a few MiB that only grow. So [`MemoryPeaks`] computes the peak of anonymous memory as `VmHWM` minus the
+//! largest file-backed part seen, which misses nothing between two samples. If frames are mapped, their pages come
+//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::looks_only`]), so
+//! samples must be taken where it is highest, at the ends of phases.
 
 use std::fs;
 
-/// Resident memory in bytes; zeros where the system does not tell.
+/// Resident memory in bytes; zeros if the system does not report it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryUse {
-    /// Peak of everything resident since the process began (`VmHWM`).
+    /// Peak of all resident memory since the process started (`VmHWM`).
     pub peak: u64,
-    /// Heap and stacks resident now (`RssAnon`).
+    /// Resident heap and stacks (`RssAnon`).
     pub anonymous: u64,
-    /// Mapped files resident now (`RssFile`, and `RssShmem` for those in a tmpfs).
+    /// Resident pages of mapped files (`RssFile`, and `RssShmem` for those in a tmpfs).
     pub file: u64,
 }
 
-/// Bytes that can still be had without swapping (`MemAvailable`); None where the system does not
-/// tell.
+/// Bytes that can be allocated without swapping (`MemAvailable`); None if the system does not report it.
 pub fn available() -> Option<u64> {
     value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemAvailable")
 }
 
-/// Bytes that this process may still take before a limit of its own (`ulimit -d`, `ulimit -v`) refuses more;
-/// None without one.
+/// Bytes that this process can allocate before it reaches its own limit (`ulimit -d`, `ulimit -v`); None without a
+/// limit.
 #[cfg(unix)]
 pub fn process_room() -> Option<u64> {
     use rustix::process::{Resource, getrlimit};
@@ -41,18 +39,18 @@ pub fn process_room() -> Option<u64> {
     rooms.min()
 }
 
-/// Bytes that this process may still take; not known on this system.
+/// Bytes that this process can allocate; unknown on this system.
 #[cfg(not(unix))]
 pub fn process_room() -> Option<u64> {
     None
 }
 
-/// Bytes of memory that the machine has (`MemTotal`); None where the system does not tell.
+/// Installed memory in bytes (`MemTotal`); None if the system does not report it.
 pub fn installed() -> Option<u64> {
     value_of(&fs::read_to_string("/proc/meminfo").ok()?, "MemTotal")
 }
 
-/// The bytes that a line `key: n kB` tells.
+/// The bytes in a line `key: n kB`.
 fn value_of(table: &str, key: &str) -> Option<u64> {
     let mut lines = table.lines();
     let rest = lines.find_map(|line| line.strip_prefix(key)?.strip_prefix(':'))?;
@@ -61,7 +59,7 @@ fn value_of(table: &str, key: &str) -> Option<u64> {
 }
 
 impl MemoryUse {
-    /// Asks the system.
+    /// The current values of the system.
     pub fn now() -> Self {
         fs::read_to_string("/proc/self/status")
             .map_or_else(|_| Self::default(), |s| Self::parse(&s))
@@ -80,25 +78,25 @@ impl MemoryUse {
 /// The largest values so far, in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryPeaks {
-    /// Heap and stacks: the larger of `total` less `file` and any `RssAnon` seen, or the latter alone
+    /// Heap and stacks: the larger of `total` minus `file` and any sample of `RssAnon`, or only the latter
     /// ([`Self::looks_only`]).
     pub anonymous: u64,
-    /// Mapped files, when looked at ([`MemoryUse::file`]).
+    /// Mapped files, largest sample ([`MemoryUse::file`]).
     pub file: u64,
     /// Everything, at any time (`VmHWM`).
     pub total: u64,
-    /// Heap and stacks, when looked at.
+    /// Heap and stacks, largest sample.
     seen: u64,
     looks_only: bool,
 }
 
 impl MemoryPeaks {
-    /// From now on files of data are mapped: anonymous memory is what is seen when looked at.
+    /// From now on data files are mapped: only samples of anonymous memory count.
     pub fn looks_only(&mut self) {
         self.looks_only = true;
     }
 
-    /// Takes in how things are `now`.
+    /// Adds the sample `now`.
     pub fn take_in(&mut self, now: MemoryUse) {
         self.file = self.file.max(now.file);
         self.total = self.total.max(now.peak);

@@ -1,4 +1,4 @@
-//! Byte counts and the memory of the process. Knows nothing of what is measured.
+//! Byte counts and the memory of the process. Does not depend on what is measured.
 
 mod bytes;
 pub mod memory;

@@ -1,5 +1,4 @@
-//! A frame as plain particles: what foreign files become, and native frames that cannot be traced as they
-//! are.
+//! Frames as plain particles in memory: those of other formats, and native frames that cannot be traced in place.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -11,39 +10,40 @@ use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::scene::RgbEncoding;
 use crate::survey::{id_of, velocity_of};
 
-/// A frame in memory, ready for the tree.
+/// A frame in memory, before the tree is built.
 #[derive(Debug)]
 pub struct DecodedFrame {
     /// Centres relative to the origin.
     pub centers: Vec<Vec3>,
     /// Radii.
     pub radius: Radius,
-    /// What shading needs.
+    /// Attributes for shading.
     pub shading: DecodedShading,
 }
 
-/// What shading needs of particles, in their order.
+/// Attributes of particles for shading, in the order of the particles.
 #[derive(Debug, Default)]
 pub struct DecodedShading {
-    /// Numbers for the colour map, one a particle; empty with a constant colour, and in a frame
-    /// that lacks an attribute which nobody asked for.
+    /// Scalars for the colour map, one per particle. Empty with a constant colour, and in a frame without the
+    /// attribute if that is optional.
     pub values: Vec<f32>,
-    /// Colours that the particles bring, linear RGB; empty where they are not asked for.
+    /// Colours from an attribute, linear RGB; empty without one.
     pub colors: Vec<Vec3>,
-    /// Numbers for the `id` channel; None if the particle's index serves.
+    /// Values for the `id` channel; None if the index of the particle is used.
     pub ids: Option<Vec<u32>>,
     /// Velocities for the `V` channel.
     pub velocities: Option<Vec<Vec3>>,
 }
 
 impl DecodedFrame {
-    /// Takes of `frame`, which was read from `file`, what `setup` asks for; tells how many radii were
-    /// raised.
+    /// Extracts from `frame`, which was read from `file`, what `setup` needs. Also returns the number of radii that
+    /// were raised.
     pub(super) fn of(
         setup: &Setup,
         frame: ParticleFrame,
         file: &str,
     ) -> Result<(Self, u64), LoadError> {
+        // Extract radii and colours
         let (radius, clamped) = radii(setup, &frame, file)?;
         let colored_by = match &setup.picture.color {
             ColorRule::Constant(_) => None,
@@ -59,6 +59,7 @@ impl DecodedFrame {
             (ColorRule::Rgb { .. }, Some(by)) => (Vec::new(), colors(by)),
             _ => (Vec::new(), Vec::new()),
         };
+        // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
         let ids = if channels.id { ids(&frame) } else { None };
         let velocities = if channels.velocity {
@@ -81,33 +82,33 @@ impl DecodedFrame {
 }
 
 impl DecodedFrame {
-    /// Moves the particles `chosen`, indices in order, behind all others; the order is the same otherwise.
-    /// Returns how many come before them. Who has no id keeps its place in the file as one if `ids` are asked
-    /// for.
-    pub(super) fn put_last(&mut self, chosen: &[u32], ids: bool) -> usize {
+    /// Moves the particles `chosen` (ascending indices) behind all others; the order is otherwise unchanged. Returns
+    /// the number of particles before them. If `ids` are needed, particles without an id get their position in the
+    /// file as one.
+    pub(super) fn move_to_end(&mut self, chosen: &[u32], ids: bool) -> usize {
         let count = self.centers.len();
         let shading = &mut self.shading;
         if ids && shading.ids.is_none() && !chosen.is_empty() {
             shading.ids = Some((0..index_u32(count)).collect());
         }
-        put_last(&mut self.centers, chosen);
+        move_to_end(&mut self.centers, chosen);
         if let Radius::PerParticle(radii) = &mut self.radius {
-            put_last(radii, chosen);
+            move_to_end(radii, chosen);
         }
-        put_last(&mut shading.values, chosen);
-        put_last(&mut shading.colors, chosen);
+        move_to_end(&mut shading.values, chosen);
+        move_to_end(&mut shading.colors, chosen);
         if let Some(ids) = &mut shading.ids {
-            put_last(ids, chosen);
+            move_to_end(ids, chosen);
         }
         if let Some(velocities) = &mut shading.velocities {
-            put_last(velocities, chosen);
+            move_to_end(velocities, chosen);
         }
         count - chosen.len()
     }
 }
 
-/// Moves the items with the indices `chosen` behind all others, if there are any.
-fn put_last<T: Copy>(items: &mut [T], chosen: &[u32]) {
+/// Moves the items with the indices `chosen` behind all others.
+fn move_to_end<T: Copy>(items: &mut [T], chosen: &[u32]) {
     if items.is_empty() {
         return;
     }
@@ -124,12 +125,12 @@ fn put_last<T: Copy>(items: &mut [T], chosen: &[u32]) {
 }
 
 impl DecodedShading {
-    /// Whether particles have colours of their own.
+    /// Whether particles have individual colours.
     pub fn has_colors(&self) -> bool {
         !self.values.is_empty() || !self.colors.is_empty()
     }
 
-    /// Bytes of all of it.
+    /// Memory in bytes.
     pub fn byte_len(&self) -> u64 {
         let ids = self.ids.as_deref().unwrap_or_default();
         let velocities = self.velocities.as_deref().unwrap_or_default();
@@ -138,7 +139,7 @@ impl DecodedShading {
     }
 }
 
-/// The attribute `name`; None in a frame without particles, which need not declare any.
+/// The attribute `name`; None in a frame without particles, which need not have any attributes.
 fn attribute<'a>(
     frame: &'a ParticleFrame,
     name: &str,
@@ -153,8 +154,9 @@ fn attribute<'a>(
     Ok(found)
 }
 
-/// The radii of a frame and how many had to be raised.
+/// The radii of a frame, and the number of radii that were raised.
 fn radii(setup: &Setup, frame: &ParticleFrame, file: &str) -> Result<(Radius, u64), LoadError> {
+    // Select the source of the radii
     let mut radius = match &setup.picture.radius {
         RadiusRule::Common(radius) => Radius::Common(*radius),
         RadiusRule::FileOr(radius) => frame.radius.clone().unwrap_or(Radius::Common(*radius)),
@@ -168,10 +170,11 @@ fn radii(setup: &Setup, frame: &ParticleFrame, file: &str) -> Result<(Radius, u6
     if frame.is_empty() {
         return Ok((radius, 0));
     }
+    // Raise radii that are too small or invalid
     let least = setup.picture.least_radius;
     let mut clamped = 0;
     let mut raise = |radius: &mut f32| {
-        // Also true for NaN.
+        // Written as `!(a >= b)` so that NaN is raised as well.
         if !(*radius >= least && is_radius(*radius)) {
             *radius = least;
             clamped += 1;
@@ -195,7 +198,7 @@ fn magnitudes(attribute: &Attribute, scale: f64) -> Vec<f32> {
         .collect()
 }
 
-/// The colours in `attribute`; black where it has fewer than three numbers a particle.
+/// The colours in `attribute`; missing components are 0.
 fn colors(attribute: &Attribute) -> Vec<Vec3> {
     let encoding = RgbEncoding::of(attribute.data.scalar_type());
     let components = attribute.components;
@@ -218,7 +221,7 @@ fn vectors(attribute: &Attribute) -> Vec<Vec3> {
         .collect()
 }
 
-/// The particles' ids, or the place in the file of particles that others were dropped between.
+/// The ids of the particles, or their positions in the file if particles between them were dropped.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -254,15 +257,15 @@ mod tests {
                 velocities: None,
             },
         };
-        assert_eq!(frame.put_last(&[], true), 6);
+        assert_eq!(frame.move_to_end(&[], true), 6);
         assert_eq!(frame.shading.ids, None);
-        assert_eq!(frame.put_last(&[0, 3, 5], true), 3);
+        assert_eq!(frame.move_to_end(&[0, 3, 5], true), 3);
         let order = [1.0, 2.0, 4.0, 0.0, 3.0, 5.0];
         assert_eq!(frame.centers, order.map(Vec3::splat));
         assert_eq!(frame.radius, Radius::PerParticle(order.to_vec()));
         assert_eq!(frame.shading.values, order);
         assert_eq!(frame.shading.colors, order.map(Vec3::splat));
         assert_eq!(frame.shading.ids, Some(vec![1, 2, 4, 0, 3, 5]));
-        assert_eq!(frame.put_last(&[0, 1, 2, 3, 4, 5], false), 0);
+        assert_eq!(frame.move_to_end(&[0, 1, 2, 3, 4, 5], false), 0);
     }
 }

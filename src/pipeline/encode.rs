@@ -1,4 +1,4 @@
-//! Third stage: images are encoded, published under their final names, and recorded.
+//! Third stage: encodes images, publishes them under their final names, and records them.
 
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -11,7 +11,7 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::{Event, InHand, Passed, Stage, Watch};
+use super::{ClaimedFrame, Event, Stage, StageResult, Watch};
 use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::mishap::is_place_at_fault;
 use crate::output::{
@@ -21,13 +21,13 @@ use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
 
-/// Why an image is not there.
+/// Reasons why an image could not be written.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum WriteError {
-    /// It cannot be encoded.
+    /// Encoding failed.
     #[error(transparent)]
     Encode(#[from] OutputError),
-    /// It cannot be written.
+    /// Writing failed.
     #[error("{}: {source}", path.display())]
     Io {
         /// The image.
@@ -37,38 +37,41 @@ pub(super) enum WriteError {
     },
 }
 
-/// Who is told when an image is written. They may have ended by then.
-pub(super) struct Written {
-    /// Whoever reads the next frame only then.
+/// Channels to notify when an image has been written. Their receivers may have ended.
+pub(super) struct WriteSignals {
+    /// To the reader, if it waits for that before it reads the next frame.
     pub(super) is_written: Option<SyncSender<()>>,
-    /// Whoever traces into the same planes again.
+    /// To the tracer, for the planes to be reused.
     pub(super) films: Option<Sender<Film>>,
 }
 
 pub(super) fn write_stage(
     setup: &Setup,
     sequence: &Sequence,
-    traced: Receiver<InHand<TracedFrame>>,
-    next: &Written,
+    traced: Receiver<ClaimedFrame<TracedFrame>>,
+    next: &WriteSignals,
     job: &mut Job,
     watch: Watch,
 ) -> Result<(), JobError> {
     let mut peaks = MemoryPeaks::default();
     let mut image_before = Instant::now();
-    for InHand { claim, passed } in traced {
-        match passed {
-            Passed::Frame(frame) => {
+    for ClaimedFrame { claim, result } in traced {
+        match result {
+            StageResult::Frame(frame) => {
                 watch(Event::Entered(frame.task.frame, Stage::Write));
+                // Stop if another worker has taken over
                 if !claim.is_valid() {
                     let dir = job.state().dir().to_owned();
                     return Err(JobError::TakenForDead { dir });
                 }
+                // Encode and publish the image
                 let task = frame.task.clone();
                 if sequence.maps_files() {
                     peaks.looks_only();
                 }
                 match write_frame(setup, frame, &mut peaks) {
                     Ok((mut report, film)) => {
+                        // Return the planes to the tracer, and record the frame
                         if let Some(films) = &next.films {
                             let _ = films.send(film);
                         }
@@ -81,7 +84,7 @@ pub(super) fn write_stage(
                         job.record_done(task.frame, &outputs, json!(report))?;
                         watch(Event::Done(&task, &report));
                     }
-                    // Not the frame's fault: it stays to be done.
+                    // The disk is at fault, not the frame, which remains to be done.
                     Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
                         return Err(JobError::writing(&path, source));
                     }
@@ -92,11 +95,12 @@ pub(super) fn write_stage(
                     }
                 }
             }
-            Passed::Failed(task, reason) => {
+            StageResult::Failed(task, reason) => {
                 watch(Event::Failed(task.frame, &reason));
                 job.record_failed(task.frame, &reason, json!(null))?;
             }
         }
+        // Release the frame, and let the next one be read
         claim.end();
         if let Some(is_written) = &next.is_written {
             let _ = is_written.send(());
@@ -105,7 +109,7 @@ pub(super) fn write_stage(
     Ok(())
 }
 
-/// Encodes and publishes the images of `frame`; the report is complete then, and the planes can serve another.
+/// Encodes and publishes the images of `frame`. Returns the completed report, and the planes for reuse.
 pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
@@ -118,7 +122,7 @@ pub(super) fn write_frame(
         let path = path.to_owned();
         move |source| WriteError::Io { path, source }
     };
-    // The preview first: a ledger line vouches for both, and the EXR is what people wait for.
+    // Publish the preview first: a ledger line vouches for both, and the EXR is the file that users wait for
     if let Some(path) = &task.preview {
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
         publish(path, &png).map_err(at(path))?;
@@ -127,18 +131,20 @@ pub(super) fn write_frame(
         peaks.looks_only();
     }
     peaks.take_in(frame.memory);
+    // Encode and publish the EXR
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
-    let mut looking = Looking {
+    let mut sampler = MemorySampler {
         out: &mut file,
         peaks,
-        looks: 0,
+        samples: 0,
     };
     let options = exr_options(setup, &frame);
     let (film, clamped) =
-        write_exr(frame.film, &options, &mut looking).map_err(|e| match e.into_io() {
+        write_exr(frame.film, &options, &mut sampler).map_err(|e| match e.into_io() {
             Ok(source) => at(&task.image)(source),
             Err(error) => error.into(),
         })?;
+    // Complete the report
     report.clamped_pixels = clamped;
     file.commit().map_err(at(&task.image))?;
     report.seconds.encode = start.elapsed().as_secs_f64();
@@ -153,20 +159,20 @@ pub(super) fn write_frame(
     Ok((report, film))
 }
 
-/// Looks at memory when the first bytes come through: then all that encoding takes is there.
-struct Looking<'a, W> {
+/// Samples the memory in use when the first bytes are written: all memory of encoding is allocated then.
+struct MemorySampler<'a, W> {
     out: &'a mut W,
     peaks: &'a mut MemoryPeaks,
-    looks: u32,
+    samples: u32,
 }
 
-/// Writes looked at: the header is written before blocks are compressed.
-const LOOKS: u32 = 16;
+/// Number of writes to sample: the header is written before blocks are compressed.
+const MAX_SAMPLES: u32 = 16;
 
-impl<W: Write> Write for Looking<'_, W> {
+impl<W: Write> Write for MemorySampler<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.looks < LOOKS {
-            self.looks += 1;
+        if self.samples < MAX_SAMPLES {
+            self.samples += 1;
             self.peaks.take_in(MemoryUse::now());
         }
         self.out.write(bytes)
@@ -177,7 +183,7 @@ impl<W: Write> Write for Looking<'_, W> {
     }
 }
 
-impl<W: Seek> Seek for Looking<'_, W> {
+impl<W: Seek> Seek for MemorySampler<'_, W> {
     fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
@@ -191,7 +197,7 @@ pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, Ou
     encode_exr(&frame.film, &exr_options(setup, frame))
 }
 
-/// How the EXR of `frame` is written, with what a compositor may ask about it in one attribute.
+/// Options for the EXR of `frame`, with an attribute of metadata for compositing.
 fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,

@@ -1,4 +1,4 @@
-//! Native frames are traced where they lie: nothing is copied, and attributes are looked up hit by hit.
+//! Native frames that are traced in place: nothing is copied, and attributes are looked up hit by hit.
 
 use std::path::Path;
 
@@ -16,22 +16,22 @@ use crate::render::{NO_ID, ShadeSource, mean};
 use crate::scene::{ColorMap, RgbEncoding};
 use crate::survey::{Named, id_of, velocity_of};
 
-/// Bytes of a frame up to which everything that is used is compared with its checksum before it is traced;
-/// of a larger one only the nodes, which are read anyhow: rays touch little of the rest.
-const VERIFIED: u64 = 1 << 30;
+/// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
+/// frames only the nodes are, which are read anyway; rays touch little of the rest.
+const MAX_VERIFIED: u64 = 1 << 30;
 
-/// A native frame, open.
+/// An open native frame.
 #[derive(Debug)]
 pub struct StoredFrame {
-    // Large, and handed from stage to stage.
+    // Boxed because it is large and moves between stages.
     file: Box<NativeFile>,
     structure: Structure,
-    /// Of all particles; None if each has its own.
+    /// Common radius; None if each particle has its own.
     radius: Option<f32>,
     names: Names,
 }
 
-/// Attributes that shading asks for, by their names in the file.
+/// Names of the attributes that shading needs, as in the file.
 #[derive(Debug, Default)]
 struct Names {
     values: Option<String>,
@@ -39,11 +39,11 @@ struct Names {
     velocities: Option<String>,
 }
 
-/// What came of opening a frame.
+/// Result of opening a frame.
 pub(super) enum Opened {
-    /// It can be traced where it lies; so many radii are raised.
+    /// It can be traced in place; with the number of raised radii.
     InPlace(StoredFrame, u64),
-    /// It must be decoded; of a native frame, why.
+    /// It must be decoded; with the reason for a native frame.
     Decode(Option<String>),
 }
 
@@ -57,6 +57,7 @@ impl StoredFrame {
         let Some(path) = sequence.native_file(index) else {
             return Ok(Opened::Decode(None));
         };
+        // Open the file, and check whether it can be traced in place
         let file = NativeFile::open(path, setup.run.access).map_err(LoadError::Frame)?;
         let structure = setup.stored_structure();
         let radius = match particles_in_place(setup, file.index()) {
@@ -66,6 +67,7 @@ impl StoredFrame {
                 return Ok(Opened::Decode(Some(note)));
             }
         };
+        // Find the attributes, and verify the data
         let names = Names::of(setup, &file)?;
         let frame = Self {
             file: Box::new(file),
@@ -82,27 +84,27 @@ impl StoredFrame {
         self.file.index().time
     }
 
-    /// Particles.
+    /// Particle count.
     pub fn particles(&self) -> u64 {
         self.file.index().count
     }
 
-    /// Where it is.
+    /// Path of the file.
     pub fn path(&self) -> &Path {
         self.file.path()
     }
 
-    /// Whose order and nodes it is said to have: k-d cells along a curve serve for both.
+    /// The structure to report: k-d cells along a curve count as either.
     pub fn structure(&self) -> Structure {
         self.structure
     }
 
-    /// The radius of all particles; None if each has its own.
+    /// The common radius; None if each particle has its own.
     pub fn radius(&self) -> Option<f32> {
         self.radius
     }
 
-    /// Whether anything is looked up by particle.
+    /// Whether attributes are looked up by particle.
     pub fn needs_indices(&self, setup: &Setup) -> bool {
         let channels = setup.picture.render.channels;
         channels.id || channels.velocity || self.names.values.is_some()
@@ -111,13 +113,13 @@ impl StoredFrame {
     /// The particles in place.
     ///
     /// # Errors
-    /// As [`NativeFrame::leaves`].
+    /// Same as [`NativeFrame::leaves`].
     pub fn leaves(&self) -> Result<StoredLeaves<'_>, FrameError> {
         let leaves = self.frame().leaves();
         leaves.map_err(|e| e.in_file(self.path()))
     }
 
-    /// What shading looks up, in the file.
+    /// Attributes for shading, in the file.
     pub fn shading<'a>(&'a self, color: &'a ColorRule, default: Vec3) -> StoredShading<'a> {
         let frame = self.frame();
         let view = |name: &Option<String>| frame.attribute(name.as_deref()?);
@@ -139,12 +141,12 @@ impl StoredFrame {
         }
     }
 
-    /// Whether it is mapped, not read.
+    /// Whether the file is mapped and not read.
     pub fn is_mapped(&self) -> bool {
         self.file.is_mapped()
     }
 
-    /// Bytes of the attributes that shading looks up.
+    /// Bytes of the attributes for shading.
     pub fn attribute_bytes(&self) -> u64 {
         let used = self.names.all();
         let all = self.file.index().attributes.iter();
@@ -152,10 +154,10 @@ impl StoredFrame {
         used.map(|a| a.section.len).sum()
     }
 
-    /// Whether the file is still what it was when it was opened: asked before the image is believed.
+    /// Checks that the file has not changed since it was opened. Must be called before an image is used.
     ///
     /// # Errors
-    /// [`FrameError::Malformed`] if it is not.
+    /// [`FrameError::Malformed`] if it has.
     pub fn check(&self) -> Result<(), FrameError> {
         self.file.check()
     }
@@ -164,17 +166,17 @@ impl StoredFrame {
         self.file.frame_unchecked()
     }
 
-    /// Compares with the checksums: all that is used if `all` or there is not too much of it, else the
-    /// nodes.
+    /// Verifies checksums: of all data in use if `all` is set or, by default, if there is not too much of it;
+    /// otherwise of the nodes.
     fn verify(&self, all: Option<bool>) -> Result<(), FrameError> {
         let used = self.names.all();
         let frame = self.frame();
-        let verified = match all.unwrap_or(frame.used_bytes(&used) <= VERIFIED) {
+        let verified = match all.unwrap_or(frame.used_bytes(&used) <= MAX_VERIFIED) {
             true => frame.verify_used(&used),
             false => frame.verify_nodes(),
         };
         verified.map_err(|e| e.in_file(self.path()))?;
-        // Else what is missing would be called damaged.
+        // A truncated file would otherwise be reported as damaged.
         self.check()
     }
 }
@@ -204,23 +206,24 @@ impl Names {
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {
             values,
-            // As in decoded frames, ids are whole numbers.
+            // Only integers are ids, as in decoded frames.
             ids: name(id_of(&attributes).filter(|a| channels.id && a.low_bits(0).is_some())),
             velocities: name(velocity_of(&attributes).filter(|_| channels.velocity)),
         })
     }
 }
 
-/// Radii as a frame that is traced in place has them.
+/// Radii of a frame that is traced in place.
 struct PlacedRadius {
-    /// Of all; None if each has its own.
+    /// Common radius; None if each particle has its own.
     common: Option<f32>,
-    /// So many are raised to the least.
+    /// Number of radii raised to the minimum.
     raised: u64,
 }
 
-/// The radii of a frame, if it can be traced in place; else why not.
+/// The radii of a frame if it can be traced in place, otherwise the reason why not.
 fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius, String> {
+    // Check that neither settings nor origin require a copy
     if let Some(why) = setup.needs_copy() {
         return Err(why);
     }
@@ -231,6 +234,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
                 .to_owned(),
         );
     }
+    // Find the radii
     let common = match (&setup.picture.radius, &index.radius) {
         (RadiusRule::Attribute { .. }, _) => {
             return Err("the radius is an attribute, for 12 bytes a particle and more".to_owned());
@@ -251,19 +255,19 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
             return Err("some radii are too small to be seen and are raised".to_owned());
         }
     };
-    // Also of what is no number.
-    let is_seen = common >= setup.picture.least_radius && is_radius(common);
+    // Raise a common radius that is too small or NaN
+    let is_visible = common >= setup.picture.least_radius && is_radius(common);
     Ok(PlacedRadius {
-        common: Some(if is_seen {
+        common: Some(if is_visible {
             common
         } else {
             setup.picture.least_radius
         }),
-        raised: if is_seen { 0 } else { index.count },
+        raised: if is_visible { 0 } else { index.count },
     })
 }
 
-/// A [`ShadeSource`] over attributes where they lie.
+/// A [`ShadeSource`] over attributes in place.
 #[derive(Debug, Clone, Copy)]
 pub struct StoredShading<'a> {
     color: StoredColor<'a>,
@@ -284,7 +288,7 @@ enum StoredColor<'a> {
     },
 }
 
-/// As colours of decoded particles are understood: codes of fewer bits are decoded to floats.
+/// The encoding of colours, as for decoded particles: codes of fewer bits are decoded to floats.
 fn encoding(values: &AttributeView) -> RgbEncoding {
     RgbEncoding::of(match values.stored() {
         StoredType::Plain(kind) => kind,

@@ -1,4 +1,4 @@
-//! First stage: a frame's files become what the tree and the shading need.
+//! First stage: reads the files of a frame into the form that tree and shading need.
 
 use std::time::{Duration, Instant};
 
@@ -14,36 +14,36 @@ use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
 use crate::mishap::may_be_unfinished;
 
-/// A frame ready for the tree.
+/// A frame before its tree is built.
 #[derive(Debug)]
 pub struct LoadedFrame {
-    /// The image that it is for.
+    /// The image to be made.
     pub task: ImageTask,
-    /// What the user should know of it.
+    /// Notes for the user.
     pub notes: Vec<String>,
     /// The particles.
     pub particles: LoadedParticles,
     /// Simulation time, if known.
     pub time: Option<f64>,
-    /// Particles left out because they were not finite.
+    /// Number of particles that were dropped because they were not finite.
     pub dropped: u64,
-    /// Radii raised to the least.
+    /// Number of radii raised to the minimum.
     pub clamped_radii: u64,
-    /// Time that reading took.
+    /// Time spent on reading.
     pub read_time: Duration,
 }
 
-/// Where the particles of a frame are.
+/// The particles of a frame.
 #[derive(Debug)]
 pub enum LoadedParticles {
     /// In memory.
     Decoded(DecodedFrame),
-    /// In a native frame, to be traced where they lie.
+    /// In a native frame, to be traced in place.
     Stored(StoredFrame),
 }
 
 impl LoadedParticles {
-    /// How many there are.
+    /// Particle count.
     pub fn count(&self) -> u64 {
         match self {
             Self::Decoded(frame) => frame.centers.len() as u64,
@@ -55,7 +55,7 @@ impl LoadedParticles {
 /// Reads the frame of `task`.
 ///
 /// # Errors
-/// See [`LoadError`]; the other frames are not concerned.
+/// See [`LoadError`]; other frames are not affected.
 pub fn load_frame(
     setup: &Setup,
     sequence: &Sequence,
@@ -63,6 +63,7 @@ pub fn load_frame(
 ) -> Result<LoadedFrame, LoadError> {
     let start = Instant::now();
     let mut notes = Vec::new();
+    // Trace a native frame in place if possible; otherwise decode the frame
     let opened = StoredFrame::open(setup, sequence, task.index);
     let mut loaded = match opened.map_err(|e| newest(e, sequence, task))? {
         Opened::InPlace(frame, clamped_radii) => LoadedFrame {
@@ -126,7 +127,7 @@ impl LoadedFrame {
     }
 }
 
-/// A damaged frame that is the last of the sequence may still be growing.
+/// Marks errors of the last frame of a sequence, which may still be growing.
 fn newest(error: LoadError, sequence: &Sequence, task: &ImageTask) -> LoadError {
     match error {
         LoadError::Frame(error) if may_be_unfinished(sequence, task.index, &error) => {
@@ -143,7 +144,7 @@ fn first_file(sequence: &Sequence, task: &ImageTask) -> String {
         .map_or_else(String::new, |p| p.display().to_string())
 }
 
-/// Refuses a frame that cannot fit, before the system ends the whole job for it.
+/// Rejects a frame that cannot fit into memory, before the system kills the whole job.
 fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
     let size = FrameSize::of(sequence, task.index, setup.run.weight.as_ref());
     let need = MemoryModel::new(setup).decoding(&size);

@@ -1,24 +1,24 @@
-//! Why a frame cannot be read.
+//! Errors when reading frames.
 
 use spherule_formats::FrameError;
 
-/// Why a frame cannot be drawn.
+/// Reasons why a frame cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Its files cannot be read.
     #[error(transparent)]
     Frame(FrameError),
-    /// The same for the last frame of the sequence, which a simulation may be at.
+    /// The same for the last frame of the sequence, which a simulation may still be writing.
     #[error("{0}; it is the newest frame, perhaps still being written: render again later")]
     Newest(FrameError),
-    /// It would not fit.
+    /// It does not fit into memory.
     #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]
     TooLarge {
         /// The frame's first file.
         file: String,
-        /// What reading needs, estimated.
+        /// Estimated memory for reading.
         need: u64,
-        /// What there is.
+        /// Available memory.
         available: u64,
     },
     /// It lacks an attribute that the job needs.
@@ -26,16 +26,16 @@ pub enum LoadError {
     MissingAttribute {
         /// The frame's first file.
         file: String,
-        /// What was looked for.
+        /// Name of the attribute.
         name: String,
-        /// What for.
+        /// Its purpose.
         purpose: &'static str,
-        /// What there is.
+        /// The attributes of the frame.
         has: String,
     },
 }
 
-/// That an attribute is not among those that the file `has`.
+/// The error for an attribute that is not among those that the file `has`.
 pub(super) fn missing<'a>(
     name: &str,
     purpose: &'static str,
@@ -50,7 +50,7 @@ pub(super) fn missing<'a>(
     }
 }
 
-/// Names for a message.
+/// A list of names for a message.
 pub(crate) fn attribute_list<'a>(names: impl Iterator<Item = &'a str>) -> String {
     let names: Vec<String> = names.map(|n| format!("`{n}`")).collect();
     if names.is_empty() {

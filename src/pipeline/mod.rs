@@ -1,11 +1,10 @@
-//! The three stages of a sequence: while frame i is traced, frame i+1 is read and frame i-1 is
-//! encoded and written.
+//! The three stages of a sequence: while frame i is traced, frame i+1 is read and frame i-1 is encoded and written.
 //!
-//! One frame is in flight in each stage, handed over without a queue, so memory is flat however long the
-//! sequence. Reading waits until the tree over the frame before is built: building is short, and only then are
-//! that frame's positions let go. It has threads of its own, so that it waits for nothing else. The planes of a
-//! written image go back to the tracer. The last stage records every frame in the job's ledger, image first. What
-//! the picture looks like is settled before, in [`Setup`].
+//! One frame is in flight per stage, handed over without a queue, so memory is constant however long the sequence is.
+//! Reading waits until the tree of the previous frame is built: building takes little time, and releases the
+//! positions of that frame. Reading has threads of its own, so that it never waits for tracing. The planes of a
+//! written image are returned to the tracer. The last stage records every frame in the ledger of the job, after its
+//! image. [`Setup`] defines the pictures in advance.
 
 use std::collections::HashSet;
 use std::panic;
@@ -53,69 +52,69 @@ use crate::mishap::guarded;
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
 
-/// One image to make.
+/// One image to be made.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageTask {
     /// Frame number.
     pub frame: i64,
     /// Index in the sequence.
     pub index: usize,
-    /// The EXR.
+    /// Path of the EXR.
     pub image: PathBuf,
-    /// The PNG beside it, if wanted.
+    /// Path of the optional PNG.
     pub preview: Option<PathBuf>,
-    /// Why it cannot be made, if that is known before.
+    /// Reason why it cannot be made, if that is known in advance.
     pub refused: Option<String>,
 }
 
-/// What a frame is going through.
+/// Stage of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// Its files are read.
+    /// Its files are being read.
     Read,
-    /// Its tree is built and its image traced.
+    /// Its tree is being built and its image traced.
     Trace,
-    /// Its image is encoded and written.
+    /// Its image is being encoded and written.
     Write,
 }
 
-/// What whoever watches is told.
+/// Events of a run.
 #[derive(Debug)]
 pub enum Event<'a> {
     /// A frame has entered a stage.
     Entered(i64, Stage),
-    /// A frame's image is in place and recorded.
+    /// The image of a frame is complete and recorded.
     Done(&'a ImageTask, &'a FrameReport),
-    /// A frame could not be made; it is recorded with this reason and the rest goes on.
+    /// A frame failed. It is recorded with this reason, and the run continues.
     Failed(i64, &'a str),
-    /// Other workers are at frames of the run.
+    /// Other workers are working on frames of the run.
     Others(QueueNews<'a>),
-    /// Something the user should know.
+    /// A note for the user.
     Note(&'a str),
 }
 
-/// Who watches.
+/// An event handler.
 pub type Watch<'a> = &'a (dyn Fn(Event) + Sync);
 
-/// A frame on its way, or why it fell out.
-enum Passed<T> {
+/// A frame between two stages, or the reason of its failure.
+enum StageResult<T> {
     Frame(T),
     Failed(ImageTask, String),
 }
 
-/// A frame on its way that no other worker does meanwhile.
-struct InHand<T> {
+/// A frame between two stages that this worker has claimed.
+struct ClaimedFrame<T> {
     claim: Claim,
-    passed: Passed<T>,
+    result: StageResult<T>,
 }
 
-/// Renders those of `tasks` that no other worker does, in order, and records each in `job`; returns when all
-/// are ended, by whomever. Ends early, with the frame in hand finished,
-/// once `interrupt` is raised, and without it once it says to stop now. Without `overlap` a frame is read only when the one before is written
-/// and nothing of it is left.
+/// Renders those of `tasks` that no other worker has claimed, in order, and records each in `job`. Returns when all
+/// of them are finished, by any worker. If `interrupt` is raised, finishes only the current frame; if it requests an
+/// immediate stop, drops that frame too. Without `overlap` a frame is read only after the previous one has been
+/// written and released.
 ///
 /// # Errors
-/// The ledger cannot be written, or the disk is full: nothing further could be recorded.
+/// The ledger cannot be written, or the disk is full: further frames could not be recorded.
 pub fn run(
     setup: &Setup,
     sequence: &Sequence,
@@ -128,17 +127,18 @@ pub fn run(
     let is_over = AtomicBool::new(false);
     let threads = ReadThreads::new();
     let mut read = Ok(());
-    // Capacity 0: a stage holds its result until the next one is free to take it.
+    // Connect the stages; with capacity 0 a stage holds its result until the next stage is free
     let (to_trace, loaded) = sync_channel(0);
     let (to_write, traced) = sync_channel(0);
-    let (go_on, room) = sync_channel(1);
+    let (memory_freed, has_memory) = sync_channel(1);
     let (films, spare) = channel();
-    // Whoever frees the memory that the next frame needs; without overlap no film is kept for it.
+    // Select the stage that lets the next frame be read, because it frees the memory; without overlap no film is kept
     let (is_built, is_written, films) = match overlap {
-        Overlap::Stages => (Some(go_on), None, Some(films)),
-        Overlap::None => (None, Some(go_on), None),
+        Overlap::Stages => (Some(memory_freed), None, Some(films)),
+        Overlap::None => (None, Some(memory_freed), None),
     };
-    let (begins, has_begun) = sync_channel(0);
+    // Start the reader
+    let (reader_started, reader_running) = sync_channel(0);
     let frames = tasks.iter().map(|task| task.frame);
     let queue = Queue::new(job.claims(), frames, interrupt);
     let reader = ReadStage {
@@ -146,20 +146,25 @@ pub fn run(
         sequence,
         tasks,
         threads: &threads,
-        next: Next { to_trace, room },
+        next: TraceHandover {
+            to_trace,
+            has_memory,
+        },
         watch,
     };
     let outcome = &mut read;
     let written = threads.scope(|first| {
         first.spawn(move |_| {
-            let _ = begins.send(());
+            let _ = reader_started.send(());
             *outcome = reader.run(queue);
         });
-        // The first of the threads finds the memory that whoever looked at the frames has left.
-        let _ = has_begun.recv();
+        // Wait until the reader runs, so that its first thread reuses the memory that the survey of the frames has
+        // freed.
+        let _ = reader_running.recv();
         thread::scope(|scope| {
+            // Start the writer, and trace on this thread
             let writer_ended = &is_over;
-            let next = encode::Written { is_written, films };
+            let next = encode::WriteSignals { is_written, films };
             let writer = scope.spawn(move || {
                 let ended = encode::write_stage(setup, sequence, traced, &next, job, watch);
                 writer_ended.store(ended.is_err(), Ordering::Relaxed);
@@ -175,46 +180,48 @@ pub fn run(
                 watch,
             };
             stage.run(loaded, spare, is_built, to_write);
-            joined(writer.join())
+            join_result(writer.join())
         })
     });
     written.and(read)
 }
 
-fn joined<T>(result: thread::Result<T>) -> T {
+fn join_result<T>(result: thread::Result<T>) -> T {
     result.unwrap_or_else(|fault| panic::resume_unwind(fault))
 }
 
-/// The first stage; see [`run`].
+/// The first stage, see [`run`].
 struct ReadStage<'a> {
     setup: &'a Setup,
     sequence: &'a Sequence,
     tasks: &'a [ImageTask],
     threads: &'a ReadThreads,
-    next: Next,
+    next: TraceHandover,
     watch: Watch<'a>,
 }
 
 impl ReadStage<'_> {
-    /// Runs on the thread of the first stage.
+    /// The neighbouring stages end when this one does, because it owns its ends of all channels.
     fn run(&self, mut queue: Queue) -> Result<(), JobError> {
-        let mut told = Told::default();
-        let mut heard = |news: QueueNews| (self.watch)(Event::Others(news));
-        while let Some((place, claim)) = queue.take(&mut heard)? {
-            let task = &self.tasks[place];
+        let mut reported = ReportedNotes::default();
+        let mut on_news = |news: QueueNews| (self.watch)(Event::Others(news));
+        while let Some((index, claim)) = queue.take(&mut on_news)? {
+            // Read the frame, unless it is known to fail
+            let task = &self.tasks[index];
             (self.watch)(Event::Entered(task.frame, Stage::Read));
             let loaded = match &task.refused {
                 Some(reason) => Err(reason.clone()),
                 None => guarded(|| self.load(task)),
             };
-            let passed = match loaded {
+            // Report its notes, and pass it on
+            let result = match loaded {
                 Ok(mut frame) => {
-                    told.tell(std::mem::take(&mut frame.notes), self.watch);
-                    Passed::Frame(frame)
+                    reported.report_new(std::mem::take(&mut frame.notes), self.watch);
+                    StageResult::Frame(frame)
                 }
-                Err(reason) => Passed::Failed(task.clone(), reason),
+                Err(reason) => StageResult::Failed(task.clone(), reason),
             };
-            if !self.next.pass_on(InHand { claim, passed }) {
+            if !self.next.send(ClaimedFrame { claim, result }) {
                 break;
             }
         }
@@ -229,12 +236,12 @@ impl ReadStage<'_> {
     }
 }
 
-/// What a stage has told of its frames: what is so in every frame is said once.
+/// Notes that a stage has reported already: a note that applies to every frame is reported once.
 #[derive(Default)]
-struct Told(HashSet<String>);
+struct ReportedNotes(HashSet<String>);
 
-impl Told {
-    fn tell(&mut self, notes: Vec<String>, watch: Watch) {
+impl ReportedNotes {
+    fn report_new(&mut self, notes: Vec<String>, watch: Watch) {
         for note in notes {
             if !self.0.contains(&note) {
                 watch(Event::Note(&note));
@@ -244,27 +251,27 @@ impl Told {
     }
 }
 
-/// The way from reading to tracing.
-struct Next {
-    to_trace: SyncSender<InHand<LoadedFrame>>,
-    /// Tells when there is memory for another frame.
-    room: Receiver<()>,
+/// Connection from reading to tracing.
+struct TraceHandover {
+    to_trace: SyncSender<ClaimedFrame<LoadedFrame>>,
+    /// Receives a message when there is memory for another frame.
+    has_memory: Receiver<()>,
 }
 
-impl Next {
-    /// Hands over and waits until there is room again; false once a later stage has ended.
-    fn pass_on(&self, frame: InHand<LoadedFrame>) -> bool {
-        self.to_trace.send(frame).is_ok() && self.room.recv().is_ok()
+impl TraceHandover {
+    /// Passes a frame on, and waits until there is memory for another one; false if a later stage has ended.
+    fn send(&self, frame: ClaimedFrame<LoadedFrame>) -> bool {
+        self.to_trace.send(frame).is_ok() && self.has_memory.recv().is_ok()
     }
 }
 
-/// Runs `work` on a thread of the current pool: its time begins when it does, and what it does in parallel is
-/// not handed over from outside each time.
+/// Runs `work` on a thread of the current pool, so that its time does not include the wait for a thread, and its
+/// parallel parts are not submitted from outside the pool each time.
 fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     rayon::scope(|_| work())
 }
 
-/// When the frame that is traced is dropped: nothing further can be recorded, or there is no time for it.
+/// Stops the frame that is being traced if further frames cannot be recorded, or if an immediate stop is requested.
 struct DropFrame<'a> {
     is_over: &'a AtomicBool,
     interrupt: &'a Interrupt,
@@ -287,52 +294,54 @@ impl TraceStage<'_> {
     /// Its neighbours end when it does: it owns its ends of all channels.
     fn run(
         &self,
-        loaded: Receiver<InHand<LoadedFrame>>,
+        loaded: Receiver<ClaimedFrame<LoadedFrame>>,
         spare: Receiver<Film>,
         is_built: Option<SyncSender<()>>,
-        next: SyncSender<InHand<TracedFrame>>,
+        next: SyncSender<ClaimedFrame<TracedFrame>>,
     ) {
         let mut tracer = renderer_of(self.setup.picture.renderer);
-        let mut told = Told::default();
-        for InHand { claim, passed } in loaded {
-            // A frame that was only read when the interrupt came is dropped, not begun.
+        let mut reported = ReportedNotes::default();
+        for ClaimedFrame { claim, result } in loaded {
+            // A frame that has only been read when the interrupt comes is dropped.
             if self.interrupt.is_raised() {
                 return;
             }
-            let (task, built) = match passed {
-                Passed::Frame(frame) => {
+            // Build the tree, and let the next frame be read
+            let (task, built) = match result {
+                StageResult::Frame(frame) => {
                     let task = frame.task.clone();
                     (self.watch)(Event::Entered(task.frame, Stage::Trace));
                     let build = || tracer.prepare(self.setup, frame);
                     (task, guarded(|| in_pool(build).map_err(|e| e.to_string())))
                 }
-                Passed::Failed(task, reason) => (task, Err(reason)),
+                StageResult::Failed(task, reason) => (task, Err(reason)),
             };
             if let Some(is_built) = &is_built {
-                // Who reads may have ended by now.
+                // The reader may have ended.
                 let _ = is_built.send(());
             }
+            // Trace the image, in the planes of an earlier one
             let traced = built.and_then(|mut frame| {
-                told.tell(std::mem::take(&mut frame.notes), self.watch);
+                reported.report_new(std::mem::take(&mut frame.notes), self.watch);
                 if let Ok(film) = spare.try_recv() {
                     tracer.recycle(film);
                 }
                 let trace = || tracer.render(self.setup, frame, &self.stop);
                 guarded(|| in_pool(trace).map_err(|e| e.to_string()))
             });
-            let passed = match traced {
-                Ok(traced) => Passed::Frame(traced),
+            let result = match traced {
+                Ok(traced) => StageResult::Frame(traced),
                 Err(_) if self.stop.is_raised() => return,
                 Err(reason) => {
-                    // Whatever happened may have left the buffers half filled.
+                    // The failure may have left its buffers in an invalid state.
                     tracer = renderer_of(self.setup.picture.renderer);
-                    Passed::Failed(task, reason)
+                    StageResult::Failed(task, reason)
                 }
             };
             if is_built.is_none() {
                 tracer = renderer_of(self.setup.picture.renderer);
             }
-            if next.send(InHand { claim, passed }).is_err() {
+            if next.send(ClaimedFrame { claim, result }).is_err() {
                 return;
             }
         }

@@ -1,11 +1,11 @@
-//! How much memory a job will take: the one model behind `--memory-limit`, `check` and the refusal
-//! of frames and images that cannot fit.
+//! Predicts the memory of a job: the model behind `--memory-limit`, `check`, and the rejection of frames and images
+//! that cannot fit.
 //!
-//! It adds up what the stages hold at once (see the module above): while the tree over frame i is
-//! built, frame i-1 is encoded and the planes of frame i-2 are there for frame i; while frame i is traced, frame
-//! i+1 is read and frame i-1 may still be encoded. What is counted is anonymous memory, not the pages of
-//! mapped files. Particle counts of frames that nobody has looked at are estimated from the length of
-//! their files and the frame that the survey found heaviest. Native frames that are traced where they lie take next to nothing.
+//! It adds up what the stages hold at the same time (see the parent module). While the tree of frame i is built,
+//! frame i-1 is encoded, and the planes of frame i-2 are kept for frame i. While frame i is traced, frame i+1 is
+//! read, and frame i-1 may still be encoded. Only anonymous memory counts, not the pages of mapped files. Particle
+//! counts of frames that have not been opened are estimated from the length of their files and the heaviest frame of
+//! the survey. Native frames that are traced in place need almost no memory.
 
 use std::fmt;
 
@@ -23,25 +23,25 @@ use crate::render::{Film, scratch_bytes};
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
 
-/// What a frame is thought to weigh before it is read; all but the counts in bytes.
+/// Estimated size of a frame before it is read; everything except counts in bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct FrameSize {
-    /// Particles.
+    /// Particle count.
     pub particles: u64,
-    /// The largest of its files, uncompressed.
+    /// Size of its largest file, uncompressed.
     pub content: u64,
-    /// The numbers read from them.
+    /// Size of the numbers in its files.
     pub raw: u64,
-    /// The positions among those.
+    /// Size of the positions among them.
     pub positions: u64,
-    /// Files.
+    /// Number of files.
     pub files: u64,
-    /// Whether its file has other frames too and stays in memory for them.
+    /// Whether its file contains other frames too, and stays in memory for them.
     pub is_shared: bool,
 }
 
 impl FrameSize {
-    /// Of frame `index` of `sequence`, by the length of its files and a known frame.
+    /// Size of frame `index` of `sequence`, from the length of its files and a known frame.
     pub fn of(sequence: &Sequence, index: usize, known: Option<&FrameWeight>) -> Self {
         let sizes = sequence.inputs(index).into_iter().map(unpacked_len);
         let stored = sizes.filter_map(Result::ok).sum();
@@ -50,7 +50,7 @@ impl FrameSize {
         Self::estimate(stored, is_shared, known)
     }
 
-    /// The bytes that reading it goes through: its file, or the numbers in it if they are more.
+    /// Bytes to process when reading: the size of its file, or of the numbers in it if that is larger.
     pub(super) fn read_bytes(&self) -> u64 {
         self.content.max(self.raw)
     }
@@ -60,8 +60,8 @@ impl FrameSize {
         needs_many(self.read_bytes())
     }
 
-    /// Of a frame whose files have `stored` bytes once unpacked, in proportion to a known one. Nothing is
-    /// known in jobs of the first versions: then as for plain single-precision positions.
+    /// Size of a frame with files of `stored` bytes (unpacked), in proportion to a known frame. Jobs of the first
+    /// versions have no known frame; plain single-precision positions are assumed for them.
     pub fn estimate(stored: u64, is_shared: bool, known: Option<&FrameWeight>) -> Self {
         let Some(known) = known.filter(|k| k.stored > 0) else {
             return Self {
@@ -88,28 +88,28 @@ impl FrameSize {
     }
 }
 
-/// Bytes of anonymous memory by what they are for.
+/// Anonymous memory by purpose, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize)]
 pub struct MemoryNeed {
     /// The program and its threads.
     pub program: u64,
-    /// A frame being read: its file, the numbers in it, and what is kept of them.
+    /// Reading a frame: its file, the numbers in it, and the part that is kept.
     pub reading: u64,
-    /// What is kept of the frame in hand beside its tree: colours, ids, velocities; while it is
-    /// built, positions too.
+    /// Particle data of the current frame next to its tree: colours, ids, velocities; positions as well during the
+    /// build.
     pub particles: u64,
-    /// The tree, and what building it takes.
+    /// The tree, and the scratch memory of its build.
     pub tree: u64,
-    /// The surface, apart from the tree.
+    /// The surface, without the tree.
     pub surface: u64,
-    /// The planes of the images being traced and encoded.
+    /// The planes of the images that are traced and encoded.
     pub images: u64,
-    /// What encoding takes beside the planes.
+    /// Encoding, without the planes.
     pub encoding: u64,
 }
 
 impl MemoryNeed {
-    /// All together.
+    /// The sum of all parts.
     pub const fn total(&self) -> u64 {
         self.program
             + self.reading
@@ -154,7 +154,7 @@ impl fmt::Display for MemoryNeed {
     }
 }
 
-/// The need of a job's frames.
+/// Predicts the memory of the frames of a job.
 #[derive(Debug, Clone, Copy)]
 pub struct MemoryModel<'a> {
     setup: &'a Setup,
@@ -164,29 +164,30 @@ pub struct MemoryModel<'a> {
     in_place: bool,
 }
 
-/// Data of the program, its threads' stacks and small allocations; large pieces go back to the system when they are
-/// freed ([`RETURNED`]). Measured on sequences of up to 1e6 particles, by what the other parts leave.
+/// Memory of the program: its data, the stacks of its threads and small allocations; large allocations are returned
+/// to the system when they are freed ([`RETURN_THRESHOLD`]). Measured on sequences of up to 1e6 particles, as the remainder
+/// of the other parts.
 const PROGRAM: u64 = 3 << 20;
-/// The same for each thread.
+/// Additional memory per thread.
 const THREAD: u64 = 256 << 10;
 
-/// Pieces from this size on go back to the system when they are freed: `cli/allocator.rs` sees to that.
-const RETURNED: u64 = 1 << 20;
+/// Allocations of at least this size are returned to the system when they are freed (`cli/allocator.rs`).
+const RETURN_THRESHOLD: u64 = 1 << 20;
 
-/// One particle of so many is taken to be spray.
-const SPRAY_PART: u64 = 10;
+/// One in this many particles is assumed to be spray.
+const PARTICLES_PER_DROP: u64 = 10;
 
-/// What a surface takes apart from the tree.
+/// Memory of a surface, without the tree.
 #[derive(Debug, Clone, Copy, Default)]
 struct SurfaceBytes {
-    /// While it is built.
+    /// During its build.
     building: u64,
-    /// While it is traced.
+    /// During tracing.
     kept: u64,
 }
 
 impl<'a> MemoryModel<'a> {
-    /// For the pictures of `setup`.
+    /// A model for the pictures of `setup`.
     pub fn new(setup: &'a Setup) -> Self {
         let known = setup.run.weight.unwrap_or_default();
         Self {
@@ -202,24 +203,24 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// The most that is held at any time while these frames are rendered in turn.
+    /// Peak memory while these frames are rendered one after another.
     pub fn peak(&self, frames: &[FrameSize]) -> MemoryNeed {
         let mut need = MemoryNeed::default();
         let mut tree = 0;
         for (i, frame) in frames.iter().enumerate() {
-            // Its memory lives on from frame to frame.
+            // The memory of the tree is reused from frame to frame, and never shrinks.
             tree = self.tree(frame).max(tree);
-            need = need.larger(self.around(i, frame, frames.get(i + 1), tree));
+            need = need.larger(self.peak_around(i, frame, frames.get(i + 1), tree));
         }
         need
     }
 
-    /// What a frame needs that is rendered alone.
+    /// Memory for a frame that is rendered alone.
     pub fn alone(&self, frame: &FrameSize) -> MemoryNeed {
         self.peak(std::slice::from_ref(frame))
     }
 
-    /// What reading a frame takes at its peak.
+    /// Peak memory for reading a frame.
     pub fn reading(&self, frame: &FrameSize) -> u64 {
         if self.in_place {
             self.held_file(frame)
@@ -228,7 +229,7 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// The bytes of a native frame where they are not those of a map.
+    /// Bytes of a native frame that is not mapped.
     fn held_file(&self, frame: &FrameSize) -> u64 {
         match self.setup.run.access {
             Access::Map => 0,
@@ -236,36 +237,36 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// What reading a frame into plain particles takes at its peak.
+    /// Peak memory for reading a frame into plain particles.
     pub fn decoding(&self, frame: &FrameSize) -> u64 {
         let n = frame.particles;
-        // Several files are read in turn and then put together.
+        // Several files are read one after another, then combined.
         let files = if frame.files > 1 {
             frame.content.max(frame.raw)
         } else {
             frame.content
         };
         let attributes = frame.raw.saturating_sub(frame.positions);
-        // Double precision is rounded into a copy, single is taken as it is.
+        // Double precision is rounded to a copy, single precision is used as it is.
         let is_double = frame.positions >= 24 * n;
         let rounding = if is_double { frame.raw + 12 * n } else { 0 };
         let shared = if frame.is_shared { frame.content } else { 0 };
-        // One byte each tells which are finite.
+        // One byte per particle marks which are finite.
         let keeping = attributes + self.kept(frame) + n;
         (files + frame.raw).max(shared + rounding.max(keeping))
     }
 
-    /// What the allocator keeps of the memory that a frame was read in, after it is freed: all of it
-    /// if there are only small pieces.
+    /// Memory that the allocator retains after the buffers for reading a frame are freed: all of it, if there are
+    /// only small allocations.
     fn retained(&self, frame: &FrameSize) -> u64 {
-        if frame.content.max(frame.positions) < RETURNED {
+        if frame.content.max(frame.positions) < RETURN_THRESHOLD {
             self.reading(frame)
         } else {
             0
         }
     }
 
-    /// What is kept of a frame that was read, until its tree is built.
+    /// Memory of a frame between reading and the end of its build.
     fn kept(&self, frame: &FrameSize) -> u64 {
         if self.in_place {
             return self.held_file(frame);
@@ -274,14 +275,14 @@ impl<'a> MemoryModel<'a> {
         frame.particles * (12 + radii) + self.shading(frame)
     }
 
-    /// What is kept of it while it is traced.
+    /// Memory of its attributes during tracing.
     fn shading(&self, frame: &FrameSize) -> u64 {
         if self.in_place {
             return self.held_file(frame);
         }
         let channels = self.setup.picture.render.channels;
         let color = self.setup.picture.color.bytes();
-        // Particles that are put elsewhere need a number.
+        // Particles that are moved need an explicit id.
         let ids = channels.id && (self.has_ids || self.setup.picture.surface.spray);
         let each = [
             (true, color),
@@ -297,7 +298,7 @@ impl<'a> MemoryModel<'a> {
             return predicted_stored_bytes(frame.particles);
         }
         let values = self.setup.picture.color.is_by_particle();
-        // A smooth surface has no tree over particles.
+        // A smooth surface needs no tree over particles.
         let particles = match self.setup.picture.surface.kind {
             SurfaceKind::Smooth => 0,
             SurfaceKind::Spheres | SurfaceKind::Union => frame.particles,
@@ -308,7 +309,7 @@ impl<'a> MemoryModel<'a> {
         if !self.setup.picture.surface.spray {
             return build;
         }
-        // Spray is looked for in a tree of its own, in the same memory.
+        // Spray is searched in a separate tree, in the same memory.
         let first = self.plain_tree(frame.particles);
         BuildBytes {
             tree: build.tree.max(first.tree),
@@ -316,16 +317,16 @@ impl<'a> MemoryModel<'a> {
         }
     }
 
-    /// The tree that is soonest built.
+    /// The tree that is fastest to build.
     fn plain_tree(&self, particles: u64) -> BuildBytes {
         let settings = BuildSettings::new(Structure::Lbvh);
         predicted_bytes(&settings, particles, self.own_radii)
     }
 
-    /// The surface over a frame: normals are found hit by hit; spray has a tree, and a smooth surface its grid.
+    /// Memory of the surface of a frame: normals need none, spray has a tree, and a smooth surface has its grid.
     fn surface(&self, frame: &FrameSize) -> SurfaceBytes {
         let spray = if self.setup.picture.surface.spray {
-            self.plain_tree(frame.particles / SPRAY_PART).tree
+            self.plain_tree(frame.particles / PARTICLES_PER_DROP).tree
         } else {
             0
         };
@@ -343,10 +344,10 @@ impl<'a> MemoryModel<'a> {
         self.build(frame).tree
     }
 
-    /// The peak of the time that `frame` is built and traced in memory for a tree of `tree` bytes, with so many
-    /// frames `before`: the image of the last of them is encoded then, that of the one before it is kept for
-    /// this frame's, and the frame `after` is read.
-    fn around(
+    /// Peak memory while `frame` is built and traced, with a tree that occupies `tree` bytes. `before` is the number
+    /// of previous frames: the image of the last one is being encoded, and the image of the one before that is kept
+    /// for reuse. Frame `after` is being read.
+    fn peak_around(
         &self,
         before: usize,
         frame: &FrameSize,
@@ -360,16 +361,17 @@ impl<'a> MemoryModel<'a> {
         let film_kept = if before > 1 { film } else { 0 };
         let encoding_before = if before > 0 { self.encoding() } else { 0 };
         let shared = if frame.is_shared { frame.content } else { 0 };
-        // Those that read, too.
-        let are_twice = [Some(frame), after]
+        // Count the threads, including those for reading
+        let has_read_pool = [Some(frame), after]
             .into_iter()
             .flatten()
             .any(FrameSize::needs_many);
         let idle = MemoryNeed {
-            program: PROGRAM + THREAD * threads * if are_twice { 2 } else { 1 },
+            program: PROGRAM + THREAD * threads * if has_read_pool { 2 } else { 1 },
             reading: shared.max(self.retained(frame)),
             ..MemoryNeed::default()
         };
+        // Add up each phase: reading, building, tracing, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
         let first_read = MemoryNeed {
@@ -378,7 +380,7 @@ impl<'a> MemoryModel<'a> {
         };
         let building = MemoryNeed {
             particles: kept,
-            // They lie in what the allocator keeps.
+            // The kept data are in the memory that the allocator retains.
             reading: shared.max(self.retained(frame).saturating_sub(kept)),
             tree: tree + self.build(frame).scratch,
             surface: surface.building,
@@ -403,7 +405,7 @@ impl<'a> MemoryModel<'a> {
         first_read.larger(building).larger(tracing).larger(encoding)
     }
 
-    /// What a thread takes while it traces.
+    /// Memory of a thread during tracing.
     fn tracing_scratch(&self) -> u64 {
         let is_body = self.setup.picture.surface.kind != SurfaceKind::Spheres;
         scratch_bytes(
@@ -413,36 +415,36 @@ impl<'a> MemoryModel<'a> {
         )
     }
 
-    /// What encoding an image takes beside its planes: the bands that are packed just then, or wait to be
-    /// written; or, before, the bytes of the preview plain, filtered and compressed.
+    /// Memory for encoding an image, without its planes: the bands that are being compressed or wait to be written;
+    /// or, before that, the bytes of the preview: plain, filtered and compressed.
     fn encoding(&self) -> u64 {
         let render = &self.setup.picture.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
         let film = Film::bytes_for(render.width, render.height, render.channels);
-        // Bands have 32 rows at most, blocks that pack well 16. Colours are kept in half precision.
+        // Bands have 32 rows at most, and 16 for compression methods with large blocks. Colours are in half precision.
         let band = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
         let threads = rayon::current_num_threads() as u64;
-        // Each thread packs one, and some are packed, at worst as large as they were.
+        // Each thread compresses one band, and some compressed bands wait, at worst at their original size.
         let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
         (9 * pixels).max(bands)
     }
 }
 
-/// A sorted particle with its volume and its share of the bins, as few as they are.
-const SORTED: f64 = 17.0;
-/// Its way back to attributes.
-const WAY_BACK: f64 = 4.0;
-/// Bytes of the grid that particles at the surface have each, voxels being as large as radii; and beside that
-/// of the field that bricks are made of. Measured on splashing dam breaks of 1e4 and 2e4 particles; a calm
-/// block needs a third to a half.
-const GRID: f64 = 5000.0;
-const FIELD: f64 = 3500.0;
-/// Most of the grid that one particle can have: one that is alone in the corner of eight bricks.
-const MOST_GRID: f64 = 22_000.0;
+/// Bytes of a sorted particle, with its volume and its share of the bins.
+const SORTED_BYTES: f64 = 17.0;
+/// Bytes of its index, for attributes.
+const INDEX_BYTES: f64 = 4.0;
+/// Bytes of the grid per particle at the surface, for voxels of the size of the radius. Measured on splashing dam
+/// breaks of 1e4 and 2e4 particles; a calm block needs a third to a half.
+const GRID_BYTES: f64 = 5000.0;
+/// Additional bytes of the field from which bricks are made, measured in the same way.
+const FIELD_BYTES: f64 = 3500.0;
+/// Maximum bytes of the grid per particle: an isolated particle at the common corner of eight bricks.
+const MAX_GRID_BYTES: f64 = 22_000.0;
 
-/// What a smooth surface takes over particles that splash, as they do in most frames. Of so many in a body a
-/// part lies at its surface that goes down with their cubic root. Too small a radius makes all of them lie at a
-/// surface of their own: that is found out, and refused, when the grid is planned.
+/// Memory of a smooth surface of splashing particles, which are in most frames. The fraction of the particles that is
+/// at the surface of a body decreases with the cube root of their number. With a radius that is too small, all of
+/// them are at a surface of their own; that is detected and rejected when the grid is planned.
 fn smooth_bytes(setup: &Setup, particles: u64) -> SurfaceBytes {
     let surface = &setup.picture.surface;
     let channels = setup.picture.render.channels;
@@ -451,9 +453,9 @@ fn smooth_bytes(setup: &Setup, particles: u64) -> SurfaceBytes {
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]
     let count = particles as f64;
     let voxels = f64::from(surface.voxel).powi(-2) / count.cbrt().max(1.0);
-    let grid = count * (GRID * voxels).min(MOST_GRID);
-    let field = count * (FIELD * voxels).min(MOST_GRID);
-    let sorted = count * (SORTED + if keeps { WAY_BACK } else { 0.0 });
+    let grid = count * (GRID_BYTES * voxels).min(MAX_GRID_BYTES);
+    let field = count * (FIELD_BYTES * voxels).min(MAX_GRID_BYTES);
+    let sorted = count * (SORTED_BYTES + if keeps { INDEX_BYTES } else { 0.0 });
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,

@@ -1,4 +1,4 @@
-//! The model against itself; `tests/suite/memory` compares it with what is measured.
+//! Tests of the model alone; `tests/suite/memory` compares it with measurements.
 
 use super::*;
 use crate::pipeline::Overlap;
@@ -35,7 +35,7 @@ fn more_of_anything_needs_more() {
     let total = |frames: &[FrameSize]| model.peak(frames).total();
     assert!(total(&[plain(4_000_000)]) < total(&[plain(8_000_000)]));
     assert!(total(&[plain(8_000_000)]) < total(&[plain(8_000_000); 2]));
-    // Memory is flat over a sequence.
+    // Memory is constant over a sequence.
     assert_eq!(
         total(&[plain(8_000_000); 3]),
         total(&[plain(8_000_000); 30])
@@ -59,7 +59,7 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
     finer.picture.surface.voxel = 0.5;
     assert!(need(&finer, 1_000_000).surface > 2 * some.surface);
     finer.picture.surface.voxel = 0.25;
-    // Too little to be of the moment at which the job takes most.
+    // Too little to affect the peak.
     let few = smooth_bytes(&finer, 1).building;
     assert!((1 << 10..1 << 16).contains(&few), "{few}");
     assert_eq!(need(&smooth, 0).surface, 0);
@@ -86,7 +86,7 @@ fn limits_leave_out_what_does_not_fit_alone() {
     let schedule = model.schedule(&[frames[1]; 2], Some(alone), None);
     assert_eq!(schedule.overlap, Overlap::None);
     assert_eq!(schedule.need.total(), alone);
-    // Less is free: nothing is refused for that here, frames only go alone.
+    // With less free memory, no frame is rejected here; they only do not overlap.
     let schedule = model.schedule(&frames, None, Some(alone / 2));
     assert!(schedule.too_large.is_empty() && schedule.overlap == Overlap::None);
 }

@@ -1,9 +1,9 @@
-//! How long a job will take, from a small measurement: the heaviest frame and a few others are read and built as they
-//! will be, and a part of the tiles of their images is traced.
+//! Estimates the time of a job from a small measurement: the heaviest frame and a few others are read and built in
+//! full, and a part of the tiles of their images is traced.
 //!
-//! An estimate. It assumes that reading and building grow with the size of the files, that the frames that were tried
-//! stand for the others, and that the machine stays as busy as it is now. Tracing has a time box: if not even the
-//! smallest trial ends within it, the result is a lower bound.
+//! The estimate assumes that the time of reading and building is proportional to the size of the files, that the
+//! measured frames are representative, and that the load of the machine does not change. Tracing has a time box: if
+//! not even the smallest trial finishes in time, the result is a lower bound.
 
 use std::time::{Duration, Instant};
 
@@ -18,46 +18,45 @@ use super::{
 use crate::output::{encode_exr, encode_preview};
 use crate::render::{Deadline, Film, RenderError};
 
-/// Pixels across of the first mosaic of tiles that is tried; each further one has twice as many.
+/// Width in pixels of the first mosaic of tiles; each further one is twice as wide.
 const FIRST_WIDTH: u32 = 32;
-/// Tracing that takes so many seconds is measured well enough,
-const ENOUGH: f64 = 0.15;
-/// and so many pixels stand for the image well enough, wherever the particles are in it: 200 tiles.
-const ENOUGH_PIXELS: u32 = 51_200;
-/// Samples a pixel on trial, at most. The rays of more samples do not cost less, and the rays that are followed in a
-/// connected body are the same.
-const MOST_SAMPLES: u32 = 96;
-/// Frames beside the heaviest one are tried until so much time has passed.
+/// Minimum tracing time of a sufficient trial, seconds.
+const MIN_SECONDS: f64 = 0.15;
+/// Minimum number of pixels of a sufficient trial: 200 tiles represent the image wherever the particles are in it.
+const MIN_PIXELS: u32 = 51_200;
+/// Maximum number of samples per pixel in a trial. The cost per ray does not decrease with more samples, and in a
+/// connected body the same rays are traced.
+const MAX_SAMPLES: u32 = 96;
+/// Time after which no further frames are measured.
 const TIME_FOR_OTHERS: Duration = Duration::from_secs(2);
 
-/// What one frame takes, seconds; bytes of its image.
+/// Measured or estimated time of one frame, seconds, and the size of its image, bytes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Probe {
     /// The heaviest frame.
     pub frame: i64,
-    /// Its particles.
+    /// Its particle count.
     pub particles: u64,
-    /// Reading it, measured.
+    /// Time of reading it, measured.
     pub read: f64,
-    /// Building the tree and the surface, measured.
+    /// Time of building its tree and surface, measured.
     pub build: f64,
-    /// Frames whose images were traced in part. The figures below are means over the frames that are spread over the
-    /// job. If there are none, they are those of the heaviest frame.
+    /// Number of frames with a traced trial. The following values are means over frames that are distributed over the
+    /// job; without any, they are those of the heaviest frame.
     pub frames: u32,
-    /// Tracing, estimated.
+    /// Time of tracing, estimated.
     pub trace: f64,
-    /// Encoding on one thread, estimated.
+    /// Time of encoding on one thread, estimated.
     pub encode: f64,
-    /// Bytes of the images, estimated.
+    /// Size of the images, estimated.
     pub image_bytes: f64,
-    /// The part of the camera rays that were traced.
+    /// Fraction of the camera rays that were traced.
     pub traced_part: f64,
-    /// Whether the time for the measurement was over before the smallest mosaic was traced, so that tracing takes
-    /// longer than estimated.
+    /// Whether the time box ended before the smallest mosaic was traced, so that tracing takes longer than estimated.
     pub is_lower_bound: bool,
 }
 
-/// A mosaic of an image that was tried.
+/// A traced mosaic of an image.
 struct Trial {
     setup: Setup,
     film: Film,
@@ -65,7 +64,7 @@ struct Trial {
     is_interrupted: bool,
 }
 
-/// What one image takes, seconds, and its bytes.
+/// Time of one image, seconds, and its size, bytes.
 #[derive(Debug, Clone, Copy, Default)]
 struct ImageCost {
     trace: f64,
@@ -73,11 +72,10 @@ struct ImageCost {
     bytes: f64,
 }
 
-/// Measures the frame of `heaviest`, and the images of `others` as long as that does not take long; among these, the
-/// first ones are tried first.
+/// Measures the frame of `heaviest`, and the images of `others` in their order, as long as time permits.
 ///
 /// # Errors
-/// Why the heaviest frame cannot be rendered.
+/// The reason why the heaviest frame cannot be rendered.
 pub fn probe(
     setup: &Setup,
     sequence: &Sequence,
@@ -87,7 +85,7 @@ pub fn probe(
     probe_for(Probe::TIME_BOX, setup, sequence, heaviest, others)
 }
 
-/// As [`probe`], with no more than `time_box` to trace the heaviest frame in.
+/// Same as [`probe`], with at most `time_box` for tracing the heaviest frame.
 fn probe_for(
     time_box: Duration,
     setup: &Setup,
@@ -108,7 +106,7 @@ fn probe_for(
     };
     let mut costs = Vec::new();
 
-    // Measure others, in memory that is free again
+    // Measure other frames, after the memory of the first one has been freed
     for task in others.iter().filter(|_| traced_part.is_some()) {
         if start.elapsed() > TIME_FOR_OTHERS {
             break;
@@ -120,6 +118,7 @@ fn probe_for(
         let trial = trial.ok().filter(|trial| !trial.is_interrupted);
         costs.extend(trial.and_then(|trial| trial.cost(setup, task).ok()));
     }
+    // Average the costs
     let frames = 1 + u32::try_from(costs.len()).unwrap_or(0);
     if costs.is_empty() {
         costs.push(first);
@@ -150,8 +149,8 @@ fn prepare(
     renderer.prepare(setup, loaded).map_err(|e| e.to_string())
 }
 
-/// Traces larger and larger mosaics of the image of `frame` until one tells enough. Returns the last one that ended
-/// before `deadline`, or the first one.
+/// Traces mosaics of the image of `frame` with increasing size until one is sufficient. Returns the last one that
+/// finished before `deadline`, or the first one.
 fn largest_trial(
     renderer: &dyn FrameRenderer,
     setup: &Setup,
@@ -162,15 +161,17 @@ fn largest_trial(
     let mut width = FIRST_WIDTH.min(full.width);
     let mut last: Option<Trial> = None;
     loop {
+        // Trace a mosaic with the aspect ratio of the image
         let height = u64::from(full.height) * u64::from(width) / u64::from(full.width);
         let height = u32::try_from(height).unwrap_or(full.height).max(1);
         let trial = Trial::of(renderer, setup, frame, [width, height], deadline)?;
         if trial.is_interrupted {
             return Ok(last.unwrap_or(trial));
         }
-        let tells_enough = trial.seconds > ENOUGH && width * height >= ENOUGH_PIXELS;
+        // Stop if it is sufficient, or if the next one would not finish in time
+        let is_sufficient = trial.seconds > MIN_SECONDS && width * height >= MIN_PIXELS;
         let next_ends = Instant::now() + Duration::from_secs_f64(4.0 * trial.seconds) < deadline;
-        if tells_enough || !next_ends || 2 * width > full.width {
+        if is_sufficient || !next_ends || 2 * width > full.width {
             return Ok(trial);
         }
         last = Some(trial);
@@ -187,11 +188,12 @@ impl Trial {
         [width, height]: [u32; 2],
         deadline: Instant,
     ) -> Result<Self, String> {
+        // Set up the mosaic
         let mut setup = setup.clone();
         let settings = &mut setup.picture.render;
         settings.mosaic_of = Some([settings.width, settings.height]);
         (settings.width, settings.height) = (width, height);
-        settings.samples = settings.samples.min(MOST_SAMPLES);
+        settings.samples = settings.samples.min(MAX_SAMPLES);
         let channels = settings.channels;
         let start = Instant::now();
         let traced = renderer.image(&setup, frame, &Deadline(deadline));
@@ -211,22 +213,22 @@ impl Trial {
         })
     }
 
-    /// The part of the pixels of the full image.
+    /// Fraction of the pixels of the full image.
     fn pixels(&self, full: &Setup) -> f64 {
         let pixels = |width: u32, height: u32| f64::from(width) * f64::from(height);
         let full = &full.picture.render;
         pixels(self.film.width, self.film.height) / pixels(full.width, full.height)
     }
 
-    /// The part of the camera rays of the full image.
+    /// Fraction of the camera rays of the full image.
     fn part(&self, full: &Setup) -> f64 {
         let samples = f64::from(self.setup.picture.render.samples);
         self.pixels(full) * samples / f64::from(full.picture.render.samples)
     }
 
-    /// What the full image takes by this one.
+    /// Estimated cost of the full image.
     fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, String> {
-        // Beside a pool that traces, one thread encodes.
+        // Images are encoded by one thread while the pool traces, so measure with one thread.
         let pool = ThreadPoolBuilder::new().num_threads(1).build();
         let pool = pool.map_err(|e| e.to_string())?;
         let start = Instant::now();
@@ -248,11 +250,12 @@ impl Trial {
 }
 
 impl Probe {
-    /// Tracing on trial takes no longer than this for a frame.
+    /// Maximum time of tracing trials per frame.
     pub const TIME_BOX: Duration = Duration::from_secs(3);
 
-    /// The time for frames of these sizes on `threads` threads, seconds. `probed` is the size of the heaviest frame.
-    /// Tracing and encoding share the threads. Where frames overlap, all frames but the first are read meanwhile.
+    /// Estimated time for frames of these sizes on `threads` threads, seconds. `probed` is the size of the heaviest
+    /// frame. Tracing and encoding share the threads. If frames overlap, all frames except the first are read in the
+    /// meantime.
     pub fn seconds_for(
         &self,
         frames: &[FrameSize],

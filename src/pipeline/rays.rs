@@ -1,12 +1,12 @@
-//! How many rays an image will take, before it is traced: enough to choose a tree by.
+//! Estimates the number of rays of an image, as needed to choose a tree.
 
 use super::Setup;
 
-/// Part of the rays that is taken to meet a particle; in the thesis's picture it is 0.3 of the
-/// primary and 0.6 of the mirrored rays.
-const HIT_PART: f64 = 0.4;
+/// Assumed fraction of rays that hit a particle; in the thesis's picture it is 0.3 of the primary and 0.6 of the
+/// reflected rays.
+const HIT_FRACTION: f64 = 0.4;
 
-/// Rays of one image.
+/// Estimated number of rays of one image.
 pub(super) fn expected_rays(setup: &Setup) -> f64 {
     let (image, scene) = (&setup.picture.render, &setup.picture.scene);
     let paths = f64::from(image.width) * f64::from(image.height) * f64::from(image.samples);
@@ -18,12 +18,12 @@ pub(super) fn expected_rays(setup: &Setup) -> f64 {
     paths * rays_per_path(scene.lights.len(), branches, image.max_depth)
 }
 
-/// A ray, and where it hits a shadow ray for each light and `branches` rays that go on, to `depth`
-/// levels.
+/// Number of rays per path up to `depth` levels: a ray, and for each hit a shadow ray per light and `branches`
+/// further rays.
 fn rays_per_path(lights: usize, branches: usize, depth: u32) -> f64 {
     let mut below = 0.0;
     for _ in 0..depth {
-        below = 1.0 + HIT_PART * (lights as f64 + branches as f64 * below);
+        below = 1.0 + HIT_FRACTION * (lights as f64 + branches as f64 * below);
     }
     below
 }

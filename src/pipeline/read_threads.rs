@@ -1,30 +1,30 @@
-//! The threads that read frames, apart from those that trace.
+//! Threads for reading frames, separate from those that trace.
 //!
-//! Readers work in parallel. In the pool that traces, their work would wait until a thread runs out of tiles: a
-//! frame that takes milliseconds to read would be ready when the image before it is. In a pool of their own it
-//! begins at once. What is read does not depend on the pool.
+//! Readers work in parallel. In the pool that traces, their tasks would wait until a thread runs out of tiles: a
+//! frame that takes milliseconds to read would be ready only when the previous image is. In a separate pool they
+//! start immediately. The data do not depend on the pool.
 
 use std::sync::OnceLock;
 
 use rayon::{Scope, ThreadPool, ThreadPoolBuilder};
 
-/// Bytes of a frame from which on all processors are worth their threads; 32 MiB of positions take one thread
-/// some 20 ms, the same of text about 300 ms.
+/// Frames of at least this size, bytes, are read by many threads; 32 MiB of positions take one thread about 20 ms,
+/// the same amount of text about 300 ms.
 const LARGE: u64 = 32 << 20;
 
 /// Threads for reading.
 #[derive(Debug)]
 pub(super) struct ReadThreads {
-    /// The one thread of the first stage.
+    /// The single thread of the first stage.
     one: ThreadPool,
-    /// As many as trace, once a large frame comes. None if the system has no more threads.
+    /// As many threads as trace, started for the first large frame. None if the system has no more threads.
     many: OnceLock<Option<ThreadPool>>,
-    /// How many trace.
+    /// Number of threads that trace.
     tracing: usize,
 }
 
 impl ReadThreads {
-    /// Starts the thread of the first stage. The current pool is the one that traces.
+    /// Starts the thread of the first stage. The current pool must be the one that traces.
     ///
     /// # Panics
     /// If the system has no thread left, as [`std::thread::spawn`] does.
@@ -37,12 +37,14 @@ impl ReadThreads {
         }
     }
 
-    /// Runs `work` here; what it spawns runs on the thread of the first stage, and has ended on return.
+    /// Runs `work` on the current thread; tasks that it spawns run on the thread of the first stage, and have
+    /// finished on return.
     pub(super) fn scope<'scope, T>(&self, work: impl FnOnce(&Scope<'scope>) -> T) -> T {
         self.one.in_place_scope(work)
     }
 
-    /// Reads a frame of `bytes` by `read`, on the thread of the first stage, which must call, or on many.
+    /// Reads a frame of `bytes` with `read`, on the thread of the first stage, which must be the caller, or on many
+    /// threads.
     pub(super) fn read<T: Send>(&self, bytes: u64, read: impl FnOnce() -> T + Send) -> T {
         if !needs_many(bytes) {
             return read();
@@ -84,7 +86,7 @@ mod tests {
                 let _ = ends.lock().map(|ends| ends.recv());
             });
         }
-        // Would never return if it took a thread of that pool.
+        // Would never return if it needed a thread of that pool.
         for bytes in [1, LARGE] {
             let threads = ReadThreads::new();
             let mut sum = 0_u64;

@@ -1,4 +1,4 @@
-//! The seam between the stages of a run and whatever makes their images.
+//! The interface between the stages of a run and the renderer.
 
 use std::path::PathBuf;
 
@@ -16,10 +16,10 @@ use crate::report::FrameReport;
 use crate::scene::{Camera, CameraError};
 use crate::surface::smooth::SmoothError;
 
-/// Why there is no image of a frame that was read.
+/// Reasons why there is no image of a frame that was read.
 #[derive(Debug, thiserror::Error)]
 pub enum TraceError {
-    /// Rendering was interrupted, or a setting makes no image.
+    /// Rendering was interrupted, or a setting is invalid.
     #[error(transparent)]
     Render(#[from] RenderError),
     /// The nodes of a native frame cannot be traced.
@@ -27,73 +27,74 @@ pub enum TraceError {
     Stored {
         /// The frame.
         path: PathBuf,
-        /// What is wrong with it.
+        /// The fault.
         fault: StoredFault,
     },
     /// A native frame changed while it was traced, or cannot be used on this machine.
     #[error(transparent)]
     File(#[from] FrameError),
-    /// The surface would not fit into memory.
+    /// The surface does not fit into memory.
     #[error(transparent)]
     Surface(#[from] SmoothError),
-    /// There is no picture from where the camera is.
+    /// The camera is invalid.
     #[error("camera: {0}")]
     Camera(#[from] CameraError),
 }
 
-/// An image in memory.
+/// A frame with its image in memory.
 #[derive(Debug)]
 pub struct TracedFrame {
-    /// What it is.
+    /// The task.
     pub task: ImageTask,
-    /// Where it was taken from.
+    /// The camera of the image.
     pub camera: Camera,
     /// The planes.
     pub film: Film,
     /// Simulation time, if known.
     pub time: Option<f64>,
-    /// The report so far.
+    /// The report, without encoding.
     pub report: FrameReport,
-    /// Memory when the image was finished and everything it was made of still there.
+    /// Memory in use when the image was finished, before anything was freed.
     pub memory: MemoryUse,
 }
 
-/// A frame whose tree stands in the tracer; what shading needs beside it.
+/// A frame whose tree is in the renderer, with the other data for shading.
 #[derive(Debug)]
 pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
     pub(super) time: Option<f64>,
     pub(super) report: FrameReport,
-    /// What the user should know of it.
+    /// Notes for the user.
     pub(super) notes: Vec<String>,
 }
 
-/// What is left of a frame's particles beside the tree.
+/// Particle data that are not part of the tree.
 #[derive(Debug)]
 pub(super) enum BuiltParticles {
-    /// The tree has copied the rest.
+    /// Attributes; the tree has a copy of the rest.
     Decoded(DecodedShading),
-    /// All of it: the tree's leaves are here.
+    /// The frame itself, whose leaves the tree uses.
     Stored(StoredFrame),
 }
 
-/// Makes the images of frames, one after the other, with memory that lives on from frame to frame.
+/// Renders frames one after another, with memory that is reused from frame to frame.
 ///
-/// A renderer takes particles as they were read and builds whatever it needs over them. Nodes, blocks of particles,
-/// lights, materials and camera are plain arrays and structures, which a device can be handed as they are.
+/// A renderer receives particles as they were read, and builds its own data structures over them. Nodes, blocks of
+/// particles, lights, materials and camera are plain arrays and structures that can be passed to a device as they
+/// are.
 pub trait FrameRenderer: Send + Sync {
-    /// Builds what `frame` is rendered from. Positions in memory are let go once they are not needed any more.
+    /// Builds the data structures to render `frame`. Positions in memory are released when they are no longer needed.
     ///
     /// # Errors
-    /// The frame cannot be rendered: damaged nodes, a surface that does not fit.
+    /// The frame cannot be rendered: damaged nodes, or a surface that does not fit.
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError>;
 
-    /// Renders `frame`, the one that was prepared last.
+    /// Renders `frame`, which must be the one prepared last.
     ///
     /// # Errors
-    /// [`crate::render::RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame changed
-    /// meanwhile; the others are settings that were checked before.
+    /// [`crate::render::RenderError::Interrupted`] if `stop` is raised, [`TraceError::File`] if a native frame
+    /// changed in the meantime; all other errors are of settings that are checked in advance.
     fn render(
         &mut self,
         setup: &Setup,
@@ -101,10 +102,10 @@ pub trait FrameRenderer: Send + Sync {
         stop: &dyn Stop,
     ) -> Result<TracedFrame, TraceError>;
 
-    /// Only the planes of `frame`, the one that was prepared last.
+    /// Renders only the planes of `frame`, which must be the one prepared last.
     ///
     /// # Errors
-    /// As [`Self::render`].
+    /// Same as [`Self::render`].
     fn image(
         &self,
         setup: &Setup,
@@ -112,6 +113,6 @@ pub trait FrameRenderer: Send + Sync {
         stop: &dyn Stop,
     ) -> Result<(Film, RayCounts), TraceError>;
 
-    /// Takes the planes of an image that nobody needs any more for the next one.
+    /// Takes planes that are no longer needed, for reuse by the next image.
     fn recycle(&mut self, film: Film);
 }

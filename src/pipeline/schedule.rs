@@ -1,32 +1,31 @@
-//! How a job's frames go through memory: side by side, one at a time, or not at all.
+//! Schedules the frames of a job within memory: overlapping, one at a time, or not at all.
 
 use super::predict::{FrameSize, MemoryModel, MemoryNeed};
 
-/// Whether frames are in flight beside one another.
+/// Whether several frames are in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Overlap {
-    /// One in each stage: the fastest.
+    /// One frame per stage: the fastest.
     #[default]
     Stages,
-    /// One at all: the least memory.
+    /// One frame in total: the least memory.
     None,
 }
 
-/// How a job's frames go through memory.
+/// A schedule for the frames of a job.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Schedule {
-    /// The peak, over the frames that are not left out.
+    /// The peak memory of all frames that fit.
     pub need: MemoryNeed,
-    /// Whether they go beside one another.
+    /// Whether frames overlap.
     pub overlap: Overlap,
-    /// Frames that do not fit, by their place among those asked about, and what they need.
+    /// Frames that do not fit, by their index in the input, with the memory that they need.
     pub too_large: Vec<(usize, MemoryNeed)>,
 }
 
 impl MemoryModel<'_> {
-    /// How to stay within `limit`: frames that do not fit even alone are left out, and the others
-    /// go one at a time if they do not fit side by side. Going on beside one another is also given
-    /// up where it would take more than is `free`.
+    /// A schedule within `limit`. Frames that do not even fit alone are excluded. The others are rendered one at a
+    /// time if they do not fit overlapping, or if overlapping needs more memory than is `free`.
     pub fn schedule(
         &self,
         frames: &[FrameSize],
@@ -35,18 +34,20 @@ impl MemoryModel<'_> {
     ) -> Schedule {
         let mut too_large = Vec::new();
         let mut fitting = Vec::new();
-        for (place, frame) in frames.iter().enumerate() {
+        // Exclude frames that do not fit alone
+        for (index, frame) in frames.iter().enumerate() {
             let need = self.alone(frame);
             if limit.is_some_and(|limit| need.total() > limit) {
-                too_large.push((place, need));
+                too_large.push((index, need));
             } else {
                 fitting.push(*frame);
             }
         }
-        let beside = self.peak(&fitting);
+        // Overlap the others if that fits
+        let overlapping = self.peak(&fitting);
         let bound = limit.unwrap_or(u64::MAX).min(free.unwrap_or(u64::MAX));
-        let (overlap, need) = if beside.total() <= bound {
-            (Overlap::Stages, beside)
+        let (overlap, need) = if overlapping.total() <= bound {
+            (Overlap::Stages, overlapping)
         } else {
             let alone = fitting.iter().map(|frame| self.alone(frame));
             let need = alone.fold(MemoryNeed::default(), MemoryNeed::larger);

@@ -1,4 +1,4 @@
-//! Everything about a job's pictures: what is the same for every frame, and where the camera is at each.
+//! The settings of the pictures of a job: everything that is the same for all frames, and the camera path.
 
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
@@ -11,28 +11,28 @@ use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
-/// Where radii come from.
+/// Source of the radii.
 #[derive(Debug, Clone, PartialEq)]
 pub enum RadiusRule {
-    /// What the frame brings, or this where it brings none.
+    /// The radii of the frame, or this one if it has none.
     FileOr(f32),
-    /// One for all.
+    /// One radius for all particles.
     Common(f32),
     /// A scalar attribute times a factor.
     Attribute {
-        /// Its name.
+        /// Name of the attribute.
         name: String,
         /// The factor.
         scale: f32,
     },
 }
 
-/// Where base colours come from.
+/// Source of the base colours.
 #[derive(Debug, Clone)]
 pub enum ColorRule {
-    /// One for all, linear RGB.
+    /// One colour for all particles, linear RGB.
     Constant(Vec3),
-    /// An attribute whose values are colours.
+    /// An attribute with colours.
     Rgb {
         /// Its name.
         name: String,
@@ -52,12 +52,12 @@ pub enum ColorRule {
 }
 
 impl ColorRule {
-    /// Whether particles have colours of their own, so that they must be told apart.
+    /// Whether particles have individual colours, so that their indices are needed.
     pub const fn is_by_particle(&self) -> bool {
         !matches!(self, Self::Constant(_))
     }
 
-    /// Bytes that a decoded particle has for its colour.
+    /// Bytes per decoded particle for its colour.
     pub(super) const fn bytes(&self) -> u64 {
         match self {
             Self::Constant(_) => 0,
@@ -67,62 +67,62 @@ impl ColorRule {
     }
 }
 
-/// A job: what is drawn, and how the run goes.
+/// The settings of a job: its pictures, and the execution of a run.
 #[derive(Debug, Clone)]
 pub struct Setup {
-    /// What every image depends on.
+    /// Settings that all images depend on.
     pub picture: Picture,
-    /// What images do not depend on.
+    /// Settings that images do not depend on.
     pub run: RunSettings,
 }
 
-/// The pictures of a job.
+/// Settings of the pictures of a job.
 #[derive(Debug, Clone)]
 pub struct Picture {
     /// World position that all coordinates are relative to.
     pub origin: DVec3,
-    /// Radii under this cannot be told from nothing and are raised to it.
+    /// Minimum radius; smaller ones would be invisible, and are raised to it.
     pub least_radius: f32,
-    /// Where radii come from.
+    /// Source of the radii.
     pub radius: RadiusRule,
-    /// Where colours come from.
+    /// Source of the colours.
     pub color: ColorRule,
-    /// Where the camera is at each frame, world units.
+    /// The camera path, in world units.
     pub path: CameraPath,
-    /// Width over height of the images, also where fewer pixels are traced on trial.
+    /// Width of the images divided by their height; also used if fewer pixels are traced in a trial.
     pub aspect: f64,
-    /// Lights, material, background, ground; its camera is that of the path's start. What a frame is traced
-    /// in is [`Setup::scene_at`].
+    /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
+    /// the scene of a frame.
     pub scene: Scene,
-    /// Who renders.
+    /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
-    /// What rays meet.
+    /// The surface.
     pub surface: SurfaceSettings,
-    /// How the EXR is written; the camera comes with the frame.
+    /// Options of the EXR; the camera is added for each frame.
     pub exr: ExrOptions,
-    /// How the PNG is made; [`Setup::preview_from`] adds what lies behind.
+    /// Options of the PNG; [`Setup::preview_from`] adds the background.
     pub preview: PreviewOptions,
 }
 
-/// How a run goes about its pictures.
+/// Execution options of a run.
 #[derive(Debug, Clone)]
 pub struct RunSettings {
-    /// Most memory that the job may take, bytes; None is what is free.
+    /// Memory limit of the job, bytes; by default the free memory.
     pub memory_limit: Option<u64>,
-    /// Who builds the tree; None chooses by the frame.
+    /// The structure of the tree; by default it is chosen for each frame.
     pub accelerator: Option<Structure>,
-    /// What `bvh` is told.
+    /// Settings of `bvh`.
     pub bvh: BvhSettings,
-    /// What `sbvh` is told.
+    /// Settings of `sbvh`.
     pub sbvh: SbvhSettings,
-    /// How the bytes of native frames come into memory.
+    /// How native frames are accessed.
     pub access: Access,
-    /// Whether all that is used of native frames is compared with its checksums, or no more than nodes;
-    /// None goes by their size.
+    /// Whether all data in use of native frames are verified with their checksums, or only the nodes; by default it
+    /// depends on their size.
     pub verify: Option<bool>,
-    /// What frames weigh, as far as is known.
+    /// Size of the heaviest frame, if known.
     pub weight: Option<FrameWeight>,
 }
 
@@ -130,7 +130,7 @@ impl Setup {
     /// The camera of `frame`.
     ///
     /// # Errors
-    /// There is no picture from there; [`crate::resolve::check_views`] finds out before.
+    /// The view is invalid; [`crate::resolve::check_views`] detects that in advance.
     pub fn camera_at(&self, frame: i64) -> Result<Camera, CameraError> {
         Camera::new(
             &self.picture.path.view(frame),
@@ -139,10 +139,10 @@ impl Setup {
         )
     }
 
-    /// What `frame` is traced in: lights and everything else stay where they are when the camera moves.
+    /// The scene of `frame`: only the camera moves, lights and everything else are fixed.
     ///
     /// # Errors
-    /// As [`Self::camera_at`].
+    /// Same as [`Self::camera_at`].
     pub fn scene_at(&self, frame: i64) -> Result<Scene, CameraError> {
         Ok(Scene {
             camera: self.camera_at(frame)?,
@@ -150,7 +150,7 @@ impl Setup {
         })
     }
 
-    /// How the PNG of an image from `camera` is made: a film without background gets one behind it.
+    /// Options for the PNG of an image from `camera`: a film without background gets one.
     pub fn preview_from(&self, camera: &Camera) -> PreviewOptions {
         let behind = || self.picture.scene.background.color(camera.forward());
         PreviewOptions {
@@ -159,8 +159,7 @@ impl Setup {
         }
     }
 
-    /// How the tree over a frame of so many particles is built, with or without values to colour
-    /// them by.
+    /// Settings for the tree of a frame with `particles`, with or without values for colours.
     pub fn build_settings(&self, particles: usize, has_values: bool) -> BuildSettings {
         let channels = self.picture.render.channels;
         let structure = self.structure_for(particles);
@@ -172,12 +171,13 @@ impl Setup {
         }
     }
 
-    /// Whether native frames relative to [`Picture::origin`] are traced where they lie.
+    /// Whether native frames relative to [`Picture::origin`] are traced in place.
     pub fn traces_in_place(&self) -> bool {
         self.needs_copy().is_none() && !matches!(self.picture.radius, RadiusRule::Attribute { .. })
     }
 
-    /// Why the particles of a native frame are copied whatever radii they have, if they are.
+    /// The reason why the particles of a native frame must be copied, whatever radii they have; None if they need not
+    /// be.
     pub(super) fn needs_copy(&self) -> Option<String> {
         let structure = self.stored_structure();
         if matches!(structure, Structure::Bvh | Structure::Sbvh) {
@@ -198,7 +198,7 @@ impl Setup {
         Some(why.to_owned())
     }
 
-    /// Whose tree a native frame in place is said to be: its order is that of k-d cells.
+    /// The structure to report for a native frame in place: its order is that of k-d cells.
     pub fn stored_structure(&self) -> Structure {
         self.run.accelerator.unwrap_or(Structure::Kdtree)
     }

@@ -1,4 +1,4 @@
-//! One image by itself: nothing of another frame is in memory.
+//! Renders a single image; no other frame is in memory.
 
 use std::io;
 use std::path::PathBuf;
@@ -19,16 +19,16 @@ use crate::mishap::{guarded, is_place_at_fault};
 use crate::output::encode_preview;
 use crate::report::FrameReport;
 
-/// Why there is no image.
+/// Reasons why there is no image.
 #[derive(Debug)]
 pub enum SingleFault {
-    /// The frame is at fault; the reason.
+    /// The frame is at fault, with the reason.
     Frame(String),
-    /// Further images would fail, too: the file that was being written, and what the system said.
+    /// Further images would fail as well: the file that was being written, and the error of the system.
     Place(PathBuf, io::Error),
 }
 
-/// The file format of a picture that is no part of a job.
+/// File format of a picture outside a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureKind {
     /// OpenEXR, as a job writes it.
@@ -37,10 +37,10 @@ pub enum PictureKind {
     Png,
 }
 
-/// Makes the image of `task` with its preview; what the user should know goes to `note`.
+/// Renders the image of `task` with its preview; notes for the user go to `note`.
 ///
 /// # Errors
-/// See [`SingleFault`]; nothing is left behind then.
+/// See [`SingleFault`]; no files remain then.
 pub fn make_image(
     setup: &Setup,
     sequence: &Sequence,
@@ -51,10 +51,10 @@ pub fn make_image(
     write_guarded(|| write_exr(setup, traced))
 }
 
-/// Makes the image of `task` alone, in a file of this `kind`; what the user should know goes to `note`.
+/// Renders only the image of `task`, to a file of this `kind`; notes for the user go to `note`.
 ///
 /// # Errors
-/// See [`SingleFault`]; nothing is left behind then.
+/// See [`SingleFault`]; no files remain then.
 pub fn make_picture(
     setup: &Setup,
     sequence: &Sequence,
@@ -76,10 +76,12 @@ fn trace_single(
     mut note: impl FnMut(&str),
 ) -> Result<TracedFrame, SingleFault> {
     let traced = guarded(|| {
+        // Read the frame
         let mut frame = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
         std::mem::take(&mut frame.notes)
             .iter()
             .for_each(|n| note(n));
+        // Build its tree, and trace the image
         let mut tracer = renderer_of(setup.picture.renderer);
         let mut built = tracer.prepare(setup, frame).map_err(|e| e.to_string())?;
         std::mem::take(&mut built.notes)
@@ -97,7 +99,7 @@ fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, WriteErro
     write_frame(setup, frame, &mut MemoryPeaks::default()).map(|(report, _)| report)
 }
 
-/// The preview of `frame` in the place of its image.
+/// Writes the preview of `frame` in place of its image.
 fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, WriteError> {
     let start = Instant::now();
     let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;

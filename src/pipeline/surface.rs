@@ -1,5 +1,5 @@
-//! What rays meet in a frame: the spheres of its tree as the setup asks for them, and what is made for that
-//! beside the tree.
+//! The surfaces of a frame, as the setup requires: the spheres of its tree, or the additional structures that are
+//! built for other surfaces.
 
 use std::time::Instant;
 
@@ -23,23 +23,23 @@ use crate::surface::{
     SurfaceSettings,
 };
 
-/// Radii that differ by no more than this part are the same.
-const SAME_RADIUS: f32 = 0.01;
+/// Radii with a smaller relative difference count as equal.
+const RADIUS_TOLERANCE: f32 = 0.01;
 
-/// What a frame's surface has beside the tree over its body; its memory lives on from frame to frame.
+/// Structures for the surfaces of a frame in addition to the tree of its body; memory is reused from frame to frame.
 #[derive(Debug, Default)]
 pub(super) struct SurfaceBuilder {
-    /// Over the spray.
+    /// Tree of the spray.
     spray: TreeBuilder,
-    /// Particles of the body, which come before those of the spray.
+    /// Number of particles in the body; those of the spray follow.
     body: u32,
     smooth: SmoothGrid,
 }
 
 impl SurfaceBuilder {
-    /// Makes what `setup` asks for of a frame that a tree is to be built over, and says in `report` what that
-    /// took. Spray is taken out of the body: its particles become the frame's last. `trees` is where the tree
-    /// will be. A smooth surface needs no tree: none of its particles are left for one.
+    /// Builds the structures that `setup` requires before the tree of a frame is built, and adds their cost to
+    /// `report`. Spray is removed from the body: its particles are moved to the end of the frame. The tree will be
+    /// built in `trees`. A smooth surface needs no tree, so no particles remain for one.
     ///
     /// # Errors
     /// [`SmoothError`] if a smooth surface does not fit.
@@ -51,11 +51,13 @@ impl SurfaceBuilder {
         report: &mut FrameReport,
     ) -> Result<Vec<String>, SmoothError> {
         let start = Instant::now();
-        self.forget();
+        self.clear();
+        // Separate the spray
         if setup.picture.surface.spray {
-            let built = self.part_spray(setup, frame, trees);
+            let built = self.separate_spray(setup, frame, trees);
             report.bytes.surface = built.position_bytes + built.structure_bytes;
         }
+        // Build the grid of a smooth surface
         let mut notes = Vec::new();
         if setup.picture.surface.kind == SurfaceKind::Smooth {
             let made = self.build_smooth(setup, frame, &mut notes)?;
@@ -76,16 +78,17 @@ impl SurfaceBuilder {
     ) -> Result<SmoothReport, SmoothError> {
         let radius = match &frame.radius {
             Radius::Common(radius) => *radius,
-            Radius::PerParticle(radii) => usual_radius(radii, notes),
+            Radius::PerParticle(radii) => median_radius(radii, notes),
         };
         let channels = setup.picture.render.channels;
         let is_colored = setup.picture.color.is_by_particle();
-        // Whoever is asked for by a place on the surface.
+        // Keep the particles if attributes are looked up at points of the surface
         let keep = channels.id || channels.velocity || is_colored;
         let left = memory_left(setup.run.memory_limit);
         let made = self
             .smooth
             .build(&frame.centers, radius, &setup.picture.surface, keep, left)?;
+        // Note what the user may not expect
         if made.left_out > 0 {
             notes.push(format!(
                 "{} particles are too far from all others for the smooth surface and left out",
@@ -102,8 +105,8 @@ impl SurfaceBuilder {
         Ok(made)
     }
 
-    /// Nothing is left of the last frame.
-    pub(super) fn forget(&mut self) {
+    /// Releases everything of the previous frame.
+    pub(super) fn clear(&mut self) {
         let nothing = Spheres {
             centers: &[],
             radius: SphereRadius::Common(1.0),
@@ -113,17 +116,18 @@ impl SurfaceBuilder {
         self.smooth = SmoothGrid::default();
     }
 
-    fn part_spray(
+    fn separate_spray(
         &mut self,
         setup: &Setup,
         frame: &mut DecodedFrame,
         trees: &mut TreeBuilder,
     ) -> BuildReport {
-        // Whatever is asked for: this one is the soonest built, and lonely particles are the same in all.
+        // Find the spray in the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
-        let body = frame.put_last(&spray, setup.picture.render.channels.id);
+        let body = frame.move_to_end(&spray, setup.picture.render.channels.id);
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
+        // Build the tree of the drops
         let drops = match &frame.radius {
             Radius::Common(radius) => Radius::Common(DROP_RADIUS * radius),
             Radius::PerParticle(radii) => {
@@ -135,6 +139,7 @@ impl SurfaceBuilder {
             radius: radius_of(&drops),
         };
         let built = self.spray.build(&built, &BuildSettings::default());
+        // Keep only the body in the frame
         frame.centers.truncate(body);
         if let Radius::PerParticle(radii) = &mut frame.radius {
             radii.truncate(body);
@@ -142,10 +147,10 @@ impl SurfaceBuilder {
         built
     }
 
-    /// Draws the surface that `setup` asks for over the spheres of `tree` into `film`.
+    /// Renders the surface that `setup` requires over the spheres of `tree` to `film`.
     ///
     /// # Errors
-    /// As [`render_into`].
+    /// Same as [`render_into`].
     pub(super) fn draw(
         &self,
         setup: &Setup,
@@ -157,8 +162,8 @@ impl SurfaceBuilder {
     ) -> Result<RayCounts, RenderError> {
         let normals = shading_normals(&setup.picture.surface);
         let body: Box<dyn Shape + '_> = match setup.picture.surface.kind {
-            SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).shaded_by(normals)),
-            SurfaceKind::Union => Box::new(UnionSurface::new(tree).shaded_by(normals)),
+            SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).with_normals(normals)),
+            SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),
             SurfaceKind::Smooth => Box::new(self.smooth.surface()),
         };
         let spray = SphereSurface::new(self.spray.tree().view()).of(MaterialId::SPRAY, self.body);
@@ -170,7 +175,7 @@ impl SurfaceBuilder {
     }
 }
 
-/// The spheres of a frame as builders take them.
+/// The spheres of a frame as the input of a builder.
 pub(super) fn spheres(frame: &DecodedFrame) -> Spheres<'_> {
     Spheres {
         centers: &frame.centers,
@@ -185,8 +190,8 @@ fn radius_of(radius: &Radius) -> SphereRadius<'_> {
     }
 }
 
-/// The radius that half of `radii` are not above: the field has one for all.
-fn usual_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
+/// The median of `radii`, because the field needs a common radius.
+fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
     let mut sorted = radii.to_vec();
     let middle = sorted.len() / 2;
     if sorted.is_empty() {
@@ -196,7 +201,7 @@ fn usual_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
     let median = *median;
     if radii
         .iter()
-        .any(|radius| (radius - median).abs() > SAME_RADIUS * median)
+        .any(|radius| (radius - median).abs() > RADIUS_TOLERANCE * median)
     {
         notes.push(format!(
             "radii differ; a smooth surface has one for all, here their median {median} (--radius gives another)"
@@ -205,7 +210,7 @@ fn usual_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
     median
 }
 
-/// Bytes that a surface may take: what is left of the job's limit, and free.
+/// Bytes that a surface may use: within the limit of the job, and free.
 fn memory_left(limit: Option<u64>) -> Option<u64> {
     let used = MemoryUse::now().anonymous;
     let of_limit = limit.map(|limit| limit.saturating_sub(used));
@@ -215,7 +220,7 @@ fn memory_left(limit: Option<u64>) -> Option<u64> {
     }
 }
 
-/// Reach of the SPH kernel, particle radii.
+/// Support of the SPH kernel in particle radii.
 fn support(surface: &SurfaceSettings) -> f32 {
     2.0 * surface.smoothing_length
 }

@@ -1,4 +1,4 @@
-//! Every kind of surface through all of the pipeline but the encoding.
+//! Every kind of surface through the whole pipeline except encoding.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
@@ -73,7 +73,7 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn 
     }
 }
 
-/// Every surface there is.
+/// Every surface.
 fn surfaces() -> Vec<SurfaceSettings> {
     let mut all = Vec::new();
     for kind in [SurfaceKind::Spheres, SurfaceKind::Union] {
@@ -145,7 +145,7 @@ fn compact_frames_in_place_have_every_surface() {
     store(&file, &frame, None, &settings).expect("a frame");
     let (setup, sequence) = opened(&file);
     for surface in surfaces() {
-        // Who decodes has the same particles.
+        // Decoding gives the same particles.
         let [placed, decoded] = [Structure::Lbvh, Structure::Bvh].map(|structure| {
             let mut setup = setup.clone();
             setup.picture.surface = surface;

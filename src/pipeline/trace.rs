@@ -1,4 +1,4 @@
-//! Second stage: the tree is built and the image traced.
+//! Second stage: builds the tree and traces the image.
 
 use std::time::{Duration, Instant};
 
@@ -16,24 +16,24 @@ use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
 use crate::scene::material::DEFAULT_COLOR;
 
-/// Traces frame after frame in the same buffers, on the threads of the current pool.
+/// Renders frame after frame in the same buffers, on the threads of the current pool.
 #[derive(Debug, Default)]
 pub struct CpuRenderer {
     builder: TreeBuilder,
     stored: StoredTree,
     surface: SurfaceBuilder,
-    /// For the next image.
+    /// Planes for the next image.
     film: Film,
 }
 
 impl FrameRenderer for CpuRenderer {
-    /// Builds the tree over `frame`. Positions in memory are let go, as the tree has its own copy; over a
-    /// native frame only the levels above what it stores are built.
+    /// Builds the tree of `frame`. Positions in memory are released, because the tree has its own copy; for a native
+    /// frame only the levels above the stored ones are built.
     ///
     /// # Errors
-    /// [`TraceError::Stored`] if the nodes of a native frame are damaged, [`TraceError::File`] if it cannot be
-    /// used.
+    /// [`TraceError::Stored`] if the nodes of a native frame are damaged, [`TraceError::File`] if it cannot be used.
     fn prepare(&mut self, setup: &Setup, frame: LoadedFrame) -> Result<BuiltFrame, TraceError> {
+        // Begin the report
         let mut report = FrameReport {
             particles: frame.particles.count(),
             dropped: frame.dropped,
@@ -41,6 +41,7 @@ impl FrameRenderer for CpuRenderer {
             ..FrameReport::default()
         };
         report.seconds.read = frame.read_time.as_secs_f64();
+        // Build surface and tree of decoded particles, or the levels above stored ones
         let mut notes = Vec::new();
         let particles = match frame.particles {
             LoadedParticles::Decoded(mut decoded) => {
@@ -52,7 +53,7 @@ impl FrameRenderer for CpuRenderer {
                 BuiltParticles::Decoded(decoded.shading)
             }
             LoadedParticles::Stored(stored) => {
-                self.surface.forget();
+                self.surface.clear();
                 report.set_build(&self.build_above(setup, &stored)?);
                 report.bytes.attributes = stored.attribute_bytes();
                 report.bytes.file.attributes = stored.attribute_bytes();
@@ -71,17 +72,16 @@ impl FrameRenderer for CpuRenderer {
         })
     }
 
-    /// Takes the planes of an image that nobody needs any more for the next: new ones cost a page fault for
-    /// each 4 KiB.
+    /// Reuses planes for the next image: new ones cost a page fault per 4 KiB.
     fn recycle(&mut self, film: Film) {
         self.film = film;
     }
 
-    /// Renders `frame`, the one that was built last.
+    /// Renders `frame`, which must be the one built last.
     ///
     /// # Errors
-    /// [`crate::render::RenderError::Interrupted`] once `stop` is raised, [`TraceError::File`] if a native frame
-    /// changed meanwhile. The other errors are settings that were checked before.
+    /// [`crate::render::RenderError::Interrupted`] if `stop` is raised, [`TraceError::File`] if a native frame
+    /// changed in the meantime. All other errors are of settings that are checked in advance.
     fn render(
         &mut self,
         setup: &Setup,
@@ -110,10 +110,10 @@ impl FrameRenderer for CpuRenderer {
         })
     }
 
-    /// Only the planes of `frame`, the one that was built last.
+    /// Renders only the planes of `frame`, which must be the one built last.
     ///
     /// # Errors
-    /// As [`Self::render`].
+    /// Same as [`Self::render`].
     fn image(
         &self,
         setup: &Setup,
@@ -170,7 +170,7 @@ impl CpuRenderer {
                 let source = stored.shading(&setup.picture.color, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
                 let rays = surface.draw(setup, tree, &scene, &source, film, stop)?;
-                // Before anyone believes what was seen.
+                // Reject the image if the file has changed meanwhile.
                 stored.check()?;
                 Ok(rays)
             }
@@ -198,7 +198,7 @@ fn seconds(time: Duration) -> f64 {
     time.as_secs_f64()
 }
 
-/// The renderer of that kind, without memory yet.
+/// A renderer of the given kind that has not allocated memory yet.
 pub fn renderer_of(kind: RendererKind) -> Box<dyn FrameRenderer> {
     match kind {
         RendererKind::Cpu => Box::new(CpuRenderer::default()),

@@ -1,4 +1,4 @@
-//! The accumulate stage: samples to pixels.
+//! The accumulate stage: averages samples to pixels.
 
 use std::ops::Range;
 
@@ -18,8 +18,8 @@ impl SampleGroup {
     }
 }
 
-/// The sum of the samples in `range`: by whole packets where a pixel has such, else one after the other. Either way it
-/// does not depend on the pixel's place in the group.
+/// The sum of the samples in `range`: packet by packet if a pixel has whole packets, otherwise one by one. In both
+/// cases the sum does not depend on the position of the pixel in the group.
 fn pixel_sum(radiance: &[Lanes3], coverage: &[Lanes], range: Range<usize>) -> [f32; 4] {
     let mut sum = [0.0; 4];
     if range.len().is_multiple_of(LANES) {

@@ -1,32 +1,32 @@
-//! The data of a pixel beside its colour: depth, normal, place, velocity, particle.
+//! The data channels of a pixel: depth, normal, position, velocity, particle.
 //!
-//! Such values have no meaningful mean over a silhouette, so a pixel takes them all from one of its
-//! samples: the nearest along the view axis, the first of equal ones.
+//! The mean of such values over a silhouette is meaningless, so all of them come from one sample of the pixel: the
+//! nearest along the view axis, and the first in a tie.
 
 use glam::Vec3;
 
-/// The `id` of a pixel that shows no particle.
+/// The `id` of a pixel without a particle.
 pub const NO_ID: u32 = u32::MAX;
 
-/// What one sample met first.
+/// The first intersection of a sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DataSample {
-    /// Distance along the view axis; infinite if nothing was met.
+    /// Distance along the view axis; infinite without an intersection.
     pub z: f32,
-    /// Unit normal of the visible side in world space; zero if nothing was met.
+    /// Unit normal of the visible side in world space; zero without an intersection.
     pub normal: Vec3,
-    /// The place in world units.
+    /// The point in world units.
     pub position: Vec3,
-    /// The particle's velocity; zero for the ground.
+    /// Velocity of the particle; zero for the ground.
     pub velocity: Vec3,
-    /// Base colour before light, linear RGB.
+    /// Base colour without lighting, linear RGB.
     pub albedo: Vec3,
-    /// The particle's id, or [`NO_ID`].
+    /// The id of the particle, or [`NO_ID`].
     pub id: u32,
 }
 
 impl DataSample {
-    /// A sample that met nothing.
+    /// A sample without an intersection.
     pub const MISS: Self = Self {
         z: f32::INFINITY,
         normal: Vec3::ZERO,
@@ -36,7 +36,7 @@ impl DataSample {
         id: NO_ID,
     };
 
-    /// Takes what `other` makes, at distance `z` along the view axis, if that is nearer.
+    /// Replaces the sample by the result of `other`, at distance `z` along the view axis, if that is nearer.
     pub fn keep_nearest(&mut self, z: f32, other: impl FnOnce() -> Self) {
         if z < self.z {
             *self = other();

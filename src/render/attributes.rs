@@ -17,11 +17,12 @@ use crate::surface::{Intersections, MaterialId};
 const SPRAY: Vec3 = Vec3::splat(0.9);
 
 impl RenderContext<'_> {
-    /// Looks up the base colours at the intersections of a packet; those of particles where `has_color`.
+    /// Looks up the base colours at the intersections of a packet; colours of particles only if `has_color`.
     pub(super) fn base_colors(&self, has_color: bool, packet: &mut PacketScratch) {
         let PacketScratch {
             hits, base, blend, ..
         } = packet;
+        // Look up the colours of particles
         let particles = hits.lanes_of(MaterialId::PARTICLES);
         if let Some(color) = self.color {
             *base = splat3(color);
@@ -30,13 +31,14 @@ impl RenderContext<'_> {
                 set_lane3(base, lane, self.particle_color(hits, lane, blend));
             }
         }
+        // Look up the colours of all other surfaces
         for lane in lanes_in(hits.mask & !particles) {
             let color = self.fixed_color(hits, lane);
             set_lane3(base, lane, color);
         }
     }
 
-    /// Base colour of the particle, or of the point between particles, in `lane`.
+    /// Base colour of the particle in `lane`, or of a point between particles.
     fn particle_color(
         &self,
         hits: &Intersections,
@@ -49,13 +51,14 @@ impl RenderContext<'_> {
         let Some(particles) = self.connected_particles() else {
             return self.source.color(hits.particle[lane]);
         };
+        // Blend the colours of the particles around the point
         blend.clear();
         let hit = hits.get(lane);
         particles.blend(&hit, &mut |particle, weight| blend.push((particle, weight)));
         self.source.blended_color(blend)
     }
 
-    /// Base colour of the floor or of spray.
+    /// Base colour of the ground or of spray.
     fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
         match (hits.material[lane], &self.scene.ground) {
             (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
@@ -63,7 +66,8 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Part of each sample that surfaces cover. A floor that fades covers all of it, unless the background is left out.
+    /// Fraction of each sample that surfaces cover. A ground that fades out still covers all of it, unless the
+    /// background is transparent.
     pub(super) fn coverage(&self, hits: &Intersections) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => 0.0,
@@ -72,8 +76,8 @@ impl RenderContext<'_> {
         })
     }
 
-    /// Keeps for each pixel the data of its nearest sample, the first of equal ones. The rays are those of the samples
-    /// from number `first` on.
+    /// Stores the data of the nearest sample of each pixel, the first in a tie. The rays belong to the samples from
+    /// index `first` on.
     pub(super) fn gather_data(
         &self,
         rays: &RayPacket,
@@ -84,12 +88,13 @@ impl RenderContext<'_> {
         if self.settings.channels == Channels::COLOR || packet.hits.mask == 0 {
             return;
         }
+        // Compute the depths of all samples
         let mut z = splat(f32::INFINITY);
         depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
         let samples = self.settings.samples as usize;
         let mut lane = 0;
         while lane < rays.len() {
-            // The lanes of one pixel.
+            // Find the lanes of the next pixel, and the nearest of its samples
             let pixel = (first + lane) / samples;
             let end = rays.len().min((pixel + 1) * samples - first);
             let nearest = (lane..end).fold(lane, |best, l| if z[l] < z[best] { l } else { best });
@@ -107,7 +112,7 @@ impl RenderContext<'_> {
         }
     }
 
-    /// The data at the intersection of the camera ray in `lane`.
+    /// The data channels at the intersection of the camera ray in `lane`.
     fn data(
         &self,
         rays: &RayPacket,
@@ -118,8 +123,9 @@ impl RenderContext<'_> {
         let PacketScratch { hits, blend, .. } = packet;
         let channels = self.settings.channels;
         let is_particle = hits.material[lane].is_of_particles();
-        let wants_particle = is_particle && (channels.id || channels.velocity);
-        let particle = wants_particle.then(|| self.particle_at(hits, lane));
+        // Look up the particle only if a channel needs it
+        let needs_particle = is_particle && (channels.id || channels.velocity);
+        let particle = needs_particle.then(|| self.particle_at(hits, lane));
         let normal = lane3(&hits.normal, lane);
         let direction = lane3(&rays.direction, lane);
         let albedo = |blend: &mut Vec<(u32, f32)>| match hits.material[lane] {

@@ -1,4 +1,4 @@
-//! One body against optics by hand.
+//! One connected body against optics computed by hand.
 
 use std::f64::consts::PI;
 use std::sync::atomic::AtomicBool;
@@ -28,7 +28,7 @@ const CLEAR: Material = Material {
     ..Material::DEFAULT
 };
 
-/// Mirrored head on by a surface of [`CLEAR`].
+/// Reflectance of a surface of [`CLEAR`] at normal incidence.
 const R: f32 = 0.04;
 
 fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
@@ -65,7 +65,7 @@ fn with_loss(color: Vec3, length: f32) -> Material {
     }
 }
 
-/// A grey floor without end.
+/// An infinite grey ground.
 fn floor(height: f32) -> Ground {
     Ground {
         up: Vec3::Z,
@@ -85,7 +85,7 @@ fn depth(max_depth: u32) -> RenderSettings {
     }
 }
 
-/// The radiance at places on the film; `split` is the weight from which on both rays are followed.
+/// The radiance at positions on the film; `split` is the weight from which both rays are traced.
 fn radiance_at(
     films: &[Vec2],
     split: f32,
@@ -103,7 +103,7 @@ fn radiance_at(
     testing::radiance_at(&integrator, films)
 }
 
-/// The middle of the film with every ray followed.
+/// The centre of the film, with every ray traced.
 fn middle_of(shapes: &[&dyn Shape], scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
     let films = [Vec2::splat(0.5)];
     let (colors, counts) = radiance_at(&films, 0.0, shapes, scene, &depth(max_depth));
@@ -144,13 +144,13 @@ fn film(solid: &Solid, scene: &Scene, settings: &RenderSettings) -> Film {
 #[test]
 #[expect(clippy::cast_possible_truncation, reason = "surfaces answer in f32")]
 fn a_glass_ball_refracts_at_the_known_angles() {
-    // A ray that meets the ball at angle a goes on turned by a - b, sin b = sin a / 1.5, leaves turned by
-    // 2 (a - b), and is mirrored at its entry by pi - 2 a. The far wall's mirror ends the path at depth 2, inside:
-    // it has turned by a - b and by pi - 2 b.
+    // A ray that hits the ball at angle a is refracted by a - b with sin b = sin a / 1.5, leaves after a turn of 2 (a
+    // - b), and is reflected at its entry by pi - 2 a. The reflection at the far wall ends the path at depth 2,
+    // inside: it has turned by a - b and by pi - 2 b.
     for offset in [0.1_f64, 0.5, 0.8, 0.95] {
         let eye = DVec3::new(0.0, offset, 10.0);
         let mut scene = scene(eye, eye - DVec3::Z, CLEAR);
-        // Brightness tells the angle from straight down: 1 there, 0 straight up.
+        // Brightness encodes the angle from straight down: 1 there, 0 straight up.
         scene.background = Background::Gradient {
             bottom: Vec3::ONE,
             top: Vec3::ZERO,
@@ -166,7 +166,7 @@ fn a_glass_ball_refracts_at_the_known_angles() {
         let back = sky((a - b) + PI - 2.0 * b);
         let wanted = r * sky(PI - 2.0 * a) + (1.0 - r) * ((1.0 - r) * out + r * back);
         let value = middle(&Solid::ball(1.0), &scene, 2);
-        // Starting off the surface shifts the path by as much.
+        // The offset from the surface shifts the path by the same length.
         assert_within(5e-4, value, Vec3::splat(wanted as f32));
     }
 }
@@ -205,7 +205,7 @@ fn energy_is_kept_and_absorbed_never_made() {
 #[test]
 fn a_slab_absorbs_along_the_way_through_it() {
     let solid = Solid::slab(-2.0, 0.0);
-    // Without refraction, head on and at 60 degrees, the way through is 2 and 4.
+    // Without refraction, at normal incidence and at 60 degrees, the paths inside have lengths 2 and 4.
     let tinted = Material {
         ior: 1.0,
         ..with_loss(Vec3::new(0.5, 0.25, 1.0), 2.0)
@@ -215,7 +215,7 @@ fn a_slab_absorbs_along_the_way_through_it() {
     let eye = DVec3::new(0.0, -3.0_f64.sqrt(), 1.0);
     let aslant = middle(&solid, &scene(eye, DVec3::ZERO, tinted), 8);
     assert_within(1e-5, aslant, Vec3::new(0.25, 0.0625, 1.0));
-    // With it, what goes to and fro inside is a geometric series.
+    // With refraction, the internal reflections form a geometric series.
     let glass = with_loss(Vec3::new(0.5, 0.25, 1.0), 2.0);
     let wanted = [0.5_f32, 0.25, 1.0].map(|kept| {
         let inside = kept * (1.0 - R) / (1.0 - R * kept);
@@ -279,8 +279,8 @@ fn more_samples_draw_sooner() {
 
 #[test]
 fn an_eye_inside_sees_total_reflection_and_a_wet_floor() {
-    // From the middle of a slab, up at 60 degrees from the normal: all of it comes back down onto the floor that
-    // lies in the slab, 0.5 below the eye. The way there is 2 * (1 + 1 + 0.5) in all.
+    // From the middle of a slab, up at 60 degrees from the normal: total internal reflection to the ground inside the
+    // slab, 0.5 below the eye. The path has length 2 * (1 + 1 + 0.5).
     let solid = Solid::slab(-3.0, 1.0);
     let eye = DVec3::ZERO;
     let up = DVec3::new(0.0, 3.0_f64.sqrt(), 1.0);
@@ -290,12 +290,12 @@ fn an_eye_inside_sees_total_reflection_and_a_wet_floor() {
     let bare = 0.5 * ground::AMBIENT;
     assert_within(1e-5, value, bare * Vec3::new(0.5, 1.0, 0.25));
     assert_eq!((counts.reflection, counts.refraction), (1, 0));
-    // Straight at it.
+    // Straight towards the ground.
     scene.camera = from_above(0.0, CLEAR).camera;
     let value = middle(&solid, &scene, 1);
     let kept = Vec3::new(0.5, 1.0, 0.25).powf(0.1);
     assert_within(1e-5, value, bare * kept);
-    // And steeply up and out of it, the background at depth 1.
+    // Steeply up and out of the slab: the background at depth 1.
     scene.camera = super::body_tests::scene(eye, DVec3::Z, CLEAR).camera;
     let value = middle(&solid, &scene, 1);
     assert_within(1e-5, value, Vec3::new(0.5, 1.0, 0.25).powf(0.2));
@@ -303,8 +303,8 @@ fn an_eye_inside_sees_total_reflection_and_a_wet_floor() {
 
 #[test]
 fn the_floor_is_seen_bent_through_a_slab() {
-    // At 45 degrees into a slab of height 1: sin b = sin 45 / 1.5, so the floor is met at tan b = 0.5345 beyond the
-    // entry at 0; straight on it would be 1.
+    // At 45 degrees into a slab of height 1: sin b = sin 45 / 1.5, so the ray hits the ground tan b = 0.5345 beyond
+    // the entry at 0; without refraction it would be 1.
     let solid = Solid::slab(-5.0, 1.0);
     let eye = DVec3::new(0.0, -2.0, 3.0);
     let mut scene = scene(eye, DVec3::new(0.0, 0.0, 1.0), CLEAR);
@@ -328,7 +328,7 @@ fn the_floor_is_seen_bent_through_a_slab() {
     }
 }
 
-/// The floor under a slab, seen from between them, by a light straight above.
+/// The ground under a slab, seen from between them, with a light straight above.
 fn under_a_slab(material: Material, spray: Vec<Ball>) -> f32 {
     let (solid, drops) = (Solid::slab(2.0, 4.0), Drops(Balls(spray)));
     let mut scene = from_above(1.0, material);
@@ -347,7 +347,7 @@ fn shadows_are_dimmed_by_crossings_and_by_the_way_inside() {
     assert!((under_a_slab(CLEAR, Vec::new()) - crossed).abs() < 1e-6);
     let half = with_loss(Vec3::splat(0.5), 2.0);
     assert!((under_a_slab(half, Vec::new()) - 0.5 * crossed).abs() < 1e-6);
-    // A wet floor, through a body that reaches below it: one crossing.
+    // A wet ground, seen through a body that extends below it: one crossing.
     let mut scene = from_above(
         5.0,
         Material {
@@ -359,7 +359,7 @@ fn shadows_are_dimmed_by_crossings_and_by_the_way_inside() {
     scene.ambient_light = Vec3::ZERO;
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     let wet = middle(&Solid::slab(-1.0, 2.0), &scene, 4).x;
-    // To the floor and back.
+    // To the ground and back.
     assert!((wet - 0.25 * crossed).abs() < 1e-5, "{wet} {crossed}");
 }
 

@@ -1,4 +1,4 @@
-//! Which branches are followed at transmissive spheres: both to the letter of equation 4.1, or one in place of both.
+//! The branches that are traced at transmissive spheres: both, as in equation 4.1, or one in place of both.
 
 use std::sync::atomic::AtomicBool;
 
@@ -26,7 +26,7 @@ fn unit(seed: u32) -> f32 {
     ((mixed ^ (mixed >> 13)) >> 8) as f32 / 16_777_216.0
 }
 
-/// Balls in a cube of edge 2 around zero, nearly all of which overlap others.
+/// Balls in a cube of edge 2 around the origin; nearly all of them overlap others.
 fn heap(count: u32) -> Vec<Ball> {
     let ball = |i: u32| Ball {
         center: Vec3::new(unit(3 * i), unit(3 * i + 1), unit(3 * i + 2)) * 2.0 - 1.0,
@@ -74,7 +74,7 @@ fn trace(surface: &dyn Shape, scene: &Scene, settings: &RenderSettings) -> (Film
     .unwrap()
 }
 
-/// Equation 4.1 with nothing but ambient light, both branches always.
+/// Equation 4.1 with ambient light only, and always both branches.
 fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 {
     let hit = (levels > 0).then(|| surface.nearest(ray)).flatten();
     let Some(hit) = hit else {
@@ -92,7 +92,9 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
     let Some(onward) = refract(ray.direction, normal, ratio) else {
         return AMBIENT + mirrored;
     };
-    let r = scene.material.mirrored(-ray.direction.dot(normal), ratio);
+    let r = scene
+        .material
+        .fresnel_reflectance(-ray.direction.dot(normal), ratio);
     AMBIENT + r * mirrored + (1.0 - r) * below(hit.anchor - step, onward)
 }
 
@@ -135,7 +137,7 @@ fn one_branch_in_place_of_both_has_the_same_mean() {
         trace(&surface, &scene, &settings)
     };
     let (literal, all) = image(0.0);
-    // The farther the weight, the more is drawn: at 1 there is one path a sample.
+    // The larger the weight, the more choices are random: at 1 there is one path per sample.
     for (min_weight, limit) in [(DEFAULT_MIN_WEIGHT, 0.001), (0.05, 0.01), (1.0, 0.03)] {
         let (drawn, counts) = image(min_weight);
         assert!(counts.total() < all.total(), "{min_weight}");
@@ -146,7 +148,7 @@ fn one_branch_in_place_of_both_has_the_same_mean() {
             assert!(worst < limit, "{min_weight}: {worst}");
             mean += difference / literal.color.len() as f32;
         }
-        // Sixteen pixels together are four times as sure.
+        // The mean of sixteen pixels has a quarter of the standard error.
         let bias = mean.abs().max_element();
         assert!(bias < limit / 4.0, "{min_weight}: {bias}");
     }
@@ -170,8 +172,8 @@ fn the_deepest_recursion_has_a_bounded_number_of_rays() {
         let (_, counts) = trace(&surface, &scene, &settings);
         (counts.reflection + counts.refraction) as f64 / counts.primary as f64
     };
-    // At most 1024 paths at each level; glass this dense keeps few of them from leaving. Without a limit there
-    // are a million at level 20.
+    // At most 1024 paths at each level; few of them leave glass this dense early. Without a limit there are a million
+    // at level 20.
     let [middle, deep] = [MAX_DEPTH / 2, MAX_DEPTH].map(rays);
     assert!(deep < 10_000.0 && deep < 5.0 * middle, "{middle} {deep}");
 }

@@ -1,4 +1,4 @@
-//! Test support: spheres met by trying every one in f64.
+//! Test support: spheres that are intersected one by one in f64.
 
 use glam::{DVec3, Vec3};
 
@@ -8,7 +8,7 @@ use crate::{
     surface::{Intersection, Shape, Side},
 };
 
-/// Centre and radius.
+/// A sphere.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Ball {
     pub(crate) center: Vec3,
@@ -23,7 +23,7 @@ impl Balls {
         Self(vec![Ball { center, radius }])
     }
 
-    /// Every meeting of `ray` with a ball in its range.
+    /// All intersections of `ray` with spheres in its range.
     fn all<'a>(&'a self, ray: &'a Ray) -> impl Iterator<Item = Intersection> + 'a {
         self.0.iter().zip(0_u32..).flat_map(move |(ball, index)| {
             ball.roots(ray)
@@ -78,13 +78,16 @@ impl Shape for Balls {
         &self,
         rays: &RayPacket,
         lanes: u32,
-        passed: &dyn Fn(f32) -> f32,
-        kept: &mut Lanes,
+        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        transmittance: &mut Lanes,
     ) {
         for lane in lanes_in(lanes) {
             let ray = rays.ray(lane);
             let cosine = |hit: Intersection| hit.normal.dot(ray.direction).abs();
-            kept[lane] = self.all(&ray).map(|hit| passed(cosine(hit))).product();
+            transmittance[lane] = self
+                .all(&ray)
+                .map(|hit| fresnel_transmittance(cosine(hit)))
+                .product();
         }
     }
 }

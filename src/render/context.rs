@@ -1,5 +1,6 @@
-//! What all integrators share: the scene as packets of rays see it, and the settings. Each stage that integrators
-//! have in common is a file with methods of [`RenderContext`]: `generate`, `intersect`, `attributes`, `visibility`.
+//! The state that all integrators share: the scene in a form for packets of rays, and the settings. Each stage that
+//! integrators have in common is a file with methods of [`RenderContext`]: `generate`, `intersect`, `attributes`,
+//! `visibility`.
 
 use glam::Vec3;
 
@@ -19,7 +20,7 @@ use crate::surface::{MaterialId, Shape, Side};
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes; the floor is first, as it is the cheapest.
+    /// All shapes; the ground comes first, because it is the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
     /// The particles, opaque or transmissive; all other shapes are opaque.
     pub(super) particles: Option<&'a dyn Shape>,
@@ -33,25 +34,25 @@ pub(super) struct RenderContext<'a> {
     /// Base colour of all particles, if they share one.
     pub(super) color: Option<Vec3>,
     pub(super) interior: Interior,
-    /// The boundary of the particles, unless they are opaque.
+    /// The interface of the particles, unless they are opaque.
     pub(super) boundary: Dielectric,
-    /// Whether the camera is inside of a connected body.
+    /// Whether the camera is inside a connected body.
     pub(super) is_camera_inside: bool,
     pub(super) sampler: FilmSampler,
-    /// Path segments of one depth, see [`SEGMENTS`].
+    /// Maximum number of path segments of one depth, see [`SEGMENTS`].
     pub(super) max_segments: usize,
 }
 
-/// What lies behind the surface of the particles.
+/// The interior of the particles.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Interior {
-    /// Nothing that light reaches.
+    /// Light does not enter.
     Opaque,
-    /// The inside of a sphere, each a body of its own. The angle between ray and normal tells whether a ray enters or
+    /// Each sphere is a separate transmissive body. The angle between ray and normal shows whether a ray enters or
     /// leaves.
     Spheres,
-    /// One connected body. Each ray knows on which side of its surface it is; the depth counts crossings of the surface,
-    /// and particles between two crossings do not matter.
+    /// One connected transmissive body. Each ray stores on which side of the surface it is. The depth counts
+    /// crossings of the surface; particles between two crossings do not matter.
     Body,
 }
 
@@ -72,15 +73,17 @@ impl<'a> RenderContext<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
+        // Find the particles and the kind of their interior
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
         let is_connected = particles.is_some_and(|shape| shape.is_connected());
         let interior = Interior::of(&scene.material, is_connected);
+        // Prepare camera, background and lights for packets
         let eye = scene.camera.eye();
         let [width, height] = settings.full_size();
-        let is_eye_inside = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
+        let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
-            is_camera_inside: interior == Interior::Body && particles.is_some_and(is_eye_inside),
+            is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
             particles,
             source,
@@ -103,7 +106,7 @@ impl<'a> RenderContext<'a> {
         self.particles.filter(|shape| shape.is_connected())
     }
 
-    /// How the rays of a packet at `depth` lie.
+    /// The coherence of a packet at `depth`.
     pub(super) fn coherence(depth: u32) -> Coherence {
         match depth {
             1 => Coherence::Coherent,

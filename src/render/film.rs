@@ -6,7 +6,7 @@ use thiserror::Error;
 
 use super::aov::{DataSample, NO_ID};
 
-/// Which planes a film has beside `R G B A`, which are always there.
+/// The planes of a film in addition to `R G B A`, which it always has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct Channels {
     /// `Z`: distance along the view axis.
@@ -23,16 +23,16 @@ pub struct Channels {
     pub id: bool,
 }
 
-/// No channel has this name.
+/// An unknown channel name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("no channel is called {name:?}, the known ones are RGBA, Z, N, P, V, albedo and id")]
 pub struct UnknownChannel {
-    /// What was asked for.
+    /// The name.
     pub name: String,
 }
 
 impl Channels {
-    /// Colour and nothing else.
+    /// Colour only.
     pub const COLOR: Self = Self {
         depth: false,
         normal: false,
@@ -42,7 +42,7 @@ impl Channels {
         id: false,
     };
 
-    /// Everything there is.
+    /// All channels.
     pub const ALL: Self = Self {
         depth: true,
         normal: true,
@@ -52,10 +52,10 @@ impl Channels {
         id: true,
     };
 
-    /// Channels by the names of a manifest; `RGBA` may be named and is always there.
+    /// Channels by their names in a manifest; `RGBA` is allowed, and always included.
     ///
     /// # Errors
-    /// If there is no such channel.
+    /// If a name is unknown.
     pub fn from_names<'a>(
         names: impl IntoIterator<Item = &'a str>,
     ) -> Result<Self, UnknownChannel> {
@@ -80,15 +80,15 @@ impl Channels {
     }
 }
 
-/// An image. Every plane holds `width * height` values, or is `None` if it was not asked for.
+/// An image. Every plane has `width * height` values; planes that were not requested are `None`.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Film {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Linear RGB, premultiplied by A. A is the part of the pixel that particles or ground cover;
-    /// the background is in RGB where nothing covers, unless it was left out.
+    /// Linear RGB, premultiplied by A. A is the fraction of the pixel that particles or ground cover; RGB includes
+    /// the background of uncovered fractions, unless the background is transparent.
     pub color: Vec<[f32; 4]>,
     /// See [`DataSample::z`].
     pub depth: Option<Vec<f32>>,
@@ -105,10 +105,10 @@ pub struct Film {
 }
 
 impl Film {
-    /// An empty image: black, transparent, nothing met.
+    /// An empty image: black and transparent, without intersections.
     pub fn new(width: u32, height: u32, channels: Channels) -> Self {
         let count = width as usize * height as usize;
-        let vectors = |wanted: bool| wanted.then(|| vec![Vec3::ZERO; count]);
+        let vectors = |is_present: bool| is_present.then(|| vec![Vec3::ZERO; count]);
         Self {
             width,
             height,
@@ -122,7 +122,7 @@ impl Film {
         }
     }
 
-    /// A film of zeros, which takes memory only where it is written.
+    /// A film of zeros. Its pages are allocated when they are first written.
     fn zeroed(width: u32, height: u32, channels: Channels) -> Self {
         let count = width as usize * height as usize;
         let vectors = |wanted: bool| wanted.then(|| zeroed_vec::<Vec3>(count));
@@ -139,19 +139,19 @@ impl Film {
         }
     }
 
-    /// Makes this a film of that size with these planes. Where it is one, its memory stays, and what is in it. Who
-    /// renders sets every pixel, so that the threads that trace are the first to write new planes: each 4 KiB cost
-    /// them a page fault then.
+    /// Makes this a film of that size with these planes. If it is one already, its memory and content stay; the
+    /// renderer sets every pixel. New planes are not written here, so that the page faults of their first use are
+    /// shared by all tracing threads.
     pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels) {
         let is_fit = (self.width, self.height) == (width, height) && self.channels() == channels;
         if !is_fit {
-            // Not both at once.
+            // Release the old planes before the new ones are allocated.
             *self = Self::default();
             *self = Self::zeroed(width, height, channels);
         }
     }
 
-    /// Bytes of all planes of an image.
+    /// Memory of all planes of an image, bytes.
     pub fn bytes_for(width: u32, height: u32, channels: Channels) -> u64 {
         let scalars = [channels.depth, channels.id];
         let vectors = [
@@ -160,12 +160,12 @@ impl Film {
             channels.velocity,
             channels.albedo,
         ];
-        let count = |wanted: &[bool]| wanted.iter().filter(|w| **w).count() as u64;
+        let count = |is_present: &[bool]| is_present.iter().filter(|w| **w).count() as u64;
         let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors);
         u64::from(width) * u64::from(height) * pixel
     }
 
-    /// Cuts all planes into bands of `rows` rows (the last may have fewer), from the top.
+    /// Splits all planes into bands of `rows` rows, from the top; the last band may have fewer.
     pub(super) fn bands_mut(&mut self, rows: u32) -> Vec<Band<'_>> {
         let length = self.width as usize * rows as usize;
         let mut depth = chunks(&mut self.depth, length);
@@ -174,6 +174,7 @@ impl Film {
         let mut velocity = chunks(&mut self.velocity, length);
         let mut albedo = chunks(&mut self.albedo, length);
         let mut id = chunks(&mut self.id, length);
+        // Combine the chunks of all planes into bands
         let top_rows = (0..self.height).step_by(rows as usize);
         let color = self.color.chunks_mut(length);
         color
@@ -204,9 +205,9 @@ fn next<T>(pieces: &mut Option<impl Iterator<Item = T>>) -> Option<T> {
     pieces.as_mut().and_then(Iterator::next)
 }
 
-/// Some whole rows of every plane.
+/// Consecutive rows of every plane.
 pub(super) struct Band<'a> {
-    /// First row of the image in this band.
+    /// First row in the image.
     top: u32,
     rows: u32,
     width: u32,
@@ -220,7 +221,7 @@ pub(super) struct Band<'a> {
 }
 
 impl Band<'_> {
-    /// Cuts the band into tiles of `side` columns, from the left; the last may have fewer.
+    /// Splits the band into tiles of `side` columns, from the left; the last tile may have fewer.
     pub(super) fn tiles(&mut self, side: u32) -> Vec<FilmTile<'_>> {
         let (width, columns) = (self.width as usize, side as usize);
         let mut color = rows_of_tiles(self.color, width, columns).into_iter();
@@ -230,6 +231,7 @@ impl Band<'_> {
         let mut velocity = planes(&mut self.velocity, width, columns);
         let mut albedo = planes(&mut self.albedo, width, columns);
         let mut id = planes(&mut self.id, width, columns);
+        // Combine the rows of all planes into tiles
         let tile = |left: u32| FilmTile {
             left,
             top: self.top,
@@ -247,10 +249,10 @@ impl Band<'_> {
     }
 }
 
-/// The rows of one plane inside a tile.
+/// The rows of one plane in a tile.
 type Rows<'a, T> = Vec<&'a mut [T]>;
 
-/// The rows of each tile of `columns` columns, out of a band of a plane.
+/// The rows of each tile of `columns` columns, from a band of a plane.
 fn rows_of_tiles<T>(band: &mut [T], width: usize, columns: usize) -> Vec<Rows<'_, T>> {
     let mut tiles = Vec::new();
     tiles.resize_with(width.div_ceil(columns), Rows::new);
@@ -269,15 +271,15 @@ fn planes<'a, T>(plane: &'a mut Option<&mut [T]>, width: usize, columns: usize) 
     plane.map(|plane| rows_of_tiles(plane, width, columns).into_iter())
 }
 
-/// A rectangle of every plane, to be filled by one thread.
+/// A rectangle of every plane, which one thread fills.
 pub(super) struct FilmTile<'a> {
-    /// First column of the image in this tile.
+    /// First column in the image.
     pub(super) left: u32,
-    /// First row.
+    /// First row in the image.
     pub(super) top: u32,
-    /// Pixels across.
+    /// Width in pixels.
     pub(super) width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub(super) rows: u32,
     color: Rows<'a, [f32; 4]>,
     depth: Option<Rows<'a, f32>>,
@@ -294,19 +296,19 @@ impl FilmTile<'_> {
         self.color[row as usize][column as usize] = color;
     }
 
-    /// Stores the data of the pixel in `column` and `row` of the tile, as far as there are planes for it.
+    /// Stores the data of the pixel in `column` and `row` of the tile in all planes that exist.
     pub(super) fn set_data(&mut self, column: u32, row: u32, data: &DataSample) {
         let at = (column as usize, row as usize);
-        put(&mut self.depth, at, data.z);
-        put(&mut self.normal, at, data.normal);
-        put(&mut self.position, at, data.position);
-        put(&mut self.velocity, at, data.velocity);
-        put(&mut self.albedo, at, data.albedo);
-        put(&mut self.id, at, data.id);
+        set_pixel(&mut self.depth, at, data.z);
+        set_pixel(&mut self.normal, at, data.normal);
+        set_pixel(&mut self.position, at, data.position);
+        set_pixel(&mut self.velocity, at, data.velocity);
+        set_pixel(&mut self.albedo, at, data.albedo);
+        set_pixel(&mut self.id, at, data.id);
     }
 }
 
-fn put<T>(plane: &mut Option<Rows<'_, T>>, (column, row): (usize, usize), value: T) {
+fn set_pixel<T>(plane: &mut Option<Rows<'_, T>>, (column, row): (usize, usize), value: T) {
     if let Some(rows) = plane {
         rows[row][column] = value;
     }
@@ -342,7 +344,7 @@ mod tests {
             .iter()
             .map(|t| (t.left, t.top, t.width, t.rows))
             .collect();
-        let wanted = [
+        let is_present = [
             (0, 0, 16, 16),
             (16, 0, 5, 16),
             (0, 16, 16, 16),
@@ -350,7 +352,7 @@ mod tests {
             (0, 32, 16, 3),
             (16, 32, 5, 3),
         ];
-        assert_eq!(sizes, wanted);
+        assert_eq!(sizes, is_present);
         for (number, tile) in (1_u8..).zip(&mut tiles) {
             let (width, rows) = (tile.width, tile.rows);
             for pixel in 0..width * rows {

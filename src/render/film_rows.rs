@@ -1,4 +1,4 @@
-//! Some whole rows of a finished film, to read: what an encoder packs at a time.
+//! Read access to consecutive rows of a finished film, in the form that encoders use.
 
 use glam::Vec3;
 
@@ -7,11 +7,11 @@ use super::film::{Channels, Film};
 /// Rows `top..top + height` of every plane; planes that the film does not have are `None`.
 #[derive(Debug, Clone, Copy)]
 pub struct FilmRows<'a> {
-    /// First row of the image among these.
+    /// First row in the image.
     pub top: u32,
-    /// Rows.
+    /// Number of rows.
     pub height: u32,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
     /// See [`Film::color`].
     pub color: &'a [[f32; 4]],
@@ -30,10 +30,10 @@ pub struct FilmRows<'a> {
 }
 
 impl<'a> FilmRows<'a> {
-    /// `height` of these rows from row `top` of the image on, or as many as there are.
+    /// `height` of these rows, or as many as there are, starting at row `top` of the image.
     ///
     /// # Panics
-    /// If row `top` is not among them.
+    /// If row `top` is not among these rows.
     pub fn part(&self, top: u32, height: u32) -> FilmRows<'a> {
         let skipped = top.checked_sub(self.top).filter(|rows| *rows < self.height);
         let skipped = skipped.expect("the part begins in these rows");
@@ -72,7 +72,7 @@ impl Film {
         }
     }
 
-    /// Which planes there are beside the colours.
+    /// The planes in addition to colour.
     pub const fn channels(&self) -> Channels {
         Channels {
             depth: self.depth.is_some(),

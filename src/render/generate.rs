@@ -1,4 +1,4 @@
-//! The generate stage: samples on the film, and camera rays through them.
+//! The generate stage: sample positions on the film, and camera rays through them.
 
 use super::{
     aov::DataSample,
@@ -14,7 +14,7 @@ use super::{
 use crate::math::{LANES, first_lanes, splat};
 
 impl RenderContext<'_> {
-    /// Places the samples of `pixels`, columns and rows of `tile`, on the film.
+    /// Generates the samples of `pixels` (columns and rows of `tile`).
     pub(super) fn place_samples(
         &self,
         tile: &FilmTile<'_>,
@@ -35,7 +35,7 @@ impl RenderContext<'_> {
         }
     }
 
-    /// The first pixel of `tile` in the image that the camera sees.
+    /// The first pixel of `tile` in the image of the camera.
     fn first_pixel(&self, tile: &FilmTile<'_>) -> [u32; 2] {
         let RenderSettings { width, height, .. } = *self.settings;
         match self.settings.mosaic_of {
@@ -47,7 +47,7 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Makes the camera rays of packet `number` of a group. `seeds` tells whether to set the seeds of their paths.
+    /// Generates the camera rays of packet `number` of a group, and the seeds of their paths if `seeds` is set.
     pub(super) fn camera_segments(
         &self,
         group: &SampleGroup,
@@ -55,11 +55,13 @@ impl RenderContext<'_> {
         seeds: bool,
         segments: &mut SegmentPacket,
     ) {
+        // Generate the rays
         let [x, y] = &group.film[number];
         camera_rays(self.simd, &self.camera, x, y, &mut segments.rays);
         let first = number * LANES;
         let len = LANES.min(group.len - first);
         segments.rays.set_len(len);
+        // Initialise their path state
         segments.throughput = [splat(1.0); 3];
         #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
         let sample = std::array::from_fn(|lane| (first + lane) as u32);

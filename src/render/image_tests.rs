@@ -135,7 +135,7 @@ fn nothing_is_left_of_what_was_in_a_film() {
             channels,
             ..settings()
         };
-        // Rays that meet something, and rays that meet nothing.
+        // Rays with and without intersections.
         for (balls, scene) in [(heap(60), &scene), (Balls(Vec::new()), &bare)] {
             let into = |film: &mut Film| {
                 render_into(film, &[&balls], scene, &source, &settings, &never).unwrap()
@@ -147,7 +147,7 @@ fn nothing_is_left_of_what_was_in_a_film() {
             assert_eq!(into(&mut used), counts);
             assert_eq!(used, fresh);
             assert_eq!(used.color.as_ptr(), memory);
-            // Those of other sizes or channels are made anew.
+            // Films of other sizes or channels are reallocated.
             for mut other in [
                 filled(settings.height, settings.width, channels),
                 filled(settings.width, settings.height, Channels::ALL),
@@ -159,7 +159,7 @@ fn nothing_is_left_of_what_was_in_a_film() {
     }
 }
 
-/// A film with something in every plane.
+/// A film with nonzero values in every plane.
 fn filled(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
     film.color.fill([7.0; 4]);
@@ -211,7 +211,7 @@ fn data_planes_hold_the_nearest_sample() {
     assert_eq!(film.velocity.as_ref().unwrap()[middle], velocities[0]);
     assert_eq!(film.albedo.as_ref().unwrap()[middle].z, 0.3);
     assert_eq!(film.id.as_ref().unwrap()[middle], 77);
-    // A corner sees nothing.
+    // A corner has no intersection.
     assert_eq!(film.depth.unwrap()[0], f32::INFINITY);
     assert_eq!(film.normal.unwrap()[0], Vec3::ZERO);
     assert_eq!(film.id.unwrap()[0], NO_ID);
@@ -231,7 +231,7 @@ fn row_zero_is_the_top() {
     scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
     let source = ParticleShading::constant(Vec3::ONE);
     let never = AtomicBool::new(false);
-    // Up and to the right of the middle.
+    // Above and to the right of the centre.
     let ball = Balls::one(Vec3::new(1.0, 0.0, 1.0), 0.3);
     let (film, _) = render(
         &[&ball],
@@ -297,7 +297,7 @@ fn interruption_and_bad_settings_are_errors() {
     assert!(matches!(result, Err(RenderError::Material(_))));
 }
 
-/// A surface without packets of its own.
+/// A surface without its own packet methods.
 struct OneByOne<'a>(SphereSurface<'a>);
 
 impl Shape for OneByOne<'_> {

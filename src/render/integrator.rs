@@ -1,10 +1,11 @@
-//! The interface of integrators, and the wavefront loop that they share (after the wavefront integrator of pbrt-v4).
+//! The interface of integrators, and the wavefront loop that they share (modelled on the wavefront integrator of
+//! pbrt-v4).
 //!
-//! A tile is sampled in groups of pixels, and each group is traced in batches whose rays fit into memory. A batch goes
-//! one depth after the other through `intersect` and [`Integrator::shade`], packet by packet; rays that leave surfaces
+//! A tile is sampled in groups of pixels, and each group is traced in batches with rays that fit into memory. A batch
+//! passes through `intersect` and [`Integrator::shade`] depth by depth and packet by packet; rays that leave surfaces
 //! are appended without gaps to the streams of the next depth. The radiance of a sample is summed in an order that
-//! depends on the sample alone: by depth, then reflected rays before refracted ones, each in the order of the rays that
-//! they leave. Nothing depends on threads, on the size of tiles or batches, or on which rays share a packet.
+//! depends only on the sample: by depth, then reflected rays before refracted ones, each in the order of their parent
+//! rays. Nothing depends on threads, on the size of tiles or batches, or on the assignment of rays to packets.
 
 use std::ops::Range;
 
@@ -24,14 +25,15 @@ pub(super) trait Integrator: Sync {
     /// The scene and the settings.
     fn context(&self) -> &RenderContext<'_>;
 
-    /// Path segments of one sample at any one depth, at most.
+    /// Maximum number of path segments of one sample at any depth.
     fn max_paths(&self) -> usize;
 
-    /// Whether random numbers are drawn along paths, so that segments need a [`PathSeed`](super::sampler::PathSeed).
+    /// Whether paths use random numbers, so that segments need a [`PathSeed`](super::sampler::PathSeed).
     fn is_stochastic(&self) -> bool;
 
-    /// Adds the radiance that `segments` bring to `packet.radiance`, and appends the rays that leave their
-    /// intersections, `packet.hits`, to `next`. `packet.throughput` is what arrives from there. Camera rays have depth 1.
+    /// Adds the radiance along `segments` to `packet.radiance`, and appends the rays that leave their intersections,
+    /// `packet.hits`, to `next`. `packet.throughput` is the throughput up to the intersections. Camera rays have
+    /// depth 1.
     fn shade(
         &self,
         segments: &SegmentPacket,
@@ -40,7 +42,7 @@ pub(super) trait Integrator: Sync {
         next: &mut RayStreams,
     );
 
-    /// Renders all pixels of `tile`. Returns `None` once `stop` is raised, which is checked for each packet.
+    /// Renders all pixels of `tile`. Returns `None` if `stop` is raised, which is checked for each packet.
     fn render_tile(
         &self,
         tile: &mut FilmTile<'_>,
@@ -49,6 +51,7 @@ pub(super) trait Integrator: Sync {
     ) -> Option<RayCounts> {
         let context = self.context();
         let samples = context.settings.samples;
+        // Render the pixels in groups of samples that fit into the cache
         let group_len = (GROUP / samples).max(1) as usize;
         scratch.packet.counts = RayCounts::default();
         let mut pixels = pixels_of(tile).peekable();
@@ -70,10 +73,13 @@ fn trace_group<I: Integrator + ?Sized>(
 ) -> Option<()> {
     let context = integrator.context();
     let packets = scratch.group.film.len();
+    // Trace batches with a bounded number of path segments
     let step = batch_len(context.max_segments, integrator.max_paths()) / LANES;
     for first in (0..packets).step_by(step) {
+        // Trace the camera rays of the batch
         scratch.next.clear();
         trace_camera_rays(integrator, first..packets.min(first + step), stop, scratch)?;
+        // Trace depth by depth, until no rays are left
         for depth in 2..=context.settings.max_depth {
             std::mem::swap(&mut scratch.current, &mut scratch.next);
             if scratch.current.is_empty() {
@@ -94,11 +100,13 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
 ) -> Option<()> {
     let context = integrator.context();
     for number in range {
+        // Generate and trace the rays of a packet
         let (group, packet) = (&mut scratch.group, &mut *scratch.packet);
         let segments = &mut *scratch.camera;
         context.camera_segments(group, number, integrator.is_stochastic(), segments);
         packet.counts.primary += segments.rays.len() as u64;
         trace_packet(integrator, segments, 1, stop, packet, &mut scratch.next)?;
+        // Store radiance, coverage and data channels of the samples
         group.radiance[number] = packet.radiance;
         group.coverage[number] = context.coverage(&packet.hits);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
@@ -106,7 +114,7 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
     Some(())
 }
 
-/// Traces the rays of one depth after the first.
+/// Traces the rays of a depth after the first.
 fn trace_depth<I: Integrator + ?Sized>(
     integrator: &I,
     depth: u32,

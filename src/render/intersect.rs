@@ -1,4 +1,4 @@
-//! The intersect stage: the nearest intersections, what of the throughput is left there, and the background behind.
+//! The intersect stage: the nearest intersections, the throughput up to them, and the background behind them.
 
 use glam::Vec3;
 
@@ -12,8 +12,8 @@ use super::{
 use crate::surface::MaterialId;
 
 impl RenderContext<'_> {
-    /// Finds the nearest intersection of each ray with the shapes of the scene, ends the ray there, and sets the
-    /// throughput up to there.
+    /// Finds the nearest intersection of each ray with the shapes of the scene, ends the ray there, and computes the
+    /// throughput up to that point.
     pub(super) fn intersect(
         &self,
         segments: &mut SegmentPacket,
@@ -39,11 +39,12 @@ impl RenderContext<'_> {
         let hits = &packet.hits;
         let lanes = match self.interior {
             Interior::Opaque => 0,
-            // A ray that leaves a sphere has come through it.
+            // Only a ray that leaves a sphere has passed through its interior.
             Interior::Spheres => {
                 hits.lanes_of(MaterialId::PARTICLES) & leaving(self.simd, &segments.rays, hits)
             }
-            // A ray inside without an intersection left by a crack in the surface; its length inside is unknown.
+            // A ray inside the body without an intersection has left through a crack in the surface; its length
+            // inside is unknown.
             Interior::Body => segments.inside & hits.mask,
         };
         if lanes != 0 {
@@ -52,23 +53,28 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Whether rays of `depth` without an intersection see the background.
+    /// Whether rays of `depth` without an intersection hit the background.
     pub(super) fn sees_background(&self, depth: u32) -> bool {
         depth > 1 || !self.settings.transparent_background
     }
 
-    /// Adds the background of rays without an intersection, and that behind surfaces that are not fully opaque.
+    /// Adds the background for rays without an intersection, and behind surfaces that are not fully opaque.
     pub(super) fn add_background(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
         let hits = &packet.hits;
         let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
             return;
         }
-        let seen = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
+        let background_part = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => 1.0,
             _ => 1.0 - hits.opacity[lane],
         });
-        scale(self.simd, &packet.throughput, &seen, &mut packet.weight);
+        scale(
+            self.simd,
+            &packet.throughput,
+            &background_part,
+            &mut packet.weight,
+        );
         let direction = &segments.rays.direction;
         let (weight, radiance) = (&packet.weight, &mut packet.radiance);
         add_background(

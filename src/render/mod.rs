@@ -1,9 +1,9 @@
-//! Rays in, planes out: samples every pixel of a [`Scene`] over a list of [`Shape`]s and fills a [`Film`].
-//! No I/O; encoding is `output`'s business.
+//! Renders a [`Scene`] with a list of [`Shape`]s: samples every pixel and fills the planes of a [`Film`]. There is no
+//! I/O; `output` encodes films.
 //!
-//! The image is cut into tiles of 16x16 pixels that rayon hands out. Every tile is computed from
-//! its pixels' coordinates alone and sums its samples in a fixed order, so the film is the same to
-//! the bit whatever the number of threads.
+//! The image is divided into tiles of 16x16 pixels, which rayon distributes over threads. A tile depends only on the
+//! coordinates of its pixels, and sums its samples in a fixed order, so the film is the same to the bit for any
+//! number of threads.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
@@ -70,16 +70,16 @@ use context::{Interior, RenderContext};
 use integrator::Integrator;
 use whitted::WhittedIntegrator;
 
-/// The renderers that there are. Images depend on which one made them.
+/// The available renderers. Images depend on the renderer.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum RendererKind {
-    /// Rays on the processor's threads.
+    /// Ray tracing on the threads of the CPU.
     #[default]
     Cpu,
 }
 
 impl RendererKind {
-    /// Its name in the settings of a job.
+    /// The name in the settings of a job.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Cpu => "cpu",
@@ -87,8 +87,8 @@ impl RendererKind {
     }
 }
 
-/// Bytes that each thread takes while it renders, beside the film, at most. `is_body` says that the particles make one
-/// connected body.
+/// Upper bound of the memory that each thread needs during rendering, without the film, in bytes. `is_body`: the
+/// particles form one connected body.
 pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bool) -> u64 {
     let max_paths = whitted::max_paths(settings, Interior::of(material, is_body));
     scratch::scratch_bytes(settings, max_paths)
@@ -96,12 +96,12 @@ pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bo
 
 /// Renders one image on the current rayon pool.
 ///
-/// The camera should have been made for `settings.width / settings.height`. No light is made: with
-/// `reflection` and `transmission` at most 1, which is checked, what a ray gathers from the
-/// background never exceeds the background's brightest colour.
+/// The aspect ratio of the camera should be `settings.width / settings.height`. No light is created: `reflection` and
+/// `transmission` are at most 1, which is checked, so the background never contributes more to a ray than its
+/// brightest colour.
 ///
 /// # Errors
-/// If `stop` is raised (looked at for each packet of samples), or a setting is out of range.
+/// If `stop` is raised (checked for each packet of samples), or if a setting is out of range.
 pub fn render(
     shapes: &[&dyn Shape],
     scene: &Scene,
@@ -114,11 +114,11 @@ pub fn render(
     Ok((film, counts))
 }
 
-/// As [`render`], into `film`, whatever is in it: in the memory of its planes if it is of the same size and
-/// channels.
+/// Same as [`render`], into an existing `film`. Its memory is reused if size and channels match; its content is
+/// ignored.
 ///
 /// # Errors
-/// As [`render`]; what is in the film then is no image.
+/// Same as [`render`]; the content of the film is unspecified then.
 pub fn render_into(
     film: &mut Film,
     shapes: &[&dyn Shape],
@@ -127,11 +127,13 @@ pub fn render_into(
     settings: &RenderSettings,
     stop: &dyn Stop,
 ) -> Result<RayCounts, RenderError> {
+    // Check the settings
     settings.validate()?;
     scene.material.validate()?;
     if !shapes.iter().any(|shape| shape.is_connected()) {
         settings.validate_branches(&scene.material)?;
     }
+    // Prepare film, shapes and integrator
     film.fit(settings.width, settings.height, settings.channels);
     let plane = scene.ground.as_ref().map(Plane::new);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
@@ -140,13 +142,13 @@ pub fn render_into(
     let integrator: &dyn Integrator = &WhittedIntegrator::new(context);
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
-        // As many as there are threads; they live until the image is done.
+        // Reuse scratch memory: there is one per thread, and all are released at the end of the image
         let mut own = lock(&scratch).pop().unwrap_or_default();
         let counts = integrator.render_tile(tile, stop, &mut own);
         lock(&scratch).push(own);
         counts.ok_or(RenderError::Interrupted)
     };
-    // Bands run at once and their tiles do too, so that a slow corner of the image keeps all threads busy.
+    // Render bands and their tiles in parallel, so that a slow corner of the image keeps all threads busy
     film.bands_mut(tile::SIDE)
         .into_par_iter()
         .map(|mut band| {

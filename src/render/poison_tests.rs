@@ -1,4 +1,4 @@
-//! Values that are infinite or no numbers stay in their lanes.
+//! Infinite and NaN values do not affect other lanes.
 
 use glam::{DVec3, Vec3};
 
@@ -51,7 +51,7 @@ fn scene(transmission: f32) -> Scene {
     }
 }
 
-/// Rays from the camera over all that there is to see.
+/// Camera rays over the whole scene.
 fn segments(scene: &Scene) -> SegmentPacket {
     let mut segments = SegmentPacket::default();
     segments.rays.clear();
@@ -63,7 +63,7 @@ fn segments(scene: &Scene) -> SegmentPacket {
     segments
 }
 
-/// All that a packet leaves behind for its samples but `poisoned`, as bits, with coherent rays and with others.
+/// All results of a packet except those of `poisoned` lanes, as bits, with coherent and with incoherent rays.
 fn left(
     integrator: &WhittedIntegrator<'_>,
     segments: &SegmentPacket,
@@ -146,7 +146,7 @@ fn poisoned_rays_change_nothing_for_their_neighbours() {
     }
 }
 
-/// A shape of which one lane meets a particle that is no number.
+/// A shape with NaN values at the intersection of one lane.
 struct Poisoned<'a> {
     shape: &'a dyn Shape,
     lane: usize,

@@ -1,20 +1,20 @@
-//! Counts of rays.
+//! Ray counters.
 
-/// Rays traced, by what they were for.
+/// Number of rays traced, by purpose.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct RayCounts {
-    /// From the camera.
+    /// Camera rays.
     pub primary: u64,
-    /// To a light.
+    /// Shadow rays.
     pub shadow: u64,
-    /// Mirrored.
+    /// Reflected rays.
     pub reflection: u64,
-    /// Into or out of a transmissive body.
+    /// Refracted rays, into or out of a transmissive body.
     pub refraction: u64,
 }
 
 impl RayCounts {
-    /// All together.
+    /// Number of all rays.
     pub const fn total(&self) -> u64 {
         self.primary + self.shadow + self.reflection + self.refraction
     }

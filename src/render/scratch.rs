@@ -1,5 +1,5 @@
-//! Memory that a thread keeps from tile to tile: the samples of a group of pixels, the rays of two depths, and what
-//! one packet needs.
+//! Memory that a thread reuses from tile to tile: the samples of a group of pixels, the rays of two depths, and the
+//! buffers of one packet.
 
 use super::{
     aov::DataSample,
@@ -14,10 +14,10 @@ use super::{
 use crate::math::{LANES, Lanes, Lanes3, lanes_in, splat};
 use crate::surface::Intersections;
 
-/// Samples of a group of pixels, unless one pixel has more.
+/// Maximum number of samples in a group of pixels, except for a single pixel with more samples.
 pub(super) const GROUP: u32 = 4096;
 
-/// Path segments of one depth, as far as batches of at least one packet of samples allow.
+/// Maximum number of path segments of one depth, except for batches of a single packet of samples.
 pub(super) const SEGMENTS: usize = 16_384;
 
 /// The memory of one thread.
@@ -25,8 +25,9 @@ pub(super) const SEGMENTS: usize = 16_384;
 pub(super) struct Scratch {
     pub(super) group: SampleGroup,
     pub(super) camera: Box<SegmentPacket>,
-    /// The depth that is traced, and the one after it.
+    /// The current depth.
     pub(super) current: RayStreams,
+    /// The next depth.
     pub(super) next: RayStreams,
     pub(super) packet: Box<PacketScratch>,
 }
@@ -35,13 +36,13 @@ pub(super) struct Scratch {
 #[derive(Default)]
 pub(super) struct SampleGroup {
     pub(super) pixels: Vec<Pixel>,
-    /// Samples in the group.
+    /// Number of samples in the group.
     pub(super) len: usize,
-    /// Position of each sample on the film, pixels.
+    /// Position of each sample on the film, in pixels.
     pub(super) film: Vec<[Lanes; 2]>,
     /// Radiance that arrives at each sample, linear RGB.
     pub(super) radiance: Vec<Lanes3>,
-    /// Part of each sample that surfaces cover.
+    /// Fraction of each sample that surfaces cover.
     pub(super) coverage: Vec<Lanes>,
 }
 
@@ -53,23 +54,23 @@ pub(super) struct Pixel {
     pub(super) data: DataSample,
 }
 
-/// Memory for the stages of one packet.
+/// Buffers for the stages of one packet.
 #[derive(Default)]
 pub(super) struct PacketScratch {
     /// The nearest intersections.
     pub(super) hits: Intersections,
-    /// Part of the radiance at the intersections that arrives at the samples.
+    /// Path throughput from the samples to the intersections.
     pub(super) throughput: Lanes3,
-    /// Radiance that arrives at the samples: the result.
+    /// Radiance that arrives at the samples, the result.
     pub(super) radiance: Lanes3,
     /// Base colours of the surfaces.
     pub(super) base: Lanes3,
     pub(super) points: ShadingPoints,
     pub(super) light: LightSamples,
-    /// Surfaces that shadow rays cross.
+    /// Intersections of shadow rays with transmissive surfaces.
     pub(super) crossings: Intersections,
     pub(super) weight: Lanes3,
-    /// Particles, with weights, from which a point takes its colour.
+    /// Particles that contribute to the colour of a point, with weights.
     pub(super) blend: Vec<(u32, f32)>,
     /// Rays traced for the tile.
     pub(super) counts: RayCounts,
@@ -85,7 +86,7 @@ impl SampleGroup {
         self.coverage.clear();
     }
 
-    /// Adds samples at these offsets, across and down, from the corner of a pixel.
+    /// Adds samples at the given offsets, in x and y, from the corner of a pixel.
     pub(super) fn push_pixel(&mut self, x: f32, y: f32, (across, down): (&[f32], &[f32])) {
         if !self.len.is_multiple_of(LANES) || !across.len().is_multiple_of(LANES) {
             for (across, down) in across.iter().zip(down) {
@@ -109,7 +110,7 @@ impl SampleGroup {
         self.coverage.push(splat(0.0));
     }
 
-    /// Adds a sample at a position on the film, pixels.
+    /// Adds a sample at a position on the film, in pixels.
     pub(super) fn push(&mut self, x: f32, y: f32) {
         let lane = self.len % LANES;
         if lane == 0 {
@@ -122,7 +123,8 @@ impl SampleGroup {
         self.len += 1;
     }
 
-    /// Adds `radiance` to the samples of `segments`, in order, as several rays of a packet may belong to one sample.
+    /// Adds `radiance` to the samples of `segments`, in order, because several rays of a packet may belong to one
+    /// sample.
     pub(super) fn add(&mut self, segments: &SegmentPacket, radiance: &Lanes3) {
         for lane in lanes_in(segments.lanes()) {
             let sample = segments.sample[lane] as usize;
@@ -134,22 +136,21 @@ impl SampleGroup {
     }
 }
 
-/// Samples, in whole packets, that are traced together where each has up to `max_paths` path segments at one depth,
-/// and all together at most `segments`.
+/// Number of samples in a batch (whole packets) such that there are at most `segments` path segments, if each sample
+/// has up to `max_paths` of them at one depth.
 pub(super) fn batch_len(segments: usize, max_paths: usize) -> usize {
     (segments / max_paths).min(GROUP as usize).max(LANES) / LANES * LANES
 }
 
-/// Bytes of the [`Scratch`] of one thread, rounded up, where each sample has up to `max_paths` path segments at one
-/// depth.
+/// Bytes of the [`Scratch`] of one thread, rounded up, if each sample has up to `max_paths` path segments at one depth.
 pub(super) fn scratch_bytes(settings: &RenderSettings, max_paths: usize) -> u64 {
     let tile = (SIDE * SIDE) as usize * settings.samples as usize;
-    let held = tile.min(GROUP.max(settings.samples) as usize);
+    let sample_count = tile.min(GROUP.max(settings.samples) as usize);
     let rays = match settings.max_depth {
         1 => 0,
-        _ => batch_len(SEGMENTS, max_paths).min(held) * max_paths,
+        _ => batch_len(SEGMENTS, max_paths).min(sample_count) * max_paths,
     };
-    let samples = held.div_ceil(LANES) * 6 * size_of::<Lanes>();
+    let samples = sample_count.div_ceil(LANES) * 6 * size_of::<Lanes>();
     let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
     let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>();
     (samples + segments + packet) as u64 + 32_768

@@ -1,52 +1,53 @@
-//! How to render: the settings of an image, their bounds, and the errors for settings out of bounds.
+//! Settings of an image, their valid ranges, and the errors for values out of range.
 
 use thiserror::Error;
 
 use super::film::Channels;
 use crate::scene::{Material, MaterialError};
 
-/// Most samples per pixel: more than any picture needs, and few enough to count in f32.
+/// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
 pub const MAX_SAMPLES: u32 = 4096;
 
-/// Deepest recursion: a level takes some stack.
+/// Maximum recursion depth.
 pub const MAX_DEPTH: u32 = 64;
 
-/// Deepest recursion that follows both branches at transmissive spheres always: the rays double at each level.
+/// Maximum recursion depth if both branches are always traced at transmissive spheres: the number of rays doubles at
+/// each level.
 pub const MAX_LITERAL_DEPTH: u32 = 8;
 
-/// Path weight below which one of two branches is drawn, unless something else is asked for.
+/// Default path weight below which one of two branches is chosen at random.
 pub const DEFAULT_MIN_WEIGHT: f32 = 1.0 / 1024.0;
 
-/// Path weights that can be asked for beside 0. A sample has at most `1 / min_weight` paths.
+/// Valid path weights apart from 0. A sample has at most `1 / min_weight` paths.
 pub const MIN_WEIGHTS: std::ops::RangeInclusive<f32> = 1e-5..=1.0;
 
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 65_536;
 
-/// How to render.
+/// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Samples per pixel; 1 looks through the pixel's centre exactly.
+    /// Samples per pixel; a single one is exactly at the centre of the pixel.
     pub samples: u32,
-    /// 1 shades what the camera sees with direct light only; each level more follows reflections
-    /// and refractions once more. Where it ends, a ray sees the background.
+    /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
+    /// beyond the last level see the background.
     pub max_depth: u32,
-    /// Where a ray meets a transmissive sphere, both the reflected and the refracted branch are followed while
-    /// each has a path weight (the product of the weights of its branches) of at least this; below, one of the
-    /// two is drawn, with the weight of both. 0 follows both always: equation 4.1 to the letter, to
-    /// [`MAX_LITERAL_DEPTH`]. Surfaces of one body have a rule of their own.
+    /// At a transmissive sphere, both the reflected and the refracted branch are traced while each has at least this
+    /// path weight (the product of the weights along its path). Below it, one of the two is chosen at random, with
+    /// the weight of both. 0 always traces both: equation 4.1 taken literally, up to [`MAX_LITERAL_DEPTH`]. Surfaces
+    /// of a connected body have a separate rule.
     pub min_weight: f32,
-    /// Leaves the background out of the colour of pixels and fades the ground out in `A`; by
-    /// default the background is in `RGB` where `A` is 0.
+    /// Removes the background from the colour of pixels and fades the ground out in `A`. By default `RGB` contains
+    /// the background where `A` is 0.
     pub transparent_background: bool,
     /// Planes to fill.
     pub channels: Channels,
-    /// If given, the image is a mosaic: its tiles of 16x16 pixels are tiles of an image of this width and height, spread
-    /// evenly over it. What a mosaic costs for each pixel, the whole image costs.
+    /// If given, the image is a mosaic: its tiles of 16x16 pixels are tiles of an image with this width and height,
+    /// evenly distributed over it. The cost per pixel of a mosaic is an estimate for the whole image.
     pub mosaic_of: Option<[u32; 2]>,
 }
 
@@ -65,7 +66,7 @@ impl RenderSettings {
         }
     }
 
-    /// Pixels across and down of the image that the camera sees.
+    /// Width and height in pixels of the image that the camera sees.
     pub(super) fn full_size(&self) -> [u32; 2] {
         self.mosaic_of.unwrap_or([self.width, self.height])
     }
@@ -90,7 +91,7 @@ impl RenderSettings {
         Ok(())
     }
 
-    /// Checks that the rays of spheres of `material` do not double at each level for too many levels.
+    /// Checks that the number of rays at spheres of `material` does not double for too many levels.
     pub(super) fn validate_branches(&self, material: &Material) -> Result<(), RenderError> {
         let max_depth = self.max_depth;
         if self.min_weight == 0.0 && material.branches() && max_depth > MAX_LITERAL_DEPTH {
@@ -100,26 +101,26 @@ impl RenderSettings {
     }
 }
 
-/// Why there is no image.
+/// Reasons why there is no image.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum RenderError {
     /// The caller asked to stop.
     #[error("rendering was interrupted")]
     Interrupted,
-    /// A setting makes no image.
+    /// A setting is out of range.
     #[error("{name} = {value} is out of range, it must lie in 1 to {max}")]
     OutOfRange {
         /// The setting.
         name: &'static str,
-        /// What it was.
+        /// Its value.
         value: u32,
-        /// The largest that works.
+        /// Its maximum.
         max: u32,
     },
-    /// The path weight from which on one branch is drawn is out of range.
+    /// `min_weight` is out of range.
     #[error("min_weight = {0} is out of range, it must be 0 or lie in {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
     MinWeight(f32),
-    /// Both branches are to be followed for too many levels.
+    /// Both branches would be traced for too many levels.
     #[error(
         "min_weight = 0 follows both branches at transmissive spheres, which doubles the rays at each level; \
          max_depth = {max_depth} is too deep for that, it must be at most {MAX_LITERAL_DEPTH}"

@@ -1,4 +1,4 @@
-//! Test support: bodies of one medium, met in f64 by what is known of them.
+//! Test support: connected bodies with exact intersections in f64.
 
 use glam::{DVec3, Vec3};
 
@@ -7,21 +7,21 @@ use crate::{
     surface::{Intersection, Shape, Side},
 };
 
-/// What a body fills.
+/// The shape of a body.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Body {
     Ball {
         center: Vec3,
         radius: f32,
     },
-    /// Between two heights, without end.
+    /// The space between two heights.
     Slab {
         low: f32,
         high: f32,
     },
 }
 
-/// A body.
+/// A connected body.
 pub(crate) struct Solid {
     body: Body,
 }
@@ -42,7 +42,7 @@ impl Solid {
         Self { body }
     }
 
-    /// Distances of entry and exit; empty if the ray misses.
+    /// Distances where the ray enters and leaves; empty if it misses.
     fn inside(&self, ray: &Ray) -> [f64; 2] {
         let (origin, direction) = (ray.origin.as_dvec3(), ray.direction.as_dvec3().normalize());
         match self.body {
@@ -51,7 +51,7 @@ impl Solid {
                 let middle = center.dot(direction);
                 let across = (center - middle * direction).length_squared();
                 let half = (f64::from(radius).powi(2) - across).sqrt();
-                // No number, if the ray misses.
+                // NaN if the ray misses.
                 [middle - half, middle + half]
             }
             Body::Slab { low, high } => {
@@ -98,7 +98,7 @@ impl Shape for Solid {
         let t = match side {
             Side::Outside if !is_in => enter,
             Side::Inside if is_in => leave,
-            // Rounding put it on the wrong side.
+            // Rounding has put the origin on the wrong side.
             Side::Outside | Side::Inside => low,
         };
         (t >= low && t < high).then(|| self.hit(ray, t))

@@ -1,4 +1,4 @@
-//! Where shading takes a particle's colour, id and velocity from.
+//! Attributes of particles for shading: colour, id and velocity.
 
 use std::iter::Sum;
 use std::ops::Mul;
@@ -8,8 +8,7 @@ use glam::Vec3;
 use super::aov::NO_ID;
 use crate::scene::ColorMap;
 
-/// Looks up what belongs to particle `index` of the frame, as [`crate::surface::Intersection`] counts
-/// them.
+/// Looks up attributes by the index of a particle in the frame, as in [`crate::surface::Intersection`].
 pub trait ShadeSource: Sync {
     /// Base colour, linear RGB.
     fn color(&self, index: u32) -> Vec3;
@@ -25,14 +24,14 @@ pub trait ShadeSource: Sync {
         mean(parts, |i| self.color(i))
     }
 
-    /// The number in the `id` channel.
+    /// The value for the `id` channel.
     fn id(&self, index: u32) -> u32;
 
-    /// Velocity in world units per time, zero if not known.
+    /// Velocity in world units per time; zero if it is unknown.
     fn velocity(&self, index: u32) -> Vec3;
 }
 
-/// The weighted mean of what `of` says about `parts`, in their order.
+/// The weighted mean of `of` over `parts`, in their order.
 pub(crate) fn mean<T>(parts: &[(u32, f32)], of: impl Fn(u32) -> T) -> T
 where
     T: Sum + Mul<f32, Output = T>,
@@ -45,32 +44,32 @@ where
 /// Base colours of a frame.
 #[derive(Debug, Clone, Copy)]
 pub enum Colors<'a> {
-    /// All alike.
+    /// One colour for all particles.
     Constant(Vec3),
-    /// One linear RGB each.
+    /// Linear RGB per particle.
     PerParticle(&'a [Vec3]),
-    /// A number each through a colour map.
+    /// A scalar per particle, with a colour map.
     Mapped {
-        /// The numbers.
+        /// The scalars.
         values: &'a [f32],
         /// The map with its range.
         map: &'a ColorMap,
     },
 }
 
-/// A [`ShadeSource`] over slices in the particles' order.
+/// A [`ShadeSource`] over slices in the order of the particles.
 #[derive(Debug, Clone, Copy)]
 pub struct ParticleShading<'a> {
     /// Base colours.
     pub colors: Colors<'a>,
-    /// Ids; without them a particle's id is its index.
+    /// Ids; by default the id of a particle is its index.
     pub ids: Option<&'a [u32]>,
-    /// Velocities; without them zero.
+    /// Velocities; zero by default.
     pub velocities: Option<&'a [Vec3]>,
 }
 
 impl ParticleShading<'_> {
-    /// One colour for all, indices for ids.
+    /// One colour for all particles, and indices as ids.
     pub const fn constant(color: Vec3) -> Self {
         Self {
             colors: Colors::Constant(color),
@@ -83,7 +82,7 @@ impl ParticleShading<'_> {
 impl ShadeSource for ParticleShading<'_> {
     fn color(&self, index: u32) -> Vec3 {
         let i = index as usize;
-        // Slices that are too short give black, not a panic in the middle of a job.
+        // If slices are too short, return black; a panic would abort the job.
         match self.colors {
             Colors::Constant(color) => color,
             Colors::PerParticle(colors) => colors.get(i).copied().unwrap_or_default(),

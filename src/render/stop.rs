@@ -1,11 +1,11 @@
-//! Asking a render to end before the image is whole.
+//! Stop requests for a render in progress.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Instant;
 
-/// Says whether to end. Looked at often and by all threads: the answer must be cheap, and stay yes.
+/// A stop request. All threads check it often, so the check must be cheap; once raised, it must stay raised.
 pub trait Stop: Sync {
-    /// Whether to end.
+    /// Whether to stop.
     fn is_raised(&self) -> bool;
 }
 
@@ -15,7 +15,7 @@ impl Stop for AtomicBool {
     }
 }
 
-/// A time to end at.
+/// A stop request at a point in time.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Deadline(pub Instant);
 

@@ -1,24 +1,24 @@
-//! Path segments on their way, in packets of 16.
+//! Streams of path segments, in packets of 16.
 
 use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
 
-/// Packets that a stream grows by.
-const PIECE: usize = 32;
+/// Number of packets by which a stream grows.
+const GROWTH: usize = 32;
 
-/// The path segments that are traced together.
+/// Path segments that are traced together.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct SegmentPacket {
     pub(super) rays: RayPacket,
-    /// What of the radiance along each ray arrives at its sample, linear RGB.
+    /// Path throughput from the sample to the origin of each ray, linear RGB.
     pub(super) throughput: Lanes3,
     /// The sample that each ray belongs to, within its batch.
     pub(super) sample: [u32; LANES],
-    /// What is drawn along the way that each ray came; kept where paths branch.
+    /// Seed of the random numbers of each path; only set for stochastic integrators.
     pub(super) path: [PathSeed; LANES],
-    /// Lanes whose rays start inside of one connected body.
+    /// Lanes of rays that start inside a connected body.
     pub(super) inside: u32,
 }
 
@@ -35,26 +35,26 @@ impl Default for SegmentPacket {
 }
 
 impl SegmentPacket {
-    /// A bit for each lane that holds a ray.
+    /// Bit mask of the lanes with a ray.
     #[inline(always)]
     pub(super) fn lanes(&self) -> u32 {
         first_lanes(self.rays.len())
     }
 }
 
-/// Rays that leave the surfaces of a packet, one for each lane.
+/// Rays that leave the surfaces of a packet, one per lane.
 #[derive(Debug, Clone, Default)]
 #[repr(C, align(64))]
 pub(super) struct ScatteredRays {
     pub(super) origin: Lanes3,
     pub(super) direction: Lanes3,
-    /// Part of the radiance along each ray that goes the way that the packet came: a weight of eq. 4.1.
+    /// Weight of each ray in eq. 4.1: the fraction of its radiance that continues along the incoming ray.
     pub(super) weight: Lanes,
-    /// The same times the throughput of the packet.
+    /// The weight times the throughput of the packet.
     pub(super) throughput: Lanes3,
 }
 
-/// Path segments of one depth, packed without gaps. Its memory lives on when it is cleared.
+/// Path segments of one depth, stored without gaps. Its memory is kept when it is cleared.
 #[derive(Debug, Default)]
 pub(super) struct RayStream {
     packets: Vec<SegmentPacket>,
@@ -67,7 +67,7 @@ impl RayStream {
         self.len = 0;
     }
 
-    /// Segments in the stream.
+    /// Number of segments in the stream.
     pub(super) fn len(&self) -> usize {
         self.len
     }
@@ -82,8 +82,8 @@ impl RayStream {
         &mut self.packets[..self.len.div_ceil(LANES)]
     }
 
-    /// Appends the rays in `lanes`, in order, which leave surfaces that `parents` meet; those in `inside` start inside
-    /// of a connected body. They are continuation `branch` of the paths.
+    /// Appends the rays in `lanes`, in order, which leave the intersections of `parents`; those in `inside` start
+    /// inside a connected body. They are continuation `branch` of the paths.
     pub(super) fn push(
         &mut self,
         lanes: u32,
@@ -92,15 +92,16 @@ impl RayStream {
         inside: u32,
         branch: u32,
     ) {
-        // There is always room for a whole packet more.
+        // Grow if there is no space for another whole packet
         let needed = (self.len + LANES).div_ceil(LANES) + 1;
         if self.packets.len() < needed {
-            // By the piece, not by doubling: streams are the larger part of what a thread holds.
-            let room = needed.next_multiple_of(PIECE);
-            self.packets.reserve_exact(room - self.packets.len());
-            self.packets.resize_with(room, SegmentPacket::default);
+            // Grow by a constant and not by doubling, because streams are most of the memory of a thread.
+            let capacity = needed.next_multiple_of(GROWTH);
+            self.packets.reserve_exact(capacity - self.packets.len());
+            self.packets.resize_with(capacity, SegmentPacket::default);
         }
         for lane in lanes_in(lanes) {
+            // Copy each ray to the next free lane
             let (packet, to) = (self.len / LANES, self.len % LANES);
             let segment = &mut self.packets[packet];
             if to == 0 {
@@ -121,7 +122,7 @@ impl RayStream {
     }
 }
 
-/// The rays of one depth, by how they left a surface.
+/// The rays of one depth, separated into reflected and refracted ones.
 #[derive(Debug, Default)]
 pub(super) struct RayStreams {
     pub(super) reflected: RayStream,
@@ -135,7 +136,7 @@ impl RayStreams {
         self.refracted.clear();
     }
 
-    /// Whether there is no segment.
+    /// Whether there are no segments.
     pub(super) fn is_empty(&self) -> bool {
         self.reflected.len() + self.refracted.len() == 0
     }

@@ -1,13 +1,13 @@
-//! The pixels of a tile in the order in which they are sampled.
+//! Tiles of an image, and the sampling order of their pixels.
 
 use super::film::FilmTile;
 
-/// Pixels along a tile's side: enough work to hide the scheduling, small enough to share evenly and for its samples
-/// to stay in the cache.
+/// Edge of a tile in pixels: large enough to hide the cost of scheduling, and small enough for even distribution and
+/// for its samples to stay in the cache.
 pub(super) const SIDE: u32 = 16;
 
-/// Where the tile at `start` of a mosaic `length` pixels long begins in the full image: its middle is that of an equal
-/// share of the `full` pixels, unless the tile would not lie within.
+/// Where the tile at `start` of a mosaic of `length` pixels begins in the full image: it is centred in its equal
+/// share of the `full` pixels, but moved if it would extend beyond the image.
 pub(super) fn mosaic_start(start: u32, length: u32, full: u32) -> u32 {
     let (number, count) = (u64::from(start / SIDE), u64::from(length.div_ceil(SIDE)));
     let middle = (2 * number + 1) * u64::from(full) / (2 * count);
@@ -17,8 +17,8 @@ pub(super) fn mosaic_start(start: u32, length: u32, full: u32) -> u32 {
         .min(full.saturating_sub(SIDE))
 }
 
-/// Column and row of each pixel of `tile` along a Z-order curve, so that every aligned square of a power of two is
-/// finished before the next one is begun: 16 successive samples lie in 4x4 pixels, or in a smaller square.
+/// Column and row of each pixel of `tile` along a Z-order curve. Every aligned square with a power of two as its edge
+/// is finished before the next one begins, so 16 consecutive samples are in 4x4 pixels or in a smaller square.
 pub(super) fn pixels_of(tile: &FilmTile<'_>) -> impl Iterator<Item = (u32, u32)> + use<> {
     let (width, rows) = (tile.width, tile.rows);
     z_order().filter(move |(column, row)| *column < width && *row < rows)

@@ -1,8 +1,9 @@
-//! The occlude stage: what shadow rays keep between shading points and lights.
+//! The occlude stage: visibility of lights from shading points, and transmittance of shadow rays.
 //!
-//! Shadow rays go straight on through transmissive bodies, so there are no caustics. They keep `transmission*(1-r)` at
-//! each crossing of a surface, with `r` for the angle outside on both sides of it (a ray that was bent there would have
-//! come from such an angle, and is never totally reflected), and the transmittance of a connected body's medium.
+//! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
+//! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
+//! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
+//! body attenuates them as well.
 
 use super::{
     context::{Interior, RenderContext},
@@ -17,15 +18,15 @@ use crate::math::{Lanes, Lanes3, first_lanes, lane3, lanes_in, splat};
 use crate::ray::RayPacket;
 use crate::surface::{Intersections, MaterialId, Shape};
 
-/// Most crossings of one body along a shadow ray.
+/// Maximum number of crossings of one body along a shadow ray.
 const MAX_CROSSINGS: u32 = 64;
 
 /// Transmittance below which a shadow ray ends.
-const DARK: f32 = 1.0 / 4096.0;
+const MIN_TRANSMITTANCE: f32 = 1.0 / 4096.0;
 
 impl RenderContext<'_> {
-    /// Traces the rays to a light from shading points of `segments`, and multiplies the radiance of `samples` by what the
-    /// rays keep. Returns the lanes that the light reaches.
+    /// Traces shadow rays from the shading points of `segments` to a light, and multiplies the radiance of `samples`
+    /// by their transmittance. Returns the lanes that the light reaches.
     pub(super) fn trace_shadow_rays(
         &self,
         segments: &SegmentPacket,
@@ -38,7 +39,7 @@ impl RenderContext<'_> {
         counts.shadow += u64::from(samples.lanes.count_ones());
         let coherence = Self::coherence(depth);
 
-        // Opaque shapes first: rays that they stop need not be traced on
+        // Trace opaque shapes first: occluded rays need no further tests
         for shape in &self.shapes {
             let is_opaque =
                 self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES;
@@ -53,7 +54,7 @@ impl RenderContext<'_> {
             return 0;
         }
 
-        // Then transmissive ones
+        // Trace the transmissive particles
         let mut transmittance = [splat(1.0); 3];
         let reached = match self.interior {
             Interior::Body => {
@@ -70,6 +71,7 @@ impl RenderContext<'_> {
             }
             _ => self.cross_spheres(particles, samples, &mut transmittance),
         };
+        // Attenuate the light
         let unoccluded = samples.radiance;
         product(
             self.simd,
@@ -80,23 +82,28 @@ impl RenderContext<'_> {
         reached
     }
 
-    /// The transmittance of spheres that are bodies of their own. Returns the lanes in which it is not 0.
+    /// The transmittance of spheres that are separate bodies. Returns the lanes in which it is not 0.
     fn cross_spheres(
         &self,
         spheres: &dyn Shape,
         samples: &LightSamples,
         transmittance: &mut Lanes3,
     ) -> u32 {
-        let passed = |cosine: f32| self.boundary.straight_transmittance(cosine);
-        spheres.transmittance(&samples.rays, samples.lanes, &passed, &mut transmittance[0]);
+        let fresnel_transmittance = |cosine: f32| self.boundary.straight_transmittance(cosine);
+        spheres.transmittance(
+            &samples.rays,
+            samples.lanes,
+            &fresnel_transmittance,
+            &mut transmittance[0],
+        );
         transmittance[1] = transmittance[0];
         transmittance[2] = transmittance[0];
-        let is_lit = |lane: usize| u32::from(transmittance[0][lane] > 0.0) << lane;
-        lanes_in(samples.lanes).fold(0, |reached, lane| reached | is_lit(lane))
+        let is_reached = |lane: usize| u32::from(transmittance[0][lane] > 0.0) << lane;
+        lanes_in(samples.lanes).fold(0, |reached, lane| reached | is_reached(lane))
     }
 
-    /// The transmittance of one connected body, crossing after crossing of all rays at once; those in `inside` start in
-    /// the body. Returns the lanes in which it is not 0.
+    /// The transmittance of one connected body, crossing after crossing for all rays at once; rays of `inside` start
+    /// inside the body. Returns the lanes in which it is not 0.
     fn cross_body(
         &self,
         body: &dyn Shape,
@@ -107,20 +114,20 @@ impl RenderContext<'_> {
         transmittance: &mut Lanes3,
     ) -> u32 {
         let (rays, boundary) = (&samples.rays, &self.boundary);
-        let mut ahead = *rays;
+        let mut remaining = *rays;
         let (mut reached, mut alive) = (samples.lanes, samples.lanes);
-        // Distances of the last crossings
+        // Distances of the previous crossings
         let mut from = rays.t_min;
         for _ in 0..MAX_CROSSINGS {
             // Find the next crossing of each ray
             for lane in lanes_in(!alive & first_lanes(rays.len())) {
-                ahead.t_max[lane] = -1.0;
+                remaining.t_max[lane] = -1.0;
             }
             hits.clear();
-            body.intersect(&mut ahead, coherence, inside & alive, hits);
+            body.intersect(&mut remaining, coherence, inside & alive, hits);
             let crossing = hits.mask & alive;
 
-            // Attenuate by the medium up to there and by the crossing
+            // Attenuate by the medium up to the crossing, and by the crossing
             let lanes = alive & inside;
             let length = inside_lengths(rays, hits, crossing, lanes, &from);
             attenuate(
@@ -132,8 +139,8 @@ impl RenderContext<'_> {
             );
             cross_straight(self.simd, boundary, rays, hits, crossing, transmittance);
 
-            // End rays that keep nothing
-            let is_dark = |lane| lane3(transmittance, lane).max_element() < DARK;
+            // End rays without transmittance
+            let is_dark = |lane| lane3(transmittance, lane).max_element() < MIN_TRANSMITTANCE;
             let dark =
                 lanes_in(crossing).fold(0, |dark, lane| dark | u32::from(is_dark(lane)) << lane);
             reached &= !dark;
@@ -142,11 +149,11 @@ impl RenderContext<'_> {
                 break;
             }
 
-            // Go on beyond the crossing
+            // Continue beyond the crossing
             for lane in lanes_in(alive) {
                 from[lane] = hits.t[lane];
-                ahead.t_min[lane] = hits.t[lane] + hits.offset[lane];
-                ahead.t_max[lane] = rays.t_max[lane];
+                remaining.t_min[lane] = hits.t[lane] + hits.offset[lane];
+                remaining.t_max[lane] = rays.t_max[lane];
             }
             inside ^= alive;
             coherence = Coherence::Incoherent;
@@ -155,8 +162,8 @@ impl RenderContext<'_> {
     }
 }
 
-/// Lengths of the ways of `lanes` inside a body, `from` the last crossing to the next one in `crossing`, else to the
-/// light. A way without an end left by a crack in the surface, and counts as none.
+/// Lengths of the segments of `lanes` inside a body, `from` the previous crossing to the next one in `crossing`, or
+/// to the light. An unbounded segment has left through a crack in the surface, and gets length 0.
 fn inside_lengths(
     rays: &RayPacket,
     hits: &Intersections,

@@ -1,8 +1,8 @@
 //! Whitted ray tracing: eq. 4.1 of the thesis, `I = ambient + sum of lights + reflection*r*S + transmission*(1-r)*T`,
-//! with lights reflected as by Blinn and Phong (4.2, program 3.1) and `r` by Schlick (4.3). Both weights 1 give 4.1 to
-//! the letter.
+//! with reflection of lights by Blinn and Phong (4.2, program 3.1) and `r` by Schlick (4.3). If both weights are 1,
+//! this is literally 4.1.
 //!
-//! The surface of one connected body is lit from outside alone; from inside it only reflects and refracts.
+//! Lights illuminate the surface of one connected body only from outside; from inside it only reflects and refracts.
 
 use glam::Vec3;
 
@@ -19,12 +19,12 @@ use super::{
 use crate::math::{lane3, lanes_in, splat};
 use crate::surface::MaterialId;
 
-/// Follows reflected and refracted rays, and samples every light at each intersection.
+/// Traces reflected and refracted rays, and samples every light at each intersection.
 pub(super) struct WhittedIntegrator<'a> {
     pub(super) context: RenderContext<'a>,
-    /// By [`MaterialId`].
+    /// The materials by [`MaterialId`].
     materials: [Box<dyn Material>; MaterialId::COUNT],
-    /// Which of two rays are followed.
+    /// Decides which of two rays are traced.
     pub(super) split: SplitRule,
 }
 
@@ -43,7 +43,7 @@ impl<'a> WhittedIntegrator<'a> {
     }
 }
 
-/// Path segments of one sample at any one depth, at most.
+/// Maximum number of path segments of one sample at any depth.
 pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize {
     SplitRule::new(settings, interior).max_paths(settings.max_depth)
 }
@@ -69,6 +69,7 @@ impl Integrator for WhittedIntegrator<'_> {
         next: &mut RayStreams,
     ) {
         let context = &self.context;
+        // Add the background for rays that leave the scene
         if context.sees_background(depth) {
             context.add_background(segments, packet);
         }
@@ -76,6 +77,7 @@ impl Integrator for WhittedIntegrator<'_> {
             return;
         }
         context.base_colors(self.particle_constants().has_color(), packet);
+        // Shade the intersections of each material
         for (number, material) in (0..).zip(&self.materials) {
             let id = MaterialId(number);
             let lanes = packet.hits.lanes_of(id);
@@ -94,7 +96,7 @@ impl Integrator for WhittedIntegrator<'_> {
 }
 
 impl WhittedIntegrator<'_> {
-    /// Adds ambient light and the light of all lights at the shading points of `lanes`.
+    /// Adds ambient light and the light of all light sources at the shading points of `lanes`.
     fn add_direct_light(
         &self,
         segments: &SegmentPacket,
@@ -126,7 +128,7 @@ impl WhittedIntegrator<'_> {
         product(simd, base, weight, &mut colored);
         add(simd, &colored, &constants.ambient, lanes, radiance);
 
-        // Add the light of each light that is visible
+        // Add the light of each visible light source
         if !constants.scatters() {
             return;
         }
@@ -158,6 +160,7 @@ impl WhittedIntegrator<'_> {
         next: &mut RayStreams,
     ) {
         let context = &self.context;
+        // Choose which rays to trace
         let is_last = depth >= context.settings.max_depth;
         if self.is_stochastic() && !is_last {
             self.split_weights(segments, lanes, depth, packet);
@@ -168,7 +171,8 @@ impl WhittedIntegrator<'_> {
             radiance,
             ..
         } = packet;
-        let (inside, beyond) = match context.interior {
+        // Describe both rays: weight, stream, side and branch of the path
+        let (inside, other_side) = match context.interior {
             Interior::Opaque | Interior::Spheres => (0, 0),
             Interior::Body => (segments.inside, !segments.inside),
         };
@@ -183,13 +187,14 @@ impl WhittedIntegrator<'_> {
             material.dielectric.transmission,
             &mut points.refracted,
             &mut next.refracted,
-            beyond,
+            other_side,
             REFRACTED,
         );
         for (weight, rays, stream, inside, branch) in [reflected, refracted] {
             if weight <= 0.0 {
                 continue;
             }
+            // Append the rays with a weight to their stream
             let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
             let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
             scale(context.simd, throughput, &rays.weight, &mut rays.throughput);
@@ -203,7 +208,7 @@ impl WhittedIntegrator<'_> {
         }
     }
 
-    /// Chooses which of the two rays that leave the shading points of `lanes` are followed, and with what weights.
+    /// Chooses which of the two rays that leave the shading points of `lanes` are traced, and their weights.
     fn split_weights(
         &self,
         segments: &SegmentPacket,

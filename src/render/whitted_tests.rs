@@ -1,4 +1,4 @@
-//! The recursion against numbers worked out by hand.
+//! The recursion against values computed by hand.
 #![expect(clippy::cast_possible_truncation, reason = "hand values are f64")]
 
 use std::sync::atomic::AtomicBool;
@@ -14,7 +14,7 @@ use crate::scene::{Background, Camera, CameraView, Ground, Light, Material, mate
 /// `1 - ((1.5-1)/(1.5+1))^2` and its complement, at normal incidence.
 const R: f32 = 0.04;
 
-/// Looks along +y at the origin from 10 away, through a narrow lens.
+/// Looks along +y at the origin from a distance of 10, with a narrow field of view.
 fn scene(material: Material) -> Scene {
     let view = CameraView {
         eye: DVec3::new(0.0, -10.0, 0.0),
@@ -42,7 +42,7 @@ const fn glass() -> Material {
     }
 }
 
-/// The middle pixel of `scene`.
+/// The centre pixel of `scene`.
 fn middle(surface: &Balls, scene: &Scene, max_depth: u32) -> (Vec3, RayCounts) {
     let settings = RenderSettings {
         max_depth,
@@ -101,14 +101,14 @@ fn equation_4_1_through_the_middle_of_a_glass_ball() {
     assert_near(one, ambient + R * back + (1.0 - R) * front);
     assert_eq!(counts.total(), 1);
 
-    // Depth 2: the refracted ray meets the far wall, and its two directions see the background.
+    // Depth 2: the refracted ray hits the far wall, and its two rays see the background.
     let far_wall = ambient + R * back + (1.0 - R) * front;
     let (two, counts) = middle(&ball, &scene, 2);
     assert_near(two, ambient + R * back + (1.0 - R) * far_wall);
     assert_eq!((counts.reflection, counts.refraction), (1, 1));
 
-    // Depth 3: the ray mirrored at the far wall meets the near one from inside; from there it is
-    // mirrored to the front and let out to the back.
+    // Depth 3: the ray reflected at the far wall hits the near one from inside; from there it is reflected to the
+    // front and refracted to the back.
     let near_wall = ambient + R * front + (1.0 - R) * back;
     let far_wall = ambient + R * near_wall + (1.0 - R) * front;
     let (three, counts) = middle(&ball, &scene, 3);
@@ -136,7 +136,7 @@ fn the_weights_scale_their_rays_and_zero_traces_none() {
 
 #[test]
 fn refraction_through_a_ball_leaves_at_the_known_angle() {
-    // A ray that meets the ball at angle a leaves turned by 2 (a - b), sin b = sin a / 1.5.
+    // A ray that hits the ball at angle a leaves after a turn of 2 (a - b), sin b = sin a / 1.5.
     for offset in [0.1_f64, 0.5, 0.8] {
         let view = CameraView {
             eye: DVec3::new(offset, -10.0, 0.0),
@@ -149,23 +149,23 @@ fn refraction_through_a_ball_leaves_at_the_known_angle() {
             ..glass()
         });
         scene.camera = Camera::new(&view, 1.0, DVec3::ZERO).unwrap();
-        // Brightness tells the angle against +y.
+        // Brightness encodes the angle to +y.
         scene.background = front_and_back(1.0, 0.0);
         let (value, counts) = middle(&Balls::one(Vec3::ZERO, 1.0), &scene, 3);
         assert_eq!(counts.refraction, 2);
         let (a, b) = (offset.asin(), (offset / 1.5).asin());
         let turned = 2.0 * (a - b);
         let sky = 1.0 - turned / std::f64::consts::PI;
-        // Schlick by the viewer's cosine: a outside, b inside.
+        // Schlick's approximation with the cosine of the ray: a outside, b inside.
         let passed = |angle: f64| 1.0 - f64::from(schlick(R, angle.cos() as f32));
-        // Starting 1e-4 off the surface shifts the path by as much.
+        // The offset of 1e-4 from the surface shifts the path by the same length.
         assert_within(1e-4, value, (passed(a) * passed(b) * sky) as f32);
     }
 }
 
 #[test]
 fn total_internal_reflection_keeps_everything_inside() {
-    // The eye is inside, 0.9 off the middle, looking across: sin = 0.9 is past 1/1.5.
+    // The eye is inside, 0.9 from the centre, looking sideways: sin = 0.9 is beyond 1/1.5.
     let view = CameraView {
         eye: DVec3::new(0.9, 0.0, 0.0),
         look_at: DVec3::new(0.9, 1.0, 0.0),
@@ -178,7 +178,7 @@ fn total_internal_reflection_keeps_everything_inside() {
     let (value, counts) = middle(&Balls::one(Vec3::ZERO, 1.0), &scene, 4);
     assert_eq!((counts.refraction, counts.reflection), (0, 3));
     assert_near(value, 4.0 * 0.125 + 1.0);
-    // The deepest recursion that is allowed fits the stack.
+    // The maximum recursion depth fits into the stack.
     let (deep, _) = middle(&Balls::one(Vec3::ZERO, 1.0), &scene, MAX_DEPTH);
     assert_within(1e-3, deep, MAX_DEPTH as f32 * 0.125 + 1.0);
 }
@@ -201,7 +201,7 @@ fn shadows_are_full_or_dimmed_by_every_crossing() {
             ..material
         });
         scene.background = Background::Constant(Vec3::ZERO);
-        // In line with the point (0, -1, 0) and the balls' middles at 45 degrees.
+        // In line with the point (0, -1, 0) and the centres of the balls, at 45 degrees.
         let light = Light::point(DVec3::new(0.0, -10.0, 9.0), DVec3::ZERO, Vec3::ONE);
         scene.lights = vec![light];
         let mut balls = vec![Ball {
@@ -223,7 +223,7 @@ fn shadows_are_full_or_dimmed_by_every_crossing() {
     // Behind the light.
     assert_near(lit(opaque, &beyond).0, cosine);
 
-    // Through the middle of a ball: two crossings at normal incidence.
+    // Through the centre of a ball: two crossings at normal incidence.
     let clear = Material {
         transmission: 0.5,
         ior: 1.5,
@@ -255,7 +255,7 @@ fn blinn_phong_by_hand() {
 
 #[test]
 fn energy_never_grows() {
-    // White background, no light of its own: at most white, for any weights and any depth.
+    // White background without other light: at most white, for any weights and any depth.
     let balls = Balls(
         (0..27_u8)
             .map(|i| Ball {
@@ -281,7 +281,7 @@ fn energy_never_grows() {
             let values = film.color.iter().flatten();
             let worst = values.copied().fold(0.0, f32::max);
             assert!(worst <= 1.0 + 1e-5, "{worst}");
-            // Nothing gets lost either if both weights are 1.
+            // No light is lost if both weights are 1.
             if reflection == 1.0 && transmission == 1.0 {
                 let least = film.color.iter().map(|c| c[0]).fold(1.0, f32::min);
                 assert!(least > 1.0 - 1e-5, "{least}");
@@ -292,8 +292,8 @@ fn energy_never_grows() {
 
 #[test]
 fn no_acne_and_no_leaks_at_any_scale() {
-    // A ball, lit by a light at the camera: every point seen faces the light, so nothing may be in
-    // shadow; and with a second ball around both nothing may be lit. Off centre as well.
+    // A ball with a light at the camera: every visible point faces the light, so nothing may be in shadow. With a
+    // second ball around the first one, nothing may be lit. Also off centre.
     for scale in [1e-4_f32, 1e-2, 1.0, 1e2, 1e4] {
         for shift in [0.0, 30.0] {
             let center = Vec3::splat(shift * scale);
@@ -329,7 +329,7 @@ fn no_acne_and_no_leaks_at_any_scale() {
                     hits += 1;
                     let to_light = (from(-10.0).as_vec3() - position).normalize();
                     let cosine = normal.dot(to_light);
-                    // Cosines near 0 may fall on either side of it.
+                    // Cosines near 0 may have either sign.
                     assert!(
                         (color[0] - cosine).abs() < 2e-3,
                         "{scale}: {color:?} {cosine}"
@@ -338,7 +338,7 @@ fn no_acne_and_no_leaks_at_any_scale() {
             }
             assert!(hits > 1000, "{hits}");
 
-            // The light inside a second ball that holds neither camera nor first ball.
+            // The light is inside a second ball that contains neither the camera nor the first ball.
             let shade = Ball {
                 center: center + Vec3::new(0.0, -10.0, 5.0) * scale,
                 radius: scale,
@@ -357,8 +357,8 @@ fn no_acne_and_no_leaks_at_any_scale() {
 
 #[test]
 fn a_glass_ball_has_no_acne_inside() {
-    // With weights 1 and a constant background every hit adds exactly its ambient light; a ray that
-    // met the same wall twice would add it once more.
+    // With weights 1 and a constant background every hit adds exactly its ambient light; a ray that hit the same wall
+    // twice would add it once more.
     for scale in [1e-4_f32, 1.0, 1e4] {
         let mut scene = scene(Material {
             reflection: 0.0,
@@ -404,7 +404,7 @@ fn the_ground_takes_shadows_and_stops_light_from_below() {
         checker: None,
     });
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
-    // The ball hangs over the looked-at point, out of the picture.
+    // The ball is above the point that the camera looks at, outside the picture.
     let above = Balls::one(Vec3::new(0.0, 0.0, 20.0), 1.0);
     let aside = Balls::one(Vec3::new(9.0, 0.0, 20.0), 1.0);
     assert_near(middle(&above, &scene, 1).0, 0.0);

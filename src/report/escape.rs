@@ -1,11 +1,11 @@
-//! Text in HTML.
+//! Escapes text for HTML.
 
 use std::borrow::Cow;
 
 use spherule_formats::is_control;
 
-/// Text as it stands in HTML, in elements and in quoted attributes. Control characters, which HTML
-/// forbids, and those that turn the direction of what follows are spelt out.
+/// Text for elements and quoted attributes of HTML. Control characters, which HTML forbids, and characters that
+/// change the direction of text are replaced by escape sequences.
 pub(super) fn escaped(text: &str) -> Cow<'_, str> {
     let is_odd = |c: char| is_control(c) && c != '\n' && c != '\t';
     if !text

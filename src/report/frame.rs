@@ -1,4 +1,4 @@
-//! The report of one frame, as it stands in the ledger and in `report.json`.
+//! The report of one frame, in the form of the ledger and of `report.json`.
 
 use std::time::Duration;
 
@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 use crate::accel::BuildReport;
 use crate::render::RayCounts;
 
-/// What one image took. Times are wall-clock seconds, sizes bytes.
+/// Measurements of one image. Times are wall-clock seconds, sizes are bytes.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrameReport {
-    /// Particles drawn.
+    /// Number of particles drawn.
     pub particles: u64,
-    /// Particles left out because a coordinate was NaN or infinite.
+    /// Number of particles dropped because a coordinate was NaN or infinite.
     pub dropped: u64,
-    /// Particles whose radius was raised to the least that can be drawn.
+    /// Number of particles with a radius raised to the minimum.
     pub clamped_radii: u64,
-    /// Pixels whose colour was too bright for half floats.
+    /// Number of pixels with a colour too bright for half floats.
     pub clamped_pixels: u64,
     /// Time by stage.
     pub seconds: StageSeconds,
@@ -31,23 +31,23 @@ pub struct FrameReport {
     pub rss: RssSummary,
 }
 
-/// Wall-clock seconds of the stages, from when they have a thread to work on; neighbouring frames overlap.
+/// Wall-clock seconds of the stages, from the moment that they have a thread; neighbouring frames overlap.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(missing_docs, reason = "the names say all")]
 pub struct StageSeconds {
     pub read: f64,
     pub build: f64,
-    /// Making the surface, apart from the tree.
+    /// Building the surface, without the tree.
     pub surface: f64,
     pub trace: f64,
     pub encode: f64,
-    /// From the image before, or the beginning of the run, to this image: summed, the time that the
-    /// frames had anyone wait.
+    /// From the previous image, or the start of the run, to this image. The sum is the time that the user waits for
+    /// the frames.
     pub wall: f64,
 }
 
-/// What [`BuildReport`] says, in the form of the files.
+/// The content of a [`BuildReport`] in the form of files.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(missing_docs, reason = "see `BuildReport`")]
@@ -63,31 +63,30 @@ pub struct BuildSummary {
     pub phases: Vec<(String, f64)>,
 }
 
-/// Bytes by part: what a traced frame holds, in anonymous memory or in a mapped file, and what its build
-/// needed beside that.
+/// Memory by part, bytes: what a frame occupies during tracing, in anonymous memory or in a mapped file, and the
+/// additional memory of its build.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FrameBytes {
     /// Positions and radii in tree order.
     pub positions: u64,
-    /// Nodes and the way back to the file's order.
+    /// Nodes and particle indices.
     pub structure: u64,
-    /// Attributes that images are made of.
+    /// Attributes for the images.
     pub attributes: u64,
-    /// The surface, apart from positions and structure.
+    /// The surface, without positions and structure.
     pub surface: u64,
-    /// Most held while making it.
+    /// Peak memory of its build.
     pub surface_peak: u64,
-    /// Held while building and let go then, beside positions and structure.
+    /// Additional memory during the build, without positions and structure.
     pub scratch: u64,
-    /// Most held while building, the frame as read not counted unless it is traced where it lies.
+    /// Peak memory of the build. Includes the input only if the input itself is traced.
     pub build_peak: u64,
-    /// How much of positions, structure and attributes lies in a mapped file.
+    /// The part of positions, structure and attributes that is in a mapped file.
     pub file: FileBytes,
 }
 
-/// Bytes by part in a mapped file. They are not anonymous memory: the system may drop their pages and
-/// read them again.
+/// Bytes by part in a mapped file. This is not anonymous memory: the system may drop these pages and read them again.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 #[expect(missing_docs, reason = "see `FrameBytes`")]
@@ -108,7 +107,7 @@ pub struct RaySummary {
     pub refraction: u64,
 }
 
-/// Resident memory of the process, the largest seen so far.
+/// Resident memory of the process, the largest values so far.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct RssSummary {
@@ -116,9 +115,9 @@ pub struct RssSummary {
     pub anonymous_peak: u64,
     /// Mapped files.
     pub file_peak: u64,
-    /// Everything, as the kernel's `VmHWM` has it.
+    /// Everything, from the kernel's `VmHWM`.
     pub total_peak: u64,
-    /// Heap and stacks when this frame was done: what does not grow over a sequence.
+    /// Heap and stacks when this frame was finished, which do not grow over a sequence.
     pub anonymous: u64,
 }
 
@@ -134,14 +133,14 @@ impl From<RayCounts> for RaySummary {
 }
 
 impl RaySummary {
-    /// Rays of all kinds.
+    /// Number of all rays.
     pub const fn total(&self) -> u64 {
         saturating_sum(&[self.primary, self.shadow, self.reflection, self.refraction])
     }
 }
 
 impl FrameReport {
-    /// Takes over what the builder says.
+    /// Copies the values of a build report.
     pub fn set_build(&mut self, report: &BuildReport) {
         self.seconds.build = report.total.as_secs_f64();
         self.build = BuildSummary {
@@ -165,22 +164,22 @@ impl FrameReport {
     pub fn total(&self) -> Duration {
         let s = &self.seconds;
         let seconds = s.read + s.build + s.surface + s.trace + s.encode;
-        // Of a damaged ledger they may be negative, or more than there are.
+        // In a damaged ledger, times may be negative or too large.
         Duration::try_from_secs_f64(seconds.max(0.0)).unwrap_or(Duration::MAX)
     }
 
-    /// Bytes of positions, radii and tree for a particle; None without particles.
+    /// Bytes of positions, radii and tree per particle; None without particles.
     pub fn bytes_per_particle(&self) -> Option<f64> {
         let bytes = self.bytes.positions.saturating_add(self.bytes.structure);
         ratio(bytes, float(self.particles))
     }
 
-    /// Rays of all kinds in a second of tracing; None if there was none.
+    /// Number of all rays per second of tracing; None without tracing.
     pub fn rays_per_second(&self) -> Option<f64> {
         ratio(self.rays.total(), self.seconds.trace)
     }
 
-    /// Adds what can be summed over frames; of memory the larger value stays.
+    /// Adds all values that can be summed over frames; for memory, keeps the larger value.
     pub(super) fn add(&mut self, frame: &Self) {
         add(&mut self.particles, frame.particles);
         add(&mut self.dropped, frame.dropped);
@@ -203,19 +202,19 @@ impl FrameReport {
 }
 
 impl FrameBytes {
-    /// Takes over what the builder says; attributes are not its business and stay.
+    /// Copies the values of a build report; attributes are not affected.
     fn set_build(&mut self, report: &BuildReport) {
         self.positions = report.position_bytes;
         self.structure = report.structure_bytes;
         let lasting = report.position_bytes + report.structure_bytes;
         self.scratch = report.peak_bytes.saturating_sub(lasting);
         self.build_peak = report.peak_bytes;
-        // Positions that are traced where they lie do so as a whole; of the nodes, the lowest.
+        // If particles are traced in place, all positions are in the file, and the lowest nodes.
         self.file.positions = report.file_bytes.min(report.position_bytes);
         self.file.structure = report.file_bytes - self.file.positions;
     }
 
-    /// Held while tracing: positions, structure, surface and attributes.
+    /// Memory during tracing: positions, structure, surface and attributes.
     pub const fn held(&self) -> u64 {
         saturating_sum(&[
             self.positions,
@@ -225,25 +224,25 @@ impl FrameBytes {
         ])
     }
 
-    /// The part of [`Self::held`] that lies in anonymous memory.
+    /// The part of [`Self::held`] that is in anonymous memory.
     pub const fn anonymous(&self) -> u64 {
         self.held().saturating_sub(self.file.total())
     }
 }
 
 impl FileBytes {
-    /// Of all parts.
+    /// The sum of all parts.
     pub const fn total(&self) -> u64 {
         saturating_sum(&[self.positions, self.structure, self.attributes])
     }
 }
 
-/// What a ledger says may be anything.
+/// Saturating addition, because a damaged ledger may contain any numbers.
 fn add(to: &mut u64, value: u64) {
     *to = to.saturating_add(value);
 }
 
-/// The same for several.
+/// Saturating sum of several values.
 const fn saturating_sum(values: &[u64]) -> u64 {
     let (mut sum, mut rest) = (0_u64, values);
     while let [first, others @ ..] = rest {

@@ -1,4 +1,4 @@
-//! The machine that something was measured on, as far as a reader of the figures must know it.
+//! Description of the machine of a measurement.
 
 use std::fs;
 use std::thread;
@@ -12,13 +12,13 @@ use crate::metrics::memory;
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Machine {
-    /// The processor's name.
+    /// Name of the CPU.
     pub cpu: String,
-    /// Threads that it runs at once.
+    /// Number of hardware threads.
     pub threads: usize,
     /// The instruction set that rays are traced with.
     pub simd: String,
-    /// Bytes of memory; None where the system does not tell.
+    /// Installed memory in bytes; None if the system does not report it.
     pub memory: Option<u64>,
     /// Operating system.
     pub os: String,
@@ -29,7 +29,7 @@ pub struct Machine {
 }
 
 impl Machine {
-    /// This one.
+    /// The current machine.
     pub fn this() -> Self {
         Self {
             cpu: cpu_name(),
@@ -43,7 +43,7 @@ impl Machine {
     }
 }
 
-/// In one line, for headings.
+/// One line, for headings.
 impl std::fmt::Display for Machine {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{}, {} threads, {}", self.cpu, self.threads, self.simd)?;

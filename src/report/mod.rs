@@ -1,4 +1,4 @@
-//! What a run says of itself: time and memory of every frame, for people and for scripts.
+//! Reports of a run: time and memory of every frame, for people and for scripts.
 
 mod escape;
 pub mod frame;
@@ -9,5 +9,5 @@ pub mod plots;
 
 pub use frame::FrameReport;
 
-/// Peak memory of the thesis's program, bytes per particle: "about 350" at 1e7 particles, for every structure.
+/// Peak memory of the thesis's program, bytes per particle: "about 350" at 1e7 particles, for all structures.
 pub const THESIS_BYTES_PER_PARTICLE: f64 = 350.0;

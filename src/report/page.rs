@@ -1,12 +1,12 @@
-//! A report as one HTML file: no scripts, nothing fetched, readable on a phone, in light and in
-//! dark. Whatever comes from outside (file names, messages) is escaped here and nowhere else.
+//! A report as one HTML file: without scripts or external resources, readable on a phone, in light and dark mode.
+//! External text (file names, messages) is escaped here and nowhere else.
 
 use std::fmt::Write as _;
 
 use super::escape::escaped;
 use super::plots::{self, Plot};
 
-/// A table: heads, then rows. Cells are plain text.
+/// A table: headings, then rows. Cells are plain text.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Table {
     id: String,
@@ -22,8 +22,7 @@ struct Row {
 }
 
 impl Table {
-    /// An empty table with a column for each of `heads`. Columns whose cells are all numbers are
-    /// set to the right.
+    /// An empty table with a column for each of `heads`. Columns with only numbers are aligned to the right.
     pub fn new(id: &str, heads: &[&str]) -> Self {
         Self {
             id: id.to_owned(),
@@ -32,7 +31,7 @@ impl Table {
         }
     }
 
-    /// Adds a row; missing cells stay empty.
+    /// Adds a row; missing cells are empty.
     pub fn row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(Row {
             class: None,
@@ -40,7 +39,7 @@ impl Table {
         });
     }
 
-    /// Adds a row that catches the eye: something failed.
+    /// Adds a highlighted row for a failure.
     pub fn bad_row(&mut self, cells: impl IntoIterator<Item = String>) {
         self.rows.push(Row {
             class: Some("bad"),
@@ -91,7 +90,7 @@ impl Table {
     }
 }
 
-/// A page being written.
+/// A page under construction.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Page {
     title: String,
@@ -107,7 +106,7 @@ impl Page {
         }
     }
 
-    /// Begins a section; `id` can be linked to.
+    /// Begins a section; `id` is a link target.
     pub fn section(&mut self, id: &str, heading: &str) {
         self.put(format_args!(
             "<h2 id=\"{}\">{}</h2>\n",
@@ -116,17 +115,17 @@ impl Page {
         ));
     }
 
-    /// A paragraph.
+    /// Adds a paragraph.
     pub fn text(&mut self, text: &str) {
         self.put(format_args!("<p>{}</p>\n", escaped(text)));
     }
 
-    /// A paragraph about something that went wrong.
+    /// Adds a paragraph about a failure.
     pub fn warning(&mut self, text: &str) {
         self.put(format_args!("<p class=\"warning\">{}</p>\n", escaped(text)));
     }
 
-    /// A paragraph that ends with a link to a file beside the page.
+    /// Adds a paragraph that ends with a link to a file next to the page.
     pub fn link(&mut self, text: &str, file: &str) {
         self.put(format_args!(
             "<p>{} <a href=\"./{file}\">{file}</a>.</p>\n",
@@ -135,7 +134,7 @@ impl Page {
         ));
     }
 
-    /// Names and values.
+    /// Adds names and values.
     pub fn key_values(&mut self, pairs: &[(&str, String)]) {
         self.body += "<dl>\n";
         for (key, value) in pairs {
@@ -148,12 +147,12 @@ impl Page {
         self.body += "</dl>\n";
     }
 
-    /// A table in a box of its own, so that a wide one moves there and the page stays.
+    /// Adds a table in a box that scrolls horizontally if the table is too wide.
     pub fn table(&mut self, table: &Table) {
         self.body += &table.html();
     }
 
-    /// Plots, side by side where there is room.
+    /// Adds plots, side by side if they fit.
     pub fn plots(&mut self, plots: &[Plot]) {
         self.body += "<div class=\"plots\">\n";
         for plot in plots {
@@ -162,7 +161,7 @@ impl Page {
         self.body += "</div>\n";
     }
 
-    /// Begins a part that is folded away until someone opens it.
+    /// Begins a collapsed part.
     pub fn fold(&mut self, heading: &str) {
         self.put(format_args!(
             "<details>\n<summary>{}</summary>\n",
@@ -170,14 +169,14 @@ impl Page {
         ));
     }
 
-    /// Ends the folded part.
+    /// Ends the collapsed part.
     pub fn end_fold(&mut self) {
         self.body += "</details>\n";
     }
 
     /// The whole file.
     pub fn html(&self) -> String {
-        // Browsers ask a server for an icon unless the page names one.
+        // The empty icon prevents browsers from requesting one from a server.
         format!(
             "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta http-equiv=\"Content-Security-Policy\" \

@@ -11,14 +11,14 @@ use crate::metrics::memory;
 use crate::render::Film;
 use crate::scale::report::CellMeasurement;
 
-/// Makes or reads the particles, builds, traces; or does so in place, in the native frame `file` that
-/// [`super::convert::convert`] has made.
+/// Makes or reads the particles, builds the tree, and traces images; or traces in place the native frame `file`,
+/// which [`super::convert::convert`] has made.
 ///
-/// The first build is in new memory, the others in that of the one before, as in a sequence. They
-/// are repeated up to eleven in all, or until they have taken a quarter of the images' time.
+/// The first build allocates its memory, the others reuse it, as in a sequence. Builds are repeated up to eleven
+/// times in total, or until they have taken a quarter of the time for images.
 ///
 /// # Errors
-/// In words: what is asked makes no pictures, would not fit into memory, or the file cannot be traced.
+/// Describes why the settings are invalid, the cell does not fit into memory, or the file cannot be traced.
 pub fn measure(request: &CellRequest, file: Option<&Path>) -> Result<CellMeasurement, String> {
     check_image(request)?;
     let measured = match file {
@@ -35,14 +35,14 @@ fn build_and_trace(request: &CellRequest) -> Result<Measured, String> {
     let load_seconds = start.elapsed().as_secs_f64();
     let mut builder = TreeBuilder::new();
     let settings = BuildSettings {
-        // One colour for all: nobody asks which particle a ray has met.
+        // All particles have the same colour, so indices are not needed.
         keep_indices: false,
         ..BuildSettings::new(request.structure)
     };
     let spheres = particles.spheres();
     let builds = peaks
         .during(|| Builds::repeat(request.budget, || Ok(builder.build(&spheres, &settings))))?;
-    // The tree has its own copy; while rays run, only that is needed.
+    // Free the input: the tree has its own copy, and rays need nothing else.
     let count = particles.centers.len() as u64;
     drop(particles);
     Ok(Measured {
@@ -54,7 +54,7 @@ fn build_and_trace(request: &CellRequest) -> Result<Measured, String> {
     })
 }
 
-/// Refuses an image that cannot fit, before the system ends the process for it.
+/// Rejects an image that cannot fit into memory, before the system kills the process.
 fn check_image(request: &CellRequest) -> Result<(), String> {
     let settings = render_settings(request);
     let need = Film::bytes_for(settings.width, settings.height, settings.channels);

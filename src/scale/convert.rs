@@ -1,4 +1,4 @@
-//! Makes the native frame that cells are traced from in place.
+//! Makes the native frame for cells that are traced in place.
 
 use std::path::Path;
 use std::time::Instant;
@@ -11,13 +11,13 @@ use super::peaks::Peaks;
 use super::{CellRequest, Particles};
 use crate::scale::report::Conversion;
 
-/// How far compact positions may be from the true ones, as where `convert` is told nothing.
+/// Maximum error of compact positions, equal to the default of `convert`.
 const BOUND: Bound = Bound::OfRadius(0.02);
 
 /// Makes or reads the particles of `request` and writes them to `path` in its encoding.
 ///
 /// # Errors
-/// In words: they would not fit into memory, cannot be read, or the file cannot be written.
+/// Describes why they do not fit into memory, cannot be read, or the file cannot be written.
 pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String> {
     let settings = StoreSettings {
         encoding: request.representation.encoding(),

@@ -1,4 +1,4 @@
-//! Repeated builds, and images, within the budget of a cell.
+//! Repeated builds and images within the budget of a cell.
 
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -14,17 +14,17 @@ use crate::scale::report::{BuildTimes, CellMeasurement, PerParticle, RayRates, S
 use crate::scene::material::DEFAULT_COLOR;
 use crate::surface::spheres::SphereSurface;
 
-/// Most builds of a cell; an odd number has a median.
+/// Maximum number of builds of a cell; an odd number has a median.
 const BUILDS: usize = 11;
-/// Builds are repeated for up to this part of the time that images are given.
+/// Time for repeated builds as a fraction of the time for images.
 const BUILD_PART: f64 = 0.25;
-/// The same where images are counted and not timed, seconds.
+/// Time for repeated builds if the number of images is given, seconds.
 const BUILD_SECONDS: f64 = 2.0;
-/// Fewest images where time decides: a quarter of the way apart, so that a slow cell too has seen
-/// all sides.
+/// Minimum number of images if their time is given: they are a quarter of the path apart, so a slow cell also covers
+/// all directions.
 pub(super) const LEAST_IMAGES: u32 = 4;
 
-/// What a cell has come to.
+/// Measurements of a cell.
 pub(super) struct Measured {
     pub(super) particles: u64,
     pub(super) load_seconds: f64,
@@ -64,19 +64,19 @@ pub(super) fn render_settings(request: &CellRequest) -> RenderSettings {
     }
 }
 
-/// What builds took.
+/// Measurements of builds.
 pub(super) struct Builds {
-    /// Of the last one, with the highest peak of all.
+    /// Report of the last build, with the highest peak of all.
     report: BuildReport,
-    /// Each one's wall-clock time, in order.
+    /// Wall-clock time of each build, in order.
     seconds: Vec<f64>,
 }
 
 impl Builds {
-    /// Builds as often as a cell of this `budget` does.
+    /// Repeats builds as often as the `budget` of a cell allows.
     ///
     /// # Errors
-    /// That of the first `build` that has one.
+    /// The first error of `build`.
     pub(super) fn repeat(
         budget: Budget,
         mut build: impl FnMut() -> Result<BuildReport, String>,
@@ -97,18 +97,18 @@ impl Builds {
     }
 }
 
-/// What images took.
+/// Measurements of images.
 pub(super) struct Images {
-    /// Each one's wall-clock time.
+    /// Wall-clock time of each image.
     seconds: Vec<f64>,
-    /// All together.
+    /// Rays of all images.
     rays: RayCounts,
 }
 
 /// Traces as many images as the budget of `request` allows.
 ///
 /// # Errors
-/// In words: the camera or an image is not possible.
+/// Describes why the camera or an image is invalid.
 pub(super) fn trace(
     tree: TreeView<'_>,
     request: &CellRequest,

@@ -1,10 +1,10 @@
-//! The thesis's experiment (chapter 5) on any count of any particles: build, then look from a
-//! camera that moves, and say how fast and in how much memory.
+//! The experiment of the thesis (chapter 5) for any number of any particles: builds a tree, traces images from a
+//! moving camera, and measures time and memory.
 //!
-//! The unit is a *cell*: one particle count, one structure, one motion, one representation. What is
-//! asked of a cell is a [`CellRequest`], what comes out is in `scale::report`. A cell measures the
-//! memory of its whole process, so whoever wants several runs each in a process of its own, and so is
-//! the native frame made that some are traced from; that, and all printing, is left to the caller.
+//! The unit is a *cell*: one particle count, one structure, one motion, one representation. A [`CellRequest`]
+//! describes a cell, `scale::report` its result. A cell measures the memory of its whole process, so callers should
+//! run each cell in a separate process, and also make native frames for cells in place in a separate process.
+//! Processes and printing are left to the caller.
 
 use std::fmt;
 use std::path::PathBuf;
@@ -30,49 +30,49 @@ pub use motion::Motion;
 pub use particles::{FrameSurvey, Particles};
 pub use stage::{Lighting, Stage};
 
-/// What is asked of one cell.
+/// The settings of one cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellRequest {
-    /// Where particles come from.
+    /// Source of the particles.
     pub source: Source,
-    /// How many.
+    /// Particle count.
     pub particles: usize,
-    /// Seed of the box, or of the choice among a frame's particles.
+    /// Seed of the box, or of the selection of particles of a frame.
     pub seed: u64,
-    /// Who builds.
+    /// The structure to build.
     #[serde(with = "by_name")]
     pub structure: Structure,
-    /// How the camera moves.
+    /// Motion of the camera.
     pub motion: Motion,
-    /// How positions are held.
+    /// Representation of positions.
     pub representation: Representation,
-    /// What the camera moves around.
+    /// Bounds, view and lights.
     pub stage: Stage,
-    /// When it is enough.
+    /// Time or number of images.
     pub budget: Budget,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Levels of recursion, the primary ray's included.
+    /// Recursion depth, including the primary ray.
     pub max_depth: u32,
     /// Threads to use.
     pub threads: usize,
 }
 
-/// Where particles come from.
+/// Source of particles.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Source {
-    /// The thesis's box, filled evenly; spheres of half the mean spacing.
+    /// The box of the thesis, evenly filled with spheres of half the mean spacing.
     Box,
-    /// A frame of the user's.
+    /// A frame of the user.
     Frame(FrameSource),
 }
 
-/// A frame of the user's, and what a look at it has settled.
+/// A frame of the user, with the results of its survey.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct FrameSource {
     /// A file, pattern or directory.
@@ -81,41 +81,41 @@ pub struct FrameSource {
     pub frame: i64,
     /// World position that coordinates are relative to.
     pub origin: DVec3,
-    /// Radius of all particles where the frame does not bring radii, world units.
+    /// Radius of all particles if the frame has no radii, world units.
     pub radius: f32,
-    /// Radii under this are raised to it, world units.
+    /// Minimum radius, to which smaller ones are raised, world units.
     pub least_radius: f32,
 }
 
-/// When a cell has traced enough.
+/// When a cell has traced enough images.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Budget {
-    /// Once images have taken so many seconds.
+    /// After this time for images, in seconds.
     Seconds(f64),
-    /// After so many images.
+    /// After this number of images.
     Images(u32),
 }
 
-/// How positions are held while rays are traced.
+/// Representation of positions during tracing.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Representation {
-    /// In memory, three f32 a particle, in a tree that is built there.
+    /// In memory, three f32 per particle, in a tree that is built there.
     Memory,
-    /// In a native frame of f32, mapped and traced where it lies.
+    /// In a native frame of f32 that is mapped and traced in place.
     F32,
-    /// The same with 16 bits an axis.
+    /// The same with 16 bits per axis.
     Q16,
     /// The same with 11, 11 and 10 bits.
     Q10,
 }
 
 impl Representation {
-    /// All there are.
+    /// All representations.
     pub const ALL: [Self; 4] = [Self::Memory, Self::F32, Self::Q16, Self::Q10];
 
-    /// Its name on the command line and in files.
+    /// The name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Memory => "memory",
@@ -125,7 +125,7 @@ impl Representation {
         }
     }
 
-    /// That of the native frame; None in memory.
+    /// The encoding of the native frame; None in memory.
     pub const fn encoding(self) -> Option<Encoding> {
         match self {
             Self::Memory => None,
@@ -135,13 +135,13 @@ impl Representation {
         }
     }
 
-    /// Whether there are cells of both. Every structure is built in memory; a native frame lies in k-d
-    /// order and is no other tree than that where it lies.
+    /// Whether there are cells of this representation with `structure`. All structures can be built in memory; a
+    /// native frame is in k-d order, so it is always the same tree in place.
     pub fn goes_with(self, structure: Structure) -> bool {
         self == Self::Memory || structure == Structure::Kdtree
     }
 
-    /// Where positions are, for people.
+    /// A description for messages.
     pub const fn place(self) -> &'static str {
         match self {
             Self::Memory => "in memory",
@@ -152,22 +152,22 @@ impl Representation {
     }
 }
 
-/// What a process of its own is asked to do.
+/// A task for a separate process.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Task {
-    /// Make the native frame that cells like this one are traced from ([`convert::convert`]).
+    /// Make the native frame for cells like this one ([`convert::convert`]).
     Convert {
-        /// One of them.
+        /// One of these cells.
         request: CellRequest,
-        /// Where to.
+        /// Path of the native frame.
         path: PathBuf,
     },
     /// Measure a cell ([`cell::measure`]).
     Measure {
-        /// Which.
+        /// The cell.
         request: CellRequest,
-        /// Its native frame, where it has one.
+        /// Its native frame, if it has one.
         file: Option<PathBuf>,
     },
 }
@@ -187,7 +187,7 @@ impl fmt::Display for Representation {
     }
 }
 
-/// Values that print as their name and are read from it.
+/// Serialises values as their names.
 mod by_name {
     use super::{FromStr, fmt};
     use serde::de::Error;

@@ -1,6 +1,6 @@
-//! The paths that cameras take. The thesis names them (rotation, translation, both) and no more;
-//! these give its figures their shape: nearly even over a rotation, widely spread over a
-//! translation, because what is looked at grows from small to all of the view and then leaves it.
+//! Camera paths. The thesis only names them (rotation, translation, both); these paths reproduce the character of its
+//! results: a small spread over a rotation, and a large one over a translation, because the particles grow from a
+//! small part of the view to all of it and then leave it.
 
 use std::f64::consts::TAU;
 use std::fmt;
@@ -10,25 +10,25 @@ use serde::{Deserialize, Serialize};
 
 use crate::scene::CameraView;
 
-/// How the camera moves while images are made.
+/// Motion of the camera.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Motion {
-    /// Once around the middle of the particles, about the camera's up, from where it stands.
+    /// One turn around the centre of the particles, about the up vector of the camera, from its position.
     Rotation,
-    /// Straight along the view: from twice the distance to the point looked at, to it, and as far
-    /// again beyond it. A third of the way is before the still view, a third from there to the
-    /// point, a third behind it.
+    /// Straight along the view: from twice the distance to the target point, to that point, and the same distance
+    /// beyond it. The first third is before the still view, the second third from there to the target, the last third
+    /// behind it.
     Translation,
-    /// Both at once: a spiral.
+    /// Both at the same time: a spiral.
     Both,
 }
 
 impl Motion {
-    /// All there are.
+    /// All motions.
     pub const ALL: [Self; 3] = [Self::Rotation, Self::Translation, Self::Both];
 
-    /// Its name on the command line and in files.
+    /// The name on the command line and in files.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Rotation => "rotation",
@@ -37,7 +37,7 @@ impl Motion {
         }
     }
 
-    /// The view at `t` in 0..1 of the way that goes with the still view `start` around `center`.
+    /// The view at `t` in 0..1 of the path that belongs to the still view `start` around `center`.
     pub(super) fn view_at(self, t: f64, start: &CameraView, center: DVec3) -> CameraView {
         match self {
             Self::Rotation => orbited(start, center, t),
@@ -72,9 +72,8 @@ fn shifted(view: &CameraView, t: f64) -> CameraView {
     }
 }
 
-/// Place on the path of image `index` of a run that ends when its time is up: the van der Corput
-/// sequence, so that however many images there are, they are spread evenly over the path, and a
-/// fast machine looks from the same places as a slow one.
+/// Position on the path of image `index` in a run with a time limit: the van der Corput sequence, so that any number
+/// of images is evenly distributed over the path, and fast and slow machines use the same positions.
 pub(super) fn spread_place(index: u32) -> f64 {
     f64::from(index.reverse_bits()) / 2_f64.powi(32)
 }

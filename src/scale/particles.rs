@@ -1,4 +1,4 @@
-//! The particles of a cell: the box at any count, or a part of a user's frame.
+//! The particles of a cell: the box at any count, or a part of a frame of the user.
 
 use glam::Vec3;
 use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
@@ -12,29 +12,28 @@ use crate::reading::read_budget;
 use crate::scene::Bounds;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
-/// A radius under this part of the bounds' diagonal cannot be told from nothing in f32.
+/// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
-/// Radius where nothing tells one (a single particle, or all in one place), as a part of the
-/// distance that the camera is framed from.
+/// Radius if there is no estimate (a single particle, or all in one place), as a fraction of the distance of the
+/// framing camera.
 const LONE_RADIUS: f64 = 0.1;
-/// Bytes a particle that are held at least while building: the positions as they came, and those
-/// in the tree.
+/// Minimum memory per particle during the build, in bytes: the positions of the input, and those in the tree.
 const LEAST_BYTES: u64 = 24;
 
 /// Spheres in memory.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Particles {
-    /// Centres relative to the stage's origin.
+    /// Centres relative to the origin of the stage.
     pub centers: Vec<Vec3>,
     /// Radii.
     pub radius: Radius,
 }
 
 impl Particles {
-    /// Makes or reads those of `request`.
+    /// Makes or reads the particles of `request`.
     ///
     /// # Errors
-    /// They would not fit into memory, or the frame cannot be read.
+    /// They do not fit into memory, or the frame cannot be read.
     pub fn of(request: &CellRequest) -> Result<Self, String> {
         let need = LEAST_BYTES.saturating_mul(request.particles as u64);
         if let Some(free) = memory::available()
@@ -53,7 +52,7 @@ impl Particles {
         }
     }
 
-    /// The box always looks filled: the radius is half the mean spacing.
+    /// Particles in the box, with half the mean spacing as their radius, so that it always looks filled.
     fn in_box(count: usize, seed: u64) -> Self {
         let extent = Stage::THESIS.bounds.max - Stage::THESIS.bounds.min;
         let spacing = (extent.element_product() / count.max(1) as f64).cbrt();
@@ -64,6 +63,7 @@ impl Particles {
     }
 
     fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, String> {
+        // Find and read the frame
         let input = SequenceInput::from_path(&source.path);
         let sequence =
             Sequence::open_within(&input, read_budget(None, None)).map_err(|e| e.to_string())?;
@@ -78,6 +78,7 @@ impl Particles {
         let ParticleFrame {
             positions, radius, ..
         } = frame;
+        // Reduce it to the requested count
         let mut particles = Self {
             radius: radius.unwrap_or(Radius::Common(source.radius)),
             centers: positions,
@@ -87,9 +88,8 @@ impl Particles {
         Ok(particles)
     }
 
-    /// Keeps `count` particles, evenly chosen, in their order, and lets their radii grow so that
-    /// together they fill as much space as before: as in the box, pictures of all counts cover
-    /// about the same part of the image.
+    /// Keeps an even selection of `count` particles in their order, and increases the radii so that the total volume
+    /// is unchanged: as with the box, pictures of all counts cover about the same part of the image.
     fn thin(&mut self, count: usize, seed: u64) {
         let all = self.centers.len();
         if count >= all {
@@ -107,7 +107,7 @@ impl Particles {
     }
 
     fn raise_radii(&mut self, least: f32) {
-        // Also true for NaN.
+        // Written as `!(a >= b)` so that NaN is raised as well.
         let raise = |radius: &mut f32| {
             if !(*radius >= least && is_radius(*radius)) {
                 *radius = least;
@@ -119,7 +119,7 @@ impl Particles {
         }
     }
 
-    /// As builders take them.
+    /// The spheres as the input of a builder.
     pub fn spheres(&self) -> Spheres<'_> {
         Spheres {
             centers: &self.centers,
@@ -131,8 +131,8 @@ impl Particles {
     }
 }
 
-/// Keeps `count` of `items` in their order, every choice being as likely (selection sampling,
-/// Knuth, The Art of Computer Programming 2, 3.4.2, algorithm S).
+/// Keeps `count` of `items` in their order; all selections are equally likely (selection sampling, Knuth, The Art of
+/// Computer Programming 2, 3.4.2, algorithm S).
 fn retain_chosen<T>(items: &mut Vec<T>, count: usize, seed: u64) {
     let mut left = items.len() as u64;
     let mut wanted = count as u64;
@@ -147,20 +147,19 @@ fn retain_chosen<T>(items: &mut Vec<T>, count: usize, seed: u64) {
     });
 }
 
-/// What a look at a user's frame has settled.
+/// Survey of a frame of the user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameSurvey {
-    /// Its particles (finite ones).
+    /// Number of finite particles.
     pub particles: usize,
-    /// What cells read.
+    /// The source for cells.
     pub source: FrameSource,
-    /// What they look at.
+    /// The stage for cells.
     pub stage: Stage,
 }
 
 impl FrameSurvey {
-    /// Looks at frame `index` of `sequence`, which was opened from `path`, for images of `aspect`
-    /// = width / height.
+    /// Surveys frame `index` of `sequence`, which was opened from `path`, for images with `aspect` = width / height.
     ///
     /// # Errors
     /// It cannot be read, or has no particles.

@@ -1,7 +1,6 @@
-//! The most memory that this process has had resident, by kind. The kernel keeps the peak of the
-//! whole alone, so that of the parts is what is seen by looking: at `RssAnon` and at mapped files every
-//! few milliseconds while particles are made and trees built, and after every image while it is held.
-//! Pages of a mapped frame are so never taken for anonymous memory.
+//! Peak resident memory of this process, by kind. The kernel only records the peak of the total, so that of the parts
+//! is sampled: `RssAnon` and mapped files every few milliseconds while particles are made and trees are built, and
+//! after every image before it is freed. So pages of a mapped frame are never counted as anonymous memory.
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread;
@@ -10,10 +9,10 @@ use std::time::Duration;
 use crate::metrics::MemoryUse;
 use crate::report::frame::RssSummary;
 
-/// Between two looks: often enough for what lasts as long as a phase of a build of 1e6.
+/// Sampling interval: short enough for allocations that last as long as a phase of a build of 1e6.
 const INTERVAL: Duration = Duration::from_millis(4);
 
-/// Largest values seen so far.
+/// The largest samples so far.
 #[derive(Debug, Default)]
 pub(super) struct Peaks {
     anonymous: AtomicU64,
@@ -22,14 +21,14 @@ pub(super) struct Peaks {
 }
 
 impl Peaks {
-    /// Looks once.
+    /// Takes one sample.
     pub(super) fn look(&self) {
         let now = MemoryUse::now();
         self.anonymous.fetch_max(now.anonymous, Ordering::Relaxed);
         self.file.fetch_max(now.file, Ordering::Relaxed);
     }
 
-    /// Does `work` and keeps looking meanwhile.
+    /// Runs `work`, and takes samples in the meantime.
     pub(super) fn during<T>(&self, work: impl FnOnce() -> T) -> T {
         self.done.store(false, Ordering::Relaxed);
         thread::scope(|scope| {
@@ -44,7 +43,7 @@ impl Peaks {
         })
     }
 
-    /// What was seen, and the kernel's own peak of the whole.
+    /// The largest samples, and the kernel's own peak of the total.
     pub(super) fn summary(&self) -> RssSummary {
         self.look();
         let now = MemoryUse::now();
@@ -57,7 +56,7 @@ impl Peaks {
     }
 }
 
-/// Ends the watcher even if the work panics, for which the scope would wait.
+/// Ends the sampling thread even if the work panics; the scope would wait for it otherwise.
 struct EndOnDrop<'a>(&'a AtomicBool, &'a thread::Thread);
 
 impl Drop for EndOnDrop<'_> {
@@ -83,7 +82,7 @@ mod tests {
             drop(block);
         });
         let after = peaks.summary();
-        // Other tests run in this process too: what they give back is less than this.
+        // Other tests run in this process too; they free less than this.
         assert!(after.anonymous_peak >= before.max(SIZE as u64 / 2));
         assert!(after.total_peak >= after.anonymous_peak / 2);
     }

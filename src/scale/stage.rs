@@ -1,5 +1,5 @@
-//! What is looked at and from where: the thesis's box with its camera, or a user's particles framed
-//! as `render` would.
+//! Bounds, view and lights of a cell: the box of the thesis with its camera, or the particles of a user in the
+//! framing of `render`.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -10,31 +10,31 @@ use crate::scene::{
     Material, Scene, camera, default_lights,
 };
 
-/// What the camera moves around, and where it stands when it does not move.
+/// The bounds that the camera moves around, and its still view.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Stage {
-    /// The bulk of the particles, world units.
+    /// Box of most particles, world units.
     pub bounds: Bounds,
     /// The still view.
     pub view: CameraView,
     /// World position that coordinates are relative to.
     pub origin: DVec3,
-    /// Which lights there are.
+    /// The lights.
     pub lighting: Lighting,
 }
 
-/// Which lights there are. Either way a point that is seen costs one shadow ray.
+/// Sets of lights. With each of them, a visible point costs one shadow ray.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Lighting {
-    /// A white point light ten units above the thesis's eye; the thesis does not tell its own.
+    /// A white point light ten units above the eye of the thesis, which does not specify its light.
     Point,
-    /// The lights that a picture has unless told otherwise.
+    /// The default lights of a picture.
     Studio,
 }
 
 impl Stage {
-    /// The thesis's: its box, its camera.
+    /// The box and the camera of the thesis.
     pub const THESIS: Self = Self {
         bounds: Bounds {
             min: DVec3::new(3.0, 5.0, -2.0),
@@ -50,7 +50,7 @@ impl Stage {
         lighting: Lighting::Point,
     };
 
-    /// A three-quarter view of `bounds` for images of `aspect` = width / height.
+    /// A three-quarter view of `bounds` for images with `aspect` = width / height.
     pub fn framing(bounds: Bounds, up: DVec3, aspect: f64, origin: DVec3) -> Self {
         Self {
             bounds,
@@ -60,10 +60,10 @@ impl Stage {
         }
     }
 
-    /// Everything but the particles, as seen at `t` in 0..1 of the camera's way.
+    /// The scene at `t` in 0..1 of the camera path, without particles.
     ///
     /// # Errors
-    /// The view makes no picture.
+    /// The view is invalid.
     pub fn scene(&self, motion: Motion, t: f64, aspect: f64) -> Result<Scene, CameraError> {
         let view = motion.view_at(t, &self.view, self.bounds.center());
         let up = self.view.up;

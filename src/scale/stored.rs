@@ -1,4 +1,4 @@
-//! A cell whose particles stay in a native frame: mapped, traced where they lie.
+//! A cell with particles in a native frame, which is mapped and traced in place.
 
 use std::path::Path;
 use std::time::Instant;
@@ -11,10 +11,10 @@ use super::measure::{Builds, Measured, trace};
 use super::peaks::Peaks;
 use crate::accel::stored::{StoredSettings, StoredTree};
 
-/// Maps the native frame at `path`, builds the levels above its nodes, traces.
+/// Maps the native frame at `path`, builds the levels above its nodes, and traces images.
 ///
 /// # Errors
-/// In words: it cannot be opened or traced, or was changed meanwhile.
+/// Describes why it cannot be opened or traced, or that it was changed in the meantime.
 pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measured, String> {
     let peaks = Peaks::default();
     let start = Instant::now();
@@ -28,7 +28,7 @@ pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measu
             RadiusIndex::Common(radius) => Some(radius),
             RadiusIndex::None | RadiusIndex::PerParticle(_) => None,
         },
-        // One colour for all: nobody asks which particle a ray has met.
+        // All particles have the same colour, so indices are not needed.
         keep_indices: false,
     };
     let mut tree = StoredTree::new();
@@ -39,7 +39,7 @@ pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measu
         })
     })?;
     let images = trace(tree.view(&leaves), request, &peaks)?;
-    // What was lost meanwhile read as zeros.
+    // Pages lost in the meantime would be read as zeros.
     file.check().map_err(|e| e.to_string())?;
     Ok(Measured {
         particles: leaves.count,

@@ -1,4 +1,4 @@
-//! What a ray sees that meets nothing: one colour, or a vertical gradient.
+//! The background for rays without an intersection: one colour, or a vertical gradient.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -6,11 +6,11 @@ use glam::Vec3;
 
 use crate::math::functions::asin;
 
-/// Bottom of the default gradient (linear RGB): a light grey as in a studio. The dark ends of
-/// colour maps stand out against it, it prints, and mirrored in particles it rounds them.
+/// Bottom of the default gradient (linear RGB): a light grey as in a photo studio. The dark ends of colour maps stand
+/// out against it, it is suitable for print, and its reflection makes particles look round.
 pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.45, 0.47, 0.50);
 
-/// Top of the default gradient (linear RGB): a lighter, cooler grey, as skies are.
+/// Top of the default gradient (linear RGB): a lighter, cooler grey, like a sky.
 pub const DEFAULT_TOP: Vec3 = Vec3::new(0.75, 0.79, 0.85);
 
 /// Colour by direction, linear RGB.
@@ -18,11 +18,11 @@ pub const DEFAULT_TOP: Vec3 = Vec3::new(0.75, 0.79, 0.85);
 pub enum Background {
     /// The same in every direction.
     Constant(Vec3),
-    /// From `bottom` straight down to `top` straight up, linear in the angle over the horizon.
+    /// From `bottom` straight down to `top` straight up, linear in the angle above the horizon.
     Gradient {
-        /// Colour seen looking against `up`.
+        /// Colour opposite to `up`.
         bottom: Vec3,
-        /// Colour seen looking along `up`.
+        /// Colour along `up`.
         top: Vec3,
         /// Unit vector.
         up: Vec3,
@@ -30,7 +30,7 @@ pub enum Background {
 }
 
 impl Background {
-    /// The calm gradient that a picture has unless told otherwise.
+    /// The default background, a calm gradient.
     pub fn default_for(up: Vec3) -> Self {
         Self::Gradient {
             bottom: DEFAULT_BOTTOM,
@@ -39,7 +39,7 @@ impl Background {
         }
     }
 
-    /// The same with a gradient along `up`.
+    /// The same background with its gradient along `up`.
     #[must_use]
     pub fn with_up(self, up: Vec3) -> Self {
         match self {

@@ -1,8 +1,8 @@
-//! The pinhole camera of the thesis (program 4.1): `d = 2*film - 1`,
-//! `direction = d.x*u + d.y*v + w`, rays start at the eye.
+//! The pinhole camera of the thesis (program 4.1): `d = 2*film - 1`, `direction = d.x*u + d.y*v + w`, rays start at
+//! the eye.
 //!
-//! Set up in f64 world coordinates, used in f32 relative to the sequence's origin. Row 0 of the
-//! image is its top. How a camera moves is [`super::path`]'s business; lens blur is left to later.
+//! It is set up in f64 world coordinates, and used in f32 relative to the origin of the sequence. Row 0 of the image
+//! is its top. [`super::path`] moves cameras. There is no depth of field.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
@@ -11,44 +11,44 @@ use thiserror::Error;
 use super::Bounds;
 use crate::ray::Ray;
 
-/// Vertical field of view where none is given, degrees: about a 29 mm lens on a film still's
-/// height (24 mm), close enough for depth and far enough to keep spheres round at the rim.
+/// Default vertical field of view in degrees: that of a 29 mm lens for a film still (24 mm high), wide enough for a
+/// sense of depth, and narrow enough for spheres to look round at the border.
 pub const DEFAULT_FOV: f64 = 45.0;
 
-/// Part of the image's half width and height left free around a framed box.
+/// Margin around a framed box as a fraction of half the width and height of the image.
 pub const FRAMING_MARGIN: f64 = 0.08;
 
-/// Turn around `up` of the default view, degrees: two sides of a box in unequal parts.
+/// Azimuth of the default view in degrees: shows two sides of a box in unequal proportions.
 pub const DEFAULT_AZIMUTH: f64 = 30.0;
 
-/// Height of the default view over the horizon, degrees: enough to see the top of the material.
+/// Elevation of the default view in degrees: high enough to show the top of the material.
 pub const DEFAULT_ELEVATION: f64 = 20.0;
 
-/// Where a camera stands and looks, in world units, as a manifest has it.
+/// Position and orientation of a camera in world units, as in a manifest.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CameraView {
     /// Position of the pinhole.
     pub eye: DVec3,
-    /// A point in the middle of the image.
+    /// The point at the centre of the image.
     pub look_at: DVec3,
-    /// Which way is up; need not be perpendicular to the view.
+    /// The up direction; need not be perpendicular to the view.
     pub up: DVec3,
     /// Vertical field of view in degrees, above 0 and below 180.
     pub fov: f64,
 }
 
-/// How [`Camera::framing`] looks at a box.
+/// Parameters of [`Camera::framing`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Framing {
-    /// The world's up.
+    /// The up direction of the world.
     pub up: DVec3,
-    /// Turn around `up` in degrees; 0 looks along +y if `up` is z, along -z if `up` is y.
+    /// Rotation about `up` in degrees; 0 looks along +y if `up` is z, along -z if `up` is y.
     pub azimuth: f64,
-    /// Height over the horizon in degrees; positive looks down.
+    /// Elevation above the horizon in degrees; a positive one looks down.
     pub elevation: f64,
     /// Vertical field of view in degrees.
     pub fov: f64,
-    /// Width over height of the image.
+    /// Width of the image divided by its height.
     pub aspect: f64,
 }
 
@@ -65,30 +65,30 @@ impl Framing {
     }
 }
 
-/// Why a camera cannot be set up.
+/// Reasons why a camera cannot be set up.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum CameraError {
     /// A coordinate is NaN or infinite.
     #[error("a coordinate is not a finite number")]
     NotFinite,
-    /// The renderer works in f32.
+    /// A coordinate exceeds the range of f32.
     #[error("eye or look_at is too far away for single precision, whose numbers end at 3e38")]
     TooFar,
-    /// There is no direction to look in.
+    /// `eye` and `look_at` are the same point.
     #[error("eye and look_at are the same point; move one of them")]
     NoDirection,
-    /// `up` is zero or along the view.
+    /// `up` is zero or parallel to the view.
     #[error("up is zero or points along the view; choose another camera.up")]
     NoUp,
     /// Field of view outside 0 to 180 degrees.
     #[error("fov must lie above 0 and below 180 degrees")]
     FieldOfView,
-    /// Width over height is zero, negative or not finite.
+    /// The aspect ratio is zero, negative or not finite.
     #[error("image width over height must be above 0")]
     Aspect,
 }
 
-/// A camera ready to make rays.
+/// A camera that generates rays.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Camera {
     eye: Vec3,
@@ -97,23 +97,23 @@ pub struct Camera {
     forward: Vec3,
     /// `tan(fov / 2)`, horizontal and vertical.
     half_extent: Vec2,
-    /// To camera space: x right, y up, z forward (left-handed as OpenEXR's `worldToCamera`).
+    /// World to camera space: x right, y up, z forward (left-handed, as in OpenEXR's `worldToCamera`).
     camera_from_world: DMat4,
 }
 
 impl Camera {
-    /// A camera at `view`, for images of `aspect` = width / height; coordinates become relative to
-    /// `origin`.
+    /// A camera at `view`, for images with `aspect` = width / height. Its coordinates are relative to `origin`.
     ///
     /// # Errors
-    /// If the view has no direction, no up, or a number that makes no picture.
+    /// If the direction or the up vector of the view is undefined, or if a number is out of range.
     pub fn new(view: &CameraView, aspect: f64, origin: DVec3) -> Result<Self, CameraError> {
+        // Check the view
         let points = [view.eye, view.look_at, view.up, origin];
         if !points.iter().all(|p| p.is_finite()) {
             return Err(CameraError::NotFinite);
         }
-        let is_near = |p: DVec3| (p - origin).as_vec3().is_finite();
-        if !is_near(view.eye) || !is_near(view.look_at) {
+        let is_representable = |p: DVec3| (p - origin).as_vec3().is_finite();
+        if !is_representable(view.eye) || !is_representable(view.look_at) {
             return Err(CameraError::TooFar);
         }
         if !(view.fov > 0.0 && view.fov < 180.0) {
@@ -122,12 +122,13 @@ impl Camera {
         if !(aspect > 0.0 && aspect.is_finite()) {
             return Err(CameraError::Aspect);
         }
+        // Build an orthonormal basis
         let forward = (view.look_at - view.eye)
             .try_normalize()
             .ok_or(CameraError::NoDirection)?;
         let up_hint = view.up.try_normalize().ok_or(CameraError::NoUp)?;
         let right = forward.cross(up_hint);
-        // Below this, rounding of the inputs decides where up is.
+        // For smaller values, rounding of the input determines the up direction.
         if right.length() < 1e-9 {
             return Err(CameraError::NoUp);
         }
@@ -144,24 +145,26 @@ impl Camera {
         })
     }
 
-    /// The nearest view from the asked direction that has all corners of `bounds` in the image,
-    /// with a margin of [`FRAMING_MARGIN`]. An empty or flat box gives a view too.
+    /// The nearest view in the given direction with all corners of `bounds` in the image, with a margin of
+    /// [`FRAMING_MARGIN`]. Also works for an empty or flat box.
     ///
-    /// The image planes through the eye must touch the box on both sides: with `x`, `d` a corner's
-    /// place across and along the view and `t` the half extent, `|x - c| <= t (D + d)` for all
-    /// corners has its least `D` at `c` midway between the outermost `x - t d` and `x + t d`.
+    /// The side planes of the view frustum must touch the box on both sides. Let `x` and `d` be the position of a
+    /// corner across and along the view, and `t` the half extent. Then `|x - c| <= t (D + d)` for all corners has its
+    /// minimum `D` at `c` midway between the outermost `x - t d` and `x + t d`.
     pub fn framing(bounds: &Bounds, framing: &Framing) -> CameraView {
+        // Find the axes of the view
         let up = framing.up.try_normalize().unwrap_or(DVec3::Z);
         let direction = view_direction(up, framing.azimuth, framing.elevation);
         let right = direction.cross(up).try_normalize().unwrap_or(DVec3::X);
         let screen_up = right.cross(direction);
         let half = half_extent(framing);
 
+        // Fit the box horizontally and vertically, and use the larger distance
         let center = bounds.center();
         let relative = bounds.corners().map(|corner| corner - center);
         let (x, distance_x) = fit(&relative, direction, right, half.x);
         let (y, distance_y) = fit(&relative, direction, screen_up, half.y);
-        let distance = distance_x.max(distance_y).max(least_distance(bounds));
+        let distance = distance_x.max(distance_y).max(min_distance(bounds));
         let look_at = center + x * right + y * screen_up;
         CameraView {
             eye: look_at - distance * direction,
@@ -171,8 +174,7 @@ impl Camera {
         }
     }
 
-    /// The ray through `film` in units of the image: (0, 0) is the top left corner of the image,
-    /// (1, 1) the bottom right one.
+    /// The ray through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
     pub fn ray(&self, film: Vec2) -> Ray {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
         let direction = self.forward + d.x * self.right + d.y * self.up;
@@ -189,7 +191,7 @@ impl Camera {
         self.forward
     }
 
-    /// Unit vectors to the right, up and along the view.
+    /// Unit vectors to the right, up, and along the view.
     pub(crate) const fn axes(&self) -> [Vec3; 3] {
         [self.right, self.up, self.forward]
     }
@@ -199,20 +201,20 @@ impl Camera {
         self.half_extent
     }
 
-    /// The pinhole, relative to the sequence's origin.
+    /// The position of the pinhole, relative to the origin of the sequence.
     pub const fn eye(&self) -> Vec3 {
         self.eye
     }
 
-    /// The matrix of OpenEXR's `worldToCamera` (row vectors, row by row; left-handed, y up, z
-    /// forward, so that a point's third coordinate is its `Z`).
+    /// The matrix of OpenEXR's `worldToCamera` (row vectors, row by row; left-handed, y up, z forward, so that the
+    /// third coordinate of a point is its `Z`).
     pub fn world_to_camera(&self) -> [f32; 16] {
-        // Rows for row vectors are the columns for column vectors.
+        // Rows for row vectors equal columns for column vectors.
         self.camera_from_world.as_mat4().to_cols_array()
     }
 }
 
-/// Columns of the matrix that takes world points to camera space.
+/// The matrix from world points to camera space.
 fn camera_from_world(eye: DVec3, right: DVec3, up: DVec3, forward: DVec3) -> DMat4 {
     let column = |x: DVec3| DVec4::new(right.dot(x), up.dot(x), forward.dot(x), 0.0);
     DMat4::from_cols(
@@ -223,16 +225,15 @@ fn camera_from_world(eye: DVec3, right: DVec3, up: DVec3, forward: DVec3) -> DMa
     )
 }
 
-/// What a framed box may fill of the picture, horizontally and vertically: its extent at distance 1 from
-/// the middle to the rim, without the margin.
+/// Half the extent of the image at distance 1, horizontally and vertically, without the margin.
 pub(super) fn half_extent(framing: &Framing) -> DVec2 {
     let half_height = libm::tan(0.5 * framing.fov.to_radians()) * (1.0 - FRAMING_MARGIN);
     DVec2::new(half_height * framing.aspect, half_height)
 }
 
-/// Distance without which nothing could be seen of `bounds`, although all of it would fit.
-pub(super) fn least_distance(bounds: &Bounds) -> f64 {
-    // A single point still needs some; the scale of its coordinates is all we have.
+/// Minimum distance for `bounds` without extent, which would otherwise be fitted at distance 0.
+pub(super) fn min_distance(bounds: &Bounds) -> f64 {
+    // A single point has no scale except that of its coordinates.
     if bounds.diagonal() > 0.0 {
         0.0
     } else {
@@ -240,9 +241,9 @@ pub(super) fn least_distance(bounds: &Bounds) -> f64 {
     }
 }
 
-/// The way a camera looks that stands at `azimuth` and `elevation` (degrees) around `up`.
+/// View direction of a camera at `azimuth` and `elevation` (degrees) about `up`.
 pub(super) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
-    // Straight down would leave no up; a degree is not seen.
+    // The up direction is undefined for a view straight down; one degree makes no visible difference.
     let elevation = elevation.clamp(-89.0, 89.0).to_radians();
     let azimuth = azimuth.to_radians();
     let hint = if up.x.abs() < 0.9 { DVec3::X } else { DVec3::Y };
@@ -252,8 +253,7 @@ pub(super) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
     -(libm::cos(elevation) * level + libm::sin(elevation) * up)
 }
 
-/// Shift along `axis` and distance along `direction` at which all `corners` lie within
-/// `half_extent`.
+/// Shift along `axis` and distance along `direction` at which all `corners` lie within `half_extent`.
 fn fit(corners: &[DVec3; 8], direction: DVec3, axis: DVec3, half_extent: f64) -> (f64, f64) {
     let mut high = f64::NEG_INFINITY;
     let mut low = f64::INFINITY;

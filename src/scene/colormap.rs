@@ -1,22 +1,22 @@
-//! Numbers to colours: the maps of `colorous` as tables in linear RGB.
+//! Colour maps: those of `colorous`, as tables in linear RGB.
 //!
-//! Its turbo is a polynomial that misses the published map by up to 22 of 255 at the ends, so that
-//! one is interpolated here from knots on the published map.
+//! The turbo map of `colorous` is a polynomial that differs from the published map by up to 22 of 255 at the ends, so
+//! turbo is interpolated here from knots of the published map.
 
 use glam::Vec3;
 use thiserror::Error;
 
-/// Entries of a table: what the published 8-bit maps hold.
+/// Entries of a table, as in the published 8-bit maps.
 const ENTRIES: usize = 256;
 
-/// Colour of a value that is not a number (linear RGB): a grey outside every map but `greys`.
+/// Colour of a value that is NaN (linear RGB): a grey that is in no map except `greys`.
 pub const NO_VALUE: Vec3 = Vec3::new(0.18, 0.18, 0.18);
 
-/// Entries of the table from one knot of [`TURBO`] to the next.
+/// Number of table entries between two knots of [`TURBO`].
 const TURBO_STEP: usize = 5;
 
-/// Every fifth of turbo's 256 colours (sRGB): Mikhailov, "Turbo, an improved rainbow colormap for
-/// visualization", 2019. Cubics through them stay within 1 of all published entries.
+/// Every fifth of the 256 colours of turbo (sRGB): Mikhailov, "Turbo, an improved rainbow colormap for
+/// visualization", 2019. The cubics through them differ by at most 1 from all published entries.
 const TURBO: [[u8; 3]; (ENTRIES - 1) / TURBO_STEP + 1] = [
     [48, 18, 59],
     [54, 33, 95],
@@ -72,7 +72,7 @@ const TURBO: [[u8; 3]; (ENTRIES - 1) / TURBO_STEP + 1] = [
     [122, 4, 3],
 ];
 
-/// Where a map's colours come from.
+/// Source of the colours of a map.
 #[derive(Debug, Clone, Copy)]
 enum Source {
     Colorous(colorous::Gradient),
@@ -98,13 +98,14 @@ fn turbo(i: usize) -> Vec3 {
     let knot = |k: usize| Vec3::from(TURBO[k.min(TURBO.len() - 1)].map(f32::from));
     let (k, t) = (i / TURBO_STEP, (i % TURBO_STEP) as f32 / TURBO_STEP as f32);
     let (from, to) = (knot(k), knot(k + 1));
-    // Beyond the ends the map goes on as straight as it came.
+    // Extrapolate linearly beyond the ends
     let before = if k == 0 { 2.0 * from - to } else { knot(k - 1) };
     let after = if k + 2 < TURBO.len() {
         knot(k + 2)
     } else {
         2.0 * to - from
     };
+    // Evaluate the cubic between the knots
     let (slope_from, slope_to) = (0.5 * (to - before), 0.5 * (after - from));
     let bend = to - from;
     let cubic = slope_from + slope_to - 2.0 * bend;
@@ -152,22 +153,22 @@ pub struct ColorMap {
     start: f32,
 }
 
-/// No map has this name.
+/// An unknown name of a colour map.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
 #[error("no color map is called {name:?}, did you mean {nearest:?}")]
 pub struct UnknownColorMap {
-    /// What was asked for.
+    /// The name.
     pub name: String,
-    /// The known name most like it.
+    /// The most similar known name.
     pub nearest: &'static str,
 }
 
 impl ColorMap {
-    /// The map called `name` stretched over `low` to `high`; values outside take the end colours.
-    /// `low > high` turns the map round; with `low == high` every number has the middle colour.
+    /// The map `name`, stretched over the range `low` to `high`; values outside get the colours at the ends. `low >
+    /// high` reverses the map; with `low == high` every number gets the middle colour.
     ///
     /// # Errors
-    /// If there is no such map.
+    /// If the name is unknown.
     pub fn new(name: &str, low: f32, high: f32) -> Result<Self, UnknownColorMap> {
         let found = MAPS.iter().find(|(known, _)| *known == name);
         let (_, source) = found.ok_or_else(|| UnknownColorMap {
@@ -196,7 +197,7 @@ impl ColorMap {
         if value.is_nan() {
             return NO_VALUE;
         }
-        // Infinite values times 0 would be NaN; the offset must be bounded first.
+        // An infinite value times 0 would be NaN, so the offset is bounded first.
         let offset = (value - self.low).clamp(f32::MIN, f32::MAX) * self.scale;
         let at = (self.start + offset).clamp(0.0, (ENTRIES - 1) as f32);
         #[expect(
@@ -209,7 +210,7 @@ impl ColorMap {
     }
 }
 
-/// The known name at the least edit distance from `name`.
+/// The known name with the smallest edit distance to `name`.
 fn nearest_name(name: &str) -> &'static str {
     let distance = |known: &str| strsim::damerau_levenshtein(known, &name.to_lowercase());
     ColorMap::names()

@@ -1,31 +1,30 @@
-//! An optional floor: an infinite, opaque, diffuse plane that receives shadows and fades into the
-//! background, so that the horizon is no hard line.
+//! An optional ground: an infinite, opaque, diffuse plane that receives shadows and fades into the background, so
+//! that there is no hard horizon.
 //!
-//! It is seen and casts shadow from above only: a camera below it looks through.
+//! It is visible and casts shadows from above only: a camera below it sees through it.
 
 use glam::Vec3;
 
 use super::Bounds;
 use crate::ray::Ray;
 
-/// Colour of the default floor (linear RGB): a dark grey that shows shadows and stays behind
-/// the particles.
+/// Default colour of the ground (linear RGB): a dark grey that shows shadows and does not distract from the particles.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
 
-/// Part of the ambient light that the floor takes: it lies under everything, so it gets more of the
-/// sky than a particle inside a cloud.
+/// Ambient reflectance of the ground. It is below everything, so it receives more of the sky than a particle inside a
+/// cloud.
 pub const AMBIENT: f32 = 0.2;
 
-/// Part of the lights' radiance that the floor takes, as a default material's `diffuse`.
+/// Diffuse reflectance of the ground, equal to the default `diffuse` of materials.
 pub const DIFFUSE: f32 = 0.7;
 
-/// What a darker square of a chequered floor has of the floor's colour.
-const DARKER: f32 = 0.35;
+/// Colour of the darker squares of a checkerboard, as a fraction of the colour of the ground.
+const DARKER_PART: f32 = 0.35;
 
-/// The default floor begins to fade at this many bounds' diagonals from its middle.
+/// Default distance from the centre at which the ground starts to fade, in diagonals of the bounds.
 const FADE_START: f32 = 1.5;
 
-/// ... and is gone at this many.
+/// Default distance at which it has faded out.
 const FADE_END: f32 = 6.0;
 
 /// A plane `dot(up, x) = height`.
@@ -37,17 +36,17 @@ pub struct Ground {
     pub height: f32,
     /// Diffuse colour, linear RGB.
     pub color: Vec3,
-    /// A point that the fading is measured from.
+    /// Centre of the fading.
     pub center: Vec3,
-    /// Distance from `center` up to which the floor is whole.
+    /// Distance from `center` up to which the ground is opaque.
     pub fade_start: f32,
-    /// Distance from which on there is only background.
+    /// Distance from which on only the background is visible.
     pub fade_end: f32,
-    /// Squares on it, if wanted.
+    /// Optional checkerboard.
     pub checker: Option<Checker>,
 }
 
-/// Squares on a floor, every other one darker. Corners of four meet at the floor's middle.
+/// A checkerboard on the ground. Four corners meet at the centre of the ground.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Checker {
     /// Edge of a square; positive.
@@ -55,7 +54,7 @@ pub struct Checker {
 }
 
 impl Ground {
-    /// A floor just under `bounds`, which must be relative to the sequence's origin in `origin`.
+    /// A ground just below `bounds`, relative to `origin`.
     pub fn under(bounds: &Bounds, up: Vec3, origin: glam::DVec3) -> Self {
         let up = up.normalize_or(Vec3::Z);
         let relative = bounds.corners().map(|c| (c - origin).as_vec3());
@@ -76,7 +75,7 @@ impl Ground {
         }
     }
 
-    /// The colour at `point` of the floor.
+    /// The colour at a `point` of the ground.
     #[inline]
     pub fn color_at(&self, point: Vec3) -> Vec3 {
         let Some(checker) = self.checker else {
@@ -84,35 +83,35 @@ impl Ground {
         };
         let [across, along] = self.axes();
         let from_middle = (point - self.center) / checker.tile;
-        let square = whole(from_middle.dot(across)) ^ whole(from_middle.dot(along));
+        let square = floor(from_middle.dot(across)) ^ floor(from_middle.dot(along));
         if square & 1 == 0 {
             self.color
         } else {
-            DARKER * self.color
+            DARKER_PART * self.color
         }
     }
 
-    /// Two directions of the floor at a right angle, along the axes of space where `up` is one of them.
+    /// Two perpendicular directions of the plane; coordinate axes if `up` is one.
     fn axes(&self) -> [Vec3; 2] {
         let size = self.up.abs();
-        let aside = if size.x >= size.y && size.x >= size.z {
+        let other_axis = if size.x >= size.y && size.x >= size.z {
             Vec3::Y
         } else if size.y >= size.z {
             Vec3::Z
         } else {
             Vec3::X
         };
-        let across = (aside - aside.dot(self.up) * self.up).normalize();
+        let across = (other_axis - other_axis.dot(self.up) * self.up).normalize();
         [across, self.up.cross(across)]
     }
 
-    /// Moves the floor along `up`.
+    /// Moves the ground along `up`.
     pub fn raise(&mut self, by: f32) {
         self.center += by * self.up;
         self.height += by;
     }
 
-    /// Distance at which `ray` comes down through the plane, if that lies in its range.
+    /// Distance at which `ray` hits the plane from above, if it is in the range of the ray.
     pub fn hit(&self, ray: &Ray) -> Option<f32> {
         let slope = ray.direction.dot(self.up);
         if slope >= 0.0 {
@@ -122,29 +121,29 @@ impl Ground {
         (t >= ray.t_min && t < ray.t_max && t.is_finite()).then_some(t)
     }
 
-    /// How much of the floor is left at `point`: 1 near, 0 far, smooth between.
-    pub fn presence(&self, point: Vec3) -> f32 {
+    /// Opacity of the ground at `point`: 1 near the centre, 0 far away, with a smooth transition.
+    pub fn opacity(&self, point: Vec3) -> f32 {
         let distance = point.distance(self.center);
         let span = (self.fade_end - self.fade_start).max(f32::MIN_POSITIVE);
         let x = ((self.fade_end - distance) / span).clamp(0.0, 1.0);
         x * x * (3.0 - 2.0 * x)
     }
 
-    /// Length to step off the plane at `point` so that the next ray does not meet it again: a few
-    /// ulps of the numbers that made the point.
+    /// Length to step off the plane at `point` so that the next ray does not hit it again: a few ulps of the numbers
+    /// that determine the point.
     pub fn offset(&self, point: Vec3, t: f32) -> f32 {
         let scale = point.abs().max_element().max(t).max(self.height.abs());
         (8.0 * f32::EPSILON * scale).max(f32::MIN_POSITIVE)
     }
 }
 
-/// The whole number at or under `value`; of the farthest squares only the last one's. Without the
-/// call that `floor` is where machines of any age must run the program.
+/// The largest integer not above `value`; saturates. It avoids the function call that `floor` needs on machines
+/// without such an instruction.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "saturates, where squares are far smaller than rounding"
 )]
-fn whole(value: f32) -> i32 {
+fn floor(value: f32) -> i32 {
     let towards_zero = value as i32;
     towards_zero.saturating_sub(i32::from(value < towards_zero as f32))
 }
@@ -195,7 +194,7 @@ mod tests {
             floor.checker = Some(Checker { tile: 0.5 });
             let [across, along] = floor.axes();
             let at = |x: f32, y: f32| floor.color_at(floor.center + x * across + y * along);
-            let [light, dark] = [floor.color, DARKER * floor.color];
+            let [light, dark] = [floor.color, DARKER_PART * floor.color];
             assert_eq!([at(0.1, 0.1), at(0.4, 0.3), at(-0.1, -0.4)], [light; 3]);
             assert_eq!([at(0.6, 0.1), at(-0.1, 0.2), at(0.3, -0.3)], [dark; 3]);
             assert_eq!(at(0.6, 0.7), light);
@@ -206,10 +205,10 @@ mod tests {
     #[test]
     fn fades_smoothly() {
         let floor = floor();
-        assert_eq!(floor.presence(floor.center), 1.0);
+        assert_eq!(floor.opacity(floor.center), 1.0);
         let far = floor.center + Vec3::X * (floor.fade_end * 1.01);
-        assert_eq!(floor.presence(far), 0.0);
+        assert_eq!(floor.opacity(far), 0.0);
         let middle = 0.5 * (floor.fade_start + floor.fade_end);
-        assert!((floor.presence(floor.center + Vec3::Y * middle) - 0.5).abs() < 1e-4);
+        assert!((floor.opacity(floor.center + Vec3::Y * middle) - 0.5).abs() < 1e-4);
     }
 }

@@ -7,38 +7,37 @@ use super::{Bounds, CameraView};
 /// Colour of the default key light (linear RGB): daylight, slightly warm.
 pub const KEY_COLOR: Vec3 = Vec3::new(1.0, 0.965, 0.91);
 
-/// Strength of the default key light: bright enough for the dark ends of colour maps, tuned on the
-/// dam break by eye; what that makes too bright, the preview's view transform rolls off.
+/// Intensity of the default key light: bright enough for the dark ends of colour maps, tuned by eye on the dam break.
+/// The view transform of the preview compresses highlights that become too bright.
 pub const KEY_INTENSITY: f32 = 1.9;
 
 /// Colour of the default fill light: cool against the warm key.
 pub const FILL_COLOR: Vec3 = Vec3::new(0.72, 0.84, 1.0);
 
-/// Strength of the default fill light: a fifth of the key keeps shadows open without making them
-/// flat.
+/// Intensity of the default fill light: a fifth of the key light brightens shadows without flattening them.
 pub const FILL_INTENSITY: f32 = 0.4;
 
-/// How a point light's strength depends on distance.
+/// Dependence of a point light on distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Falloff {
-    /// Not at all, as in the thesis.
+    /// Constant, as in the thesis.
     #[default]
     None,
     /// `intensity / distance²`.
     InverseSquare,
 }
 
-/// Where light comes from.
+/// Kinds of lights.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum LightKind {
-    /// From a place.
+    /// A point light.
     Point {
-        /// Relative to the sequence's origin.
+        /// Position relative to the origin of the sequence.
         position: Vec3,
-        /// Strength over distance.
+        /// Dependence on distance.
         falloff: Falloff,
     },
-    /// From infinitely far.
+    /// A light at infinite distance.
     Directional {
         /// Unit vector from the scene to the light.
         to_light: Vec3,
@@ -48,11 +47,11 @@ pub enum LightKind {
 /// A light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Light {
-    /// Where it shines from.
+    /// The kind of light and its position or direction.
     pub kind: LightKind,
     /// Colour times intensity, linear RGB.
     pub radiance: Vec3,
-    /// Whether things stand in its way; without, it costs no shadow ray.
+    /// Whether other objects occlude it. A light without shadows needs no shadow rays.
     pub casts_shadow: bool,
 }
 
@@ -74,7 +73,7 @@ impl Light {
         }
     }
 
-    /// Light that travels along `direction` (any length); `None` if that has no length.
+    /// Light that travels along `direction` (of any length); `None` for a zero vector.
     pub fn directional(direction: Vec3, radiance: Vec3) -> Option<Self> {
         Some(Self {
             kind: LightKind::Directional {
@@ -86,18 +85,20 @@ impl Light {
     }
 }
 
-/// A key light from above the camera's left shoulder with shadows, and a soft fill from the right
-/// without. Both are directional, so they suit a scene of any size; they stay where they are when
-/// a camera moves, so pass the view that its path starts with.
+/// A key light from above the left shoulder of the camera, with shadows, and a soft fill light from the right,
+/// without shadows. Both are directional, so they suit a scene of any size. They do not move with the camera: pass
+/// the first view of its path.
 pub fn default_lights(bounds: &Bounds, up: DVec3, view: &CameraView) -> Vec<Light> {
+    // Find the horizontal axes of the view
     let up = up.try_normalize().unwrap_or(DVec3::Z);
     let to_eye = view.eye - bounds.center();
     let level = to_eye - to_eye.dot(up) * up;
-    // Seen from straight above any side is as good as another.
+    // For a view from straight above, any direction will do.
     let back = level
         .try_normalize()
         .unwrap_or_else(|| up.any_orthonormal_vector());
     let right = up.cross(back);
+    // Place both lights relative to these axes
     let light = |right_part: f64, up_part: f64, back_part: f64, radiance| {
         let to_light = (right_part * right + up_part * up + back_part * back).normalize();
         LightKind::Directional {

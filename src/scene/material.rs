@@ -1,18 +1,18 @@
-//! The constants of eq. 4.1 to 4.3, and the optics that need nothing else: Schlick's Fresnel term
-//! and Snell's refraction.
+//! The constants of eq. 4.1 to 4.3, and the optics that depend only on them: Fresnel reflectance and refraction by
+//! Snell's law.
 //!
-//! Schlick, "An inexpensive BRDF model for physically-based rendering", 1994. As in eq. 4.3 the
-//! cosine is the viewer's, on whichever side of the surface the viewer is.
+//! Schlick, "An inexpensive BRDF model for physically-based rendering", 1994. As in eq. 4.3 the cosine is that of the
+//! incoming ray, on its side of the surface.
 
 use glam::Vec3;
 use thiserror::Error;
 
-/// Base colour of particles that bring none (linear RGB): a clear blue, the colour that
-/// readers expect of a fluid; highlights and rims take away saturation, so it has some to spare.
+/// Default base colour of particles (linear RGB): a clear blue, as readers expect of a fluid; highlights and
+/// reflections at silhouettes reduce the saturation, so it is higher than desired.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.12, 0.38, 0.78);
 
-/// One set of constants for all particles. The base colour multiplies ambient and diffuse light;
-/// highlights have the light's colour.
+/// The constants of all particles. The base colour multiplies ambient and diffuse light; highlights have the colour
+/// of the light.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Material {
     /// `Ka`.
@@ -23,33 +23,33 @@ pub struct Material {
     pub specular: f32,
     /// Exponent of the highlight, not negative.
     pub shininess: f32,
-    /// Index of refraction inside against outside, above 0.
+    /// Relative index of refraction, inside over outside, above 0.
     pub ior: f32,
-    /// Weight of the mirrored ray, 0 to 1.
+    /// Weight of the reflected ray, 0 to 1.
     pub reflection: f32,
     /// Weight of the refracted ray, 0 to 1; 0 is opaque.
     pub transmission: f32,
-    /// How `r` of eq. 4.1 comes of the angle.
+    /// The formula for `r` of eq. 4.1.
     pub fresnel: Fresnel,
-    /// What is taken of light inside, per length: its colours fade by `exp(-extinction * length)` (Beer-Lambert).
-    /// Not negative. Shadows of separate spheres are without it.
+    /// Extinction coefficient of the medium inside, per length: light is attenuated by `exp(-extinction * length)`
+    /// (Beer-Lambert law). Not negative. Shadows of separate spheres ignore it.
     pub extinction: Vec3,
 }
 
-/// How much a surface mirrors at which angle.
+/// Formulas for the Fresnel reflectance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Fresnel {
-    /// Schlick's approximation with the viewer's cosine (eq. 4.3). From inside it mirrors too little:
-    /// not nearly all where total reflection begins.
+    /// Schlick's approximation with the cosine of the incoming ray (eq. 4.3). From inside it reflects too little: it
+    /// does not approach 1 at the critical angle.
     #[default]
     Schlick,
-    /// Fresnel's equations for light without polarisation.
+    /// Fresnel's equations for unpolarised light.
     Exact,
 }
 
 impl Material {
-    /// What a picture has unless told otherwise: water's index of refraction, opaque, a soft
-    /// highlight. Under the default lights a white particle comes out just under white.
+    /// Default constants: the index of refraction of water, opaque, a soft highlight. A white particle under the
+    /// default lights is just below white.
     pub const DEFAULT: Self = Self {
         ambient: 0.1,
         diffuse: 0.7,
@@ -62,13 +62,13 @@ impl Material {
         extinction: Vec3::ZERO,
     };
 
-    /// Whether rays go on in two directions where they meet it: mirrored and refracted.
+    /// Whether two rays leave a surface: reflected and refracted.
     pub fn branches(&self) -> bool {
         self.reflection > 0.0 && self.transmission > 0.0
     }
 
-    /// Checks that the constants make sense; with reflection and transmission in 0 to 1 a ray's
-    /// children never weigh more than itself.
+    /// Checks the ranges of all constants. With reflection and transmission in 0 to 1, the weight of the rays that
+    /// leave a surface never exceeds that of the incoming ray.
     ///
     /// # Errors
     /// Names the first constant that is out of range.
@@ -103,15 +103,15 @@ impl Material {
         }
     }
 
-    /// `R0` of eq. 4.3; the same from either side.
+    /// `R0` of eq. 4.3, which is the same for both sides.
     pub fn r0(&self) -> f32 {
         let root = (1.0 - self.ior) / (1.0 + self.ior);
         root * root
     }
 
-    /// The part mirrored by a surface that is met at the absolute `cosine` with the normal; `ratio` is the index
-    /// of refraction on the viewer's side over the one beyond. All of it where refraction ends.
-    pub fn mirrored(&self, cosine: f32, ratio: f32) -> f32 {
+    /// The Fresnel reflectance at the absolute `cosine` between ray and normal. `ratio` is the index of refraction on
+    /// the side of the ray over that on the other side. 1 under total internal reflection.
+    pub fn fresnel_reflectance(&self, cosine: f32, ratio: f32) -> f32 {
         match self.fresnel {
             Fresnel::Schlick => schlick(self.r0(), cosine),
             Fresnel::Exact => dielectric(cosine, ratio),
@@ -119,8 +119,8 @@ impl Material {
     }
 }
 
-/// The extinction of a medium that leaves `color` of white light after `length`. Of black, a millionth
-/// is left.
+/// The extinction coefficient of a medium that attenuates white light to `color` over `length`. Black is treated as
+/// one millionth.
 pub fn extinction(color: Vec3, length: f32) -> Vec3 {
     let loss = |part: f32| (-libm::logf(part.clamp(1e-6, 1.0)) / length).clamp(0.0, f32::MAX);
     Vec3::from_array(color.to_array().map(loss))
@@ -136,13 +136,13 @@ impl Default for Material {
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 #[error("material {name} = {value} is out of range")]
 pub struct MaterialError {
-    /// The constant.
+    /// Name of the constant.
     pub name: &'static str,
-    /// What it was.
+    /// Its value.
     pub value: f32,
 }
 
-/// Reflected part by Schlick (eq. 4.3) from `r0` and the absolute cosine between normal and ray.
+/// Fresnel reflectance by Schlick's approximation (eq. 4.3), from `r0` and the absolute cosine between normal and ray.
 #[inline(always)]
 pub fn schlick(r0: f32, cosine: f32) -> f32 {
     let x = (1.0 - cosine).clamp(0.0, 1.0);
@@ -150,25 +150,26 @@ pub fn schlick(r0: f32, cosine: f32) -> f32 {
     r0 + (1.0 - r0) * (x2 * x2 * x)
 }
 
-/// Reflected part by Fresnel's equations, the mean of both polarisations, from the absolute cosine between
-/// normal and ray and the `ratio` of the indices of refraction, on the ray's side over beyond. 1 under total reflection.
+/// Fresnel reflectance of a dielectric, averaged over both polarisations, from the absolute cosine between normal and
+/// ray and the `ratio` of the indices of refraction: on the side of the ray over that on the other side. 1 under
+/// total internal reflection.
 #[inline(always)]
 pub fn dielectric(cosine: f32, ratio: f32) -> f32 {
-    // Without a branch, for loops over lanes.
+    // Free of branches, for loops over lanes.
     let cos_in = cosine.clamp(0.0, 1.0);
     let sin2_out = ratio * ratio * (1.0 - cos_in * cos_in);
     let is_total = sin2_out >= 1.0;
     let cos_out = (1.0 - if is_total { 1.0 } else { sin2_out }).sqrt();
-    let across = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out);
-    let along = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out);
-    let mean = 0.5 * (across * across + along * along);
+    let r_s = (ratio * cos_in - cos_out) / (ratio * cos_in + cos_out);
+    let r_p = (cos_in - ratio * cos_out) / (cos_in + ratio * cos_out);
+    let mean = 0.5 * (r_s * r_s + r_p * r_p);
     if is_total { 1.0 } else { mean }
 }
 
-/// Direction after passing a surface by Snell's law; `None` if all is reflected.
+/// Direction of the refracted ray by Snell's law; `None` under total internal reflection.
 ///
-/// `normal` is the unit normal on the side that unit `direction` comes from, `ratio` the index of
-/// refraction on that side over the one beyond.
+/// `normal` is the unit normal on the side of the unit vector `direction`, and `ratio` the index of refraction on
+/// that side over that on the other side.
 pub fn refract(direction: Vec3, normal: Vec3, ratio: f32) -> Option<Vec3> {
     let cos_in = -direction.dot(normal);
     let sin2_out = ratio * ratio * (1.0 - cos_in * cos_in).max(0.0);
@@ -176,11 +177,11 @@ pub fn refract(direction: Vec3, normal: Vec3, ratio: f32) -> Option<Vec3> {
         return None;
     }
     let along_normal = ratio * cos_in - (1.0 - sin2_out).sqrt();
-    // Normalised again so that errors do not add up over a long path.
+    // Normalised, so that errors do not accumulate along a path.
     Some((ratio * direction + along_normal * normal).normalize())
 }
 
-/// Mirrors unit `direction` at a surface with unit `normal` (either side).
+/// Reflects the unit vector `direction` at a surface with unit `normal` (of either sign).
 pub fn reflect(direction: Vec3, normal: Vec3) -> Vec3 {
     (direction - 2.0 * direction.dot(normal) * normal).normalize()
 }
@@ -219,9 +220,10 @@ mod tests {
 
     #[test]
     fn fresnel_at_known_angles() {
-        // By hand for 1.5: head on 0.04 from both sides; at Brewster's angle (tan a = 1.5) the part along is 0 and
-        // across ((1 - 1.5^2) / (1 + 1.5^2))^2 = 0.147929, the mean half of that. 60 degrees: cos_out = 0.816497,
-        // across (0.5 - 1.224745) / 1.724745 = -0.420204, along (0.75 - 0.816497) / 1.566497 = -0.042449.
+        // By hand for 1.5: 0.04 at normal incidence from both sides; at Brewster's angle (tan a = 1.5) the
+        // p-polarised part is 0 and the s-polarised one ((1 - 1.5^2) / (1 + 1.5^2))^2 = 0.147929, the mean half of
+        // that. 60 degrees: cos_out = 0.816497, s (0.5 - 1.224745) / 1.724745 = -0.420204, p (0.75 -
+        // 0.816497) / 1.566497 = -0.042449.
         let brewster = 1.5_f32.atan().cos();
         for (cosine, ratio, wanted) in [
             (1.0, 1.0 / 1.5, 0.04),
@@ -235,7 +237,7 @@ mod tests {
             let r = dielectric(cosine, ratio);
             assert!((r - wanted).abs() < 2e-6, "{cosine} {ratio}: {r} {wanted}");
         }
-        // The same along the same way back.
+        // The same on the same path in reverse.
         let inside = (1.0 - 0.75_f32 / 2.25).sqrt();
         assert!((dielectric(inside, 1.5) - dielectric(0.5, 1.0 / 1.5)).abs() < 1e-6);
     }
@@ -259,7 +261,7 @@ mod tests {
         // sin 30 / 1.5 = 1/3.
         let t = refract(down(30.0), Vec3::Z, 1.0 / 1.5).unwrap();
         assert!((t.x - 1.0 / 3.0).abs() < 1e-6 && t.z < 0.0);
-        // And the way back.
+        // The path in reverse.
         let back = refract(-t, Vec3::NEG_Z, 1.5).unwrap();
         assert!((back + down(30.0)).length() < 1e-6);
         // Critical angle of 1.5 is 41.81 degrees.

@@ -1,8 +1,8 @@
-//! What there is to see besides the particles: camera, lights, material, background, ground. Plain
-//! values; how light travels between them is `render`'s business.
+//! Everything in a scene apart from the particles: camera, lights, material, background, ground. These are plain
+//! values; `render` computes the transport of light between them.
 //!
-//! Everything here is in scene units relative to [`Scene::origin`] (see DESIGN section 4), so that
-//! f32 is enough however far out the simulation's domain lies. Colours are linear RGB.
+//! Coordinates are in scene units relative to [`Scene::origin`] (see DESIGN section 4), so that f32 is sufficient
+//! wherever the domain of the simulation is. Colours are linear RGB.
 
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
@@ -25,7 +25,7 @@ pub use material::{Fresnel, Material, MaterialError};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
 
-/// An axis-aligned box in world units, spheres included.
+/// An axis-aligned box in world units; includes the spheres.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Bounds {
     /// Lowest corner.
@@ -35,7 +35,7 @@ pub struct Bounds {
 }
 
 impl Bounds {
-    /// The middle.
+    /// The centre.
     pub fn center(&self) -> DVec3 {
         0.5 * (self.min + self.max)
     }
@@ -58,26 +58,25 @@ impl Bounds {
     }
 }
 
-/// Colour and strength of the ambient light where nothing else is said: white, so that a
-/// material's `ambient` alone decides, as `Ka` does in the thesis.
+/// Default ambient light: white, so that the `ambient` of a material determines it alone, like `Ka` in the thesis.
 pub const DEFAULT_AMBIENT_LIGHT: Vec3 = Vec3::ONE;
 
-/// Everything but the particles.
+/// A scene without its particles.
 #[derive(Debug, Clone)]
 pub struct Scene {
-    /// World position of the zero of all coordinates here and of the particles.
+    /// World position of the origin of all coordinates here and of the particles.
     pub origin: DVec3,
-    /// Where the picture is taken from.
+    /// The camera.
     pub camera: Camera,
     /// Point and directional lights.
     pub lights: Vec<Light>,
-    /// Light that comes from everywhere (`ambient` of eq. 4.1).
+    /// Ambient light (`ambient` of eq. 4.1).
     pub ambient_light: Vec3,
-    /// One material for all particles; their colours come with the particles.
+    /// The material of all particles; their colours are attributes.
     pub material: Material,
-    /// What rays see that meet nothing.
+    /// Background for rays without an intersection.
     pub background: Background,
-    /// A floor, if wanted.
+    /// Optional ground.
     pub ground: Option<Ground>,
 }
 

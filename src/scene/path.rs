@@ -1,5 +1,5 @@
-//! Where the camera is at each frame of a sequence. Pure and in f64: the same frame number gives the
-//! same view, whichever frames there are beside it.
+//! The camera at each frame of a sequence. A pure function in f64: a frame number always gives the same view,
+//! whatever other frames exist.
 
 use thiserror::Error;
 
@@ -15,24 +15,24 @@ pub use turntable::Turntable;
 /// A view for every frame number.
 #[derive(Debug, Clone, PartialEq)]
 pub enum CameraPath {
-    /// The same view always.
+    /// The same view for all frames.
     Still(CameraView),
-    /// Around an axis at an even pace.
+    /// A rotation about an axis at constant speed.
     Turntable(Turntable),
-    /// Through keys.
+    /// An interpolation of key views.
     Keys(KeyedPath),
 }
 
-/// Why keys make no path.
+/// Reasons why keys do not define a path.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum PathError {
-    /// There is no key.
+    /// There are no keys.
     #[error("a path of the camera needs at least one key")]
     NoKeys,
-    /// A frame has two keys.
+    /// Two keys have the same frame.
     #[error("two keys have frame {0}; a frame has one view")]
     SameFrame(i64),
-    /// Halfway there is no up.
+    /// The up vectors of two consecutive keys are opposite, so there is none halfway.
     #[error(
         "up turns upside down from frame {} to frame {}, which leaves open to which side; put a key \
          between them", .0[0], .0[1]
@@ -41,21 +41,22 @@ pub enum PathError {
 }
 
 impl CameraPath {
-    /// Around `bounds`, from `framing` at frame 0 by `degrees_per_frame` a frame about its up; see
-    /// [`Turntable`].
+    /// A rotation around `bounds`, with `framing` at frame 0 and by `degrees_per_frame` per frame about its up
+    /// vector; see [`Turntable`].
     pub fn turntable(bounds: &Bounds, framing: &Framing, degrees_per_frame: f64) -> Self {
         Self::Turntable(Turntable::new(bounds, framing, degrees_per_frame))
     }
 
-    /// Through `keys` in the order of their frames; see [`KeyedPath`].
+    /// An interpolation of `keys`, sorted by frame; see [`KeyedPath`].
     ///
     /// # Errors
-    /// There are no keys, two for one frame, or opposite ups at one and the next.
+    /// There are no keys, two keys for one frame, or opposite up vectors at consecutive keys.
     pub fn through(keys: Vec<CameraKey>) -> Result<Self, PathError> {
         KeyedPath::new(keys).map(Self::Keys)
     }
 
-    /// The view at `frame`. It may be impossible (up along the view, say): [`super::Camera::new`] tells.
+    /// The view at `frame`. It may be invalid (up parallel to the view, for example), which [`super::Camera::new`]
+    /// reports.
     pub fn view(&self, frame: i64) -> CameraView {
         match self {
             Self::Still(view) => *view,
@@ -64,8 +65,8 @@ impl CameraPath {
         }
     }
 
-    /// The view that the path is known by, whichever frames a sequence has: that of frame 0 on a
-    /// turntable, of the first key.
+    /// The first view of the path, whatever frames a sequence has: that of frame 0 on a turntable, or that of the
+    /// first key.
     pub fn start(&self) -> CameraView {
         match self {
             Self::Still(view) => *view,
@@ -74,7 +75,7 @@ impl CameraPath {
         }
     }
 
-    /// What changes on the way, of `eye`, `look_at`, `up` and `fov`; nothing if the camera stands still.
+    /// The parameters that vary along the path, of `eye`, `look_at`, `up` and `fov`; empty for a fixed camera.
     pub fn moving(&self) -> Vec<&'static str> {
         match self {
             Self::Still(_) => Vec::new(),

@@ -1,7 +1,7 @@
-//! Colours that particles bring: three numbers of an attribute, as the programs that write them mean them.
+//! Colours in particle attributes: three components, interpreted as the programs that write them do.
 //!
-//! Floating-point colours are linear (Houdini's `Cd`), integers are sRGB codes (PLY, VTK): of 8 bits, or of 16
-//! where the type has 16 bits without a sign.
+//! Floating-point colours are linear (Houdini's `Cd`), integers are sRGB codes (PLY, VTK): with 16 bits if the type
+//! is an unsigned 16-bit integer, otherwise with 8 bits.
 
 use glam::Vec3;
 use serde::{Deserialize, Serialize};
@@ -9,7 +9,7 @@ use spherule_formats::{Attribute, ScalarType, names};
 
 use super::colormap::linear_from_srgb;
 
-/// What the numbers of a colour mean.
+/// Encoding of the components of a colour.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RgbEncoding {
@@ -22,7 +22,7 @@ pub enum RgbEncoding {
 }
 
 impl RgbEncoding {
-    /// That of colours stored as `scalar`.
+    /// Encoding of colours of the type `scalar`.
     pub const fn of(scalar: ScalarType) -> Self {
         match scalar {
             ScalarType::F32 | ScalarType::F64 => Self::Linear,
@@ -31,7 +31,7 @@ impl RgbEncoding {
         }
     }
 
-    /// For people.
+    /// A name for messages.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Linear => "linear",
@@ -40,7 +40,7 @@ impl RgbEncoding {
         }
     }
 
-    /// Linear RGB from 0 to 1; 0 for what is no number.
+    /// Linear RGB from 0 to 1; 0 for NaN.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "colours need no more than f32"
@@ -65,8 +65,8 @@ impl RgbEncoding {
     }
 }
 
-/// Whether `attribute` holds colours: three or four numbers a particle, by the name or because they are bytes, which
-/// VTK takes for colours whatever their name.
+/// Whether `attribute` holds colours: three or four components per particle, and either a colour name or bytes, which
+/// VTK treats as colours whatever their name.
 pub fn is_rgb(attribute: &Attribute) -> bool {
     let is_named = || names::is_one_of(&attribute.name, &names::COLOR);
     let is_bytes = attribute.data.scalar_type() == ScalarType::U8;

@@ -1,6 +1,6 @@
-//! Normals of the SPH colour field, taken from the tree that rays use: against the gradient of
-//! `sum_j W(x - x_j)` with the cubic spline (Monaghan 1992) and all particles alike (Müller, Charypar and Gross
-//! 2003, eq. 16). For surfaces of spheres; the smooth surface has a field of its own.
+//! Normals from the gradient of the SPH colour field, with neighbours found in the tree that rays use: the negated
+//! gradient of `sum_j W(x - x_j)` with the cubic spline (Monaghan 1992) and equal weights for all particles (Müller,
+//! Charypar and Gross 2003, eq. 16). Used for surfaces of spheres; the smooth surface has a field of its own.
 
 use super::Intersection;
 use super::field::kernel::slope;
@@ -9,24 +9,24 @@ use super::pca::towards_viewer;
 use crate::accel::view::TreeView;
 use crate::ray::Ray;
 
-/// Distance in smoothing lengths under which a slope is mostly rounding.
+/// Distance in smoothing lengths below which rounding dominates the slope.
 const NO_DISTANCE: f32 = 1e-4;
 
-/// Normals by the gradient of the field about the spheres of a tree.
+/// Normals from the gradient of the field around the spheres of a tree.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct GradientNormals {
-    /// Reach of the kernel, in radii of the sphere that is hit.
+    /// Radius of the kernel, in radii of the sphere that is hit.
     support: f32,
 }
 
 impl GradientNormals {
-    /// Of a kernel that ends at `support` times the radius of the sphere that is hit.
+    /// Normals with a kernel of `support` times the radius of the sphere that is hit.
     #[must_use]
     pub const fn new(support: f32) -> Self {
         Self { support }
     }
 
-    /// `hit`, which a `ray` found on a sphere of `radius` in `tree`, with the normal to shade it by.
+    /// `hit`, the intersection of `ray` with a sphere of `radius` in `tree`, with its shading normal.
     pub(super) fn shade(
         &self,
         tree: &TreeView,
@@ -34,6 +34,7 @@ impl GradientNormals {
         hit: Intersection,
         radius: f32,
     ) -> Intersection {
+        // Sum the negated gradient over the neighbours in fixed point
         let mut sum = [0_i64; 3];
         let is_whole = each_neighbour(tree, hit.point, self.support * radius, |at| {
             let pull = -at * steepness(2.0 * at.length());
@@ -41,6 +42,7 @@ impl GradientNormals {
                 *sum += fixed(value);
             }
         });
+        // Use it as the shading normal, unless there are too many neighbours or they cancel out
         let outward = glam::DVec3::from_array(sum.map(|sum| sum as f64)).try_normalize();
         match outward {
             Some(outward) if is_whole => Intersection {
@@ -52,9 +54,10 @@ impl GradientNormals {
     }
 }
 
-/// Minus the derivative of the cubic spline over the distance `q` in smoothing lengths, up to a factor.
+/// Negated derivative of the cubic spline divided by the distance, up to a constant factor; `q` is the distance in
+/// smoothing lengths.
 fn steepness(q: f32) -> f32 {
-    // The limit in the middle, where both vanish.
+    // The limit at the centre, where both vanish.
     if q < NO_DISTANCE {
         return 1.0;
     }

@@ -1,79 +1,81 @@
-//! What the rays of a packet meet, one array per component.
+//! Intersections of the rays of a packet, one array per component.
 
 use glam::Vec3;
 
 use crate::math::{Lanes, Lanes3, lane3, set_lane3, splat};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
-/// Names a material of the scene.
+/// Index of a material of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct MaterialId(pub u8);
 
 impl MaterialId {
-    /// What the scene's material says; its base colour comes with the particles.
+    /// The material of the particles; its base colour comes from their attributes.
     pub const PARTICLES: Self = Self(0);
     /// Foam and spray.
     pub const SPRAY: Self = Self(1);
     /// The floor.
     pub const GROUND: Self = Self(2);
-    /// Materials that there are.
+    /// Number of materials.
     pub const COUNT: usize = 3;
 
-    /// Whether its surfaces are those of particles, with attributes.
+    /// Whether surfaces of this material belong to particles, which have attributes.
     pub fn is_of_particles(self) -> bool {
         matches!(self, Self::PARTICLES | Self::SPRAY)
     }
 }
 
-/// The intersection of one ray.
+/// The intersection of one ray with a surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Intersection {
     /// Distance along the ray, scene units.
     pub t: f32,
-    /// The point, put back onto the surface so that it is exact to a few units in the last place.
+    /// The point, projected onto the surface so that it is exact to a few units in the last place.
     pub point: Vec3,
-    /// Outward geometric unit normal; the ray enters the body if it points against the ray.
+    /// Outward geometric unit normal. A ray that points against it enters the body.
     pub normal: Vec3,
-    /// Unit normal to shade by, seen from the same side as `normal`; `normal` where nothing smoother is known.
+    /// Unit shading normal, on the same side as `normal` as seen by the ray; equal to `normal` if there is no
+    /// smoother one.
     pub shading: Vec3,
-    /// Length along `shading` by which rays to lights start higher, so that what it smooths over casts no
-    /// shadow on itself; 0 where it smooths over nothing.
+    /// Length along `shading` by which shadow rays start higher, so that bumps that `shading` smooths over do not
+    /// cast shadows onto each other; 0 without smoothing.
     pub lift: f32,
     /// Index of the particle in the frame.
     pub particle: u32,
-    /// Length to step along the normal (either side) so that the next ray does not meet the same
-    /// place again.
+    /// Length to step along the normal, to either side, so that the next ray does not hit the same point again.
     pub offset: f32,
-    /// Where to step from: `point`, unless that lies on a finer surface than rays meet.
+    /// Origin of the next ray before the step: `point`, unless the shaded surface is finer than the surface that rays
+    /// are traced against.
     pub anchor: Vec3,
 }
 
-/// The nearest intersection of each ray of a packet. The fields of lanes outside `mask` mean nothing.
+/// The nearest intersection of each ray of a packet. The fields of lanes outside `mask` are unspecified.
 #[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub struct Intersections {
     /// Distance along the ray, scene units.
     pub t: Lanes,
-    /// The point, put back onto the surface so that it is exact to a few units in the last place.
+    /// The point, projected onto the surface so that it is exact to a few units in the last place.
     pub point: Lanes3,
     /// Outward geometric unit normal.
     pub normal: Lanes3,
-    /// Unit normal to shade by, on the same side as `normal`.
+    /// Unit shading normal, on the same side as `normal`.
     pub shading_normal: Lanes3,
-    /// Where the next ray starts, before it steps off the surface: `point`, unless the surface that is shaded is finer
-    /// than the one that rays meet.
+    /// Origin of the next ray before it steps off the surface: `point`, unless the shaded surface is finer than the
+    /// surface that rays are traced against.
     pub anchor: Lanes3,
-    /// Length to step along the geometric normal, to either side, so that the next ray does not meet the same place.
+    /// Length to step along the geometric normal, to either side, so that the next ray does not hit the same point
+    /// again.
     pub offset: Lanes,
-    /// Length along the shading normal by which rays to lights start higher (see [`Intersection::lift`]).
+    /// Length along the shading normal by which shadow rays start higher (see [`Intersection::lift`]).
     pub lift: Lanes,
-    /// Part of the surface that is there: 1, less where a floor fades into the background.
+    /// Opacity of the surface: 1, or less where a floor fades into the background.
     pub opacity: Lanes,
-    /// Index in the frame of the particle.
+    /// Index of the particle in the frame.
     pub particle: [u32; PACKET_SIZE],
-    /// What the surface is made of.
+    /// Material of the surface.
     pub material: [MaterialId; PACKET_SIZE],
-    /// Lanes whose rays meet anything.
+    /// Lanes with an intersection.
     pub mask: u32,
 }
 
@@ -96,16 +98,16 @@ impl Default for Intersections {
 }
 
 impl Intersections {
-    /// Forgets all of them.
+    /// Removes all intersections.
     #[inline(always)]
     pub fn clear(&mut self) {
         self.mask = 0;
     }
 
-    /// Puts `hit` with a surface of `material` into `lane`.
+    /// Stores `hit` with a surface of `material` in `lane`.
     ///
     /// # Panics
-    /// If there is no such lane.
+    /// If the lane does not exist.
     pub fn set(&mut self, lane: usize, hit: &Intersection, material: MaterialId) {
         self.mask |= 1 << lane;
         self.t[lane] = hit.t;
@@ -120,7 +122,7 @@ impl Intersections {
         self.material[lane] = material;
     }
 
-    /// Puts `hit` with a surface of `material` into `lane`, and ends the ray there.
+    /// Stores `hit` with a surface of `material` in `lane`, and ends the ray there.
     pub(super) fn end_ray(
         &mut self,
         rays: &mut RayPacket,
@@ -135,7 +137,7 @@ impl Intersections {
     /// The intersection in `lane`.
     ///
     /// # Panics
-    /// If there is no such lane.
+    /// If the lane does not exist.
     pub fn get(&self, lane: usize) -> Intersection {
         Intersection {
             t: self.t[lane],
@@ -149,7 +151,7 @@ impl Intersections {
         }
     }
 
-    /// What the first `count` rays meet, one by one.
+    /// The intersections of the first `count` rays.
     pub fn all(&self, count: usize) -> Vec<Option<Intersection>> {
         let found = |lane| (self.mask >> lane & 1 == 1).then(|| self.get(lane));
         (0..count).map(found).collect()

@@ -1,7 +1,6 @@
-//! What rays meet: a scene is a list of [`Shape`]s, which answer for packets of rays. Whatever made an
-//! [`Intersection`], it is a distance, a normal, a material, and a particle to take attributes from.
+//! Surfaces for ray tracing. A scene is a list of [`Shape`]s that intersect packets of rays. Every [`Intersection`]
+//! has a distance, a normal, a material, and a particle that provides attributes, whatever shape it belongs to.
 
-mod dimming;
 pub mod field;
 mod gradient;
 mod intersections;
@@ -14,9 +13,9 @@ mod shape;
 pub mod smooth;
 pub mod spheres;
 pub mod spray;
+mod transmittance;
 pub mod union;
 
-pub(crate) use dimming::Dimming;
 pub use gradient::GradientNormals;
 pub use intersections::{Intersection, Intersections, MaterialId};
 pub use normals::ShadingNormals;
@@ -24,3 +23,4 @@ pub use pca::PcaNormals;
 pub use plane::Plane;
 pub use settings::{NormalKind, SurfaceKind, SurfaceSettings};
 pub use shape::{Shape, Side};
+pub(crate) use transmittance::TransmittanceProduct;

@@ -1,4 +1,4 @@
-//! Which way spheres are said to face when they are shaded.
+//! Shading normals of spheres.
 
 use super::Intersection;
 use super::gradient::GradientNormals;
@@ -6,21 +6,21 @@ use super::pca::PcaNormals;
 use crate::accel::view::TreeView;
 use crate::ray::Ray;
 
-/// Where the normals come from that surfaces of spheres are shaded by. What decides on which side of them a
-/// ray is, and where the next one starts, is always the sphere's own.
+/// The kind of normals that shade surfaces of spheres. The geometric normals of the spheres always decide on which
+/// side of a surface a ray is, and where the next ray starts.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum ShadingNormals {
-    /// The sphere's.
+    /// The normal of the sphere.
     #[default]
     Sphere,
-    /// Across where the particles about the place lie flat.
+    /// Perpendicular to the plane in which the neighbouring particles lie.
     Pca(PcaNormals),
-    /// Against the gradient of their field.
+    /// Against the gradient of the field of the neighbouring particles.
     Gradient(GradientNormals),
 }
 
 impl ShadingNormals {
-    /// `hit`, on a sphere of `radius` in `tree`, with the normal that it is to be shaded by.
+    /// `hit`, on a sphere of `radius` in `tree`, with its shading normal.
     #[inline]
     pub(super) fn shade(
         &self,

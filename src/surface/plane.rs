@@ -1,4 +1,4 @@
-//! The floor: an endless plane that fades into the background, met from above only.
+//! The ground: an infinite plane that fades into the background, and is visible from above only.
 
 use super::shape::crossing_of_packet;
 use super::{Intersection, Intersections, MaterialId, Shape, Side};
@@ -7,7 +7,7 @@ use crate::math::{LANES, Supported, first_lanes, lane_kernel, larger};
 use crate::ray::{Ray, RayPacket};
 use crate::scene::Ground;
 
-/// A floor as rays meet it.
+/// A ground plane as a shape.
 #[derive(Debug, Clone, Copy)]
 pub struct Plane<'a> {
     ground: &'a Ground,
@@ -43,13 +43,13 @@ impl Shape for Plane<'_> {
         intersect_plane(self.simd, self.ground, rays, first_lanes(rays.len()), hits);
     }
 
-    /// Also where it has faded: what lies under the horizon is dark.
+    /// The whole plane occludes, including the faded part: everything below the horizon is in shadow.
     fn occluded(&self, rays: &RayPacket, _coherence: Coherence, lanes: u32) -> u32 {
         occluded_by_plane(self.simd, self.ground, rays) & lanes
     }
 }
 
-/// Intersects rays with a floor, which is met from above only.
+/// Intersects rays with a ground plane from above.
 #[inline(always)]
 fn intersect_plane_body(
     ground: &Ground,
@@ -64,7 +64,7 @@ fn intersect_plane_body(
     } else {
         f32::MIN_POSITIVE
     };
-    let mut met = 0;
+    let mut hit_lanes = 0;
     for l in 0..LANES {
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
         let d = [
@@ -72,11 +72,12 @@ fn intersect_plane_body(
             rays.direction[1][l],
             rays.direction[2][l],
         ];
+        // Intersect the ray with the plane
         let slope = d[0] * up.x + d[1] * up.y + d[2] * up.z;
         let height = o[0] * up.x + o[1] * up.y + o[2] * up.z;
         let t = (ground.height - height) / slope;
         let p = [o[0] + d[0] * t, o[1] + d[1] * t, o[2] + d[2] * t];
-        // How much of the floor is left, by the distance from its middle.
+        // Compute the opacity from the distance to the centre of the scene
         let c = [
             p[0] - ground.center.x,
             p[1] - ground.center.y,
@@ -86,32 +87,35 @@ fn intersect_plane_body(
         let x = (ground.fade_end - distance) / span;
         let x = if x < 0.0 { 0.0 } else { x };
         let x = if x > 1.0 { 1.0 } else { x };
-        let presence = x * x * (3.0 - 2.0 * x);
+        let opacity = x * x * (3.0 - 2.0 * x);
+        // Accept hits from above, within the ray and before the plane has faded out
         let is_ahead = slope < 0.0 && t >= rays.t_min[l] && t < rays.t_max[l] && t < f32::INFINITY;
-        let is_met = is_ahead && presence > 0.0 && lanes >> l & 1 == 1;
-        met |= u32::from(is_met) << l;
+        let is_hit = is_ahead && opacity > 0.0 && lanes >> l & 1 == 1;
+        hit_lanes |= u32::from(is_hit) << l;
+        // Compute an offset above the rounding of the point
         let largest = larger(larger(larger(p[0].abs(), p[1].abs()), p[2].abs()), t);
         let largest = larger(largest, ground.height.abs());
         let offset = larger(8.0 * f32::EPSILON * largest, f32::MIN_POSITIVE);
+        // Store the hit, and end the ray there
         for axis in 0..3 {
-            let keep = |new: f32, old: f32| if is_met { new } else { old };
-            hits.point[axis][l] = keep(p[axis], hits.point[axis][l]);
-            hits.anchor[axis][l] = keep(p[axis], hits.anchor[axis][l]);
-            hits.normal[axis][l] = keep(up[axis], hits.normal[axis][l]);
-            hits.shading_normal[axis][l] = keep(up[axis], hits.shading_normal[axis][l]);
+            let select = |new: f32, old: f32| if is_hit { new } else { old };
+            hits.point[axis][l] = select(p[axis], hits.point[axis][l]);
+            hits.anchor[axis][l] = select(p[axis], hits.anchor[axis][l]);
+            hits.normal[axis][l] = select(up[axis], hits.normal[axis][l]);
+            hits.shading_normal[axis][l] = select(up[axis], hits.shading_normal[axis][l]);
         }
-        hits.t[l] = if is_met { t } else { hits.t[l] };
-        rays.t_max[l] = if is_met { t } else { rays.t_max[l] };
-        hits.offset[l] = if is_met { offset } else { hits.offset[l] };
-        hits.lift[l] = if is_met { 0.0 } else { hits.lift[l] };
-        hits.opacity[l] = if is_met { presence } else { hits.opacity[l] };
+        hits.t[l] = if is_hit { t } else { hits.t[l] };
+        rays.t_max[l] = if is_hit { t } else { rays.t_max[l] };
+        hits.offset[l] = if is_hit { offset } else { hits.offset[l] };
+        hits.lift[l] = if is_hit { 0.0 } else { hits.lift[l] };
+        hits.opacity[l] = if is_hit { opacity } else { hits.opacity[l] };
     }
     for lane in 0..LANES {
-        if met >> lane & 1 == 1 {
+        if hit_lanes >> lane & 1 == 1 {
             hits.material[lane] = MaterialId::GROUND;
         }
     }
-    hits.mask |= met;
+    hits.mask |= hit_lanes;
 }
 
 lane_kernel! {
@@ -123,20 +127,20 @@ lane_kernel! {
     ) = intersect_plane_body;
 }
 
-/// The lanes whose rays a floor stops, whole or faded.
+/// The lanes of rays that hit the ground plane, faded or not.
 #[inline(always)]
 fn occluded_by_plane_body(ground: &Ground, rays: &RayPacket) -> u32 {
     let up = ground.up;
-    let mut met = 0;
+    let mut hit_lanes = 0;
     for l in 0..LANES {
         let slope =
             rays.direction[0][l] * up.x + rays.direction[1][l] * up.y + rays.direction[2][l] * up.z;
         let height = rays.origin[0][l] * up.x + rays.origin[1][l] * up.y + rays.origin[2][l] * up.z;
         let t = (ground.height - height) / slope;
-        let is_met = slope < 0.0 && t >= rays.t_min[l] && t < rays.t_max[l] && t < f32::INFINITY;
-        met |= u32::from(is_met) << l;
+        let is_hit = slope < 0.0 && t >= rays.t_min[l] && t < rays.t_max[l] && t < f32::INFINITY;
+        hit_lanes |= u32::from(is_hit) << l;
     }
-    met
+    hit_lanes
 }
 
 lane_kernel! {

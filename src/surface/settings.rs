@@ -1,9 +1,9 @@
-//! What is asked of a surface, whatever builds it.
+//! Settings of a surface, for all kinds.
 
-/// What rays meet.
+/// Kinds of surfaces.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum SurfaceKind {
-    /// Spheres, each a body of its own.
+    /// Spheres, each a separate body.
     #[default]
     Spheres,
     /// The union of the spheres: one connected body.
@@ -12,13 +12,13 @@ pub enum SurfaceKind {
     Smooth,
 }
 
-/// Which way a surface is said to face.
+/// Kinds of normals.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum NormalKind {
-    /// What is usual for the surface: spheres' own, of a smooth surface the field's.
+    /// The default of the surface: the normals of the spheres, or those of the field for a smooth surface.
     #[default]
     Auto,
-    /// Of the sphere that is met.
+    /// The normal of the sphere that is hit.
     Sphere,
     /// Against the gradient of the SPH colour field.
     Field,
@@ -26,17 +26,17 @@ pub enum NormalKind {
     Pca,
 }
 
-/// Everything that decides a surface beside particles and radii. Lengths are in particle radii, as
-/// in splashsurf, so that its users can bring theirs.
+/// Everything that defines a surface apart from particles and radii. Lengths are in particle radii, as in splashsurf,
+/// so that its parameters can be used here.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SurfaceSettings {
-    /// What rays meet.
+    /// The kind of surface.
     pub kind: SurfaceKind,
-    /// Which way it faces.
+    /// The kind of normals.
     pub normals: NormalKind,
-    /// From 0 (every particle shows) to 1 (calm bulk water): how much crowded particles are smoothed.
+    /// Smoothing of crowded particles, from 0 (every particle is visible) to 1 (calm bulk water).
     pub smoothing: f32,
-    /// Takes places and normals from the particles instead of the grid, of the field without smoothing.
+    /// Compute points and normals from the particles and not from the grid, for the field without smoothing.
     pub exact: bool,
     /// Edge of a voxel of the grid.
     pub voxel: f32,
@@ -44,12 +44,12 @@ pub struct SurfaceSettings {
     pub smoothing_length: f32,
     /// Value of the colour field at the surface; inside it is about 1.
     pub threshold: f32,
-    /// Whether particles with few neighbours are white spheres beside the surface, no part of it.
+    /// Draw particles with few neighbours as white spheres that are not part of the surface.
     pub spray: bool,
 }
 
 impl SurfaceSettings {
-    /// Spheres; and what a smooth surface looks best with.
+    /// Spheres, and the values with which a smooth surface looks best.
     pub const DEFAULT: Self = Self {
         kind: SurfaceKind::Spheres,
         normals: NormalKind::Auto,

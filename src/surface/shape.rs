@@ -1,21 +1,21 @@
-//! The interface between what rays meet and what becomes of them there.
+//! The interface between surfaces and the renderer.
 
-use super::{Dimming, Intersection, Intersections, MaterialId};
+use super::{Intersection, Intersections, MaterialId, TransmittanceProduct};
 use crate::accel::Coherence;
 use crate::math::{Lanes, lanes_in};
 use crate::ray::{Ray, RayPacket};
 
-/// Where a ray is that meets one connected body.
+/// Position of a ray relative to a connected body.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Side {
-    /// In the open.
+    /// Outside the body.
     Outside,
-    /// In the body's medium.
+    /// Inside the body.
     Inside,
 }
 
 impl Side {
-    /// Where a ray is after it crossed the surface.
+    /// The side after the ray has crossed the surface.
     #[must_use]
     pub const fn other(self) -> Self {
         match self {
@@ -24,7 +24,7 @@ impl Side {
         }
     }
 
-    /// Where the ray in `lane` is, by a mask of those inside.
+    /// The side of the ray in `lane`, from the mask of rays that are inside.
     #[inline(always)]
     pub(crate) const fn of_lane(inside: u32, lane: usize) -> Self {
         if inside >> lane & 1 == 1 {
@@ -35,14 +35,15 @@ impl Side {
     }
 }
 
-/// Anything that rays meet. Answers depend neither on threads nor on the accelerator.
+/// A surface that rays can hit. Results depend neither on threads nor on the accelerator.
 ///
-/// A shape that can answer for one ray, by [`Self::crossing`], is whole; one that can do better for packets says so in
-/// [`Self::intersect`] and [`Self::occluded`].
+/// A shape that implements only [`Self::crossing`], for one ray, is complete. Shapes with a faster method for packets
+/// override [`Self::intersect`] and [`Self::occluded`].
 pub trait Shape: Sync {
-    /// The first intersection with distance in `ray.t_min..ray.t_max`; equal distances go to the lower particle index.
-    /// Rays of a [connected](Self::is_connected) body start on `side` of it, and one that starts on the wrong side by
-    /// rounding crosses at once. Any other shape tells by the normal where a ray goes, and has no side.
+    /// The first intersection with a distance in `ray.t_min..ray.t_max`. Ties in distance go to the lower particle
+    /// index. With a [connected](Self::is_connected) body, rays start on `side`; a ray that starts on the wrong side
+    /// because of rounding crosses the surface immediately. All other shapes ignore `side`; the normal decides
+    /// whether a ray enters or leaves.
     fn crossing(&self, ray: &Ray, side: Side) -> Option<Intersection>;
 
     /// The first intersection of a ray that starts outside.
@@ -50,25 +51,25 @@ pub trait Shape: Sync {
         self.crossing(ray, Side::Outside)
     }
 
-    /// What all of it is made of. [`MaterialId::PARTICLES`] is for the particles alone: any other shape has a material
-    /// of its own.
+    /// The material of the whole shape. [`MaterialId::PARTICLES`] is reserved for particles; all other shapes have a
+    /// material of their own.
     fn material(&self) -> MaterialId {
         MaterialId::PARTICLES
     }
 
-    /// Whether it bounds one body of one medium, so that rays are on one [`Side`] of it.
+    /// Whether the shape bounds one connected body, so that rays are on one [`Side`] of it.
     fn is_connected(&self) -> bool {
         false
     }
 
-    /// Where a place is of a connected body.
+    /// The side of a connected body on which `point` is.
     fn side_of(&self, point: glam::Vec3) -> Side {
         let _ = point;
         Side::Outside
     }
 
-    /// Puts the nearest intersection of each ray into `hits`, where one lies before the ray's end, and ends the ray
-    /// there. Rays of lanes in `inside` start inside of a connected body. Rays that end before they start meet nothing.
+    /// Stores the nearest intersection of each ray in `hits` if it lies before the end of the ray, and ends the ray
+    /// there. Rays of lanes in `inside` start inside a connected body. Rays that end before they start hit nothing.
     fn intersect(
         &self,
         rays: &mut RayPacket,
@@ -80,51 +81,52 @@ pub trait Shape: Sync {
         intersect_one_by_one(self, rays, inside, hits);
     }
 
-    /// The rays of `lanes` that meet it anywhere between their ends: a bit for each.
+    /// Bit mask of the rays of `lanes` that hit the shape between their ends.
     fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
         let _ = coherence;
-        lanes_in(lanes).fold(0, |met, lane| {
+        lanes_in(lanes).fold(0, |hit_lanes, lane| {
             let hit = self.crossing(&rays.ray(lane), Side::Outside);
-            met | u32::from(hit.is_some()) << lane
+            hit_lanes | u32::from(hit.is_some()) << lane
         })
     }
 
-    /// What is left of light along the rays of `lanes` through bodies that are not connected: the product over all
-    /// crossings between their ends, entering and leaving, of what `passed` makes of the absolute cosine between ray and
+    /// Transmittance along the rays of `lanes` through bodies that are not connected: the product of `fresnel_transmittance` over
+    /// all crossings between their ends, entering and leaving. `fresnel_transmittance` gets the absolute cosine between ray and
     /// normal.
     fn transmittance(
         &self,
         rays: &RayPacket,
         lanes: u32,
-        passed: &dyn Fn(f32) -> f32,
-        kept: &mut Lanes,
+        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        transmittance: &mut Lanes,
     ) {
         for lane in lanes_in(lanes) {
-            let mut dimming = Dimming::default();
+            // Step from crossing to crossing until no light is left
+            let mut product = TransmittanceProduct::default();
             let mut rest = rays.ray(lane);
             while let Some(hit) = self.crossing(&rest, Side::Outside) {
-                if !dimming.by(passed(hit.normal.dot(rest.direction).abs())) {
+                if !product.multiply(fresnel_transmittance(hit.normal.dot(rest.direction).abs())) {
                     break;
                 }
                 rest.t_min = hit.t + hit.offset;
             }
-            kept[lane] = dimming.product();
+            transmittance[lane] = product.value();
         }
     }
 
-    /// The particle of an intersection, where finding it takes more than finding the intersection.
+    /// The particle of an intersection, for shapes that need an additional search to find it.
     fn particle_at(&self, hit: &Intersection) -> u32 {
         hit.particle
     }
 
-    /// Gives `each` the particles whose attributes are those of a place on the surface, with positive weights of any
-    /// sum; at least one.
+    /// Calls `each` with the particles that contribute attributes to a point on the surface, and with positive
+    /// weights that need not be normalised; calls it at least once.
     fn blend(&self, hit: &Intersection, each: &mut dyn FnMut(u32, f32)) {
         each(hit.particle, 1.0);
     }
 }
 
-/// [`Shape::intersect`] by [`Shape::crossing`].
+/// [`Shape::intersect`] in terms of [`Shape::crossing`].
 pub(super) fn intersect_one_by_one<S: Shape + ?Sized>(
     shape: &S,
     rays: &mut RayPacket,
@@ -141,7 +143,7 @@ pub(super) fn intersect_one_by_one<S: Shape + ?Sized>(
     }
 }
 
-/// [`Shape::crossing`] by [`Shape::intersect`].
+/// [`Shape::crossing`] in terms of [`Shape::intersect`].
 pub(super) fn crossing_of_packet(shape: &dyn Shape, ray: &Ray, side: Side) -> Option<Intersection> {
     let mut rays = RayPacket::default();
     rays.push(ray);

@@ -1,23 +1,25 @@
-//! Opaque or transmissive spheres, each a body of its own, found through a [`TreeView`].
+//! Opaque or transmissive spheres, each a separate body, in a [`TreeView`].
 
 use std::cell::RefCell;
 
 use glam::Vec3;
 
-use super::{Dimming, Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side};
+use super::{
+    Intersection, Intersections, MaterialId, ShadingNormals, Shape, Side, TransmittanceProduct,
+};
 use crate::accel::traverse::{TreeCrossing, TreeHit};
 use crate::accel::view::TreeView;
 use crate::accel::{Coherence, TreeHits};
 use crate::math::{LANES, Lanes, Lanes3, Supported, first_lanes, lane_kernel, lanes_in, larger};
 use crate::ray::{Ray, RayPacket};
 
-/// Step off the surface as a fraction of the radius. Large enough for the rounding of a point that
-/// was put back onto its sphere, small enough not to be seen.
+/// Step off the surface as a fraction of the radius: larger than the rounding of a point that was projected onto its
+/// sphere, and too small to be visible.
 const OFFSET_OF_RADIUS: f32 = 1e-4;
 /// Step off the surface in units of the rounding of the largest coordinate involved.
 const OFFSET_OF_ROUNDING: f32 = 8.0 * f32::EPSILON;
 
-/// The spheres of a tree.
+/// The spheres of a tree as a shape.
 #[derive(Debug, Clone, Copy)]
 pub struct SphereSurface<'a> {
     tree: TreeView<'a>,
@@ -40,13 +42,13 @@ impl<'a> SphereSurface<'a> {
         }
     }
 
-    /// Shaded by these normals.
+    /// Sets the shading normals.
     #[must_use]
-    pub fn shaded_by(self, normals: ShadingNormals) -> Self {
+    pub fn with_normals(self, normals: ShadingNormals) -> Self {
         Self { normals, ..self }
     }
 
-    /// Made of `material`, with the particles of the frame from `first` on.
+    /// Sets the material, and the index in the frame of the tree's first particle.
     #[must_use]
     pub fn of(self, material: MaterialId, first: u32) -> Self {
         Self {
@@ -57,7 +59,7 @@ impl<'a> SphereSurface<'a> {
     }
 }
 
-/// What a ray meets at `hit`, a sphere of `tree`.
+/// The intersection of a ray with the sphere of `hit` in `tree`.
 #[inline]
 pub(super) fn sphere_hit(
     tree: &TreeView,
@@ -68,11 +70,12 @@ pub(super) fn sphere_hit(
     let (center, radius) = tree.sphere(hit.slot);
     let normal = outward(ray.at(hit.t) - center, radius, ray.direction);
     let point = center + normal * radius;
+    // Compute an offset above the rounding of the point
     let largest = point
         .abs()
         .max_element()
         .max(ray.origin.abs().max_element());
-    let met = Intersection {
+    let intersection = Intersection {
         t: hit.t,
         point,
         normal,
@@ -82,7 +85,7 @@ pub(super) fn sphere_hit(
         anchor: point,
         offset: (OFFSET_OF_RADIUS * radius).max(OFFSET_OF_ROUNDING * largest),
     };
-    normals.shade(tree, ray, met, radius)
+    normals.shade(tree, ray, intersection, radius)
 }
 
 impl Shape for SphereSurface<'_> {
@@ -107,30 +110,32 @@ impl Shape for SphereSurface<'_> {
         _inside: u32,
         hits: &mut Intersections,
     ) {
+        // Find the nearest spheres
         let mut found = TreeHits {
             t: [0.0; LANES],
             slot: [TreeHits::NO_SLOT; LANES],
         };
         self.tree.nearest_lanes(rays, coherence, &mut found);
-        let met = found.mask() & first_lanes(rays.len());
-        if met == 0 {
+        let hit_lanes = found.mask() & first_lanes(rays.len());
+        if hit_lanes == 0 {
             return;
         }
-        // Gather centres and radii.
+        // Compute points and normals of all lanes
         let mut centers = [[0.0; LANES]; 3];
         let mut radii = [1.0; LANES];
         self.tree
-            .gather_spheres(&found, met, &mut centers, &mut radii);
-        intersections(self.simd, rays, &found.t, &centers, &radii, met, hits);
-        for lane in lanes_in(met) {
+            .gather_spheres(&found, hit_lanes, &mut centers, &mut radii);
+        intersections(self.simd, rays, &found.t, &centers, &radii, hit_lanes, hits);
+        // End the rays at their hits
+        for lane in lanes_in(hit_lanes) {
             rays.t_max[lane] = found.t[lane];
             hits.particle[lane] = self.first + self.tree.particle(found.slot[lane]);
             hits.material[lane] = self.material;
         }
-        hits.mask |= met;
-        // Normals of neighbourhoods are found place by place.
+        hits.mask |= hit_lanes;
+        // Replace the shading normals, hit by hit
         if self.normals != ShadingNormals::Sphere {
-            for lane in lanes_in(met) {
+            for lane in lanes_in(hit_lanes) {
                 let ray = rays.ray(lane);
                 let hit = self
                     .normals
@@ -144,7 +149,7 @@ impl Shape for SphereSurface<'_> {
         if lanes == first_lanes(rays.len()) {
             return self.tree.occluded_lanes(rays, coherence);
         }
-        // Rays that end before they start meet nothing.
+        // Disable the other rays: rays that end before they start hit nothing.
         let mut rest = *rays;
         for lane in lanes_in(!lanes & first_lanes(rays.len())) {
             rest.t_max[lane] = -1.0;
@@ -156,47 +161,48 @@ impl Shape for SphereSurface<'_> {
         &self,
         rays: &RayPacket,
         lanes: u32,
-        passed: &dyn Fn(f32) -> f32,
-        kept: &mut Lanes,
+        fresnel_transmittance: &dyn Fn(f32) -> f32,
+        transmittance: &mut Lanes,
     ) {
-        let mut dimming = [Dimming::default(); LANES];
+        let mut product = [TransmittanceProduct::default(); LANES];
+        // Multiply the transmittance of all crossings, each counted once
         if self.tree.has_copies() {
             for lane in lanes_in(lanes) {
                 self.each_crossing_once(&rays.ray(lane), |crossing| {
                     let radius = self.tree.sphere(crossing.slot).1;
-                    dimming[lane].by(passed(crossing.half_chord / radius))
+                    product[lane].multiply(fresnel_transmittance(crossing.half_chord / radius))
                 });
             }
         } else {
             self.tree.visit_chords(rays, lanes, |lane, chord| {
                 let radius = self.tree.sphere(chord.slot).1;
-                let part = passed(chord.half() / radius);
+                let part = fresnel_transmittance(chord.half() / radius);
                 let is_within = |t: &f32| *t >= rays.t_min[lane] && *t < rays.t_max[lane];
                 chord
                     .ends
                     .iter()
                     .filter(|t| is_within(t))
-                    .all(|_| dimming[lane].by(part))
+                    .all(|_| product[lane].multiply(part))
             });
         }
         for lane in lanes_in(lanes) {
-            kept[lane] = dimming[lane].product();
+            transmittance[lane] = product[lane].value();
         }
     }
 }
 
-/// Where rays meet spheres, as [`sphere_hit`] operation by operation, for the lanes in `met`.
+/// Intersections of rays and spheres for the lanes in `hit_lanes`, with the operations of [`sphere_hit`] in the same order.
 #[inline(always)]
 fn intersections_body(
     rays: &RayPacket,
     t: &Lanes,
     centers: &Lanes3,
     radii: &Lanes,
-    met: u32,
+    hit_lanes: u32,
     hits: &mut Intersections,
 ) {
     for l in 0..LANES {
-        let is_met = met >> l & 1 == 1;
+        let is_hit = hit_lanes >> l & 1 == 1;
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
         let d = [
             rays.direction[0][l],
@@ -204,7 +210,7 @@ fn intersections_body(
             rays.direction[2][l],
         ];
         let c = [centers[0][l], centers[1][l], centers[2][l]];
-        // The outward normal; against the ray for a sphere too small to have one.
+        // Compute the outward normal; it points against the ray if the sphere is too small to have one
         let v = [
             o[0] + d[0] * t[l] - c[0],
             o[1] + d[1] * t[l] - c[1],
@@ -222,22 +228,23 @@ fn intersections_body(
             };
             p[axis] = c[axis] + n[axis] * radii[l];
         }
-        // Step off the surface by more than rounding.
+        // Compute an offset above the rounding of the point
         let of_point = larger(larger(p[0].abs(), p[1].abs()), p[2].abs());
         let of_origin = larger(larger(o[0].abs(), o[1].abs()), o[2].abs());
         let largest = larger(of_point, of_origin);
         let offset = larger(OFFSET_OF_RADIUS * radii[l], OFFSET_OF_ROUNDING * largest);
+        // Store the hit
         for axis in 0..3 {
-            let keep = |new: f32, old: f32| if is_met { new } else { old };
-            hits.point[axis][l] = keep(p[axis], hits.point[axis][l]);
-            hits.anchor[axis][l] = keep(p[axis], hits.anchor[axis][l]);
-            hits.normal[axis][l] = keep(n[axis], hits.normal[axis][l]);
-            hits.shading_normal[axis][l] = keep(n[axis], hits.shading_normal[axis][l]);
+            let select = |new: f32, old: f32| if is_hit { new } else { old };
+            hits.point[axis][l] = select(p[axis], hits.point[axis][l]);
+            hits.anchor[axis][l] = select(p[axis], hits.anchor[axis][l]);
+            hits.normal[axis][l] = select(n[axis], hits.normal[axis][l]);
+            hits.shading_normal[axis][l] = select(n[axis], hits.shading_normal[axis][l]);
         }
-        hits.t[l] = if is_met { t[l] } else { hits.t[l] };
-        hits.offset[l] = if is_met { offset } else { hits.offset[l] };
-        hits.lift[l] = if is_met { 0.0 } else { hits.lift[l] };
-        hits.opacity[l] = if is_met { 1.0 } else { hits.opacity[l] };
+        hits.t[l] = if is_hit { t[l] } else { hits.t[l] };
+        hits.offset[l] = if is_hit { offset } else { hits.offset[l] };
+        hits.lift[l] = if is_hit { 0.0 } else { hits.lift[l] };
+        hits.opacity[l] = if is_hit { 1.0 } else { hits.opacity[l] };
     }
 }
 
@@ -247,16 +254,16 @@ lane_kernel! {
         t: &Lanes,
         centers: &Lanes3,
         radii: &Lanes,
-        met: u32,
+        hit_lanes: u32,
         hits: &mut Intersections,
     ) = intersections_body;
 }
 
 impl SphereSurface<'_> {
-    /// Crossings where one may be found several times: all of them must be there first.
+    /// Visits each crossing once in a tree with duplicates, for which all crossings must be collected first.
     fn each_crossing_once(&self, ray: &Ray, mut visit: impl FnMut(TreeCrossing) -> bool) {
         thread_local! {
-            /// Shadow rays of a thread follow one another: one buffer serves them all.
+            /// The shadow rays of a thread are traced one after another, so they share one buffer.
             static FOUND: RefCell<Vec<TreeCrossing>> = const { RefCell::new(Vec::new()) };
         }
         FOUND.with_borrow_mut(|found| {
@@ -266,7 +273,7 @@ impl SphereSurface<'_> {
     }
 }
 
-/// Unit vector along `from_center`; against the ray for a sphere too small to have a direction.
+/// Unit vector along `from_center`; points against the ray for a sphere too small to have a direction.
 fn outward(from_center: Vec3, radius: f32, direction: Vec3) -> Vec3 {
     if radius > 0.0 {
         from_center.try_normalize().unwrap_or(-direction)

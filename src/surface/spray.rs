@@ -1,5 +1,5 @@
-//! Foam and spray: particles with few neighbours, drawn as small white spheres beside the body that the
-//! others make.
+//! Foam and spray: particles with few neighbours, drawn as small white spheres that are not part of the body of the
+//! others.
 
 use crate::accel::view::TreeView;
 
@@ -7,14 +7,14 @@ use crate::accel::view::TreeView;
 /// particle-based fluids").
 const ENOUGH_NEIGHBOURS: usize = 6;
 
-/// Radius of a drop of spray in radii of its particle: by eye.
+/// Radius of a drop of spray in radii of its particle, tuned by eye.
 pub const DROP_RADIUS: f32 = 0.5;
 
-/// The particles of `tree` that are spray, in order: those with few others within `support` times their radius.
-/// The tree must know its particles' indices.
+/// Indices of the spray particles of `tree` in ascending order: those with few others within `support` times their
+/// radius. The tree must have been built with indices.
 #[must_use]
 pub fn spray_of(tree: &TreeView, support: f32) -> Vec<u32> {
-    tree.lonely(support, ENOUGH_NEIGHBOURS)
+    tree.isolated(support, ENOUGH_NEIGHBOURS)
 }
 
 #[cfg(test)]

@@ -32,7 +32,7 @@ fn splash() -> Vec<Vec3> {
     centers
 }
 
-/// As [`spray_of`], by looking at every pair.
+/// [`spray_of`] by a test of every pair.
 fn by_pairs(centers: &[Vec3], reach: f32) -> Vec<u32> {
     let others = |i: usize| {
         let near = |p: &&Vec3| p.distance_squared(centers[i]) <= reach * reach;

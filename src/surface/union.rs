@@ -1,5 +1,5 @@
-//! Overlapping spheres as one body of one medium: a ray that enters it leaves where it leaves the union,
-//! whatever spheres it passes on the way.
+//! Overlapping spheres as one connected body: a ray that enters it leaves where it leaves the union, whatever spheres
+//! it passes through on the way.
 
 use glam::Vec3;
 
@@ -12,14 +12,14 @@ use crate::accel::traverse::TreeHit;
 use crate::accel::view::TreeView;
 use crate::ray::{Ray, RayPacket};
 
-/// Cosine between ray and normal under which a sphere may be touched and no more.
+/// Cosine between ray and normal below which a ray may only touch a sphere.
 const TOUCHING: f32 = 1e-2;
 
 /// The union of a tree's spheres.
 #[derive(Debug, Clone, Copy)]
 pub struct UnionSurface<'a> {
     tree: TreeView<'a>,
-    /// The same, each for itself.
+    /// The same spheres as separate bodies.
     spheres: SphereSurface<'a>,
     normals: ShadingNormals,
 }
@@ -34,12 +34,12 @@ impl<'a> UnionSurface<'a> {
         }
     }
 
-    /// Shaded by these normals.
+    /// Sets the shading normals.
     #[must_use]
-    pub fn shaded_by(self, normals: ShadingNormals) -> Self {
+    pub fn with_normals(self, normals: ShadingNormals) -> Self {
         Self {
             normals,
-            spheres: self.spheres.shaded_by(normals),
+            spheres: self.spheres.with_normals(normals),
             ..self
         }
     }
@@ -56,20 +56,20 @@ impl<'a> UnionSurface<'a> {
         match self.tree.exit(ray) {
             TreeExit::Here(hit) => Some(self.hit(ray, hit)),
             TreeExit::Beyond => None,
-            TreeExit::NotInside => self.at_once(ray),
+            TreeExit::NotInside => self.exit_at_start(ray),
         }
     }
 
-    /// Out where the ray starts, by the sphere that lies before it, or else behind it: it must have come
-    /// from some.
-    fn at_once(&self, ray: &Ray) -> Option<Intersection> {
-        let forth = Ray {
+    /// Exit at the start of the ray, with the particle of the next sphere ahead or else behind it: the ray must have
+    /// come from one of them.
+    fn exit_at_start(&self, ray: &Ray) -> Option<Intersection> {
+        let forward = Ray {
             t_max: f32::INFINITY,
             ..*ray
         };
-        let back = Ray::new(ray.at(ray.t_min), -ray.direction);
-        let near = |ray: &Ray| self.spheres.crossing(ray, Side::Outside);
-        let hit = near(&forth).or_else(|| near(&back))?;
+        let backward = Ray::new(ray.at(ray.t_min), -ray.direction);
+        let nearest_sphere = |ray: &Ray| self.spheres.crossing(ray, Side::Outside);
+        let hit = nearest_sphere(&forward).or_else(|| nearest_sphere(&backward))?;
         let point = ray.at(ray.t_min);
         (ray.t_min < ray.t_max).then_some(Intersection {
             t: ray.t_min,
@@ -111,36 +111,39 @@ impl Shape for UnionSurface<'_> {
         hits: &mut Intersections,
     ) {
         if coherence == Coherence::Coherent && inside == 0 {
-            self.enter(rays, hits);
+            self.intersect_coherent(rays, hits);
             return;
         }
         intersect_one_by_one(self, rays, inside, hits);
     }
 
-    /// Also for rays that start inside: what is met are the surfaces of spheres.
+    /// Also correct for rays that start inside: they hit the surfaces of the spheres.
     fn occluded(&self, rays: &RayPacket, coherence: Coherence, lanes: u32) -> u32 {
         self.spheres.occluded(rays, coherence, lanes)
     }
 }
 
 impl UnionSurface<'_> {
-    /// Where rays that lie close together enter. From outside all spheres that is the first sphere that they meet,
-    /// unless they only touch it.
-    fn enter(&self, rays: &mut RayPacket, hits: &mut Intersections) {
-        let mut ahead = *rays;
-        let mut met = Intersections::default();
+    /// Entries of coherent rays. A ray that starts outside all spheres enters at the first sphere that it hits,
+    /// unless it only touches that sphere.
+    fn intersect_coherent(&self, rays: &mut RayPacket, hits: &mut Intersections) {
+        // Find the first spheres with packet traversal
+        let mut shortened = *rays;
+        let mut sphere_hits = Intersections::default();
         self.spheres
-            .intersect(&mut ahead, Coherence::Coherent, 0, &mut met);
+            .intersect(&mut shortened, Coherence::Coherent, 0, &mut sphere_hits);
         let mut start = None;
         for lane in 0..rays.len() {
             let ray = rays.ray(lane);
-            let begins = ray.at(ray.t_min);
+            // Determine whether the ray starts inside; most rays have the same origin
+            let origin = ray.at(ray.t_min);
             let is_inside = match start {
-                Some((at, is_inside)) if at == begins => is_inside,
-                _ => self.tree.contains(begins),
+                Some((at, is_inside)) if at == origin => is_inside,
+                _ => self.tree.contains(origin),
             };
-            start = Some((begins, is_inside));
-            let found = (met.mask >> lane & 1 == 1).then(|| met.get(lane));
+            start = Some((origin, is_inside));
+            // Trace rays that start inside, or only touch a sphere, alone
+            let found = (sphere_hits.mask >> lane & 1 == 1).then(|| sphere_hits.get(lane));
             let is_touched = |hit: &Intersection| hit.normal.dot(ray.direction).abs() < TOUCHING;
             let found = if is_inside || found.as_ref().is_some_and(is_touched) {
                 self.entry(&ray)

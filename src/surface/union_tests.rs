@@ -17,7 +17,7 @@ impl Random {
     }
 }
 
-/// A body of overlapping spheres with stray ones about it.
+/// A body of overlapping spheres, with isolated spheres around it.
 fn body(count: usize) -> (Vec<Vec3>, Vec<f32>) {
     let mut random = Random(5);
     let spheres = (0..count).map(|i| {
@@ -59,7 +59,7 @@ fn what_lies_inside_is_not_met() {
     });
 }
 
-/// As light goes: bent at every crossing, from where a hit says that the next ray starts.
+/// Rays are refracted at every crossing, and each starts at the origin that the previous hit provides.
 #[test]
 fn bent_rays_come_out_again() {
     let (centers, radii) = body(600);
@@ -100,7 +100,7 @@ fn rays_on_the_wrong_side_cross_at_once() {
         let start = Vec3::new(-0.999_99, 0.0, 0.0);
         let hit = body.crossing(&Ray::new(start, Vec3::X), Side::Outside);
         assert_eq!(hit.map(|hit| (hit.t, hit.normal)), Some((0.0, -Vec3::X)));
-        // On its way out, it is out.
+        // After the last crossing, the ray is outside.
         assert_eq!(
             body.crossing(&Ray::new(start, -Vec3::X), Side::Outside),
             None

@@ -1,5 +1,5 @@
-//! What the survey sees of one frame: all of it, or of a large native frame a part, the rest being in its
-//! index.
+//! Samples one frame for the survey: all of it, or for large frames a part, with the rest taken from the index or
+//! read in runs.
 
 use glam::DVec3;
 use spherule_formats::convert::{SourceAttribute, open_source};
@@ -13,30 +13,30 @@ use super::robust::{NEIGHBOUR_QUERIES, middle};
 use super::stream;
 use super::{FrameWeight, RadiusQuestion, id_of, velocity_of};
 
-/// Particles that are looked at of a native frame; smaller ones are looked at as a whole.
+/// Number of particles to sample in a native frame; smaller frames are read completely.
 const MOST: usize = 1 << 17;
 
-/// Particles of a binary foreign file beyond which it is not read for a look.
+/// Particle count above which a binary file of another format is sampled and not read into memory.
 const LARGE: u64 = 1 << 20;
 
-/// What is seen of a frame.
+/// A sample of a frame.
 pub(super) struct Look {
-    /// The particles, or some of them evenly spread.
+    /// The particles, or an even selection of them.
     pub(super) particles: RawParticles,
-    /// How many the frame has.
+    /// Particle count of the frame.
     pub(super) count: usize,
-    /// Outermost coordinates, if all are told.
+    /// Bounding box of all particles, if it is known.
     pub(super) extremes: Option<(DVec3, DVec3)>,
-    /// What the distances of neighbours tell, where the particles that are seen do not tell it.
+    /// The spacing of neighbours, if the sample is not sufficient to compute it.
     pub(super) spacing: Option<Spacing>,
-    /// What the coordinates in a native frame are relative to.
+    /// Origin of the coordinates in a native frame.
     pub(super) origin: Option<DVec3>,
     pub(super) weight: FrameWeight,
 }
 
 impl Look {
-    /// At frame `index` of `sequence`. The spacing of particles takes long to find, and is looked for only if
-    /// it is `asked` for.
+    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if it is
+    /// `asked` for.
     pub(super) fn at(
         sequence: &Sequence,
         index: usize,
@@ -57,7 +57,7 @@ impl Look {
         }
     }
 
-    /// At a binary file of many particles; None for others.
+    /// Samples a binary file of many particles; None for other files.
     fn at_large(
         sequence: &Sequence,
         index: usize,
@@ -69,6 +69,7 @@ impl Look {
         let Some(source) = open_source(path)?.filter(|s| s.count() > LARGE) else {
             return Ok(None);
         };
+        // Read a sample, and stream over all particles for spacing and extremes
         let particles = stream::sample(&*source, path, MOST)?;
         let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
         let has_radii = source.attributes().iter().any(is_radius);
@@ -78,11 +79,12 @@ impl Look {
         };
         let extremes = stream::extremes(&*source)?;
         source.check()?;
+        // Estimate the memory of the frame from its attributes
         let stored = std::fs::metadata(path).map_or(0, |meta| meta.len());
         let widths = source.attributes().iter().map(|a| a.width() as u64);
         let count = source.count();
         let attributes = count.saturating_mul(widths.sum());
-        // A binary file has room for positions in double precision or has them in single.
+        // The length of the file shows whether positions are in double precision.
         let is_double = stored >= attributes.saturating_add(count.saturating_mul(24));
         let positions = count.saturating_mul(if is_double { 24 } else { 12 });
         Ok(Some(Self {
@@ -116,7 +118,7 @@ impl Look {
             raw: raw.byte_len(),
             positions: raw.positions.byte_len(),
             files: sequence.inputs(index).len() as u64,
-            // Looked for later.
+            // Determined later, after the radii have been extracted.
             own_radii: false,
             ids: id_of(&raw.attributes).is_some(),
             velocities: velocity_of(&raw.attributes).is_some(),
@@ -139,7 +141,7 @@ impl Look {
         let count = usize::try_from(index.count).map_err(too_many)?;
         let is_part = count > MOST;
         if !is_part {
-            // Soon done, and what damage would do to percentiles is never seen.
+            // Small frames are verified completely: it takes little time, and damage might not show in percentiles.
             frame.verify()?;
         }
         frame.verify_nodes()?;
@@ -161,7 +163,7 @@ impl Look {
     }
 }
 
-/// What neighbours in a native frame tell.
+/// The spacing of neighbours in a native frame.
 fn stored_spacing(
     frame: &NativeFrame<'_>,
     how_packed: bool,
@@ -180,7 +182,7 @@ fn stored_spacing(
     Ok(Some(Spacing { touching, packed }))
 }
 
-/// Of a native frame: as if it were read, for those who cannot trace it where it lies.
+/// Size of a native frame as if it were read, because some settings require that.
 fn weight(file: &NativeFile, particles: &RawParticles) -> FrameWeight {
     let index: &FrameIndex = file.index();
     let positions = if index.origin == [0.0; 3] { 12 } else { 24 };

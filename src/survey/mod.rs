@@ -1,9 +1,8 @@
-//! What "auto" means for a sequence, settled once from a look at its frames: the origin, the box
-//! that the camera frames, the particle radius, the range of the colour map.
+//! Determines the meaning of "auto" for a sequence, once, from a sample of its frames: the origin, the box that the
+//! camera frames, the particle radius, the range of the colour map.
 //!
-//! Percentiles rather than extremes, so that one escaped particle neither shrinks the picture nor
-//! washes out the colours. The answer is kept with the job, so that all frames, runs and machines
-//! agree.
+//! It uses percentiles and not extremes, so that a single outlier neither shrinks the picture nor reduces the
+//! contrast of colours. The result is stored with the job, so that all frames, runs and machines use the same values.
 
 use std::collections::BTreeSet;
 
@@ -25,97 +24,96 @@ use packing::Spacing;
 use packing::narrow;
 use robust::{estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range};
 
-/// Frames looked at; evenly spread, first and last among them. All of a shorter sequence.
+/// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
 
-/// What was found.
+/// Result of a survey.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Survey {
     /// World position that all coordinates are relative to.
     pub origin: DVec3,
-    /// Box of the bulk of the particles over the sequence, world units.
+    /// Lower corner of the box of most particles over the sequence, world units.
     pub min: DVec3,
-    /// Its upper corner.
+    /// Upper corner of that box.
     pub max: DVec3,
-    /// Radius for frames that do not bring their own: half the usual distance of neighbours.
+    /// Radius for frames without radii: half the median distance of neighbours.
     pub radius: Option<f32>,
-    /// The same for the particles of one body: half the edge of the cube that each has for itself inside, and a
-    /// little more. Told if it was asked for.
+    /// The same for the particles of one body: half the edge of the cube that each particle occupies inside, slightly
+    /// enlarged. Only if it was requested.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub packed_radius: Option<f32>,
-    /// Whether the frames bring radii of their own.
+    /// Whether the frames contain radii.
     pub has_radii: bool,
-    /// How far the spheres reach beyond their centres, as far as the frames tell: the 99th
-    /// percentile of the radii of the frame with the largest; 0 where they bring none.
+    /// Extent of the spheres beyond their centres: the 99th percentile of the radii of the frame with the largest
+    /// ones; 0 for frames without radii.
     pub reach: f32,
-    /// The attribute that colours were asked for by, if any, with its range.
+    /// The attribute for colours, if one was requested, with its range.
     pub color: Option<ColorRange>,
-    /// The attribute whose values are the particles' colours, unless they are by speed. Jobs of earlier versions
-    /// lack it.
+    /// The attribute with the colours of particles, unless they are coloured by speed. Jobs of earlier versions lack
+    /// it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rgb: Option<RgbAttribute>,
-    /// Which way is up for users of this format, unit vector.
+    /// The up direction that is usual for this format, unit vector.
     pub up: DVec3,
-    /// Names of all attributes seen.
+    /// Names of all attributes in the sampled frames.
     pub attributes: Vec<String>,
-    /// Particles of the fullest frame looked at.
+    /// Largest particle count of the sampled frames.
     pub most_particles: usize,
-    /// Frames looked at.
+    /// Number of sampled frames.
     pub frames: usize,
-    /// What the heaviest frame looked at takes in memory. Jobs of the first versions lack it.
+    /// Size of the heaviest sampled frame. Jobs of the first versions lack it.
     #[serde(default)]
     pub weight: Option<FrameWeight>,
 }
 
-/// Bytes and counts of a frame as it was read: what the need of others is told by.
+/// Sizes and counts of a frame that was read, from which those of other frames are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 pub struct FrameWeight {
-    /// Particles, those included that are not finite.
+    /// Particle count, including particles that are not finite.
     pub particles: u64,
-    /// Bytes of its files, unpacked if by gzip.
+    /// Total size of its files in bytes, after decompression of gzip.
     pub stored: u64,
-    /// Bytes of the largest of its files, uncompressed.
+    /// Size of its largest file in bytes, uncompressed.
     pub content: u64,
-    /// Bytes of the numbers read from them.
+    /// Size of the numbers in its files, bytes.
     pub raw: u64,
-    /// Bytes of the positions among them.
+    /// Size of the positions among them, bytes.
     pub positions: u64,
-    /// Files.
+    /// Number of files.
     pub files: u64,
-    /// Whether the file brings a radius for each particle.
+    /// Whether it has a radius per particle.
     pub own_radii: bool,
-    /// Whether it brings ids.
+    /// Whether it has ids.
     pub ids: bool,
-    /// Whether it brings velocities.
+    /// Whether it has velocities.
     pub velocities: bool,
-    /// Whether it is a native frame relative to the origin of the sequence, which can be traced where it
-    /// lies.
+    /// Whether it is a native frame relative to the origin of the sequence, so that it can be traced in place.
     #[serde(default)]
     pub in_place: bool,
 }
 
-/// An attribute and the range its colours span.
+/// An attribute and its range for a colour map.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ColorRange {
     /// Name of the attribute.
     pub attribute: String,
-    /// Value at the map's start.
+    /// Value at the start of the map.
     pub low: f64,
-    /// Value at the map's end.
+    /// Value at the end of the map.
     pub high: f64,
 }
 
-/// An attribute whose values are colours.
+/// An attribute with colours.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RgbAttribute {
     /// Name of the attribute.
     pub attribute: String,
-    /// What its numbers mean, in the first frame that has it.
+    /// Encoding of the colours in the first frame that has it.
     pub encoding: RgbEncoding,
 }
 
 impl RgbAttribute {
-    /// The first of `attributes` that holds colours, or the one called `name`, if it does.
+    /// The first of `attributes` that contains colours; with a `name`, only the attribute of that name.
     fn of(attributes: &[Attribute], name: Option<&str>) -> Option<Self> {
         let is_wanted = |a: &&Attribute| name.is_none_or(|name| a.name.eq_ignore_ascii_case(name));
         let found = attributes.iter().filter(is_wanted).find(|a| is_rgb(a))?;
@@ -129,20 +127,20 @@ impl RgbAttribute {
 /// What a job needs to know.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Question<'a> {
-    /// About colours.
+    /// Colours.
     pub color: ColorQuestion<'a>,
-    /// About radii.
+    /// Radii.
     pub radius: RadiusQuestion<'a>,
 }
 
-/// What is asked about radii.
+/// What a job needs to know about radii.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusQuestion<'a> {
-    /// Nothing: it is given.
+    /// Nothing, because the radius is given.
     None,
-    /// What the frames bring, or an estimate where they bring none.
+    /// The radii of the frames, or an estimate for frames without.
     Auto,
-    /// As `Auto`, and an estimate for particles that are one body as well.
+    /// Same as `Auto`, and an estimate for particles of one body.
     AutoOfBody,
     /// The largest values of an attribute times a factor.
     Attribute(&'a str, f64),
@@ -158,12 +156,12 @@ impl RadiusQuestion<'_> {
     }
 }
 
-/// What is asked about colours.
+/// What a job needs to know about colours.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColorQuestion<'a> {
     /// No attribute is needed.
     None,
-    /// The velocity, if there is one, else colours, if there are any.
+    /// The velocity if there is one, otherwise an attribute with colours if there is one.
     Speed,
     /// This attribute.
     Attribute(&'a str),
@@ -186,14 +184,14 @@ struct Totals {
     origin: Origins,
 }
 
-/// What the coordinates of native frames are relative to.
+/// Origins of the coordinates in native frames.
 #[derive(Clone, Copy, PartialEq)]
 enum Origins {
-    /// There was none yet.
+    /// No frame so far.
     None,
-    /// The same in all.
+    /// All frames have this origin.
     Shared(DVec3),
-    /// Different ones, or there are frames of another kind, too.
+    /// Origins differ, or there are frames of other formats.
     Mixed,
 }
 
@@ -208,19 +206,18 @@ impl Origins {
 }
 
 impl Survey {
-    /// Looks at `sequence`. Frames that cannot be read are passed over here; they are reported when
-    /// their turn comes.
+    /// Surveys `sequence`. Frames that cannot be read are skipped here, and reported when they are rendered.
     ///
     /// # Errors
-    /// If none of the frames can be read, why the first one cannot.
+    /// If none of the frames can be read: the error of the first one.
     pub fn of(sequence: &Sequence, question: Question) -> Result<Self, FrameError> {
         Self::of_frames(sequence, spread(sequence.frames().len()), question)
     }
 
-    /// Looks at the frames of `sequence` with these indices.
+    /// Surveys the frames of `sequence` with these indices.
     ///
     /// # Errors
-    /// As [`Self::of`].
+    /// Same as [`Self::of`].
     pub fn of_frames(
         sequence: &Sequence,
         indices: impl IntoIterator<Item = usize>,
@@ -260,7 +257,7 @@ impl Survey {
         }
     }
 
-    /// The box as the scene takes it.
+    /// The box in the form that scenes use.
     pub fn bounds(&self) -> Bounds {
         Bounds {
             min: self.min,
@@ -269,11 +266,11 @@ impl Survey {
     }
 }
 
-/// An attribute by name and components, wherever its values are.
+/// An attribute by name and number of components, in memory or in a file.
 pub trait Named {
     /// Its name.
     fn name(&self) -> &str;
-    /// Numbers a particle.
+    /// Components per particle.
     fn components(&self) -> usize;
 }
 
@@ -297,7 +294,7 @@ impl Named for AttributeView<'_> {
     }
 }
 
-/// The one of `attributes` that holds velocities, if any does.
+/// The attribute with velocities, if there is one.
 pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
     names::VELOCITY.iter().find_map(|name| {
         attributes
@@ -306,8 +303,7 @@ pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
     })
 }
 
-/// The attribute that holds ids, if any does: exactly by name, or failing that without regard to
-/// case.
+/// The attribute with ids, if there is one. An exact match of the name is preferred over one that ignores case.
 pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
     names::ID.iter().find_map(|name| {
         let exact = attributes.iter().find(|a| a.name() == *name);
@@ -320,7 +316,7 @@ pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
     })
 }
 
-/// What the neighbours in a frame tell.
+/// The spacing of neighbours in a frame.
 fn spacing_of(frame: &ParticleFrame, how_packed: bool) -> Option<Spacing> {
     let touching = estimate_radius(&frame.positions)?;
     let packed = || estimate_packed(&frame.positions, touching);
@@ -330,7 +326,7 @@ fn spacing_of(frame: &ParticleFrame, how_packed: bool) -> Option<Spacing> {
     })
 }
 
-/// Up to [`FRAMES`] indices below `count`, evenly spread.
+/// Up to [`FRAMES`] indices below `count`, evenly distributed.
 fn spread(count: usize) -> Vec<usize> {
     if count <= FRAMES {
         return (0..count).collect();
@@ -354,12 +350,14 @@ impl Totals {
         } = look;
         self.attributes
             .extend(raw.attributes.iter().map(|a| a.name.clone()));
+        // Extend the bounds
         if let Some((min, max)) = robust_bounds(&raw.positions, extremes) {
             self.bounds = Some(match self.bounds {
                 Some((low, high)) => (low.min(min), high.max(max)),
                 None => (min, max),
             });
         }
+        // Look for velocity and colours
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
         }
@@ -373,9 +371,10 @@ impl Totals {
         let origin = self
             .bounds
             .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
+        // Count particles, and remember the heaviest frame
         let seen = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
-        // Of a part, none is known not to be finite.
+        // In a sample, only the sampled particles are checked for being finite.
         let count = count - (seen - frame.len());
         self.most_particles = self.most_particles.max(count);
         if !weight.in_place {
@@ -384,6 +383,7 @@ impl Totals {
         if self.weight.is_none_or(|heaviest| weight.raw > heaviest.raw) {
             self.weight = Some(weight);
         }
+        // Update the ranges of colour and radius
         self.take_in_color(&frame, question.color);
         match question.radius {
             RadiusQuestion::None => {}
@@ -433,7 +433,7 @@ impl Totals {
                 self.reach = self.reach.max(robust_largest(radii.len(), |i| radii[i]));
             }
             None => {
-                // The fullest frame knows the spacing best.
+                // The estimate is best in the frame with the most particles.
                 let fuller = self.radius.is_none_or(|(known, _)| count > known);
                 if fuller && let Some(spacing) = estimate() {
                     self.radius = Some((count, spacing));
@@ -446,7 +446,7 @@ impl Totals {
         let (min, max) = self
             .bounds
             .unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
-        // Speed goes before colours.
+        // Speed has precedence over colours.
         let rgb = self.rgb.filter(|rgb| {
             let is_asked = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
             self.color.as_ref().is_none_or(is_asked)
@@ -459,8 +459,7 @@ impl Totals {
                 high,
             }
         });
-        // Native frames have settled it already; another one would be in the way of tracing them as they
-        // are.
+        // Use the origin of native frames: with a different one, they could not be traced in place.
         let origin = match self.origin {
             Origins::Shared(origin) => origin,
             Origins::None | Origins::Mixed => choose_origin(min, max),

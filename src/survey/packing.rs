@@ -1,37 +1,38 @@
-//! The radius of particles that are one body: by how many lie around one, not by how near the nearest is.
+//! Estimates the radius of particles that form one body, from the number of neighbours and not from the distance of
+//! the nearest one.
 //!
-//! Half the distance to the nearest neighbour is right for spheres that just touch. Particles of a fluid lie in
-//! disorder, and the nearest of a dozen neighbours is nearer than they are apart: the radius comes out about a
-//! fifth too small, and the field of such particles has holes in the middle of the fluid.
+//! Half the distance to the nearest neighbour is correct for spheres that touch. Particles of a fluid are disordered,
+//! and the nearest of a dozen neighbours is closer than the average one: the radius would be about a fifth too small,
+//! and the field of such particles would have holes inside the fluid.
 
-/// Particles are counted this far around one, in median distances to the nearest neighbour. Of a fluid about
-/// 30 are found: enough for a density, few enough not to reach out of thin sheets.
+/// Radius within which neighbours are counted, in median distances to the nearest neighbour. In a fluid it contains
+/// about 30 particles: enough for a density, and few enough not to extend beyond thin sheets.
 const REACH: f32 = 2.5;
-/// Part of the counts that lie below the one that tells: at least half of the particles of a splash are near
-/// its surface, and count too few.
+/// Quantile of the counts that is used: at least half of the particles of a splash are near its surface, and have
+/// fewer neighbours.
 const BULK: f64 = 0.75;
-/// Too small a radius makes holes, too large a one a slightly thicker surface. Tuned on dam breaks, whose
-/// estimates came out 0.94 to 1.01 of the simulation's radius before.
+/// Enlargement of the estimate: a radius that is too small causes holes, one that is too large only a slightly
+/// thicker surface. Tuned on dam breaks, for which the estimates were 0.94 to 1.01 of the radius of the simulation.
 const RATHER_LARGE: f64 = 1.05;
-/// What is no body, a lone line of particles or a few, must not swell: most half distances to the nearest
-/// neighbour that the radius may be.
+/// Maximum radius in half distances to the nearest neighbour, so that particles that are not a body, such as a line
+/// or a few particles, do not become too large.
 const MOST: f64 = 2.0;
 
-/// What distances of particles tell of their radius.
+/// Estimates of the radius from the distances of particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Spacing {
     /// Half the median distance to the nearest neighbour.
     pub(super) touching: f32,
-    /// Half the edge of the cube that each has for itself inside the body, if it was asked for.
+    /// Half the edge of the cube that each particle occupies inside a body, if it was requested.
     pub(super) packed: Option<f32>,
 }
 
-/// How far around particles others are to be counted.
+/// Radius within which neighbours are to be counted.
 pub(super) fn reach(touching: f32) -> f32 {
     REACH * 2.0 * touching
 }
 
-/// The radius by the `counts` of particles within [`reach`] of some, themselves included.
+/// The radius from the `counts` of particles within [`reach`] of some particles, including themselves.
 pub(super) fn packed_radius(touching: f32, mut counts: Vec<u32>) -> Option<f32> {
     counts.sort_unstable();
     #[expect(

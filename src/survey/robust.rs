@@ -1,4 +1,4 @@
-//! Percentiles of what is sampled, and the spacing of particles.
+//! Percentiles of samples, and the spacing of particles.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -6,22 +6,21 @@ use spherule_formats::{Attribute, Positions};
 
 use super::packing::{self};
 
-/// Particles of a frame that percentiles are taken from.
+/// Number of particles of a frame from which percentiles are computed.
 const SAMPLE: usize = 20_000;
-/// Fewest particles of which one alone may count as escaped: of a handful each matters.
+/// Minimum number of particles for which a single one may be treated as an outlier.
 const ESCAPE_MIN: usize = 16;
-/// Distances to the nearest neighbour that the radius is estimated from.
+/// Number of nearest-neighbour distances from which the radius is estimated.
 pub(super) const NEIGHBOUR_QUERIES: usize = 512;
-/// Distance computations that the estimate may cost: half a second for a frame of 1e7.
+/// Maximum number of distance computations of the estimate: half a second for a frame of 1e7.
 pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 
-/// The box of the particles, except that on each axis it reaches beyond the middle 98 % by at most
-/// half their extent. None without finite particles. The outermost ones are `extremes` where `positions` are
-/// not all.
+/// The box of the particles, limited on each axis to half the extent of the middle 98 % beyond them. None without
+/// finite particles. `extremes` is the box of all particles if `positions` are only a part of them.
 ///
-/// Below 100 particles, where that would leave none out, the outermost on each side of an axis is
-/// not of the middle, and the box may reach beyond by the longest side of the middle: one of a few
-/// particles that lies off the others' plane belongs to the picture.
+/// Below 100 particles, 98 % would include all. There the outermost particle on each side of an axis is excluded, and
+/// the limit is the longest side of the box of the rest: one of a few particles that is outside the plane of the
+/// others belongs to the picture.
 pub(super) fn robust_bounds(
     positions: &Positions,
     extremes: Option<(DVec3, DVec3)>,
@@ -41,6 +40,7 @@ pub(super) fn robust_bounds(
         0 => usize::from(sample.len() >= ESCAPE_MIN),
         percent => percent,
     };
+    // Find the middle of each axis
     let (mut first, mut last) = (min, max);
     for axis in 0..3 {
         sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
@@ -49,6 +49,7 @@ pub(super) fn robust_bounds(
             (first[axis], last[axis]) = (low[axis], high[axis]);
         }
     }
+    // Limit the box to a margin around it
     let extent = last - first;
     let margin = if few {
         DVec3::splat(extent.max_element())
@@ -71,7 +72,7 @@ pub(super) fn robust_largest(count: usize, radius: impl Fn(usize) -> f32) -> f32
     radii.get(place).copied().unwrap_or(0.0)
 }
 
-/// The middle 99 % of an attribute's values (vectors by magnitude, from zero up).
+/// The range of the middle 99 % of the values of an attribute (for vectors: of the magnitudes, from zero).
 pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
     let count = attribute.count();
     let stride = count.div_ceil(SAMPLE).max(1);
@@ -87,14 +88,14 @@ pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
     Some((if is_vector { 0.0 } else { low }, high))
 }
 
-/// What is asked of some of the particles, evenly spread.
+/// An even selection of the particles, for queries.
 fn asked(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
     let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
     let stride = positions.len().div_ceil(queries).max(1);
     positions.iter().step_by(stride)
 }
 
-/// The radius that `touching`, half the distance to the nearest neighbour, and the density tell.
+/// The radius from the density; `touching` is half the distance to the nearest neighbour.
 pub(super) fn estimate_packed(positions: &[Vec3], touching: f32) -> Option<f32> {
     let square = packing::reach(touching).powi(2);
     let count = |from: &Vec3| {

@@ -1,4 +1,4 @@
-//! A look at a foreign file of many particles without having it in memory: it passes through in runs.
+//! Surveys a large file of another format without reading it into memory: it is streamed in runs.
 
 use std::path::Path;
 
@@ -10,14 +10,14 @@ use spherule_formats::{Attribute, Endian, FrameError, ParseError, Positions, Raw
 use super::packing::{self, Spacing};
 use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, middle};
 
-/// Particles that are read at a time.
+/// Particles per read.
 const RUN: usize = 1 << 16;
-/// Particles of a run of the sample: enough for a file's pages to be worth reading.
+/// Particles per run of the sample: enough for reading a page of the file to be worthwhile.
 const SAMPLE_RUN: usize = 64;
-/// Fewest distances that the spacing is told by, whatever they cost.
+/// Minimum number of distances for the spacing, whatever they cost.
 const LEAST_QUERIES: usize = 16;
 
-/// Smallest and largest coordinates of all particles that are finite; `None` without any.
+/// Bounding box of all finite particles; `None` without any.
 pub(super) fn extremes(source: &dyn ParticleSource) -> Result<Option<(DVec3, DVec3)>, FrameError> {
     let of_run = |positions: &[DVec3]| {
         let finite = positions.iter().filter(|p| p.is_finite());
@@ -33,12 +33,13 @@ pub(super) fn extremes(source: &dyn ParticleSource) -> Result<Option<(DVec3, DVe
     each_run(source, of_run, || None, join)
 }
 
-/// At most `most` particles of the file `path`, evenly spread in short runs.
+/// At most `most` particles of the file `path`, in short runs that are evenly distributed.
 pub(super) fn sample(
     source: &dyn ParticleSource,
     path: &Path,
     most: usize,
 ) -> Result<RawParticles, FrameError> {
+    // Distribute the runs over the file
     let runs = source.count().div_ceil(SAMPLE_RUN as u64);
     let stride = runs.div_ceil((most / SAMPLE_RUN).max(1) as u64).max(1);
     let starts = || (0..runs).step_by(usize::try_from(stride).unwrap_or(usize::MAX));
@@ -47,12 +48,14 @@ pub(super) fn sample(
         let len = (source.count() - first).min(SAMPLE_RUN as u64);
         (first, usize::try_from(len).unwrap_or(SAMPLE_RUN))
     };
+    // Read the positions
     let mut positions = Vec::new();
     for (first, len) in starts().map(run) {
         let start = positions.len();
         positions.resize(start + len, DVec3::ZERO);
         source.read_positions(first, &mut positions[start..])?;
     }
+    // Read the attributes
     let mut attributes = Vec::with_capacity(source.attributes().len());
     for (number, attribute) in source.attributes().iter().enumerate() {
         let mut values = Vec::new();
@@ -80,7 +83,7 @@ fn decoded(attribute: &SourceAttribute, values: &[u8]) -> Result<Attribute, Pars
     })
 }
 
-/// Some of the `sample` whose neighbours among all particles are looked for.
+/// An even selection of the `sample`, for queries.
 fn asked(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
     let count = usize::try_from(source.count()).unwrap_or(usize::MAX);
     let queries = (NEIGHBOUR_BUDGET / count.max(1)).clamp(LEAST_QUERIES, NEIGHBOUR_QUERIES);
@@ -92,7 +95,8 @@ fn asked(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
         .collect()
 }
 
-/// What the neighbours of some of the `sample` among all particles tell; `how_packed` asks for all of it.
+/// The spacing of neighbours, from queries for some of the `sample` among all particles. `how_packed` requests the
+/// radius from the density as well.
 pub(super) fn spacing(
     source: &dyn ParticleSource,
     sample: &Positions,
@@ -109,7 +113,7 @@ pub(super) fn spacing(
     Ok(Some(Spacing { touching, packed }))
 }
 
-/// How many particles lie around each of those `asked`.
+/// Number of particles around each of those `asked`.
 fn around(
     source: &dyn ParticleSource,
     asked: &[DVec3],
@@ -153,7 +157,7 @@ fn half_nearest(source: &dyn ParticleSource, asked: &[DVec3]) -> Result<Option<f
     Ok(middle(distances).map(|distance| 0.5 * distance))
 }
 
-/// Reads all positions in runs, and joins what `of_run` says of each.
+/// Reads all positions in runs, and combines the results of `of_run`.
 fn each_run<T: Send>(
     source: &dyn ParticleSource,
     of_run: impl Fn(&[DVec3]) -> T + Sync,

@@ -1,14 +1,14 @@
-//! The reference budget: how many duplicates spatial splits may make, and who may make them.
+//! The reference budget: how many references spatial splits may add, and how that number is distributed.
 //!
-//! The room for references is made once, of the size that the budget allows, and every split shares
-//! what is free in its node between the two sides (as in Fuetterling, Lojewski, Pfreundt & Ebert
-//! 2016, "Parallel spatial splits in bounding volume hierarchies"). So memory is bounded, threads
-//! never ask each other, and the tree does not depend on them.
+//! The memory for all references is allocated once, at the size that the budget allows. Every split distributes the
+//! free part of its node between the two children (as in Fuetterling, Lojewski, Pfreundt & Ebert 2016, "Parallel
+//! spatial splits in bounding volume hierarchies"). So memory is bounded, threads need no communication, and the tree
+//! does not depend on their number.
 
 use spherule_formats::blocks::BLOCK_SIZE;
 
-/// References that there is room for: `particles`, and `budget` times as many on top.
-pub(super) fn room(particles: usize, budget: f32) -> usize {
+/// Number of references to allocate: one per particle, and `budget` times as many for spatial splits.
+pub(super) fn capacity(particles: usize, budget: f32) -> usize {
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -17,11 +17,13 @@ pub(super) fn room(particles: usize, budget: f32) -> usize {
     )]
     let duplicates = (particles as f64 * f64::from(budget)) as u64;
     let most = u64::from(u32::MAX);
-    let room = (particles as u64).saturating_add(duplicates).min(most);
-    usize::try_from(room).unwrap_or(usize::MAX).max(particles)
+    let capacity = (particles as u64).saturating_add(duplicates).min(most);
+    usize::try_from(capacity)
+        .unwrap_or(usize::MAX)
+        .max(particles)
 }
 
-/// Shares `free` places between two sides in proportion to their references.
+/// Distributes `free` slots between two children in proportion to their reference counts.
 pub(super) fn share(free: usize, counts: [usize; 2]) -> [usize; 2] {
     let [below, above] = counts.map(|count| count as u128);
     let first = free as u128 * below / (below + above).max(1);
@@ -29,7 +31,7 @@ pub(super) fn share(free: usize, counts: [usize; 2]) -> [usize; 2] {
     [first, free - first]
 }
 
-/// About half of `count` such that the lower half fills its blocks; less than `count`.
+/// About half of `count`, less than `count`, and a multiple of the block size if possible.
 pub(super) fn half_in_blocks(count: usize) -> usize {
     let half = count.div_ceil(2);
     let filled = half.next_multiple_of(BLOCK_SIZE);
@@ -42,11 +44,11 @@ mod tests {
 
     #[test]
     fn room_is_bounded() {
-        assert_eq!(room(1000, 0.0), 1000);
-        assert_eq!(room(1000, 0.25), 1250);
-        assert_eq!(room(1000, f32::NAN), 1000);
-        assert_eq!(room(1000, -1.0), 1000);
-        assert_eq!(room(10, f32::MAX), u32::MAX as usize);
+        assert_eq!(capacity(1000, 0.0), 1000);
+        assert_eq!(capacity(1000, 0.25), 1250);
+        assert_eq!(capacity(1000, f32::NAN), 1000);
+        assert_eq!(capacity(1000, -1.0), 1000);
+        assert_eq!(capacity(10, f32::MAX), u32::MAX as usize);
     }
 
     #[test]

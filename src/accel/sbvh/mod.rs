@@ -1,18 +1,17 @@
-//! `sbvh`: binned object splits by the surface area heuristic, and spatial splits that cut spheres
-//! where boxes would overlap (Stich, Friedrich & Dietrich 2009, "Spatial splits in bounding volume
-//! hierarchies").
+//! `sbvh`: binned object splits by the surface area heuristic, and spatial splits that cut spheres if boxes would
+//! overlap (Stich, Friedrich & Dietrich 2009, "Spatial splits in bounding volume hierarchies").
 //!
-//! Each node takes the cheapest split that its rules find (`split.rs`: `object.rs`, near the leaves
-//! `sweep.rs`; `spatial.rs` where the sides overlap), on one thread or all (`grow.rs`), in room that
-//! the reference budget sets (`budget.rs`). The binary tree then becomes a wide one like any other
-//! (`collapse.rs`), whose boxes bound the parts of spheres.
+//! Each node uses the cheapest split of its rules (`split.rs`: `object.rs`, or `sweep.rs` near the leaves;
+//! `spatial.rs` if the children overlap). The build uses one thread or all of them (`grow.rs`), in memory that the
+//! reference budget limits (`budget.rs`). The binary tree is collapsed like any other (`collapse.rs`); the boxes of
+//! the wide tree bound parts of spheres.
 //!
-//! Measured against `lbvh` with 1e5 and 1e6 particles (AMD EPYC, 2 threads, thesis's camera): on the
-//! thesis's box of equal spheres, rays are 1.1 to 1.3 times as fast, all of it by the object splits:
-//! spatial ones add 0.5 % references and change nothing, but take three quarters of the build. They
-//! pay where radii vary a hundredfold: 1.3 to 2.4 times the rays of `lbvh`, without them 0.9 to 1.5.
-//! The price is 2 s of one core a million particles (4.5 s where many are cut), 40 to 70 times
-//! `lbvh`, and half as much memory again, or more than twice where many are cut.
+//! Measured against `lbvh` with 1e5 and 1e6 particles (AMD EPYC, 2 threads, thesis's camera). On the thesis's box of
+//! equal spheres, rays are 1.1 to 1.3 times as fast, entirely because of the object splits: spatial splits add 0.5 %
+//! references without an effect, and take three quarters of the build time. They pay off if radii vary by a factor of
+//! a hundred: rays are then 1.3 to 2.4 times as fast as with `lbvh`; without spatial splits 0.9 to 1.5 times. A build
+//! costs 2 s of one core per million particles (4.5 s if many are cut), which is 40 to 70 times `lbvh`, and 1.5 times
+//! the memory, or more than twice if many are cut.
 
 use std::ops::RangeInclusive;
 
@@ -23,7 +22,7 @@ use super::collapse::{Content, collapse};
 use super::report::PhaseClock;
 use super::wide::WideTree;
 use super::{BuildReport, BuildSettings, Spheres, Structure};
-use divide::Roomed;
+use divide::BuildNode;
 use grow::{Grower, Grown};
 use reference::{Parts, Reference};
 use spherule_formats::order::index_u32;
@@ -40,25 +39,25 @@ mod split;
 mod sweep;
 mod unsplit;
 
-/// What `sbvh` may be told.
+/// Settings of `sbvh`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SbvhSettings {
-    /// A spatial split is looked for where the sides of the best object split overlap by more than
-    /// this part of the whole scene's surface area.
+    /// A spatial split is searched if the children of the best object split overlap by more than this fraction of the
+    /// surface area of the whole scene.
     pub alpha: f32,
-    /// References that spatial splits may add, as a part of the particles; 0 for no such splits.
+    /// References that spatial splits may add, as a fraction of the particle count; 0 disables such splits.
     pub budget: f32,
 }
 
 impl SbvhSettings {
-    /// The paper's alpha; at most as many references again as there are particles.
+    /// The alpha of the paper, and at most one additional reference per particle.
     pub const DEFAULT: Self = Self {
         alpha: 1e-5,
         budget: 1.0,
     };
-    /// Areas of which the overlap may be measured as a part.
+    /// Valid values of `alpha`.
     pub const ALPHAS: RangeInclusive<f32> = 0.0..=1.0;
-    /// More than the largest is memory that nothing is gained for.
+    /// Valid values of `budget`; a larger one would only cost memory.
     pub const BUDGETS: RangeInclusive<f32> = 0.0..=8.0;
 }
 
@@ -68,16 +67,16 @@ impl Default for SbvhSettings {
     }
 }
 
-/// References that one thread takes at a time of a set that all work on. Fixed, so that results do
-/// not depend on the number of threads.
+/// References per task if all threads work on one set. It is fixed, so that results do not depend on the number of
+/// threads.
 const CHUNK: usize = 16 * 1024;
 
-/// Whether all threads work on one set of this many references.
+/// Whether all threads should work on one set of this many references.
 fn is_large(references: usize) -> bool {
     references >= 4 * CHUNK
 }
 
-/// Builds over `spheres` in the memory of `tree`.
+/// Builds a tree over `spheres` in the memory of `tree`.
 pub(super) fn build(
     tree: &mut WideTree,
     spheres: &Spheres,
@@ -86,61 +85,64 @@ pub(super) fn build(
     let mut clock = PhaseClock::new();
     let parts = Parts::of(*spheres);
     let particles = spheres.centers.len();
-    let mut room: Vec<Reference> =
-        bytemuck::zeroed_vec(budget::room(particles, settings.sbvh.budget));
-    room[..particles]
+    // Allocate the budget, and create one reference per particle
+    let mut storage: Vec<Reference> =
+        bytemuck::zeroed_vec(budget::capacity(particles, settings.sbvh.budget));
+    storage[..particles]
         .par_iter_mut()
         .enumerate()
         .for_each(|(particle, reference)| *reference = parts.whole(index_u32(particle)));
-    let bounds = divide::bounds_of(&room[..particles]);
+    let bounds = divide::bounds_of(&storage[..particles]);
     clock.lap("references");
 
+    // Split recursively, and concatenate the subtrees
     let grown = (particles > 0).then(|| {
-        let root = Roomed {
-            room: &mut room,
+        let root = BuildNode {
+            storage: &mut storage,
             count: particles,
             bounds,
         };
         Grower::new(parts, bounds, settings.sbvh.alpha).grow(root, 0)
     });
-    let room_bytes = size_of_val(&room[..]) as u64;
-    drop(room);
-    let binary = grown.map_or_else(BinaryTree::default, joined);
+    let storage_bytes = size_of_val(&storage[..]) as u64;
+    drop(storage);
+    let binary = grown.map_or_else(BinaryTree::default, concatenate);
     let binary_bytes =
         (size_of_val(&binary.nodes[..]) + size_of_val(&binary.references[..])) as u64;
     clock.lap("splits");
 
+    // Collapse the binary tree into 8-wide nodes
     let collapsed = collapse(tree, binary, &Content::Clipped(*spheres), &mut clock);
     tree.is_clipped = true;
     tree.report(
         Structure::Sbvh,
         "surface area heuristic, spatial splits",
         collapsed.sah_cost,
-        collapsed.scratch_bytes.max(room_bytes + binary_bytes),
+        collapsed.scratch_bytes.max(storage_bytes + binary_bytes),
         clock.finish(),
     )
 }
 
-/// All trees as one, depth first.
-fn joined(grown: Grown) -> BinaryTree {
+/// Concatenates all subtrees, depth first.
+fn concatenate(grown: Grown) -> BinaryTree {
     let mut tree = BinaryTree::default();
-    // A growing vector would hold up to three times what it needs.
+    // Reserve the exact size: a growing vector would take up to three times as much memory.
     let (nodes, references) = grown.lengths();
     tree.nodes.reserve_exact(nodes);
     tree.references.reserve_exact(references);
     tree.nodes.push(grown.root());
-    join_at(&mut tree, 0, grown);
+    append_at(&mut tree, 0, grown);
     tree
 }
 
-/// Puts `grown` into the place `at`, and what is below at the end.
-fn join_at(tree: &mut BinaryTree, at: usize, grown: Grown) {
+/// Stores the root of `grown` at index `at`, and appends the rest.
+fn append_at(tree: &mut BinaryTree, at: usize, grown: Grown) {
     let first = index_u32(tree.nodes.len());
     match grown {
         Grown::Tree(own) => {
             let references = index_u32(tree.references.len());
             let mut nodes = own.nodes.into_iter().map(|node| BinaryNode {
-                // The root of `own` goes elsewhere, the others keep their order.
+                // The root of `own` moves to `at`; the other nodes keep their order.
                 first: if node.is_leaf() {
                     node.first + references
                 } else {
@@ -156,7 +158,7 @@ fn join_at(tree: &mut BinaryTree, at: usize, grown: Grown) {
             tree.nodes[at] = grow::inner(bounds, first as usize);
             tree.nodes.extend(halves.iter().map(Grown::root));
             for (half, at) in halves.into_iter().zip(first as usize..) {
-                join_at(tree, at, half);
+                append_at(tree, at, half);
             }
         }
     }

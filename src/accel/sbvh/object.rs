@@ -1,19 +1,19 @@
-//! Binned object splits (Wald 2007, "On fast construction of SAH-based bounding volume
-//! hierarchies"): references go by the bin that their centre is in.
+//! Binned object splits (Wald 2007, "On fast construction of SAH-based bounding volume hierarchies"): references are
+//! binned by their centres.
 
 use rayon::prelude::*;
 
 use super::cost;
 use super::reference::{Bounds, Reference};
-use super::split::{BINS, BinGrid, Set, Split, SplitPlace, SplitRule};
+use super::split::{BINS, BinGrid, PrimSet, Split, SplitPosition, SplitRule};
 use super::{CHUNK, is_large};
 
-/// The rule of this module.
+/// The split rule of this module.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BinnedObjectSplit;
 
 impl SplitRule for BinnedObjectSplit {
-    fn find(&self, set: &Set) -> Option<Split> {
+    fn find(&self, set: &PrimSet) -> Option<Split> {
         let grid = BinGrid::over(centers(set.references));
         let bins = Bins::of(set.references, &grid);
         let mut best: Option<Split> = None;
@@ -24,7 +24,7 @@ impl SplitRule for BinnedObjectSplit {
     }
 }
 
-/// Box of the doubled centres.
+/// Bounding box of the doubled centres.
 fn centers(references: &[Reference]) -> Bounds {
     let of = |references: &[Reference]| {
         references
@@ -65,7 +65,7 @@ struct Bins([[Bin; BINS]; 3]);
 impl Bins {
     const EMPTY: Self = Self([[Bin::EMPTY; BINS]; 3]);
 
-    /// Smallest, largest and count do not depend on the order in which parts are merged.
+    /// Minimum, maximum and count do not depend on the order in which chunks are merged.
     fn of(references: &[Reference], grid: &BinGrid) -> Self {
         if is_large(references.len()) {
             let parts = references.par_chunks(CHUNK);
@@ -97,14 +97,16 @@ impl Bins {
         self
     }
 
-    /// Puts the cheapest split on `axis` into `best` if it is cheaper than that.
+    /// Replaces `best` by the cheapest split on `axis` if that is cheaper.
     fn cheapest(&self, axis: usize, grid: BinGrid, best: &mut Option<Split>) {
         let bins = &self.0[axis];
+        // Accumulate bins from above
         let mut above = [Bin::EMPTY; BINS];
         above[BINS - 1] = bins[BINS - 1];
         for bin in (0..BINS - 1).rev() {
             above[bin] = above[bin + 1].merged(bins[bin]);
         }
+        // Evaluate the split before each bin, while accumulating bins from below
         let mut below = Bin::EMPTY;
         for first_above in 1..BINS {
             below = below.merged(bins[first_above - 1]);
@@ -120,7 +122,7 @@ impl Bins {
                     boxes,
                     counts,
                     axis,
-                    place: SplitPlace::Centers { grid, first_above },
+                    place: SplitPosition::Centers { grid, first_above },
                 });
             }
         }

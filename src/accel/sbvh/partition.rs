@@ -1,7 +1,6 @@
-//! Partition in place by all threads: the same order however many there are.
+//! In-place partition by all threads, with the same result for any number of threads.
 //!
-//! Chunks of a fixed length are partitioned each for itself; then runs that ended up on the wrong
-//! side of the middle change places.
+//! Chunks of a fixed length are partitioned separately. Then runs on the wrong side of the global middle are swapped.
 
 use std::ops::Range;
 
@@ -10,7 +9,7 @@ use rayon::prelude::*;
 use super::reference::Reference;
 use super::{CHUNK, is_large};
 
-/// Brings the references for which `is_first` holds to the front; returns how many those are.
+/// Moves the references that satisfy `is_first` to the front, and returns their number.
 pub(super) fn partition(
     references: &mut [Reference],
     is_first: impl Fn(&Reference) -> bool + Sync,
@@ -18,6 +17,7 @@ pub(super) fn partition(
     if !is_large(references.len()) {
         return partition_chunk(references, &is_first);
     }
+    // Partition each chunk separately
     let firsts: Vec<usize> = references
         .par_chunks_mut(CHUNK)
         .map(|chunk| partition_chunk(chunk, &is_first))
@@ -28,6 +28,7 @@ pub(super) fn partition(
         let start = number * CHUNK;
         (start, start + first, len.min(start + CHUNK))
     });
+    // Swap the runs that lie on the wrong side of the middle
     let late = chunks.clone().map(|(_, cut, end)| cut..end.min(middle));
     let early = chunks.map(|(start, cut, _)| start.max(middle)..cut);
     let (lower, upper) = references.split_at_mut(middle);
@@ -36,6 +37,7 @@ pub(super) fn partition(
 }
 
 fn partition_chunk(references: &mut [Reference], is_first: &impl Fn(&Reference) -> bool) -> usize {
+    // Hoare's scheme: swap the first and last elements that are on the wrong side
     let (mut start, mut end) = (0, references.len());
     loop {
         while start < end && is_first(&references[start]) {
@@ -53,7 +55,7 @@ fn partition_chunk(references: &mut [Reference], is_first: &impl Fn(&Reference) 
     }
 }
 
-/// The slices at `ranges`, which ascend, of `whole`, whose first element has the number `base`.
+/// The slices of `whole` at the ascending `ranges`; `base` is the index of the first element of `whole`.
 fn runs(
     whole: &mut [Reference],
     base: usize,
@@ -70,10 +72,11 @@ fn runs(
     runs
 }
 
-/// Exchanges two lists of runs of the same length in all.
+/// Swaps the elements of two lists of runs with the same total length.
 fn swap_runs(late: Vec<&mut [Reference]>, early: Vec<&mut [Reference]>) {
     let (mut late, mut early) = (late.into_iter(), early.into_iter());
     let (mut a, mut b) = (late.next(), early.next());
+    // Cut the runs into pairs of equal length
     let mut pairs = Vec::new();
     while let (Some(x), Some(y)) = (a.take(), b.take()) {
         let len = x.len().min(y.len());

@@ -1,14 +1,14 @@
-//! References: parts of spheres in boxes, and how planes cut them.
+//! References: boxes around parts of spheres, and how planes cut them.
 //!
-//! A box cut by a plane still holds corners that the sphere in it does not reach: parts are bounded
-//! as tightly as spheres allow. Every rounding is away from the sphere.
+//! After a cut, the box of a part can be smaller than the cut box, because a sphere does not reach the corners. The
+//! boxes computed here are as tight as spheres allow. All rounding is away from the sphere.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{Vec3, Vec3A};
 
 use super::super::{Aabb, SphereRadius, Spheres};
 
-/// Part of a sphere: all of it, or what lies in the cell that planes have left.
+/// A sphere or a part of it, which lies in the cell between some planes.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub(super) struct Reference {
@@ -36,7 +36,7 @@ impl Reference {
     }
 }
 
-/// A box in two SIMD registers: what the inner loops of the splits work on.
+/// A box in two SIMD registers, for the inner loops of the split rules.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Bounds {
     pub(super) min: Vec3A,
@@ -55,7 +55,7 @@ impl Bounds {
         max: Vec3A::INFINITY,
     };
 
-    /// The box of what `references` are parts of.
+    /// Bounding box of `references`.
     pub(super) fn around(references: &[Reference]) -> Self {
         let bounds = references.iter().map(Reference::bounds);
         bounds.fold(Self::EMPTY, Self::union)
@@ -85,13 +85,13 @@ impl Bounds {
         }
     }
 
-    /// Twice the centre, which orders as well and is cheaper.
+    /// Twice the centre: the same order, without a multiplication.
     #[inline(always)]
     pub(super) fn doubled_center(self) -> Vec3A {
         self.min + self.max
     }
 
-    /// Surface area, 0 if empty. In f64, where squares of f32 never overflow.
+    /// Surface area, 0 if empty. In f64, because squares of f32 cannot overflow there.
     #[inline(always)]
     pub(super) fn area(self) -> f64 {
         let size = (self.max - self.min).max(Vec3A::ZERO).as_dvec3();
@@ -106,15 +106,15 @@ impl Bounds {
     }
 }
 
-/// A sphere as clipping needs it.
+/// A sphere prepared for clipping.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Sphere {
     center: Vec3A,
-    /// A little more than the square of the radius, for what rounding may lose.
+    /// Slightly more than the squared radius, to compensate for rounding.
     squared: f32,
 }
 
-/// More than the errors of a few operations in a row, as a part of the result.
+/// Larger than the relative error of a few consecutive operations.
 const ROUNDING: f32 = 1e-6;
 
 impl Sphere {
@@ -125,21 +125,23 @@ impl Sphere {
         }
     }
 
-    /// What of `bounds` is around the sphere: the tightest box around their common part, but for
-    /// rounding. On an axis, that part reaches as far as the sphere does at the point of the other
-    /// two axes' rectangle that is nearest to its centre.
+    /// The part of `bounds` around the sphere: the tightest box around their intersection, except for rounding. The
+    /// extent of the intersection on an axis is the extent of the sphere at the point that is nearest to its centre
+    /// in the rectangle of the other two axes.
     #[inline(always)]
     pub(super) fn clip(&self, bounds: Bounds) -> Bounds {
+        // Compute the squared distance from the centre to the box, per axis
         let outside = (bounds.min - self.center)
             .max(self.center - bounds.max)
             .max(Vec3A::ZERO);
         let squares = outside * outside;
+        // Compute the extent of the sphere along each axis, at the nearest point of the other two
         let others = Vec3A::splat(squares.element_sum()) - squares;
         let reach = (Vec3A::splat(self.squared) - others)
             .max(Vec3A::ZERO)
             .sqrt();
         let common = bounds.intersection(self.rounded_out(reach));
-        // A touched corner, lost to rounding.
+        // Rounding can leave nothing if the box only touches the sphere; keep the box then.
         if common.min.cmpgt(common.max).any() {
             bounds
         } else {
@@ -147,7 +149,7 @@ impl Sphere {
         }
     }
 
-    /// Prepares for clipping at slabs of `bounds`.
+    /// Prepares the sphere for clipping to slabs of `bounds`.
     #[inline(always)]
     pub(super) fn in_slabs(self, bounds: Bounds) -> SlabClip {
         let outside = (bounds.min - self.center)
@@ -161,7 +163,7 @@ impl Sphere {
         }
     }
 
-    /// The box that reaches `reach` from the centre.
+    /// The box that extends by `reach` from the centre, rounded outwards.
     #[inline(always)]
     fn rounded_out(&self, reach: Vec3A) -> Bounds {
         let (min, max) = (self.center - reach, self.center + reach);
@@ -172,20 +174,20 @@ impl Sphere {
     }
 }
 
-/// A part of a sphere, ready to be cut into slabs. A slab changes the nearest point on its own axis
-/// alone, and never the reach along that: the box is tight already.
+/// A part of a sphere, prepared for cuts into slabs. A slab changes the nearest point only on its own axis, and does
+/// not change the extent along it, because the box is already tight.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SlabClip {
     sphere: Sphere,
     bounds: Bounds,
     center: [f32; 3],
-    /// Of the distance from the centre to the box, by axis.
+    /// Squared distance from the centre to the box, per axis.
     squares: Vec3A,
 }
 
 impl SlabClip {
-    /// Squares of the reach on each axis but `axis`, where it is infinite, before the distance of the
-    /// slab is taken off.
+    /// Squared extent on the two axes other than `axis`, before the distance of the slab is subtracted; infinite on
+    /// `axis` itself.
     #[inline(always)]
     pub(super) fn reach_beside(&self, axis: usize) -> Vec3A {
         let squares = self.squares.to_array();
@@ -197,7 +199,7 @@ impl SlabClip {
         }
     }
 
-    /// The box between `from` and `to` on `axis`, on the other axes around the sphere.
+    /// The box between `from` and `to` on `axis`, tight around the sphere on the other axes.
     #[inline(always)]
     pub(super) fn slab(&self, axis: usize, reach_beside: Vec3A, from: f32, to: f32) -> Bounds {
         let center = self.center[axis];
@@ -232,11 +234,11 @@ impl<'a> Parts<'a> {
         }
     }
 
-    /// The reference to all of a sphere.
+    /// A reference to an entire sphere.
     pub(super) fn whole(&self, particle: u32) -> Reference {
         let index = particle as usize;
         let reach = Vec3A::splat(self.radius(index));
-        // Beyond the range of f32 nothing is met, and infinite boxes have no area to compare.
+        // Rays hit nothing beyond the range of f32, and areas of infinite boxes cannot be compared.
         let range = Bounds {
             min: Vec3A::splat(f32::MIN),
             max: Vec3A::splat(f32::MAX),
@@ -245,7 +247,7 @@ impl<'a> Parts<'a> {
         Reference::new(bounds.intersection(range), particle)
     }
 
-    /// The two parts of `reference` below and above `plane` on `axis`.
+    /// The parts of `reference` below and above `plane` on `axis`.
     #[inline(always)]
     pub(super) fn cut(&self, reference: &Reference, axis: usize, plane: f32) -> [Bounds; 2] {
         let bounds = reference.bounds();
@@ -293,7 +295,7 @@ mod tests {
     }
 
     proptest! {
-        /// Points of the sphere in the cell are in its part, however often it was cut.
+        /// Points of the sphere in the cell are in its part after any number of cuts.
         #[test]
         fn parts_hold_what_of_the_sphere_is_in_their_cells(
             center in prop::array::uniform3(-1e3_f32..1e3),

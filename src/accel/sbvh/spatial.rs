@@ -1,23 +1,23 @@
-//! Spatial splits (Stich, Friedrich & Dietrich 2009, "Spatial splits in bounding volume
-//! hierarchies"): a plane cuts the node, and a sphere that it meets is referred to from both sides.
+//! Spatial splits (Stich, Friedrich & Dietrich 2009, "Spatial splits in bounding volume hierarchies"): a plane cuts
+//! the node, and a sphere that crosses the plane is referenced by both children.
 //!
-//! Chopped binning (section 4.2 there): each reference is cut at the planes of the bins that it
-//! spans, its parts grow the bins, and it is counted in where it begins and out where it ends.
+//! Chopped binning (section 4.2 of the paper): each reference is cut at the planes of the bins that it spans. Its
+//! parts extend the boxes of the bins. It is counted as an entry in its first bin and as an exit in its last one.
 
 use rayon::prelude::*;
 
 use super::cost;
 use super::reference::{Bounds, Parts, Reference};
-use super::split::{BINS, BinGrid, Set, Split, SplitPlace, SplitRule};
+use super::split::{BINS, BinGrid, PrimSet, Split, SplitPosition, SplitRule};
 use super::{CHUNK, is_large};
 
-/// The rule of this module.
+/// The split rule of this module.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SpatialSplit;
 
 impl SplitRule for SpatialSplit {
-    /// Only splits that add no more references than are free.
-    fn find(&self, set: &Set) -> Option<Split> {
+    /// Considers only splits that add at most `set.free` references.
+    fn find(&self, set: &PrimSet) -> Option<Split> {
         let grid = BinGrid::over(set.bounds);
         let bins = Bins::of(set.references, set.parts, &Slabs::of(grid));
         let mut best: Option<Split> = None;
@@ -28,7 +28,7 @@ impl SplitRule for SpatialSplit {
     }
 }
 
-/// The bins of a grid as what is between two planes.
+/// The slabs between the planes of a grid.
 struct Slabs {
     grid: BinGrid,
     slabs: [[Slab; BINS]; 3],
@@ -38,7 +38,7 @@ struct Slabs {
 struct Slab {
     from: f32,
     to: f32,
-    /// The same without bounds on the other axes.
+    /// The slab as a box, unbounded on the other axes.
     bounds: Bounds,
 }
 
@@ -98,6 +98,7 @@ impl Bins {
 
     #[inline(always)]
     fn add(&mut self, reference: &Reference, parts: Parts, slabs: &Slabs) {
+        // A reference inside a single cell of the grid needs no cuts
         let bounds = reference.bounds();
         let firsts = slabs.grid.bins(bounds.min);
         let lasts = slabs.grid.bins(bounds.max);
@@ -109,6 +110,7 @@ impl Bins {
             }
             return;
         }
+        // Cut the reference into slabs, axis by axis
         let (mins, maxs) = (bounds.min.to_array(), bounds.max.to_array());
         let clip = parts.sphere(reference.particle).in_slabs(bounds);
         for axis in 0..3 {
@@ -138,15 +140,17 @@ impl Bins {
         self
     }
 
-    /// Puts the cheapest split on `axis` into `best` if it is cheaper than that.
-    fn cheapest(&self, axis: usize, grid: BinGrid, set: &Set, best: &mut Option<Split>) {
+    /// Replaces `best` by the cheapest split on `axis` if that is cheaper.
+    fn cheapest(&self, axis: usize, grid: BinGrid, set: &PrimSet, best: &mut Option<Split>) {
         let bins = &self.0[axis];
         let count = set.references.len();
+        // Accumulate boxes from above
         let mut above = [Bounds::EMPTY; BINS];
         above[BINS - 1] = bins[BINS - 1].bounds;
         for bin in (0..BINS - 1).rev() {
             above[bin] = above[bin + 1].union(bins[bin].bounds);
         }
+        // Evaluate the split before each bin, while accumulating bins from below
         let (mut below, mut entered, mut left) = (Bounds::EMPTY, 0, 0);
         for first_above in 1..BINS {
             let bin = &bins[first_above - 1];
@@ -154,7 +158,7 @@ impl Bins {
             entered += bin.entries;
             left += bin.exits;
             let counts = [entered, count - left];
-            // A side as full as the node is no progress.
+            // Skip splits with an empty child or one as large as the node, and those above the budget.
             if counts.contains(&0) || counts.contains(&count) || entered - left > set.free {
                 continue;
             }
@@ -166,7 +170,7 @@ impl Bins {
                     boxes,
                     counts,
                     axis,
-                    place: SplitPlace::Plane { grid, first_above },
+                    place: SplitPosition::Plane { grid, first_above },
                 });
             }
         }

@@ -1,59 +1,59 @@
-//! Splits: what the rules propose and the builder carries out.
+//! Splits: proposed by split rules, and performed by `divide.rs`.
 
 use glam::Vec3A;
 
 use super::reference::{Bounds, Parts, Reference};
 
-/// References of a node that is to be split.
+/// References of a node to be split.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Set<'a> {
+pub(super) struct PrimSet<'a> {
     pub(super) references: &'a [Reference],
-    /// Box of all of them.
+    /// Bounding box of the references.
     pub(super) bounds: Bounds,
     pub(super) parts: Parts<'a>,
-    /// References that a split may add.
+    /// Number of references that a split may add.
     pub(super) free: usize,
 }
 
-/// A way to find the cheapest split of its kind.
+/// Finds the cheapest split of one kind.
 pub(super) trait SplitRule {
-    /// None if there is no split with two sides.
-    fn find(&self, set: &Set) -> Option<Split>;
+    /// None if every split leaves one child empty.
+    fn find(&self, set: &PrimSet) -> Option<Split>;
 }
 
 /// A proposed split.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Split {
-    /// By the surface area heuristic, the node's own test left out.
+    /// Cost by the surface area heuristic, without the test of the node itself.
     pub(super) cost: f64,
-    /// Boxes of the two sides.
+    /// Boxes of the two children.
     pub(super) boxes: [Bounds; 2],
-    /// References of the two sides.
+    /// Reference counts of the two children.
     pub(super) counts: [usize; 2],
     pub(super) axis: usize,
-    pub(super) place: SplitPlace,
+    pub(super) place: SplitPosition,
 }
 
-/// Where a split is on its axis.
+/// Position of a split on its axis.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum SplitPlace {
-    /// References go by the bin of their centre: below bin `first_above`, or from it on.
+pub(super) enum SplitPosition {
+    /// References are separated by the bins of their centres: below bin `first_above`, or from it on.
     Centers { grid: BinGrid, first_above: usize },
-    /// The lowest centres go to one side, as many as its count says.
+    /// The references with the lowest centres go to the first child, as many as its count.
     Rank,
-    /// References are cut by the lower plane of bin `first_above`.
+    /// The lower plane of bin `first_above` separates or cuts references.
     Plane { grid: BinGrid, first_above: usize },
 }
 
-/// Bins on each axis. More find hardly better splits: those near the leaves are found exactly.
+/// Bins per axis. More bins hardly improve the splits, because splits near the leaves are found exactly.
 pub(super) const BINS: usize = 16;
 
-/// Equal bins over a box.
+/// A grid of equal bins over a box.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BinGrid {
     origin: Vec3A,
     width: Vec3A,
-    /// Bins in a unit of length.
+    /// Bins per unit of length.
     scale: Vec3A,
 }
 
@@ -68,7 +68,7 @@ impl BinGrid {
         }
     }
 
-    /// Bin of `point` on each axis; the first one on an axis without extent.
+    /// Bin of `point` on each axis; the first bin if the box has no extent on an axis.
     #[inline(always)]
     #[expect(
         clippy::cast_possible_truncation,
@@ -81,13 +81,13 @@ impl BinGrid {
         [bin(places.x), bin(places.y), bin(places.z)]
     }
 
-    /// Bin on one axis.
+    /// Bin of `point` on one axis.
     #[inline(always)]
     pub(super) fn bin(&self, point: Vec3A, axis: usize) -> usize {
         self.bins(point)[axis]
     }
 
-    /// Lower plane of a bin.
+    /// Position of the lower plane of a bin.
     #[inline(always)]
     #[expect(clippy::cast_precision_loss, reason = "a small number")]
     pub(super) fn plane(&self, axis: usize, bin: usize) -> f32 {

@@ -1,19 +1,19 @@
-//! Object splits of small sets: every one of them (the full sweep of MacDonald & Booth 1990). Near
-//! the leaves bins are too coarse to fill blocks, and sorting a hundred references is cheap.
+//! Object splits of small sets, by the full sweep of MacDonald & Booth (1990) over all positions. Near the leaves
+//! bins are too coarse to fill blocks, and sorting a hundred references is cheap.
 
 use super::cost;
 use super::reference::{Bounds, Reference};
-use super::split::{Set, Split, SplitPlace, SplitRule};
+use super::split::{PrimSet, Split, SplitPosition, SplitRule};
 
-/// Sets that are swept.
+/// Largest set that is swept.
 pub(super) const SWEEP_LEN: usize = 128;
 
-/// The rule of this module, for sets of up to [`SWEEP_LEN`].
+/// The split rule of this module, for sets of up to [`SWEEP_LEN`].
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SweptObjectSplit;
 
 impl SplitRule for SweptObjectSplit {
-    fn find(&self, set: &Set) -> Option<Split> {
+    fn find(&self, set: &PrimSet) -> Option<Split> {
         let mut best: Option<Split> = None;
         for axis in 0..3 {
             sweep(set.references, axis, &mut best);
@@ -22,7 +22,8 @@ impl SplitRule for SweptObjectSplit {
     }
 }
 
-/// Places of references by centre, equal ones by place: the key above, the place below.
+/// Indices of references, sorted by centre and then by index: the sort key in the upper half, the index in the lower
+/// half.
 type Order = [u64; SWEEP_LEN];
 
 const PLACE_BITS: u32 = 32;
@@ -36,7 +37,7 @@ fn order(references: &[Reference], axis: usize, order: &mut Order) {
     order.sort_unstable();
 }
 
-/// Bits that order as the numbers do.
+/// Maps a float to an integer with the same order.
 fn ordered_bits(value: f32) -> u32 {
     let bits = value.to_bits();
     let sign = 1 << 31;
@@ -47,9 +48,10 @@ fn place(key: u64) -> usize {
     (key & ((1 << PLACE_BITS) - 1)) as usize
 }
 
-/// Puts the cheapest split on `axis` into `best` if it is cheaper than that.
+/// Replaces `best` by the cheapest split on `axis` if that is cheaper.
 fn sweep(references: &[Reference], axis: usize, best: &mut Option<Split>) {
     let count = references.len();
+    // Sort by centre, and accumulate boxes from above
     let mut keys = [0; SWEEP_LEN];
     order(references, axis, &mut keys);
     let bounds = |at: usize| references[place(keys[at])].bounds();
@@ -59,6 +61,7 @@ fn sweep(references: &[Reference], axis: usize, best: &mut Option<Split>) {
         upper = upper.union(bounds(at));
         above[at] = upper;
     }
+    // Evaluate every split, while accumulating boxes from below
     let mut below = Bounds::EMPTY;
     for (at, upper) in above.iter().enumerate().take(count).skip(1) {
         below = below.union(bounds(at - 1));
@@ -70,13 +73,13 @@ fn sweep(references: &[Reference], axis: usize, best: &mut Option<Split>) {
                 boxes,
                 counts,
                 axis,
-                place: SplitPlace::Rank,
+                place: SplitPosition::Rank,
             });
         }
     }
 }
 
-/// Brings a small set into the order of centres on `axis`.
+/// Sorts a small set by centres on `axis`.
 pub(super) fn sort(references: &mut [Reference], axis: usize) {
     let mut keys = [0; SWEEP_LEN];
     order(references, axis, &mut keys);

@@ -1,18 +1,18 @@
-//! Reference unsplitting (Stich et al. 2009, section 4.4): a sphere that the plane meets goes to one
-//! side whole where that is cheaper than to have it on both.
+//! Reference unsplitting (Stich et al. 2009, section 4.4): a sphere that crosses the plane is assigned to one child
+//! entirely if that is cheaper than a reference in both.
 
 use super::reference::{Bounds, Parts, Reference};
 use super::split::Split;
 
-/// Where a reference goes.
+/// Assignment of a reference to the children.
 enum Side {
     Below,
     Above,
     Both([Bounds; 2]),
 }
 
-/// Divides the references that `plane` meets. Those that go below come to the front of
-/// `straddlers`; returns how many they are, and those that go above.
+/// Assigns the references that `plane` cuts. References of the lower child are moved to the front of `straddlers`.
+/// Returns their number, and the references of the upper child.
 pub(super) fn divide(
     straddlers: &mut [Reference],
     split: &Split,
@@ -26,6 +26,7 @@ pub(super) fn divide(
     };
     let (mut below, mut above) = (0, Vec::new());
     for at in 0..straddlers.len() {
+        // Cut the reference, and keep the cheapest of the three choices
         let reference = straddlers[at];
         let halves = parts.cut(&reference, split.axis, plane);
         match sides.place(reference.bounds(), halves) {
@@ -44,7 +45,7 @@ pub(super) fn divide(
     (below, above)
 }
 
-/// The two sides as they would be if all that are still to come were on both.
+/// The two children, under the assumption that all remaining references belong to both.
 struct Sides {
     boxes: [Bounds; 2],
     areas: [f64; 2],
@@ -52,15 +53,17 @@ struct Sides {
 }
 
 impl Sides {
-    /// Where a reference of the box `whole`, in `halves` by the plane, is cheapest. Counts are not
-    /// rounded up to blocks here, or one reference would hardly ever matter. No side is left empty.
+    /// The cheapest assignment of a reference with the box `whole`, which the plane cuts into `halves`. Counts are
+    /// not rounded up to blocks here, because a single reference would then hardly ever matter. No child becomes
+    /// empty.
     fn place(&mut self, whole: Bounds, halves: [Bounds; 2]) -> Side {
         #[expect(clippy::cast_precision_loss, reason = "fewer than 2^53")]
         let counts = self.counts.map(|count| count as f64);
+        // Compute the cost of both choices that keep the reference whole, and of the split
         let alone = [0, 1].map(|side| self.boxes[side].union(whole));
         let alone_areas = alone.map(Bounds::area);
         let both = self.areas[0] * counts[0] + self.areas[1] * counts[1];
-        // Staying on one side makes that one larger and takes the reference from the other.
+        // Keeping the reference on one side enlarges that side and removes the reference from the other.
         let cost = |side: usize| {
             let other = 1 - side;
             if self.counts[other] > 1 {
@@ -74,6 +77,7 @@ impl Sides {
         if costs[side] > both {
             return Side::Both(halves);
         }
+        // Update the children for the references that follow
         self.boxes[side] = alone[side];
         self.areas[side] = alone_areas[side];
         self.counts[1 - side] -= 1;

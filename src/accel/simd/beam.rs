@@ -1,9 +1,8 @@
-//! What the rays of a packet have in common: bounds of their origins and directions, so that a box or
-//! a sphere that none of them meets is put aside for all at once.
+//! Beams: bounds of the origins and directions of the rays of a packet. A box or sphere outside the beam is rejected
+//! for all rays at once.
 //!
-//! Boxes are tested by interval arithmetic (Wald, Boulos & Shirley 2007, "Ray tracing deformable
-//! scenes using dynamic bounding volume hierarchies", section 4.2), spheres against a cone with a
-//! rounded tip around a middle ray.
+//! Boxes are tested by interval arithmetic (Wald, Boulos & Shirley 2007, "Ray tracing deformable scenes using dynamic
+//! bounding volume hierarchies", section 4.2), spheres with a cone with a rounded tip around a central ray.
 
 use glam::Vec3;
 
@@ -12,75 +11,75 @@ use super::{MIN_DIRECTION, SLAB_SLACK};
 use crate::math::{fold, larger, smaller};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
-/// A value for each ray.
+/// One value per ray.
 type Lanes = [f32; PACKET_SIZE];
 
-/// Directions farther apart than this (sine of the angle to the middle) make no beam.
-const WIDEST: f32 = 0.2;
+/// Largest angle (as its sine) between a direction and the central one for which a beam is used.
+const MAX_SPREAD_SINE: f32 = 0.2;
 /// Slack of the cone test as a fraction of its terms: covers the rounding of a ray's own test.
 const CONE_SLACK: f32 = 4e-6;
 
-/// Bounds of the rays in some lanes of a packet. Per axis, with a fourth lane of zero.
+/// Bounds of the rays in some lanes of a packet. Arrays have one element per axis, and a fourth element of zero.
 #[derive(Debug, Clone, Copy)]
 #[repr(align(16))]
 pub(in super::super) struct Beam {
-    /// The origins' bound that puts the first planes of boxes nearest.
+    /// The bound of the origins for which the near planes of boxes are nearest.
     pub(super) origin_near: [f32; 4],
-    /// The origins' bound that puts the second planes farthest.
+    /// The bound of the origins for which the far planes of boxes are farthest.
     pub(super) origin_far: [f32; 4],
-    /// Least and greatest inverse of the directions' components.
+    /// Least and greatest component of the inverse directions.
     pub(super) inverse: [[f32; 3]; 2],
     /// Sign of the directions.
     pub(super) sign: [f32; 4],
-    /// Which side's planes come first: 1 where directions are negative.
+    /// Index of the near planes: 1 if directions are negative.
     pub(super) near_side: [usize; 3],
-    /// Distance that boxes lack on every side.
+    /// Length by which boxes must be extended on every side.
     pub(super) padding: f32,
-    /// Where the first ray starts to count.
+    /// The least `t_min` of the rays.
     pub(super) t_min: f32,
-    /// Start of the middle ray.
+    /// Origin of the central ray.
     pub(super) center: Vec3,
-    /// Direction of the middle ray.
+    /// Direction of the central ray.
     pub(super) axis: Vec3,
-    /// Radius of the spheres, if common.
+    /// Radius of the spheres, if they have a common one.
     pub(super) radius: f32,
-    /// Distance of origins from the middle one.
+    /// Largest distance of an origin from the central one.
     pub(super) spread: f32,
-    /// How much farther rays get from the middle ray with every unit along it.
+    /// Increase of the distance to the central ray per unit of length along it.
     pub(super) growth: f32,
 }
 
-/// Inverse directions with every component finite: [`super::finite_inverse`] of all lanes.
+/// Inverse directions with finite components: [`super::finite_inverse`] for all lanes.
 #[inline(always)]
 pub(super) fn inverses(directions: &Lanes) -> Lanes {
     let mut inverses = *directions;
     for d in &mut inverses {
-        let kept = if d.abs() < MIN_DIRECTION {
+        let clamped = if d.abs() < MIN_DIRECTION {
             MIN_DIRECTION.copysign(*d)
         } else {
             *d
         };
-        *d = 1.0 / kept;
+        *d = 1.0 / clamped;
     }
     inverses
 }
 
-/// Values of the rays in `lanes`; lanes out of use stand in for the one in `first`.
+/// Values of the rays in `lanes`; all other lanes get the value of lane `first`.
 #[inline(always)]
-fn used(values: &Lanes, lanes: u32, first: usize) -> Lanes {
-    let stand_in = values[first];
-    let mut used = *values;
-    for (lane, value) in used.iter_mut().enumerate() {
+fn fill_inactive(values: &Lanes, lanes: u32, first: usize) -> Lanes {
+    let replacement = values[first];
+    let mut filled = *values;
+    for (lane, value) in filled.iter_mut().enumerate() {
         *value = if lanes >> lane & 1 == 1 {
             *value
         } else {
-            stand_in
+            replacement
         };
     }
-    used
+    filled
 }
 
-/// The greatest distance of any of the points from `middle`.
+/// Largest distance of the points from `middle`.
 #[inline(always)]
 fn farthest_from(middle: Vec3, points: &[Lanes; 3]) -> f32 {
     let mut squared = [0.0; PACKET_SIZE];
@@ -93,10 +92,10 @@ fn farthest_from(middle: Vec3, points: &[Lanes; 3]) -> f32 {
     fold(squared, larger).sqrt()
 }
 
-/// The lanes of rays that are all numbers, with finite origins and directions: no other hits anything.
+/// Lanes of rays with finite origins and directions and without NaN. All other rays hit nothing.
 #[inline(always)]
-fn sound_lanes(packet: &RayPacket) -> u32 {
-    // A product with zero is zero of what is finite, and NaN of all else.
+fn finite_lanes(packet: &RayPacket) -> u32 {
+    // The product with zero is zero for finite values, and NaN for all others
     let mut rest = [0.0; PACKET_SIZE];
     for axis in 0..3 {
         let (origin, direction) = (&packet.origin[axis], &packet.direction[axis]);
@@ -106,16 +105,18 @@ fn sound_lanes(packet: &RayPacket) -> u32 {
     }
     let mut lanes = 0;
     for (lane, rest) in rest.iter().enumerate() {
+        // Keep the rays with a sum of zero and ends that are not NaN
         let has_ends = !packet.t_min[lane].is_nan() && !packet.t_max[lane].is_nan();
         lanes |= u32::from(*rest == 0.0 && has_ends) << lane;
     }
     lanes
 }
 
-/// The lanes whose rays come near `bounds`; a superset of those that meet anything inside. All of them
-/// are sound: no component is NaN, origins and directions are finite.
+/// The lanes whose rays enter `bounds`: a superset of the rays that hit anything inside. All of them are valid: no
+/// component is NaN, and origins and directions are finite.
 #[inline(always)]
-pub(in super::super) fn lanes_near(packet: &RayPacket, bounds: &Aabb) -> u32 {
+pub(in super::super) fn lanes_entering(packet: &RayPacket, bounds: &Aabb) -> u32 {
+    // Clip the rays to the slabs of all three axes, with some slack
     let mut near = packet.t_min;
     let mut far = packet.t_max;
     for axis in 0..3 {
@@ -131,17 +132,17 @@ pub(in super::super) fn lanes_near(packet: &RayPacket, bounds: &Aabb) -> u32 {
     }
     let mut lanes = 0;
     for lane in 0..PACKET_SIZE {
-        // Said so that NaN (bounds beyond the range of f32) counts as met.
+        // Written as `!(near > far)` so that NaN (bounds beyond the range of f32) counts as a hit.
         let misses = near[lane] > far[lane];
         lanes |= u32::from(!misses) << lane;
     }
-    lanes & sound_lanes(packet) & ((1 << packet.len()) - 1)
+    lanes & finite_lanes(packet) & ((1 << packet.len()) - 1)
 }
 
 impl Beam {
-    /// Around the rays in `lanes` (at least one) of `packet`, for spheres of a common `radius` (0 where
-    /// each has its own) in boxes that lack `padding` on every side. `None` if the rays point too far
-    /// apart or are no proper rays.
+    /// The beam around the rays in `lanes` (at least one) of `packet`, for spheres of a common `radius` (0 for a
+    /// radius per sphere) in boxes that must be extended by `padding` on every side. `None` if the directions differ
+    /// too much or rays are invalid.
     #[inline(always)]
     pub(in super::super) fn around(
         packet: &RayPacket,
@@ -157,28 +158,30 @@ impl Beam {
             sign: [0.0; 4],
             near_side: [0; 3],
             padding,
-            t_min: fold(used(&packet.t_min, lanes, first_lane), smaller),
+            t_min: fold(fill_inactive(&packet.t_min, lanes, first_lane), smaller),
             center: Vec3::ZERO,
             axis: Vec3::ZERO,
             radius,
             spread: 0.0,
             growth: 0.0,
         };
-        let mut sound = beam.t_min >= 0.0;
+        let mut is_valid = beam.t_min >= 0.0;
         let (mut origins, mut directions) = (packet.origin, packet.direction);
         for axis in 0..3 {
-            origins[axis] = used(&packet.origin[axis], lanes, first_lane);
-            directions[axis] = used(&packet.direction[axis], lanes, first_lane);
+            origins[axis] = fill_inactive(&packet.origin[axis], lanes, first_lane);
+            directions[axis] = fill_inactive(&packet.direction[axis], lanes, first_lane);
+            // Bound the inverse directions, which must have the same sign
             let inverse = inverses(&directions[axis]);
             let (low, high) = (fold(inverse, smaller), fold(inverse, larger));
-            sound &= low.is_sign_negative() == high.is_sign_negative();
-            sound &= low.is_finite() && high.is_finite();
+            is_valid &= low.is_sign_negative() == high.is_sign_negative();
+            is_valid &= low.is_finite() && high.is_finite();
             beam.inverse[0][axis] = low;
             beam.inverse[1][axis] = high;
-            // Inverses order the other way round.
+            // Inversion reverses the order, but both ends are averaged.
             beam.axis[axis] = 0.5 * (1.0 / low + 1.0 / high);
+            // Bound the origins
             let (first, last) = (fold(origins[axis], smaller), fold(origins[axis], larger));
-            sound &= first <= last;
+            is_valid &= first <= last;
             beam.center[axis] = 0.5 * (first + last);
             let backward = high < 0.0;
             beam.near_side[axis] = usize::from(backward);
@@ -190,15 +193,16 @@ impl Beam {
             };
             [beam.origin_near[axis], beam.origin_far[axis]] = ends;
         }
-        if !sound {
+        if !is_valid {
             return None;
         }
+        // Compute the cone around the central ray
         beam.axis = beam.axis.normalize_or_zero();
-        let turn = farthest_from(beam.axis, &directions) + CONE_SLACK;
+        let spread_sine = farthest_from(beam.axis, &directions) + CONE_SLACK;
         beam.spread = farthest_from(beam.center, &origins);
-        beam.growth = turn / (1.0 - turn);
-        // Also false for NaN.
-        (turn < WIDEST && beam.spread.is_finite()).then_some(beam)
+        beam.growth = spread_sine / (1.0 - spread_sine);
+        // The comparison is also false for NaN.
+        (spread_sine < MAX_SPREAD_SINE && beam.spread.is_finite()).then_some(beam)
     }
 }
 
@@ -228,7 +232,7 @@ mod tests {
         assert!(beam.growth > 0.5 * apart && beam.growth < apart);
         assert!(around(&[one, turned], 0b11).is_none());
         assert!(around(&[one, across], 0b11).is_none());
-        // Lanes out of use do not count.
+        // Inactive lanes do not matter.
         assert!(around(&[turned, one, across, other], 0b1010).is_some());
     }
 
@@ -239,12 +243,12 @@ mod tests {
             max: Vec3::splat(3.0),
         };
         let rays = packet(&[Vec3::ONE, -Vec3::ONE, Vec3::X, Vec3::new(1.0, 1.2, 1.1)]);
-        assert_eq!(lanes_near(&rays, &bounds), 0b1001);
+        assert_eq!(lanes_entering(&rays, &bounds), 0b1001);
         let mut short = RayPacket::default();
         short.push(&Ray {
             t_max: 1.0,
             ..rays.ray(0)
         });
-        assert_eq!(lanes_near(&short, &bounds), 0);
+        assert_eq!(lanes_entering(&short, &bounds), 0);
     }
 }

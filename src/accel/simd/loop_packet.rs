@@ -1,4 +1,4 @@
-//! Packets in plain loops, for kernels that have no packet tests of their own.
+//! Packet tests as plain loops, for kernels without packet tests in intrinsics.
 
 use super::super::hits::TreeHits;
 use super::packet::{EnteredChildren, LaneSlabs, key_of};
@@ -8,20 +8,20 @@ use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// A kernel whose packets are tested in loops over lanes.
+/// A kernel that tests packets in loops over lanes.
 pub(super) trait LoopPackets: Kernel<Keys = [u32; WIDTH]> {
-    /// Whether its test of one ray multiplies and adds in one step; that of packets must do likewise.
+    /// Whether the test for single rays uses fused multiply-add; the packet test must use the same operations.
     const FUSED: bool;
 }
 
-/// `a * b + c`, rounded once or twice.
+/// `a * b + c`, rounded once (fused) or twice.
 #[inline(always)]
 fn multiply_add<const FUSED: bool>(a: f32, b: f32, c: f32) -> f32 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
-/// The crossing of the ray in `lane` with `sphere` that counts, if it lies in `t_min..=limit`. The
-/// operations are those of the kernels' tests of one ray.
+/// The hit distance of the ray in `lane` with `sphere`, if it is in `t_min..=limit`. The operations are those of the
+/// tests for single rays.
 #[inline(always)]
 fn distance<const FUSED: bool>(
     packet: &RayPacket,
@@ -29,6 +29,7 @@ fn distance<const FUSED: bool>(
     sphere: &PacketSphere,
     limit: f32,
 ) -> Option<f32> {
+    // Find the point of the ray nearest to the centre, and the distance between them
     let [ox, oy, oz] = [0, 1, 2].map(|axis| sphere.center[axis] - packet.origin[axis][lane]);
     let [dx, dy, dz] = [0, 1, 2].map(|axis| packet.direction[axis][lane]);
     let dot = |a: [f32; 3], b: [f32; 3]| {
@@ -37,11 +38,12 @@ fn distance<const FUSED: bool>(
     };
     let middle = dot([ox, oy, oz], [dx, dy, dz]);
     let across = [(ox, dx), (oy, dy), (oz, dz)].map(|(o, d)| multiply_add::<FUSED>(-middle, d, o));
+    // Choose the first intersection that does not lie before `t_min`
     let half = (sphere.radius_squared - dot(across, across)).sqrt();
     let near = middle - half;
     let t_min = packet.t_min[lane];
     let t = if near >= t_min { near } else { middle + half };
-    // False for NaN, where the ray misses.
+    // The comparison is false for NaN, which means that the ray misses.
     (t >= t_min && t <= limit).then_some(t)
 }
 
@@ -73,7 +75,7 @@ fn any<const FUSED: bool>(packet: &RayPacket, sphere: &PacketSphere, hits: &Tree
         .fold(0, |lanes, lane| lanes | 1 << lane)
 }
 
-/// Where rays cross the planes of a node along one axis: at `step * plane + base`, within `slack`.
+/// Where rays intersect the planes of a node along one axis: at `step * plane + base`, within `slack`.
 struct AxisSlabs {
     step: [f32; PACKET_SIZE],
     base: [f32; PACKET_SIZE],
@@ -101,7 +103,7 @@ impl AxisSlabs {
         slabs
     }
 
-    /// Shortens the rays to where they are within `half` of `middle`, in planes. A NaN is no bound.
+    /// Clips the rays to the slab within `half` of `middle`, in units of planes. A NaN is no bound.
     #[inline(always)]
     fn clip(
         &self,
@@ -124,11 +126,13 @@ impl<K: LoopPackets> PacketKernel for K {
         let mut near = [beam.t_min; WIDTH];
         let mut far = [limit; WIDTH];
         for axis in 0..3 {
+            // Compute the distance of the node from the bounds of the origins, with slack
             let step = f32::from_bits(u32::from(node.exponent[axis]) << 23);
             let from_near = node.origin[axis] - beam.origin_near[axis];
             let from_far = node.origin[axis] - beam.origin_far[axis];
             let terms = from_near.abs().max(from_far.abs()) + 255.0 * step;
             let slack = (terms * SLAB_SLACK + beam.padding) * beam.sign[axis];
+            // Clip each child to its slab, with interval arithmetic over the inverse directions
             let [least, greatest] = [beam.inverse[0][axis], beam.inverse[1][axis]];
             let side = beam.near_side[axis];
             for slot in 0..WIDTH {
@@ -157,6 +161,7 @@ impl<K: LoopPackets> PacketKernel for K {
         ];
         let mut found = 0;
         for slot in 0..node.child_count() {
+            // Clip all rays to the box of the child
             let mut near = rays.t_min;
             let mut far = *limits;
             for (axis, slab) in slabs.iter().enumerate() {
@@ -165,6 +170,7 @@ impl<K: LoopPackets> PacketKernel for K {
                 let (middle, half) = (0.5 * (first + second), 0.5 * (second - first));
                 slab.clip(middle, half, &mut near, &mut far);
             }
+            // Store the entry distance of each ray, and the least one as the key of the child
             let mut any = false;
             for lane in 0..PACKET_SIZE {
                 let is_entered = alive >> lane & 1 == 1 && near[lane] <= far[lane];
@@ -202,12 +208,14 @@ impl<K: LoopPackets> PacketKernel for K {
         let mut lanes = 0;
         for lane in 0..BLOCK_SIZE {
             let radius = radii.map_or(beam.radius, |r| r.0[lane]);
+            // Compute the position along the central ray, and the squared distance from it
             let to_center = block.center(lane) - beam.center;
             let middle = to_center.dot(beam.axis);
             let across = (to_center - beam.axis * middle).length_squared();
+            // Compare with the radius of the cone there
             let tip = radius + beam.spread;
             let reach = tip + beam.growth * (middle + tip).max(0.0);
-            // Said so that NaN stays, for the rays' own tests to judge.
+            // Written as `!(a > b)` so that NaN counts as inside; the tests of the rays then decide.
             let outside = across > reach * reach || middle - reach > limit;
             lanes |= u32::from(!outside) << lane;
         }
@@ -236,7 +244,7 @@ impl<K: LoopPackets> PacketKernel for K {
     }
 }
 
-/// Keys of the children whose boxes are entered no later than left, and how many they are.
+/// Keys of the children whose entry distance does not exceed their exit distance, and their number.
 pub(super) fn keys_of(
     node: &Node,
     near: &[f32; WIDTH],

@@ -1,8 +1,8 @@
-//! The tests of nodes and blocks in the instructions that the machine has.
+//! Tests of nodes and blocks with the SIMD instructions of the machine.
 //!
-//! The level is found at run time, once per tree, so that a default build is fast everywhere. All
-//! levels with fused multiply-add give the same results to the bit; the portable one may differ in
-//! the last.
+//! The instruction set is detected at run time, once per tree, so that a default build is fast on all machines. All
+//! instruction sets with fused multiply-add give the same results to the bit; the portable kernel may differ in the
+//! last bit.
 
 use glam::Vec3;
 
@@ -22,18 +22,18 @@ mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
-pub(super) use beam::{Beam, lanes_near};
+pub(super) use beam::{Beam, lanes_entering};
 pub(super) use packet::{EnteredChildren, LaneSlabs, PacketKernel, PacketSphere};
 
-/// Slack of the slab test, as a fraction of the larger terms: covers the rounding of planes,
-/// inverses and products (about five roundings of 2^-24), so that no sphere is lost at a box's edge.
+/// Slack of the slab test as a fraction of the larger terms: covers the rounding of planes, inverses and products
+/// (about five roundings of 2^-24), so that no sphere is lost at the edge of a box.
 pub(super) const SLAB_SLACK: f32 = 1e-6;
 /// Bytes of a cache line.
 const LINE: usize = 64;
-/// Directions are kept this far from zero in the slab test, so that their inverses are finite.
+/// Minimum absolute component of a direction in the slab test, so that inverses are finite.
 const MIN_DIRECTION: f32 = 1e-7;
 
-/// Inverse direction with every component finite.
+/// Inverse direction with finite components.
 pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
     direction
         .map(|d| {
@@ -46,30 +46,30 @@ pub(super) fn finite_inverse(direction: Vec3) -> Vec3 {
         .recip()
 }
 
-/// What a traversal needs of the machine.
+/// The tests of a traversal, for one instruction set.
 pub(super) trait Kernel: Copy {
-    /// A ray with what all tests need of it.
+    /// A ray in the form that all tests need.
     type Ray;
-    /// Keys of the children that a ray enters, packed: a key is the bits of the distance of entry,
-    /// the low three replaced by the child's slot.
+    /// Keys of the children that a ray enters, packed. A key has the bits of the entry distance; its low three bits
+    /// are replaced by the slot of the child.
     type Keys: Copy;
 
-    /// Prepares `ray` for spheres of a common `radius` (0 where each has its own) in boxes that lack
+    /// Prepares `ray` for spheres of a common `radius` (0 for a radius per sphere) in boxes that must be extended by
     /// `padding` on every side.
     fn prepare(self, ray: &Ray, radius: f32, padding: f32) -> Self::Ray;
 
-    /// Tests the children of `node` up to distance `limit`. Returns how many the ray enters, and
+    /// Tests the children of `node` up to distance `limit`. Returns the number of children that the ray enters, and
     /// their keys in slot order.
     fn test_node(self, ray: &Self::Ray, node: &Node, limit: f32) -> (usize, Self::Keys);
 
-    /// The first two keys, without a way through memory: most nodes have no more.
+    /// The first two keys, without a store to memory: most nodes have no more.
     fn first_two(self, keys: Self::Keys) -> [u32; 2];
 
     /// All keys.
     fn all_keys(self, keys: Self::Keys) -> [u32; WIDTH];
 
-    /// The smallest distance in `t_min..=limit` at which the ray crosses a sphere of `block`, and the
-    /// lanes that have it. `radii` where they differ.
+    /// The smallest distance in `t_min..=limit` at which the ray intersects a sphere of `block`, and the lanes with
+    /// this distance. `radii` is None for a common radius.
     fn nearest_in_block(
         self,
         ray: &Self::Ray,
@@ -78,7 +78,7 @@ pub(super) trait Kernel: Copy {
         limit: f32,
     ) -> Option<(f32, u32)>;
 
-    /// Whether the ray crosses any sphere of `block` within `t_min..=limit`.
+    /// Whether the ray intersects any sphere of `block` within `t_min..=limit`.
     fn any_in_block(
         self,
         ray: &Self::Ray,
@@ -87,7 +87,7 @@ pub(super) trait Kernel: Copy {
         limit: f32,
     ) -> bool;
 
-    /// Both crossings of each sphere with the whole line of the ray.
+    /// Both intersections of each sphere with the line of the ray.
     fn all_in_block(
         self,
         ray: &Self::Ray,
@@ -95,34 +95,34 @@ pub(super) trait Kernel: Copy {
         radii: Option<&BlockRadii>,
     ) -> BlockCrossings;
 
-    /// [`CompactBlock::decode`], the same to the bit.
+    /// [`CompactBlock::decode`]; the same result to the bit.
     #[inline(always)]
     fn decode_q10(self, block: &Q10Block, frame: &BlockFrame) -> Block {
         block.decode(frame)
     }
 
-    /// [`CompactBlock::decode`], the same to the bit.
+    /// [`CompactBlock::decode`]; the same result to the bit.
     #[inline(always)]
     fn decode_q16(self, block: &Q16Block, frame: &BlockFrame) -> Block {
         block.decode(frame)
     }
 
-    /// Asks for the memory of a node or block ahead of time.
+    /// Prefetches a node or block.
     fn prefetch<T>(self, value: &T);
 }
 
-/// Both crossings of each sphere of a block with the line of a ray.
+/// Both intersections of each sphere of a block with the line of a ray.
 pub(super) struct BlockCrossings {
-    /// Lanes whose sphere the line meets.
+    /// Lanes of the spheres that the line intersects.
     pub(super) lanes: u32,
-    /// Distance of the first crossing.
+    /// Distance of the first intersection.
     pub(super) near: [f32; BLOCK_SIZE],
-    /// Distance of the second.
+    /// Distance of the second intersection.
     pub(super) far: [f32; BLOCK_SIZE],
 }
 
 impl BlockCrossings {
-    /// No lane is met.
+    /// No intersections.
     const NONE: Self = Self {
         lanes: 0,
         near: [0.0; BLOCK_SIZE],
@@ -130,19 +130,19 @@ impl BlockCrossings {
     };
 }
 
-/// Something to be done with a kernel, compiled for each level. `run` should be `inline(always)`, so
-/// that all of it gets the level's instructions.
+/// Code that uses a kernel, compiled for each instruction set. `run` should be `inline(always)`, so that all of it is
+/// compiled with these instructions.
 pub(super) trait KernelTask {
-    /// What comes of it.
+    /// The result.
     type Output;
 
-    /// Does it.
+    /// Runs the task.
     fn run<K: PacketKernel>(self, kernel: K) -> Self::Output;
 }
 
-/// Runs tasks with the kernel of a level that the machine has.
+/// Runs tasks with the kernel of an instruction set that the machine supports.
 pub(super) trait RunTask {
-    /// Does `task` with the kernel of this level.
+    /// Runs `task` with the kernel of this instruction set.
     fn run<T: KernelTask>(self, task: T) -> T::Output;
 }
 
@@ -161,14 +161,14 @@ impl RunTask for Supported {
     }
 }
 
-/// Arithmetic on plain arrays, which the compiler turns into the instructions of each level. `run` and
-/// all that it calls should be `inline(always)`. Nothing is contracted into fused operations unless it
-/// says so, so every level gives the same bits.
+/// Arithmetic on plain arrays, which the compiler vectorises for each instruction set. `run` and everything that it
+/// calls should be `inline(always)`. Operations are only fused if the code does so explicitly, so all instruction
+/// sets give the same bits.
 pub(crate) trait ArrayTask {
-    /// What comes of it.
+    /// The result.
     type Output;
 
-    /// Does it.
+    /// Runs the task.
     fn run(self) -> Self::Output;
 }
 
@@ -183,12 +183,12 @@ impl<T: ArrayTask> KernelTask for OnArrays<T> {
     }
 }
 
-/// Compiles [`ArrayTask`]s for the best level of this machine.
+/// Compiles [`ArrayTask`]s for the best instruction set of this machine.
 #[derive(Debug, Clone, Copy, Default)]
 pub(crate) struct ArrayLanes(Supported);
 
 impl ArrayLanes {
-    /// Does `task`.
+    /// Runs `task`.
     #[inline]
     pub(crate) fn run<T: ArrayTask>(self, task: T) -> T::Output {
         self.0.run(OnArrays(task))

@@ -1,9 +1,8 @@
-//! Hand-written NEON tests for 64-bit Arm, where NEON is always there.
+//! NEON intrinsics for 64-bit Arm, where NEON is always available.
 //!
-//! The same operations in the same order as the x86 kernels, so that pictures agree to the bit. Eight
-//! children are two registers of four lanes, a block is four. Without an Arm machine, `cargo test
-//! --target aarch64-unknown-linux-gnu --lib accel` under `qemu-aarch64` runs all of it; its speed was
-//! never measured.
+//! The operations and their order are those of the x86 kernels, so pictures agree to the bit. Eight children are two
+//! registers of four lanes, a block is four registers. Without an Arm machine, `cargo test --target
+//! aarch64-unknown-linux-gnu --lib accel` under `qemu-aarch64` runs all of it. Its speed has not been measured.
 #![expect(unsafe_code, reason = "intrinsics; every block says why it is sound")]
 
 use std::arch::aarch64::*;
@@ -15,22 +14,22 @@ use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// Lanes of a register.
+/// Lanes per register.
 const LANES: usize = 4;
 
-/// 128-bit kernel.
+/// The 128-bit kernel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Neon;
 
-/// A ray with what its tests need: in the slab vectors one lane per axis, the fourth at zero.
+/// A prepared ray; the slab vectors have one lane per axis, and a fourth lane of zero.
 pub(super) struct NeonRay {
     ray: Ray,
     radius_squared: f32,
     origin: float32x4_t,
     inverse: float32x4_t,
-    /// Distance that the padding of boxes adds on either side, per axis.
+    /// Distance along the ray that the padding of boxes adds on either side, per axis.
     reach: float32x4_t,
-    /// Which side's planes come first, per axis: 1 where the direction is negative.
+    /// Index of the near planes per axis: 1 if the direction is negative.
     near_side: [usize; 3],
 }
 
@@ -50,7 +49,7 @@ impl NeonRay {
         }
     }
 
-    /// Where the ray enters and leaves each child of `node`, within its own start and `limit`.
+    /// Where the ray enters and leaves each child of `node`, between its `t_min` and `limit`.
     #[inline(always)]
     fn slabs(&self, node: &Node, limit: f32) -> ([float32x4_t; 2], [float32x4_t; 2]) {
         let [x, y, z] = node.origin;
@@ -59,12 +58,14 @@ impl NeonRay {
         let scale = load(&[scale[0], scale[1], scale[2], 0.0], 0);
         // SAFETY: NEON is part of every 64-bit Arm target of Rust's with floats.
         unsafe {
+            // Convert the grid of the node to distances along the ray, with slack
             let step = vmulq_f32(scale, self.inverse);
             let base = vmulq_f32(vsubq_f32(corner, self.origin), self.inverse);
             let fixed = vfmaq_f32(self.reach, vabsq_f32(step), vdupq_n_f32(255.0 * SLAB_SLACK));
             let slack = vfmaq_f32(fixed, vabsq_f32(base), vdupq_n_f32(SLAB_SLACK));
             let low = vsubq_f32(base, slack);
             let high = vaddq_f32(base, slack);
+            // Clip the ray to the slabs of all children, axis by axis
             let mut near = [vdupq_n_f32(self.ray.t_min.max(0.0)); 2];
             let mut far = [vdupq_n_f32(limit); 2];
             macro_rules! axis {
@@ -76,8 +77,7 @@ impl NeonRay {
                     for half in 0..2 {
                         let enter = vfmaq_f32(vdupq_laneq_f32::<$axis>(low), enter[half], step);
                         let leave = vfmaq_f32(vdupq_laneq_f32::<$axis>(high), leave[half], step);
-                        // Of a NaN (planes beyond the range of f32) and a number, these take the
-                        // number: no bound.
+                        // If one operand is NaN (planes beyond the range of f32), these return the other one: no bound.
                         near[half] = vmaxnmq_f32(enter, near[half]);
                         far[half] = vminnmq_f32(leave, far[half]);
                     }
@@ -90,7 +90,7 @@ impl NeonRay {
         }
     }
 
-    /// Middle of the chord and discriminant for lanes `first .. first + 4` of a block.
+    /// Midpoint of the chord and discriminant for lanes `first .. first + 4` of a block.
     #[inline(always)]
     fn chords(
         &self,
@@ -106,6 +106,7 @@ impl NeonRay {
         );
         // SAFETY: NEON is part of every 64-bit Arm target of Rust's with floats.
         unsafe {
+            // Find the points of the ray nearest to the centres, and the vectors between them
             let cx = vsubq_f32(x, vdupq_n_f32(o.x));
             let cy = vsubq_f32(y, vdupq_n_f32(o.y));
             let cz = vsubq_f32(z, vdupq_n_f32(o.z));
@@ -115,6 +116,7 @@ impl NeonRay {
             let ay = vfmsq_f32(cy, middle, dy);
             let az = vfmsq_f32(cz, middle, dz);
             let across = vfmaq_f32(vfmaq_f32(vmulq_f32(ax, ax), ay, ay), az, az);
+            // Subtract the squared distances from the squared radii
             let squared = match radii {
                 Some(radii) => {
                     let r = load(&radii.0, first);
@@ -126,7 +128,7 @@ impl NeonRay {
         }
     }
 
-    /// The crossing that counts, and which of the four lanes have it in `t_min..=limit`.
+    /// The hit distance of each of the four lanes, and a mask of those in `t_min..=limit`.
     #[inline(always)]
     fn distances(
         &self,
@@ -142,6 +144,7 @@ impl NeonRay {
             if vmaxvq_u32(hit) == 0 {
                 return ([0.0; LANES], 0);
             }
+            // Choose the first intersection that does not lie before `t_min`
             let chord = vsqrtq_f32(vmaxnmq_f32(discriminant, vdupq_n_f32(0.0)));
             let t_min = vdupq_n_f32(self.ray.t_min);
             let near = vsubq_f32(middle, chord);
@@ -173,6 +176,7 @@ impl Kernel for Neon {
         let entered = unsafe {
             bits(vcleq_f32(near[0], far[0])) | (bits(vcleq_f32(near[1], far[1])) << LANES)
         };
+        // Compress the keys of the entered children
         let mut mask = entered & u32::from(node.child_mask);
         let distances = [store(near[0]), store(near[1])];
         let mut keys = [0; WIDTH];
@@ -211,6 +215,7 @@ impl Kernel for Neon {
             while lanes != 0 {
                 let lane = lanes.trailing_zeros() as usize;
                 lanes &= lanes - 1;
+                // Keep the nearest distance and all lanes with it
                 let distance = t[lane % LANES];
                 if distance <= best {
                     tied = if distance < best { 0 } else { tied } | (1 << (first + lane));
@@ -266,7 +271,7 @@ impl Kernel for Neon {
     }
 }
 
-/// Four numbers of `values` from `first` on.
+/// Loads four elements of `values` from `first` on.
 #[inline(always)]
 fn load<const N: usize>(values: &[f32; N], first: usize) -> float32x4_t {
     let four = &values[first..first + LANES];
@@ -282,7 +287,7 @@ fn store(v: float32x4_t) -> [f32; LANES] {
     array
 }
 
-/// A bit for each lane of a comparison's result.
+/// One bit per lane of the result of a comparison.
 #[inline(always)]
 fn bits(mask: uint32x4_t) -> u32 {
     const BITS: [u32; LANES] = [1, 2, 4, 8];

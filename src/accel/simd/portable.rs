@@ -1,5 +1,4 @@
-//! Plain loops over lanes, for machines without a kernel of their own and as the readable statement
-//! of what the others do.
+//! Plain loops over lanes, for machines without a kernel of their own, and as the reference for the other kernels.
 
 use glam::Vec3;
 
@@ -9,7 +8,7 @@ use crate::ray::Ray;
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii};
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// See the module.
+/// The portable kernel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Portable;
 
@@ -28,9 +27,9 @@ impl PreparedRay {
         radius * radius
     }
 
-    /// Half chord and distance of the chord's middle for each lane; the half chord is NaN where
-    /// the line misses. The distance of the line from the centre is taken from the difference
-    /// vector (Haines et al. 2019, "Precision Improvements for Ray/Sphere Intersection").
+    /// Midpoint distance and half length of the chord for each lane; the half length is NaN if the line misses the
+    /// sphere. The distance of the line from the centre is computed from the difference vector (Haines et al. 2019,
+    /// "Precision Improvements for Ray/Sphere Intersection").
     fn chords(&self, block: &Block, radii: Option<&BlockRadii>) -> [(f32, f32); BLOCK_SIZE] {
         std::array::from_fn(|lane| {
             let to_center = block.center(lane) - self.ray.origin;
@@ -41,7 +40,7 @@ impl PreparedRay {
         })
     }
 
-    /// The crossing that counts for each lane, or NaN.
+    /// The hit distance for each lane, or NaN.
     fn distances(&self, block: &Block, radii: Option<&BlockRadii>) -> [f32; BLOCK_SIZE] {
         self.chords(block, radii).map(|(middle, half)| {
             let near = middle - half;
@@ -75,11 +74,13 @@ impl Kernel for Portable {
         let mut near = [ray.ray.t_min.max(0.0); WIDTH];
         let mut far = [limit; WIDTH];
         for axis in 0..3 {
+            // Convert the grid of the node to distances along the ray, with slack
             let inverse = ray.inverse[axis];
             let step = f32::from_bits(u32::from(node.exponent[axis]) << 23) * inverse;
             let base = (node.origin[axis] - ray.ray.origin[axis]) * inverse;
             let slack =
                 (base.abs() + 255.0 * step.abs()) * SLAB_SLACK + ray.padding * inverse.abs();
+            // Clip the ray to the slab of each child
             let side = usize::from(inverse < 0.0);
             for slot in 0..WIDTH {
                 let enter = f32::from(node.planes[axis][side][slot]) * step + (base - slack);
@@ -106,6 +107,7 @@ impl Kernel for Portable {
         radii: Option<&BlockRadii>,
         limit: f32,
     ) -> Option<(f32, u32)> {
+        // Keep the nearest distance and all lanes with it
         let mut best = limit;
         let mut lanes = 0;
         for (lane, t) in ray.distances(block, radii).into_iter().enumerate() {

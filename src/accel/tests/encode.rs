@@ -1,4 +1,4 @@
-//! Leaves as a native frame stores them, by the simplest encoder that is right.
+//! Leaves as a native frame stores them, by the simplest correct encoder.
 
 use super::*;
 use spherule_formats::blocks::{
@@ -46,7 +46,7 @@ pub(super) enum OwnedRadii {
     U8(Vec<[u8; BLOCK_SIZE]>),
 }
 
-/// Stored leaves in memory of their own.
+/// Stored leaves that own their memory.
 #[derive(Debug, Clone)]
 pub(super) struct OwnedLeaves {
     pub(super) count: u64,
@@ -59,7 +59,7 @@ pub(super) struct OwnedLeaves {
 }
 
 impl OwnedLeaves {
-    /// The spheres of `scene`, which has a radius for each if they are to be stored.
+    /// Encodes the spheres of `scene`, which needs a radius per sphere if radii are stored.
     pub(super) fn encode(scene: &Scene, positions: Positions, radii: Radii) -> Self {
         let mut builder = TreeBuilder::new();
         builder.build(&scene.spheres(), &BuildSettings::new(Structure::Lbvh));
@@ -92,7 +92,7 @@ impl OwnedLeaves {
         leaves
     }
 
-    /// As files give them.
+    /// The leaves as files contain them.
     pub(super) fn leaves(&self) -> StoredLeaves<'_> {
         let wide = &self.wide;
         let [low, step] = self.radius_codes;
@@ -113,7 +113,7 @@ impl OwnedLeaves {
         }
     }
 
-    /// What is stored, decoded; `radius` where it is given or none are stored.
+    /// The decoded content; all spheres have `radius` if it is given or if no radii are stored.
     pub(super) fn scene(&self, name: &'static str, radius: Option<f32>) -> Scene {
         let leaves = self.leaves();
         let count = self.count as usize;
@@ -158,7 +158,7 @@ impl OwnedLeaves {
         };
     }
 
-    /// Nodes over `blocks` and the radii that are there.
+    /// Makes nodes over `blocks` and the stored radii.
     fn make_nodes(&mut self, blocks: &[Block]) {
         let radii = self.leaves().radii;
         let bounds: Vec<_> = (0..blocks.len())
@@ -170,7 +170,7 @@ impl OwnedLeaves {
         self.nodes = bounds.chunks(WIDTH).map(Node::enclosing).collect();
     }
 
-    /// Codes of `blocks`; some that could be coded are kept as they are, too.
+    /// Encodes `blocks`; some are stored uncoded although they could be coded.
     fn encode_blocks<B: CompactBlock>(&mut self, blocks: &[Block]) -> Vec<B> {
         let mut coded = Vec::new();
         for (index, block) in blocks.iter().enumerate() {
@@ -187,7 +187,7 @@ impl OwnedLeaves {
     }
 }
 
-/// Brings the lowest of the `used` lanes to the front; the others repeat the last.
+/// Moves the lowest of the `used` lanes to the front; the unused lanes repeat the last one.
 fn arrange(block: &mut Block, radii: &mut BlockRadii, used: usize) {
     let lowest = (1..used).fold(0, |a, b| if block.z[b] < block.z[a] { b } else { a });
     for axis in [&mut block.x, &mut block.y, &mut block.z, &mut radii.0] {
@@ -197,7 +197,7 @@ fn arrange(block: &mut Block, radii: &mut BlockRadii, used: usize) {
     }
 }
 
-/// The nearest codes whose positions are within the planes; none if there are no such.
+/// The nearest codes with positions between the planes; None if there are none.
 fn codes_of<B: CompactBlock>(block: &Block, node: &Node, slot: usize) -> Option<B> {
     let frame = node.child_frame(slot);
     let mut codes = [[0; BLOCK_SIZE]; 3];

@@ -1,11 +1,11 @@
-//! Packets with rays that are none, and packets against brute force.
+//! Packets with invalid rays, and packets against brute force.
 
 use super::packets::{SHAPES, check_packet, packet};
 use super::*;
 use crate::accel::{Coherence, TreeHits};
 use crate::ray::{PACKET_SIZE, RayPacket};
 
-/// What a component of a ray may be that should not be there.
+/// Invalid values for a component of a ray.
 const POISON: [f32; 7] = [
     f32::NAN,
     f32::INFINITY,
@@ -15,8 +15,8 @@ const POISON: [f32; 7] = [
     -1.0,
     0.0,
 ];
-/// Of a direction: any other value would break the promise of unit directions, without which distances to
-/// boxes and spheres are not the same.
+/// Invalid values for a direction. Any other value would violate the precondition of unit directions, without which
+/// distances to boxes and spheres differ.
 const DIRECTION_POISON: [f32; 3] = [f32::NAN, f32::INFINITY, f32::NEG_INFINITY];
 
 /// `ray` with one component replaced.
@@ -43,7 +43,7 @@ fn levels() -> impl Iterator<Item = SimdLevel> {
     SimdLevel::ALL.into_iter().filter(|l| l.is_supported())
 }
 
-/// Poisoned lanes find what they find alone, and the others as well.
+/// All lanes, poisoned or not, find what they find alone.
 #[test]
 fn poisoned_rays_do_not_change_their_neighbours() {
     let structures = [Structure::Kdtree, Structure::Bvh];
@@ -58,7 +58,7 @@ fn poisoned_rays_do_not_change_their_neighbours() {
                 for shape in SHAPES {
                     for turn in 0..12 {
                         let sound = packet(&scene, shape, &mut random);
-                        // From a single lane up to most of them.
+                        // Poisons a single lane up to most of them.
                         let part = if turn % 2 == 0 { 0.1 } else { 0.6 };
                         let rays: Vec<Ray> = sound
                             .rays()
@@ -126,7 +126,7 @@ fn points_are_found_as_by_single_rays() {
     }
 }
 
-/// Incoherent packets, whose rays are all far apart.
+/// Incoherent packets with rays that are far apart.
 #[test]
 fn incoherent_packets_match_brute_force() {
     for scene in awkward_scenes() {
@@ -147,7 +147,7 @@ fn incoherent_packets_match_brute_force() {
     }
 }
 
-/// Returns how many rays were judged: too near to call are left out.
+/// Returns the number of rays that were compared; rays whose result may change by rounding are skipped.
 #[track_caller]
 fn check_by_brute_force(scene: &Scene, tree: &TreeView, rays: &[Ray], what: &str) -> usize {
     let packet = packet_of(rays.iter().copied());
@@ -173,7 +173,7 @@ fn check_by_brute_force(scene: &Scene, tree: &TreeView, rays: &[Ray], what: &str
     judged
 }
 
-/// The distance that brute force finds, if any; none where rounding may decide.
+/// The distance found by brute force, if any; None if rounding may change the result.
 fn certain_hit(scene: &Scene, ray: &Ray) -> Option<Option<f64>> {
     let mut nearest: Option<f64> = None;
     for (i, center) in scene.centers.iter().enumerate() {

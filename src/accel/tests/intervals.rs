@@ -6,11 +6,11 @@ use crate::accel::intervals::TreeExit;
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::traverse::TreeHit;
 
-/// Where the line of `ray` is inside the union.
+/// The pieces of the line of `ray` inside the union.
 struct Exact {
-    /// Pieces in order.
+    /// Pieces in ascending order.
     pieces: Vec<(f64, f64)>,
-    /// Whether there are as many where f32 puts ends a little elsewhere.
+    /// Whether the number of pieces stays the same if rounding to f32 moves their ends a little.
     is_clear: bool,
 }
 
@@ -33,7 +33,7 @@ fn merged(scene: &Scene, ray: &Ray, tolerance: f64) -> Exact {
     Exact { pieces, is_clear }
 }
 
-/// The union of intervals that each are `grown` at both ends.
+/// The union of intervals, each extended by `grown` at both ends.
 fn united(all: &[(f64, f64)], grown: f64) -> Vec<(f64, f64)> {
     let ends = all
         .iter()
@@ -51,7 +51,7 @@ fn united(all: &[(f64, f64)], grown: f64) -> Vec<(f64, f64)> {
     pieces
 }
 
-/// The distances at which a ray that starts in the open changes sides, one after the other along the line.
+/// The distances at which a ray that starts outside changes sides, in order along the line.
 fn crossings(tree: &TreeView, ray: &Ray) -> Vec<TreeHit> {
     let mut found = Vec::new();
     let mut rest = *ray;
@@ -70,7 +70,7 @@ fn crossings(tree: &TreeView, ray: &Ray) -> Vec<TreeHit> {
     found
 }
 
-/// Returns whether the ray was judged.
+/// Returns whether the ray was compared.
 #[track_caller]
 fn judge(scene: &Scene, tree: &TreeView, ray: &Ray) -> bool {
     let tolerance = 1e-3 * f64::from(scene.typical_radius()).max(1e-3);
@@ -92,13 +92,13 @@ fn judge(scene: &Scene, tree: &TreeView, ray: &Ray) -> bool {
             (f64::from(hit.t) - t).abs() < 0.1 * tolerance + 1e-5 * t,
             "{what}"
         );
-        // Whose surface it is: the point lies on it.
+        // The point lies on the surface of the sphere that was hit.
         let (center, radius) = tree.sphere(hit.slot);
         let (own, _) = exact(ray, center, radius);
         let on = |t: f64| own.iter().any(|own| (own - t).abs() < tolerance + 1e-5 * t);
         assert!(on(*t), "{what}: not a place of {:?}", hit.slot);
     }
-    // In the midst of each piece it is inside, and comes out at its end.
+    // The midpoint of each piece is inside, and the exit is at its end.
     for (near, far) in pieces.iter().filter(|p| p.0 > 0.0) {
         let t_min = (0.5 * (near + far)) as f32;
         let inside = Ray { t_min, ..*ray };
@@ -241,7 +241,7 @@ proptest! {
         spheres in prop::collection::vec((0_u8..60, 1_u8..20, -3_i8..4), 1..40),
         start in 0_u8..60,
     ) {
-        // Whole numbers, so that ends touch and coincide often; all arithmetic is exact but roots.
+        // Whole numbers, so that ends touch and coincide often; all arithmetic except roots is exact.
         let centers = spheres.iter().map(|s| Vec3::new(f32::from(s.0), 0.0, 0.0)).collect();
         let radii: Vec<f32> = spheres.iter().map(|s| f32::from(s.1)).collect();
         let scene = Scene { name: "line", centers, radii };

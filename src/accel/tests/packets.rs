@@ -8,20 +8,20 @@ use crate::accel::{Coherence, TreeHits};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::Node;
 
-/// How the rays of a packet lie to one another.
+/// Arrangement of the rays of a packet.
 #[derive(Debug, Clone, Copy)]
 pub(super) enum Shape {
     /// From one point through a square.
     Camera,
-    /// From points near one another to one point.
+    /// From nearby points to one point.
     Shadow,
-    /// Next to one another, as far apart as the scene is wide.
+    /// Parallel, as far apart as the scene is wide.
     Wide,
-    /// From within a particle, every way.
+    /// From inside a particle, in all directions.
     Inside,
-    /// Along an axis or nearly, to both sides of it.
+    /// Along an axis or nearly so, on both sides of it.
     Axis,
-    /// As they come.
+    /// Random rays.
     Any,
 }
 
@@ -65,7 +65,7 @@ pub(super) fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPac
     let len = 1 + (random.next() * 1.5 * PACKET_SIZE as f32) as usize;
     let mut packet = RayPacket::default();
     for ray in rays.iter().take(len) {
-        // Some end early or begin late.
+        // Some rays end early or begin late.
         let choice = (random.next() * 8.0) as u32;
         let distance = (target - ray.origin).length();
         packet.push(&Ray {
@@ -77,10 +77,10 @@ pub(super) fn packet(scene: &Scene, shape: Shape, random: &mut Random) -> RayPac
     packet
 }
 
-/// Returns how many rays hit.
+/// Returns the number of rays that hit.
 #[track_caller]
 pub(super) fn check_packet(tree: &TreeView, packet: &RayPacket, what: &str) -> usize {
-    // Which of several copies is found depends on the leaves that were visited.
+    // The copy that is found depends on the leaves that were visited.
     let sphere = |slot| {
         if tree.has_copies {
             tree.particle(slot)
@@ -160,7 +160,7 @@ fn packets_find_what_single_rays_find() {
     }
 }
 
-/// Returns how many rays hit, over all levels.
+/// Returns the number of rays that hit, over all levels.
 #[track_caller]
 fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
     let mut hits = 0;
@@ -184,7 +184,7 @@ fn an_empty_packet_finds_nothing() {
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());
     let view = builder.tree().view();
-    // Also one that held rays before.
+    // Also an empty packet that held rays before.
     let mut emptied = RayPacket::default();
     emptied.push(&Ray::new(Vec3::X * -3.0, Vec3::X));
     assert_eq!(check_packet(&view, &emptied, "one ray"), 1);

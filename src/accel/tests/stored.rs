@@ -1,4 +1,4 @@
-//! Trees over stored leaves against brute force over what is stored, and over damaged ones.
+//! Trees over stored leaves against brute force over the same data, and trees over damaged leaves.
 
 use std::borrow::Borrow;
 
@@ -38,7 +38,7 @@ fn sets(count: usize) -> [(&'static str, Vec<Vec3>); 5] {
     ]
 }
 
-/// Radii around one that gives a ray something to miss.
+/// Radii around a value that leaves gaps for rays to miss.
 fn radii_of(points: &[Vec3], name: &str) -> Vec<f32> {
     let mut random = Random(points.len() as u64);
     let typical = match name {
@@ -49,7 +49,7 @@ fn radii_of(points: &[Vec3], name: &str) -> Vec<f32> {
     (0..points.len()).map(factor).collect()
 }
 
-/// Returns how many rays were judged.
+/// Returns the number of rays that were compared.
 #[track_caller]
 fn check_stored(owned: &OwnedLeaves, name: &'static str, radius: Option<f32>) -> usize {
     let mut scene = match owned.count {
@@ -57,7 +57,7 @@ fn check_stored(owned: &OwnedLeaves, name: &'static str, radius: Option<f32>) ->
         _ => owned.scene(name, radius),
     };
     if radius.is_none() || scene.centers.windows(2).any(|pair| pair[0] != pair[1]) {
-        // Not to the bit, with grids or radii of their own.
+        // Not equal to the bit, because of coded positions or radii.
         scene.name = match name {
             "coincident" => "nearly coincident",
             other => other,
@@ -128,7 +128,7 @@ fn many_stored_particles_match_brute_force() {
     check_sets(20_000);
 }
 
-/// All blocks as a walk has them.
+/// Loads all blocks as a traversal does.
 struct LoadAll(usize);
 
 impl TreeTask for LoadAll {
@@ -144,7 +144,7 @@ impl TreeTask for LoadAll {
     }
 }
 
-/// What is decoded within a walk is what files say, to the bit.
+/// Blocks decoded during a traversal equal those decoded from the file, to the bit.
 #[test]
 fn spheres_of_slots_are_those_stored() {
     let centers = random_points(1025, 3);
@@ -181,7 +181,7 @@ fn spheres_of_slots_are_those_stored() {
     }
 }
 
-/// The levels above are made from planes instead of particles, and rays find the same.
+/// The upper levels are built from planes and not from particles, and rays find the same hits.
 #[test]
 fn stored_and_built_trees_find_the_same() {
     let scene = Scene::common("cloud", random_points(20_000, 5), 0.02);
@@ -313,7 +313,7 @@ fn scramble<T: bytemuck::Pod>(values: &mut [T], seed: u64) {
     }
 }
 
-/// Asks everything of a tree over what may be nonsense.
+/// Runs every query on a tree over invalid data.
 #[track_caller]
 fn trace_anything(owned: &OwnedLeaves, radius: Option<f32>) {
     let leaves = owned.leaves();
@@ -386,7 +386,7 @@ fn noise_in_leaves_is_harmless() {
     }
 }
 
-/// To blocks that are not there.
+/// References to missing blocks.
 #[test]
 fn references_out_of_range_are_harmless() {
     let scene = Scene::common("cloud", random_points(1025, 1), 0.1);

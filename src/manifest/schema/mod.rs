@@ -1,7 +1,7 @@
-//! The manifest's JSON schema, for editors: completion, and mistakes underlined while typing.
+//! The JSON schema of the manifest, for completion and error marking in editors.
 //!
-//! All of it comes from the declarations of the keys, but for what keys need of one another (`conditions` in the
-//! modules of the tables). What the reader refuses beyond that (a camera that looks at itself) only the reader knows.
+//! All of it comes from the declarations of the keys, except dependencies between keys (`conditions` in the modules
+//! of the tables). Further checks (a camera at its own target, for example) are only made by the reader.
 
 use serde_json::{Map, Value, json};
 
@@ -11,7 +11,7 @@ use super::{ABOUT, Manifest, camera, work};
 #[cfg(test)]
 mod tests;
 
-/// Name of the schema beside a manifest that refers to it.
+/// Name of the schema next to a manifest that refers to it.
 pub const SCHEMA_FILE: &str = "job.schema.json";
 
 /// The schema of manifests (draft 2020-12).
@@ -39,7 +39,7 @@ pub fn job_schema() -> Value {
     })
 }
 
-/// Puts every list of tables where it belongs.
+/// Adds every list of tables to the table that contains it.
 fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
     let mut kinds: Vec<(&str, Vec<Value>)> = Vec::new();
     for section in sections(entries) {
@@ -68,7 +68,7 @@ fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
     }
 }
 
-/// The tables of `entries`, each once, in order.
+/// The tables of `entries` in order, each once.
 pub(super) fn sections(entries: &Entries) -> impl Iterator<Item = &str> {
     let tables = entries.list().chunk_by(|a, b| a.section == b.section);
     tables.map(|table| &*table[0].section)
@@ -96,7 +96,7 @@ fn table(entries: &Entries, section: &str) -> Value {
 }
 
 fn property(entry: &Entry) -> Value {
-    // The type of an item decides which keys it has.
+    // The type of an item determines its keys.
     let mut schema = match entry.name() {
         "type" => json!({ "const": json_of(entry.sample()) }),
         _ => entry.schema.clone(),
@@ -111,7 +111,7 @@ fn property(entry: &Entry) -> Value {
     schema
 }
 
-/// A value of our own as JSON.
+/// Converts a TOML value of this program to JSON.
 fn json_of(value: &str) -> Value {
     let table: toml::Table = format!("value = {value}")
         .parse()

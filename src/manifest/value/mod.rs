@@ -1,4 +1,4 @@
-//! Kinds of values: how each is read, written and described. What restricts them is in the [`Key`].
+//! Types of values: how each is read, written and described. Restrictions are in the [`Key`].
 
 use serde_json::{Value as Json, json};
 use spherule_formats::is_control;
@@ -11,22 +11,22 @@ mod text;
 
 pub(super) use numbers::numbers_schema;
 
-/// Why a value is not accepted.
+/// Reasons why a value is not accepted.
 pub(super) enum Fault {
-    /// It is not of the kind that [`Value::kind`] describes.
+    /// It does not match the description of [`Value::kind`].
     Unwanted,
-    /// As the text says.
+    /// The reason in the text.
     Because(String),
-    /// The problems are already noted.
+    /// Problems that have been reported already.
     Noted,
 }
 
-/// How an option of the command line takes a value.
+/// The kind of value of a command-line option.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FlagKind {
-    /// It takes none.
+    /// No value.
     Switch,
-    /// A whole number.
+    /// An integer.
     Integer,
     /// A number.
     Number,
@@ -40,12 +40,12 @@ pub enum FlagKind {
     List,
 }
 
-/// A kind of value.
+/// A type of values.
 pub(super) trait Value: Sized {
-    /// How an option takes it.
+    /// The kind of value of an option for it.
     const FLAG: FlagKind = FlagKind::Text(false);
 
-    /// What it is, with its range, as in "wants a number from 0 to 1".
+    /// Description with the range, as in "wants a number from 0 to 1".
     fn kind(key: &Key) -> String;
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault>;
@@ -56,7 +56,7 @@ pub(super) trait Value: Sized {
     /// As JSON schema.
     fn schema(key: &Key) -> Json;
 
-    /// What stands for it among the settings that images depend on.
+    /// The value in the settings that images depend on.
     fn setting(&self) -> String {
         self.toml()
     }
@@ -67,7 +67,7 @@ pub(super) trait Value: Sized {
     }
 }
 
-/// What a key sets: a value, or perhaps one.
+/// The target of a key: a value, or an optional value.
 pub(super) trait Slot {
     type Value: Value;
 
@@ -102,13 +102,13 @@ impl<T: Value> Slot for Option<T> {
     }
 }
 
-/// A value that is one of some words.
+/// A value with a fixed set of names.
 pub(super) trait Named: Copy + PartialEq + 'static {
-    /// All, with the names that users type.
+    /// All values with their names.
     fn names() -> Vec<(Self, &'static str)>;
 }
 
-/// Declares an enum whose variants have the names that users type; or names those of an enum that is elsewhere.
+/// Declares an enum with names for its variants, or names the variants of an existing enum.
 macro_rules! named {
     ($(#[$meta:meta])* $name:ident { $($(#[$variant_meta:meta])* $variant:ident = $text:literal,)+ }) => {
         $(#[$meta])*
@@ -118,10 +118,10 @@ macro_rules! named {
         }
 
         impl $name {
-            /// All, with the names that users type.
+            /// All values with their names.
             pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
 
-            /// As users type it.
+            /// The name in a manifest.
             pub const fn name(self) -> &'static str {
                 match self {
                     $(Self::$variant => $text,)+
@@ -166,7 +166,7 @@ impl<T: Named> Value for T {
     }
 }
 
-/// Each at most once, and at least one.
+/// At least one item, and no duplicates.
 impl<T: Named> Value for Vec<T> {
     const FLAG: FlagKind = FlagKind::List;
 
@@ -224,7 +224,7 @@ fn list(items: impl Iterator<Item = String>) -> String {
     format!("[{}]", items.collect::<Vec<_>>().join(", "))
 }
 
-/// `text` as a TOML string on one line. What controls a terminal is escaped in it: manifests are printed.
+/// `text` as a TOML string on one line. Control characters of terminals are escaped, because manifests are printed.
 pub(super) fn quoted(text: &str) -> String {
     if !text.contains(is_control) {
         return toml::Value::from(text).to_string();

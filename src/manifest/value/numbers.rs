@@ -75,7 +75,7 @@ impl Value for f64 {
     }
 }
 
-/// Bounds hold in single precision.
+/// Bounds are checked in single precision.
 impl Value for f32 {
     const FLAG: FlagKind = FlagKind::Number;
 
@@ -115,7 +115,7 @@ fn number_schema(kind: &str, key: &Key) -> Json {
     range
 }
 
-/// Whole numbers without a point.
+/// Integers are written without a decimal point.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "checked to be whole and small"
@@ -128,7 +128,7 @@ fn json_number(value: f64) -> Json {
     }
 }
 
-/// Seconds, to the nanosecond.
+/// Seconds, with a resolution of one nanosecond.
 impl Value for Duration {
     const FLAG: FlagKind = FlagKind::Seconds;
 
@@ -139,7 +139,7 @@ impl Value for Duration {
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
         let seconds = field.as_number().filter(|v| key.holds(*v));
         let time = seconds.and_then(|s| Self::try_from_secs_f64(s).ok());
-        // Less than a nanosecond is none.
+        // Less than a nanosecond counts as zero.
         let time = time.filter(|time| key.holds(time.as_secs_f64()));
         time.ok_or(Fault::Unwanted)
     }

@@ -8,7 +8,7 @@ use crate::manifest::key::Key;
 use crate::manifest::reader::Field;
 use crate::metrics::Bytes;
 
-/// A name: text that is not blank.
+/// A name is text that is not blank.
 const NAME_PATTERN: &str = r"\S";
 
 impl Value for String {
@@ -30,7 +30,7 @@ impl Value for String {
     }
 }
 
-/// Names, at least one.
+/// At least one name.
 impl Value for Vec<String> {
     const FLAG: FlagKind = FlagKind::List;
 
@@ -122,7 +122,7 @@ impl Value for Bytes {
     }
 }
 
-/// Sizes as a regular expression; parts of a unit need one larger than a byte.
+/// Sizes as a regular expression; fractions require a unit larger than a byte.
 const SIZE_PATTERN: &str = concat!(
     r"^\s*([0-9]+\s*([bB]|[kKmMgGtT]([iI]?[bB])?)?",
     r"|([0-9]+\.[0-9]*|\.[0-9]+)\s*[kKmMgGtT]([iI]?[bB])?)\s*$"

@@ -1,14 +1,14 @@
-//! Light from infinitely far.
+//! Directional lights.
 
 use glam::Vec3;
 
 use super::light::{Light, LightSamples};
 use crate::math::{Lanes3, Supported, splat, splat3};
 
-/// Parallel light.
+/// A light with parallel rays.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DirectionalLight {
-    /// Unit vector.
+    /// Unit vector towards the light.
     pub(super) to_light: Vec3,
     pub(super) radiance: Vec3,
     pub(super) casts_shadow: bool,

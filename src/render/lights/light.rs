@@ -5,10 +5,10 @@ use crate::ray::RayPacket;
 
 /// A light.
 pub(in crate::render) trait Light: Sync {
-    /// Samples the light that arrives at `start`, the shading points of a packet, if nothing is in its way.
+    /// Samples the unoccluded light at `start`, the shading points of a packet.
     fn sample_li(&self, simd: Supported, start: &Lanes3, samples: &mut LightSamples);
 
-    /// Whether things stand in its way; without, it costs no ray.
+    /// Whether other objects occlude the light. A light without shadows needs no shadow rays.
     fn casts_shadow(&self) -> bool;
 }
 
@@ -18,8 +18,9 @@ pub(in crate::render) trait Light: Sync {
 pub(in crate::render) struct LightSamples {
     /// Rays to the light.
     pub(in crate::render) rays: RayPacket,
-    /// Radiance that arrives along each ray; then what of it the surface sends on to the sample of the picture.
+    /// Radiance that arrives along each ray; after `Material::reflect`, the radiance that arrives at the sample of
+    /// the image.
     pub(in crate::render) radiance: Lanes3,
-    /// Lanes that the light shines on.
+    /// Lanes that the light reaches.
     pub(in crate::render) lanes: u32,
 }

@@ -1,6 +1,6 @@
 //! Lights: each samples the light that arrives at the shading points of a packet.
 //!
-//! A new kind of light is one file here and a line in [`light_of`].
+//! To add a kind of light, add a file here and a line in [`light_of`].
 
 use crate::scene::{self, LightKind};
 
@@ -12,7 +12,7 @@ use directional::DirectionalLight;
 pub(super) use light::{Light, LightSamples};
 use point::PointLight;
 
-/// The light that a scene's `light` is.
+/// The light for a `light` of the scene.
 pub(super) fn light_of(light: &scene::Light) -> Box<dyn Light> {
     match light.kind {
         LightKind::Point { position, falloff } => Box::new(PointLight {

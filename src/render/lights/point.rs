@@ -1,4 +1,4 @@
-//! Light from a place.
+//! Point lights.
 
 #![expect(
     clippy::needless_range_loop,
@@ -30,11 +30,12 @@ impl Light for PointLight {
     }
 }
 
-/// At the very place of the light the direction is no number, and nothing is lit.
+/// Samples a point light. At the exact position of the light the direction is NaN, so that a material rejects it.
 #[inline(always)]
 fn sample_point_light_body(light: &PointLight, start: &Lanes3, samples: &mut LightSamples) {
     let has_falloff = light.falloff == Falloff::InverseSquare;
     for l in 0..LANES {
+        // Compute direction and distance
         let mut v = [0.0; 3];
         for axis in 0..3 {
             v[axis] = light.position[axis] - start[axis][l];

@@ -1,4 +1,4 @@
-//! The smooth boundary of a transmissive medium, and absorption within.
+//! The smooth interface of a transmissive medium, and absorption inside it.
 
 use glam::Vec3;
 
@@ -9,14 +9,14 @@ use crate::scene::material::{dielectric, schlick};
 use crate::scene::{self, Fresnel};
 use crate::surface::Intersections;
 
-/// The boundary of the particles, and the medium behind it.
+/// The interface of the particles, and the medium inside.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct Dielectric {
-    /// Index of refraction inside over that outside.
+    /// Relative index of refraction: inside over outside.
     pub(super) ior: f32,
     r0: f32,
     is_exact: bool,
-    /// Weight of the refracted ray; 0 is opaque.
+    /// Weight of the refracted ray; 0 if opaque.
     pub(in crate::render) transmission: f32,
     /// Extinction coefficient of the medium, linear RGB, per scene unit.
     pub(in crate::render) extinction: Vec3,
@@ -34,8 +34,8 @@ impl Dielectric {
     }
 
     /// The Fresnel reflectance at the absolute `cosine` between ray and normal, and the squared sine of the refracted
-    /// ray, which is 1 or more under total internal reflection. `ratio` is the index of refraction on the ray's side over
-    /// the one beyond.
+    /// ray, which is 1 or more under total internal reflection. `ratio` is the index of refraction on the side of the
+    /// ray over that on the other side.
     #[inline(always)]
     pub(super) fn fresnel(&self, cosine: f32, ratio: f32) -> (f32, f32) {
         let rest = 1.0 - cosine * cosine;
@@ -44,8 +44,8 @@ impl Dielectric {
         (if sin2_out >= 1.0 { 1.0 } else { r }, sin2_out)
     }
 
-    /// What a shadow ray keeps that crosses the boundary without a bend, at the absolute `cosine` with the normal: as
-    /// seen from outside, whichever side it comes from.
+    /// Transmittance of a shadow ray that crosses the interface without refraction, at the absolute `cosine` with the
+    /// normal. It is that of a ray from outside, whatever side the shadow ray comes from.
     #[inline(always)]
     pub(in crate::render) fn straight_transmittance(&self, cosine: f32) -> f32 {
         self.transmission * (1.0 - self.reflectance(cosine, 1.0 / self.ior))
@@ -61,15 +61,19 @@ impl Dielectric {
     }
 }
 
-/// Multiplies `throughput` by the transmittance of a medium over `length` (Beer-Lambert), for `lanes` alone.
+/// Multiplies `throughput` by the transmittance of a medium over `length` (Beer-Lambert law), only for `lanes`.
 #[inline(always)]
 fn attenuate_body(extinction: &Vec3, length: &Lanes, lanes: u32, throughput: &mut Lanes3) {
     for axis in 0..3 {
         for l in 0..LANES {
             let length = if length[l] > 0.0 { length[l] } else { 0.0 };
-            let kept = throughput[axis][l] * exp(-length * extinction[axis]);
+            let attenuated = throughput[axis][l] * exp(-length * extinction[axis]);
             let is_inside = lanes >> l & 1 == 1;
-            throughput[axis][l] = if is_inside { kept } else { throughput[axis][l] };
+            throughput[axis][l] = if is_inside {
+                attenuated
+            } else {
+                throughput[axis][l]
+            };
         }
     }
 }
@@ -83,7 +87,7 @@ lane_kernel! {
     ) = attenuate_body;
 }
 
-/// The lanes whose rays leave a sphere at their intersection.
+/// The lanes of rays that leave a sphere at their intersection.
 #[inline(always)]
 fn leaving_body(rays: &RayPacket, hits: &Intersections) -> u32 {
     let (d, n) = (&rays.direction, &hits.normal);
@@ -99,7 +103,7 @@ lane_kernel! {
     pub(in crate::render) fn leaving(rays: &RayPacket, hits: &Intersections) -> u32 = leaving_body;
 }
 
-/// Multiplies `transmittance` by what shadow rays keep where they cross the boundary, for `lanes` alone.
+/// Multiplies `transmittance` by that of the interface that shadow rays cross, only for `lanes`.
 #[inline(always)]
 fn cross_straight_body(
     boundary: &Dielectric,
@@ -111,10 +115,14 @@ fn cross_straight_body(
     let (d, n) = (&rays.direction, &hits.normal);
     for l in 0..LANES {
         let along = d[0][l] * n[0][l] + d[1][l] * n[1][l] + d[2][l] * n[2][l];
-        let passed = boundary.straight_transmittance(along.abs());
-        let passed = if lanes >> l & 1 == 1 { passed } else { 1.0 };
+        let fresnel_transmittance = boundary.straight_transmittance(along.abs());
+        let fresnel_transmittance = if lanes >> l & 1 == 1 {
+            fresnel_transmittance
+        } else {
+            1.0
+        };
         for transmittance in &mut *transmittance {
-            transmittance[l] *= passed;
+            transmittance[l] *= fresnel_transmittance;
         }
     }
 }

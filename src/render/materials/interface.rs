@@ -1,5 +1,5 @@
-//! The surface of one connected transmissive body. It is lit from outside alone; from inside it only reflects and
-//! refracts.
+//! The surface of one connected transmissive body. Light sources illuminate it only from outside; from inside it only
+//! reflects and refracts.
 
 use super::material::Material;
 use super::points::ShadingPoints;
@@ -8,10 +8,10 @@ use crate::math::{LANES, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::surface::Intersections;
 
-/// Least cosine between a ray and a normal: interpolated normals may turn away from rays that graze.
+/// Minimum cosine between a ray and a normal: interpolated normals may face away from grazing rays.
 const GRAZING: f32 = 1e-3;
 
-/// See the module.
+/// The material of a connected transmissive body, see the module.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Interface(pub(super) WhittedMaterial);
 
@@ -36,8 +36,9 @@ impl Material for Interface {
     }
 }
 
-/// The shading points of the surface of one connected body, and both rays that leave them; the rays in `inside` come
-/// from within. Light is bent by the normal to shade by, and goes on from off the surface that rays meet.
+/// The shading points on the surface of one connected body, with reflected and refracted rays; rays of `inside` come
+/// from inside. The shading normal determines their directions; their origins are offset from the surface that rays
+/// are traced against.
 #[inline(always)]
 fn interface_points_body(
     material: &WhittedMaterial,
@@ -47,6 +48,7 @@ fn interface_points_body(
     points: &mut ShadingPoints,
 ) {
     for l in 0..LANES {
+        // Orient the shading normal to the side of the ray
         let is_inside = inside >> l & 1 == 1;
         let side = if is_inside { -1.0 } else { 1.0 };
         let mut d = [0.0; 3];
@@ -55,7 +57,7 @@ fn interface_points_body(
             d[axis] = rays.direction[axis][l];
             s[axis] = hits.shading_normal[axis][l] * side;
         }
-        // The normal, turned against the ray as little as it takes.
+        // If it faces away from the ray, turn it by the smallest angle towards the ray
         let along = d[0] * s[0] + d[1] * s[1] + d[2] * s[2];
         let is_facing = along <= -GRAZING;
         let mut turned = [0.0; 3];
@@ -74,7 +76,7 @@ fn interface_points_body(
             };
             n[axis] = if is_facing { s[axis] } else { turned };
         }
-        // Both rays.
+        // Compute the Fresnel reflectance, and the directions of both rays
         let cosine = -(d[0] * n[0] + d[1] * n[1] + d[2] * n[2]);
         let ratio = if is_inside {
             material.dielectric.ior
@@ -84,27 +86,31 @@ fn interface_points_body(
         let (r, sin2_out) = material.dielectric.fresnel(cosine, ratio);
         let rest = 1.0 - sin2_out;
         let along_normal = ratio * cosine - (if rest > 0.0 { rest } else { 0.0 }).sqrt();
-        let mut onward = [0.0; 3];
-        let mut back = [0.0; 3];
+        let mut refracted = [0.0; 3];
+        let mut reflected = [0.0; 3];
         for axis in 0..3 {
-            onward[axis] = ratio * d[axis] + along_normal * n[axis];
-            back[axis] = d[axis] + 2.0 * cosine * n[axis];
+            refracted[axis] = ratio * d[axis] + along_normal * n[axis];
+            reflected[axis] = d[axis] + 2.0 * cosine * n[axis];
         }
-        let onward2 = onward[0] * onward[0] + onward[1] * onward[1] + onward[2] * onward[2];
-        let back2 = back[0] * back[0] + back[1] * back[1] + back[2] * back[2];
-        let inverse_onward = 1.0 / onward2.sqrt();
-        let inverse_back = 1.0 / back2.sqrt();
-        let has_onward = inverse_onward > 0.0 && inverse_onward < f32::INFINITY;
+        // Normalise the directions
+        let refracted2 =
+            refracted[0] * refracted[0] + refracted[1] * refracted[1] + refracted[2] * refracted[2];
+        let reflected2 =
+            reflected[0] * reflected[0] + reflected[1] * reflected[1] + reflected[2] * reflected[2];
+        let inverse_refracted = 1.0 / refracted2.sqrt();
+        let inverse_reflected = 1.0 / reflected2.sqrt();
+        let has_refracted = inverse_refracted > 0.0 && inverse_refracted < f32::INFINITY;
         for axis in 0..3 {
             let step = hits.offset[l] * (hits.normal[axis][l] * side);
-            let onward = onward[axis] * inverse_onward;
+            let refracted = refracted[axis] * inverse_refracted;
             points.normal[axis][l] = n[axis];
             points.start[axis][l] = hits.anchor[axis][l] + step;
             points.reflected.origin[axis][l] = hits.anchor[axis][l] + step;
-            points.reflected.direction[axis][l] = back[axis] * inverse_back;
+            points.reflected.direction[axis][l] = reflected[axis] * inverse_reflected;
             points.refracted.origin[axis][l] = hits.anchor[axis][l] - step;
-            points.refracted.direction[axis][l] = if has_onward { onward } else { d[axis] };
+            points.refracted.direction[axis][l] = if has_refracted { refracted } else { d[axis] };
         }
+        // Weight the rays
         points.reflected.weight[l] = material.reflection * r;
         points.refracted.weight[l] = material.dielectric.transmission * (1.0 - r);
     }

@@ -8,14 +8,14 @@ use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;
 use crate::surface::Intersections;
 
-/// A material as equation 4.1 of the thesis knows it: what it does with the light of lights, and with what weights
-/// further rays leave it.
+/// A material as defined by equation 4.1 of the thesis: its reflection of direct light, and the weights of the rays
+/// that leave it.
 pub(in crate::render) trait Material: Sync {
     /// The constants of equations 4.1 to 4.3.
     fn constants(&self) -> &WhittedMaterial;
 
-    /// From intersections to shading points with the rays that leave them; rays in `inside` come from within a connected
-    /// body.
+    /// Computes shading points and the rays that leave them from intersections; rays of `inside` come from inside a
+    /// connected body.
     fn shading_points(
         &self,
         simd: Supported,
@@ -25,14 +25,14 @@ pub(in crate::render) trait Material: Sync {
         points: &mut ShadingPoints,
     );
 
-    /// The `lanes` at which lights are seen.
+    /// The `lanes` with direct light.
     fn lit_lanes(&self, lanes: u32, inside: u32) -> u32 {
         let _ = inside;
         lanes
     }
 
-    /// Makes of the radiance that arrives from a light what goes on along the rays of the packet, times `throughput`, for
-    /// `lanes` alone; the others are not lit.
+    /// Converts the radiance that arrives from a light to the radiance reflected along the rays of the packet, times
+    /// `throughput`, only for `lanes`; all other lanes are not lit.
     #[expect(
         clippy::too_many_arguments,
         reason = "arrays that do not overlap; see `lane_kernel!`"

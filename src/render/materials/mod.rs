@@ -1,6 +1,6 @@
-//! Materials: what surfaces do with light.
+//! Materials: reflection and refraction at surfaces.
 //!
-//! A new material is one file here and a line in [`materials_of`].
+//! To add a material, add a file here and a line in [`materials_of`].
 
 use crate::scene::{Scene, ground};
 use crate::surface::MaterialId;
@@ -20,10 +20,10 @@ pub(super) use points::ShadingPoints;
 use two_sided::TwoSided;
 pub(super) use whitted::WhittedMaterial;
 
-/// Highlights of clear bodies below this part of the light are dark.
-const DARKEST_HIGHLIGHT: f32 = 1.0 / 4096.0;
+/// Highlights of clear bodies below this fraction of the light count as dark.
+const MIN_HIGHLIGHT: f32 = 1.0 / 4096.0;
 
-/// The materials of `scene` by [`MaterialId`]. `is_connected` says that the particles bound one body.
+/// The materials of `scene` by [`MaterialId`]. `is_connected`: the particles bound one body.
 pub(super) fn materials_of(
     scene: &Scene,
     is_connected: bool,
@@ -36,7 +36,7 @@ pub(super) fn materials_of(
     let mut constants = WhittedMaterial::new(&scene.material, scene.ambient_light);
     let particles: Box<dyn Material> = if is_connected && constants.dielectric.transmission > 0.0 {
         if !constants.has_color() {
-            constants.darkest_highlight = DARKEST_HIGHLIGHT;
+            constants.min_highlight = MIN_HIGHLIGHT;
         }
         Box::new(Interface(constants))
     } else {

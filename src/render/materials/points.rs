@@ -1,18 +1,18 @@
-//! Shading points: what materials make of intersections.
+//! Shading points, which materials compute from intersections.
 
 use crate::math::Lanes3;
 use crate::render::stream::ScatteredRays;
 
-/// Where the rays of a packet meet surfaces, as light and further rays see it.
+/// The intersections of a packet, prepared for direct light and for further rays.
 #[derive(Debug, Clone, Default)]
 #[repr(C, align(64))]
 pub(in crate::render) struct ShadingPoints {
-    /// Unit normal to shade by, on the side that the ray comes from.
+    /// Unit shading normal, on the side of the ray.
     pub(in crate::render) normal: Lanes3,
-    /// Where rays to lights start.
+    /// Origins of shadow rays.
     pub(in crate::render) start: Lanes3,
     /// Reflected rays.
     pub(in crate::render) reflected: ScatteredRays,
-    /// Refracted rays, of transmissive materials alone.
+    /// Refracted rays, only for transmissive materials.
     pub(in crate::render) refracted: ScatteredRays,
 }

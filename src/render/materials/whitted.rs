@@ -5,7 +5,7 @@ use glam::Vec3;
 use super::dielectric::Dielectric;
 use crate::scene;
 
-/// The constants of eq. 4.1 to 4.3, settled for a scene.
+/// The constants of eq. 4.1 to 4.3 for a scene.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct WhittedMaterial {
     /// `Ka` times the ambient light, linear RGB.
@@ -13,8 +13,8 @@ pub(in crate::render) struct WhittedMaterial {
     pub(in crate::render) diffuse: f32,
     pub(in crate::render) specular: f32,
     pub(in crate::render) shininess: f32,
-    /// Highlights up to this part of the light are left out.
-    pub(in crate::render) darkest_highlight: f32,
+    /// Highlights up to this fraction of the light are ignored.
+    pub(in crate::render) min_highlight: f32,
     /// Weight of the reflected ray.
     pub(in crate::render) reflection: f32,
     /// Fresnel terms, and the weight of the refracted ray.
@@ -28,28 +28,28 @@ impl WhittedMaterial {
             diffuse: material.diffuse,
             specular: material.specular,
             shininess: material.shininess,
-            darkest_highlight: 0.0,
+            min_highlight: 0.0,
             reflection: material.reflection,
             dielectric: Dielectric::new(material),
         }
     }
 
-    /// Whether its base colour is seen.
+    /// Whether its base colour is visible.
     pub(in crate::render) fn has_color(&self) -> bool {
         self.ambient != Vec3::ZERO || self.diffuse > 0.0
     }
 
-    /// Whether it scatters the light of lights.
+    /// Whether it reflects direct light.
     pub(in crate::render) fn scatters(&self) -> bool {
         self.diffuse > 0.0 || self.specular > 0.0
     }
 
-    /// Whether further rays leave it.
+    /// Whether reflected or refracted rays leave it.
     pub(in crate::render) fn sends_rays(&self) -> bool {
         self.reflection > 0.0 || self.dielectric.transmission > 0.0
     }
 
-    /// An opaque material that only scatters.
+    /// An opaque material without specular reflection.
     pub(in crate::render) fn matte(ambient: f32, diffuse: f32, ambient_light: Vec3) -> Self {
         let material = scene::Material {
             ambient,

@@ -1,17 +1,17 @@
-//! The places of a pixel's samples on the film.
+//! Sample positions of a pixel on the film.
 //!
-//! The points of a pixel come from a table of correlated multi-jittered sets, picked by a hash of the pixel: as even as
-//! a set made for every pixel, for a fraction of the time.
+//! The points of a pixel come from a table of correlated multi-jittered sets, selected by a hash of the pixel: as
+//! well distributed as a separate set for every pixel, at a fraction of the cost.
 
 use super::hash::mix;
 use super::multi_jitter::MultiJitter;
 
-/// Sets in a table, unless they are very large.
-const MOST_SETS: usize = 256;
-/// Points in a table, roughly; at least [`LEAST_SETS`] sets are made.
+/// Maximum number of sets in a table.
+const MAX_SETS: usize = 256;
+/// Approximate number of points in a table; there are at least [`MIN_SETS`] sets.
 const TABLE_POINTS: usize = 1 << 16;
-/// Sets in a table, however large they are.
-const LEAST_SETS: usize = 16;
+/// Minimum number of sets in a table, for large sets.
+const MIN_SETS: usize = 16;
 
 /// Sample points for the pixels of a film.
 #[derive(Debug, Clone)]
@@ -23,11 +23,11 @@ pub struct FilmSampler {
 }
 
 impl FilmSampler {
-    /// A sampler for `samples` points a pixel (at least one).
+    /// A sampler with `samples` points per pixel (at least one).
     pub fn new(samples: u32) -> Self {
         let mut sets = MultiJitter::new(samples);
         let samples = samples.max(1) as usize;
-        let count = (TABLE_POINTS / samples).clamp(LEAST_SETS, MOST_SETS);
+        let count = (TABLE_POINTS / samples).clamp(MIN_SETS, MAX_SETS);
         let (mut x, mut y) = (Vec::new(), Vec::new());
         for set in (0_u64..).take(count) {
             sets.for_each(set, |point| {
@@ -38,7 +38,7 @@ impl FilmSampler {
         Self { samples, x, y }
     }
 
-    /// The points of pixel `(x, y)`, both coordinates in 0..1. A single point is the pixel's centre.
+    /// The points of pixel `(x, y)`, with coordinates in 0..1. A single point is the centre of the pixel.
     pub fn points(&self, x: u32, y: u32) -> (&[f32], &[f32]) {
         let sets = self.x.len() / self.samples;
         let hash = mix(u64::from(y) << 32 | u64::from(x)) >> 32;

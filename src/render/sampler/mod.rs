@@ -1,5 +1,5 @@
-//! Where samples lie: on the film ([`FilmSampler`]), and in what is drawn along their paths ([`PathSeed`]). Both depend
-//! on the pixel and on the number of the sample alone.
+//! Sampling: positions on the film ([`FilmSampler`]), and random numbers along paths ([`PathSeed`]). Both depend only
+//! on the pixel and on the index of the sample.
 
 mod film;
 mod hash;

@@ -1,15 +1,14 @@
-//! Sets of points in a square.
+//! Point sets in a square.
 //!
-//! Correlated multi-jittered sampling for any count (Kensler, "Correlated multi-jittered sampling",
-//! Pixar technical memo 13-01, 2013): `n` points are stratified in a grid of about sqrt(n) by
-//! sqrt(n) cells and along each axis alone. The shuffles are drawn from a generator seeded by the
-//! number of the set, so its points depend on nothing else.
+//! Correlated multi-jittered sampling for any count (Kensler, "Correlated multi-jittered sampling", Pixar technical
+//! memo 13-01, 2013): `n` points are stratified in a grid of about sqrt(n) by sqrt(n) cells, and along each axis. The
+//! shuffles come from a generator that is seeded with the index of the set, so its points depend on nothing else.
 
 use glam::Vec2;
 
 use super::hash::{STEP, mix};
 
-/// Makes sets of points; its buffers are reused.
+/// A generator of point sets; it reuses its buffers.
 #[derive(Debug, Clone)]
 pub struct MultiJitter {
     samples: u32,
@@ -19,7 +18,7 @@ pub struct MultiJitter {
 }
 
 impl MultiJitter {
-    /// For sets of `samples` points (at least one).
+    /// A generator of sets of `samples` points (at least one).
     pub fn new(samples: u32) -> Self {
         let samples = samples.max(1);
         let columns = samples.isqrt();
@@ -32,24 +31,26 @@ impl MultiJitter {
         }
     }
 
-    /// Calls `each` with the points of set number `set` in order, both coordinates in 0..1. A single point is the
-    /// middle exactly.
+    /// Calls `each` with the points of set number `set` in order, with coordinates in 0..1. A single point is exactly
+    /// the centre.
     pub fn for_each(&mut self, set: u64, mut each: impl FnMut(Vec2)) {
         if self.samples == 1 {
             each(Vec2::splat(0.5));
             return;
         }
         self.random = SplitMix64(set);
-        // Neighbouring numbers are neighbouring states; one step apart they would share outputs.
+        // Seed the shuffles. Consecutive set numbers are consecutive states, which would share outputs, so hash them
+        // first
         self.random.0 = self.random.next();
         reorder(&mut self.column_order, &mut self.random);
         reorder(&mut self.row_order, &mut self.random);
         let columns = self.column_order.len();
         let rows = self.row_order.len();
         for (sample, index) in (0..self.samples).zip(0_usize..) {
+            // Jitter the point in its cell
             let column = self.column_order[index % columns] as f32;
             let row = self.row_order[index / columns] as f32;
-            // Every sample has a fine stratum of its own in x: a row's share of a column.
+            // In x, every sample has a fine stratum of its own: the part of a column that belongs to its row.
             let x = (column + (row + self.random.unit()) / rows as f32) / columns as f32;
             let y = (sample as f32 + self.random.unit()) / self.samples as f32;
             each(Vec2::new(x, y).min(Vec2::splat(1.0 - 0.5 * f32::EPSILON)));
@@ -57,7 +58,7 @@ impl MultiJitter {
     }
 }
 
-/// A random order of `0..order.len()` that does not depend on the one before (Fisher-Yates).
+/// A random permutation of `0..order.len()`, independent of the previous content (Fisher-Yates).
 fn reorder(order: &mut [u32], random: &mut SplitMix64) {
     for (value, slot) in (0..).zip(order.iter_mut()) {
         *slot = value;
@@ -67,7 +68,7 @@ fn reorder(order: &mut [u32], random: &mut SplitMix64) {
     }
 }
 
-/// SplitMix64 (Steele, Lea and Flood, 2014): small, fast, and good from any seed.
+/// SplitMix64 (Steele, Lea and Flood, 2014): small, fast, and of good quality for any seed.
 #[derive(Debug, Clone, Copy)]
 struct SplitMix64(u64);
 
@@ -78,12 +79,12 @@ impl SplitMix64 {
         value
     }
 
-    /// 0..1 in steps of 2^-24.
+    /// A number in 0..1 in steps of 2^-24.
     fn unit(&mut self) -> f32 {
         (self.next() >> 40) as f32 * (1.0 / 16_777_216.0)
     }
 
-    /// 0..bound; the bias for these small bounds is under 2^-50.
+    /// An integer in 0..bound; the bias for the small bounds used here is below 2^-50.
     fn below(&mut self, bound: usize) -> usize {
         let wide = u128::from(self.next()) * bound as u128;
         #[expect(
@@ -105,7 +106,7 @@ mod tests {
         points
     }
 
-    /// How many of `strata` equal parts of 0..1 hold one of `values`.
+    /// The number of `strata` equal parts of 0..1 that contain one of `values`.
     fn filled(values: impl Iterator<Item = f32>, strata: u32) -> usize {
         let mut parts: Vec<u32> = values.map(|v| stratum(v, strata)).collect();
         parts.sort_unstable();
@@ -137,7 +138,7 @@ mod tests {
                 assert!(points.iter().all(|p| p.max_element() < 1.0));
                 let columns = samples.isqrt();
                 let fine = columns * samples.div_ceil(columns);
-                // 4096 strata are as fine as rounding of the sums allows.
+                // 4096 strata are at the limit that rounding of the sums allows.
                 let slack = usize::from(samples == 4096) * 4;
                 let across = filled(points.iter().map(|p| p.x), fine);
                 let down = filled(points.iter().map(|p| p.y), samples);

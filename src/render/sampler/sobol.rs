@@ -1,23 +1,23 @@
-//! Numbers for what is drawn along a path: Sobol' points, scrambled in Owen's way for each dimension.
+//! Random numbers along paths: Sobol' points with Owen scrambling for each dimension.
 //!
-//! The first `2^k` samples of a dimension lie in `2^k` equal parts of 0..1, whatever the scrambling. It is done by a
+//! The first `2^k` samples of a dimension lie in `2^k` equal intervals of 0..1, whatever the scrambling, which is a
 //! hash of the bits (Burley, "Practical hash-based Owen scrambling", Journal of Computer Graphics Techniques 9(4),
 //! 2020).
 
 use super::hash::mix;
 
-/// What is drawn at one place of a path, for all samples of a pixel. Dimensions of different paths, and different
-/// dimensions of one, have nothing to do with each other.
+/// Seed of the random numbers at one vertex of a path, for all samples of a pixel. Different paths are independent,
+/// and so are different dimensions of a path.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub struct PathSeed(u64);
 
 impl PathSeed {
-    /// Of the paths that begin at pixel `(x, y)`.
+    /// Seed of the paths of pixel `(x, y)`.
     pub fn of_pixel(x: u32, y: u32) -> Self {
         Self(mix(u64::from(y) << 32 | u64::from(x)))
     }
 
-    /// Of the path's continuation number `branch`.
+    /// Seed of continuation `branch` of the path.
     #[must_use]
     pub fn child(self, branch: u32) -> Self {
         Self(mix(self.0.wrapping_add(u64::from(branch) + 1)))
@@ -26,19 +26,20 @@ impl PathSeed {
     /// The number of sample `sample` in dimension `dimension`, in 0..1 in steps of 2^-24.
     pub fn get_1d(self, dimension: u32, sample: u32) -> f32 {
         let [order, seed] = self.halves(dimension);
-        // In another order for each dimension, or samples would be low or high in all of them.
-        let shuffled = scrambled(sample, order);
-        unit(scrambled(shuffled.reverse_bits(), seed))
+        // Each dimension has an order of its own, otherwise a sample would be low or high in all dimensions.
+        let shuffled = scramble(sample, order);
+        unit(scramble(shuffled.reverse_bits(), seed))
     }
 
-    /// The numbers of sample `sample` in the pair of dimensions `dimension`. The first `2^k` samples lie each in a part
-    /// of its own of every division of the square into `2^k` equal rectangles that halve and halve again.
+    /// The numbers of sample `sample` in the pair of dimensions `dimension`. If the unit square is divided into `2^k`
+    /// equal rectangles by repeated halving along either axis, each rectangle contains one of the first `2^k`
+    /// samples.
     pub fn get_2d(self, dimension: u32, sample: u32) -> [f32; 2] {
         let [first, second] = self.halves(dimension);
-        let shuffled = scrambled(sample, first ^ second);
+        let shuffled = scramble(sample, first ^ second);
         [
-            unit(scrambled(shuffled.reverse_bits(), first)),
-            unit(scrambled(second_coordinate(shuffled), second)),
+            unit(scramble(shuffled.reverse_bits(), first)),
+            unit(scramble(second_coordinate(shuffled), second)),
         ]
     }
 
@@ -62,10 +63,10 @@ fn second_coordinate(mut index: u32) -> u32 {
     sum
 }
 
-/// Owen's scrambling of a fraction of 2^32: each bit is turned or not by a hash of the bits above it. In reverse that is
-/// a hash in which bits change higher ones only; the constants were searched by Vegdahl ("Building a better LK hash",
-/// 2021).
-fn scrambled(fraction: u32, seed: u32) -> u32 {
+/// Owen scrambling of a fraction of 2^32: each bit is flipped depending on a hash of the bits above it. On reversed
+/// bits, that is a hash in which bits only affect higher ones; the constants are from a search by Vegdahl ("Building
+/// a better LK hash", 2021).
+fn scramble(fraction: u32, seed: u32) -> u32 {
     let mut x = fraction.reverse_bits();
     x ^= x.wrapping_mul(0x3d20_adea);
     x = x.wrapping_add(seed);
@@ -92,7 +93,7 @@ mod tests {
         (value * parts as f32) as u32
     }
 
-    /// Whether each of `count` parts is named once.
+    /// Whether each of `count` parts occurs once.
     fn is_permutation(parts: impl Iterator<Item = u32>, count: u32) -> bool {
         let mut parts: Vec<u32> = parts.collect();
         parts.sort_unstable();
@@ -152,7 +153,7 @@ mod tests {
             let product = |s| f64::from((seed.get_1d(0, s) - 0.5) * (seed.get_1d(1, s) - 0.5));
             square += ((0..64).map(product).sum::<f64>() / 64.0).powi(2) / 256.0;
         }
-        // 1.1e-4 if nothing is common, 4e-3 if the first bits are.
+        // 1.1e-4 if dimensions are independent, 4e-3 if they share their first bits.
         assert!(square < 2e-4, "{square}");
     }
 }

@@ -1,10 +1,10 @@
-//! Sums and products of colours.
+//! Arithmetic with colours.
 
 use glam::Vec3;
 
 use crate::math::{LANES, Lanes, Lanes3, lane_kernel};
 
-/// Adds `added`, linear RGB times `weight`, to `radiance` for `lanes` alone.
+/// Adds `added` (linear RGB) times `weight` to `radiance`, only for `lanes`.
 #[inline(always)]
 fn add_body(added: &Lanes3, weight: &Vec3, lanes: u32, radiance: &mut Lanes3) {
     for axis in 0..3 {
@@ -23,7 +23,7 @@ lane_kernel! {
     pub(in crate::render) fn add(added: &Lanes3, weight: &Vec3, lanes: u32, radiance: &mut Lanes3) = add_body;
 }
 
-/// `a * b`, component by component.
+/// `a * b` per component.
 #[inline(always)]
 fn product_body(a: &Lanes3, b: &Lanes3, product: &mut Lanes3) {
     for axis in 0..3 {
@@ -37,7 +37,7 @@ lane_kernel! {
     pub(in crate::render) fn product(a: &Lanes3, b: &Lanes3, product: &mut Lanes3) = product_body;
 }
 
-/// `a * b`, one number for all components.
+/// `a * b`, with the same factor for all components.
 #[inline(always)]
 fn scale_body(a: &Lanes3, b: &Lanes, scaled: &mut Lanes3) {
     for axis in 0..3 {

@@ -1,4 +1,4 @@
-//! What rays see that meet nothing.
+//! The background, for rays without an intersection.
 
 use glam::Vec3;
 
@@ -6,7 +6,7 @@ use crate::math::functions::asin;
 use crate::math::{LANES, Lanes3, lane_kernel, splat};
 use crate::scene::Background;
 
-/// A background as lanes see it: from `bottom` to `top` along `up`.
+/// A background in a form for packets: a gradient from `bottom` to `top` along `up`.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct BackgroundLanes {
     bottom: Vec3,
@@ -34,7 +34,7 @@ impl From<&Background> for BackgroundLanes {
     }
 }
 
-/// Adds the background's radiance along `direction` to `radiance`, by `weight` and for the `lanes` alone.
+/// Adds the radiance of the background along `direction` times `weight` to `radiance`, only for `lanes`.
 #[inline(always)]
 fn add_background_body(
     background: &BackgroundLanes,
@@ -43,6 +43,7 @@ fn add_background_body(
     lanes: u32,
     radiance: &mut Lanes3,
 ) {
+    // Compute the position in the gradient from the elevation of the ray
     let up = background.up;
     let mut part = splat(0.0);
     if !background.is_constant {

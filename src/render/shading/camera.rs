@@ -1,4 +1,4 @@
-//! Camera rays, and how far along the view axis they meet something.
+//! Camera rays, and the depth of their intersections along the view axis.
 
 #![expect(
     clippy::needless_range_loop,
@@ -12,7 +12,7 @@ use crate::ray::RayPacket;
 use crate::scene::Camera;
 use crate::surface::Intersections;
 
-/// A camera as lanes see it.
+/// A camera in a form for packets.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::render) struct CameraLanes {
     eye: Vec3,
@@ -21,7 +21,7 @@ pub(in crate::render) struct CameraLanes {
     forward: Vec3,
     /// Tangents of half the field of view.
     half_extent: [f32; 2],
-    /// Pixels of the image.
+    /// Size of the image in pixels.
     size: [f32; 2],
 }
 
@@ -39,7 +39,7 @@ impl CameraLanes {
     }
 }
 
-/// Rays through points of the film, in pixels from its top left corner.
+/// Camera rays through points of the film, which are in pixels from its top left corner.
 #[inline(always)]
 fn camera_rays_body(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) {
     let (r, u, f) = (camera.right, camera.up, camera.forward);
@@ -65,7 +65,7 @@ lane_kernel! {
     pub(in crate::render) fn camera_rays(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) = camera_rays_body;
 }
 
-/// Distance along the view axis of what camera rays meet; infinite where they meet nothing.
+/// Distances of the intersections of camera rays along the view axis; infinite without an intersection.
 #[inline(always)]
 fn depths_body(camera: &CameraLanes, rays: &RayPacket, hits: &Intersections, z: &mut Lanes) {
     let f = camera.forward;

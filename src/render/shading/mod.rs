@@ -1,8 +1,8 @@
-//! Arithmetic of shading for the 16 lanes of a packet: camera rays, background, sums of colours.
+//! Arithmetic of shading for the 16 lanes of a packet: camera rays, background, colours.
 //!
-//! Every function here, in `materials` and in `lights` is compiled for each instruction set by `lane_kernel!`; see `math`
-//! for what that asks of the bodies. A lane whose numbers are infinite or not numbers never touches another lane:
-//! results are selected, not multiplied by zero.
+//! Every function here, in `materials` and in `lights` is compiled for each instruction set by `lane_kernel!`; see
+//! `math` for its requirements. A lane with infinite or NaN values never affects another lane: results are selected,
+//! not multiplied by zero.
 
 mod arithmetic;
 mod background;

@@ -1,13 +1,14 @@
-//! Tables of frames. A long sequence has all its frames in `report.json` and a choice here.
+//! Tables of frames. For a long sequence `report.json` lists all frames, and this page a selection.
 
 use super::numbers::{count, float, mib, seconds, short, shortened};
 use super::{JobFrame, JobReport, Status};
 use crate::report::page::{Page, Table};
 
-/// Rows of the table of frames, and of that of failures.
+/// Maximum number of rows in the table of frames.
 const MOST_FRAMES: usize = 300;
+/// Maximum number of rows in the table of failures.
 const MOST_FAILURES: usize = 50;
-/// Characters of a message.
+/// Maximum length of a message, in characters.
 const MOST_TEXT: usize = 500;
 
 const HEADS: [&str; 18] = [
@@ -32,7 +33,7 @@ const HEADS: [&str; 18] = [
 ];
 
 impl JobReport {
-    /// Failed frames with their reasons, if any.
+    /// Adds failed frames with their reasons, if there are any.
     pub(super) fn put_failures(&self, page: &mut Page) {
         let failed = || self.frames.iter().filter(|f| f.status == Status::Failed);
         let total = failed().count();
@@ -59,13 +60,13 @@ impl JobReport {
         }
     }
 
-    /// The slowest frames, where there are so many that they are worth a table.
+    /// Adds the slowest frames, if there are at least two.
     pub(super) fn put_slowest(&self, page: &mut Page) {
         if self.done().count() < 2 {
             return;
         }
         page.section("slowest", "Slowest frames");
-        // Up to the sum of the stages: the rest is further down.
+        // Up to the sum of the stages; the table of all frames has the other columns.
         let mut table = Table::new("slowest-frames", &HEADS[..9]);
         for (frame, _) in self.slowest() {
             table.row(cells(frame).into_iter().take(9));
@@ -73,7 +74,7 @@ impl JobReport {
         page.table(&table);
     }
 
-    /// Frames that were tried.
+    /// Adds all frames that were attempted.
     pub(super) fn put_frames(&self, page: &mut Page) {
         page.section("frames", "Frames");
         let tried: Vec<&JobFrame> = self
@@ -109,7 +110,7 @@ impl JobReport {
     }
 }
 
-/// At most `most` of the indices up to `total`, evenly spread, the first and the last among them.
+/// At most `most` of the indices below `total`, evenly distributed, including the first and the last one.
 fn evenly(total: usize, most: usize) -> Vec<usize> {
     if total <= most {
         return (0..total).collect();
@@ -117,7 +118,7 @@ fn evenly(total: usize, most: usize) -> Vec<usize> {
     (0..most).map(|i| i * (total - 1) / (most - 1)).collect()
 }
 
-/// The row of a frame under [`HEADS`]; empty cells for what is not known.
+/// The row of a frame under [`HEADS`]; cells of unknown values are empty.
 fn cells(frame: &JobFrame) -> Vec<String> {
     let mut cells = vec![frame.number.to_string(), frame.status.name().to_owned()];
     let Some(report) = &frame.report else {

@@ -1,4 +1,4 @@
-//! `report.html`: the same for people.
+//! `report.html`, the report as a page.
 
 use spherule_jobs::FrameRange;
 
@@ -8,7 +8,7 @@ use crate::report::FrameReport;
 use crate::report::THESIS_BYTES_PER_PARTICLE;
 use crate::report::page::{Page, Table};
 
-/// Characters of a list of frame numbers, or of a setting.
+/// Maximum length of a list of frame numbers or of a setting, in characters.
 const MOST_TEXT: usize = 300;
 
 impl JobReport {
@@ -33,7 +33,7 @@ impl JobReport {
         page.html()
     }
 
-    /// The images' name is what the user knows the job by.
+    /// The title contains the path of the images, by which users know the job.
     fn title(&self) -> String {
         let path = self.settings.iter().find(|(key, _)| key == "output.path");
         path.map_or_else(
@@ -105,7 +105,7 @@ impl JobReport {
         list
     }
 
-    /// The tree of the slowest frame, and where the time to build it went.
+    /// Adds the tree of the slowest frame, and the phases of its build.
     fn put_tree(&self, page: &mut Page) {
         let slowest = self.slowest();
         let Some((frame, report)) = slowest.first() else {
@@ -159,7 +159,7 @@ impl JobReport {
     }
 }
 
-/// Seconds by phase, and their part of the whole.
+/// Seconds by phase, and their percentage of the total.
 fn phases(report: &FrameReport) -> Table {
     let mut table = Table::new("build-phases", &["phase", "seconds", "part, %"]);
     for (name, seconds) in &report.build.phases {
@@ -169,13 +169,13 @@ fn phases(report: &FrameReport) -> Table {
     table
 }
 
-/// Frame numbers as a range.
+/// Frame numbers as ranges.
 fn list_of(frames: &[i64]) -> String {
     let range = FrameRange::from_frames(frames.iter().copied());
     range.map_or_else(String::new, |r| shortened(&r.to_string(), MOST_TEXT))
 }
 
-/// Bytes a particle in anonymous memory and in the mapped file.
+/// Bytes per particle in anonymous memory and in the mapped file.
 fn per_particle(report: &FrameReport) -> String {
     let each = |bytes: u64| short(bytes as f64 / report.particles.max(1) as f64);
     let held = [report.bytes.anonymous(), report.bytes.file.total()].map(each);

@@ -1,4 +1,4 @@
-//! `report.json`. Keys are there to stay: scripts rely on them.
+//! `report.json`. Its keys must not change, because scripts depend on them.
 
 use serde_json::{Map, Value, json};
 

@@ -1,5 +1,5 @@
-//! A job so far, from its ledger: `report.json` for scripts, `report.html` for people, both from
-//! one [`JobReport`].
+//! The current state of a job, from its ledger: `report.json` for scripts and `report.html` for people, both from one
+//! [`JobReport`].
 
 mod frames;
 mod html;
@@ -20,37 +20,37 @@ use super::frame::FrameReport;
 use crate::accel::simd::SimdLevel;
 use crate::manifest::Manifest;
 
-/// Name of the report for scripts, beside the images.
+/// Name of the report for scripts, next to the images.
 pub const JSON_FILE: &str = "report.json";
 /// Name of the report for people.
 pub const HTML_FILE: &str = "report.html";
 
-/// How many frames count as the slowest.
+/// Number of frames in the list of the slowest ones.
 const SLOWEST: usize = 10;
 
-/// A job so far.
+/// The current state of a job.
 #[derive(Debug, Clone)]
 pub struct JobReport {
-    /// By number.
+    /// Sorted by number.
     frames: Vec<JobFrame>,
-    /// Sums over the frames that are done, of memory the largest value.
+    /// Sums over the finished frames; for memory, the largest value.
     totals: FrameReport,
-    /// Keys and values as the manifest has them.
+    /// Keys and values of the manifest.
     settings: Vec<(String, String)>,
     machine: Machine,
 }
 
-/// A frame of the plan and the ledger's word on it.
+/// A planned frame, with its ledger entry.
 #[derive(Debug, Clone)]
 struct JobFrame {
     number: i64,
     image: Option<String>,
     status: Status,
-    /// Why it failed.
+    /// The reason of its failure.
     reason: Option<String>,
-    /// As the ledger has it.
+    /// The details of the ledger entry.
     details: Value,
-    /// The same read; None unless done.
+    /// The parsed details; None unless finished.
     report: Option<FrameReport>,
 }
 
@@ -61,7 +61,7 @@ enum Status {
     Pending,
 }
 
-/// What the report was written on, which is not always what the frames were made on.
+/// The machine that writes the report, which may differ from the machines that rendered the frames.
 #[derive(Debug, Clone)]
 struct Machine {
     threads: usize,
@@ -79,7 +79,7 @@ impl Status {
 }
 
 impl JobReport {
-    /// What plan, ledger and disk say.
+    /// A report from plan, ledger and disk.
     pub fn new(state: &JobState, manifest: &Manifest) -> Self {
         let frames = state.plan().frames().iter();
         let frames = frames
@@ -105,25 +105,25 @@ impl JobReport {
         }
     }
 
-    /// Names and contents of the files that tell of it.
+    /// Names and contents of the report files.
     pub fn files(&self) -> [(&'static str, String); 2] {
         let json = format!("{:#}\n", self.to_json());
         [(JSON_FILE, json), (HTML_FILE, self.to_html())]
     }
 
-    /// Numbers of the frames that stand so.
+    /// Numbers of the frames with `status`.
     fn with_status(&self, status: Status) -> Vec<i64> {
         let frames = self.frames.iter().filter(|frame| frame.status == status);
         frames.map(|frame| frame.number).collect()
     }
 
-    /// Frames that are done, with what they took.
+    /// The finished frames with their reports.
     fn done(&self) -> impl Iterator<Item = (&JobFrame, &FrameReport)> {
         let frames = self.frames.iter();
         frames.filter_map(|frame| Some((frame, frame.report.as_ref()?)))
     }
 
-    /// The frames that took longest, the longest first.
+    /// The slowest frames, slowest first.
     fn slowest(&self) -> Vec<(&JobFrame, &FrameReport)> {
         let mut frames: Vec<_> = self.done().collect();
         frames.sort_by_key(|(frame, report)| (Reverse(report.total()), frame.number));
@@ -134,7 +134,7 @@ impl JobReport {
 
 impl JobFrame {
     fn new(state: &JobState, planned: &PlannedFrame) -> Self {
-        // A lost image is still to be made, and what the ledger says of it does not hold.
+        // A lost image must be rendered again, so its ledger entry is ignored.
         let status = match state.frame_state(planned.number) {
             Some(FrameState::Done) => Status::Done,
             Some(FrameState::Failed) => Status::Failed,
@@ -164,10 +164,10 @@ impl JobFrame {
     }
 }
 
-/// Publishes one of [`JobReport::files`] in `dir`, unless it stands there already.
+/// Publishes one of [`JobReport::files`] in `dir`, unless the file is already up to date.
 ///
 /// # Errors
-/// It cannot be written.
+/// The file cannot be written.
 pub fn write(dir: &Path, name: &str, text: &str) -> io::Result<()> {
     let path = dir.join(name);
     if read_regular_text(&path, text.len() as u64).is_ok_and(|old| old == text) {

@@ -1,9 +1,9 @@
-//! Numbers as people read them.
+//! Formats numbers for people.
 
-/// Binary multiples of a byte.
+/// Bytes per MiB.
 pub(super) const MIB: f64 = 1024.0 * 1024.0;
 
-/// A count with its digits in threes, by a narrow space that does not break.
+/// A count with its digits in groups of three, separated by narrow non-breaking spaces.
 pub(super) fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
@@ -16,7 +16,7 @@ pub(super) fn count(value: u64) -> String {
     text
 }
 
-/// About three digits; nothing for what is not known.
+/// About three digits; empty for unknown values.
 pub(super) fn short(value: f64) -> String {
     match value {
         v if !v.is_finite() => String::new(),
@@ -28,7 +28,7 @@ pub(super) fn short(value: f64) -> String {
     }
 }
 
-/// Seconds in a table, to a tenth of a millisecond where that counts.
+/// Seconds in a table, with a resolution of 0.1 ms for short times.
 pub(super) fn seconds(value: f64) -> String {
     if value < 0.9995 {
         format!("{value:.4}")
@@ -37,7 +37,7 @@ pub(super) fn seconds(value: f64) -> String {
     }
 }
 
-/// Seconds in the unit that suits them.
+/// A duration with a suitable unit.
 pub(super) fn duration(seconds: f64) -> String {
     if seconds < 1.0 {
         return format!("{} ms", short(seconds * 1e3));
@@ -64,7 +64,7 @@ pub(super) fn mib(bytes: u64) -> String {
     short(float(bytes) / MIB)
 }
 
-/// Bytes with their unit.
+/// A size with its unit.
 pub(super) fn bytes(bytes: u64) -> String {
     let mib = float(bytes) / MIB;
     if mib < 0.9995 {
@@ -76,13 +76,13 @@ pub(super) fn bytes(bytes: u64) -> String {
     }
 }
 
-/// For people: past 2^53 the last digits do not count.
+/// For display: above 2^53 the last digits do not matter.
 #[expect(clippy::cast_precision_loss, reason = "see above")]
 pub(super) const fn float(value: u64) -> f64 {
     value as f64
 }
 
-/// At most `most` characters of `text`; a message may hold a whole file.
+/// At most `most` characters of `text`, because a message may contain a whole file.
 pub(super) fn shortened(text: &str, most: usize) -> String {
     match text.char_indices().nth(most) {
         Some((end, _)) => format!("{}\u{2026}", &text[..end]),

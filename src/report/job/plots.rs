@@ -5,7 +5,7 @@ use super::numbers::{MIB, float};
 use crate::report::FrameReport;
 use crate::report::plots::{Axis, Plot, Series};
 
-/// Colours that are told apart.
+/// Number of distinct colours.
 const MOST_PHASES: usize = 7;
 
 type Curve<'a> = (String, Box<dyn Fn(&FrameReport) -> f64 + 'a>);
@@ -15,7 +15,7 @@ fn curve<'a>(name: &str, value: impl Fn(&FrameReport) -> f64 + 'a) -> Curve<'a> 
 }
 
 impl JobReport {
-    /// All plots; frames that are not done leave gaps.
+    /// All plots, with gaps for frames that are not finished.
     pub(super) fn plots(&self) -> Vec<Plot> {
         let stages = vec![
             curve("read", |r| r.seconds.read),
@@ -56,7 +56,7 @@ impl JobReport {
         ]
     }
 
-    /// A plot of seconds, or of milliseconds if that suits them better.
+    /// A plot of seconds, or of milliseconds for short times.
     fn times(&self, id: &str, title: &str, curves: Vec<Curve>) -> Plot {
         let values = self
             .done()
@@ -85,7 +85,7 @@ impl JobReport {
         })
     }
 
-    /// Phases of the build in the order in which they come; those past the last colour as one.
+    /// Phases of the build in their order; if there are more than colours, the last ones are combined.
     fn phases(&self) -> Vec<Curve<'_>> {
         let mut names: Vec<&str> = Vec::new();
         for (_, report) in self.done() {

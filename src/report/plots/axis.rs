@@ -1,20 +1,20 @@
-//! An axis: which values it spans and where its ticks stand.
+//! An axis: its range and its ticks.
 
 use std::ops::Range;
 
 use plotters::coord::ranged1d::{KeyPointHint, NoDefaultFormatting, Ranged, ValueFormatter};
 
-/// How values become lengths.
+/// The scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Scale {
-    /// In proportion.
+    /// Linear.
     #[default]
     Linear,
-    /// By their logarithm; values up to zero have no place.
+    /// Logarithmic; values up to zero cannot be shown.
     Log,
 }
 
-/// What an axis is to look like; the range comes from the data.
+/// The properties of an axis; its range depends on the data.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Axis {
     title: String,
@@ -42,14 +42,14 @@ impl Axis {
         }
     }
 
-    /// Shows zero as well, so that heights can be compared; a logarithmic axis has none.
+    /// Includes zero, so that heights can be compared; has no effect on a logarithmic axis.
     #[must_use]
     pub const fn from_zero(mut self) -> Self {
         self.from_zero = true;
         self
     }
 
-    /// Ticks at whole numbers alone, for counts and frame numbers.
+    /// Ticks only at integers, for counts and frame numbers.
     #[must_use]
     pub const fn whole(mut self) -> Self {
         self.whole = true;
@@ -64,8 +64,8 @@ impl Axis {
         self.scale == Scale::Log
     }
 
-    /// Where `value` stands on the axis; NaN where it has no place. Values past 1e100 are as good
-    /// as infinite: sums and differences of what is left are finite.
+    /// Position of `value` on the axis; NaN if it cannot be shown. Values above 1e100 count as infinite, so that sums
+    /// and differences of the others are finite.
     pub(super) fn place(&self, value: f64) -> f64 {
         match self.scale {
             _ if value.abs() > 1e100 => f64::NAN,
@@ -75,7 +75,7 @@ impl Axis {
         }
     }
 
-    /// The axis over places from `low` to `high`, both finite, with about `wanted` ticks.
+    /// The axis over positions from `low` to `high`, both finite, with about `wanted` ticks.
     pub(super) fn span(&self, low: f64, high: f64, wanted: f64) -> Span {
         match self.scale {
             Scale::Linear => self.linear_span(low, high, wanted),
@@ -88,7 +88,7 @@ impl Axis {
             low = low.min(0.0);
             high = high.max(0.0);
         }
-        // All equal, or so nearly that ticks would fall together.
+        // Widen a range that is empty or too small for distinct ticks
         if high - low <= 1e-9 * high.abs().max(low.abs()) {
             let half = if self.whole {
                 (1e-6 * high.abs()).max(1.0)
@@ -98,18 +98,19 @@ impl Axis {
             let half = if half > 0.0 { half } else { 1.0 };
             (low, high) = (low - half, high + half);
         }
+        // Choose the distance between ticks
         let mut step = nice_step((high - low) / wanted);
         if self.whole {
             step = step.max(1.0);
         }
-        // Air for the markers at the edge.
+        // Add a margin for markers at the edge
         if !self.whole {
             let air = 0.05 * (high - low);
             let keeps = |end: f64| self.from_zero && end == 0.0;
             high += if keeps(high) { 0.0 } else { air };
             low -= if keeps(low) { 0.0 } else { air };
         }
-        // Slack, so that rounding does not cost the first or the last tick.
+        // Place the ticks; the slack prevents rounding from removing the first or the last one
         let first = (low / step - 1e-9).ceil();
         let count = (high / step + 1e-9).floor() - first;
         let largest = high.abs().max(low.abs());
@@ -124,7 +125,7 @@ impl Axis {
     }
 }
 
-/// The range of an axis in places, and its ticks with their labels.
+/// The range of an axis in positions, and its ticks with their labels.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Span {
     pub(super) low: f64,
@@ -148,7 +149,7 @@ impl Ranged for Span {
     }
 
     fn key_points<Hint: KeyPointHint>(&self, hint: Hint) -> Vec<f64> {
-        // No finer lines between the ticks.
+        // Without finer lines between the ticks.
         if hint.weight().allow_light_points() {
             return Vec::new();
         }
@@ -167,7 +168,7 @@ impl ValueFormatter<f64> for Span {
     }
 }
 
-/// 1, 2 or 5 times a power of ten, not under `least`.
+/// 1, 2 or 5 times a power of ten, at least `least`.
 fn nice_step(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
     let factor = [1.0, 2.0, 5.0]
@@ -176,9 +177,9 @@ fn nice_step(least: f64) -> f64 {
     factor.unwrap_or(10.0) * power
 }
 
-/// `value` with the decimals that a step of `step` needs, on an axis up to `largest`.
+/// `value` with the number of decimals that `step` requires, on an axis up to `largest`.
 fn label(value: f64, step: f64, largest: f64) -> String {
-    // Rounding leaves a tiny or a negative zero.
+    // Rounding may leave a tiny or negative zero.
     let value = if value.abs() < 0.5 * step { 0.0 } else { value };
     if largest >= 1e6 || step < 1e-4 {
         return if value == 0.0 {
@@ -198,7 +199,7 @@ fn label(value: f64, step: f64, largest: f64) -> String {
     minus(&text)
 }
 
-/// As `1.25e6`, with the digits that tell it from its neighbour.
+/// In the form `1.25e6`, with enough digits to distinguish it from its neighbours.
 fn scientific(value: f64, step: f64) -> String {
     let digits = (value.abs().log10().floor() - step.log10().floor()).clamp(0.0, 8.0);
     #[expect(
@@ -216,15 +217,15 @@ fn scientific(value: f64, step: f64) -> String {
     }
 }
 
-/// With a minus sign as wide as a digit.
+/// With a minus sign that is as wide as a digit.
 fn minus(text: &str) -> String {
     text.replace('-', "\u{2212}")
 }
 
-/// Widened to the next 1, 2 or 5 times a power of ten; ticks at these, or at powers alone.
+/// The range extended to the next 1, 2 or 5 times a power of ten; ticks at these, or only at powers.
 fn log_span(low: f64, high: f64, wanted: f64) -> Span {
     const SLACK: f64 = 1e-9;
-    // Steps of a third of a decade: 3k, 3k+1, 3k+2 are 1, 2 and 5 times 10^k.
+    // Steps of about a third of a decade: 3k, 3k+1, 3k+2 are 1, 2 and 5 times 10^k
     let place = |step: f64| {
         let decade = (step / 3.0).floor();
         let factor = [1.0f64, 2.0, 5.0];
@@ -237,6 +238,7 @@ fn log_span(low: f64, high: f64, wanted: f64) -> Span {
         let factor = factor[third as usize];
         (decade + factor.log10(), decade, factor)
     };
+    // Find the first and the last step
     let mut first = 3.0 * low.floor();
     while place(first + 1.0).0 <= low + SLACK {
         first += 1.0;
@@ -245,13 +247,14 @@ fn log_span(low: f64, high: f64, wanted: f64) -> Span {
     while place(last).0 < high - SLACK {
         last += 1.0;
     }
-    // One value would sit on the edge.
+    // A single value would be at the edge.
     if place(first).0 >= low - SLACK && high - low < SLACK {
         first -= 1.0;
     }
+    // Place the ticks
     let decades = (last - first) / 3.0;
     let every = (decades / wanted).ceil().max(1.0);
-    // 10000 beside 1e5 would be odd.
+    // Do not mix notations such as 10000 and 1e5.
     let is_plain = low >= -4.0 && high < 5.0;
     let mut ticks = Vec::new();
     let mut step = first;
@@ -270,7 +273,7 @@ fn log_span(low: f64, high: f64, wanted: f64) -> Span {
     }
 }
 
-/// `factor` times ten to the `decade`; in full where that is short, or all over the axis.
+/// `factor` times ten to the `decade`; written in full if that is short, or on the whole axis.
 fn log_label(decade: f64, factor: f64, is_plain: bool) -> String {
     if is_plain || (-3.0..=3.0).contains(&decade) {
         #[expect(

@@ -11,19 +11,22 @@ use super::svg::{FINE, GRID, INK, SERIES, SvgText};
 use super::{Line, Plot, key};
 use crate::report::escape::escaped;
 
-/// Size of a plot in units, of which a line of text is [`FONT`] high.
+/// Width of a plot, in units in which a line of text is [`FONT`] high.
 const WIDTH: i32 = 440;
+/// Height of a plot.
 const HEIGHT: i32 = 270;
+/// Height of a line of text.
 const FONT: i32 = 13;
-/// Digits are about this wide.
+/// Approximate width of a digit.
 const DIGIT: i32 = 8;
-/// Room above for the title of the vertical axis, and below for labels and the horizontal one's.
+/// Space above for the title of the vertical axis.
 const TOP: i32 = 30;
+/// Space below for labels and the title of the horizontal axis.
 const BOTTOM: i32 = 46;
-/// Room for half of the last label.
+/// Space on the right for half of the last label.
 const RIGHT: i32 = 22;
 
-/// The plot of at least one point.
+/// The SVG of a plot with at least one point.
 pub(super) fn svg_of(plot: &Plot, series: &[Drawn]) -> String {
     let text = RefCell::new(format!(
         "<svg class=\"plot\" id=\"{id}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
@@ -45,7 +48,7 @@ pub(super) fn svg_of(plot: &Plot, series: &[Drawn]) -> String {
     text.into_inner() + "</svg>\n"
 }
 
-/// The axes that hold all points.
+/// The axes with the range of all points.
 fn spans(plot: &Plot, series: &[Drawn]) -> (Span, Span) {
     let points = || series.iter().flat_map(|s| s.pieces.iter().flatten());
     let range = |of: fn(&(f64, f64)) -> f64| {
@@ -67,6 +70,7 @@ fn draw(
     backend: SvgText,
     text: &RefCell<String>,
 ) -> Result<(), DrawError> {
+    // Lay out the chart, with space for the labels
     let font = TextStyle::from(("sans-serif", FONT * FINE).into_font()).color(&INK);
     let root = backend.into_drawing_area();
     let longest = y.ticks.iter().map(|(_, label)| label.chars().count()).max();
@@ -77,6 +81,7 @@ fn draw(
         .x_label_area_size(BOTTOM * FINE)
         .y_label_area_size(left * FINE)
         .build_cartesian_2d(x, y)?;
+    // Draw axes and titles
     chart
         .configure_mesh()
         .max_light_lines(0)
@@ -91,6 +96,7 @@ fn draw(
     let corner = ((WIDTH - 2) * FINE, (HEIGHT - 4) * FINE);
     root.draw_text(plot.x.title(), &font.pos(bottom_right), corner)?;
 
+    // Draw each series: lines, then markers
     let put = |piece: &str| text.borrow_mut().push_str(piece);
     for drawn in series {
         put(&key::group(drawn.hue, "series"));

@@ -1,14 +1,14 @@
-//! A series as it is drawn: thinned, and cut at gaps.
+//! A series in the form in which it is drawn: thinned, and split at gaps.
 
 use super::{Line, Plot, Series};
 
-/// More points than this are thinned, to one smallest and one largest in each of half as many
-/// stretches: about a point for each unit of width.
+/// Maximum number of points, about one per unit of width. Longer series are divided into half as many intervals, and
+/// the smallest and the largest value of each are kept.
 const MOST_POINTS: usize = 800;
-/// Series with more points have markers at some only.
+/// Maximum number of markers; longer series have markers at some points only.
 const MOST_MARKERS: usize = 24;
 
-/// A series in places of its axes, cut at gaps.
+/// A series in positions of its axes, split at gaps.
 pub(super) struct Drawn<'a> {
     pub(super) name: &'a str,
     pub(super) hue: usize,
@@ -38,7 +38,7 @@ impl<'a> Drawn<'a> {
         self.pieces.iter().map(Vec::len).sum()
     }
 
-    /// Where markers go: lone points always, of many joined ones some.
+    /// Positions of markers: all isolated points, and some of many connected ones.
     pub(super) fn marked(&self) -> Vec<(f64, f64)> {
         let joined = self.line != Line::None;
         let every = if joined {
@@ -64,8 +64,8 @@ fn is_finite((x, y): (f64, f64)) -> bool {
     x.is_finite() && y.is_finite()
 }
 
-/// Long series as the smallest and the largest value of each stretch, in their order; a stretch
-/// without values stays a gap.
+/// Reduces a long series to the smallest and the largest value of each section, in their order. A
+/// section without values remains a gap.
 fn thinned(points: Vec<(f64, f64)>) -> Vec<(f64, f64)> {
     if points.len() <= MOST_POINTS {
         return points;

@@ -1,8 +1,8 @@
-//! Colours and markers of series, and the legend that tells them.
+//! Colours and markers of series, and the legend.
 //!
-//! Colours after Okabe and Ito, "Color Universal Design" (2008), the light ones darkened until they
-//! stand out from white by 3:1; on a dark page their light relatives. Markers differ as well, for
-//! whoever sees no colours.
+//! Colours follow Okabe and Ito, "Color Universal Design" (2008); light ones are darkened to a contrast of 3:1
+//! against white, and have lighter versions for dark pages. Series also have different markers, for readers who
+//! cannot distinguish the colours.
 
 use std::fmt::Write as _;
 
@@ -16,7 +16,7 @@ const COLORS: [&str; 7] = [
     "#0072b2", "#d55e00", "#008f68", "#b0478a", "#8f6d00", "#3a96cf", "#444444",
 ];
 
-/// The rules that plots need on their page: series colours in light and dark, text, grid, legend.
+/// The style rules that plots need on their page: series colours in light and dark mode, text, grid, legend.
 pub const CSS: &str = "\
 figure.plot{margin:0;min-width:0}
 figure.plot figcaption{font-weight:600;margin-bottom:.4rem}
@@ -41,7 +41,7 @@ svg.plot .grid{stroke:var(--grid)}
 }
 ";
 
-/// Opens the group of a series: everything in it takes the look from here.
+/// Opens the group of a series, which defines the style of its content.
 pub(super) fn group(hue: usize, kind: &str) -> String {
     let hue = hue % COLORS.len();
     let color = COLORS[hue];
@@ -51,7 +51,7 @@ pub(super) fn group(hue: usize, kind: &str) -> String {
     )
 }
 
-/// Opens the group of lines or of markers within a series.
+/// Opens the group of lines or of markers of a series.
 pub(super) const fn part(line: Line, markers: bool) -> &'static str {
     match (line, markers) {
         (Line::Dashed, false) => "<g stroke-dasharray=\"5 4\">",
@@ -60,7 +60,7 @@ pub(super) const fn part(line: Line, markers: bool) -> &'static str {
     }
 }
 
-/// Corners of the marker of `hue` around zero, in fine units; a circle is None.
+/// Corners of the marker of `hue` around zero, in fine units; None for a circle.
 pub(super) fn marker(hue: usize) -> Option<&'static [(i32, i32)]> {
     const SQUARE: [(i32, i32); 4] = [(-26, -26), (26, -26), (26, 26), (-26, 26)];
     const UP: [(i32, i32); 3] = [(0, -36), (34, 24), (-34, 24)];
@@ -82,7 +82,7 @@ pub(super) fn marker(hue: usize) -> Option<&'static [(i32, i32)]> {
 /// Radius of the round marker, in fine units.
 pub(super) const MARKER_RADIUS: i32 = 28;
 
-/// The names of the series with a piece of each.
+/// The names of the series with a sample of each.
 pub(super) fn legend(series: &[Drawn]) -> String {
     let mut html = "<ul class=\"legend\">\n".to_owned();
     for drawn in series {

@@ -1,12 +1,12 @@
-//! Line and scatter plots as SVG inside an HTML page: axes with units, several named series told
-//! apart by colour, marker and dash, gaps where values are missing. The same data give the same text.
+//! Line and scatter plots as SVG in an HTML page: axes with units, several named series with distinct colours,
+//! markers and dashes, and gaps at missing values. The same data give the same text.
 //!
-//! `plotters` maps and lays out; `svg` is our backend for it, because that of plotters writes
-//! fixed colours and no classes, so that its plots cannot follow a dark page. The colours stand in
-//! [`CSS`] and again as attributes, for whoever takes the SVG out of the page. Text is sized for a
-//! plot 480 units wide: readable when a phone shrinks it to three quarters.
+//! `plotters` does the mapping and layout. `svg` is a backend for it, because the one of plotters writes fixed
+//! colours without classes, so its plots cannot adapt to a dark page. Colours are in [`CSS`] and also in attributes,
+//! for SVGs that are extracted from the page. The text size is for a plot that is 480 units wide: readable when a
+//! phone shrinks it to three quarters.
 //!
-//! What is in the data is left to the caller; [`super::page`] puts the figure onto a page.
+//! The caller provides the data; [`super::page`] adds the figure to a page.
 
 mod axis;
 #[cfg(test)]
@@ -23,19 +23,19 @@ pub use key::CSS;
 
 use super::escape::escaped;
 
-/// How the points of a series are joined.
+/// How the points of a series are connected.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Line {
-    /// By a line.
+    /// By a solid line.
     #[default]
     Solid,
-    /// By a dashed line with hollow markers: figures of others, predictions.
+    /// By a dashed line with hollow markers, for results of others and for predictions.
     Dashed,
-    /// Not at all: a scatter plot.
+    /// Not connected: a scatter plot.
     None,
 }
 
-/// Named points of one look.
+/// Named points with a common style.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Series {
     name: String,
@@ -45,7 +45,7 @@ pub struct Series {
 }
 
 impl Series {
-    /// Points joined in the order given. A coordinate that is NaN or infinite leaves a gap.
+    /// Points that are connected in their order. A NaN or infinite coordinate leaves a gap.
     pub fn new(name: impl Into<String>, points: impl IntoIterator<Item = (f64, f64)>) -> Self {
         Self {
             name: name.into(),
@@ -55,15 +55,15 @@ impl Series {
         }
     }
 
-    /// Joins the points in another way.
+    /// Sets the kind of line.
     #[must_use]
     pub const fn line(mut self, line: Line) -> Self {
         self.line = line;
         self
     }
 
-    /// Takes colour and marker number `hue` instead of that of its place, so that a series looks
-    /// the same in several plots or like another that it belongs to. Seven are told apart.
+    /// Sets the number of colour and marker, which is otherwise the index of the series, so that a series looks the
+    /// same in several plots or like a related one. There are seven.
     #[must_use]
     pub const fn hue(mut self, hue: usize) -> Self {
         self.hue = Some(hue);
@@ -82,7 +82,7 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// An empty plot. `id` names its element on the page: letters, digits and hyphens.
+    /// An empty plot. `id` is the id of its element on the page: letters, digits and hyphens.
     pub fn new(id: impl Into<String>, title: impl Into<String>, x: Axis, y: Axis) -> Self {
         Self {
             id: id.into(),
@@ -100,10 +100,11 @@ impl Plot {
         self
     }
 
-    /// The `<figure>`: title, plot and legend, or a sentence where there is nothing to draw.
-    /// Series of over 800 points are thinned to the least and the largest value of each stretch.
+    /// The `<figure>`: title, plot and legend, or a message if there is nothing to draw. Series of over 800 points
+    /// are thinned to the smallest and the largest value of each interval.
     pub fn figure(&self) -> String {
         let mut notes = String::new();
+        // Prepare the series
         let drawn: Vec<drawn::Drawn> = self
             .series
             .iter()
@@ -111,6 +112,7 @@ impl Plot {
             .map(|(place, series)| drawn::Drawn::new(self, series, series.hue.unwrap_or(place)))
             .filter(|drawn| drawn.point_count() > 0)
             .collect();
+        // Note values that cannot be shown
         let left_out = self.count_off_log_axis();
         if left_out > 0 {
             notes = format!(
@@ -123,6 +125,7 @@ impl Plot {
                 }
             );
         }
+        // Draw plot and legend
         let body = if drawn.is_empty() {
             "<p class=\"empty\">There are no values to plot.</p>\n".to_owned()
         } else {
@@ -134,7 +137,7 @@ impl Plot {
         )
     }
 
-    /// Finite values that a logarithmic axis cannot show.
+    /// Number of finite values that a logarithmic axis cannot show.
     fn count_off_log_axis(&self) -> usize {
         let off = |axis: &Axis, value: f64| axis.is_log() && value.is_finite() && value <= 0.0;
         let points = self.series.iter().flat_map(|s| &s.points);

@@ -1,7 +1,7 @@
-//! A backend for `plotters` that writes SVG with classes in place of colours: what is drawn in
-//! [`INK`] or [`GRID`] gets that class, what belongs to a series has the look of the group around it.
+//! A backend for `plotters` that writes SVG with classes instead of colours: elements in [`INK`] or [`GRID`] get that
+//! class, elements of a series the style of the group around them.
 //!
-//! Coordinates of plotters are whole numbers, so one unit here is a tenth of a unit of the plot.
+//! Coordinates of plotters are integers, so one unit here is a tenth of a unit of the plot.
 
 use std::cell::RefCell;
 use std::convert::Infallible;
@@ -15,17 +15,17 @@ use plotters_backend::{
 
 use crate::report::escape::escaped;
 
-/// Stands for the colour of text.
+/// Represents the colour of text.
 pub(super) const INK: RGBColor = RGBColor(0, 0, 0);
-/// Stands for that of lines in the background.
+/// Represents the colour of lines in the background.
 pub(super) const GRID: RGBColor = RGBColor(1, 0, 0);
-/// Stands for that of the series being drawn.
+/// Represents the colour of the current series.
 pub(super) const SERIES: RGBColor = RGBColor(2, 0, 0);
 
-/// Units a unit of the plot.
+/// Units per unit of the plot.
 pub(super) const FINE: i32 = 10;
 
-/// Writes to a text that others write to as well, between two drawings.
+/// Writes to a text that is also written to by others between two drawings.
 pub(super) struct SvgText<'a> {
     pub(super) text: &'a RefCell<String>,
     /// Width and height.
@@ -157,7 +157,7 @@ impl DrawingBackend for SvgText<'_> {
         ))
     }
 
-    /// Turned text is not asked for.
+    /// Supports only horizontal text.
     fn draw_text<S: BackendTextStyle>(
         &mut self,
         text: &str,
@@ -169,7 +169,7 @@ impl DrawingBackend for SvgText<'_> {
             HPos::Center => "middle",
             HPos::Right => "end",
         };
-        // From the place asked for down to the base line: digits are 0.7 em high.
+        // Distance from the given position to the base line; digits are 0.7 em high.
         let down = match style.anchor().v_pos {
             VPos::Top => "0.72em",
             VPos::Center => "0.36em",

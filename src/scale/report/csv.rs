@@ -1,10 +1,10 @@
-//! `scale.csv`: one row a cell, for spreadsheets and scripts.
+//! `scale.csv`: one row per cell, for spreadsheets and scripts.
 
 use super::{CellMeasurement, CellReport, ScaleReport};
 
 type Value = fn(&CellMeasurement) -> Option<f64>;
 
-/// Columns that say which cell it is and how it ended.
+/// Columns that identify a cell and its outcome.
 const CELL: [&str; 6] = [
     "particles",
     "structure",
@@ -14,7 +14,7 @@ const CELL: [&str; 6] = [
     "reason",
 ];
 
-/// Columns of numbers; empty where a cell has none. Seconds and bytes.
+/// Columns of numbers in seconds and bytes; empty if a cell does not have them.
 const NUMBERS: [(&str, Value); 43] = [
     ("images", |m| Some(m.images as f64)),
     ("images_per_second_mean", |m| Some(m.images_per_second.mean)),
@@ -98,7 +98,7 @@ pub fn header() -> String {
     names.join(",")
 }
 
-/// The whole file. Lines end with a line feed.
+/// The whole file, with line feeds as line ends.
 pub fn text(report: &ScaleReport) -> String {
     let rows = report.cells.iter().map(row);
     let lines: Vec<String> = std::iter::once(header()).chain(rows).collect();
@@ -127,7 +127,7 @@ fn row(cell: &CellReport) -> String {
     fields.join(",")
 }
 
-/// Text as RFC 4180 has it, in quotes where it needs them.
+/// Text in the form of RFC 4180, quoted if necessary.
 fn quoted(text: &str) -> String {
     if text.contains([',', '"', '\n', '\r']) {
         format!("\"{}\"", text.replace('"', "\"\""))

@@ -1,5 +1,4 @@
-//! The files that a run leaves: `scale.json`, `scale.csv`, `scale.html`. Each appears whole or not
-//! at all.
+//! The files of a run: `scale.json`, `scale.csv`, `scale.html`. Each appears complete or not at all.
 
 use std::fs;
 use std::io::{self, Read};
@@ -10,12 +9,12 @@ use spherule_jobs::{Publisher, publish};
 
 use super::{CSV, HTML, JSON, MADE_BY, ScaleReport, csv, page};
 
-/// How a file under one of the names is known to be ours.
+/// Recognises files of this program by their content.
 type Mark = fn(&str) -> bool;
 
 const OURS: [(&str, Mark); 3] = [(JSON, is_our_json), (CSV, is_our_csv), (HTML, is_our_page)];
 
-/// Writes all files into `dir`, over older ones.
+/// Writes all files into `dir`, and replaces older ones.
 ///
 /// # Errors
 /// With the file that cannot be written.
@@ -32,16 +31,16 @@ pub fn write(dir: &Path, report: &ScaleReport) -> Result<(), (PathBuf, io::Error
     Ok(())
 }
 
-/// Makes `dir` and sees whether files can be made in it; leaves nothing else behind.
+/// Creates `dir` and checks that files can be created in it; no file remains.
 ///
 /// # Errors
-/// What the file system says.
+/// The error of the file system.
 pub fn prepare(dir: &Path) -> io::Result<()> {
     fs::create_dir_all(dir)?;
     Publisher::create(&dir.join(JSON)).map(drop)
 }
 
-/// A file in `dir` under one of our names that we have not made.
+/// A file in `dir` under one of these names that this program has not made.
 pub fn foreign(dir: &Path) -> Option<PathBuf> {
     OURS.into_iter().find_map(|(name, is_ours)| {
         let path = dir.join(name);
@@ -50,7 +49,7 @@ pub fn foreign(dir: &Path) -> Option<PathBuf> {
     })
 }
 
-/// Text up to a length that no report of ours has.
+/// Text up to a length that no report exceeds.
 fn read(path: &Path) -> Option<String> {
     const MOST: u64 = 64 << 20;
     let mut text = String::new();
@@ -67,7 +66,7 @@ fn is_our_json(text: &str) -> bool {
 }
 
 fn is_our_csv(text: &str) -> bool {
-    // Older versions may have had other numbers.
+    // Older versions may have other columns of numbers.
     text.starts_with("particles,structure,motion,")
 }
 

@@ -1,5 +1,5 @@
-//! What `spherule scale` has measured: one typed report, from which the tables, `scale.json`,
-//! `scale.csv` and the page are made.
+//! The results of `spherule scale`: one typed report, from which the tables, `scale.json`, `scale.csv` and the page
+//! are made.
 
 use serde::{Deserialize, Serialize};
 
@@ -16,44 +16,44 @@ pub mod parts;
 pub mod table;
 pub mod thesis;
 
-/// Who makes these reports; tells ours from files of the same name.
+/// The program that makes these reports; distinguishes them from other files of the same name.
 pub const MADE_BY: &str = "spherule scale";
 
-/// File of the typed report.
+/// File with the typed report.
 pub const JSON: &str = "scale.json";
-/// File of one row per cell.
+/// File with one row per cell.
 pub const CSV: &str = "scale.csv";
-/// File of tables and plots.
+/// File with tables and plots.
 pub const HTML: &str = "scale.html";
 
-/// Bytes in the thesis's "MB".
+/// Bytes per "MB" of the thesis.
 pub(super) const MIB: f64 = 1_048_576.0;
-/// What stands where a cell has failed.
+/// Entry for a failed cell.
 pub(super) const FAILED: &str = "failed";
-/// What stands where nothing was measured.
+/// Entry for a value that was not measured.
 pub(super) const MISSING: &str = "-";
 
-/// Everything that was measured, cell by cell.
+/// All measurements, cell by cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScaleReport {
     /// [`MADE_BY`].
     pub made_by: String,
-    /// Where it was measured.
+    /// The machine.
     pub machine: Machine,
-    /// What was asked.
+    /// The settings.
     pub settings: ScaleSettings,
-    /// Cells that were to be measured; more than there are if the run was interrupted.
+    /// Number of planned cells; larger than the number of cells if the run was interrupted.
     pub planned: usize,
-    /// The cells that have ended, in the order in which they ran.
+    /// The finished cells, in the order in which they ran.
     pub cells: Vec<CellReport>,
 }
 
-/// What was asked.
+/// The settings of a run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct ScaleSettings {
-    /// The user's frame; None is the thesis's box.
+    /// The frame of the user; None for the box of the thesis.
     pub input: Option<InputSummary>,
-    /// Counts.
+    /// Particle counts.
     pub particles: Vec<usize>,
     /// Names of the structures.
     pub structures: Vec<String>,
@@ -61,15 +61,15 @@ pub struct ScaleSettings {
     pub motions: Vec<Motion>,
     /// Representations.
     pub representations: Vec<Representation>,
-    /// Time or images of a cell.
+    /// Time or number of images per cell.
     pub budget: Budget,
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// Samples a pixel.
+    /// Samples per pixel.
     pub samples: u32,
-    /// Levels of recursion.
+    /// Recursion depth.
     pub max_depth: u32,
     /// Seed of the particles.
     pub seed: u64,
@@ -77,10 +77,10 @@ pub struct ScaleSettings {
     pub threads: usize,
 }
 
-/// A frame of the user's.
+/// A frame of the user.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct InputSummary {
-    /// As it was named.
+    /// The path as given.
     pub path: String,
     /// Frame number.
     pub frame: i64,
@@ -88,78 +88,78 @@ pub struct InputSummary {
     pub particles: usize,
 }
 
-/// One cell.
+/// Settings and outcome of one cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellReport {
     /// How many particles.
     pub particles: usize,
     /// Name of the structure.
     pub structure: String,
-    /// How the camera moved.
+    /// Motion of the camera.
     pub motion: Motion,
     /// How positions were held.
     pub representation: Representation,
-    /// How it ended.
+    /// The outcome.
     #[serde(flatten)]
     pub outcome: CellOutcome,
 }
 
-/// How a cell ended.
+/// Outcome of a cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "status", rename_all = "lowercase")]
 pub enum CellOutcome {
     /// It was measured.
     Done(Box<CellMeasurement>),
-    /// It was not; the others are not concerned.
+    /// It failed; other cells are not affected.
     Failed {
-        /// Why.
+        /// The reason.
         reason: String,
     },
 }
 
-/// What one cell has shown. Times are wall-clock seconds, sizes bytes.
+/// Measurements of one cell. Times are wall-clock seconds, sizes are bytes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct CellMeasurement {
-    /// Images traced.
+    /// Number of images.
     pub images: u64,
-    /// One over the time of each image.
+    /// Inverse of the time of each image.
     pub images_per_second: Spread,
-    /// The time of each image.
+    /// Time of each image.
     pub image_seconds: Spread,
-    /// Making or reading the particles; of a native frame, opening and mapping it.
+    /// Time of making or reading the particles; with a native frame, of opening and mapping it.
     pub load_seconds: f64,
-    /// How the native frame was made that is traced in place, in a process of its own; None in memory.
+    /// Conversion to the native frame that is traced in place, in a separate process; None in memory.
     pub conversion: Option<Conversion>,
     /// Time of the builds; in place, of the levels above the stored ones.
     pub build_seconds: BuildTimes,
-    /// The structure, phases of the last build.
+    /// The structure, with the phases of the last build.
     pub build: BuildSummary,
-    /// Memory by purpose; the peak is the highest of all builds.
+    /// Memory by purpose, with the highest peak of all builds.
     pub bytes: FrameBytes,
-    /// The same a particle; None without particles.
+    /// The same per particle; None without particles.
     pub bytes_per_particle: Option<PerParticle>,
-    /// Resident memory of the cell's whole process.
+    /// Resident memory of the whole process of the cell.
     pub rss: RssSummary,
     /// Rays of all images.
     pub rays: RaySummary,
-    /// Rays over the time of all images.
+    /// Rays divided by the time of all images.
     pub rays_per_second: RayRates,
 }
 
-/// How a native frame was made.
+/// Measurements of a conversion to a native frame.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct Conversion {
-    /// Making or reading the particles.
+    /// Time of making or reading the particles.
     pub load_seconds: f64,
-    /// Bringing them into order, coding and writing them.
+    /// Time of ordering, encoding and writing them.
     pub seconds: f64,
     /// Length of the file.
     pub file_bytes: u64,
-    /// The farthest that a stored position is from the true one, world units.
+    /// Maximum error of a stored position, world units.
     pub max_error: f64,
-    /// The same as a part of the smallest radius; None of spheres without one.
+    /// The same as a fraction of the smallest radius; None for spheres without a radius.
     pub max_error_of_radius: Option<f64>,
-    /// Resident memory of the process that did it.
+    /// Resident memory of its process.
     pub rss: RssSummary,
 }
 
@@ -174,14 +174,14 @@ pub struct Spread {
     pub max: f64,
 }
 
-/// How long builds took.
+/// Times of builds.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct BuildTimes {
-    /// How many there were.
+    /// Number of builds.
     pub builds: usize,
-    /// The first one, in new memory.
+    /// The first build, which allocates its memory.
     pub first: f64,
-    /// The middle one of all.
+    /// The median.
     pub median: f64,
     /// The fastest.
     pub min: f64,
@@ -189,7 +189,7 @@ pub struct BuildTimes {
     pub max: f64,
 }
 
-/// Bytes a particle by purpose; see [`FrameBytes`].
+/// Bytes per particle by purpose; see [`FrameBytes`].
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "see `FrameBytes`")]
 pub struct PerParticle {
@@ -198,14 +198,14 @@ pub struct PerParticle {
     pub attributes: f64,
     pub scratch: f64,
     pub build_peak: f64,
-    /// Positions, structure and attributes together: those in anonymous memory.
+    /// Positions, structure and attributes in anonymous memory.
     pub anonymous: f64,
-    /// And those in a mapped file.
+    /// Positions, structure and attributes in a mapped file.
     pub file: f64,
 }
 
-/// Rays a second by purpose. Kinds are traced in turns within an image, so these add up to the
-/// total, and none says how fast its kind alone would be.
+/// Rays per second by purpose. The kinds of rays are interleaved within an image, so the rates add up to the total,
+/// and do not show how fast one kind alone would be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the names say all")]
 pub struct RayRates {
@@ -217,7 +217,7 @@ pub struct RayRates {
 }
 
 impl Spread {
-    /// Of `values`; zeros if there are none.
+    /// The spread of `values`; zeros if there are none.
     pub fn of(values: &[f64]) -> Self {
         if values.is_empty() {
             return Self::default();
@@ -235,7 +235,7 @@ impl Spread {
 }
 
 impl BuildTimes {
-    /// Of the `seconds` of builds in their order; zeros if there are none.
+    /// The times of builds in their order; zeros if there are none.
     pub fn of(seconds: &[f64]) -> Self {
         let mut sorted = seconds.to_vec();
         sorted.sort_unstable_by(f64::total_cmp);
@@ -251,7 +251,7 @@ impl BuildTimes {
 }
 
 impl PerParticle {
-    /// `bytes` shared by `particles`.
+    /// `bytes` divided by `particles`.
     pub fn of(bytes: &FrameBytes, particles: u64) -> Option<Self> {
         let share = |bytes: u64| bytes as f64 / particles as f64;
         (particles > 0).then(|| Self {
@@ -267,7 +267,7 @@ impl PerParticle {
 }
 
 impl RayRates {
-    /// `rays` in `seconds`.
+    /// `rays` divided by `seconds`.
     pub fn of(rays: RayCounts, seconds: f64) -> Self {
         let rate = |count: u64| {
             if seconds > 0.0 {
@@ -287,7 +287,7 @@ impl RayRates {
 }
 
 impl CellReport {
-    /// What was measured, if it was.
+    /// The measurements, unless the cell failed.
     pub fn measured(&self) -> Option<&CellMeasurement> {
         match &self.outcome {
             CellOutcome::Done(measured) => Some(measured),
@@ -297,8 +297,7 @@ impl CellReport {
 }
 
 impl ScaleReport {
-    /// The columns of tables: every structure in every representation that it goes with, with a name for
-    /// people.
+    /// The columns of tables: every structure in all representations that it supports, with a title.
     pub fn columns(&self) -> Vec<Column> {
         let structures = self.settings.structures.iter();
         let pairs = structures.flat_map(|name| {
@@ -319,7 +318,7 @@ impl ScaleReport {
             .collect()
     }
 
-    /// The cells of one count and column, one a motion.
+    /// The cells of one count and column, one per motion.
     pub fn cells_of<'a>(
         &'a self,
         particles: usize,
@@ -332,7 +331,7 @@ impl ScaleReport {
         })
     }
 
-    /// The median over motions of the median build time in seconds.
+    /// The median over all motions of the median build time, in seconds.
     pub fn build_seconds(&self, particles: usize, column: &Column) -> Option<f64> {
         let cells = self.cells_of(particles, column);
         let medians: Vec<f64> = cells
@@ -341,7 +340,7 @@ impl ScaleReport {
         (!medians.is_empty()).then(|| BuildTimes::of(&medians).median)
     }
 
-    /// The highest peak over motions of everything resident, bytes.
+    /// The highest peak over all motions of resident memory, bytes.
     pub fn peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
         let cells = self.cells_of(particles, column);
         cells
@@ -349,7 +348,7 @@ impl ScaleReport {
             .max()
     }
 
-    /// The highest peak over motions of anonymous memory, bytes.
+    /// The highest peak over all motions of anonymous memory, bytes.
     pub fn anonymous_peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
         let cells = self.cells_of(particles, column);
         cells
@@ -357,7 +356,7 @@ impl ScaleReport {
             .max()
     }
 
-    /// The same of mapped files.
+    /// The highest peak over all motions of mapped files, bytes.
     pub fn file_peak_bytes(&self, particles: usize, column: &Column) -> Option<u64> {
         let cells = self.cells_of(particles, column);
         cells
@@ -365,7 +364,7 @@ impl ScaleReport {
             .max()
     }
 
-    /// Cells that have failed.
+    /// The failed cells, with their reasons.
     pub fn failed(&self) -> impl Iterator<Item = (&CellReport, &str)> {
         self.cells.iter().filter_map(|cell| match &cell.outcome {
             CellOutcome::Failed { reason } => Some((cell, reason.as_str())),
@@ -381,7 +380,7 @@ pub struct Column {
     pub structure: String,
     /// Of the positions.
     pub representation: Representation,
-    /// For people.
+    /// Title for tables.
     pub title: String,
 }
 

@@ -1,5 +1,5 @@
-//! `scale.html`: the tables with the thesis's figures beside ours, and plots against the particle
-//! count on logarithmic axes.
+//! `scale.html`: the tables, including the results of the thesis, and plots over the particle count on logarithmic
+//! axes.
 
 use super::table;
 use super::{
@@ -64,7 +64,7 @@ pub fn html(report: &ScaleReport) -> String {
     page.html()
 }
 
-/// Memory by part, and the native frames if there are some.
+/// Memory by part, and the native frames if there are any.
 fn put_parts(page: &mut Page, report: &ScaleReport) {
     page.section("parts", "Memory by part");
     page.text(&format!(
@@ -122,7 +122,7 @@ fn introduce(page: &mut Page, report: &ScaleReport) {
     );
 }
 
-/// Rows are counts; our columns, then the thesis's.
+/// One row per count; columns of this report, then those of the thesis.
 fn rates(report: &ScaleReport, motion: Motion) -> Table {
     let columns = report.columns();
     let theirs: Vec<_> = thesis::RATES
@@ -151,7 +151,7 @@ fn rates(report: &ScaleReport, motion: Motion) -> Table {
     table
 }
 
-/// The same for a figure that motions share.
+/// The same for a quantity that does not depend on the motion.
 fn figures(
     report: &ScaleReport,
     id: &str,
@@ -185,7 +185,7 @@ fn figures(
     table
 }
 
-/// What was asked for, and what the thesis has on top.
+/// The counts of the report, and the one of the thesis.
 fn counts(report: &ScaleReport, theirs: usize) -> Vec<usize> {
     let mut counts = report.settings.particles.clone();
     if report.settings.input.is_none() && !counts.contains(&theirs) {
@@ -194,7 +194,7 @@ fn counts(report: &ScaleReport, theirs: usize) -> Vec<usize> {
     counts
 }
 
-/// Columns for the count, for ours and for the thesis's.
+/// A table with columns for the count, for this report and for the thesis.
 fn table_with(id: &str, columns: &[Column], theirs: &[&str]) -> Table {
     let theirs: Vec<String> = theirs
         .iter()
@@ -262,7 +262,7 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
     all
 }
 
-/// A line a column, and the thesis's beside it in the same colour.
+/// One line per column, and that of the thesis in the same colour.
 fn plot(
     report: &ScaleReport,
     id: &str,
@@ -282,7 +282,7 @@ fn plot(
         });
         plot = plot.with(Series::new(&column.title, points).hue(hue));
     }
-    // A user's own particles are no comparison.
+    // The particles of a user cannot be compared with the thesis.
     if report.settings.input.is_some() {
         return plot;
     }
@@ -301,7 +301,7 @@ fn plot(
     plot
 }
 
-/// What was measured of a count and a column, with one motion or the first that was.
+/// The measurements of a count and a column, for one motion or the first available one.
 fn measured<'a>(
     report: &'a ScaleReport,
     particles: usize,

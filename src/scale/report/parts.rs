@@ -1,10 +1,10 @@
-//! Memory by part: rows are counts in a column of the other tables, columns parts. And what the native
-//! frames took to make.
+//! Memory by part: one row per count and column of the other tables, one column per part; and the measurements of
+//! conversions.
 
 use super::{CellMeasurement, Column, Conversion, ScaleReport, thesis};
 use super::{FAILED, MIB, MISSING};
 
-/// Heads of the table of bytes.
+/// Headings of the table of bytes.
 pub(super) const HEADS: [&str; 11] = [
     "particles",
     "tree",
@@ -19,7 +19,7 @@ pub(super) const HEADS: [&str; 11] = [
     "peak mapped, MB",
 ];
 
-/// Heads of the table of conversions.
+/// Headings of the table of conversions.
 pub(super) const CONVERSION_HEADS: [&str; 7] = [
     "particles",
     "tree",
@@ -30,11 +30,11 @@ pub(super) const CONVERSION_HEADS: [&str; 7] = [
     "peak anonymous, MB",
 ];
 
-/// What the columns of bytes mean.
+/// Explanation of the columns of bytes.
 pub(super) const NOTE: &str = "bytes a particle while tracing (positions to in the file) and while building \
     (scratch); peaks of the process as seen, with images and the program itself";
 
-/// The rows of the table of bytes, the thesis's in the end.
+/// The rows of the table of bytes; the last one is that of the thesis.
 pub(super) fn rows(report: &ScaleReport) -> Vec<Vec<String>> {
     let mut rows = our_rows(report);
     if report.settings.input.is_none() {
@@ -66,7 +66,7 @@ fn our_rows(report: &ScaleReport) -> Vec<Vec<String>> {
     })
 }
 
-/// Bytes a particle; none without particles.
+/// Bytes per particle; none without particles.
 fn shares(measured: &CellMeasurement) -> Vec<String> {
     let Some(share) = measured.bytes_per_particle else {
         return vec![MISSING.to_owned(); 7];
@@ -83,7 +83,7 @@ fn shares(measured: &CellMeasurement) -> Vec<String> {
     all.iter().map(|bytes| format!("{bytes:.2}")).collect()
 }
 
-/// The rows of the table of conversions, one a native frame.
+/// The rows of the table of conversions, one per native frame.
 pub(super) fn conversions(report: &ScaleReport) -> Vec<Vec<String>> {
     rows_of(report, |particles, column| {
         let mut cells = report.cells_of(particles, column);
@@ -103,7 +103,7 @@ fn conversion_cells(conversion: &Conversion) -> [String; 5] {
     ]
 }
 
-/// A row for every count and column that has one, both named in front.
+/// The rows of all counts and columns that have one, with count and column in front.
 fn rows_of(
     report: &ScaleReport,
     row: impl Fn(usize, &Column) -> Option<Vec<String>>,

@@ -1,5 +1,4 @@
-//! The report as text, laid out as the thesis's tables 2 to 5: rows are particle counts, columns
-//! structures.
+//! The report as text, in the layout of tables 2 to 5 of the thesis: rows are particle counts, columns structures.
 
 use std::fmt::Write as _;
 
@@ -10,7 +9,7 @@ use super::{
 };
 use crate::scale::{Budget, Motion};
 
-/// All tables, with a heading each.
+/// All tables with their headings.
 pub fn text(report: &ScaleReport) -> String {
     let mut text = format!("{}\n{}\n", subject(report), conditions(report));
     for motion in &report.settings.motions {
@@ -55,7 +54,7 @@ pub fn text(report: &ScaleReport) -> String {
     text
 }
 
-/// What was rendered.
+/// Description of the scene and settings.
 pub fn subject(report: &ScaleReport) -> String {
     let s = &report.settings;
     let what = s.input.as_ref().map_or_else(
@@ -75,7 +74,7 @@ pub fn subject(report: &ScaleReport) -> String {
     )
 }
 
-/// Where it was rendered.
+/// Description of the machine and software.
 pub fn conditions(report: &ScaleReport) -> String {
     format!(
         "{}; {} in use; spherule {}",
@@ -83,7 +82,7 @@ pub fn conditions(report: &ScaleReport) -> String {
     )
 }
 
-/// A cell as people name it.
+/// Description of a cell for messages.
 pub fn cell_name(cell: &CellReport) -> String {
     format!(
         "{} particles, {} {}, {}",
@@ -117,7 +116,7 @@ fn put(
     put_rows(text, heading, &rows);
 }
 
-/// Memory by part, and the native frames if there are some.
+/// Memory by part, and the native frames if there are any.
 fn put_parts(text: &mut String, report: &ScaleReport) {
     let with_heads = |heads: &[&str], rows: Vec<Vec<String>>| -> Vec<Vec<String>> {
         let heads = heads.iter().map(|head| (*head).to_owned()).collect();
@@ -133,7 +132,7 @@ fn put_parts(text: &mut String, report: &ScaleReport) {
     }
 }
 
-/// `rows` under `heading`, as wide as they need to be; the first has as many cells as any.
+/// `rows` under `heading`, aligned in columns; the first row has as many cells as any other.
 fn put_rows(text: &mut String, heading: &str, rows: &[Vec<String>]) {
     let columns = rows.first().map_or(0, Vec::len);
     let width = |place: usize| rows.iter().map(|r| r[place].len()).max().unwrap_or(0);
@@ -146,7 +145,7 @@ fn put_rows(text: &mut String, heading: &str, rows: &[Vec<String>]) {
     }
 }
 
-/// A table's cell for one motion.
+/// The entry of a table for one motion.
 pub(super) fn rate(
     report: &ScaleReport,
     particles: usize,
@@ -162,7 +161,7 @@ pub(super) fn rate(
     }
 }
 
-/// A table's cell for all motions together: `value`, or why there is none.
+/// The entry of a table for all motions: `value`, or the reason why there is none.
 pub(super) fn summed(
     report: &ScaleReport,
     particles: usize,
@@ -170,7 +169,7 @@ pub(super) fn summed(
     value: Option<String>,
 ) -> String {
     let mut cells = report.cells_of(particles, column).peekable();
-    // No particles have no bytes each: that is no failure.
+    // Bytes per particle are undefined without particles, which is not a failure.
     let failed = cells.peek().is_some() && cells.all(|c| c.measured().is_none());
     value.unwrap_or_else(|| if failed { FAILED } else { MISSING }.to_owned())
 }
@@ -197,7 +196,7 @@ pub(super) fn bytes(report: &ScaleReport, particles: usize, column: &Column) -> 
     Some(format!("{:.2}", share.positions + share.structure))
 }
 
-/// Mean and standard deviation, as the thesis's tables have them.
+/// Mean and standard deviation, in the format of the thesis.
 pub(super) fn spread(values: &Spread) -> String {
     let mean = short(values.mean);
     values
@@ -205,7 +204,7 @@ pub(super) fn spread(values: &Spread) -> String {
         .map_or_else(|| mean.clone(), |sd| format!("{mean} ({})", short(sd)))
 }
 
-/// Two digits after the point, fewer of large numbers.
+/// Two digits after the decimal point, fewer for large numbers.
 fn short(value: f64) -> String {
     match value {
         ..100.0 => format!("{value:.2}"),
@@ -214,7 +213,7 @@ fn short(value: f64) -> String {
     }
 }
 
-/// One measured cell in a line.
+/// The measurements of a cell in one line.
 pub fn line(measured: &CellMeasurement) -> String {
     format!(
         "build {:.4} s, {} images/s in {} images, peak {:.1} MB",

@@ -1,37 +1,37 @@
-//! What the thesis measured (tables 2 to 5): i7-7700HQ at 2.8 GHz, 16 GB, GeForce GTX 1050 Ti with
-//! 4 GB, OptiX; box, camera and depth as here, 1920x1080.
+//! The results of the thesis (tables 2 to 5): i7-7700HQ at 2.8 GHz, 16 GB, GeForce GTX 1050 Ti with 4 GB, OptiX; the
+//! same box, camera and depth as here, 1920x1080.
 
 use crate::report::THESIS_BYTES_PER_PARTICLE;
 use crate::scale::Motion;
 
-/// The thesis's machine and settings.
+/// The machine and settings of the thesis.
 pub const MACHINE: &str = "GeForce GTX 1050 Ti 4 GB, OptiX (i7-7700HQ); 1920x1080, depth 3, 60 s";
 
-/// Frames a second at 1e7 particles: mean and standard deviation.
+/// Frames per second at 1e7 particles: mean and standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FrameRate {
     /// Name of the structure.
     pub structure: &'static str,
-    /// How the camera moved.
+    /// Motion of the camera.
     pub motion: Motion,
-    /// Frames a second.
+    /// Mean of the frames per second.
     pub mean: f64,
     /// Their standard deviation.
     pub sd: f64,
 }
 
-/// A number for a structure and a particle count.
+/// A value for a structure and a particle count.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Figure {
     /// Name of the structure.
     pub structure: &'static str,
-    /// Particles.
+    /// Particle count.
     pub particles: usize,
-    /// The number.
+    /// The value.
     pub value: f64,
 }
 
-/// Particles of tables 2 to 4.
+/// Particle count of tables 2 to 4.
 pub const RATE_PARTICLES: usize = 10_000_000;
 
 const fn rate(structure: &'static str, motion: Motion, mean: f64, sd: f64) -> FrameRate {
@@ -67,14 +67,14 @@ pub const RATES: [FrameRate; 12] = [
     rate("kdtree", Motion::Both, 17.91, 10.55),
 ];
 
-/// Seconds to build, as the text has them: "about 2.5", and for sbvh "more than 80".
+/// Build times in seconds, from the text: "about 2.5", and for sbvh "more than 80".
 pub const BUILD_SECONDS: [Figure; 3] = [
     figure("lbvh", 10_000_000, 2.5),
     figure("kdtree", 10_000_000, 2.5),
     figure("sbvh", 10_000_000, 80.0),
 ];
 
-/// The same by structure.
+/// Bytes per particle by structure.
 pub const BYTES_PER_PARTICLE: [Figure; 4] = [
     figure("lbvh", 10_000_000, THESIS_BYTES_PER_PARTICLE),
     figure("kdtree", 10_000_000, THESIS_BYTES_PER_PARTICLE),
@@ -82,8 +82,7 @@ pub const BYTES_PER_PARTICLE: [Figure; 4] = [
     figure("sbvh", 10_000_000, THESIS_BYTES_PER_PARTICLE),
 ];
 
-/// Table 5: peak memory. Its "MB" are of 1024 x 1024 bytes: the large ones are whole tenths of
-/// 1024.
+/// Table 5: peak memory. Its "MB" are 1024 x 1024 bytes, because the large values are multiples of tenths of 1024.
 pub const PEAK_MIB: [Figure; 12] = [
     figure("lbvh", 100_000, 524.4),
     figure("lbvh", 1_000_000, 808.0),

@@ -1,11 +1,11 @@
-//! Cubics through given values that never leave the range of the two values they lie between.
+//! Cubic interpolation that never leaves the range of the two adjacent values.
 //!
-//! The slopes at the values are those of M. Steffen, "A simple method for monotonic interpolation in
-//! one dimension", Astronomy and Astrophysics 239 (1990): the parabola's through three values, held
-//! to what keeps the cubics on both sides monotone, and 0 where the values turn.
+//! The slopes at the values follow M. Steffen, "A simple method for monotonic interpolation in one dimension",
+//! Astronomy and Astrophysics 239 (1990): the slope of the parabola through three values, limited so that the cubics
+//! on both sides are monotone, and 0 at extrema.
 
-/// Slope at a value between two pieces of the curve: `before` and `after` are the slopes of the
-/// straight lines there (11 of the paper), `gaps` the lengths of the pieces.
+/// Slope at a value between two segments of the curve: `before` and `after` are the slopes of the straight lines (eq.
+/// 11 of the paper), `gaps` the lengths of the segments.
 pub(super) fn slope(before: f64, after: f64, gaps: [f64; 2]) -> f64 {
     if before == 0.0 || after == 0.0 || (before > 0.0) != (after > 0.0) {
         return 0.0;
@@ -16,8 +16,7 @@ pub(super) fn slope(before: f64, after: f64, gaps: [f64; 2]) -> f64 {
     2.0 * steepest.min(0.5 * parabola.abs()).copysign(before)
 }
 
-/// The cubic at `t` in 0..1 that goes from one of `ends` to the other and has these `slopes` there, per
-/// piece (not per frame).
+/// The cubic at `t` in 0..1 between the values `ends`, with the `slopes` at both ends per segment (not per frame).
 pub(super) fn cubic(ends: [f64; 2], slopes: [f64; 2], t: f64) -> f64 {
     let [from, to] = ends;
     let rest = 1.0 - t;

@@ -1,4 +1,4 @@
-//! The way through given views.
+//! Interpolation of key views.
 
 use glam::DVec3;
 
@@ -6,10 +6,10 @@ use super::PathError;
 use super::curve::{cubic, slope};
 use crate::scene::CameraView;
 
-/// Below this, rounding decides where an interpolated up points.
-const LEAST_UP: f64 = 1e-9;
+/// Minimum length of an interpolated up vector; for shorter ones, rounding determines the direction.
+const MIN_UP: f64 = 1e-9;
 
-/// A view that the camera has at a frame.
+/// The view at a frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CameraKey {
     /// The frame.
@@ -18,15 +18,15 @@ pub struct CameraKey {
     pub view: CameraView,
 }
 
-/// A path through keys, exact at each.
+/// A path through keys, which it reaches exactly.
 ///
-/// Each coordinate of eye, look_at and up and the field of view go their own way: monotone cubics over the
-/// frame number that never leave the range of the two keys around a frame, with slopes that go on
-/// through the keys. Before the first key and after the last the camera stands, and it starts and stops
-/// softly. Up has length 1; where it would pass through zero it is zero.
+/// Each coordinate of eye, look_at and up, and the field of view, is interpolated separately: a monotone cubic over
+/// the frame number that never leaves the range of the two adjacent keys, with continuous slopes at the keys. Before
+/// the first key and after the last one, the camera does not move; it starts and stops smoothly. Up is normalised, or
+/// zero if it would pass through zero.
 #[derive(Debug, Clone, PartialEq)]
 pub struct KeyedPath {
-    /// At least one, frames ascending, ups of length 1.
+    /// At least one key; ascending frames, normalised up vectors.
     keys: Vec<CameraKey>,
 }
 
@@ -35,17 +35,19 @@ impl KeyedPath {
         if keys.is_empty() {
             return Err(PathError::NoKeys);
         }
+        // Check that frames are unique
         keys.sort_by_key(|key| key.frame);
         let same = keys.windows(2).find(|pair| pair[0].frame == pair[1].frame);
         if let Some(pair) = same {
             return Err(PathError::SameFrame(pair[0].frame));
         }
+        // Normalise the up vectors, and reject opposite ones
         for key in &mut keys {
             key.view.up = key.view.up.normalize_or_zero();
         }
         let is_opposite = |pair: &&[CameraKey]| {
             let [a, b] = [pair[0].view.up, pair[1].view.up];
-            a != DVec3::ZERO && (a + b).length() < LEAST_UP
+            a != DVec3::ZERO && (a + b).length() < MIN_UP
         };
         if let Some(pair) = keys.windows(2).find(is_opposite) {
             return Err(PathError::OppositeUps([pair[0].frame, pair[1].frame]));
@@ -53,29 +55,29 @@ impl KeyedPath {
         Ok(Self { keys })
     }
 
-    /// The keys, frames ascending.
+    /// The keys, with ascending frames.
     pub fn keys(&self) -> &[CameraKey] {
         &self.keys
     }
 
-    /// Frames of the keys around `frame`; None at a key, before the first and after the last.
+    /// Frames of the keys before and after `frame`; None at a key, before the first key and after the last one.
     pub fn around(&self, frame: i64) -> Option<[i64; 2]> {
-        let next = self.place(frame).err()?;
+        let next = self.find(frame).err()?;
         let from = self.keys.get(next.checked_sub(1)?)?;
         Some([from.frame, self.keys.get(next)?.frame])
     }
 
     pub(super) fn view(&self, frame: i64) -> CameraView {
-        match self.place(frame) {
+        match self.find(frame) {
             Ok(at) => self.keys[at].view,
             Err(0) => self.keys[0].view,
             Err(end) if end == self.keys.len() => self.keys[end - 1].view,
-            Err(next) => Piece::new(&self.keys, next - 1).view(frame),
+            Err(next) => Segment::new(&self.keys, next - 1).view(frame),
         }
     }
 
-    /// The key of `frame`, or which one comes after it.
-    fn place(&self, frame: i64) -> Result<usize, usize> {
+    /// Index of the key of `frame`, or of the first key after it.
+    fn find(&self, frame: i64) -> Result<usize, usize> {
         self.keys.binary_search_by_key(&frame, |key| key.frame)
     }
 
@@ -95,16 +97,16 @@ impl KeyedPath {
     }
 }
 
-/// The way from a key to the next, with the keys before and after it as far as there are any.
-struct Piece<'a> {
+/// The segment between two keys, with the keys before and after it if there are any.
+struct Segment<'a> {
     from: &'a CameraKey,
     to: &'a CameraKey,
     before: Option<&'a CameraKey>,
     after: Option<&'a CameraKey>,
 }
 
-impl<'a> Piece<'a> {
-    /// From the key at `index`, which is not the last.
+impl<'a> Segment<'a> {
+    /// The segment after the key at `index`, which is not the last one.
     fn new(keys: &'a [CameraKey], index: usize) -> Self {
         Self {
             from: &keys[index],
@@ -127,7 +129,7 @@ impl<'a> Piece<'a> {
         CameraView {
             eye: point(|view| view.eye),
             look_at: point(|view| view.look_at),
-            up: if up.length() < LEAST_UP {
+            up: if up.length() < MIN_UP {
                 DVec3::ZERO
             } else {
                 up.normalize_or_zero()
@@ -136,14 +138,14 @@ impl<'a> Piece<'a> {
         }
     }
 
-    /// One number of the view at `t` in 0..1 of the way.
+    /// One coordinate of the view at `t` in 0..1 of the segment.
     fn value(&self, t: f64, of: impl Fn(&CameraView) -> f64) -> f64 {
         let line = |a: &CameraKey, b: &CameraKey| {
             let length = gap(a.frame, b.frame);
             ((of(&b.view) - of(&a.view)) / length, length)
         };
         let (here, length) = line(self.from, self.to);
-        // Beyond the ends the camera stands.
+        // The camera does not move beyond the ends.
         let start = self.before.map_or(0.0, |key| {
             let (before, gap) = line(key, self.from);
             slope(before, here, [gap, length])
@@ -157,7 +159,7 @@ impl<'a> Piece<'a> {
     }
 }
 
-/// Frames from `a` to `b`, which is not before it.
+/// Number of frames from `a` to `b`, which is not before `a`.
 #[expect(
     clippy::cast_precision_loss,
     reason = "beyond 2^53 frames a frame more is no other place"

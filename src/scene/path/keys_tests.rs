@@ -20,7 +20,7 @@ fn key(frame: i64, eye: [f64; 3]) -> CameraKey {
     }
 }
 
-/// A path whose eye has these x at these frames.
+/// A path with the given x of the eye at the given frames.
 fn through(points: &[(i64, f64)]) -> CameraPath {
     let keys = points.iter().map(|(frame, x)| key(*frame, [*x, 5.0, 0.0]));
     CameraPath::through(keys.collect()).unwrap()
@@ -62,7 +62,7 @@ fn slopes_are_those_of_the_paper() {
     near(slope(1.0, 2.0, [1.0, 1.0]), 1.5);
     // Through (0, 0), (1, 1), (4, 7): 1 + (2 - 1) * 1/4.
     near(slope(1.0, 2.0, [1.0, 3.0]), 1.25);
-    // Held to twice the flatter side.
+    // Limited to twice the flatter side.
     near(slope(-0.25, -9.0, [1.0, 1.0]), -0.5);
     for (before, after) in [(1.0, -1.0), (-2.0, 1.0), (0.0, 3.0), (3.0, 0.0)] {
         assert_eq!(slope(before, after, [1.0, 1.0]), 0.0);
@@ -141,7 +141,7 @@ fn number() -> impl Strategy<Value = f64> {
     prop_oneof![-10.0..10.0, Just(0.0), Just(1.0), -1e6..1e6, -1e-6..1e-6]
 }
 
-/// Frames far apart, so that a frame is a small step, with a value each.
+/// Values at frames that are far apart, so that a frame is a small step.
 fn points() -> impl Strategy<Value = Vec<(i64, f64)>> {
     let gaps = prop::collection::vec((1_000_000_i64..4_000_000, number()), 1..8);
     gaps.prop_map(|gaps| {
@@ -174,7 +174,7 @@ proptest! {
         }
     }
 
-    /// Between two keys a coordinate goes one way.
+    /// Between two keys a coordinate is monotone.
     #[test]
     fn pieces_are_monotone(points in points(), steps in 2_i64..40) {
         let path = through(&points);
@@ -192,7 +192,7 @@ proptest! {
         }
     }
 
-    /// The step to a key is the step from it, but for what a million frames make of a bend.
+    /// The steps before and after a key are equal, except for the curvature over a millionth of the segment.
     #[test]
     fn the_pace_does_not_jump(points in points()) {
         let path = through(&points);

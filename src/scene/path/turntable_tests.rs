@@ -32,7 +32,7 @@ fn frame_0_of_a_turntable_is_at_its_azimuth() {
     // 2^63 quarters are whole turns.
     near(toward(i64::MIN), DVec3::Y);
     assert_eq!(path.start(), path.view(0));
-    // As the automatic camera with that azimuth looks.
+    // Equal to the automatic camera with that azimuth.
     let auto = Camera::framing(
         &BOX,
         &Framing {
@@ -65,7 +65,7 @@ fn far_frames_turn_as_near_ones() {
     );
 }
 
-/// Film coordinates of a world point, -1 to 1, by hand.
+/// Film coordinates of a world point, -1 to 1, computed independently.
 fn project(view: &CameraView, aspect: f64, point: DVec3) -> DVec2 {
     let forward = (view.look_at - view.eye).normalize();
     let right = forward.cross(view.up).normalize();
@@ -77,7 +77,7 @@ fn project(view: &CameraView, aspect: f64, point: DVec3) -> DVec2 {
     DVec2::new(seen.dot(right) / aspect, seen.dot(up)) / (depth * half)
 }
 
-/// The outermost place of a corner in any of the pictures of a turn.
+/// The outermost position of a corner in all pictures of a turn.
 fn outermost(path: &CameraPath, bounds: &Bounds, aspect: f64, frames: i64) -> f64 {
     let mut most = 0.0_f64;
     for frame in 0..frames {

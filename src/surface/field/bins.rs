@@ -1,7 +1,7 @@
-//! Particles sorted into cubic bins of the kernel's support.
+//! Particles sorted into cubic bins with the size of the kernel's support.
 //!
-//! Only bins that hold particles are kept: rows along x by (z, y), in each row the bins by x, in each bin
-//! the particles. So particles that escaped cost nothing, and the neighbours of a bin are nine runs.
+//! Only bins with particles are stored: rows along x sorted by (z, y), the bins of each row sorted by x, and the
+//! particles of each bin. So outliers cost nothing, and the neighbourhood of a bin is nine runs of bins.
 
 use std::cmp::Ordering;
 use std::ops::Range;
@@ -11,11 +11,12 @@ use rayon::prelude::*;
 use spherule_formats::order::index_u32;
 use spherule_formats::order::partition::scatter;
 
-/// Bins lie within so many of the origin along each axis: three coordinates fit a key of 64 bits.
-const REACH: i32 = 1 << 20;
-/// Particles that a piece of the sort should have.
-const PIECE: usize = 512;
-/// Most pieces of the sort.
+/// Maximum distance of bins from the origin along each axis, in bins, so that three coordinates fit into a key of 64
+/// bits.
+const MAX_CELL: i32 = 1 << 20;
+/// Target number of particles per piece of the sort.
+const PIECE_LEN: usize = 512;
+/// Maximum number of pieces of the sort.
 const MAX_PIECES: usize = 1 << 14;
 
 /// A row of bins along x.
@@ -23,41 +24,41 @@ const MAX_PIECES: usize = 1 << 14;
 pub(crate) struct Row {
     pub(crate) z: i32,
     pub(crate) y: i32,
-    /// Number of its first bin.
+    /// Index of its first bin.
     first: u32,
 }
 
-/// A bin that holds particles.
+/// A bin with at least one particle.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Bin {
     pub(crate) x: i32,
-    /// Number of its first particle.
+    /// Index of its first particle.
     pub(crate) start: u32,
 }
 
-/// See the module.
+/// Sorted particles, see the module.
 #[derive(Debug, Default)]
 pub(crate) struct Bins {
     size: f32,
     inverse: f32,
-    /// One more than there are: the last one ends the one before.
+    /// All rows, and one more that marks the end of the last one.
     rows: Vec<Row>,
-    /// One more than there are.
+    /// All bins, and one more that marks the end of the last one.
     bins: Vec<Bin>,
     points: Vec<Vec3>,
-    /// Index in the frame of each point; empty unless asked for.
+    /// Index in the frame of each point; empty unless requested.
     indices: Vec<u32>,
     lookup: RowLookup,
     left_out: u64,
 }
 
-/// Where the row at (z, y) is.
+/// How to find the row at (z, y).
 #[derive(Debug, Default)]
 enum RowLookup {
-    /// By binary search: rows lie far apart.
+    /// By binary search, for rows that are far apart.
     #[default]
     Search,
-    /// In a table over the rectangle of all rows.
+    /// By a table over the rectangle of all rows.
     Table {
         low: [i32; 2],
         width: i32,
@@ -73,7 +74,7 @@ pub(crate) fn cell_of(point: Vec3, inverse: f32) -> [i32; 3] {
     [point.x, point.y, point.z].map(|x| floor(x * inverse))
 }
 
-/// The whole number at or below `x`, without the call that plain `floor` is on old processors.
+/// The largest integer not above `x`, without the function call that plain `floor` needs on old processors.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "saturates")]
 pub(crate) fn floor(x: f32) -> i32 {
@@ -82,20 +83,20 @@ pub(crate) fn floor(x: f32) -> i32 {
 }
 
 #[inline(always)]
-fn in_reach(cell: [i32; 3]) -> bool {
-    cell.iter().all(|c| (-REACH..REACH).contains(c))
+fn is_in_range(cell: [i32; 3]) -> bool {
+    cell.iter().all(|c| (-MAX_CELL..MAX_CELL).contains(c))
 }
 
-/// Order of bins: by z, then y, then x.
+/// Sort key of bins: by z, then y, then x.
 #[inline(always)]
 fn key(cell: [i32; 3]) -> u64 {
-    let part = |c: i32| u64::from((c + REACH).cast_unsigned());
+    let part = |c: i32| u64::from((c + MAX_CELL).cast_unsigned());
     part(cell[2]) << 42 | part(cell[1]) << 21 | part(cell[0])
 }
 
 impl Bins {
-    /// Sorts `centers` into bins of edge `size`; in a bin they keep their order. With `keep_indices` the way back
-    /// is kept.
+    /// Sorts `centers` into bins of edge `size`. Particles of a bin keep their order. With `keep_indices`, their
+    /// indices in the frame are stored.
     pub(crate) fn sort(centers: &[Vec3], size: f32, keep_indices: bool) -> Self {
         let inverse = 1.0 / size;
         let (low, high) = cell_bounds(centers, inverse);
@@ -106,24 +107,25 @@ impl Bins {
             indices: vec![0; if keep_indices { centers.len() } else { 0 }],
             ..Self::default()
         };
-        // The last piece takes what is out of reach.
+        // Divide the rows into pieces; one more piece takes the particles out of reach
         let width = i64::from(high[1]) - i64::from(low[1]) + 1;
         let rows = (width * (i64::from(high[2]) - i64::from(low[2]) + 1))
             .max(1)
             .cast_unsigned();
-        let most = (centers.len() / PIECE).clamp(1, MAX_PIECES) as u64;
-        let rows_each = rows.div_ceil(most);
+        let max_pieces = (centers.len() / PIECE_LEN).clamp(1, MAX_PIECES) as u64;
+        let rows_each = rows.div_ceil(max_pieces);
         #[expect(clippy::cast_possible_truncation, reason = "at most MAX_PIECES")]
         let pieces = rows.div_ceil(rows_each) as usize;
         #[expect(clippy::cast_possible_truncation, reason = "at most MAX_PIECES")]
         let piece_of = |_: usize, center: Vec3| {
             let cell = cell_of(center, inverse);
-            if !in_reach(cell) {
+            if !is_in_range(cell) {
                 return pieces;
             }
             let (z, y) = (i64::from(cell[2] - low[2]), i64::from(cell[1] - low[1]));
             ((z * width + y).cast_unsigned() / rows_each) as usize
         };
+        // Scatter the particles into pieces, and sort each piece by bin
         let cells = scatter(
             centers,
             pieces + 1,
@@ -142,6 +144,7 @@ impl Bins {
                 bins_of(points, inverse, *first)
             })
             .collect();
+        // Drop the particles out of reach, and index rows and bins
         bins.left_out = (centers.len() - kept) as u64;
         bins.points.truncate(kept);
         bins.indices.truncate(kept);
@@ -149,14 +152,15 @@ impl Bins {
         bins
     }
 
-    /// Makes rows and bins of the keys of all bins with their first particles, in order.
+    /// Creates rows and bins from the keys of all bins with their first particles, in order.
     fn index(&mut self, found: &[Vec<(u64, u32)>]) {
         let count = found.iter().map(Vec::len).sum::<usize>();
         self.bins = Vec::with_capacity(count + 1);
         self.rows = Vec::new();
-        let part = |key: u64| (key & ((1 << 21) - 1)) as i32 - REACH;
+        let part = |key: u64| (key & ((1 << 21) - 1)) as i32 - MAX_CELL;
         let mut before = None;
         for (key, start) in found.iter().flatten() {
+            // Begin a new row if z or y changes
             if before != Some(key >> 21) {
                 before = Some(key >> 21);
                 let first = index_u32(self.bins.len());
@@ -171,6 +175,7 @@ impl Bins {
                 start: *start,
             });
         }
+        // Append the end markers
         self.lookup = RowLookup::of(&self.rows);
         self.rows.push(Row {
             z: i32::MAX,
@@ -183,13 +188,13 @@ impl Bins {
         });
     }
 
-    /// Keeps the bins that are `wanted`, a flag each.
-    pub(crate) fn retain(&mut self, wanted: impl Fn(usize) -> bool) {
+    /// Removes all bins for which `is_needed` returns false.
+    pub(crate) fn retain(&mut self, is_needed: impl Fn(usize) -> bool) {
         let mut kept = 0;
         let mut found = Vec::new();
         for row in 0..self.row_count() {
             let place = self.rows[row];
-            for bin in self.bins_in(row).filter(|bin| wanted(*bin)) {
+            for bin in self.bins_in(row).filter(|bin| is_needed(*bin)) {
                 let particles = self.particles_in(bin..bin + 1);
                 found.push((key([self.bins[bin].x, place.y, place.z]), index_u32(kept)));
                 self.points.copy_within(particles.clone(), kept);
@@ -206,19 +211,21 @@ impl Bins {
         self.index(&[found]);
     }
 
-    /// Brings the particles of each bin into an order that depends on their positions alone, so that sums over
-    /// them do not depend on the order of the file. Indices must be kept.
+    /// Sorts the particles of each bin by position, so that sums over them do not depend on the order of the file.
+    /// Requires indices.
     pub(crate) fn order_by_position(&mut self) {
+        // Split points and indices by bin
         let mut tasks = Vec::with_capacity(self.bin_count());
         let (mut points, mut indices) = (&mut self.points[..], &mut self.indices[..]);
         for bins in self.bins.windows(2) {
             let count = (bins[1].start - bins[0].start) as usize;
-            let (its_points, others) = points.split_at_mut(count);
+            let (own_points, others) = points.split_at_mut(count);
             points = others;
-            let (its_indices, others) = indices.split_at_mut(count);
+            let (own_indices, others) = indices.split_at_mut(count);
             indices = others;
-            tasks.push((its_points, its_indices));
+            tasks.push((own_points, own_indices));
         }
+        // Sort the particles of each bin by position, then by index
         tasks.into_par_iter().with_min_len(64).for_each_init(
             Vec::new,
             |pairs, (points, indices)| {
@@ -242,49 +249,49 @@ impl Bins {
         self.size
     }
 
-    /// Particles too far away to be sorted in.
+    /// Number of particles that are too far away to be stored.
     pub(crate) fn left_out(&self) -> u64 {
         self.left_out
     }
 
-    /// Particles in order.
+    /// The particles, in the order of the bins.
     pub(crate) fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// Their indices in the frame; empty unless kept.
+    /// Their indices in the frame; empty unless requested.
     pub(crate) fn indices(&self) -> &[u32] {
         &self.indices
     }
 
-    /// Rows.
+    /// Number of rows.
     pub(crate) fn row_count(&self) -> usize {
         self.rows.len().saturating_sub(1)
     }
 
-    /// Bins that hold particles.
+    /// Number of bins with particles.
     pub(crate) fn bin_count(&self) -> usize {
         self.bins.len().saturating_sub(1)
     }
 
-    /// A row.
+    /// The row with an index.
     pub(crate) fn row(&self, row: usize) -> Row {
         self.rows[row]
     }
 
-    /// Numbers of the bins of a row.
+    /// Indices of the bins of a row.
     #[inline]
     pub(crate) fn bins_in(&self, row: usize) -> Range<usize> {
         self.rows[row].first as usize..self.rows[row + 1].first as usize
     }
 
-    /// A bin.
+    /// The bin with an index.
     #[inline]
     pub(crate) fn bin(&self, bin: usize) -> Bin {
         self.bins[bin]
     }
 
-    /// Numbers of the particles in a run of bins.
+    /// Indices of the particles in a run of bins.
     #[inline]
     pub(crate) fn particles_in(&self, bins: Range<usize>) -> Range<usize> {
         self.bins[bins.start].start as usize..self.bins[bins.end].start as usize
@@ -296,7 +303,7 @@ impl Bins {
         cell_of(point, self.inverse)
     }
 
-    /// The number of the row at (z, y).
+    /// Index of the row at (z, y).
     #[inline]
     pub(crate) fn row_at(&self, z: i32, y: i32) -> Option<usize> {
         match &self.lookup {
@@ -330,7 +337,7 @@ impl Bins {
         all.start + from..all.start + from + len
     }
 
-    /// Bytes of all of it.
+    /// Memory in bytes.
     pub(crate) fn byte_len(&self) -> u64 {
         let lookup = match &self.lookup {
             RowLookup::Search => 0,
@@ -353,6 +360,7 @@ impl RowLookup {
         let ((low_y, high_y), (low_z, high_z)) = (bounds(|r| r.y), bounds(|r| r.z));
         let width = high_y - low_y + 1;
         let area = i64::from(width) * i64::from(high_z - low_z + 1);
+        // Prefer binary search if a table would be sparse
         if area > 8 * rows.len() as i64 + 4096 {
             return Self::Search;
         }
@@ -387,7 +395,7 @@ fn cell_bounds(centers: &[Vec3], inverse: f32) -> ([i32; 3], [i32; 3]) {
         .map(|chunk| {
             let cells = chunk.iter().map(|center| cell_of(*center, inverse));
             cells
-                .filter(|cell| in_reach(*cell))
+                .filter(|cell| is_in_range(*cell))
                 .fold(none, |all, cell| join(all, (cell, cell)))
         })
         .reduce(|| none, join);
@@ -398,20 +406,21 @@ fn cell_bounds(centers: &[Vec3], inverse: f32) -> ([i32; 3], [i32; 3]) {
     }
 }
 
-/// The memory of sorting pieces.
+/// Buffers of one thread for sorting pieces.
 #[derive(Default)]
 struct Scratch {
-    /// Bin and place before.
+    /// Key of the bin and index before the sort, for each particle.
     keyed: Vec<(u64, u32)>,
-    /// Particles before each bin.
+    /// Number of particles before each bin.
     starts: Vec<u32>,
     points: Vec<Vec3>,
     indices: Vec<u32>,
 }
 
 impl Scratch {
-    /// Sorts a piece by bin, stably.
+    /// Sorts a piece by bin; the sort is stable.
     fn sort(&mut self, points: &mut [Vec3], indices: &mut [u32], inverse: f32) {
+        // Sort the keys of the particles
         self.keyed.clear();
         let keys = points.iter().map(|point| key(cell_of(*point, inverse)));
         self.keyed.extend(keys.zip(0..));
@@ -419,9 +428,10 @@ impl Scratch {
         self.points.extend_from_slice(points);
         self.indices.clear();
         self.indices.extend_from_slice(indices);
-        if !self.count_into_order() {
+        if !self.counting_sort() {
             self.keyed.sort_unstable();
         }
+        // Move points and indices into the sorted order
         for (point, (_, place)) in points.iter_mut().zip(&self.keyed) {
             *point = self.points[*place as usize];
         }
@@ -430,19 +440,20 @@ impl Scratch {
         }
     }
 
-    /// Sorts the keys by counting, if they are not too far apart; tells whether.
-    fn count_into_order(&mut self) -> bool {
+    /// Sorts the keys by counting if their range is small; returns whether it was.
+    fn counting_sort(&mut self) -> bool {
         let all = || self.keyed.iter().map(|(key, _)| *key);
         let (Some(low), Some(high)) = (all().min(), all().max()) else {
             return true;
         };
-        // Keys of different rows are far apart.
+        // Give up on a large range, as of a piece with several rows
         let span = high - low;
         if span > 4 * self.keyed.len() as u64 {
             return false;
         }
         #[expect(clippy::cast_possible_truncation, reason = "compared above")]
         let place = |key: u64| (key - low) as usize;
+        // Count the keys of each bin, and sum the counts up to the start of each bin
         self.starts.clear();
         self.starts.resize(place(high) + 2, 0);
         for (key, _) in &self.keyed {
@@ -451,6 +462,7 @@ impl Scratch {
         for bin in 1..self.starts.len() {
             self.starts[bin] += self.starts[bin - 1];
         }
+        // Move each key to its bin
         let mut sorted = vec![(0, 0); self.keyed.len()];
         for entry in &self.keyed {
             let next = &mut self.starts[place(entry.0)];
@@ -462,7 +474,7 @@ impl Scratch {
     }
 }
 
-/// Key and first particle of each bin of a sorted piece that begins at particle `first`.
+/// Key and first particle of each bin of a sorted piece; `first` is the index of the first particle of the piece.
 fn bins_of(points: &[Vec3], inverse: f32, first: usize) -> Vec<(u64, u32)> {
     let mut bins: Vec<(u64, u32)> = Vec::new();
     for (number, point) in (first..).zip(points) {

@@ -1,4 +1,4 @@
-//! Volumes of particles from the kernel sums over their neighbours.
+//! Computes the volumes of particles from kernel sums over their neighbours.
 
 use std::ops::Range;
 
@@ -11,37 +11,39 @@ use crate::accel::simd::{ArrayLanes, ArrayTask};
 
 /// Particles tested at once.
 const LANES: usize = 16;
-/// Kernel sums end here: more particles than any fluid has in one place. It bounds the work where all
-/// particles are in one, and sums below are exact.
-const CROWDED: f32 = 64.0;
-/// Terms are multiples of 2^-18, exact for sums up to that.
+/// Upper limit of kernel sums, above the number of particles that a fluid has in one place. It bounds the work if all
+/// particles coincide, and sums below it are exact.
+const MAX_SUM: f32 = 64.0;
+/// Terms are rounded to multiples of 2^-18, so that sums up to the limit are exact.
 const ROUNDING: f32 = 48.0;
-/// Particles tested between two looks at whether it is crowded.
-const LOOK: usize = 16 * LANES;
-/// Farther than any neighbour; its square is still a number.
-const NOWHERE: f32 = 1e18;
-/// Rows of bins for a task.
+/// Particles tested between two checks of the limit.
+const CHECK_LEN: usize = 16 * LANES;
+/// A coordinate farther away than any neighbour; its square is finite.
+const FAR_AWAY: f32 = 1e18;
+/// Rows of bins per task.
 const ROWS: usize = 8;
 
-/// The volume of each particle of the bins that are `wanted`, else 0.
-pub(super) fn volumes(bins: &Bins, wanted: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
+/// The volume of each particle in the bins for which `is_needed` returns true; 0 for all others.
+pub(super) fn volumes(bins: &Bins, is_needed: impl Fn(usize) -> bool + Sync) -> Vec<f32> {
     let mut volumes = vec![0.0; bins.points().len()];
+    // Split the result into tasks of several rows
     let mut tasks = Vec::new();
     let mut rest = &mut volumes[..];
     for first in (0..bins.row_count()).step_by(ROWS) {
         let rows = first..(first + ROWS).min(bins.row_count());
         let of_rows = bins.bins_in(rows.start).start..bins.bins_in(rows.end - 1).end;
         let particles = bins.particles_in(of_rows);
-        let (mine, others) = rest.split_at_mut(particles.len());
+        let (own_volumes, others) = rest.split_at_mut(particles.len());
         rest = others;
-        tasks.push((rows, particles.start, mine));
+        tasks.push((rows, particles.start, own_volumes));
     }
+    // Compute the volumes bin by bin
     let lanes = ArrayLanes::default();
     tasks.into_par_iter().for_each_init(
         Neighbours::default,
         |neighbours, (rows, first, volumes)| {
             for row in rows {
-                for bin in bins.bins_in(row).filter(|bin| wanted(*bin)) {
+                for bin in bins.bins_in(row).filter(|bin| is_needed(*bin)) {
                     let particles = bins.particles_in(bin..bin + 1);
                     neighbours.gather(bins, row, bin);
                     let own = particles.start - first..particles.end - first;
@@ -58,13 +60,13 @@ pub(super) fn volumes(bins: &Bins, wanted: impl Fn(usize) -> bool + Sync) -> Vec
     volumes
 }
 
-/// The particles of a bin and of the 26 around it.
+/// The particles of a bin and of the 26 bins around it, in groups of lanes.
 #[derive(Debug, Default)]
 struct Neighbours {
     x: Vec<[f32; LANES]>,
     y: Vec<[f32; LANES]>,
     z: Vec<[f32; LANES]>,
-    /// How far the last group is filled.
+    /// Number of particles in the last group.
     filled: usize,
 }
 
@@ -86,9 +88,9 @@ impl Neighbours {
     fn extend(&mut self, points: &[Vec3], particles: Range<usize>) {
         for point in &points[particles] {
             if self.filled == LANES {
-                self.x.push([NOWHERE; LANES]);
-                self.y.push([NOWHERE; LANES]);
-                self.z.push([NOWHERE; LANES]);
+                self.x.push([FAR_AWAY; LANES]);
+                self.y.push([FAR_AWAY; LANES]);
+                self.z.push([FAR_AWAY; LANES]);
                 self.filled = 0;
             }
             let group = self.x.len() - 1;
@@ -100,7 +102,7 @@ impl Neighbours {
     }
 }
 
-/// Volumes of the particles of a bin.
+/// Computes the volumes of the particles of a bin.
 struct Sum<'a> {
     neighbours: &'a Neighbours,
     inverse: f32,
@@ -116,8 +118,9 @@ impl ArrayTask for Sum<'_> {
         let Neighbours { x, y, z, .. } = self.neighbours;
         for (point, volume) in self.points.iter().zip(self.volumes) {
             let mut sums = [0.0_f32; LANES];
-            for first in (0..x.len()).step_by(LOOK / LANES) {
-                let groups = first..(first + LOOK / LANES).min(x.len());
+            for first in (0..x.len()).step_by(CHECK_LEN / LANES) {
+                let groups = first..(first + CHECK_LEN / LANES).min(x.len());
+                // Sum the kernel over some groups, in lanes
                 for ((x, y), z) in x[groups.clone()]
                     .iter()
                     .zip(&y[groups.clone()])
@@ -131,12 +134,13 @@ impl ArrayTask for Sum<'_> {
                         sums[lane] += (term + ROUNDING) - ROUNDING;
                     }
                 }
-                if sums.iter().sum::<f32>() >= CROWDED {
+                // Stop if the place is crowded
+                if sums.iter().sum::<f32>() >= MAX_SUM {
                     break;
                 }
             }
-            // Its own term is 1.
-            *volume = 1.0 / sums.iter().sum::<f32>().clamp(1.0, CROWDED);
+            // The sum includes the particle's own term, which is 1.
+            *volume = 1.0 / sums.iter().sum::<f32>().clamp(1.0, MAX_SUM);
         }
     }
 }

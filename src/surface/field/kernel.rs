@@ -1,10 +1,10 @@
-//! The cubic spline kernel (Monaghan and Lattanzio 1985, with the compact support of Koschier et al. 2019,
-//! "Smoothed particle hydrodynamics techniques", eq. 4), in units of its value in the middle.
+//! The cubic spline kernel (Monaghan and Lattanzio 1985, with the compact support of Koschier et al. 2019, "Smoothed
+//! particle hydrodynamics techniques", eq. 4), in units of its central value.
 
-/// The kernel at `q`, the distance over the support; 1 in the middle, 0 from 1 on.
+/// The kernel at `q`, the distance divided by the support; 1 at the centre, 0 from 1 on.
 ///
-/// `6 (q^3 - q^2) + 1` up to one half and `2 (1 - q)^3` from there are `2 (1 - q)^3 - 8 (1/2 - q)^3` with
-/// both terms cut off at zero: no branch, so it is the same code for any number of lanes.
+/// `6 (q^3 - q^2) + 1` up to one half, and `2 (1 - q)^3` from there, equal `2 (1 - q)^3 - 8 (1/2 - q)^3` with both
+/// terms clamped at zero. This form has no branch, so it is the same code for any number of lanes.
 #[inline(always)]
 pub(crate) fn weight(q: f32) -> f32 {
     let outer = (1.0 - q).max(0.0);

@@ -1,9 +1,9 @@
-//! The SPH colour field of a frame: `phi(x) = sum_j V_j W(x - x_j)` with `V_j = 1 / sum_k W(x_j - x_k)`
-//! (Müller, Charypar and Gross 2003, eq. 12, with masses cancelled): about 1 inside, 0 outside, and 1 in the
-//! middle of a particle that is alone, so that no drop vanishes.
+//! The SPH colour field of a frame: `phi(x) = sum_j V_j W(x - x_j)` with `V_j = 1 / sum_k W(x_j - x_k)` (Müller,
+//! Charypar and Gross 2003, eq. 12, with masses cancelled). It is about 1 inside, 0 outside, and 1 at the centre of
+//! an isolated particle, so that no drop vanishes.
 //!
-//! Sums that decide bits elsewhere are exact: each term is rounded to a multiple of a power of two that is
-//! small, but large enough for the sum to fit f32. So they do not depend on the order of particles.
+//! Sums that must not vary in any bit are exact: each term is rounded to a multiple of a power of two that is small,
+//! but large enough for the sum to fit into f32. So they do not depend on the order of particles.
 
 use glam::Vec3;
 
@@ -14,27 +14,27 @@ mod query;
 
 use bins::Bins;
 
-/// Terms of the field are multiples of 2^-20, exact for sums below 16.
+/// Terms of the field are multiples of 2^-20, so that sums below 16 are exact.
 const FIELD_ROUNDING: f32 = 12.0;
 
-/// `term` as a multiple of 2^-20.
+/// `term` rounded to a multiple of 2^-20.
 #[inline(always)]
 pub(crate) fn rounded(term: f32) -> f32 {
     (term + FIELD_ROUNDING) - FIELD_ROUNDING
 }
 
-/// The particles of a frame, sorted, with the volumes of those that the field was asked for.
+/// The particles of a frame, sorted into bins, with the volumes of those that contribute to the field.
 #[derive(Debug, Default)]
 pub struct FieldParticles {
     bins: Bins,
-    /// Volume of each particle in units of the inverse of the kernel in the middle: at most 1, which is a
-    /// particle alone. 0 where it was not asked for.
+    /// Volume of each particle in units of the inverse of the kernel's central value: at most 1, which is the volume
+    /// of an isolated particle. 0 if it was not computed.
     volumes: Vec<f32>,
 }
 
 impl FieldParticles {
-    /// Sorts `centers` for a kernel of `support` and finds all volumes. Indices are kept for
-    /// [`Self::nearest`] and [`Self::neighbours`].
+    /// Sorts `centers` for a kernel with `support`, and computes all volumes. Indices are kept for [`Self::nearest`]
+    /// and [`Self::neighbours`].
     pub fn new(centers: &[Vec3], support: f32) -> Self {
         let mut field = Self::sorted(centers, support, true);
         field.bins.order_by_position();
@@ -42,7 +42,7 @@ impl FieldParticles {
         field
     }
 
-    /// Sorts `centers`; no volumes yet.
+    /// Sorts `centers` without computing volumes.
     pub(crate) fn sorted(centers: &[Vec3], support: f32, keep_indices: bool) -> Self {
         Self {
             bins: Bins::sort(centers, support, keep_indices),
@@ -50,7 +50,7 @@ impl FieldParticles {
         }
     }
 
-    /// Lets go of the particles in bins that are not `kept`, a flag each.
+    /// Removes the particles of all bins with a false flag in `kept`.
     pub(crate) fn retain(&mut self, kept: &[bool]) {
         self.bins.retain(|bin| kept[bin]);
     }
@@ -60,12 +60,12 @@ impl FieldParticles {
         self.bins.order_by_position();
     }
 
-    /// Finds the volumes of the particles in the bins that are `wanted`.
-    pub(crate) fn find_volumes(&mut self, wanted: impl Fn(usize) -> bool + Sync) {
-        self.volumes = density::volumes(&self.bins, wanted);
+    /// Computes the volumes of the particles in the bins for which `is_needed` returns true.
+    pub(crate) fn find_volumes(&mut self, is_needed: impl Fn(usize) -> bool + Sync) {
+        self.volumes = density::volumes(&self.bins, is_needed);
     }
 
-    /// Where the kernel ends.
+    /// Radius of the kernel.
     pub fn support(&self) -> f32 {
         self.bins.size()
     }
@@ -75,12 +75,12 @@ impl FieldParticles {
         &self.bins
     }
 
-    /// Volume of each, in the order of the bins.
+    /// Volume of each particle, in the order of the bins.
     pub(crate) fn volumes(&self) -> &[f32] {
         &self.volumes
     }
 
-    /// Bytes of all of it.
+    /// Memory in bytes.
     pub fn byte_len(&self) -> u64 {
         self.bins.byte_len() + size_of_val(&self.volumes[..]) as u64
     }

@@ -1,4 +1,4 @@
-//! The field at a point, straight from the particles.
+//! Evaluates the field at a point, directly from the particles.
 
 use glam::Vec3;
 
@@ -10,19 +10,20 @@ use super::kernel::{slope, weight};
 pub(crate) struct Sample {
     /// `phi`.
     pub(crate) value: f32,
-    /// Its gradient: points inward at a surface.
+    /// Its gradient, which points inward at a surface.
     pub(crate) gradient: Vec3,
 }
 
 impl FieldParticles {
-    /// Gives `each` place in the order of the bins, square of the distance and offset from `point` of
-    /// all particles within the support.
+    /// Calls `each` for all particles within the support of `point`, with index in the order of the bins, squared
+    /// distance and offset from `point`.
     #[inline]
     fn around(&self, point: Vec3, mut each: impl FnMut(usize, f32, Vec3)) {
         let [x, y, z] = self.bins.cell_of(point);
         let limit = self.support() * self.support();
         for z in z.saturating_sub(1)..=z.saturating_add(1) {
             for y in y.saturating_sub(1)..=y.saturating_add(1) {
+                // Visit the neighbouring bins of the row
                 let run = self
                     .bins
                     .run(z, y, x.saturating_sub(1)..x.saturating_add(2));
@@ -37,7 +38,7 @@ impl FieldParticles {
         }
     }
 
-    /// The field at `point`. Particles whose volumes are not known count nothing.
+    /// The field at `point`. Particles without a computed volume do not contribute.
     pub(crate) fn sample(&self, point: Vec3) -> Sample {
         let inverse = 1.0 / self.support();
         let (mut value, mut gradient) = (0.0, Vec3::ZERO);
@@ -53,8 +54,8 @@ impl FieldParticles {
         Sample { value, gradient }
     }
 
-    /// Index in the frame of the particle nearest to `point`, if any is within the support; the lower index
-    /// of those at equal distance.
+    /// Index in the frame of the particle nearest to `point`, if any is within the support. Ties in distance go to
+    /// the lower index.
     pub fn nearest(&self, point: Vec3) -> Option<u32> {
         let mut best: Option<(f32, u32)> = None;
         self.around(point, |place, squared, _| {
@@ -66,8 +67,8 @@ impl FieldParticles {
         best.map(|(_, index)| index)
     }
 
-    /// Gives `each` the index in the frame and the part in the field at `point` of all particles within the
-    /// support.
+    /// Calls `each` with the index in the frame and the contribution to the field at `point` of all particles within
+    /// the support.
     pub fn neighbours(&self, point: Vec3, each: &mut dyn FnMut(u32, f32)) {
         let inverse = 1.0 / self.support();
         self.around(point, |place, squared, _| {

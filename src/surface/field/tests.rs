@@ -11,7 +11,7 @@ fn exact_weight(q: f64) -> f64 {
     }
 }
 
-/// The field by the book, of all particles.
+/// The field by its definition, summed over all particles.
 fn exact_field(centers: &[Vec3], support: f32, at: DVec3) -> f64 {
     let weight = |a: DVec3, b: DVec3| exact_weight(a.distance(b) / f64::from(support));
     centers

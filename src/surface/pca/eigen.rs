@@ -1,15 +1,15 @@
-//! The least of the principal components of three dimensions, in closed form: glam has no eigenvectors of
-//! symmetric matrices, and of a matrix this small iteration gains nothing.
+//! The smallest principal component in three dimensions, in closed form: glam has no eigenvectors of symmetric
+//! matrices, and iteration has no advantage for a matrix this small.
 
 use std::ops::Sub;
 
 use glam::DVec3;
 
-/// xx, yy, zz, xy, xz, yz.
+/// The elements xx, yy, zz, xy, xz, yz.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct SymmetricMatrix(pub(super) [f64; 6]);
 
-/// Second moments about zero, less the mean: those about the mean.
+/// Converts second moments about zero to second moments about the mean, by subtracting the mean.
 impl Sub<DVec3> for SymmetricMatrix {
     type Output = Self;
 
@@ -19,23 +19,24 @@ impl Sub<DVec3> for SymmetricMatrix {
     }
 }
 
-/// A direction in which a set spreads least.
+/// The direction of least variance.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Least {
-    /// Unit vector, either way.
+    /// Unit vector with either sign.
     pub(super) direction: DVec3,
-    /// How much less than the second it spreads, as a part of the second: 0 to 1.
+    /// Difference to the second smallest variance, as a fraction of the latter: 0 to 1.
     pub(super) gap: f64,
 }
 
-/// More than what rounding to f32 leaves of no spread at all, in squared supports.
+/// Larger than the variance that rounding to f32 adds to a set without extent, in squared supports.
 const NOISE: f64 = 1e-6;
 
-/// The least component of `matrix`, whose eigenvalues are not negative; None where no direction is the least.
-/// Eigenvalues by the angle of the characteristic cubic (Smith 1961, "Eigenvalues of a symmetric 3 x 3
+/// The smallest component of `matrix`, whose eigenvalues are not negative; None if there is no unique direction. The
+/// eigenvalues follow from the angle of the characteristic cubic (Smith 1961, "Eigenvalues of a symmetric 3 x 3
 /// matrix").
 pub(super) fn least_component(matrix: &SymmetricMatrix) -> Option<Least> {
     let [xx, yy, zz, xy, xz, yz] = matrix.0;
+    // Normalise the matrix by its mean and scale
     let mean = (xx + yy + zz) / 3.0;
     let [a, b, c] = [xx - mean, yy - mean, zz - mean];
     let around = a * a + b * b + c * c + 2.0 * (xy * xy + xz * xz + yz * yz);
@@ -43,14 +44,16 @@ pub(super) fn least_component(matrix: &SymmetricMatrix) -> Option<Least> {
     if scale.is_nan() || scale <= NOISE {
         return None;
     }
+    // Compute the eigenvalues
     let determinant = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz);
     let cosine = (determinant / (2.0 * scale * scale * scale)).clamp(-1.0, 1.0);
     let angle = libm::acos(cosine) / 3.0;
     let third = std::f64::consts::TAU / 3.0;
-    let most = mean + 2.0 * scale * libm::cos(angle);
+    let largest_value = mean + 2.0 * scale * libm::cos(angle);
     let least = mean + 2.0 * scale * libm::cos(angle + third);
-    let second = 3.0 * mean - most - least;
-    // What is across two rows of the matrix less the eigenvalue; the longest is the surest.
+    let second = 3.0 * mean - largest_value - least;
+    // Compute the eigenvector: perpendicular to two rows of the matrix minus the eigenvalue; the longest product is
+    // the most accurate
     let rows = [
         DVec3::new(xx - least, xy, xz),
         DVec3::new(xy, yy - least, yz),

@@ -6,7 +6,8 @@ use crate::surface::spheres::SphereSurface;
 
 const SUPPORT: f32 = 4.0;
 
-/// The shading normals of `centers`, with radius 1, as `rays` see them; the same of every structure.
+/// The shading normals at the hits of `rays` on spheres of radius 1 at `centers`, which must be the same for every
+/// structure.
 fn seen(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
     let mut all = Structure::ALL.map(|structure| {
         let mut builder = TreeBuilder::new();
@@ -16,7 +17,7 @@ fn seen(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
         };
         builder.build(&spheres, &BuildSettings::new(structure));
         let normals = ShadingNormals::Pca(PcaNormals::new(SUPPORT));
-        let surface = SphereSurface::new(builder.tree().view()).shaded_by(normals);
+        let surface = SphereSurface::new(builder.tree().view()).with_normals(normals);
         let shading = |ray: &Ray| surface.nearest(ray).expect("aimed at a sphere").shading;
         rays.iter().map(shading).collect::<Vec<_>>()
     });
@@ -24,7 +25,7 @@ fn seen(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
     std::mem::take(&mut all[0])
 }
 
-/// Points `spacing` apart in a box of `counts` from the origin.
+/// A lattice of points `spacing` apart, `counts` along the axes, from the origin.
 fn lattice(counts: [i16; 3], spacing: f32) -> Vec<Vec3> {
     let [x, y, z] = counts;
     let points = (0..x).flat_map(|i| (0..y).flat_map(move |j| (0..z).map(move |k| [i, j, k])));
@@ -112,7 +113,7 @@ fn coincident_spheres_have_a_normal() {
 
 #[test]
 fn components_are_those_of_a_known_matrix() {
-    // Turned by a quarter about z: the least is along x + y.
+    // Rotated by 45 degrees about z: the smallest component is along x + y.
     let least = least_component(&SymmetricMatrix([2.0, 2.0, 5.0, -1.0, 0.0, 0.0])).expect("one");
     let along = DVec3::new(1.0, 1.0, 0.0).normalize();
     assert!((least.direction.dot(along).abs() - 1.0).abs() < 1e-12);

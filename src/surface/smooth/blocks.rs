@@ -1,4 +1,4 @@
-//! Which bricks the surface may pass: near particles, but not deep among them.
+//! Selects the bricks that the surface may pass through: near particles, but not deep inside the fluid.
 
 use std::ops::Range;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -11,42 +11,46 @@ use crate::surface::field::bins::{Bins, floor};
 
 /// Bricks along an edge of a block.
 pub(super) const EDGE: i32 = 4;
-/// Blocks that a task looks at.
-const BLOCKS: usize = 64;
-/// Rows of bins that a task looks at.
-const ROWS: usize = 128;
-/// Part of the particles that an even filling has, from which on a bin counts as filled.
+/// Blocks per task.
+const TASK_BLOCKS: usize = 64;
+/// Rows of bins per task.
+const TASK_ROWS: usize = 128;
+/// A bin with at least this fraction of the particles of a regular filling counts as filled.
 const FILLED: f32 = 0.5;
 
-/// 4x4x4 bricks, a bit for each: x fastest, then y, then z.
+/// A block of 4x4x4 bricks, with one bit per brick: x fastest, then y, then z.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct BlockPlan {
-    /// In blocks.
-    pub(super) place: [i32; 3],
-    /// The surface may pass.
+    /// Position in blocks.
+    pub(super) position: [i32; 3],
+    /// Bricks that the surface may pass through.
     pub(super) band: u64,
-    /// All inside, deep among particles.
+    /// Bricks that are deep inside the fluid.
     pub(super) inside: u64,
-    /// The band and its neighbours that are not deep inside: the field is needed here.
+    /// Bricks in which the field is needed: the band and its neighbours, without those that are deep inside.
     pub(super) raw: u64,
 }
 
-/// The blocks that hold anything, in the order of their places.
+/// All blocks with any bits set, sorted by position.
 #[derive(Debug)]
 pub(super) struct Plan {
-    /// By their keys.
+    /// Sorted by their keys.
     pub(super) blocks: Vec<BlockPlan>,
 }
 
 impl Plan {
     pub(super) fn of(bins: &Bins, layout: &Layout) -> Self {
+        // Find the band, and the bricks around it
         let blocks = near_particles(bins, layout);
-        let beside: Vec<Vec<(u64, u64)>> = blocks.par_chunks(BLOCKS).map(beside_band).collect();
-        let beside = merged(beside.concat());
+        let with_neighbours: Vec<Vec<(u64, u64)>> = blocks
+            .par_chunks(TASK_BLOCKS)
+            .map(neighbours_of_band)
+            .collect();
+        let with_neighbours = merge_by_key(with_neighbours.concat());
         let mut near = blocks.into_iter().peekable();
         let mut blocks = Vec::new();
-        // Two lists by key become one.
-        for (key, raw) in beside {
+        // Merge the two sorted lists
+        for (key, raw) in with_neighbours {
             while let Some(earlier) = near.next_if(|block| block.key() < key) {
                 blocks.push(earlier);
             }
@@ -59,18 +63,18 @@ impl Plan {
         Self { blocks }
     }
 
-    /// Numbers of the blocks around a block, by z, y and x.
+    /// Indices of a block and its 26 neighbours, by z, y and x.
     pub(super) fn around(&self, block: usize) -> [Option<usize>; 27] {
-        let place = self.blocks[block].place;
+        let position = self.blocks[block].position;
         std::array::from_fn(|i| {
             let step = |i: usize| [-1, 0, 1][i % 3];
             let (x, y, z) = (step(i), step(i / 3), step(i / 9));
-            let key = key_of([place[0] + x, place[1] + y, place[2] + z]);
+            let key = key_of([position[0] + x, position[1] + y, position[2] + z]);
             self.blocks.binary_search_by_key(&key, BlockPlan::key).ok()
         })
     }
 
-    /// Bytes of all of it.
+    /// Memory in bytes.
     pub(super) fn byte_len(&self) -> u64 {
         size_of_val(&self.blocks[..]) as u64
     }
@@ -78,12 +82,12 @@ impl Plan {
 
 impl BlockPlan {
     fn key(&self) -> u64 {
-        key_of(self.place)
+        key_of(self.position)
     }
 
     fn empty(key: u64) -> Self {
         Self {
-            place: place_of(key),
+            position: position_of(key),
             band: 0,
             inside: 0,
             raw: 0,
@@ -91,12 +95,12 @@ impl BlockPlan {
     }
 }
 
-/// Keys and bits of the bricks of bands and of those around them.
-fn beside_band(blocks: &[BlockPlan]) -> Vec<(u64, u64)> {
+/// Keys and bits of the bricks of all bands and of their neighbours.
+fn neighbours_of_band(blocks: &[BlockPlan]) -> Vec<(u64, u64)> {
     let mut found = Vec::new();
     for block in blocks {
         for cell in cells(block.band) {
-            let [x, y, z] = brick_at(block.place, cell);
+            let [x, y, z] = brick_at(block.position, cell);
             for z in z - 1..=z + 1 {
                 for y in y - 1..=y + 1 {
                     found.extend((x - 1..=x + 1).map(|x| key_and_bit([x, y, z])));
@@ -104,10 +108,10 @@ fn beside_band(blocks: &[BlockPlan]) -> Vec<(u64, u64)> {
             }
         }
     }
-    merged(found)
+    merge_by_key(found)
 }
 
-/// The cells whose bits are set.
+/// Indices of the set bits.
 pub(super) fn cells(mut bits: u64) -> impl Iterator<Item = u32> {
     std::iter::from_fn(move || {
         let cell = bits.trailing_zeros();
@@ -116,23 +120,24 @@ pub(super) fn cells(mut bits: u64) -> impl Iterator<Item = u32> {
     })
 }
 
-/// The bands of the blocks that particles are near enough to for a surface, by their keys.
+/// All blocks with particles near enough for a surface, sorted by key; `raw` is not set yet.
 fn near_particles(bins: &Bins, layout: &Layout) -> Vec<BlockPlan> {
     let occupied = occupied(bins, layout);
     let filled = filled_count(layout);
-    // Deep inside the field is taken to be 1: no inside for who asks for more.
+    // The field deep inside is assumed to be 1, so a higher threshold has no inside.
     let has_inside = layout.threshold < 1.0;
     occupied
         .into_par_iter()
         .map(|(key, near)| {
-            let place = place_of(key);
+            let position = position_of(key);
+            // Separate bricks that are deep inside from the band
             let is_deep = |cell: u32| {
-                let brick = brick_at(place, cell);
+                let brick = brick_at(position, cell);
                 has_inside && near >> cell & 1 == 1 && is_deep(bins, layout, brick, filled)
             };
             let inside = (0..64).fold(0, |bits, cell| bits | u64::from(is_deep(cell)) << cell);
             BlockPlan {
-                place,
+                position,
                 band: near & !inside,
                 inside,
                 raw: 0,
@@ -141,13 +146,13 @@ fn near_particles(bins: &Bins, layout: &Layout) -> Vec<BlockPlan> {
         .collect()
 }
 
-/// The brick of a cell of the block at `place`, in bricks.
-pub(super) fn brick_at(place: [i32; 3], cell: u32) -> [i32; 3] {
+/// Position in bricks of a cell of the block at `position`.
+pub(super) fn brick_at(position: [i32; 3], cell: u32) -> [i32; 3] {
     let part = |axis: usize| (cell >> (2 * axis) & 3).cast_signed();
-    std::array::from_fn(|axis| EDGE * place[axis] + part(axis))
+    std::array::from_fn(|axis| EDGE * position[axis] + part(axis))
 }
 
-/// Flags for the bins within `reach` of the bricks where the field is needed.
+/// A flag for each bin: whether it is within `reach` of a brick in which the field is needed.
 pub(super) fn bins_near(
     bins: &Bins,
     layout: &Layout,
@@ -159,7 +164,8 @@ pub(super) fn bins_near(
         .collect();
     blocks.par_iter().for_each(|block| {
         for cell in cells(block.raw) {
-            let [xs, ys, zs] = cells_around(layout, brick_at(block.place, cell), reach);
+            // Flag all bins within reach of the brick
+            let [xs, ys, zs] = cells_around(layout, brick_at(block.position, cell), reach);
             for z in zs {
                 for y in ys.clone() {
                     for bin in bins.run(z, y, xs.clone()) {
@@ -172,11 +178,11 @@ pub(super) fn bins_near(
     near.into_iter().map(AtomicBool::into_inner).collect()
 }
 
-/// Keys and bits of blocks with bricks that particles are near enough to for a surface, in order.
+/// Sorted keys of all blocks with particles near enough for a surface, and the bits of these bricks.
 fn occupied(bins: &Bins, layout: &Layout) -> Vec<(u64, u64)> {
     let tasks: Vec<Range<usize>> = (0..bins.row_count())
-        .step_by(ROWS)
-        .map(|first| first..(first + ROWS).min(bins.row_count()))
+        .step_by(TASK_ROWS)
+        .map(|first| first..(first + TASK_ROWS).min(bins.row_count()))
         .collect();
     let parts: Vec<Vec<(u64, u64)>> = tasks
         .into_par_iter()
@@ -185,14 +191,14 @@ fn occupied(bins: &Bins, layout: &Layout) -> Vec<(u64, u64)> {
             for row in rows {
                 occupied_by_row(bins, layout, row, &mut found);
             }
-            merged(found)
+            merge_by_key(found)
         })
         .collect();
-    merged(parts.concat())
+    merge_by_key(parts.concat())
 }
 
-/// One entry for each key, in order.
-pub(super) fn merged(mut found: Vec<(u64, u64)>) -> Vec<(u64, u64)> {
+/// Sorts entries by key, and combines the bits of equal keys.
+pub(super) fn merge_by_key(mut found: Vec<(u64, u64)>) -> Vec<(u64, u64)> {
     found.par_sort_unstable();
     found.dedup_by(|next, kept| {
         let same = next.0 == kept.0;
@@ -205,17 +211,20 @@ pub(super) fn merged(mut found: Vec<(u64, u64)>) -> Vec<(u64, u64)> {
 }
 
 fn occupied_by_row(bins: &Bins, layout: &Layout, row: usize, found: &mut Vec<(u64, u64)>) {
-    let place = bins.row(row);
-    let (ys, zs) = (layout.bricks_near(place.y), layout.bricks_near(place.z));
+    let position = bins.row(row);
+    let (ys, zs) = (
+        layout.bricks_near(position.y),
+        layout.bricks_near(position.z),
+    );
     for z in zs {
         for y in ys.clone() {
-            // Bins come by x: entries of one block follow one another.
+            // Bins are sorted by x, so entries of the same block are adjacent: combine them at once
             let mut last: Option<(u64, u64)> = None;
             for bin in bins.bins_in(row) {
                 for x in layout.bricks_near(bins.bin(bin).x) {
                     let (key, bit) = key_and_bit([x, y, z]);
                     match &mut last {
-                        Some((held, bits)) if *held == key => *bits |= bit,
+                        Some((current, bits)) if *current == key => *bits |= bit,
                         _ => found.extend(last.replace((key, bit))),
                     }
                 }
@@ -236,11 +245,11 @@ pub(super) fn key_of(block: [i32; 3]) -> u64 {
     part(block[2]) << 42 | part(block[1]) << 21 | part(block[0])
 }
 
-pub(super) fn place_of(key: u64) -> [i32; 3] {
+pub(super) fn position_of(key: u64) -> [i32; 3] {
     [0, 21, 42].map(|shift| (key >> shift & ((1 << 21) - 1)) as i32 - (1 << 20))
 }
 
-/// Particles from which on a bin counts as filled.
+/// Particle count from which a bin counts as filled.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -265,9 +274,9 @@ fn is_deep(bins: &Bins, layout: &Layout, brick: [i32; 3], filled: usize) -> bool
     })
 }
 
-/// The bins that come within `reach` of a brick, along each axis.
+/// The range of bins within `reach` of a brick, along each axis.
 pub(super) fn cells_around(layout: &Layout, brick: [i32; 3], reach: f32) -> [Range<i32>; 3] {
-    /// Bins that touch only by rounding do not count.
+    /// Excludes bins that touch the range only because of rounding.
     const SLACK: f32 = 1e-3;
     let edge = VOXELS as f32 * layout.voxel;
     brick.map(|b| {

@@ -1,4 +1,4 @@
-//! A cube of voxels with the field at their corners, quantised.
+//! A cube of voxels with quantised samples of the field at their corners.
 
 use glam::{Vec3, Vec3A, Vec4};
 
@@ -6,60 +6,62 @@ use crate::surface::Side;
 
 /// Voxels along an edge.
 pub(super) const VOXELS: usize = 8;
-/// The same to count with coordinates.
+/// [`VOXELS`] for arithmetic with coordinates.
 pub(super) const VOXELS_I32: i32 = 8;
-/// Bits of a coordinate in voxels that tell the voxel in its brick.
+/// Bits of a coordinate in voxels that give the position in the brick.
 pub(super) const VOXEL_BITS: u32 = 3;
 /// Samples along an edge: the corners of the voxels, and one more on either side for gradients.
 pub(super) const SAMPLES: usize = VOXELS + 3;
-/// The largest value that is told from larger ones; the field in a body is about 1.
-const MOST: f32 = 1.5;
-/// Codes for a value of 1.
-pub(super) const CODES: f32 = 65_535.0 / MOST;
+/// The largest value that can be stored; the field inside a body is about 1.
+const MAX_VALUE: f32 = 1.5;
+/// Codes per unit of the field.
+pub(super) const CODES: f32 = 65_535.0 / MAX_VALUE;
 
-/// Places of a sample's neighbours along y and z.
+/// Distance in the sample array between neighbours along y.
 const ROW: usize = SAMPLES;
+/// Distance in the sample array between neighbours along z.
 const LAYER: usize = SAMPLES * SAMPLES;
 
-/// See the module. Neighbouring bricks have the same samples where they meet.
+/// A brick, see the module. Neighbouring bricks have equal samples at their common border.
 #[derive(Debug, Clone)]
 pub(super) struct Brick {
-    /// A bit for each voxel of a layer (8 y + x), for each z: some corner is inside.
+    /// For each z, one bit per voxel (8 y + x): set if any corner is inside.
     any_inside: [u64; VOXELS],
-    /// Some corner is outside.
+    /// The same: set if any corner is outside.
     any_outside: [u64; VOXELS],
-    /// Boxes around the voxels of each, first and beyond the last along each axis.
+    /// Bounding box of the voxels of `any_inside`: the first one, and one past the last one, along each axis.
     inside_box: [[u8; 4]; 2],
+    /// Bounding box of the voxels of `any_outside`.
     outside_box: [[u8; 4]; 2],
-    /// By z, y and x from one voxel before the brick on.
+    /// The samples by z, y and x, from one voxel before the brick on.
     samples: [u16; SAMPLES * LAYER],
 }
 
-/// What the samples of a brick are.
+/// The brick made from samples, unless it is uniform.
 #[derive(Debug)]
 #[expect(
     clippy::large_enum_variant,
     reason = "bricks are moved into their place at once"
 )]
-pub(super) enum Made {
-    /// The surface passes.
+pub(super) enum BrickKind {
+    /// The surface passes through the brick.
     Brick(Brick),
-    /// No voxel has a corner inside.
+    /// All corners are outside.
     Outside,
-    /// No voxel has a corner outside.
+    /// All corners are inside.
     Inside,
 }
 
-/// Inside the surface at `threshold`, which is in codes. The same for a number and its code.
+/// Whether a code is inside the surface at `threshold`, which is in codes. A value and its code give the same result.
 #[inline(always)]
 pub(super) fn is_inside(code: u16, threshold: f32) -> bool {
     f32::from(code) >= threshold
 }
 
 impl Brick {
-    /// Of the field's values in rows of 16 of which `SAMPLES` count.
+    /// Makes a brick from values of the field, in rows of 16 with `SAMPLES` valid values.
     #[inline(always)]
-    pub(super) fn make(field: &[[[f32; 16]; SAMPLES]; SAMPLES], threshold: f32) -> Made {
+    pub(super) fn make(field: &[[[f32; 16]; SAMPLES]; SAMPLES], threshold: f32) -> BrickKind {
         let mut brick = Self {
             any_inside: [0; VOXELS],
             any_outside: [0; VOXELS],
@@ -67,18 +69,20 @@ impl Brick {
             outside_box: [[0; 4]; 2],
             samples: [0; SAMPLES * LAYER],
         };
-        // A bit for each sample of a row, the one before the brick first.
+        // Quantise the samples, and set a bit for each one inside; the first bit of a row is the sample before the
+        // brick
         let mut inside = [[0_u32; SAMPLES]; SAMPLES];
         for z in 0..SAMPLES {
             for y in 0..SAMPLES {
                 let codes = codes(&field[z][y]);
-                let place = z * LAYER + y * ROW;
-                brick.samples[place..place + SAMPLES].copy_from_slice(&codes[..SAMPLES]);
+                let position = z * LAYER + y * ROW;
+                brick.samples[position..position + SAMPLES].copy_from_slice(&codes[..SAMPLES]);
                 for (x, code) in codes.iter().enumerate() {
                     inside[z][y] |= u32::from(is_inside(*code, threshold)) << x;
                 }
             }
         }
+        // Mark the voxels with a corner inside, and those with a corner outside
         let (mut any_inside, mut any_outside) = (0, 0);
         for z in 0..VOXELS {
             for y in 0..VOXELS {
@@ -90,7 +94,7 @@ impl Brick {
                 ];
                 let any = rows.iter().fold(0, |any, row| any | row);
                 let all = rows.iter().fold(!0, |all, row| all & row);
-                // Both ends of each voxel of the row.
+                // Combine both ends of each voxel of the row.
                 let (any, all) = (any >> 1 | any >> 2, all >> 1 & all >> 2);
                 brick.any_inside[z] |= u64::from(any & 0xff) << (8 * y);
                 brick.any_outside[z] |= u64::from(!all & 0xff) << (8 * y);
@@ -98,18 +102,19 @@ impl Brick {
             any_inside |= brick.any_inside[z];
             any_outside |= brick.any_outside[z];
         }
+        // Find the bounding boxes of the marked voxels
         match (any_inside, any_outside) {
-            (0, _) => Made::Outside,
-            (_, 0) => Made::Inside,
+            (0, _) => BrickKind::Outside,
+            (_, 0) => BrickKind::Inside,
             _ => {
                 brick.inside_box = box_around(&brick.any_inside);
                 brick.outside_box = box_around(&brick.any_outside);
-                Made::Brick(brick)
+                BrickKind::Brick(brick)
             }
         }
     }
 
-    /// For each layer of voxels, those that a ray on `side` may cross the surface in.
+    /// For each layer of voxels, those in which a ray on `side` may cross the surface.
     #[inline(always)]
     pub(super) fn voxels(&self, side: Side) -> &[u64; VOXELS] {
         match side {
@@ -118,7 +123,7 @@ impl Brick {
         }
     }
 
-    /// The box around those: the first, and the one beyond the last, along each axis.
+    /// Bounding box of these voxels: the first one, and one past the last one, along each axis.
     #[inline(always)]
     pub(super) fn marked(&self, side: Side) -> &[[u8; 4]; 2] {
         match side {
@@ -127,8 +132,8 @@ impl Brick {
         }
     }
 
-    /// The field at the corners of a voxel, in codes: x fastest, then y, then z. Voxels beyond the brick by
-    /// one have their corners, too.
+    /// The field at the corners of a voxel, in codes: x fastest, then y, then z. Also valid for voxels that are one
+    /// outside the brick.
     #[inline(always)]
     pub(super) fn corners(&self, x: i32, y: i32, z: i32) -> [i32; 8] {
         #[expect(clippy::cast_sign_loss, reason = "voxels from -1 on")]
@@ -148,26 +153,27 @@ impl Brick {
         ]
     }
 
-    /// The field at a place in voxels from the brick's corner, trilinear, in codes.
+    /// The field at a position in voxels from the corner of the brick, by trilinear interpolation, in codes.
     #[inline(always)]
-    pub(super) fn value(&self, place: Vec3) -> f32 {
-        let voxel = voxel_of(place);
+    pub(super) fn value(&self, position: Vec3) -> f32 {
+        let voxel = voxel_of(position);
         let [x, y, z] = voxel;
         trilinear(
             &self.corners(x, y, z).map(|code| code as f32),
-            place - Vec3::from(corner(voxel)),
+            position - Vec3::from(corner(voxel)),
         )
     }
 
-    /// The gradient at a place in voxels from the brick's corner: central differences at the corners,
-    /// trilinear between; in codes a voxel.
+    /// The gradient at a position in voxels from the corner of the brick, in codes per voxel: trilinear interpolation
+    /// of central differences at the corners.
     ///
-    /// That is a sum over 4x4x4 samples without the edges of that cube, with weights that are products of one for
-    /// each axis.
+    /// The result is a weighted sum over 4x4x4 samples without the edges of that cube; a weight is a product of one
+    /// factor per axis.
     #[inline(always)]
-    pub(super) fn gradient(&self, place: Vec3) -> Vec3 {
-        let voxel = voxel_of(place);
-        let part = place - Vec3::from(corner(voxel));
+    pub(super) fn gradient(&self, position: Vec3) -> Vec3 {
+        let voxel = voxel_of(position);
+        let part = position - Vec3::from(corner(voxel));
+        // Compute the weights along each axis, for interpolation and for differences
         let [mix_x, mix_y, mix_z] = part.to_array().map(|part| [0.0, 1.0 - part, part, 0.0]);
         let [slope_x, slope_y, slope_z] = part.to_array().map(|part| {
             let (a, b) = (0.5 * (1.0 - part), 0.5 * part);
@@ -175,6 +181,7 @@ impl Brick {
         });
         #[expect(clippy::cast_sign_loss, reason = "voxels from 0 on")]
         let first = voxel[2] as usize * LAYER + voxel[1] as usize * ROW + voxel[0] as usize;
+        // Sum rows of four samples over y and z
         let (mut along_x, mut along_y, mut along_z) = (Vec4::ZERO, Vec4::ZERO, Vec4::ZERO);
         for z in 0..4 {
             let is_middle_z = z == 1 || z == 2;
@@ -195,6 +202,7 @@ impl Brick {
                 }
             }
         }
+        // Sum along x
         let mix = Vec4::from_array(mix_x);
         Vec3::new(
             along_x.dot(Vec4::from_array(slope_x)),
@@ -203,7 +211,7 @@ impl Brick {
         )
     }
 
-    /// Four samples of a row.
+    /// Four consecutive samples of a row.
     #[inline(always)]
     fn row(&self, first: usize) -> Vec4 {
         let row = &self.samples[first..first + 4];
@@ -216,7 +224,7 @@ impl Brick {
     }
 }
 
-/// The box around the voxels whose bits are set; there are some.
+/// Bounding box of the voxels with a set bit; there is at least one.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "numbers from 0 to 8")]
 fn box_around(layers: &[u64; VOXELS]) -> [[u8; 4]; 2] {
@@ -244,14 +252,14 @@ fn codes(row: &[f32; 16]) -> [u16; 16] {
     row.map(|value| ((value * CODES).clamp(0.0, 65_535.0) + 0.5) as i32 as u16)
 }
 
-/// The voxel of a brick that holds a place.
+/// The voxel of a brick that contains a position.
 #[inline(always)]
 #[expect(
     clippy::cast_possible_truncation,
     reason = "saturates, then is clamped"
 )]
-pub(super) fn voxel_of(place: Vec3) -> [i32; 3] {
-    [place.x, place.y, place.z].map(|x| (x as i32).clamp(0, VOXELS_I32 - 1))
+pub(super) fn voxel_of(position: Vec3) -> [i32; 3] {
+    [position.x, position.y, position.z].map(|x| (x as i32).clamp(0, VOXELS_I32 - 1))
 }
 
 #[inline(always)]
@@ -259,7 +267,7 @@ pub(super) fn corner(voxel: [i32; 3]) -> Vec3A {
     Vec3A::new(voxel[0] as f32, voxel[1] as f32, voxel[2] as f32)
 }
 
-/// Between the corners of a voxel, `part` of the way along each axis.
+/// Trilinear interpolation of values at the corners of a voxel; `part` is the position in the voxel, from 0 to 1.
 #[inline(always)]
 pub(super) fn trilinear(c: &[f32; 8], part: Vec3) -> f32 {
     let mix = |a: f32, b: f32, part: f32| a + (b - a) * part;

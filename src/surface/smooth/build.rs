@@ -1,4 +1,4 @@
-//! From particles to bricks.
+//! Builds bricks from particles.
 
 use std::time::Duration;
 
@@ -9,7 +9,7 @@ use thiserror::Error;
 
 use super::blocks::{self, BlockPlan, Plan};
 use super::blur::{Around, Blur, BrickField, Part, taps};
-use super::brick::{Brick, CODES, Made, SAMPLES};
+use super::brick::{Brick, BrickKind, CODES, SAMPLES};
 use super::layout::Layout;
 use super::raw::{Codes, Gather, RawBrick};
 use super::tree::{Block, BrickTree, Node};
@@ -19,61 +19,62 @@ use crate::metrics::Bytes;
 use crate::surface::SurfaceSettings;
 use crate::surface::field::FieldParticles;
 
-/// Blocks whose bricks are made at once, a thread: few, so that what they bring can be put away in order.
+/// Blocks per thread whose bricks are made at once. Few, because the results of a batch are held until they are
+/// appended in order.
 const BATCH: usize = 16;
 
-/// Why there is no surface.
+/// Reasons why there is no surface.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum SmoothError {
-    /// Its grid would not fit.
+    /// The grid does not fit into memory.
     #[error(
         "the smooth surface of {particles} particles of radius {radius} in voxels of {voxel} needs about {} of \
          memory, {} are left for it; is the radius right? Else give larger voxels (surface.voxel) or more memory",
         Bytes(*.need), Bytes(*.left)
     )]
     TooLarge {
-        /// Particles.
+        /// Number of particles.
         particles: u64,
         /// Their radius.
         radius: f32,
         /// Edge of a voxel.
         voxel: f32,
-        /// Bytes.
+        /// Bytes needed.
         need: u64,
-        /// Bytes.
+        /// Bytes available.
         left: u64,
     },
 }
 
-/// What building a surface took.
+/// Cost of building a surface.
 #[derive(Debug, Clone, Default)]
 pub struct SmoothReport {
     /// Wall-clock time.
     pub total: Duration,
-    /// By phase, in order.
+    /// Wall-clock time by phase, in order.
     pub phases: Vec<Phase>,
-    /// Bricks that the surface passes.
+    /// Number of bricks that the surface passes through.
     pub bricks: u64,
-    /// Bytes of the grid, and of particles that are kept for looking up attributes or exact places.
+    /// Bytes of the grid, and of the particles that are kept for attributes or exact intersections.
     pub bytes: u64,
-    /// Most bytes held while building, those included.
+    /// Peak memory of the build in bytes, including `bytes`.
     pub peak_bytes: u64,
-    /// Particles too far from all others to be drawn.
+    /// Number of particles that are too far from all others to be drawn.
     pub left_out: u64,
-    /// Whether there are particles, but the field nowhere gets to the threshold.
+    /// Whether there are particles, but the field does not reach the threshold anywhere.
     pub is_empty: bool,
 }
 
-/// A grid with what else rays ask for.
+/// A grid with the data that ray queries need in addition.
 #[derive(Debug, Default)]
 pub(super) struct Built {
     pub(super) tree: BrickTree,
     pub(super) field: Option<FieldParticles>,
-    /// Lengths, where places and normals are to be the field's.
+    /// The layout, if intersections and normals are to be computed from the field.
     pub(super) exact: Option<Layout>,
 }
 
-/// Builds the surface of `centers`; with `keep` the particles are kept. `left` is what memory there is.
+/// Builds the surface of `centers`. With `keep` the particles are kept. `left` is the available memory in bytes.
 pub(super) fn build(
     centers: &[Vec3],
     radius: f32,
@@ -84,7 +85,7 @@ pub(super) fn build(
     let mut clock = PhaseClock::new();
     let layout = Layout::new(settings, radius);
     let count = centers.len() as u64;
-    let refuse = |need: u64| match left {
+    let check_memory = |need: u64| match left {
         Some(left) if need > left => Err(SmoothError::TooLarge {
             particles: count,
             radius,
@@ -94,26 +95,30 @@ pub(super) fn build(
         }),
         _ => Ok(()),
     };
+    // Sort the particles into bins
     let keep = keep || settings.exact;
-    refuse(count * if keep { 24 } else { 20 })?;
+    check_memory(count * if keep { 24 } else { 20 })?;
     let mut field = FieldParticles::sorted(centers, layout.support, keep);
     clock.lap("sort");
+    // Select the bricks that the surface may pass through
     let plan = Plan::of(field.bins(), &layout);
     clock.lap("plan");
-    let need = Need::of(&plan);
-    refuse(field.byte_len() + 4 * count + need.total())?;
+    let need = MemoryNeed::of(&plan);
+    check_memory(field.byte_len() + 4 * count + need.total())?;
     let sorted_bytes = field.byte_len() + plan.byte_len();
+    // Compute the volumes of the particles that contribute to the surface
     if settings.exact {
         field.order_by_position();
         field.find_volumes(|_| true);
     } else {
-        let needed = let_go(&mut field, &layout, &plan);
+        let needed = discard_unused(&mut field, &layout, &plan);
         if keep {
             field.order_by_position();
         }
         field.find_volumes(|bin| needed[bin]);
     }
     clock.lap("volumes");
+    // Sample the field, then assemble bricks and their tree
     let work = Work {
         field: &field,
         layout: &layout,
@@ -127,6 +132,7 @@ pub(super) fn build(
     drop(raw);
     let tree = BrickTree::new(&blocks, bricks, layout.voxel, layout.threshold * CODES);
     clock.lap("bricks");
+    // Report the cost of the build
     let phases = clock.finish();
     let report = SmoothReport {
         total: phases.iter().map(|phase| phase.time).sum(),
@@ -146,23 +152,23 @@ pub(super) fn build(
     Ok((built, report))
 }
 
-/// Lets go of all particles that the surface does not depend on. Those whose volumes the field is made of are
-/// flagged, bin by bin; the others are their neighbours.
-fn let_go(field: &mut FieldParticles, layout: &Layout, plan: &Plan) -> Vec<bool> {
+/// Removes all particles that do not affect the surface. Returns a flag for each remaining bin: whether its volumes
+/// contribute to the field. The other bins are neighbours of those.
+fn discard_unused(field: &mut FieldParticles, layout: &Layout, plan: &Plan) -> Vec<bool> {
     let near = |reach: f32| blocks::bins_near(field.bins(), layout, &plan.blocks, reach);
     let (needed, kept) = (near(layout.support), near(2.0 * layout.support));
     field.retain(&kept);
-    let still = needed.iter().zip(&kept).filter(|(_, kept)| **kept);
-    still.map(|(needed, _)| *needed).collect()
+    let remaining = needed.iter().zip(&kept).filter(|(_, kept)| **kept);
+    remaining.map(|(needed, _)| *needed).collect()
 }
 
-/// Bytes that bricks may take at most, before it is known which of them the surface passes.
-struct Need {
+/// Upper bound of the memory of all bricks in bytes, before it is known which of them the surface passes through.
+struct MemoryNeed {
     raw: u64,
     bricks: u64,
 }
 
-impl Need {
+impl MemoryNeed {
     fn of(plan: &Plan) -> Self {
         let count = |bits: fn(&BlockPlan) -> u64| -> u64 {
             let counts = plan
@@ -182,7 +188,7 @@ impl Need {
     }
 }
 
-/// What bricks are made of.
+/// Input for making bricks.
 struct Work<'a> {
     field: &'a FieldParticles,
     layout: &'a Layout,
@@ -190,10 +196,10 @@ struct Work<'a> {
     lanes: ArrayLanes,
 }
 
-/// The field of all bricks that need it: of each block, in the order of its bits.
+/// The field of all bricks that need it, block by block in the order of their bits.
 struct RawField {
     bricks: Vec<RawBrick>,
-    /// The first of each block.
+    /// Index of the first brick of each block.
     firsts: Vec<usize>,
 }
 
@@ -213,8 +219,11 @@ impl Work<'_> {
         let mut places = Vec::new();
         for block in &self.plan.blocks {
             firsts.push(places.len());
-            places.extend(blocks::cells(block.raw).map(|cell| blocks::brick_at(block.place, cell)));
+            places.extend(
+                blocks::cells(block.raw).map(|cell| blocks::brick_at(block.position, cell)),
+            );
         }
+        // Sum the particles of each brick
         let gather = |brick: &[i32; 3]| {
             self.lanes.run(Gather {
                 field: self.field,
@@ -228,18 +237,19 @@ impl Work<'_> {
         }
     }
 
-    /// The blocks that hold anything, and all bricks in their order.
+    /// All blocks that are not outside, and their bricks in the same order.
     fn bricks(&self, raw: &RawField) -> (Vec<Block>, Vec<Brick>) {
         let taps = taps(self.layout);
         let (mut blocks, mut bricks) = (Vec::new(), Vec::new());
-        let numbers: Vec<usize> = (0..self.plan.blocks.len()).collect();
-        for batch in numbers.chunks(BATCH * rayon::current_num_threads()) {
+        let indices: Vec<usize> = (0..self.plan.blocks.len()).collect();
+        for batch in indices.chunks(BATCH * rayon::current_num_threads()) {
+            // Make the bricks of a batch of blocks in parallel
             let made: Vec<(Block, Vec<Brick>)> = batch
                 .par_iter()
-                .map_init(Workshop::default, |shop, number| {
+                .map_init(BrickScratch::default, |scratch, number| {
                     let neighbours = Neighbours::of(self.plan, raw, *number);
                     self.lanes.run(MakeBlock {
-                        shop,
+                        scratch,
                         plan: &self.plan.blocks[*number],
                         neighbours,
                         layout: self.layout,
@@ -247,12 +257,13 @@ impl Work<'_> {
                     })
                 })
                 .collect();
-            for (mut block, mut its) in made {
+            // Append them in order, without empty blocks
+            for (mut block, mut own_bricks) in made {
                 if block.node.children | block.node.inside == 0 {
                     continue;
                 }
                 block.node.first = index_u32(bricks.len());
-                bricks.append(&mut its);
+                bricks.append(&mut own_bricks);
                 blocks.push(block);
             }
         }
@@ -261,21 +272,21 @@ impl Work<'_> {
     }
 }
 
-/// A block and those around it.
+/// A block and its 26 neighbours.
 struct Neighbours<'a> {
     blocks: [Option<(&'a BlockPlan, &'a [RawBrick])>; 27],
 }
 
 impl<'a> Neighbours<'a> {
     fn of(plan: &'a Plan, raw: &'a RawField, block: usize) -> Self {
-        let known = |number: usize| (&plan.blocks[number], &raw.bricks[raw.firsts[number]..]);
+        let with_bricks = |number: usize| (&plan.blocks[number], &raw.bricks[raw.firsts[number]..]);
         Self {
-            blocks: plan.around(block).map(|number| number.map(known)),
+            blocks: plan.around(block).map(|number| number.map(with_bricks)),
         }
     }
 
-    /// A part of the field over the brick at `cell` of the block in the middle, and around it. `deep` is what
-    /// it is deep inside.
+    /// One part of the field over the brick at `cell` of the central block, and around it. `deep` is its value deep
+    /// inside.
     #[inline(always)]
     fn around(
         &self,
@@ -283,9 +294,9 @@ impl<'a> Neighbours<'a> {
         deep: f32,
         part: impl Fn(&'a RawBrick) -> Option<&'a Codes>,
     ) -> Around<'a> {
-        let mut around = [Part::Even(0.0); 27];
+        let mut around = [Part::Uniform(0.0); 27];
         for (number, found) in (0..27_u32).zip(&mut around) {
-            // One block before the middle one is 4 bricks before.
+            // Compute the position of the brick in 3x3x3 blocks; one block is 4 bricks
             let along = |step: u32, shift: u32| 3 + step + (cell >> shift & 3);
             let (x, y, z) = (
                 along(number % 3, 0),
@@ -296,12 +307,13 @@ impl<'a> Neighbours<'a> {
             let Some((plan, raw)) = block else {
                 continue;
             };
+            // Look up the brick in its block
             let bit = (x % 4) | ((y % 4) << 2) | ((z % 4) << 4);
             if plan.inside >> bit & 1 == 1 {
-                *found = Part::Even(deep);
+                *found = Part::Uniform(deep);
             } else if plan.raw >> bit & 1 == 1 {
-                let place = (plan.raw & ((1 << bit) - 1)).count_ones() as usize;
-                if let Some(codes) = part(&raw[place]) {
+                let position = (plan.raw & ((1 << bit) - 1)).count_ones() as usize;
+                if let Some(codes) = part(&raw[position]) {
                     *found = Part::Codes(codes);
                 }
             }
@@ -310,13 +322,13 @@ impl<'a> Neighbours<'a> {
     }
 }
 
-/// What a thread needs to make bricks.
-struct Workshop {
+/// Buffers of one thread for making bricks.
+struct BrickScratch {
     blur: Blur,
     field: Box<BrickField>,
 }
 
-impl Default for Workshop {
+impl Default for BrickScratch {
     fn default() -> Self {
         Self {
             blur: Blur::default(),
@@ -327,7 +339,7 @@ impl Default for Workshop {
 
 /// Makes the bricks of a block.
 struct MakeBlock<'a> {
-    shop: &'a mut Workshop,
+    scratch: &'a mut BrickScratch,
     plan: &'a BlockPlan,
     neighbours: Neighbours<'a>,
     layout: &'a Layout,
@@ -339,12 +351,12 @@ impl ArrayTask for MakeBlock<'_> {
 
     #[inline(always)]
     fn run(self) -> (Block, Vec<Brick>) {
-        let Workshop { blur, field } = self.shop;
+        let BrickScratch { blur, field } = self.scratch;
         let is_blurred = self.layout.blur > 0;
         let (mut children, mut inside) = (0, self.plan.inside);
         let mut bricks = Vec::new();
         for cell in blocks::cells(self.plan.band) {
-            // Deep inside all particles are in company.
+            // Assemble the samples of the brick; all particles deep inside are crowded
             let (deep_sharp, deep_smooth) = if is_blurred { (0.0, 1.0) } else { (1.0, 0.0) };
             let sharp = self
                 .neighbours
@@ -356,13 +368,14 @@ impl ArrayTask for MakeBlock<'_> {
                     .around(cell, deep_smooth, |raw| raw.smooth.as_deref());
                 blur.add_smooth(&smooth, self.taps, field);
             }
+            // Quantise them, unless the brick is uniform
             match Brick::make(field, self.layout.threshold * CODES) {
-                Made::Brick(brick) => {
+                BrickKind::Brick(brick) => {
                     children |= 1 << cell;
                     bricks.push(brick);
                 }
-                Made::Inside => inside |= 1 << cell,
-                Made::Outside => {}
+                BrickKind::Inside => inside |= 1 << cell,
+                BrickKind::Outside => {}
             }
         }
         let node = Node {
@@ -371,7 +384,7 @@ impl ArrayTask for MakeBlock<'_> {
             first: 0,
         };
         let block = Block {
-            place: self.plan.place,
+            position: self.plan.position,
             node,
         };
         (block, bricks)

@@ -1,20 +1,20 @@
-//! Crossing and normal straight from the particles.
+//! Refines intersections and normals with the field of the particles.
 
 use super::layout::Layout;
 use crate::ray::Ray;
 use crate::surface::Intersection;
 use crate::surface::field::FieldParticles;
 
-/// Newton steps; they gain twice as many digits each.
+/// Newton steps; each doubles the number of exact digits.
 const STEPS: usize = 4;
-/// The way from the grid's surface to the field's is no longer than this, in voxels.
-const FARTHEST: f32 = 0.75;
-/// The search ends this close to the surface, in voxels.
-const CLOSE: f32 = 1e-3;
+/// Maximum distance between the surface of the grid and that of the field, in voxels.
+const MAX_DISTANCE: f32 = 0.75;
+/// The iteration ends at this distance from the surface, in voxels.
+const TOLERANCE: f32 = 1e-3;
 
-/// `hit` of the grid moved along the field's gradient onto its surface. Secondary rays still start from the
-/// grid's, which is what they meet.
-pub(super) fn refined(
+/// `hit` moved from the surface of the grid to that of the field, along the gradient. Secondary rays still start from
+/// the surface of the grid, because they are traced against it.
+pub(super) fn refine(
     field: &FieldParticles,
     layout: &Layout,
     ray: &Ray,
@@ -23,6 +23,7 @@ pub(super) fn refined(
     let mut point = hit.point;
     let mut gradient = None;
     for _ in 0..STEPS {
+        // Take a Newton step along the gradient
         let sample = field.sample(point);
         let steepness = sample.gradient.length_squared();
         if steepness <= 0.0 {
@@ -30,17 +31,18 @@ pub(super) fn refined(
         }
         gradient = Some(sample.gradient);
         let step = (layout.threshold - sample.value) / steepness * sample.gradient;
-        if step.length_squared() < (CLOSE * layout.voxel).powi(2) {
+        if step.length_squared() < (TOLERANCE * layout.voxel).powi(2) {
             break;
         }
         point += step;
-        if point.distance_squared(hit.point) > (FARTHEST * layout.voxel).powi(2) {
-            // Another sheet of the surface; the gradient at the grid's is as good as any.
+        if point.distance_squared(hit.point) > (MAX_DISTANCE * layout.voxel).powi(2) {
+            // The point is on another sheet of the surface: keep the original point, with the gradient there
             point = hit.point;
             gradient = Some(field.sample(point).gradient);
             break;
         }
     }
+    // Use the gradient of the field as the normal
     let normal = gradient.and_then(|gradient| (-gradient).try_normalize());
     let normal = normal.unwrap_or(hit.normal);
     Intersection {

@@ -1,4 +1,4 @@
-//! The lengths of a smooth surface.
+//! Lengths and thresholds of a smooth surface.
 
 use std::ops::RangeInclusive;
 
@@ -7,31 +7,31 @@ use crate::surface::SurfaceSettings;
 use crate::surface::field::bins::floor;
 
 /// Standard deviation of the blur of crowded particles at smoothing 1, in particle radii.
-const WIDEST: f32 = 2.0;
-/// The blur ends at so many standard deviations, within the bricks beside.
+const MAX_SIGMA: f32 = 2.0;
+/// Extent of the blur in standard deviations.
 const BLUR_REACH: f32 = 2.7;
-const LONGEST_BLUR: i32 = 6;
-/// Blurring lowers the field at convex places, so the threshold goes down with it: by this part at
-/// smoothing 1. Tuned against splashsurf's smoothed mesh.
-const LOWERED: f32 = 1.0 / 9.0;
-/// Thresholds below this may be met farther than half the support from any particle: the part of the kernel
-/// beyond that is 0.37.
+/// Maximum extent of the blur in voxels, so that it stays within the neighbouring bricks.
+const MAX_BLUR: i32 = 6;
+/// Blurring lowers the field at convex places, so the threshold is reduced by this fraction at smoothing 1. Tuned
+/// against the smoothed mesh of splashsurf.
+const THRESHOLD_REDUCTION: f32 = 1.0 / 9.0;
+/// A surface with a lower threshold may be farther than half the support from all particles: the kernel is 0.37 there.
 const NEAR_THRESHOLD: f32 = 0.45;
 
-/// Lengths in scene units unless said otherwise.
+/// Lengths are in scene units unless noted otherwise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Layout {
-    /// Of a particle.
+    /// Radius of a particle.
     pub(super) radius: f32,
     /// Edge of a voxel.
     pub(super) voxel: f32,
-    /// Of the kernel.
+    /// Support of the kernel.
     pub(super) support: f32,
     /// Value of the field at the surface.
     pub(super) threshold: f32,
-    /// Standard deviation of the blur, in voxels; 0 is none.
+    /// Standard deviation of the blur, in voxels; 0 without blur.
     pub(super) sigma: f32,
-    /// Distance at which the blur ends, in voxels.
+    /// Extent of the blur, in voxels.
     pub(super) blur: i32,
 }
 
@@ -42,23 +42,23 @@ impl Layout {
         } else {
             settings.smoothing
         };
-        let sigma = WIDEST * smoothing / settings.voxel;
+        let sigma = MAX_SIGMA * smoothing / settings.voxel;
         #[expect(
             clippy::cast_possible_truncation,
             reason = "settings are checked: below 30"
         )]
-        let blur = ((BLUR_REACH * sigma).round() as i32).min(LONGEST_BLUR);
+        let blur = ((BLUR_REACH * sigma).round() as i32).min(MAX_BLUR);
         Self {
             radius,
             voxel: settings.voxel * radius,
             support: 2.0 * settings.smoothing_length * radius,
-            threshold: settings.threshold * (1.0 - LOWERED * smoothing),
+            threshold: settings.threshold * (1.0 - THRESHOLD_REDUCTION * smoothing),
             sigma: if blur > 0 { sigma } else { 0.0 },
             blur,
         }
     }
 
-    /// The bricks along an axis in which the particles of a bin may make a surface.
+    /// The bricks along an axis that may contain a surface of the particles of a bin.
     pub(super) fn bricks_near(&self, bin: i32) -> RangeInclusive<i32> {
         let reach = if self.threshold < NEAR_THRESHOLD {
             self.support + self.blur as f32 * self.voxel

@@ -1,9 +1,9 @@
-//! The isosurface of the particles' SPH colour field, cast without a mesh.
+//! The isosurface of the SPH colour field of the particles, ray traced without a mesh.
 //!
-//! The field is sampled where the surface passes: in bricks of 8x8x8 voxels that lie at multiples of their edge,
-//! so that it does not swim from frame to frame. Particles in company are blurred on that grid, lonely ones are
-//! left as they are, so that bumps go and drops stay. Rays step through a sparse tree of bricks and solve
-//! for the crossing in the voxel. Exactly, crossing and normal are then taken from the particles.
+//! The field is sampled near the surface, in bricks of 8x8x8 voxels at multiples of their edge, so that the grid does
+//! not move from frame to frame. Crowded particles are blurred on that grid, isolated ones are not, so that bumps
+//! disappear and drops remain. Rays traverse a sparse tree of bricks and solve for the intersection in a voxel. In
+//! exact mode, intersection and normal are then refined with the particles.
 
 use glam::Vec3;
 
@@ -30,23 +30,23 @@ use build::Built;
 pub use build::{SmoothError, SmoothReport};
 use traversal::Crossings;
 
-/// Step off the surface in voxels: beyond the rounding of places in it.
+/// Step off the surface in voxels, larger than the rounding of positions in a voxel.
 const OFFSET: f32 = 0.01;
 /// Step off the surface in units of the rounding of the largest coordinate involved.
 const OFFSET_OF_ROUNDING: f32 = 16.0 * f32::EPSILON;
 
-/// The surface of a frame. Its memory is let go for the next one.
+/// The surface of a frame. Building the next one releases its memory.
 #[derive(Debug, Default)]
 pub struct SmoothGrid {
     built: Built,
 }
 
 impl SmoothGrid {
-    /// Builds the surface of particles with `centers` and one `radius`. With `keep_particles` it can tell which
-    /// particles are near a place. `memory_left` bytes may be taken.
+    /// Builds the surface of particles with `centers` and one `radius`. With `keep_particles`, particles near a point
+    /// can be queried. The build may use `memory_left` bytes.
     ///
     /// # Errors
-    /// [`SmoothError::TooLarge`] before anything large is made.
+    /// [`SmoothError::TooLarge`] before any large allocation.
     pub fn build(
         &mut self,
         centers: &[Vec3],
@@ -55,14 +55,14 @@ impl SmoothGrid {
         keep_particles: bool,
         memory_left: Option<u64>,
     ) -> Result<SmoothReport, SmoothError> {
-        // Before the next one is made.
+        // Release the memory of the previous surface first.
         self.built = Built::default();
         let (made, report) = build::build(centers, radius, settings, keep_particles, memory_left)?;
         self.built = made;
         Ok(report)
     }
 
-    /// As rays see it.
+    /// The surface as a shape.
     pub fn surface(&self) -> SmoothSurface<'_> {
         SmoothSurface {
             built: &self.built,
@@ -71,7 +71,7 @@ impl SmoothGrid {
     }
 }
 
-/// See the module.
+/// The surface as a shape, see the module.
 #[derive(Debug, Clone, Copy)]
 pub struct SmoothSurface<'a> {
     built: &'a Built,
@@ -88,12 +88,14 @@ impl SmoothSurface<'_> {
             Side::Outside => -ray.direction,
             Side::Inside => ray.direction,
         };
+        // Compute the normal from the gradient of the field; without one, it points against the ray
         let brick = crossings.brick(lane);
         let gradient =
             brick.map(|(brick, position)| tree.bricks[brick as usize].gradient(position));
         let normal = gradient
             .and_then(|gradient| (-gradient).try_normalize())
             .unwrap_or(against);
+        // Compute an offset above the rounding of the point
         let largest = point.abs().max(ray.origin.abs()).max_element();
         let hit = Intersection {
             t,
@@ -106,7 +108,7 @@ impl SmoothSurface<'_> {
             anchor: point,
         };
         match (&self.built.field, &self.built.exact) {
-            (Some(field), Some(layout)) => exact::refined(field, layout, ray, hit),
+            (Some(field), Some(layout)) => exact::refine(field, layout, ray, hit),
             _ => hit,
         }
     }

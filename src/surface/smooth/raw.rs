@@ -1,4 +1,4 @@
-//! The field of the particles at the samples of one brick, before any smoothing.
+//! Samples the field of the particles over one brick, before smoothing.
 
 use std::ops::Range;
 
@@ -12,36 +12,37 @@ use crate::surface::field::bins::Bins;
 use crate::surface::field::kernel::weight;
 use crate::surface::field::{FieldParticles, rounded};
 
-/// Sums of kernels from which on particles are smoothed, and at which they are so fully, in units of the kernel
-/// in the middle: a sheet of one layer has 2.2, a flat surface 2.7, bulk 3.1.
-const LONELY: f32 = 1.8;
-const IN_COMPANY: f32 = 2.6;
-/// The field ends here.
-const MOST: f32 = 1.9999;
-/// Codes for a value of 1.
+/// Kernel sum from which particles are smoothed, in units of the kernel's central value. A sheet of one layer has
+/// 2.2, a flat surface 2.7, bulk 3.1.
+const ISOLATED_SUM: f32 = 1.8;
+/// Kernel sum from which particles are smoothed fully.
+const CROWDED_SUM: f32 = 2.6;
+/// Upper limit of the field.
+const MAX_VALUE: f32 = 1.9999;
+/// Codes per unit of the field.
 const CODES: f32 = 32_768.0;
 
 /// Values at the first corner of each voxel of a brick, by z, y and x: 0 to 2 in 16 bits.
 pub(super) type Codes = [u16; VOXELS * VOXELS * VOXELS];
 
-/// What a code stands for.
+/// The value of a code.
 #[inline(always)]
 pub(super) fn decode(code: u16) -> f32 {
     f32::from(code) * (1.0 / CODES)
 }
 
-/// The field of a brick in two parts; one that is zero all over is left out.
+/// The field of a brick in two parts; a part that is zero everywhere is not stored.
 #[derive(Debug, Default)]
 pub(super) struct RawBrick {
-    /// Of particles in company, which is to be smoothed.
+    /// Field of crowded particles, which will be smoothed.
     pub(super) smooth: Option<Box<Codes>>,
-    /// Of lonely ones.
+    /// Field of isolated particles.
     pub(super) sharp: Option<Box<Codes>>,
 }
 
 type Sums = [[[f32; VOXELS]; VOXELS]; VOXELS];
 
-/// Sums up the particles around a brick.
+/// Sums the particles around a brick.
 pub(super) struct Gather<'a> {
     pub(super) field: &'a FieldParticles,
     pub(super) layout: &'a Layout,
@@ -62,6 +63,7 @@ impl ArrayTask for Gather<'_> {
         for z in zs {
             for y in ys.clone() {
                 for place in particles(bins, z, y, xs.clone()) {
+                    // Distribute the particle over the smooth and the sharp part
                     let volume = self.field.volumes()[place];
                     let part = smoothed_part(volume, self.layout);
                     let center = bins.points()[place];
@@ -86,13 +88,13 @@ fn particles(bins: &Bins, z: i32, y: i32, xs: Range<i32>) -> Range<usize> {
     bins.particles_in(bins.run(z, y, xs))
 }
 
-/// The part of a particle of `volume` that is smoothed.
+/// The fraction of a particle with `volume` that is smoothed.
 #[inline(always)]
 fn smoothed_part(volume: f32, layout: &Layout) -> f32 {
     if layout.blur == 0 {
         return 0.0;
     }
-    let x = ((1.0 / volume - LONELY) / (IN_COMPANY - LONELY)).clamp(0.0, 1.0);
+    let x = ((1.0 / volume - ISOLATED_SUM) / (CROWDED_SUM - ISOLATED_SUM)).clamp(0.0, 1.0);
     x * x * (3.0 - 2.0 * x)
 }
 
@@ -105,12 +107,12 @@ fn smoothed_part(volume: f32, layout: &Layout) -> f32 {
 fn encode(sums: &Sums) -> Box<Codes> {
     let mut codes = Box::new([0; VOXELS * VOXELS * VOXELS]);
     for (code, sum) in codes.iter_mut().zip(sums.as_flattened().as_flattened()) {
-        *code = (sum.min(MOST) * CODES + 0.5) as i32 as u16;
+        *code = (sum.min(MAX_VALUE) * CODES + 0.5) as i32 as u16;
     }
     codes
 }
 
-/// The samples of a brick.
+/// The positions of the samples of a brick.
 struct Splat {
     x: [f32; VOXELS],
     y: [f32; VOXELS],
@@ -138,10 +140,11 @@ impl Splat {
         }
     }
 
-    /// Adds a particle of `volume` to all samples within its support; exact, so in any order. Tells whether
-    /// there are any.
+    /// Adds a particle of `volume` to all samples within its support, and returns whether there are any. The sums are
+    /// exact, so their order does not matter.
     #[inline(always)]
     fn add(&self, sums: &mut Sums, center: Vec3, volume: f32) -> bool {
+        // Compute the squared distances per axis
         let squares = |places: &[f32; VOXELS], center: f32| {
             let mut squares = [0.0; VOXELS];
             for (square, place) in squares.iter_mut().zip(places) {
@@ -152,6 +155,7 @@ impl Splat {
         let along_x = squares(&self.x, center.x);
         let along_y = squares(&self.y, center.y);
         let along_z = squares(&self.z, center.z);
+        // Skip layers and rows that are out of reach
         let mut least_x = f32::INFINITY;
         for square in along_x {
             least_x = least_x.min(square);

@@ -1,6 +1,6 @@
-//! Where rays cross the surface within a voxel.
+//! Finds where rays cross the surface within a voxel.
 //!
-//! Along a ray a trilinear field is a cubic polynomial (Parker et al. 1998; Marmitt et al. 2004).
+//! Along a ray, a trilinear field is a cubic polynomial (Parker et al. 1998; Marmitt et al. 2004).
 
 #![expect(
     clippy::needless_range_loop,
@@ -9,25 +9,25 @@
 
 use crate::math::{Integers, LANES, Lanes, Lanes3, splat};
 
-/// Rounds of the search in a bracket; false position with Illinois steps gains more than a digit each.
+/// Iterations in a bracket; false position with Illinois steps gains more than one digit per iteration.
 const ROUNDS: usize = 6;
-/// Values this close to the surface end the search, in codes.
-const CLOSE: f32 = 0.5;
+/// The search ends at this distance from the threshold, in codes.
+const TOLERANCE: f32 = 0.5;
 
-/// The part of each ray that lies in a voxel, in voxels from its corner.
+/// The segment of each ray inside a voxel, in voxels from its corner.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub(super) struct Segments {
     pub(super) from: Lanes3,
-    /// From there to the end.
+    /// Vector from the start of the segment to its end.
     pub(super) along: Lanes3,
-    /// 1 for a ray that comes from smaller values, -1 from larger ones.
+    /// 1 for a ray that is outside (lower values), -1 for a ray that is inside.
     pub(super) sign: Lanes,
 }
 
-/// Finds the first crossing of each segment: the fraction of its length at which the field reaches `threshold`. The field
-/// is given by its values at the `corners` of the voxels. A ray that starts beyond the surface crosses it at 0. The first
-/// result has a bit for each ray of `lanes` that crosses.
+/// Finds the first crossing of each segment: the fraction of its length at which the field reaches `threshold`. The
+/// field is given by its values at the `corners` of the voxels. A ray that starts beyond the surface crosses it at 0.
+/// The first result is the mask of the rays of `lanes` that cross the surface.
 #[inline(always)]
 pub(super) fn first_roots(
     corners: &[Integers; 8],
@@ -53,9 +53,10 @@ pub(super) fn first_roots(
         } else if g[3] >= 0.0 {
             (2.0 / 3.0, 1.0, g[2], g[3])
         } else {
-            // Thinner than the steps
+            // The field exceeds the threshold between two samples
             (0.0, peak, g[0], at_peak)
         };
+        // Store the polynomial and the bracket of the lane
         crossed |= u32::from(at_high >= 0.0) << l;
         for (of_all, of_this) in cubic.0.iter_mut().zip(c) {
             of_all[l] = of_this;
@@ -72,8 +73,8 @@ pub(super) fn first_roots(
     (crossed, bracket.root(&cubic, crossed))
 }
 
-/// The polynomial of lane `l`: `sign` times the field over `threshold` along the segment, the trilinear form multiplied
-/// out.
+/// The polynomial of lane `l`: `sign` times (field - `threshold`) along the segment, by expansion of the trilinear
+/// form.
 #[inline(always)]
 fn cubic_along(corners: &[Integers; 8], segments: &Segments, threshold: f32, l: usize) -> [f32; 4] {
     let c = |corner: usize| corners[corner][l] as f32;
@@ -118,10 +119,10 @@ fn value(c: &[f32; 4], s: f32) -> f32 {
     c[0] + s * (c[1] + s * (c[2] + s * c[3]))
 }
 
-/// Where in 0..1 the polynomial has a maximum, else 0.
+/// Position of a maximum of the polynomial in 0..1, or 0 if there is none.
 #[inline(always)]
 fn maximum(c: &[f32; 4]) -> f32 {
-    // c1 + 2 c2 s + 3 c3 s^2 = 0 with a falling slope; written so that c3 may vanish
+    // Solve c1 + 2 c2 s + 3 c3 s^2 = 0 for the root with a falling slope; this form also works if c3 is 0
     let [_, a, b, c] = *c;
     let discriminant = b * b - 3.0 * a * c;
     let root = if discriminant > 0.0 {
@@ -147,7 +148,7 @@ fn maximum(c: &[f32; 4]) -> f32 {
 #[repr(C, align(64))]
 struct Cubic([Lanes; 4]);
 
-/// Intervals at whose ends polynomials have values of either sign.
+/// Intervals with polynomial values of opposite signs at their ends.
 #[derive(Default)]
 #[repr(C, align(64))]
 struct Bracket {
@@ -158,21 +159,23 @@ struct Bracket {
 }
 
 impl Bracket {
-    /// Where the polynomials of `lanes` are 0.
+    /// The roots of the polynomials of `lanes`.
     #[inline(always)]
     fn root(&mut self, cubic: &Cubic, lanes: u32) -> Lanes {
         let mut roots = self.high;
         let mut searching = lanes;
         for _ in 0..ROUNDS {
-            let mut goes_on = 0;
+            let mut continuing = 0;
             for l in 0..LANES {
+                // Take a step of false position
                 let span = self.at_high[l] - self.at_low[l];
                 let is_searched = (searching >> l & 1 == 1) & (span > 0.0);
                 let s = self.low[l] - self.at_low[l] * (self.high[l] - self.low[l]) / span;
                 let c = [cubic.0[0][l], cubic.0[1][l], cubic.0[2][l], cubic.0[3][l]];
                 let g = value(&c, s);
                 roots[l] = if is_searched { s } else { roots[l] };
-                goes_on |= u32::from(is_searched & (g.abs() >= CLOSE)) << l;
+                continuing |= u32::from(is_searched & (g.abs() >= TOLERANCE)) << l;
+                // Shorten the bracket; halve the value at the end that stays (Illinois)
                 let is_beyond = g >= 0.0;
                 let (low, high) = (self.low[l], self.high[l]);
                 let (at_low, at_high) = (self.at_low[l], self.at_high[l]);
@@ -181,7 +184,7 @@ impl Bracket {
                 self.at_low[l] = if is_beyond { 0.5 * at_low } else { g };
                 self.at_high[l] = if is_beyond { g } else { 0.5 * at_high };
             }
-            searching = goes_on;
+            searching = continuing;
             if searching == 0 {
                 break;
             }
@@ -197,7 +200,7 @@ mod tests {
     use super::*;
     use crate::math::set_lane3;
 
-    /// Of one ray, in a lane of its own among others that are no numbers.
+    /// The crossing of one ray, in a lane among others that contain NaN.
     #[expect(clippy::cast_possible_truncation, reason = "codes are integers")]
     fn first_crossing(
         corners: &[f32; 8],

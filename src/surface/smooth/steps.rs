@@ -1,4 +1,5 @@
-//! The arithmetic of a packet's steps through a brick tree: plain loops over lanes, compiled for each instruction set.
+//! The arithmetic of the traversal of a brick tree by a packet: plain loops over lanes, compiled for each instruction
+//! set.
 #![expect(
     clippy::needless_range_loop,
     reason = "loops over lanes, each of many arrays"
@@ -10,45 +11,47 @@ use super::tree::BrickTree;
 use crate::math::{Integers, LANES, Lanes, Lanes3, lane_kernel, larger, smaller, splat};
 use crate::ray::RayPacket;
 
-/// Components of directions are kept this far from zero, so that their inverses are finite.
+/// Minimum absolute component of a direction, so that inverses are finite.
 const MIN_DIRECTION: f32 = 1e-9;
 
-/// Rays in voxels from the root's corner; distances stay those of the rays.
+/// Rays in voxels from the corner of the root; distances are still those of the original rays.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub(super) struct GridRays {
     pub(super) origin: Lanes3,
     pub(super) direction: Lanes3,
     pub(super) inverse: Lanes3,
-    /// 1 along axes that a ray goes up, else 0: where it leaves a cell.
+    /// 1 along axes with a positive direction, else 0: the side at which the ray leaves a cell.
     pub(super) ahead: Lanes3,
 }
 
-/// Where each ray of a packet is.
+/// Current position of each ray of a packet.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub(super) struct Progress {
     pub(super) t: Lanes,
-    /// Where the ray leaves the tree, or ends.
+    /// Distance at which the ray leaves the tree or ends.
     pub(super) t_out: Lanes,
 
-    /// The cell, by the coordinates of a brick in it, and its edge in bricks.
+    /// The current cell: the coordinates of a brick in it.
     pub(super) cell: [Integers; 3],
+    /// The edge of the cell, in bricks.
     pub(super) size: Integers,
-    /// Where the ray leaves the cell, and the axes along which it does so, a bit each.
+    /// Distance at which the ray leaves the cell.
     pub(super) t_exit: Lanes,
+    /// The axes along which it leaves the cell, one bit each.
     pub(super) exit_axes: Integers,
-    /// The origin of the ray in voxels from the corner of the cell.
+    /// Origin of the ray in voxels from the corner of the cell.
     pub(super) local: Lanes3,
 
-    /// Where the ray leaves the marked voxels of a brick.
-    pub(super) until: Lanes,
+    /// Distance at which the ray leaves the marked voxels of a brick.
+    pub(super) t_marked: Lanes,
     pub(super) voxel: [Integers; 3],
-    /// Where the ray crosses the next plane of voxels along each axis.
+    /// Distance at which the ray crosses the next plane of voxels, along each axis.
     pub(super) next: Lanes3,
 }
 
-/// Boxes of marked voxels.
+/// Bounding boxes of marked voxels.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub(super) struct Boxes {
@@ -56,7 +59,8 @@ pub(super) struct Boxes {
     pub(super) high: Lanes3,
 }
 
-/// Rays in voxels, clipped to the box of the tree, and the cells where they enter it. Returns the lanes that do.
+/// Converts rays to voxels, clips them to the box of the tree, and finds the cells where they enter it. Returns the
+/// lanes of rays that enter the tree.
 #[inline(always)]
 fn enter_tree_body(
     tree: &BrickTree,
@@ -71,7 +75,7 @@ fn enter_tree_body(
         let (mut t_in, mut t_out) = (rays.t_min[l], rays.t_max[l]);
         let mut sum = 0.0;
         for a in 0..3 {
-            // Bring the ray into voxels
+            // Convert the ray to voxels
             let origin = (rays.origin[a][l] - corner[a]) * tree.inverse;
             let direction = rays.direction[a][l] * tree.inverse;
             let is_flat = direction.abs() < MIN_DIRECTION;
@@ -80,13 +84,13 @@ fn enter_tree_body(
             } else {
                 MIN_DIRECTION
             };
-            let away = if is_flat { least } else { direction };
-            let inverse = 1.0 / away;
+            let nonzero = if is_flat { least } else { direction };
+            let inverse = 1.0 / nonzero;
             grid.origin[a][l] = origin;
             grid.direction[a][l] = direction;
             grid.inverse[a][l] = inverse;
-            grid.ahead[a][l] = if away >= 0.0 { 1.0 } else { 0.0 };
-            // Clip it to the box
+            grid.ahead[a][l] = if nonzero >= 0.0 { 1.0 } else { 0.0 };
+            // Clip the ray to the box
             let near = (low[a] - origin) * inverse;
             let far = (high[a] - origin) * inverse;
             t_in = larger(smaller(near, far), t_in);
@@ -97,7 +101,7 @@ fn enter_tree_body(
         progress.t[l] = t_in;
         progress.t_out[l] = t_out;
         for a in 0..3 {
-            // Find the brick where it enters
+            // Find the brick where the ray enters
             let last = larger(high[a] - 1.0, low[a]);
             let position = grid.origin[a][l] + grid.direction[a][l] * t_in;
             let position = smaller(larger(position, low[a]), last);
@@ -116,8 +120,8 @@ lane_kernel! {
     ) -> u32 = enter_tree_body;
 }
 
-/// Moves the rays of `lanes` into the cells behind theirs, and says which coordinates are others in `changed`. Returns
-/// the lanes of rays that do not end before.
+/// Moves the rays of `lanes` to the next cells, and writes the coordinate bits that change to `changed`. Returns the
+/// lanes of rays that do not end before.
 #[inline(always)]
 fn leave_cells_body(
     grid: &GridRays,
@@ -125,21 +129,24 @@ fn leave_cells_body(
     changed: &mut Integers,
     lanes: u32,
 ) -> u32 {
-    let mut onward = 0;
+    let mut continuing = 0;
     for l in 0..LANES {
-        let leaves = lanes >> l & 1 == 1;
-        onward |= u32::from(progress.t_exit[l] < progress.t_out[l]) << l;
+        // Advance the ray to the exit of its cell
+        let is_leaving = lanes >> l & 1 == 1;
+        continuing |= u32::from(progress.t_exit[l] < progress.t_out[l]) << l;
         let t = larger(progress.t_exit[l], progress.t[l]);
-        progress.t[l] = if leaves { t } else { progress.t[l] };
+        progress.t[l] = if is_leaving { t } else { progress.t[l] };
         let size = progress.size[l];
         let last = size as f32 - 0.5;
         let mut bits = 0;
         for a in 0..3 {
-            // Along the axes that it does not leave by, the ray stays beside the cell, however `t` is rounded
+            // Along all axes except the exit axes, the ray stays within the extent of the cell, whatever the rounding
+            // of `t`
             let cell = progress.cell[a][l];
             let first = cell & !(size - 1);
             let position = (progress.local[a][l] + grid.direction[a][l] * t) / VOXELS as f32;
             let beside = first + integer_part(smaller(larger(position, 0.0), last));
+            // Along an exit axis, it moves to the adjacent brick
             let beyond = if grid.ahead[a][l] > 0.0 {
                 first + size
             } else {
@@ -148,11 +155,11 @@ fn leave_cells_body(
             let is_exit = progress.exit_axes[l] >> a & 1 == 1;
             let next = if is_exit { beyond } else { beside };
             bits |= cell ^ next;
-            progress.cell[a][l] = if leaves { next } else { cell };
+            progress.cell[a][l] = if is_leaving { next } else { cell };
         }
         changed[l] = bits;
     }
-    onward
+    continuing
 }
 
 lane_kernel! {
@@ -164,7 +171,7 @@ lane_kernel! {
     ) -> u32 = leave_cells_body;
 }
 
-/// Finds out where rays leave their cells.
+/// Finds the distances at which rays leave their cells.
 #[inline(always)]
 fn find_exits_body(grid: &GridRays, progress: &mut Progress) {
     for l in 0..LANES {
@@ -172,12 +179,14 @@ fn find_exits_body(grid: &GridRays, progress: &mut Progress) {
         let edge = (size << VOXEL_BITS) as f32;
         let mut next = [0.0; 3];
         for a in 0..3 {
+            // Intersect the ray with the far plane of the cell
             let first = progress.cell[a][l] & !(size - 1);
             let corner = first as f32 * VOXELS as f32;
             let far = corner + edge * grid.ahead[a][l];
             next[a] = (far - grid.origin[a][l]) * grid.inverse[a][l];
             progress.local[a][l] = grid.origin[a][l] - corner;
         }
+        // Find the nearest plane, and all axes with this distance
         let nearest = least(&next);
         progress.t_exit[l] = nearest;
         let bit = |a: usize| i32::from(next[a] <= nearest) << a;
@@ -189,25 +198,31 @@ lane_kernel! {
     pub(super) fn find_exits(grid: &GridRays, progress: &mut Progress) = find_exits_body;
 }
 
-/// Puts rays of `lanes` into the first voxel of a box in their bricks. Returns the lanes of those that meet it.
+/// Moves rays of `lanes` to the first voxel of a box in their bricks. Returns the lanes of the rays that hit the box.
 #[inline(always)]
 fn enter_boxes_body(grid: &GridRays, boxes: &Boxes, progress: &mut Progress, lanes: u32) -> u32 {
     let mut entered = 0;
     for l in 0..LANES {
         let mut t = progress.t[l];
-        // Of planes of voxels, so that the last step ends there
-        let mut until = smaller(progress.t_exit[l], progress.t_out[l]);
+        // Clip the ray to the box, whose planes are voxel planes, so that the last step ends there
+        let mut t_marked = smaller(progress.t_exit[l], progress.t_out[l]);
         for a in 0..3 {
             let near = (boxes.low[a][l] - progress.local[a][l]) * grid.inverse[a][l];
             let far = (boxes.high[a][l] - progress.local[a][l]) * grid.inverse[a][l];
             t = larger(smaller(near, far), t);
-            until = smaller(larger(near, far), until);
+            t_marked = smaller(larger(near, far), t_marked);
         }
-        let is_in = (lanes >> l & 1 == 1) & (t <= until);
+        // Update the rays that hit the box
+        let is_in = (lanes >> l & 1 == 1) & (t <= t_marked);
         entered |= u32::from(is_in) << l;
         progress.t[l] = if is_in { t } else { progress.t[l] };
-        progress.until[l] = if is_in { until } else { progress.until[l] };
+        progress.t_marked[l] = if is_in {
+            t_marked
+        } else {
+            progress.t_marked[l]
+        };
         for a in 0..3 {
+            // Find the first voxel, and the next plane of voxels
             let local = progress.local[a][l];
             let start = local + grid.direction[a][l] * t;
             let start = smaller(larger(start, boxes.low[a][l]), boxes.high[a][l] - 1.0);
@@ -229,11 +244,11 @@ lane_kernel! {
     ) -> u32 = enter_boxes_body;
 }
 
-/// Moves the rays of `lanes` into the next voxel (Amanatides and Woo 1987); where a ray passes an edge, along two axes at
-/// once. Returns the lanes of those that are still between marked voxels.
+/// Moves the rays of `lanes` to the next voxel (Amanatides and Woo 1987); a ray that passes through an edge steps
+/// along two axes at once. Returns the lanes of rays that are still inside the box of marked voxels.
 #[inline(always)]
 fn step_voxels_body(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32 {
-    let mut stay = 0;
+    let mut staying = 0;
     for l in 0..LANES {
         let next = [
             progress.next[0][l],
@@ -241,12 +256,13 @@ fn step_voxels_body(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32
             progress.next[2][l],
         ];
         let nearest = least(&next);
-        let steps = lanes >> l & 1 == 1;
+        let is_stepping = lanes >> l & 1 == 1;
         let t = larger(nearest, progress.t[l]);
-        progress.t[l] = if steps { t } else { progress.t[l] };
+        progress.t[l] = if is_stepping { t } else { progress.t[l] };
         let mut bits = 0;
         for a in 0..3 {
-            let is_stepped = steps & (next[a] <= nearest);
+            // Step along the axis if its plane is the nearest
+            let is_stepped = is_stepping & (next[a] <= nearest);
             let length = grid.inverse[a][l].abs();
             let direction = if grid.ahead[a][l] > 0.0 { 1 } else { -1 };
             let voxel = progress.voxel[a][l] + if is_stepped { direction } else { 0 };
@@ -258,17 +274,18 @@ fn step_voxels_body(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32
             progress.voxel[a][l] = voxel;
             bits |= voxel;
         }
+        // Keep rays that stay in the brick and in the box
         let is_in_brick = bits & !(VOXELS_I32 - 1) == 0;
-        stay |= u32::from(steps & is_in_brick & (nearest < progress.until[l])) << l;
+        staying |= u32::from(is_stepping & is_in_brick & (nearest < progress.t_marked[l])) << l;
     }
-    stay
+    staying
 }
 
 lane_kernel! {
     pub(super) fn step_voxels(grid: &GridRays, progress: &mut Progress, lanes: u32) -> u32 = step_voxels_body;
 }
 
-/// Puts rays of `lanes` where they cross the surface in their voxels. Returns the lanes of those that do.
+/// Moves rays of `lanes` to their crossing with the surface in their voxels. Returns the lanes of rays that cross it.
 #[inline(always)]
 fn cross_voxels_body(
     grid: &GridRays,
@@ -278,6 +295,7 @@ fn cross_voxels_body(
     lanes: u32,
     inside: u32,
 ) -> u32 {
+    // Compute the segment of each ray in its voxel
     let mut segments = Segments::default();
     let mut end = splat(0.0);
     for l in 0..LANES {
@@ -287,7 +305,7 @@ fn cross_voxels_body(
             progress.next[2][l],
         ];
         let nearest = least(&next);
-        end[l] = larger(smaller(nearest, progress.until[l]), progress.t[l]);
+        end[l] = larger(smaller(nearest, progress.t_marked[l]), progress.t[l]);
         segments.sign[l] = if inside >> l & 1 == 1 { -1.0 } else { 1.0 };
         for a in 0..3 {
             let (local, direction) = (progress.local[a][l], grid.direction[a][l]);
@@ -298,6 +316,7 @@ fn cross_voxels_body(
             segments.along[a][l] = to - from;
         }
     }
+    // Solve for the first crossings, and move the rays there
     let (crossed, part) = first_roots(corners, &segments, threshold, lanes);
     for l in 0..LANES {
         let t = progress.t[l] + part[l] * (end[l] - progress.t[l]);
@@ -321,13 +340,13 @@ lane_kernel! {
     ) -> u32 = cross_voxels_body;
 }
 
-/// The least of three numbers.
+/// The least of three values.
 #[inline(always)]
 fn least([x, y, z]: &[f32; 3]) -> f32 {
     smaller(smaller(*x, *y), *z)
 }
 
-/// The integer part of a number from 0 to 2^22. (`as`, which saturates, is compiled lane by lane.)
+/// The integer part of a number from 0 to 2^22. (The saturating `as` would be compiled lane by lane.)
 #[inline(always)]
 fn integer_part(x: f32) -> i32 {
     const UNIT: f32 = 8_388_608.0;

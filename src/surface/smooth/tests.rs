@@ -47,7 +47,7 @@ impl Random {
     }
 }
 
-/// Particles two radii apart, shaken a little, where `is_in` says so of their places.
+/// Particles two radii apart with a small random offset, at positions for which `is_in` is true.
 fn filled(edge: i32, is_in: impl Fn(Vec3) -> bool) -> Vec<Vec3> {
     let mut random = Random(11);
     let mut centers = Vec::new();
@@ -76,7 +76,7 @@ fn bodies() -> Vec<(&'static str, Vec<Vec3>)> {
     ]
 }
 
-/// Rays at a body around the origin from all sides.
+/// Rays towards a body around the origin, from all sides.
 fn rays(count: usize, seed: u64, spread: f32) -> impl Iterator<Item = Ray> {
     let mut random = Random(seed);
     (0..count).map(move |_| {
@@ -86,7 +86,7 @@ fn rays(count: usize, seed: u64, spread: f32) -> impl Iterator<Item = Ray> {
     })
 }
 
-/// The field and its gradient by the book, in f64.
+/// The field and its gradient by their definition, in f64.
 fn exact_field(centers: &[Vec3], at: DVec3) -> (f64, DVec3) {
     let support = f64::from(4.0 * RADIUS);
     let weight = |q: f64| match q {
@@ -173,7 +173,7 @@ fn a_fine_grid_comes_to_the_field_by_itself() {
     }
 }
 
-/// Follows rays through a body from crossing to crossing: they end outside, where sides say so.
+/// Traces rays through a body from crossing to crossing: they end outside, and the sides between crossings are correct.
 fn assert_pairs(surface: &SmoothSurface, rays: impl Iterator<Item = Ray>) -> usize {
     let mut all = 0;
     for ray in rays {
@@ -219,7 +219,7 @@ fn sides_are_those_of_the_field() {
     for _ in 0..2000 {
         let point = 9.0 * random.in_cube();
         let (value, _) = exact_field(&centers, point.as_dvec3());
-        // Where the grid cannot be wrong by its coarseness.
+        // Skip points where the resolution of the grid may matter.
         if (value - 0.6).abs() > 0.15 {
             let wanted = if value > 0.6 {
                 Side::Inside
@@ -256,7 +256,7 @@ fn order_and_threads_change_nothing() {
 
 #[test]
 fn does_not_swim() {
-    // Everything moved by whole bricks, and by numbers that change no rounding.
+    // Move everything by whole bricks, and by distances that do not change the rounding.
     let centers: Vec<Vec3> = filled(4, |p| p.length() < 3.5)
         .iter()
         .map(|c| (c * 1024.0).round() / 1024.0)
@@ -293,7 +293,7 @@ fn little_and_strange_input_makes_a_surface_or_none() {
     let (hit, report) = build(&[], &default);
     assert_eq!((hit, report.bricks, report.is_empty), (None, 0, false));
     let (hit, _) = build(&[Vec3::ZERO], &default);
-    // A lone particle is a ball of about 1.3 radii, whatever the smoothing.
+    // An isolated particle is a ball of about 1.3 radii, whatever the smoothing.
     assert!((hit.expect("a drop").t - (9.0 - 1.3 * RADIUS)).abs() < 0.15 * RADIUS);
     let (hit, _) = build(&vec![Vec3::ZERO; 20_000], &default);
     assert!(hit.is_some());
@@ -353,7 +353,7 @@ fn smoothing_takes_bumps_away() {
     assert!(smooth < 0.6 * raw, "{raw} {smooth}");
 }
 
-/// Where a ray goes that is bent by a ball of glass around the origin, in f64, by Snell's law twice.
+/// The direction of a ray behind a glass ball around the origin, by two applications of Snell's law in f64.
 fn bent_by_ball(ray: &Ray, radius: f64, ior: f64) -> Option<DVec3> {
     let bend = |direction: DVec3, normal: DVec3, ratio: f64| {
         let cosine = -direction.dot(normal);
@@ -370,7 +370,7 @@ fn bent_by_ball(ray: &Ray, radius: f64, ior: f64) -> Option<DVec3> {
     bend(inside, -exit / radius, ior)
 }
 
-/// A ball of particles two radii apart: shells on which they lie along a spiral (Vogel 1979).
+/// A ball of particles two radii apart: shells with particles along a spiral (Vogel 1979).
 fn shells(count: u8) -> Vec<Vec3> {
     let golden = std::f64::consts::PI * (3.0 - 5.0_f64.sqrt());
     let shell = |number: u8| {
@@ -395,7 +395,7 @@ fn shells(count: u8) -> Vec<Vec3> {
 fn a_ball_of_particles_bends_light_as_a_ball_of_glass() {
     let grid = grid(&shells(12), &settings(1.0, false));
     let surface = grid.surface();
-    // As large as its volume says, by rays through the middle.
+    // The size of the ball, measured by rays through its centre, agrees with the volume of the particles.
     let chords: Vec<f32> = rays(200, 40, 0.01)
         .filter_map(|ray| {
             let enters = surface.nearest(&ray)?;
@@ -433,7 +433,7 @@ fn a_ball_of_particles_bends_light_as_a_ball_of_glass() {
     assert!(mean(&degrees) < 2.5, "{}", mean(&degrees));
 }
 
-/// Packets of rays from all sides and in no order; every third ray starts within the body.
+/// Packets of rays from all sides in random order; every third ray starts inside the body.
 fn packets(count: usize) -> Vec<(RayPacket, u32)> {
     let rays: Vec<Ray> = rays(16 * count, 13, 7.0).collect();
     let packet = |rays: &[Ray]| {

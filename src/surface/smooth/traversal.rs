@@ -1,9 +1,9 @@
-//! Packets of rays through a brick tree: where each ray first crosses the surface.
+//! Traversal of a brick tree by packets of rays, to the first crossing of each ray with the surface.
 //!
-//! Each ray goes its own way, in three stages as on a graphics processor (Aila and Laine 2009): from cell to cell of the
-//! tree, from voxel to voxel of a brick, and along the field within a voxel. The stage that most rays wait for is next,
-//! for all of them at once. Nodes and bricks are looked up ray by ray, all arithmetic is on 16 lanes. What is found for
-//! a ray does not depend on the others.
+//! Rays are independent of each other, and go through three stages as on a GPU (Aila and Laine 2009): from cell to
+//! cell of the tree, from voxel to voxel of a brick, and along the field within a voxel. The next stage is always the
+//! one that most rays wait for, and runs for all of them at once. Nodes and bricks are looked up ray by ray, and all
+//! arithmetic is on 16 lanes. The result of a ray does not depend on the others.
 
 use super::steps::{
     Boxes, GridRays, Progress, cross_voxels, enter_boxes, enter_tree, find_exits, in_lane,
@@ -14,14 +14,14 @@ use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel, lane3, lanes_in}
 use crate::ray::RayPacket;
 use crate::surface::Side;
 
-/// Stands for no brick.
+/// Marks the absence of a brick.
 const NO_BRICK: u32 = u32::MAX;
 
-/// Where rays of a packet first come to the other side.
+/// The first positions of the rays of a packet on the other side of the surface.
 #[derive(Default)]
 #[repr(C, align(64))]
 pub(super) struct Crossings {
-    /// Lanes that do.
+    /// Lanes with a crossing.
     pub(super) mask: u32,
     /// Distance along the ray.
     pub(super) t: Lanes,
@@ -31,8 +31,8 @@ pub(super) struct Crossings {
 }
 
 impl Crossings {
-    /// The brick of the crossing in `lane` and the position in it, in voxels. None where a uniform cell begins against
-    /// expectation.
+    /// The brick of the crossing in `lane`, and the position in it in voxels. None for a ray that entered a uniform
+    /// cell of the other side, which happens only because of rounding.
     #[inline(always)]
     pub(super) fn brick(&self, lane: usize) -> Option<(u32, glam::Vec3)> {
         let brick = self.brick[lane];
@@ -40,7 +40,7 @@ impl Crossings {
     }
 }
 
-/// The state of a packet.
+/// State of the traversal of a packet.
 struct Traversal<'a> {
     simd: Supported,
     tree: &'a BrickTree,
@@ -48,29 +48,31 @@ struct Traversal<'a> {
     progress: &'a mut Progress,
     brick: &'a mut [u32; LANES],
     level: [u32; LANES],
-    /// The node of each level.
+    /// The current node of each level.
     nodes: [[u32; MAX_LEVELS as usize]; LANES],
     /// Lanes of rays that start inside.
     inside: u32,
     waiting: Waiting,
-    /// Lanes of rays that crossed the surface, at `progress.t`.
+    /// Lanes of rays that have crossed the surface, at `progress.t`.
     crossed: u32,
 }
 
 /// Lanes that wait for each stage.
 #[derive(Default)]
 struct Waiting {
-    /// For the cell that they are in to be looked at.
+    /// Rays in a new cell, which is to be looked up.
     in_new_cell: u32,
-    /// For the next cell.
+    /// Rays that move to the next cell.
     leaving: u32,
+    /// Rays in a voxel of a brick that is to be checked.
     in_voxel: u32,
-    /// They are in a voxel that the surface may pass.
+    /// Rays in a voxel that the surface may pass through.
     at_surface: u32,
 }
 
 impl BrickTree {
-    /// The first positions where the rays of `lanes` come to the other side; those of `inside` start inside.
+    /// Finds the first positions of the rays of `lanes` on the other side of the surface; rays of `inside` start
+    /// inside.
     #[inline]
     pub(super) fn first_crossings(
         &self,
@@ -84,12 +86,14 @@ impl BrickTree {
         if self.is_empty() {
             return;
         }
+        // Clip the rays to the box of the tree
         let mut grid = GridRays::default();
         let mut progress = Progress::default();
         let entered = lanes & enter_tree(simd, self, rays, &mut grid, &mut progress);
         if entered == 0 {
             return;
         }
+        // Traverse the tree
         crossings.mask = traverse(
             simd,
             simd,
@@ -100,6 +104,7 @@ impl BrickTree {
             &mut progress,
             &mut crossings.brick,
         );
+        // Compute the positions of the crossings in their bricks
         crossings.t = progress.t;
         for a in 0..3 {
             for l in 0..LANES {
@@ -120,6 +125,7 @@ fn traverse_body(
     progress: &mut Progress,
     brick: &mut [u32; LANES],
 ) -> u32 {
+    // Start at the root
     let top = tree.levels - 1;
     let mut nodes = [[0; MAX_LEVELS as usize]; LANES];
     for nodes in &mut nodes {
@@ -145,7 +151,7 @@ fn traverse_body(
 }
 
 lane_kernel! {
-    /// Follows the rays of `entered` lanes. Returns the lanes of those that cross the surface.
+    /// Traverses the tree with the rays of `entered` lanes. Returns the lanes of rays that cross the surface.
     fn traverse(
         simd: Supported,
         tree: &BrickTree,
@@ -158,7 +164,7 @@ lane_kernel! {
 }
 
 impl Traversal<'_> {
-    /// Does the stage that most rays wait for, until none is left.
+    /// Runs the stage that most rays wait for, until no ray is left.
     #[inline(always)]
     fn run(&mut self) {
         loop {
@@ -179,16 +185,18 @@ impl Traversal<'_> {
         }
     }
 
-    /// From cell to cell: one step of all rays that are not in a brick.
+    /// First stage: moves all rays outside bricks to the next cell.
     #[inline(always)]
     fn next_brick(&mut self) {
         let leaving = self.waiting.leaving;
         if leaving != 0 {
+            // Move the rays that leave their cells
             let mut changed = [0; LANES];
-            let onward = leave_cells(self.simd, self.rays, self.progress, &mut changed, leaving);
+            let continuing =
+                leave_cells(self.simd, self.rays, self.progress, &mut changed, leaving);
             self.waiting.leaving = 0;
-            // Up to the node that holds both cells; there is none where the ray leaves the root
-            for lane in lanes_in(onward & leaving) {
+            // Ascend to the node that contains both cells; there is none if the ray leaves the root
+            for lane in lanes_in(continuing & leaving) {
                 let up = changed[lane].cast_unsigned().max(1).ilog2() / LEVEL_BITS;
                 if up < self.tree.levels {
                     self.level[lane] = self.level[lane].max(up);
@@ -196,6 +204,7 @@ impl Traversal<'_> {
                 }
             }
         }
+        // Descend to the new cells, and find their exits
         let in_brick = self.descend();
         find_exits(self.simd, self.rays, self.progress);
         if in_brick != 0 {
@@ -203,7 +212,7 @@ impl Traversal<'_> {
         }
     }
 
-    /// Goes down to the largest uniform cell, or a brick. Returns the lanes of rays in bricks.
+    /// Descends to the largest uniform cell, or to a brick. Returns the lanes of rays in bricks.
     #[inline(always)]
     fn descend(&mut self) -> u32 {
         let mut in_brick = 0;
@@ -214,6 +223,7 @@ impl Traversal<'_> {
             loop {
                 let node = &self.tree.nodes[nodes[level as usize] as usize];
                 let bit = bit_of(cell, level);
+                // A uniform cell: the ray leaves it, or has crossed the surface
                 if node.children >> bit & 1 == 0 {
                     let is_inside = node.inside >> bit & 1 == 1;
                     if is_inside == (self.inside >> lane & 1 == 1) {
@@ -224,6 +234,7 @@ impl Traversal<'_> {
                     }
                     break;
                 }
+                // Descend to the child
                 let child = node.child(bit);
                 if level == 0 {
                     in_brick |= 1 << lane;
@@ -240,7 +251,8 @@ impl Traversal<'_> {
         in_brick
     }
 
-    /// Puts rays into the first voxel of the box of marked voxels in their bricks; rays that miss it leave.
+    /// Moves rays to the first voxel of the box of marked voxels in their bricks; rays that miss the box leave the
+    /// brick.
     #[inline(always)]
     fn enter_bricks(&mut self, in_brick: u32) {
         let mut boxes = Boxes::default();
@@ -257,9 +269,10 @@ impl Traversal<'_> {
         self.waiting.leaving |= in_brick & !entered;
     }
 
-    /// Looks at the voxels that rays are in, and goes on from those that the surface does not pass.
+    /// Second stage: checks the voxels of all rays in bricks, and steps on from voxels without a surface.
     #[inline(always)]
     fn next_marked_voxel(&mut self) {
+        // Look up the voxel of each ray
         let mut marked = 0;
         for lane in lanes_in(self.waiting.in_voxel) {
             let brick = &self.tree.bricks[self.brick[lane] as usize];
@@ -269,25 +282,27 @@ impl Traversal<'_> {
             let is_marked = voxels[z as usize] >> (8 * y + x) & 1 == 1;
             marked |= u32::from(is_marked) << lane;
         }
+        // Stop at marked voxels, and step on from all others
         self.waiting.at_surface |= marked;
         self.waiting.in_voxel &= !marked;
         self.step(self.waiting.in_voxel);
     }
 
-    /// Moves the rays of `lanes` into the next voxel, or out of the brick.
+    /// Moves the rays of `lanes` to the next voxel, or out of the brick.
     #[inline(always)]
     fn step(&mut self, lanes: u32) {
         if lanes != 0 {
-            let stay = step_voxels(self.simd, self.rays, self.progress, lanes);
-            self.waiting.in_voxel = self.waiting.in_voxel & !lanes | stay;
-            self.waiting.leaving |= lanes & !stay;
+            let staying = step_voxels(self.simd, self.rays, self.progress, lanes);
+            self.waiting.in_voxel = self.waiting.in_voxel & !lanes | staying;
+            self.waiting.leaving |= lanes & !staying;
         }
     }
 
-    /// Solves for the crossings in the voxels that rays are in; rays without one go on.
+    /// Third stage: solves for the crossings in the voxels of rays; rays without a crossing step on.
     #[inline(always)]
     fn solve(&mut self) {
         let lanes = self.waiting.at_surface;
+        // Gather the corners of the voxels
         let mut corners = [[0; LANES]; 8];
         for lane in lanes_in(lanes) {
             let brick = &self.tree.bricks[self.brick[lane] as usize];
@@ -297,6 +312,7 @@ impl Traversal<'_> {
                 corner[lane] = value;
             }
         }
+        // Solve for the crossings
         let crossed = cross_voxels(
             self.simd,
             self.rays,

@@ -11,7 +11,7 @@ use spherule_formats::blocks::{
     BLOCK_SIZE, Block, BlockFrame, BlockRadii, Node, Q10Block, Q16Block, WIDTH,
 };
 
-/// 256-bit kernel.
+/// The 256-bit kernel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Avx2;
 
@@ -22,10 +22,10 @@ pub(super) struct Avx2Ray {
 }
 
 impl Avx2Ray {
-    /// Middle of the chord and discriminant for lanes `half * 8 .. half * 8 + 8`.
+    /// Midpoint of the chord and discriminant for lanes `half * 8 .. half * 8 + 8`.
     ///
     /// # Safety
-    /// The caller's machine has AVX2 and FMA.
+    /// The machine of the caller has AVX2 and FMA.
     #[inline(always)]
     unsafe fn chords(
         &self,
@@ -38,6 +38,7 @@ impl Avx2Ray {
         // SAFETY: AVX2 and FMA by contract; the loads are of lanes 0..8 or 8..16 of 16.
         unsafe {
             let load = |v: &[f32; BLOCK_SIZE]| _mm256_load_ps(v.as_ptr().add(half * 8));
+            // Find the points of the ray nearest to the centres, and the vectors between them
             let cx = _mm256_sub_ps(load(&block.x), _mm256_set1_ps(o.x));
             let cy = _mm256_sub_ps(load(&block.y), _mm256_set1_ps(o.y));
             let cz = _mm256_sub_ps(load(&block.z), _mm256_set1_ps(o.z));
@@ -51,6 +52,7 @@ impl Avx2Ray {
             let ay = _mm256_fnmadd_ps(middle, dy, cy);
             let az = _mm256_fnmadd_ps(middle, dz, cz);
             let across = _mm256_fmadd_ps(az, az, _mm256_fmadd_ps(ay, ay, _mm256_mul_ps(ax, ax)));
+            // Subtract the squared distances from the squared radii
             let squared = match radii {
                 Some(radii) => {
                     let r = load(&radii.0);
@@ -62,10 +64,10 @@ impl Avx2Ray {
         }
     }
 
-    /// The crossing that counts, and the lanes where it lies in `t_min..=limit`.
+    /// The hit distances, and the lanes with a distance in `t_min..=limit`.
     ///
     /// # Safety
-    /// The caller's machine has AVX2 and FMA.
+    /// The machine of the caller has AVX2 and FMA.
     #[inline(always)]
     unsafe fn distances(
         &self,
@@ -83,11 +85,13 @@ impl Avx2Ray {
                 return (zero, 0);
             }
             let chord = _mm256_sqrt_ps(_mm256_max_ps(discriminant, zero));
+            // Choose the first intersection that does not lie before `t_min`
             let t_min = _mm256_set1_ps(self.ray.t_min);
             let near = _mm256_sub_ps(middle, chord);
             let far = _mm256_add_ps(middle, chord);
             let ahead = _mm256_cmp_ps::<_CMP_GE_OQ>(near, t_min);
             let t = _mm256_blendv_ps(far, near, ahead);
+            // Keep the lanes with a distance in range
             let after = _mm256_cmp_ps::<_CMP_GE_OQ>(t, t_min);
             let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, _mm256_set1_ps(limit));
             let valid = _mm256_and_ps(hit, _mm256_and_ps(after, before));
@@ -138,6 +142,7 @@ impl Kernel for Avx2 {
     ) -> Option<(f32, u32)> {
         // SAFETY: this kernel is only used inside functions with AVX2 and FMA.
         unsafe {
+            // Test both halves of the block
             let (t_low, lanes_low) = ray.distances(block, radii, 0, limit);
             let (t_high, lanes_high) = ray.distances(block, radii, 1, limit);
             let mut lanes = lanes_low | (lanes_high << 8);
@@ -147,6 +152,7 @@ impl Kernel for Avx2 {
             let mut t = [0.0_f32; BLOCK_SIZE];
             _mm256_storeu_ps(t.as_mut_ptr(), t_low);
             _mm256_storeu_ps(t.as_mut_ptr().add(8), t_high);
+            // Find the nearest distance and all lanes with it
             let (mut best, mut tied) = (f32::INFINITY, 0);
             while lanes != 0 {
                 let lane = lanes.trailing_zeros();
@@ -220,7 +226,7 @@ impl Kernel for Avx2 {
     }
 }
 
-/// For each mask of eight lanes, the lanes that are set, in order: AVX2 has no compress.
+/// The indices of the set lanes for each mask of eight lanes, because AVX2 has no compress instruction.
 const COMPRESSED: [[u8; WIDTH]; 256] = {
     let mut table = [[0; WIDTH]; 256];
     let mut mask = 0;
@@ -238,10 +244,10 @@ const COMPRESSED: [[u8; WIDTH]; 256] = {
     table
 };
 
-/// How many children of `node` are entered no later than left, and their keys, packed.
+/// The number of children of `node` whose entry distance does not exceed their exit distance, and their keys, packed.
 ///
 /// # Safety
-/// The caller's machine has AVX2.
+/// The machine of the caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn packed_keys(node: &Node, near: __m256, far: __m256) -> (usize, __m256i) {
     // SAFETY: AVX2 by contract; eight bytes are read from an array of eight.

@@ -1,4 +1,4 @@
-//! The children of a node against each ray of a packet, eight rays at a time.
+//! Tests the children of a node with each ray of a packet, eight rays at a time.
 
 use std::arch::x86_64::*;
 
@@ -8,11 +8,10 @@ use super::lanes::ChildBoxes;
 use crate::ray::PACKET_SIZE;
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// Lanes of a register.
+/// Lanes per register.
 const LANES: usize = 8;
 
-/// Where eight rays cross the planes of a node along one axis: at `step * plane + base`, within
-/// `slack`.
+/// Where eight rays intersect the planes of a node along one axis: at `step * plane + base`, within `slack`.
 #[derive(Clone, Copy)]
 struct AxisSlabs {
     step: __m256,
@@ -31,17 +30,17 @@ unsafe fn absolute(v: __m256) -> __m256 {
 /// Lanes `first .. first + 8` of `values`.
 ///
 /// # Safety
-/// The caller's machine has AVX2, and `first` is 0 or 8.
+/// The machine of the caller has AVX2, and `first` is 0 or 8.
 #[inline(always)]
 unsafe fn load(values: &[f32; PACKET_SIZE], first: usize) -> __m256 {
     // SAFETY: AVX2 by contract; lanes 0..8 or 8..16 of 16 are read.
     unsafe { _mm256_loadu_ps(values.as_ptr().add(first)) }
 }
 
-/// A lane of ones for each of the low eight bits of `lanes`.
+/// Expands the low eight bits of `lanes` to a mask of eight lanes.
 ///
 /// # Safety
-/// The caller's machine has AVX2.
+/// The machine of the caller has AVX2.
 #[inline(always)]
 unsafe fn lane_mask(lanes: u32) -> __m256 {
     // SAFETY: AVX2 by contract.
@@ -52,10 +51,10 @@ unsafe fn lane_mask(lanes: u32) -> __m256 {
     }
 }
 
-/// The least of eight lanes, none of them NaN.
+/// The least of eight lanes, none of which is NaN.
 ///
 /// # Safety
-/// The caller's machine has AVX2.
+/// The machine of the caller has AVX2.
 #[inline(always)]
 unsafe fn least(v: __m256) -> f32 {
     // SAFETY: AVX2 by contract.
@@ -76,6 +75,7 @@ impl AxisSlabs {
         unsafe {
             let inverse = load(&rays.inverse[axis], first);
             let origin = load(&rays.origin[axis], first);
+            // Convert the grid of the node to distances along the rays, with slack
             let step = _mm256_mul_ps(_mm256_set1_ps(scale), inverse);
             let to_node = _mm256_sub_ps(_mm256_set1_ps(node.origin[axis]), origin);
             let base = _mm256_mul_ps(to_node, inverse);
@@ -87,10 +87,11 @@ impl AxisSlabs {
     }
 }
 
-/// The lanes of `first .. first + 8` that enter each child, as the low eight bits, and where.
+/// The lanes of `first .. first + 8` that enter each child, as the low eight bits. Writes the entry distances to
+/// `near_of`.
 ///
 /// # Safety
-/// The caller's machine has AVX2 and FMA, and `first` is 0 or 8.
+/// The machine of the caller has AVX2 and FMA, and `first` is 0 or 8.
 #[inline(always)]
 unsafe fn test_half(
     rays: &LaneSlabs,
@@ -113,7 +114,7 @@ unsafe fn test_half(
         let alive = lane_mask(alive);
         let never = _mm256_set1_ps(f32::INFINITY);
         for slot in 0..node.child_count() {
-            // Shorten all rays to where they are in the child's box
+            // Clip all rays to the box of the child
             let (mut near, mut far) = (start, limit);
             for (axis, slab) in slabs.iter().enumerate() {
                 let AxisSlabs { step, base, slack } = *slab;
@@ -121,10 +122,11 @@ unsafe fn test_half(
                 let half = _mm256_set1_ps(boxes.half[axis][slot]);
                 let at = _mm256_fmadd_ps(middle, step, base);
                 let extent = _mm256_fmadd_ps(half, absolute(step), slack);
-                // A NaN yields the second operand: no bound.
+                // If the first operand is NaN, the result is the second one: no bound.
                 near = _mm256_max_ps(_mm256_sub_ps(at, extent), near);
                 far = _mm256_min_ps(_mm256_add_ps(at, extent), far);
             }
+            // Store the entry distances, and the lanes that enter the child
             let entered = _mm256_and_ps(_mm256_cmp_ps::<_CMP_LE_OQ>(near, far), alive);
             let near = _mm256_blendv_ps(never, near, entered);
             _mm256_storeu_ps(near_of[slot].as_mut_ptr().add(first), near);
@@ -150,6 +152,7 @@ pub(super) unsafe fn test_node(
 ) -> usize {
     // SAFETY: AVX2 and FMA by contract; lanes start at 0 and 8.
     unsafe {
+        // Test both halves of the packet
         let boxes = ChildBoxes::of(node);
         let child = (node, &boxes);
         let low = test_half(rays, 0, child, alive, limits, &mut entered.near);
@@ -161,6 +164,7 @@ pub(super) unsafe fn test_node(
             limits,
             &mut entered.near,
         );
+        // Make the keys of the entered children from the least entry distances
         let mut found = 0;
         for slot in 0..node.child_count() {
             if low[slot] | high[slot] == 0 {

@@ -1,4 +1,4 @@
-//! Packets in the 256-bit kernel: two registers hold a value of each ray.
+//! Packet tests of the 256-bit kernel: two registers hold one value per ray.
 
 use std::arch::x86_64::*;
 
@@ -10,12 +10,11 @@ use super::{avx2_lanes, beam};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{BLOCK_SIZE, Block, BlockRadii, Node};
 
-/// The crossing of each ray in lanes `half * 8 .. half * 8 + 8` with `sphere` that counts, and the
-/// lanes where it lies in `t_min..=limit`. The operations on each pair of ray and sphere are those of
-/// the test of one ray.
+/// The hit distance of each ray in lanes `half * 8 .. half * 8 + 8` with `sphere`, and the lanes with a distance in
+/// `t_min..=limit`. The operations for each pair of ray and sphere are those of the test for single rays.
 ///
 /// # Safety
-/// The caller's machine has AVX2 and FMA.
+/// The machine of the caller has AVX2 and FMA.
 #[inline(always)]
 unsafe fn distances(
     packet: &RayPacket,
@@ -29,6 +28,7 @@ unsafe fn distances(
     };
     // SAFETY: AVX2 and FMA by contract.
     unsafe {
+        // Find the points of the rays nearest to the centre, and the vectors between them
         let [x, y, z] = sphere.center;
         let cx = _mm256_sub_ps(_mm256_set1_ps(x), load(&packet.origin[0]));
         let cy = _mm256_sub_ps(_mm256_set1_ps(y), load(&packet.origin[1]));
@@ -41,28 +41,31 @@ unsafe fn distances(
         let ay = _mm256_fnmadd_ps(middle, dy, cy);
         let az = _mm256_fnmadd_ps(middle, dz, cz);
         let across = _mm256_fmadd_ps(az, az, _mm256_fmadd_ps(ay, ay, _mm256_mul_ps(ax, ax)));
+        // Stop if all rays miss the sphere
         let discriminant = _mm256_sub_ps(_mm256_set1_ps(sphere.radius_squared), across);
         let zero = _mm256_setzero_ps();
         let hit = _mm256_cmp_ps::<_CMP_GE_OQ>(discriminant, zero);
         if _mm256_movemask_ps(hit) == 0 {
             return (zero, zero);
         }
+        // Choose the first intersection that does not lie before `t_min`
         let chord = _mm256_sqrt_ps(_mm256_max_ps(discriminant, zero));
         let t_min = load(&packet.t_min);
         let near = _mm256_sub_ps(middle, chord);
         let far = _mm256_add_ps(middle, chord);
         let ahead = _mm256_cmp_ps::<_CMP_GE_OQ>(near, t_min);
         let t = _mm256_blendv_ps(far, near, ahead);
+        // Keep the lanes with a distance in range
         let after = _mm256_cmp_ps::<_CMP_GE_OQ>(t, t_min);
         let before = _mm256_cmp_ps::<_CMP_LE_OQ>(t, load(&hits.t));
         (t, _mm256_and_ps(hit, _mm256_and_ps(after, before)))
     }
 }
 
-/// The lanes of half a block whose spheres a ray of the beam may meet.
+/// The lanes of half a block whose spheres a ray of the beam may hit.
 ///
 /// # Safety
-/// The caller's machine has AVX2 and FMA.
+/// The machine of the caller has AVX2 and FMA.
 #[inline(always)]
 unsafe fn spheres_in_beam(
     beam: &Beam,
@@ -74,6 +77,7 @@ unsafe fn spheres_in_beam(
     let (o, d) = (beam.center, beam.axis);
     // SAFETY: AVX2 and FMA by contract; the loads are of lanes 0..8 or 8..16 of 16.
     unsafe {
+        // Compute the positions along the central ray, and the squared distances from it
         let load = |v: &[f32; BLOCK_SIZE]| _mm256_load_ps(v.as_ptr().add(half * 8));
         let cx = _mm256_sub_ps(load(&block.x), _mm256_set1_ps(o.x));
         let cy = _mm256_sub_ps(load(&block.y), _mm256_set1_ps(o.y));
@@ -88,6 +92,7 @@ unsafe fn spheres_in_beam(
         let ay = _mm256_fnmadd_ps(middle, dy, cy);
         let az = _mm256_fnmadd_ps(middle, dz, cz);
         let across = _mm256_fmadd_ps(az, az, _mm256_fmadd_ps(ay, ay, _mm256_mul_ps(ax, ax)));
+        // Compute the radius of the cone at each position
         let radius = match radii {
             Some(radii) => load(&radii.0),
             None => _mm256_set1_ps(beam.radius),
@@ -95,7 +100,7 @@ unsafe fn spheres_in_beam(
         let tip = _mm256_add_ps(radius, _mm256_set1_ps(beam.spread));
         let ahead = _mm256_max_ps(_mm256_add_ps(middle, tip), _mm256_setzero_ps());
         let reach = _mm256_fmadd_ps(ahead, _mm256_set1_ps(beam.growth), tip);
-        // Said so that NaN stays, for the rays' own tests to judge.
+        // "Not greater" is true for NaN, so that the tests of the rays decide in that case.
         let inside = _mm256_cmp_ps::<_CMP_NGT_UQ>(across, _mm256_mul_ps(reach, reach));
         let start = _mm256_sub_ps(middle, reach);
         let before = _mm256_cmp_ps::<_CMP_NGT_UQ>(start, _mm256_set1_ps(limit));
@@ -163,6 +168,7 @@ impl PacketKernel for Avx2 {
                 if _mm256_movemask_ps(lanes) == 0 {
                     continue;
                 }
+                // Find ties with the current hits
                 let limit_at = hits.t.as_mut_ptr().add(half * 8);
                 let slot_at = hits.slot.as_mut_ptr().add(half * 8).cast::<i32>();
                 let limit = _mm256_loadu_ps(limit_at);
@@ -171,6 +177,7 @@ impl PacketKernel for Avx2 {
                 let equal = _mm256_and_ps(lanes, _mm256_cmp_ps::<_CMP_EQ_OQ>(t, limit));
                 let empty = _mm256_castsi256_ps(_mm256_cmpeq_epi32(held, none));
                 let tied = _mm256_andnot_ps(empty, equal);
+                // Store the nearer hits
                 let nearer = _mm256_castps_si256(_mm256_andnot_ps(tied, lanes));
                 let slot = _mm256_set1_epi32(sphere.slot.cast_signed());
                 _mm256_maskstore_ps(limit_at, nearer, t);

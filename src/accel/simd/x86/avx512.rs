@@ -9,7 +9,7 @@ use super::slab::SlabRay;
 use crate::ray::Ray;
 use spherule_formats::blocks::{Block, BlockFrame, BlockRadii, Node, Q10Block, Q16Block, WIDTH};
 
-/// 512-bit kernel.
+/// The 512-bit kernel.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct Avx512;
 
@@ -20,16 +20,17 @@ pub(super) struct Avx512Ray {
 }
 
 impl Avx512Ray {
-    /// Middle of the chord and discriminant of all lanes.
+    /// Midpoint of the chord and discriminant for all lanes.
     ///
     /// # Safety
-    /// The caller's machine has AVX-512 F.
+    /// The machine of the caller has AVX-512 F.
     #[inline(always)]
     unsafe fn chords(&self, block: &Block, radii: Option<&BlockRadii>) -> (__m512, __m512) {
         let o = self.ray.origin;
         let d = self.ray.direction;
         // SAFETY: AVX-512 by contract; the loads are of arrays of 16 aligned to 64 bytes.
         unsafe {
+            // Find the points of the ray nearest to the centres, and the vectors between them
             let cx = _mm512_sub_ps(_mm512_load_ps(block.x.as_ptr()), _mm512_set1_ps(o.x));
             let cy = _mm512_sub_ps(_mm512_load_ps(block.y.as_ptr()), _mm512_set1_ps(o.y));
             let cz = _mm512_sub_ps(_mm512_load_ps(block.z.as_ptr()), _mm512_set1_ps(o.z));
@@ -43,6 +44,7 @@ impl Avx512Ray {
             let ay = _mm512_fnmadd_ps(middle, dy, cy);
             let az = _mm512_fnmadd_ps(middle, dz, cz);
             let across = _mm512_fmadd_ps(az, az, _mm512_fmadd_ps(ay, ay, _mm512_mul_ps(ax, ax)));
+            // Subtract the squared distances from the squared radii
             let squared = match radii {
                 Some(radii) => {
                     let r = _mm512_load_ps(radii.0.as_ptr());
@@ -54,10 +56,10 @@ impl Avx512Ray {
         }
     }
 
-    /// The crossing that counts, and the lanes where it lies in `t_min..=limit`.
+    /// The hit distances, and the lanes with a distance in `t_min..=limit`.
     ///
     /// # Safety
-    /// The caller's machine has AVX-512 F.
+    /// The machine of the caller has AVX-512 F.
     #[inline(always)]
     unsafe fn distances(
         &self,
@@ -74,11 +76,13 @@ impl Avx512Ray {
                 return (zero, 0);
             }
             let chord = _mm512_sqrt_ps(_mm512_max_ps(discriminant, zero));
+            // Choose the first intersection that does not lie before `t_min`
             let t_min = _mm512_set1_ps(self.ray.t_min);
             let near = _mm512_sub_ps(middle, chord);
             let far = _mm512_add_ps(middle, chord);
             let ahead = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(near, t_min);
             let t = _mm512_mask_blend_ps(ahead, far, near);
+            // Keep the lanes with a distance in range
             let after = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(hit, t, t_min);
             let before = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(after, t, _mm512_set1_ps(limit));
             (t, before)
@@ -99,8 +103,8 @@ impl Kernel for Avx512 {
         }
     }
 
-    /// In 256 bits as for AVX2: a node has eight children, and the 512-bit form (both sides of an axis
-    /// in one register) has the longer chain from load to branch.
+    /// Uses 256 bits as AVX2 does: a node has eight children, and the 512-bit form (both sides of an axis in one
+    /// register) has a longer dependency chain from load to branch.
     #[inline(always)]
     fn test_node(self, ray: &Avx512Ray, node: &Node, limit: f32) -> (usize, __m256i) {
         // SAFETY: this kernel is only used inside functions with AVX-512 F, BW, DQ and VL.
@@ -136,6 +140,7 @@ impl Kernel for Avx512 {
             if lanes == 0 {
                 return None;
             }
+            // Find the nearest distance and all lanes with it
             let best = _mm512_mask_reduce_min_ps(lanes, t);
             let tied = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(lanes, t, _mm512_set1_ps(best));
             Some((best, u32::from(tied)))

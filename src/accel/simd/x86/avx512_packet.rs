@@ -1,4 +1,4 @@
-//! Packets in the 512-bit kernel: a register holds a value of each ray.
+//! Packet tests of the 512-bit kernel: one register holds one value per ray.
 
 use std::arch::x86_64::*;
 
@@ -11,11 +11,11 @@ use super::lanes::{ChildBoxes, keys_of};
 use crate::ray::{PACKET_SIZE, RayPacket};
 use spherule_formats::blocks::{Block, BlockRadii, Node};
 
-/// The crossing of each ray with `sphere` that counts, and the lanes where it lies in
-/// `t_min..=limit`. The operations on each pair of ray and sphere are those of the test of one ray.
+/// The hit distance of each ray with `sphere`, and the lanes with a distance in `t_min..=limit`. The operations for
+/// each pair of ray and sphere are those of the test for single rays.
 ///
 /// # Safety
-/// The caller's machine has AVX-512 F.
+/// The machine of the caller has AVX-512 F.
 #[inline(always)]
 unsafe fn distances(
     packet: &RayPacket,
@@ -28,6 +28,7 @@ unsafe fn distances(
     };
     // SAFETY: AVX-512 by contract.
     unsafe {
+        // Find the points of the rays nearest to the centre, and the vectors between them
         let [x, y, z] = sphere.center;
         let cx = _mm512_sub_ps(_mm512_set1_ps(x), load(&packet.origin[0]));
         let cy = _mm512_sub_ps(_mm512_set1_ps(y), load(&packet.origin[1]));
@@ -40,25 +41,28 @@ unsafe fn distances(
         let ay = _mm512_fnmadd_ps(middle, dy, cy);
         let az = _mm512_fnmadd_ps(middle, dz, cz);
         let across = _mm512_fmadd_ps(az, az, _mm512_fmadd_ps(ay, ay, _mm512_mul_ps(ax, ax)));
+        // Stop if all rays miss the sphere
         let discriminant = _mm512_sub_ps(_mm512_set1_ps(sphere.radius_squared), across);
         let zero = _mm512_setzero_ps();
         let hit = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(discriminant, zero);
         if hit == 0 {
             return (zero, 0);
         }
+        // Choose the first intersection that does not lie before `t_min`
         let chord = _mm512_sqrt_ps(_mm512_max_ps(discriminant, zero));
         let t_min = load(&packet.t_min);
         let near = _mm512_sub_ps(middle, chord);
         let far = _mm512_add_ps(middle, chord);
         let ahead = _mm512_cmp_ps_mask::<_CMP_GE_OQ>(near, t_min);
         let t = _mm512_mask_blend_ps(ahead, far, near);
+        // Keep the lanes with a distance in range
         let after = _mm512_mask_cmp_ps_mask::<_CMP_GE_OQ>(hit, t, t_min);
         let before = _mm512_mask_cmp_ps_mask::<_CMP_LE_OQ>(after, t, load(&hits.t));
         (t, before)
     }
 }
 
-/// Where 16 rays cross the planes of a node along one axis: at `step * plane + base`, within `slack`.
+/// Where 16 rays intersect the planes of a node along one axis: at `step * plane + base`, within `slack`.
 #[derive(Clone, Copy)]
 struct AxisSlabs {
     step: __m512,
@@ -77,6 +81,7 @@ impl AxisSlabs {
             let inverse = _mm512_loadu_ps(rays.inverse[axis].as_ptr());
             let origin = _mm512_loadu_ps(rays.origin[axis].as_ptr());
             let reach = _mm512_loadu_ps(rays.reach[axis].as_ptr());
+            // Convert the grid of the node to distances along the rays, with slack
             let step = _mm512_mul_ps(_mm512_set1_ps(scale), inverse);
             let to_node = _mm512_sub_ps(_mm512_set1_ps(node.origin[axis]), origin);
             let base = _mm512_mul_ps(to_node, inverse);
@@ -115,7 +120,7 @@ unsafe fn test_node_with_lanes(
         let alive = alive as __mmask16;
         let mut found = 0;
         for slot in 0..node.child_count() {
-            // Shorten all rays to where they are in the child's box
+            // Clip all rays to the box of the child
             let (mut near, mut far) = (start, limit);
             for (axis, slab) in slabs.iter().enumerate() {
                 let AxisSlabs { step, base, slack } = *slab;
@@ -123,7 +128,7 @@ unsafe fn test_node_with_lanes(
                 let half = _mm512_set1_ps(boxes.half[axis][slot]);
                 let at = _mm512_fmadd_ps(middle, step, base);
                 let extent = _mm512_fmadd_ps(half, _mm512_abs_ps(step), slack);
-                // A NaN yields the second operand: no bound.
+                // If the first operand is NaN, the result is the second one: no bound.
                 near = _mm512_max_ps(_mm512_sub_ps(at, extent), near);
                 far = _mm512_min_ps(_mm512_add_ps(at, extent), far);
             }
@@ -131,7 +136,7 @@ unsafe fn test_node_with_lanes(
             if lanes == 0 {
                 continue;
             }
-            // Keep where they enter, and the first of them as the child's key
+            // Store the entry distances, and the least one as the key of the child
             let near = _mm512_mask_blend_ps(lanes, never, near);
             _mm512_storeu_ps(entered.near[slot].as_mut_ptr(), near);
             entered.keys[found] = key_of(_mm512_reduce_min_ps(near), slot);
@@ -189,6 +194,7 @@ impl PacketKernel for Avx512 {
         // SAFETY: this kernel is only used inside functions with AVX-512; the loads are of arrays of
         // 16 aligned to 64 bytes.
         unsafe {
+            // Compute the positions along the central ray, and the squared distances from it
             let cx = _mm512_sub_ps(_mm512_load_ps(block.x.as_ptr()), _mm512_set1_ps(o.x));
             let cy = _mm512_sub_ps(_mm512_load_ps(block.y.as_ptr()), _mm512_set1_ps(o.y));
             let cz = _mm512_sub_ps(_mm512_load_ps(block.z.as_ptr()), _mm512_set1_ps(o.z));
@@ -202,6 +208,7 @@ impl PacketKernel for Avx512 {
             let ay = _mm512_fnmadd_ps(middle, dy, cy);
             let az = _mm512_fnmadd_ps(middle, dz, cz);
             let across = _mm512_fmadd_ps(az, az, _mm512_fmadd_ps(ay, ay, _mm512_mul_ps(ax, ax)));
+            // Compute the radius of the cone at each position
             let radius = match radii {
                 Some(radii) => _mm512_load_ps(radii.0.as_ptr()),
                 None => _mm512_set1_ps(beam.radius),
@@ -209,7 +216,7 @@ impl PacketKernel for Avx512 {
             let tip = _mm512_add_ps(radius, _mm512_set1_ps(beam.spread));
             let ahead = _mm512_max_ps(_mm512_add_ps(middle, tip), _mm512_setzero_ps());
             let reach = _mm512_fmadd_ps(ahead, _mm512_set1_ps(beam.growth), tip);
-            // Said so that NaN stays, for the rays' own tests to judge.
+            // "Not greater" is true for NaN, so that the tests of the rays decide in that case.
             let inside = _mm512_cmp_ps_mask::<_CMP_NGT_UQ>(across, _mm512_mul_ps(reach, reach));
             let start = _mm512_sub_ps(middle, reach);
             let limit = _mm512_set1_ps(limit);
@@ -231,11 +238,13 @@ impl PacketKernel for Avx512 {
             if lanes == 0 {
                 return 0;
             }
+            // Find ties with the current hits
             let limit = _mm512_loadu_ps(hits.t.as_ptr());
             let held = _mm512_loadu_si512(hits.slot.as_ptr().cast());
             let none = _mm512_set1_epi32(TreeHits::NO_SLOT.cast_signed());
             let equal = _mm512_mask_cmp_ps_mask::<_CMP_EQ_OQ>(lanes, t, limit);
             let tied = _mm512_mask_cmpneq_epi32_mask(equal, held, none);
+            // Store the nearer hits
             let nearer = lanes & !tied;
             let slot = _mm512_set1_epi32(sphere.slot.cast_signed());
             _mm512_mask_storeu_ps(hits.t.as_mut_ptr(), nearer, t);

@@ -1,7 +1,7 @@
-//! Coded blocks into registers: stores and the tests' loads are of equal width and place, so that no
-//! memory is touched once both are inlined.
+//! Decodes coded blocks into registers. The width and position of the stores equal those of the loads in the tests,
+//! so that the block needs no memory once both are inlined.
 //!
-//! Positions are a product and a sum, each rounded: never fused, as in
+//! A position is a product and a sum, each rounded and never fused, as in
 //! [`spherule_formats::blocks::CompactBlock::decode`].
 
 use std::arch::x86_64::*;
@@ -17,10 +17,11 @@ pub(super) unsafe fn q10_by_16(coded: &Q10Block, frame: &BlockFrame) -> Block {
     let mut block = Block::zeroed();
     // SAFETY: AVX-512 by contract; loads and stores are of arrays of 16, aligned to 64 bytes.
     unsafe {
+        // Extract the codes of x, y and z: 11, 11 and 10 bits
         let words = _mm512_load_si512(coded.0.as_ptr().cast());
-        let eleven = _mm512_set1_epi32(2047);
-        let x = _mm512_and_si512(words, eleven);
-        let y = _mm512_and_si512(_mm512_srli_epi32::<11>(words), eleven);
+        let low_11_bits = _mm512_set1_epi32(2047);
+        let x = _mm512_and_si512(words, low_11_bits);
+        let y = _mm512_and_si512(_mm512_srli_epi32::<11>(words), low_11_bits);
         let z = _mm512_srli_epi32::<22>(words);
         for (axis, (codes, lanes)) in [(x, &mut block.x), (y, &mut block.y), (z, &mut block.z)]
             .into_iter()
@@ -80,10 +81,11 @@ pub(super) unsafe fn q10_by_8(coded: &Q10Block, frame: &BlockFrame) -> Block {
         // SAFETY: AVX2 by contract; loads and stores are of lanes 0..8 or 8..16 of 16, aligned to 32
         // bytes.
         unsafe {
+            // Extract the codes of x, y and z: 11, 11 and 10 bits
             let words = _mm256_load_si256(coded.0.as_ptr().add(first).cast());
-            let eleven = _mm256_set1_epi32(2047);
-            let x = _mm256_and_si256(words, eleven);
-            let y = _mm256_and_si256(_mm256_srli_epi32::<11>(words), eleven);
+            let low_11_bits = _mm256_set1_epi32(2047);
+            let x = _mm256_and_si256(words, low_11_bits);
+            let y = _mm256_and_si256(_mm256_srli_epi32::<11>(words), low_11_bits);
             let z = _mm256_srli_epi32::<22>(words);
             for (axis, (codes, lanes)) in [(x, &mut block.x), (y, &mut block.y), (z, &mut block.z)]
                 .into_iter()

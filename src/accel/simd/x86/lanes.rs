@@ -1,28 +1,28 @@
-//! Small pieces that the kernels share.
+//! Small functions that the x86 kernels share.
 
 use std::arch::x86_64::*;
 
 use super::super::LINE;
 use spherule_formats::blocks::{Node, WIDTH};
 
-/// Eight planes as floats.
+/// Converts eight planes to floats.
 ///
 /// # Safety
-/// The caller's machine has AVX2.
+/// The machine of the caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn planes(bytes: &[u8; WIDTH]) -> __m256 {
     // SAFETY: eight bytes are read from an array of eight; AVX2 by contract.
     unsafe { _mm256_cvtepi32_ps(_mm256_cvtepu8_epi32(_mm_loadl_epi64(bytes.as_ptr().cast()))) }
 }
 
-/// The children's boxes in planes, as [`PacketKernel::test_node_with_lanes`] has them.
+/// The boxes of the children in units of planes, in the form of [`PacketKernel::test_node_with_lanes`].
 ///
 /// [`PacketKernel::test_node_with_lanes`]: super::super::PacketKernel::test_node_with_lanes
 #[repr(align(32))]
 pub(super) struct ChildBoxes {
-    /// Middles, per axis and slot.
+    /// Midpoints, per axis and slot.
     pub(super) middle: [[f32; WIDTH]; 3],
-    /// Half widths.
+    /// Half widths, per axis and slot.
     pub(super) half: [[f32; WIDTH]; 3],
 }
 
@@ -51,12 +51,12 @@ impl ChildBoxes {
     }
 }
 
-/// One lane (chosen by `SHUFFLE`) in all eight.
+/// Broadcasts one lane (selected by `SHUFFLE`) to all eight.
 ///
 /// # Safety
-/// The caller's machine has AVX2.
+/// The machine of the caller has AVX2.
 #[inline(always)]
-pub(super) unsafe fn spread<const SHUFFLE: i32>(v: __m128) -> __m256 {
+pub(super) unsafe fn broadcast<const SHUFFLE: i32>(v: __m128) -> __m256 {
     // SAFETY: AVX2 by contract.
     unsafe {
         let lane = _mm_shuffle_ps::<SHUFFLE>(v, v);
@@ -64,7 +64,7 @@ pub(super) unsafe fn spread<const SHUFFLE: i32>(v: __m128) -> __m256 {
     }
 }
 
-/// Asks for all lines of `value`.
+/// Prefetches all cache lines of `value`.
 #[inline(always)]
 pub(super) fn prefetch<T>(value: &T) {
     for line in 0..size_of::<T>().div_ceil(LINE) {
@@ -87,10 +87,10 @@ pub(super) unsafe fn absolute(v: __m128) -> __m128 {
     unsafe { _mm_andnot_ps(_mm_set1_ps(-0.0), v) }
 }
 
-/// Keys of eight distances: see [`Kernel::Keys`].
+/// Keys of eight distances, without packing: see [`Kernel::Keys`].
 ///
 /// # Safety
-/// The caller's machine has AVX2.
+/// The machine of the caller has AVX2.
 #[inline(always)]
 pub(super) unsafe fn keys_of(distances: __m256) -> __m256i {
     // SAFETY: AVX2 by contract.
@@ -101,7 +101,7 @@ pub(super) unsafe fn keys_of(distances: __m256) -> __m256i {
     }
 }
 
-/// All lanes.
+/// Stores all lanes to an array.
 #[inline(always)]
 pub(super) fn keys_to_array(keys: __m256i) -> [u32; WIDTH] {
     let mut array = [0; WIDTH];
@@ -110,7 +110,7 @@ pub(super) fn keys_to_array(keys: __m256i) -> [u32; WIDTH] {
     array
 }
 
-/// The first two lanes, by register.
+/// The first two lanes, without a store to memory.
 #[inline(always)]
 #[expect(clippy::cast_possible_truncation, reason = "the two halves")]
 pub(super) fn first_two(keys: __m256i) -> [u32; 2] {

@@ -1,7 +1,7 @@
-//! Hand-written AVX2 and AVX-512 tests, and the doors to code compiled with them.
+//! Kernels in AVX2 and AVX-512 intrinsics, and the entry points that enable these instructions.
 //!
-//! The traits' methods are inlined into the functions at the end, which carry the target features;
-//! those are only called after the machine was asked.
+//! The methods of the kernels are inlined into the functions at the end of this file, which have the target features
+//! and are only called if the machine supports them.
 #![expect(unsafe_code, reason = "intrinsics; every block says why it is sound")]
 
 use super::{KernelTask, SimdLevel, Supported};
@@ -19,7 +19,7 @@ mod slab;
 use avx2::Avx2;
 use avx512::Avx512;
 
-/// A task compiled with a kernel's instructions.
+/// Defines the function that runs a task with the instructions of a kernel.
 macro_rules! compiled {
     ($run:ident, $kernel:expr, $level:path, $features:literal) => {
         /// # Panics

@@ -1,25 +1,25 @@
-//! One ray against the eight boxes of a node.
+//! Tests the eight boxes of a node with one ray.
 
 use std::arch::x86_64::*;
 
 use super::super::{SLAB_SLACK, finite_inverse};
-use super::lanes::{absolute, planes, spread};
+use super::lanes::{absolute, broadcast, planes};
 use crate::ray::Ray;
 use spherule_formats::blocks::Node;
 
-/// What the slab test needs of a ray: one lane per axis, the fourth unused.
+/// A ray prepared for the slab test: one lane per axis, the fourth unused.
 #[derive(Clone, Copy)]
 pub(super) struct SlabRay {
     origin: __m128,
     inverse: __m128,
-    /// Distance that the padding of boxes adds on either side, per axis.
+    /// Distance along the ray that the padding of boxes adds on either side, per axis.
     reach: __m128,
-    /// Which side's planes come first, per axis: 1 where the direction is negative.
+    /// Index of the near planes per axis: 1 if the direction is negative.
     near_side: [usize; 3],
     t_min: f32,
 }
 
-/// Step, base and slack of a node's planes as distances along the ray, per axis.
+/// Step, base and slack of the planes of a node as distances along the ray, per axis.
 struct SlabNode {
     step: __m128,
     base: __m128,
@@ -50,26 +50,30 @@ impl SlabRay {
         // SAFETY: SSE4.1 and FMA are there, or no kernel here would run. The 16 bytes read from the
         // node's start are its origin, exponents and mask: within its 64 bytes.
         unsafe {
-            let head = _mm_load_si128(std::ptr::from_ref(node).cast());
-            // The fourth lane is kept at zero throughout: what else it would hold gives denormal
-            // products, each of which costs an Intel processor over a hundred cycles.
-            let origin = _mm_blend_ps::<0b1000>(_mm_castsi128_ps(head), self.origin);
-            let three = _mm_setr_epi32(0, 0, 0, 0x00ff_ffff);
-            let exponents = _mm_cvtepu8_epi32(_mm_srli_si128::<12>(_mm_and_si128(head, three)));
+            // Load origin and exponents of the node
+            let header = _mm_load_si128(std::ptr::from_ref(node).cast());
+            // The fourth lane is zero throughout: other content would lead to denormal products, each of which costs
+            // over a hundred cycles on Intel processors.
+            let origin = _mm_blend_ps::<0b1000>(_mm_castsi128_ps(header), self.origin);
+            let exponent_bytes = _mm_setr_epi32(0, 0, 0, 0x00ff_ffff);
+            let exponents =
+                _mm_cvtepu8_epi32(_mm_srli_si128::<12>(_mm_and_si128(header, exponent_bytes)));
             let scale = _mm_castsi128_ps(_mm_slli_epi32::<23>(exponents));
+            // Convert the grid of the node to distances along the ray
             let step = _mm_mul_ps(scale, self.inverse);
             let base = _mm_mul_ps(_mm_sub_ps(origin, self.origin), self.inverse);
-            // The part that does not wait for the origin comes first.
+            // Compute the slack; the part that does not depend on the origin comes first, which shortens the
+            // dependency chain.
             let fixed = _mm_fmadd_ps(absolute(step), _mm_set1_ps(255.0 * SLAB_SLACK), self.reach);
             let slack = _mm_fmadd_ps(absolute(base), _mm_set1_ps(SLAB_SLACK), fixed);
             SlabNode { step, base, slack }
         }
     }
 
-    /// Where the ray enters and leaves each child of `node`, within its own start and `limit`.
+    /// Where the ray enters and leaves each child of `node`, between its `t_min` and `limit`.
     ///
     /// # Safety
-    /// The caller's machine has AVX2 and FMA.
+    /// The machine of the caller has AVX2 and FMA.
     #[inline(always)]
     pub(super) unsafe fn test(&self, node: &Node, limit: f32) -> (__m256, __m256) {
         // SAFETY: AVX2 and FMA by contract. Plane loads are of eight bytes out of arrays of eight.
@@ -77,17 +81,19 @@ impl SlabRay {
             let slab = self.enter(node);
             let low = _mm_sub_ps(slab.base, slab.slack);
             let high = _mm_add_ps(slab.base, slab.slack);
+            // Clip the ray to the slabs of all children, axis by axis
             let mut near = _mm256_set1_ps(self.t_min);
             let mut far = _mm256_set1_ps(limit);
             macro_rules! axis {
                 ($axis:literal, $lanes:literal) => {
                     let side = self.near_side[$axis];
-                    let step = spread::<$lanes>(slab.step);
+                    let step = broadcast::<$lanes>(slab.step);
                     let enter = planes(&node.planes[$axis][side]);
                     let leave = planes(&node.planes[$axis][1 - side]);
-                    let enter = _mm256_fmadd_ps(enter, step, spread::<$lanes>(low));
-                    let leave = _mm256_fmadd_ps(leave, step, spread::<$lanes>(high));
-                    // A NaN (planes beyond the range of f32) yields the second operand: no bound.
+                    let enter = _mm256_fmadd_ps(enter, step, broadcast::<$lanes>(low));
+                    let leave = _mm256_fmadd_ps(leave, step, broadcast::<$lanes>(high));
+                    // If the first operand is NaN (planes beyond the range of f32), the result is the second one: no
+                    // bound.
                     near = _mm256_max_ps(enter, near);
                     far = _mm256_min_ps(leave, far);
                 };

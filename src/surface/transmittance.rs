@@ -2,38 +2,39 @@
 
 use crate::math::functions::{exp2, log2};
 
-/// Adds up logarithms in fixed point, where addition is exact in any order: structures that find
-/// crossings in different orders come to the same light to the bit, without sorting.
+/// The transmittance along a ray: a product of factors from 0 to 1. Sums logarithms in fixed point, where addition is
+/// exact in any order. Structures that find crossings in different orders get the same result to the bit, without
+/// sorting.
 #[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Dimming {
-    /// Minus the logarithm of the product to base 2, in units of 2^-32.
+pub(crate) struct TransmittanceProduct {
+    /// Negated base-2 logarithm of the product, in units of 2^-32.
     loss: u64,
 }
 
-/// Loss beyond which nothing is left: 2^-32 of the light is less than a hundredth of the smallest number that a half
-/// float holds.
-const DARK: u64 = 32 << 32;
+/// Loss beyond which the product counts as zero: 2^-32 of the light is less than a hundredth of the smallest number
+/// that a half float can represent.
+const MAX_LOSS: u64 = 32 << 32;
 const UNIT: f64 = 4_294_967_296.0;
 
-impl Dimming {
-    /// Multiplies by `kept`, from 0 to 1. Returns whether any light is left, which more factors
-    /// cannot bring back.
+impl TransmittanceProduct {
+    /// Multiplies the product by a factor from 0 to 1. Returns whether the product is still above zero; once it is
+    /// not, further factors cannot change it.
     #[inline]
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
         reason = "casts saturate, and a factor above 1 loses nothing"
     )]
-    pub(crate) fn by(&mut self, kept: f32) -> bool {
-        let loss = (f64::from(-log2(kept)) * UNIT) as u64;
+    pub(crate) fn multiply(&mut self, factor: f32) -> bool {
+        let loss = (f64::from(-log2(factor)) * UNIT) as u64;
         self.loss = self.loss.saturating_add(loss);
-        self.loss <= DARK
+        self.loss <= MAX_LOSS
     }
 
     /// The product.
     #[expect(clippy::cast_possible_truncation, reason = "light is f32")]
-    pub(crate) fn product(self) -> f32 {
-        if self.loss > DARK {
+    pub(crate) fn value(self) -> f32 {
+        if self.loss > MAX_LOSS {
             0.0
         } else {
             exp2((-(self.loss as f64) / UNIT) as f32)
@@ -46,11 +47,11 @@ mod tests {
     use super::*;
 
     fn product(factors: impl Iterator<Item = f32>) -> f32 {
-        let mut dimming = Dimming::default();
+        let mut transmittance = TransmittanceProduct::default();
         for factor in factors {
-            dimming.by(factor);
+            transmittance.multiply(factor);
         }
-        dimming.product()
+        transmittance.value()
     }
 
     #[test]
@@ -70,9 +71,12 @@ mod tests {
         assert_eq!(product(std::iter::empty()), 1.0);
         assert_eq!(product([1.0, 1.0].into_iter()), 1.0);
         assert_eq!(product([0.5, 0.0].into_iter()), 0.0);
-        let mut dimming = Dimming::default();
-        assert!((0..31).all(|_| dimming.by(0.5)), "2^-31 is left");
-        assert!(!dimming.by(0.25));
-        assert_eq!(dimming.product(), 0.0);
+        let mut transmittance = TransmittanceProduct::default();
+        assert!(
+            (0..31).all(|_| transmittance.multiply(0.5)),
+            "2^-31 is left"
+        );
+        assert!(!transmittance.multiply(0.25));
+        assert_eq!(transmittance.value(), 0.0);
     }
 }

@@ -1,26 +1,26 @@
-//! The order of the upper levels: subtrees of about a thousand particles, brought from the order of
-//! the curve into that of a k-d tree.
+//! Order of the top levels: reorders subtrees of about a thousand particles from the order of the curve to that of a
+//! k-d tree.
 //!
-//! A long run along a curve is no compact region, so the upper nodes of a curve-ordered implicit tree
-//! overlap. Splitting the few thousand subtrees at medians of the widest axis (Bentley 1975) costs a
-//! millisecond at 1e7 particles, and primary rays then take a third less time there. The subtrees
-//! stay where they are: only a table of their places is made.
+//! A long run along a curve is not a compact region, so the upper nodes of an implicit tree in curve order overlap.
+//! Splitting the few thousand subtrees at medians of the widest axis (Bentley 1975) takes a millisecond at 1e7
+//! particles, and primary rays then take a third less time. The subtrees are not moved; only a table of their order
+//! is made.
 
 use rayon::prelude::*;
 
 use super::Aabb;
 use spherule_formats::order::kd::aligned_middle;
 
-/// Below this a task of its own costs more than it saves.
+/// Shorter ranges are not worth a task of their own.
 const PARALLEL_LEN: usize = 4096;
 
-/// Places of `boxes` in an order such that each aligned run of 8, 64, 512... is a cell of a k-d tree.
+/// Indices of `boxes` in an order such that each aligned run of 8, 64, 512... is a cell of a k-d tree.
 pub(super) fn kd_order(boxes: &[Aabb]) -> Vec<u32> {
     let mut items: Vec<Item> = boxes
         .par_iter()
         .enumerate()
         .map(|(place, bounds)| Item {
-            // Twice the centre, which orders as well.
+            // Twice the centre, which has the same order.
             center: (bounds.min + bounds.max).to_array(),
             place: spherule_formats::order::index_u32(place),
         })
@@ -40,11 +40,13 @@ fn split(items: &mut [Item]) {
     if middle == 0 {
         return;
     }
+    // Partition at the median of the widest axis
     let axis = widest_axis(items);
     items.select_nth_unstable_by(middle, |a, b| {
         let order = a.center[axis].total_cmp(&b.center[axis]);
         order.then(a.place.cmp(&b.place))
     });
+    // Recurse into both halves
     let (lower, upper) = items.split_at_mut(middle);
     if lower.len() > PARALLEL_LEN {
         rayon::join(|| split(lower), || split(upper));

@@ -1,4 +1,4 @@
-//! The particles about a place, found in the tree that rays use.
+//! Finds the particles around a point, by queries to the tree that rays use.
 
 use std::borrow::Borrow;
 
@@ -13,10 +13,15 @@ use crate::ray::Ray;
 use spherule_formats::blocks::BLOCK_SIZE;
 
 impl TreeView<'_> {
-    /// Gives `visit` slot and centre of every particle whose centre lies within `reach` of `point`, in the
-    /// order of the walk, until it returns false. Where there are copies, they come several times.
-    pub(crate) fn visit_near(&self, point: Vec3, reach: f32, visit: impl FnMut(u32, Vec3) -> bool) {
-        self.run(Near {
+    /// Calls `visit` with slot and centre of every particle whose centre is within `reach` of `point`, in traversal
+    /// order, until it returns false. A particle that is stored in several slots is visited several times.
+    pub(crate) fn visit_neighbours(
+        &self,
+        point: Vec3,
+        reach: f32,
+        visit: impl FnMut(u32, Vec3) -> bool,
+    ) {
+        self.run(Neighbours {
             point,
             reach,
             visit,
@@ -24,14 +29,14 @@ impl TreeView<'_> {
     }
 }
 
-struct Near<F> {
+struct Neighbours<F> {
     point: Vec3,
     reach: f32,
-    /// Gets every particle; false ends the walk.
+    /// Called with every particle; false ends the traversal.
     visit: F,
 }
 
-impl<F: FnMut(u32, Vec3) -> bool> TreeTask for Near<F> {
+impl<F: FnMut(u32, Vec3) -> bool> TreeTask for Neighbours<F> {
     type Output = ();
 
     #[inline(always)]
@@ -45,8 +50,8 @@ impl<F: FnMut(u32, Vec3) -> bool> TreeTask for Near<F> {
             reach,
             mut visit,
         } = self;
-        // A ray of no length meets the boxes that hold its start, once they are `reach` larger on every
-        // side: all boxes hold the centres of their particles.
+        // Use a ray of length zero and boxes padded by `reach`: all boxes contain the centres of their particles, so
+        // the ray enters every box with a centre within `reach`
         let ray = Ray::new(point, Vec3::X);
         let prepared = kernel.prepare(&ray, 0.0, reach);
         let slots = tree.view.slot_count();
@@ -56,6 +61,7 @@ impl<F: FnMut(u32, Vec3) -> bool> TreeTask for Near<F> {
             |node, limit| kernel.test_node(&prepared, node, limit),
             0.0,
             |block, limit| {
+                // Visit the particles of the block that are within `reach`
                 let loaded = tree.leaves.load(kernel, block);
                 let centers = loaded.borrow();
                 let first = block * BLOCK_SIZE;
