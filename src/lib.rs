@@ -23,6 +23,7 @@
 #![deny(unsafe_code)]
 
 pub mod accel;
+#[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
 pub mod manifest;
@@ -36,6 +37,7 @@ pub mod reading;
 pub mod render;
 pub mod report;
 pub mod resolve;
+#[cfg(feature = "reports")]
 pub mod scale;
 pub mod scene;
 pub mod surface;

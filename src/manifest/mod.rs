@@ -59,6 +59,7 @@ pub use output::{Channel, Output};
 pub use pattern::OutputPattern;
 pub use preset::Look;
 pub(crate) use reader::nearest;
+#[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
 pub use rebase::{named_place, real_dir};
 pub use render::{GroundPattern, Image, Render};

@@ -1,10 +1,13 @@
 //! Reports of a run: time and memory of every frame, for people and for scripts.
 
+#[cfg(feature = "reports")]
 mod escape;
 pub mod frame;
 pub mod job;
 pub mod machine;
+#[cfg(feature = "reports")]
 pub mod page;
+#[cfg(feature = "reports")]
 pub mod plots;
 
 pub use frame::FrameReport;

@@ -140,8 +140,11 @@ fn conversion() -> spherule::conversion::ConvertSettings {
 
 /// Both files of the report, of which the one for scripts can be read.
 fn report(state: &JobState) {
-    let [(_, json), (_, html)] = JobReport::new(state, &Manifest::new("in")).files();
-    assert!(serde_json::from_str::<Value>(&json).is_ok(), "{json}");
+    let files = JobReport::new(state, &Manifest::new("in")).files();
+    let [(_, json), (_, html)] = &files[..] else {
+        panic!("two files");
+    };
+    assert!(serde_json::from_str::<Value>(json).is_ok(), "{json}");
     assert!(html.contains("</html>"));
 }
 

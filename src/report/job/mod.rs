@@ -1,10 +1,14 @@
 //! The current state of a job, from its ledger: `report.json` for scripts and `report.html` for people, both from one
 //! [`JobReport`].
 
+#[cfg(feature = "reports")]
 mod frames;
+#[cfg(feature = "reports")]
 mod html;
 mod json;
+#[cfg(feature = "reports")]
 mod numbers;
+#[cfg(feature = "reports")]
 mod plots;
 #[cfg(test)]
 mod tests;
@@ -105,10 +109,13 @@ impl JobReport {
         }
     }
 
-    /// Names and contents of the report files.
-    pub fn files(&self) -> [(&'static str, String); 2] {
-        let json = format!("{:#}\n", self.to_json());
-        [(JSON_FILE, json), (HTML_FILE, self.to_html())]
+    /// Names and contents of the report files. The page needs the feature `reports`.
+    pub fn files(&self) -> Vec<(&'static str, String)> {
+        vec![
+            (JSON_FILE, format!("{:#}\n", self.to_json())),
+            #[cfg(feature = "reports")]
+            (HTML_FILE, self.to_html()),
+        ]
     }
 
     /// Numbers of the frames with `status`.
