@@ -131,6 +131,11 @@ pub(crate) trait Reader: Sync {
         0
     }
 
+    /// Whether [`Self::remarks`] needs all bytes of a file. It gets them if the file is not compressed.
+    fn remarks_need_whole_file(&self) -> bool {
+        false
+    }
+
     /// What a user should know about a file that begins with `head` and is not in its particles: a simulation
     /// cell, the names behind numbers.
     fn remarks(&self, _head: &[u8]) -> Vec<String> {

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use crate::format::Format;
 use crate::native;
-use crate::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
+use crate::read::{bgeo, csv, gsd, lammps, npy, ply, vtk, vtk_xml, xyz};
 
 /// Every format. Of formats that match a file equally well, the first is taken; messages list them in this order.
 const FORMATS: &[Format] = &[
@@ -17,6 +17,7 @@ const FORMATS: &[Format] = &[
     lammps::FORMAT,
     npy::NPY,
     npy::NPZ,
+    gsd::FORMAT,
     csv::FORMAT,
 ];
 

@@ -59,10 +59,30 @@ impl Step {
         range: Range<usize>,
         budget: MemoryBudget,
     ) -> Result<(), ParseError> {
+        Self::push_new(steps, StepHandle::Bytes(range), budget)
+    }
+
+    /// [`Self::push`] of a step that its reader finds again by `key`.
+    ///
+    /// # Errors
+    /// As [`Self::push`].
+    pub(crate) fn push_with_key(
+        steps: &mut Vec<Self>,
+        key: u64,
+        budget: MemoryBudget,
+    ) -> Result<(), ParseError> {
+        Self::push_new(steps, StepHandle::Key(key), budget)
+    }
+
+    fn push_new(
+        steps: &mut Vec<Self>,
+        handle: StepHandle,
+        budget: MemoryBudget,
+    ) -> Result<(), ParseError> {
         // `Sequence` makes a list of its own.
         let need = 4 * size_of::<Self>() * (steps.len() + 1);
         budget.check(need as u64, "the list of its steps is")?;
-        steps.push(Self::at_bytes(steps.len(), range));
+        steps.push(Self::new(steps.len(), handle));
         Ok(())
     }
 

@@ -89,10 +89,6 @@ const MAGICS: &[(&[u8], &str)] = &[
     (b"\x54\0\0\0CORD", DCD),
     (b"\0\0\0\x54CORD", DCD),
     (
-        b"\xdf\x65\xdf\x65\xdf\x65\xdf\x65",
-        "a GSD file (HOOMD-blue), which is not read; write .npz with gsd and numpy, or a LAMMPS dump with OVITO",
-    ),
-    (
         b"\x08\0\0\0HEAD",
         "a binary snapshot of Gadget, which is not read; write positions and attributes to .npz with pynbody or yt",
     ),

@@ -97,7 +97,7 @@ fn opening(head: &[u8]) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
+    use crate::read::{bgeo, csv, gsd, lammps, npy, ply, vtk, vtk_xml, xyz};
 
     #[track_caller]
     fn detect(name: &str, bytes: &[u8]) -> Format {
@@ -130,6 +130,7 @@ mod tests {
         assert_eq!(detect("a.txt", b"ITEM: TIMESTEP\n0\n"), lammps::FORMAT);
         assert_eq!(detect("a.xyz", b"\x93NUMPY\x01\0"), npy::NPY);
         assert_eq!(detect("a.zip", b"PK\x03\x04"), npy::NPZ);
+        assert_eq!(detect("a.xyz", &[0xdf, 0x65].repeat(4)), gsd::FORMAT);
         let vtu = b"<?xml version=\"1.0\"?>\n<VTKFile header_type=\"UInt64\" type=\"PolyData\">";
         assert_eq!(detect("a.vtk", vtu), vtk_xml::FORMAT);
     }
@@ -190,7 +191,7 @@ mod tests {
         refused("a.usda", b"#usda 1.0\n", "USD");
         refused("a.xtc", b"\0\0\x07\xcb\0\0\0\x03", "GROMACS");
         refused("a.dcd", b"\x54\0\0\0CORD\0", "DCD");
-        refused("a.gsd", &[0xdf, 0x65].repeat(4), "GSD");
+        refused("a.gsd", &[0x65, 0xdf].repeat(4), "big-endian");
         refused("Part_0001.bi4", &[1, 2, 3], "DualSPHysics");
         refused("Part_0001", b"#File JPartDataBi4\0\0", "DualSPHysics");
         let mut snapshot = vec![0; 400];

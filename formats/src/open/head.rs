@@ -10,7 +10,7 @@ use crate::FrameError;
 use crate::detect::Format;
 use crate::gzip::is_gzip;
 use crate::message::one_line;
-use crate::native;
+use crate::native::{self, MappedFile};
 use crate::reader::HEAD_LEN;
 use crate::regular::regular_len;
 
@@ -38,19 +38,26 @@ pub fn detect_file(path: &Path) -> Result<Format, FrameError> {
     Format::detect(&head, path).map_err(|e| e.in_file(path))
 }
 
-/// What the head of the file at `path` holds that is not in its particles: a cell and periodic boundaries, which are
-/// not used, and the names behind numbers. Empty for a file that cannot be read.
+/// What the file at `path` holds that is not in its particles: a cell and periodic boundaries, which are not used, and
+/// the names behind numbers. Looks at the first bytes unless the format needs more. Empty for a file that cannot be
+/// read.
 pub fn remarks(path: &Path) -> Vec<String> {
-    let Ok(head) = head(path) else {
-        return Vec::new();
-    };
-    let format = Format::detect(&head, path);
-    let remarks = format.map(|format| format.reader().remarks(&head));
-    remarks
-        .unwrap_or_default()
-        .into_iter()
-        .map(one_line)
-        .collect()
+    let remarks = head(path).and_then(|head| {
+        let format = Format::detect(&head, path).map_err(|e| e.in_file(path))?;
+        let reader = format.reader();
+        if !reader.remarks_need_whole_file() {
+            return Ok(reader.remarks(&head));
+        }
+        let map = MappedFile::open(path)?;
+        if is_gzip(map.bytes()) {
+            return Ok(reader.remarks(&head));
+        }
+        let remarks = reader.remarks(map.bytes());
+        map.check()?;
+        Ok(remarks)
+    });
+    let remarks = remarks.unwrap_or_default().into_iter();
+    remarks.map(one_line).collect()
 }
 
 /// The first bytes of the file at `path`, decompressed if it is gzip.

@@ -148,6 +148,15 @@ impl ParticleLayout {
         check_columns(columns.chain(&self.attributes), self.count, len)
     }
 
+    /// Bytes that the numbers take in memory.
+    pub(super) fn byte_len(&self) -> u64 {
+        let each = self
+            .columns()
+            .map(|c| c.component_strides.len() * c.scalar.size());
+        let each = each.fold(0, usize::saturating_add);
+        (each as u64).saturating_mul(self.count as u64)
+    }
+
     /// Reads everything: positions in the precision of the file, attributes as they are.
     ///
     /// # Errors

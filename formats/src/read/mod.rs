@@ -10,6 +10,7 @@ pub(crate) mod columns;
 pub mod csv;
 #[cfg(test)]
 mod damage;
+pub mod gsd;
 mod input;
 pub mod lammps;
 pub mod npy;
