@@ -19,7 +19,7 @@ pub use packed::{npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 13] = [
+pub const TARGETS: [(&str, Target); 14] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -29,6 +29,7 @@ pub const TARGETS: [(&str, Target); 13] = [
     ("npy", npy),
     ("npz", npz),
     ("csv", csv),
+    ("gsd", gsd),
     ("open", open),
     ("native", native),
     ("convert", convert),
@@ -94,6 +95,11 @@ pub fn npy(bytes: &[u8]) -> usize {
 /// CSV.
 pub fn csv(bytes: &[u8]) -> usize {
     read_all(read::csv::FORMAT, bytes, 1)
+}
+
+/// GSD.
+pub fn gsd(bytes: &[u8]) -> usize {
+    read_all(read::gsd::FORMAT, bytes, 1)
 }
 
 /// Reads `bytes` as `format`, the first steps and the last. `packing` is the ratio that
