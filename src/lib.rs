@@ -26,6 +26,7 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
+pub mod hdr;
 pub mod manifest;
 pub mod math;
 pub mod metrics;

@@ -1,11 +1,11 @@
 //! Elementary functions in single precision, without the C library and without branches, so that loops over lanes
 //! vectorise and all platforms give the same bits.
 //!
-//! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`, `sinf`, `cosf`;
-//! "Methods and Programs for Mathematical Functions", 1989). The tests of this file measured the stated errors
-//! against double precision.
+//! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`, `atanf`,
+//! `sinf`, `cosf`; "Methods and Programs for Mathematical Functions", 1989). The tests of this file measured the stated
+//! errors against double precision.
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, LN_2, LOG2_E, PI};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
 
 /// Adding and subtracting this constant rounds a number of magnitude below 2^22 to an integer, ties to even.
 const ROUND: f32 = 12_582_912.0;
@@ -118,6 +118,31 @@ pub fn acos(x: f32) -> f32 {
     if is_large { large } else { small }
 }
 
+/// The angle of the vector `(x, y)` from the x axis, -pi to pi, absolute error below 4e-7. 0 for the zero vector.
+#[inline(always)]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    // Reduce to the octant next to the x axis, where tan is 0..=1
+    let (ax, ay) = (x.abs(), y.abs());
+    let is_steep = ay > ax;
+    let (small, large) = if is_steep { (ax, ay) } else { (ay, ax) };
+    let large = if large > 0.0 { large } else { 1.0 };
+    // Above tan(pi/8), use atan(t) = pi/4 + atan((t - 1) / (t + 1))
+    let is_far = small > 0.414_213_57 * large;
+    let (above, below) = (small - large, small + large);
+    let t = if is_far { above / below } else { small / large };
+    let z = t * t;
+    let mut p = 8.053_744_5e-2;
+    p = p * z - 1.387_768_6e-1;
+    p = p * z + 1.997_771_1e-1;
+    p = p * z - 3.333_295e-1;
+    let angle = p * z * t + t;
+    let angle = if is_far { FRAC_PI_4 + angle } else { angle };
+    // Return to the octant of the vector
+    let angle = if is_steep { FRAC_PI_2 - angle } else { angle };
+    let angle = if x < 0.0 { PI - angle } else { angle };
+    angle.copysign(y)
+}
+
 /// Sine and cosine of an angle of magnitude up to 8192 radians, absolute error below 2e-7.
 #[inline(always)]
 #[expect(
@@ -224,6 +249,25 @@ mod tests {
         check(-1.0, 1.0, asin, f64::asin, |_, _| 3e-7);
         check(-1.0, 1.0, acos, f64::acos, |_, _| 4e-7);
         assert_eq!((asin(0.0), acos(1.0)), (0.0, 0.0));
+    }
+
+    #[test]
+    fn angles_of_vectors_keep_their_error() {
+        for angle in steps(-std::f32::consts::PI, std::f32::consts::PI) {
+            let exact = f64::from(angle);
+            for length in [1e-20, 1.0, 3e4] {
+                #[expect(clippy::cast_possible_truncation, reason = "the argument is f32")]
+                let (x, y) = ((length * exact.cos()) as f32, (length * exact.sin()) as f32);
+                let wanted = f64::from(y).atan2(f64::from(x));
+                let error = (f64::from(atan2(y, x)) - wanted).abs();
+                assert!(error < 4e-7, "{x} {y}: {} instead of {wanted}", atan2(y, x));
+            }
+        }
+        assert_eq!(atan2(0.0, 0.0), 0.0);
+        assert_eq!(atan2(0.0, -1.0), PI);
+        assert_eq!(atan2(1.0, 0.0), FRAC_PI_2);
+        assert_eq!(atan2(-2.0, 0.0), -FRAC_PI_2);
+        assert!(atan2(f32::NAN, 1.0).is_nan());
     }
 
     #[test]
