@@ -12,15 +12,16 @@ use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{Channels, RenderSettings};
+use crate::render::{Channels, IntegratorKind, RenderSettings};
 use crate::scene::{
-    Background, Bounds, CameraError, Checker, ColorMap, Ground, Light, PathError, Scene,
-    default_lights, material,
+    Background, Bounds, CameraError, Checker, ColorMap, Ground, Light, PathError, RadianceMap,
+    Scene, default_lights, material,
 };
 use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
+mod environment;
 mod surface;
 
 pub use camera::check_views;
@@ -117,11 +118,21 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
     }
 }
 
-/// Determines everything about the images of a job.
+/// Whether [`setup`] needs the image of `environment.image`.
+pub fn needs_environment_image(manifest: &Manifest) -> bool {
+    environment::needs_image(manifest)
+}
+
+/// Determines everything about the images of a job. `map` is the image of the environment, if it
+/// [is needed](needs_environment_image).
 ///
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
-pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError> {
+pub fn setup(
+    manifest: &Manifest,
+    survey: &Survey,
+    map: Option<&RadianceMap>,
+) -> Result<Setup, ResolveError> {
     // Determine surface, radius and colours
     let surface = surface::settings(manifest)?;
     let radius = radius_rule(manifest, survey)?;
@@ -140,10 +151,12 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     let path = camera::path(manifest, &bounds, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
     // Set up lights and ground
-    let lights = if manifest.lights.is_empty() {
-        default_lights(&bounds, up, &path.start())
-    } else {
-        lights(manifest, survey.origin)
+    let environment = environment::environment(manifest, map, &path.start(), up)?;
+    let lights = match (manifest.lights.is_empty(), manifest.render.integrator) {
+        (false, _) => lights(manifest, survey.origin),
+        (true, IntegratorKind::Whitted) => default_lights(&bounds, up, &path.start()),
+        // The environment is the light
+        (true, IntegratorKind::Path) => Vec::new(),
     };
     let mut ground = ground(manifest, &bounds, up, survey.origin);
     if surface.kind != SurfaceKind::Spheres
@@ -162,6 +175,8 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         material: surface::material(manifest, &bounds),
         background: background(manifest, up.as_vec3()),
         ground,
+        environment,
+        is_environment_visible: manifest.environment.visible,
     };
     // Collect the settings of the images
     let output = &manifest.output;
@@ -173,6 +188,8 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     })?;
     let mut render = RenderSettings::new(image.width, image.height);
     render.samples = image.samples;
+    render.integrator = manifest.render.integrator;
+    render.bounces = manifest.render.bounces;
     render.max_depth = manifest.render.max_depth;
     render.min_weight = manifest.render.min_weight;
     render.channels = channels;

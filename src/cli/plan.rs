@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish, read_regular_text};
+use spherule_jobs::{Fingerprint, FrameRequest, Job, JobRequest, Mode, publish, read_regular_text};
 
 use super::CliError;
 use super::job::{Asked, ManifestArgs, apart};
@@ -16,6 +16,7 @@ use super::work::{
     WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey, selection,
 };
 use crate::accel::Structure;
+use crate::hdr::read_radiance_map;
 use crate::manifest::{
     Manifest, OutputPattern, SCHEMA_FILE, is_marked, marked, named_place, read_manifest, real_dir,
 };
@@ -23,7 +24,8 @@ use crate::metrics::Bytes;
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::resolve::{self, check_views, question};
+use crate::resolve::{self, check_views, needs_environment_image, question};
+use crate::scene::RadianceMap;
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
@@ -163,7 +165,8 @@ impl Plan {
 
     /// What the images depend on, in the words of the job that is gone on with, where that makes no difference.
     fn settings(&self, mode: Mode) -> Result<Vec<(String, String)>, CliError> {
-        let settings = self.manifest.settings();
+        let mut settings = self.manifest.settings();
+        self.identify_environment(&mut settings)?;
         let planned = match mode {
             Mode::Force => None,
             _ => Job::peek(&self.dir)?,
@@ -172,15 +175,32 @@ impl Plan {
             return Ok(settings);
         };
         let has_rgb = planned.resolved().get("rgb").is_some_and(Value::is_object);
-        let as_planned = self
+        let mut as_planned = self
             .manifest
             .settings_as_planned(planned.settings(), has_rgb);
+        self.identify_environment(&mut as_planned)?;
         // What is settled anew is settled by what is asked for now.
         let is_settled_anew = mode == Mode::KeepDone && !planned.changes_to(&as_planned).is_empty();
         Ok(match is_settled_anew {
             true => settings,
             false => as_planned,
         })
+    }
+
+    /// Replaces the path of the image of the environment in `settings` by its fingerprint: the image may be moved.
+    fn identify_environment(&self, settings: &mut [(String, String)]) -> Result<(), CliError> {
+        let path = self.environment_path();
+        let setting = settings
+            .iter_mut()
+            .find(|(key, _)| key == "environment.image");
+        if let (Some(path), Some((_, value))) = (path, setting) {
+            let found = Fingerprint::of_file(&path);
+            let found = found.map_err(|e| {
+                CliError::Other(format!("environment.image: {}: {e}", path.display()))
+            })?;
+            *value = format!("blake3 {}", found.blake3);
+        }
+        Ok(())
     }
 
     /// The frames that the job has: all of the sequence, or the one that is asked for if there is but one name.
@@ -239,9 +259,32 @@ impl Plan {
     /// The pictures, if there is one from everywhere the camera goes.
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, CliError> {
         let frames = sequence.frames().iter().map(|frame| frame.number);
-        let setup = resolve::setup(&self.manifest, survey);
+        let map = self.environment_image()?;
+        let setup = resolve::setup(&self.manifest, survey, map.as_ref());
         let setup = setup.and_then(|setup| check_views(&setup, frames).map(|()| setup));
         setup.map_err(|e| CliError::Other(e.to_string()))
+    }
+
+    /// The path of the image of the environment, if there is one.
+    fn environment_path(&self) -> Option<PathBuf> {
+        let path = self.manifest.environment.image.as_ref()?;
+        needs_environment_image(&self.manifest).then(|| self.dir.join(path))
+    }
+
+    fn environment_image(&self) -> Result<Option<RadianceMap>, CliError> {
+        let Some(path) = self.environment_path() else {
+            return Ok(None);
+        };
+        let map = read_radiance_map(&path)
+            .map_err(|e| CliError::Other(format!("environment.image: {e}")))?;
+        if map.negative() > 0 {
+            note!(
+                "{}: {} pixels are negative, which counts as 0",
+                path.display(),
+                map.negative()
+            );
+        }
+        Ok(Some(map))
     }
 
     /// The pictures, by what was found when the job began.

@@ -70,6 +70,8 @@ pub(super) enum Affects {
     Bodies,
     /// Spheres that reflect and refract.
     BranchingSpheres,
+    /// The path integrator.
+    PathTracing,
 }
 
 impl Affects {
@@ -82,6 +84,7 @@ impl Affects {
             Self::SmoothSurfaces => "smooth surfaces only",
             Self::Bodies => "unions and smooth surfaces only",
             Self::BranchingSpheres => "spheres that reflect and transmit only",
+            Self::PathTracing => "`integrator = \"path\"` only",
         }
     }
 }

@@ -9,7 +9,7 @@ use std::path::Path;
 
 use spherule_jobs::FrameRange;
 
-use crate::render::{MAX_LITERAL_DEPTH, RendererKind};
+use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
 use key::{Affects, Keys};
@@ -19,6 +19,7 @@ use tree::{Node, Place};
 
 mod camera;
 mod color;
+mod environment;
 mod file;
 mod flags;
 mod input;
@@ -49,6 +50,7 @@ mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
 pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
+pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
@@ -83,6 +85,8 @@ pub struct Manifest {
     pub surface: SurfaceSettings,
     /// The material of the particles.
     pub material: Material,
+    /// Light from infinitely far away.
+    pub environment: Environment,
     /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
     pub lights: Vec<Light>,
     /// The images.
@@ -122,6 +126,7 @@ impl Manifest {
             render: Render::default(),
             surface: SurfaceSettings::DEFAULT,
             material: Material::default(),
+            environment: Environment::default(),
             lights: Vec::new(),
             output: Output::default(),
             job: Work::default(),
@@ -198,6 +203,9 @@ impl Manifest {
             surface::all_keys(&mut self.surface, keys);
         });
         keys.section("material", material::ABOUT, |keys| self.material.keys(keys));
+        keys.section("environment", environment::ABOUT, |keys| {
+            self.environment.keys(keys);
+        });
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list(
@@ -242,6 +250,7 @@ impl Manifest {
             Affects::SmoothSurfaces => self.surface.kind == SurfaceKind::Smooth,
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
             Affects::BranchingSpheres => self.branches_at_spheres(),
+            Affects::PathTracing => self.render.integrator == IntegratorKind::Path,
         }
     }
 

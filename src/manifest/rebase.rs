@@ -24,6 +24,9 @@ impl Manifest {
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
         self.output.path = OutputPattern::parse(&output)?;
+        if let Some(path) = &mut self.environment.image {
+            *path = rebased(path, from, to)?;
+        }
         if let Some(path) = &mut self.job.stop_file {
             *path = rebased(path, from, to)?;
         }

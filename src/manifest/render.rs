@@ -6,7 +6,10 @@ use super::key::{Affects, section};
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::metrics::Bytes;
-use crate::render::{DEFAULT_MIN_WEIGHT, MAX_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS};
+use crate::render::{
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, IntegratorKind, MAX_BOUNCES, MAX_DEPTH, MAX_SAMPLES,
+    MAX_SIDE, MIN_WEIGHTS,
+};
 use crate::scene::{Background, ground};
 
 section! {
@@ -50,6 +53,14 @@ section! {
         /// References that the spatial splits of sbvh may add, per particle; 0 allows no spatial splits
         sbvh_budget: f32 = SbvhSettings::DEFAULT.budget, affects(Affects::Nothing),
             zero("no spatial splits"), from(*SbvhSettings::BUDGETS.start()), to(*SbvhSettings::BUDGETS.end());
+        /// Light transport: whitted | path (environment, interreflection)
+        ///
+        /// whitted is the model of the thesis: lights without extent, ambient light and highlights. path follows
+        /// diffusely reflected light as well, and is lit by the environment.
+        integrator: IntegratorKind = IntegratorKind::Whitted, flag("integrator", "NAME", "Look");
+        /// Diffuse reflections that light may take before its last one; 0 is direct light only
+        bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
+            flag("bounces", "COUNT", "Look");
         /// Reflections and refractions followed; 1 is direct light only
         max_depth: u32 = 3, from(1), to(MAX_DEPTH), flag("max-depth", "MAX_DEPTH", "Look");
         /// Transmissive spheres: path weight below which one of two branches is followed; 0 follows both
@@ -72,6 +83,8 @@ section! {
             flag("memory-limit", "SIZE", "Job");
     }
 }
+
+named!(IntegratorKind: Whitted = "whitted", Path = "path");
 
 impl Named for Structure {
     fn names() -> Vec<(Self, &'static str)> {

@@ -20,6 +20,7 @@ use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predic
 use crate::metrics::Bytes;
 use crate::output::PackBuffers;
 use crate::render::{Film, scratch_bytes};
+use crate::scene::Environment;
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
 
@@ -361,13 +362,15 @@ impl<'a> MemoryModel<'a> {
         let film_kept = if before > 1 { film } else { 0 };
         let encoding_before = if before > 0 { self.encoding() } else { 0 };
         let shared = if frame.is_shared { frame.content } else { 0 };
+        let environment = self.setup.picture.scene.environment.as_deref();
+        let environment = environment.map_or(0, Environment::byte_len);
         // Count the threads, including those for reading
         let has_read_pool = [Some(frame), after]
             .into_iter()
             .flatten()
             .any(FrameSize::needs_many);
         let idle = MemoryNeed {
-            program: PROGRAM + THREAD * threads * if has_read_pool { 2 } else { 1 },
+            program: PROGRAM + environment + THREAD * threads * if has_read_pool { 2 } else { 1 },
             reading: shared.max(self.retained(frame)),
             ..MemoryNeed::default()
         };

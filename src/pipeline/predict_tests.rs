@@ -25,7 +25,7 @@ fn setup() -> Setup {
     let sequence = Sequence::open(&input).expect("a frame");
     let question = crate::resolve::question(&manifest);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    crate::resolve::setup(&manifest, &survey).expect("pictures")
+    crate::resolve::setup(&manifest, &survey, None).expect("pictures")
 }
 
 #[test]

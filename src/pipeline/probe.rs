@@ -297,7 +297,7 @@ mod tests {
         let manifest = crate::manifest::Manifest::new("in");
         let question = crate::resolve::question(&manifest);
         let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-        let setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
+        let setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
         let task = ImageTask {
             frame: 1,
             index: 0,

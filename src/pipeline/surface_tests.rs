@@ -34,7 +34,7 @@ fn opened(file: &Path) -> (Setup, Sequence) {
     let sequence = Sequence::open(&SequenceInput::from_path(file)).expect("a frame");
     let question = crate::resolve::question(&manifest);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    let mut setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
+    let mut setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
     setup.picture.render.width = 48;
     setup.picture.render.height = 27;
     setup.picture.render.samples = 1;

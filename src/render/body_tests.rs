@@ -46,6 +46,8 @@ fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
         material,
         background: Background::Constant(Vec3::ONE),
         ground: None,
+        environment: None,
+        is_environment_visible: false,
     }
 }
 

@@ -59,6 +59,8 @@ fn glass_scene() -> Scene {
             up: Vec3::new(0.6, 0.0, 0.8),
         },
         ground: None,
+        environment: None,
+        is_environment_visible: false,
     }
 }
 

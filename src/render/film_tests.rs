@@ -63,6 +63,8 @@ fn scene(has_ground: bool) -> Scene {
         material: Material::DEFAULT,
         background: Background::default_for(Vec3::Z),
         ground: has_ground.then(|| Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+        environment: None,
+        is_environment_visible: false,
     }
 }
 

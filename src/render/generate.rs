@@ -63,6 +63,8 @@ impl RenderContext<'_> {
         segments.rays.set_len(len);
         // Initialise their path state
         segments.throughput = [splat(1.0); 3];
+        segments.pdf = splat(f32::INFINITY);
+        segments.bounces = [0; LANES];
         #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
         let sample = std::array::from_fn(|lane| (first + lane) as u32);
         segments.sample = sample;

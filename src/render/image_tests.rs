@@ -48,6 +48,8 @@ fn heap_scene(transmission: f32) -> Scene {
         },
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+        environment: None,
+        is_environment_visible: false,
     }
 }
 

@@ -10,10 +10,12 @@
 use std::ops::Range;
 
 use super::{
-    context::RenderContext,
+    context::{Interior, RenderContext},
     film::FilmTile,
     ray_counts::RayCounts,
+    roulette::SplitRule,
     scratch::{GROUP, PacketScratch, Scratch, batch_len},
+    settings::{IntegratorKind, RenderSettings},
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
     tile::pixels_of,
@@ -26,7 +28,15 @@ pub(super) trait Integrator: Sync {
     fn context(&self) -> &RenderContext<'_>;
 
     /// Maximum number of path segments of one sample at any depth.
-    fn max_paths(&self) -> usize;
+    fn max_paths(&self) -> usize {
+        let context = self.context();
+        max_paths(context.settings, context.interior)
+    }
+
+    /// Maximum number of path segments one after the other.
+    fn max_depth(&self) -> u32 {
+        max_depth(self.context().settings)
+    }
 
     /// Whether paths use random numbers, so that segments need a [`PathSeed`](super::sampler::PathSeed).
     fn is_stochastic(&self) -> bool;
@@ -65,6 +75,20 @@ pub(super) trait Integrator: Sync {
     }
 }
 
+/// Maximum number of path segments of one sample at any depth.
+pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize {
+    SplitRule::new(settings, interior).max_paths(max_depth(settings))
+}
+
+/// Maximum number of path segments one after the other: reflections and refractions, and diffuse reflections with the
+/// last segment to the environment.
+pub(super) fn max_depth(settings: &RenderSettings) -> u32 {
+    match settings.integrator {
+        IntegratorKind::Whitted => settings.max_depth,
+        IntegratorKind::Path => settings.max_depth + settings.bounces + 1,
+    }
+}
+
 /// Traces all samples of a group, batch by batch.
 fn trace_group<I: Integrator + ?Sized>(
     integrator: &I,
@@ -80,7 +104,7 @@ fn trace_group<I: Integrator + ?Sized>(
         scratch.next.clear();
         trace_camera_rays(integrator, first..packets.min(first + step), stop, scratch)?;
         // Trace depth by depth, until no rays are left
-        for depth in 2..=context.settings.max_depth {
+        for depth in 2..=integrator.max_depth() {
             std::mem::swap(&mut scratch.current, &mut scratch.next);
             if scratch.current.is_empty() {
                 break;

@@ -19,6 +19,7 @@ mod aov;
 mod attributes;
 #[cfg(test)]
 pub(crate) mod brute;
+mod bsdf;
 mod context;
 mod film;
 mod film_rows;
@@ -27,6 +28,7 @@ mod integrator;
 mod intersect;
 mod lights;
 mod materials;
+mod path;
 mod ray_counts;
 mod roulette;
 mod sampler;
@@ -34,6 +36,7 @@ mod scratch;
 mod settings;
 mod shading;
 mod source;
+mod specular;
 mod stop;
 mod stream;
 mod tile;
@@ -47,6 +50,8 @@ mod branch_tests;
 #[cfg(test)]
 mod image_tests;
 #[cfg(test)]
+mod path_tests;
+#[cfg(test)]
 mod poison_tests;
 #[cfg(test)]
 pub(crate) mod solid;
@@ -59,8 +64,8 @@ pub use film_rows::FilmRows;
 pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, MultiJitter, PathSeed};
 pub use settings::{
-    DEFAULT_MIN_WEIGHT, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
-    RenderError, RenderSettings,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, IntegratorKind, MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH,
+    MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError, RenderSettings,
 };
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
@@ -68,6 +73,7 @@ pub use stop::{Deadline, Stop};
 
 use context::{Interior, RenderContext};
 use integrator::Integrator;
+use path::PathIntegrator;
 use whitted::WhittedIntegrator;
 
 /// The available renderers. Images depend on the renderer.
@@ -90,8 +96,9 @@ impl RendererKind {
 /// Upper bound of the memory that each thread needs during rendering, without the film, in bytes. `is_body`: the
 /// particles form one connected body.
 pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bool) -> u64 {
-    let max_paths = whitted::max_paths(settings, Interior::of(material, is_body));
-    scratch::scratch_bytes(settings, max_paths)
+    let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
+    let max_depth = integrator::max_depth(settings);
+    scratch::scratch_bytes(settings.samples, max_depth, max_paths)
 }
 
 /// Renders one image on the current rayon pool.
@@ -139,7 +146,10 @@ pub fn render_into(
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();
     let context = RenderContext::new(shapes, scene, source, settings);
-    let integrator: &dyn Integrator = &WhittedIntegrator::new(context);
+    let integrator: Box<dyn Integrator> = match settings.integrator {
+        IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
+        IntegratorKind::Path => Box::new(PathIntegrator::new(context)),
+    };
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image

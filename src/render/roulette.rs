@@ -27,9 +27,14 @@ const FIRST_CHANCE: f32 = 2.0;
 /// Continuations of a path.
 pub(super) const REFLECTED: u32 = 0;
 pub(super) const REFRACTED: u32 = 1;
+pub(super) const BOUNCED: u32 = 2;
 
-/// The dimension of a path for the choice between rays.
+/// Dimensions of a path at one vertex: the choice between specular rays, the continuation of a long path, the
+/// direction of a diffuse reflection, and a direction towards the environment.
 const BRANCH: u32 = 0;
+pub(super) const CONTINUATION: u32 = 1;
+pub(super) const BSDF: u32 = 2;
+pub(super) const ENVIRONMENT: u32 = 3;
 
 /// Decides from which path weight both rays are traced.
 #[derive(Debug, Clone, Copy)]

@@ -3,11 +3,11 @@
 
 use super::{
     aov::DataSample,
+    bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
     lights::LightSamples,
     materials::ShadingPoints,
     ray_counts::RayCounts,
     sampler::PathSeed,
-    settings::RenderSettings,
     stream::{RayStreams, SegmentPacket},
     tile::SIDE,
 };
@@ -66,6 +66,10 @@ pub(super) struct PacketScratch {
     /// Base colours of the surfaces.
     pub(super) base: Lanes3,
     pub(super) points: ShadingPoints,
+    /// Points on opaque surfaces, for path tracing.
+    pub(super) surface: SurfacePoints,
+    pub(super) bsdf: BsdfValues,
+    pub(super) bounce: BsdfSamples,
     pub(super) light: LightSamples,
     /// Intersections of shadow rays with transmissive surfaces.
     pub(super) crossings: Intersections,
@@ -143,10 +147,11 @@ pub(super) fn batch_len(segments: usize, max_paths: usize) -> usize {
 }
 
 /// Bytes of the [`Scratch`] of one thread, rounded up, if each sample has up to `max_paths` path segments at one depth.
-pub(super) fn scratch_bytes(settings: &RenderSettings, max_paths: usize) -> u64 {
-    let tile = (SIDE * SIDE) as usize * settings.samples as usize;
-    let sample_count = tile.min(GROUP.max(settings.samples) as usize);
-    let rays = match settings.max_depth {
+/// `samples` is the number per pixel.
+pub(super) fn scratch_bytes(samples: u32, max_depth: u32, max_paths: usize) -> u64 {
+    let tile = (SIDE * SIDE) as usize * samples as usize;
+    let sample_count = tile.min(GROUP.max(samples) as usize);
+    let rays = match max_depth {
         1 => 0,
         _ => batch_len(SEGMENTS, max_paths).min(sample_count) * max_paths,
     };

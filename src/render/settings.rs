@@ -21,8 +21,24 @@ pub const DEFAULT_MIN_WEIGHT: f32 = 1.0 / 1024.0;
 /// Valid path weights apart from 0. A sample has at most `1 / min_weight` paths.
 pub const MIN_WEIGHTS: std::ops::RangeInclusive<f32> = 1e-5..=1.0;
 
+/// Maximum number of diffuse reflections of a path.
+pub const MAX_BOUNCES: u32 = 1000;
+
+/// Default number of diffuse reflections of a path. Russian roulette ends most paths earlier.
+pub const DEFAULT_BOUNCES: u32 = 6;
+
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 65_536;
+
+/// Methods to compute the radiance along rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum IntegratorKind {
+    /// Whitted ray tracing: ambient light, lights without extent, and specular rays.
+    #[default]
+    Whitted,
+    /// Path tracing: light of the environment, and light that diffuse surfaces reflect.
+    Path,
+}
 
 /// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,6 +49,10 @@ pub struct RenderSettings {
     pub height: u32,
     /// Samples per pixel; a single one is exactly at the centre of the pixel.
     pub samples: u32,
+    /// The light transport.
+    pub integrator: IntegratorKind,
+    /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
+    pub bounces: u32,
     /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
     /// beyond the last level see the background.
     pub max_depth: u32,
@@ -52,12 +72,14 @@ pub struct RenderSettings {
 }
 
 impl RenderSettings {
-    /// Depth 3 as in the thesis, one sample per pixel, colour only.
+    /// Whitted ray tracing with depth 3 as in the thesis, one sample per pixel, colour only.
     pub const fn new(width: u32, height: u32) -> Self {
         Self {
             width,
             height,
             samples: 1,
+            integrator: IntegratorKind::Whitted,
+            bounces: DEFAULT_BOUNCES,
             max_depth: 3,
             min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,
@@ -84,6 +106,9 @@ impl RenderSettings {
             if !(1..=max).contains(&value) {
                 return Err(RenderError::OutOfRange { name, value, max });
             }
+        }
+        if self.bounces > MAX_BOUNCES {
+            return Err(RenderError::TooManyBounces(self.bounces));
         }
         if self.min_weight != 0.0 && !MIN_WEIGHTS.contains(&self.min_weight) {
             return Err(RenderError::MinWeight(self.min_weight));
@@ -117,6 +142,9 @@ pub enum RenderError {
         /// Its maximum.
         max: u32,
     },
+    /// `bounces` is out of range.
+    #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
+    TooManyBounces(u32),
     /// `min_weight` is out of range.
     #[error("min_weight = {0} is out of range, it must be 0 or lie in {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
     MinWeight(f32),

@@ -1,5 +1,6 @@
 //! Streams of path segments, in packets of 16.
 
+use super::roulette::BOUNCED;
 use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
@@ -12,6 +13,11 @@ const GROWTH: usize = 32;
 #[repr(C, align(64))]
 pub(super) struct SegmentPacket {
     pub(super) rays: RayPacket,
+    /// Probability density with which the direction of each ray was sampled, per steradian; infinite for camera rays
+    /// and specular rays.
+    pub(super) pdf: Lanes,
+    /// Number of diffuse reflections of the path before each ray.
+    pub(super) bounces: [u32; LANES],
     /// Path throughput from the sample to the origin of each ray, linear RGB.
     pub(super) throughput: Lanes3,
     /// The sample that each ray belongs to, within its batch.
@@ -26,6 +32,8 @@ impl Default for SegmentPacket {
     fn default() -> Self {
         Self {
             rays: RayPacket::default(),
+            pdf: splat(f32::INFINITY),
+            bounces: [0; LANES],
             throughput: [splat(1.0); 3],
             sample: [0; LANES],
             path: [PathSeed::default(); LANES],
@@ -43,7 +51,7 @@ impl SegmentPacket {
 }
 
 /// Rays that leave the surfaces of a packet, one per lane.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct ScatteredRays {
     pub(super) origin: Lanes3,
@@ -52,6 +60,20 @@ pub(super) struct ScatteredRays {
     pub(super) weight: Lanes,
     /// The weight times the throughput of the packet.
     pub(super) throughput: Lanes3,
+    /// Probability density of each direction, per steradian; infinite for specular rays.
+    pub(super) pdf: Lanes,
+}
+
+impl Default for ScatteredRays {
+    fn default() -> Self {
+        Self {
+            origin: [splat(0.0); 3],
+            direction: [splat(0.0); 3],
+            weight: splat(0.0),
+            throughput: [splat(0.0); 3],
+            pdf: splat(f32::INFINITY),
+        }
+    }
 }
 
 /// Path segments of one depth, stored without gaps. Its memory is kept when it is cleared.
@@ -83,7 +105,8 @@ impl RayStream {
     }
 
     /// Appends the rays in `lanes`, in order, which leave the intersections of `parents`; those in `inside` start
-    /// inside a connected body. They are continuation `branch` of the paths.
+    /// inside a connected body. They are continuation `branch` of the paths; one that is [`BOUNCED`] counts as a
+    /// diffuse reflection.
     pub(super) fn push(
         &mut self,
         lanes: u32,
@@ -113,6 +136,8 @@ impl RayStream {
                 segment.rays.direction[axis][to] = rays.direction[axis][lane];
                 segment.throughput[axis][to] = rays.throughput[axis][lane];
             }
+            segment.pdf[to] = rays.pdf[lane];
+            segment.bounces[to] = parents.bounces[lane] + u32::from(branch == BOUNCED);
             segment.sample[to] = parents.sample[lane];
             segment.path[to] = parents.path[lane].child(branch);
             segment.inside |= (inside >> lane & 1) << to;

@@ -40,13 +40,9 @@ impl RenderContext<'_> {
         let coherence = Self::coherence(depth);
 
         // Trace opaque shapes first: occluded rays need no further tests
-        for shape in &self.shapes {
-            let is_opaque =
-                self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES;
-            if is_opaque && samples.lanes != 0 {
-                samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
-            }
-        }
+        self.occlude(coherence, samples, |shape| {
+            self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
+        });
         let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
             return samples.lanes;
         };
@@ -80,6 +76,34 @@ impl RenderContext<'_> {
             &mut samples.radiance,
         );
         reached
+    }
+
+    /// Traces shadow rays that no shape lets through, not even a transmissive one. Returns the lanes that arrive.
+    pub(super) fn unoccluded(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        samples: &mut LightSamples,
+        counts: &mut RayCounts,
+    ) -> u32 {
+        samples.rays.set_len(segments.rays.len());
+        counts.shadow += u64::from(samples.lanes.count_ones());
+        self.occlude(Self::coherence(depth), samples, |_| true);
+        samples.lanes
+    }
+
+    /// Removes the lanes of `samples` that shapes for which `is_opaque` occlude.
+    fn occlude(
+        &self,
+        coherence: Coherence,
+        samples: &mut LightSamples,
+        is_opaque: impl Fn(&dyn Shape) -> bool,
+    ) {
+        for shape in &self.shapes {
+            if samples.lanes != 0 && is_opaque(*shape) {
+                samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
+            }
+        }
     }
 
     /// The transmittance of spheres that are separate bodies. Returns the lanes in which it is not 0.

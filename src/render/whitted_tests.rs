@@ -30,6 +30,8 @@ fn scene(material: Material) -> Scene {
         material,
         background: Background::Constant(Vec3::ONE),
         ground: None,
+        environment: None,
+        is_environment_visible: false,
     }
 }
 

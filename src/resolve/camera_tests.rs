@@ -38,7 +38,7 @@ fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveErr
     (manifest.image.width, manifest.image.height) = (64, 36);
     manifest.output.transparent = true;
     change(&mut manifest.camera);
-    super::super::setup(&manifest, &survey())
+    super::super::setup(&manifest, &survey(), None)
 }
 
 fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {

@@ -83,6 +83,8 @@ impl Stage {
             material: Material::DEFAULT,
             background: Background::default_for(up.as_vec3()),
             ground: None,
+            environment: None,
+            is_environment_visible: false,
         })
     }
 }

@@ -242,7 +242,7 @@ pub(super) fn min_distance(bounds: &Bounds) -> f64 {
 }
 
 /// View direction of a camera at `azimuth` and `elevation` (degrees) about `up`.
-pub(super) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
+pub(crate) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
     // The up direction is undefined for a view straight down; one degree makes no visible difference.
     let elevation = elevation.clamp(-89.0, 89.0).to_radians();
     let azimuth = azimuth.to_radians();

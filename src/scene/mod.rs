@@ -4,6 +4,8 @@
 //! Coordinates are in scene units relative to [`Scene::origin`] (see DESIGN section 4), so that f32 is sufficient
 //! wherever the domain of the simulation is. Colours are linear RGB.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -80,6 +82,10 @@ pub struct Scene {
     pub background: Background,
     /// Optional ground.
     pub ground: Option<Ground>,
+    /// Light from infinitely far away, for path tracing.
+    pub environment: Option<Arc<Environment>>,
+    /// Whether camera rays without an intersection see the environment instead of the background.
+    pub is_environment_visible: bool,
 }
 
 #[cfg(test)]

@@ -123,7 +123,8 @@ fn look_at(plan: &Plan) {
     let Ok(survey) = serde_json::from_value::<Survey>(plan.resolved().clone()) else {
         return;
     };
-    let _ = setup(&Manifest::new("in"), &survey).map(|setup| check_views(&setup, numbers).is_ok());
+    let _ = setup(&Manifest::new("in"), &survey, None)
+        .map(|setup| check_views(&setup, numbers).is_ok());
     let _ = Conversion::new(conversion(), &survey);
 }
 

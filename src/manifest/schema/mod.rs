@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::list::{Entries, Entry};
-use super::{ABOUT, Manifest, camera, work};
+use super::{ABOUT, Manifest, camera, environment, work};
 
 #[cfg(test)]
 mod tests;
@@ -22,6 +22,7 @@ pub fn job_schema() -> Value {
         let mut table = table(&entries, section);
         match section {
             "camera" => table["allOf"] = camera::conditions(),
+            "environment" => table["allOf"] = environment::conditions(),
             "job" => table["allOf"] = work::conditions(),
             _ => {}
         }
@@ -96,9 +97,9 @@ fn table(entries: &Entries, section: &str) -> Value {
 }
 
 fn property(entry: &Entry) -> Value {
-    // The type of an item determines its keys.
+    // The type of an item of a list determines its keys.
     let mut schema = match entry.name() {
-        "type" => json!({ "const": json_of(entry.sample()) }),
+        "type" if entry.section.contains('.') => json!({ "const": json_of(entry.sample()) }),
         _ => entry.schema.clone(),
     };
     schema["description"] = json!(entry.comment());

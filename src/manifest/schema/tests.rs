@@ -14,10 +14,11 @@ mod values;
 const EVERYTHING: &str = r#"
 input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
-render = { surface = "smooth", ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
+render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true }
 material = { color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }]
+environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
 job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
 "#;
@@ -81,7 +82,7 @@ fn what_the_program_writes_is_valid() {
 }
 
 /// Every table of the schema with a manifest that has it open at the end, so that a line goes into it.
-const TABLES: [(&str, &str); 15] = [
+const TABLES: [(&str, &str); 16] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -101,6 +102,7 @@ const TABLES: [(&str, &str); 15] = [
         "/properties/light/items/oneOf/1",
         "[[light]]\ntype = \"directional\"\n",
     ),
+    ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),
     (

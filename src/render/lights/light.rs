@@ -1,6 +1,6 @@
 //! The interface between lights and integrators.
 
-use crate::math::{Lanes3, Supported};
+use crate::math::{Lanes, Lanes3, Supported};
 use crate::ray::RayPacket;
 
 /// A light.
@@ -21,6 +21,9 @@ pub(in crate::render) struct LightSamples {
     /// Radiance that arrives along each ray; after `Material::reflect`, the radiance that arrives at the sample of
     /// the image.
     pub(in crate::render) radiance: Lanes3,
+    /// Probability density of each direction, per steradian; infinite for lights without extent. Only used by path
+    /// tracing.
+    pub(in crate::render) pdf: Lanes,
     /// Lanes that the light reaches.
     pub(in crate::render) lanes: u32,
 }

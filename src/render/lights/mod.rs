@@ -5,10 +5,12 @@
 use crate::scene::{self, LightKind};
 
 mod directional;
+mod environment;
 mod light;
 mod point;
 
 use directional::DirectionalLight;
+pub(super) use environment::{environment_along, sample_environment};
 pub(super) use light::{Light, LightSamples};
 use point::PointLight;
 

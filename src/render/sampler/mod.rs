@@ -9,3 +9,4 @@ mod sobol;
 pub use film::FilmSampler;
 pub use multi_jitter::MultiJitter;
 pub use sobol::PathSeed;
+pub(super) use sobol::{get_1d_lanes, get_2d_lanes};

@@ -87,6 +87,8 @@ impl Shot {
                 material: MATT,
                 background: Background::Constant(Vec3::new(0.02, 0.03, 0.05)),
                 ground: None,
+                environment: None,
+                is_environment_visible: false,
             },
             settings: RenderSettings {
                 samples: 4,
