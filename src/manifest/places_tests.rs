@@ -1,17 +1,17 @@
-//! That whatever is wrong with a manifest is told with line, column and the nearest known key.
+//! Messages about invalid manifests: each names line, column and the nearest known key.
 
 use std::path::Path;
 
 use super::*;
 
-/// `text` must give exactly one message, which is `wanted` after the file's name.
+/// Checks that `text` gives exactly one message: the file's name, followed by `wanted`.
 #[track_caller]
 fn told(text: &str, wanted: &str) {
     let error = Manifest::parse(text, Path::new("job.toml")).unwrap_err();
     assert_eq!(error.messages(), [format!("job.toml: {wanted}")]);
 }
 
-/// The same for what follows a good beginning of two lines.
+/// Same as [`told`], with two valid lines in front of `text`.
 #[track_caller]
 fn told_below(text: &str, wanted: &str) {
     told(&format!("[input]\npath = \"ä\"\n{text}"), wanted);

@@ -125,7 +125,7 @@ mod tests {
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
         assert!(mixed.render.ground);
-        // What is wrong there is told once, by its own place.
+        // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
         let error = Manifest::parse_with(wrong, Path::new("job.toml"), Look::Water.settings());
         let error = error.unwrap_err();

@@ -5,7 +5,7 @@ use super::*;
 use crate::output::Compression;
 use crate::scene::{Background, Falloff};
 
-/// The example of the design, as users find it in the documentation.
+/// The example in the design, which is also in the user documentation.
 const EXAMPLE: &str = r#"
 [input]
 path = "ParticleData_Fluid_#.vtk"   # a directory, a pattern, or a list of files
@@ -67,7 +67,7 @@ fn with_sets(sets: &[&str]) -> Result<Manifest, ManifestError> {
     Manifest::parse_with(EXAMPLE, path(), sets)
 }
 
-/// `section` added to a good manifest must be refused with exactly one message, which has all of
+/// Checks that a valid manifest with `section` appended is rejected with exactly one message, which contains all
 /// `parts`.
 #[track_caller]
 fn refused(section: &str, parts: &[&str]) {
@@ -357,7 +357,7 @@ fn input_is_checked() {
     assert_eq!(*manifest.input.path, ["a", "b"]);
     assert_eq!(manifest.input.frames, Some("7".parse().unwrap()));
     assert_eq!(manifest.input.radius, RadiusSetting::Length(2.0));
-    // Which of the frames 1-3 there are is known only with the sequence.
+    // Which of the frames 1-3 exist is unknown without the sequence.
     for range in ["3", "1-3"] {
         let text =
             format!("input = {{ path = \"a\", frames = \"{range}\" }}\noutput.path = \"a.exr\"");
@@ -557,7 +557,7 @@ fn commented_file_reads_back_and_shows_every_key() {
         assert!(text.contains(&format!("{name} = ")), "{key}\n{text}");
     }
     assert_eq!(parse(&parse(EXAMPLE).to_commented_toml()), parse(EXAMPLE));
-    // What is shown as a comment must be right too.
+    // Check that the keys in comments are valid too
     let uncommented: String = text
         .lines()
         .map(|l| {

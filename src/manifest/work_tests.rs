@@ -1,11 +1,11 @@
-//! `[job]`, and that every key can be given by `--set`.
+//! The table `[job]`, and every key as an argument of `--set`.
 
 use std::path::Path;
 use std::time::Duration;
 
 use super::*;
 
-/// Keys of `[job]` with a value that is not the default, and what that needs.
+/// Keys of `[job]`, each with a value other than the default, and with the settings that it requires.
 const OTHERS: [(&str, &str); 11] = [
     ("threads=3", ""),
     ("progress=json", ""),
@@ -104,7 +104,7 @@ fn any_time_is_a_duration() {
     }
 }
 
-/// The manifest that all keys are tried on: what some of them need is there.
+/// Keys that require other keys, and these keys with values.
 const NEEDS: [(&str, &[&str]); 3] = [
     ("camera.eye", &["camera.look_at=[1,2,3]"]),
     (
@@ -126,7 +126,7 @@ fn every_key_can_be_set() {
         let all = manifest.entries();
         let found = all.list().iter().find(|e| e.key == *key).unwrap();
         assert_eq!(found.value.as_deref(), Some(value), "{set}");
-        // What is set can be laid over by another value, so it did not pass unread.
+        // The reader checks the key: it rejects a table with an unknown key.
         let error = with(&[&format!("{key}={{ no_such = 1 }}")]).unwrap_err();
         assert!(error.to_string().contains(key), "{error}");
     }

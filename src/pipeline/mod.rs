@@ -201,7 +201,7 @@ struct ReadStage<'a> {
 }
 
 impl ReadStage<'_> {
-    /// The neighbouring stages end when this one does, because it owns its ends of all channels.
+    /// Reads frame after frame, on the thread of the first stage.
     fn run(&self, mut queue: Queue) -> Result<(), JobError> {
         let mut reported = ReportedNotes::default();
         let mut on_news = |news: QueueNews| (self.watch)(Event::Others(news));
@@ -291,7 +291,7 @@ struct TraceStage<'a> {
 }
 
 impl TraceStage<'_> {
-    /// Its neighbours end when it does: it owns its ends of all channels.
+    /// The neighbouring stages end when this one does, because it owns its ends of all channels.
     fn run(
         &self,
         loaded: Receiver<ClaimedFrame<LoadedFrame>>,

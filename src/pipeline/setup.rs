@@ -45,7 +45,7 @@ pub enum ColorRule {
         name: String,
         /// The map with the range of the whole sequence.
         map: ColorMap,
-        /// Whether it was asked for by name, so that a frame without it is an error. Otherwise such
+        /// Whether the user named it, so that a frame without it is an error. Otherwise such
         /// a frame has the default colour.
         required: bool,
     },

@@ -114,7 +114,7 @@ mod tests {
         assert!(rays[0].reflection > 0);
     }
 
-    /// The cell of the same particles in a native frame.
+    /// Measures the same cell in a native frame.
     fn in_place(request: &CellRequest, representation: Representation) -> CellMeasurement {
         let request = CellRequest {
             representation,
@@ -146,7 +146,7 @@ mod tests {
                 assert!(coded.rays.shadow.abs_diff(memory.rays.shadow) <= near);
                 assert!(coded.bytes.positions <= exact.bytes.positions);
                 assert_eq!(coded.bytes.file.positions, coded.bytes.positions);
-                // All that lies in memory is what was built above the stored nodes.
+                // Only the levels built above the stored nodes are in memory.
                 let built = coded.bytes.structure - coded.bytes.file.structure;
                 assert_eq!(coded.bytes.anonymous(), built);
             }

@@ -230,7 +230,7 @@ mod tests {
         };
         assert_eq!(chosen(1), chosen(1));
         assert_ne!(chosen(1), chosen(2));
-        // A tenth of the first half: 5000, standard deviation about 47.
+        // Expected in the first half: 5000, with a standard deviation of about 47.
         let first_half = chosen(1).iter().filter(|i| **i < 50_000).count();
         assert!((4700..5300).contains(&first_half), "{first_half}");
     }

@@ -1,4 +1,4 @@
-//! Reports of awkward jobs.
+//! Reports of unusual jobs.
 
 use serde_json::json;
 
