@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::math::SimdLevel;
+use crate::accel::simd::tested_levels::tested_levels;
 use crate::surface::SurfaceKind;
 
 const RADIUS: f32 = 0.5;
@@ -454,7 +454,7 @@ fn packets(count: usize) -> Vec<(RayPacket, u32)> {
 fn packets_find_what_single_rays_find() {
     let (_, centers) = bodies().remove(3);
     let grid = grid(&centers, &settings(0.75, false));
-    for level in SimdLevel::ALL {
+    for level in tested_levels() {
         let surface = SmoothSurface {
             built: &grid.built,
             simd: Supported::or_best(level),
