@@ -28,6 +28,7 @@ mod predict;
 mod preset;
 mod report;
 mod sbvh;
+mod settings;
 pub mod simd;
 pub mod stored;
 mod topology;
@@ -40,14 +41,14 @@ mod walk;
 pub mod wide;
 mod widen;
 
-pub use builder::{BuildSettings, Structure, TreeBuilder};
-pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
+pub use builder::TreeBuilder;
 pub use choose::choose;
 pub use hits::{Coherence, TreeHits};
 pub use predict::{BuildBytes, predicted_bytes, predicted_stored_bytes};
+pub use preset::BvhPreset;
 pub(crate) use report::PhaseClock;
 pub use report::{BuildReport, Phase};
-pub use sbvh::SbvhSettings;
+pub use settings::{BuildSettings, BvhLeaves, BvhSettings, SbvhSettings, Structure};
 pub use spherule_formats::blocks::Aabb;
 
 /// Index of a particle in the frame that was built over.

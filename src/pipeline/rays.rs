@@ -1,14 +1,14 @@
 //! How many rays an image will take, before it is traced: enough to choose a tree by.
 
-use super::Setup;
+use crate::render::RenderSettings;
+use crate::scene::Scene;
 
 /// Part of the rays that is taken to meet a particle; in the thesis's picture it is 0.3 of the
 /// primary and 0.6 of the mirrored rays.
 const HIT_PART: f64 = 0.4;
 
 /// Rays of one image.
-pub(super) fn expected_rays(setup: &Setup) -> f64 {
-    let (image, scene) = (&setup.picture.render, &setup.picture.scene);
+pub(super) fn expected_rays(image: &RenderSettings, scene: &Scene) -> f64 {
     let paths = f64::from(image.width) * f64::from(image.height) * f64::from(image.samples);
     let material = &scene.material;
     let branches = [material.reflection, material.transmission]

@@ -14,8 +14,6 @@
 //! The price is 2 s of one core a million particles (4.5 s where many are cut), 40 to 70 times
 //! `lbvh`, and half as much memory again, or more than twice where many are cut.
 
-use std::ops::RangeInclusive;
-
 use rayon::prelude::*;
 
 use super::binary::{BinaryNode, BinaryTree};
@@ -39,34 +37,6 @@ mod spatial;
 mod split;
 mod sweep;
 mod unsplit;
-
-/// What `sbvh` may be told.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SbvhSettings {
-    /// A spatial split is looked for where the sides of the best object split overlap by more than
-    /// this part of the whole scene's surface area.
-    pub alpha: f32,
-    /// References that spatial splits may add, as a part of the particles; 0 for no such splits.
-    pub budget: f32,
-}
-
-impl SbvhSettings {
-    /// The paper's alpha; at most as many references again as there are particles.
-    pub const DEFAULT: Self = Self {
-        alpha: 1e-5,
-        budget: 1.0,
-    };
-    /// Areas of which the overlap may be measured as a part.
-    pub const ALPHAS: RangeInclusive<f32> = 0.0..=1.0;
-    /// More than the largest is memory that nothing is gained for.
-    pub const BUDGETS: RangeInclusive<f32> = 0.0..=8.0;
-}
-
-impl Default for SbvhSettings {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
 
 /// References that one thread takes at a time of a set that all work on. Fixed, so that results do
 /// not depend on the number of threads.
