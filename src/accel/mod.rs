@@ -46,14 +46,9 @@ pub use choose::choose;
 pub use hits::{Coherence, TreeHits};
 pub use predict::{BuildBytes, predicted_bytes, predicted_stored_bytes};
 pub use preset::BvhPreset;
-pub(crate) use report::PhaseClock;
 pub use report::{BuildReport, Phase};
 pub use settings::{BuildSettings, BvhLeaves, BvhSettings, SbvhSettings, Structure};
 pub use spherule_formats::blocks::Aabb;
-
-/// Index of a particle in the frame that was built over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct PrimIdx(pub u32);
 
 /// Radii of the spheres of a frame, scene units.
 #[derive(Debug, Clone, Copy)]

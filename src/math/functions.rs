@@ -1,11 +1,11 @@
 //! Elementary functions in single precision, without the C library and without branches, so that loops over lanes
 //! vectorise and every platform gives the same bits.
 //!
-//! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`, `sinf`, `cosf`;
+//! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`;
 //! "Methods and Programs for Mathematical Functions", 1989). The errors stated were measured against double precision
 //! by the tests of this file.
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, LN_2, LOG2_E, PI};
+use std::f32::consts::{FRAC_PI_2, LOG2_E};
 
 /// Adding and subtracting it rounds a number of magnitude under 2^22 to a whole one, ties to even.
 const ROUND: f32 = 12_582_912.0;
@@ -72,12 +72,6 @@ pub fn log2(x: f32) -> f32 {
     (rest * LOG2_E + f * (LOG2_E - 1.0)) + f + e as f32
 }
 
-/// The natural logarithm; see [`log2`].
-#[inline(always)]
-pub fn ln(x: f32) -> f32 {
-    log2(x) * LN_2
-}
-
 /// `x^y` for `x` in 0..=1 and `y` from 0 to 1e4, relative error below 2e-7 + 2e-7 y |log2 x|. Below 1e-30 `x` counts
 /// as 0, and `0^0` is 1.
 #[inline(always)]
@@ -105,49 +99,6 @@ pub fn asin(x: f32) -> f32 {
     let r = s + s * z * p;
     let r = if is_large { FRAC_PI_2 - 2.0 * r } else { r };
     r.copysign(x)
-}
-
-/// The arc cosine of a number in -1..=1, absolute error below 4e-7.
-#[inline(always)]
-pub fn acos(x: f32) -> f32 {
-    let a = x.abs();
-    let is_large = a > 0.5;
-    let small = FRAC_PI_2 - asin(x);
-    let s = asin((0.5 * (1.0 - a)).sqrt());
-    let large = if x < 0.0 { PI - 2.0 * s } else { 2.0 * s };
-    if is_large { large } else { small }
-}
-
-/// Sine and cosine of an angle of magnitude up to 8192 radians, absolute error below 2e-7.
-#[inline(always)]
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "quadrants are counted in few bits"
-)]
-pub fn sin_cos(x: f32) -> (f32, f32) {
-    // x = quadrant * pi/2 + r with |r| <= pi/4; pi/2 in three parts (Cody and Waite).
-    let quadrant = (x * (2.0 * FRAC_1_PI) + ROUND) - ROUND;
-    let r = x - quadrant * 1.570_312_5;
-    let r = r - quadrant * 4.837_513e-4;
-    let r = r - quadrant * 7.549_789_5e-8;
-    let z = r * r;
-    let mut s = -1.951_529_6e-4;
-    s = s * z + 8.332_161e-3;
-    s = s * z - 1.666_665_5e-1;
-    let sine = s * z * r + r;
-    let mut c = 2.443_315_7e-5;
-    c = c * z - 1.388_731_6e-3;
-    c = c * z + 4.166_664_6e-2;
-    let cosine = c * z * z - 0.5 * z + 1.0;
-    let quarter = quadrant as i32;
-    let (s, c) = if quarter & 1 == 0 {
-        (sine, cosine)
-    } else {
-        (cosine, sine)
-    };
-    let s = if quarter & 2 == 0 { s } else { -s };
-    let c = if (quarter + 1) & 2 == 0 { c } else { -c };
-    (s, c)
 }
 
 #[cfg(test)]
@@ -198,7 +149,6 @@ mod tests {
         check(0.3, 3.0, log2, f64::log2, bound);
         check(1e-30, 1e-20, log2, f64::log2, bound);
         check(1.0, 1e30, log2, f64::log2, bound);
-        check(0.01, 100.0, ln, f64::ln, bound);
         assert_eq!(log2(1.0), 0.0);
         assert_eq!(log2(8.0), 3.0);
     }
@@ -218,18 +168,8 @@ mod tests {
     }
 
     #[test]
-    fn arcs_keep_their_error() {
+    fn arc_sines_keep_their_error() {
         check(-1.0, 1.0, asin, f64::asin, |_, _| 3e-7);
-        check(-1.0, 1.0, acos, f64::acos, |_, _| 4e-7);
-        assert_eq!((asin(0.0), acos(1.0)), (0.0, 0.0));
-    }
-
-    #[test]
-    fn sine_and_cosine_keep_their_error() {
-        for (low, high) in [(-8.0, 8.0), (-8192.0, 8192.0)] {
-            check(low, high, |x| sin_cos(x).0, f64::sin, |_, _| 2e-7);
-            check(low, high, |x| sin_cos(x).1, f64::cos, |_, _| 2e-7);
-        }
-        assert_eq!(sin_cos(0.0), (0.0, 1.0));
+        assert_eq!(asin(0.0), 0.0);
     }
 }

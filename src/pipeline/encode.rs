@@ -13,9 +13,7 @@ use super::setup::Setup;
 use super::{Event, InHand, Passed, Stage, Watch};
 use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::mishap::is_place_at_fault;
-use crate::output::{
-    CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
-};
+use crate::output::{CustomAttribute, ExrOptions, OutputError, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
@@ -176,14 +174,6 @@ impl<W: Seek> Seek for Looking<'_, W> {
     fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
-}
-
-/// The EXR of `frame` in memory.
-///
-/// # Errors
-/// If the image cannot be encoded.
-pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, OutputError> {
-    encode_exr(&frame.film, &exr_options(setup, frame))
 }
 
 /// How the EXR of `frame` is written, with what a compositor may ask about it in one attribute.

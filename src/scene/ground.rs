@@ -6,7 +6,6 @@
 use glam::Vec3;
 
 use super::Bounds;
-use crate::ray::Ray;
 
 /// Colour of the default floor (linear RGB): a dark grey that shows shadows and stays behind
 /// the particles.
@@ -111,31 +110,6 @@ impl Ground {
         self.center += by * self.up;
         self.height += by;
     }
-
-    /// Distance at which `ray` comes down through the plane, if that lies in its range.
-    pub fn hit(&self, ray: &Ray) -> Option<f32> {
-        let slope = ray.direction.dot(self.up);
-        if slope >= 0.0 {
-            return None;
-        }
-        let t = (self.height - ray.origin.dot(self.up)) / slope;
-        (t >= ray.t_min && t < ray.t_max && t.is_finite()).then_some(t)
-    }
-
-    /// How much of the floor is left at `point`: 1 near, 0 far, smooth between.
-    pub fn presence(&self, point: Vec3) -> f32 {
-        let distance = point.distance(self.center);
-        let span = (self.fade_end - self.fade_start).max(f32::MIN_POSITIVE);
-        let x = ((self.fade_end - distance) / span).clamp(0.0, 1.0);
-        x * x * (3.0 - 2.0 * x)
-    }
-
-    /// Length to step off the plane at `point` so that the next ray does not meet it again: a few
-    /// ulps of the numbers that made the point.
-    pub fn offset(&self, point: Vec3, t: f32) -> f32 {
-        let scale = point.abs().max_element().max(t).max(self.height.abs());
-        (8.0 * f32::EPSILON * scale).max(f32::MIN_POSITIVE)
-    }
 }
 
 /// The whole number at or under `value`; of the farthest squares only the last one's. Without the
@@ -171,17 +145,6 @@ mod tests {
     }
 
     #[test]
-    fn is_met_from_above_only_and_within_range() {
-        let floor = floor();
-        let down = Ray::new(Vec3::new(3.0, 4.0, 11.0), Vec3::NEG_Z);
-        assert_eq!(floor.hit(&down), Some(10.0));
-        assert_eq!(floor.hit(&Ray { t_max: 9.9, ..down }), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::NEG_Z)), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::splat(5.0), Vec3::X)), None);
-    }
-
-    #[test]
     fn squares_alternate_around_the_middle() {
         for up in [
             Vec3::X,
@@ -201,15 +164,5 @@ mod tests {
             assert_eq!(at(0.6, 0.7), light);
             assert!(across.dot(along).abs() < 1e-6 && across.dot(up).abs() < 1e-6);
         }
-    }
-
-    #[test]
-    fn fades_smoothly() {
-        let floor = floor();
-        assert_eq!(floor.presence(floor.center), 1.0);
-        let far = floor.center + Vec3::X * (floor.fade_end * 1.01);
-        assert_eq!(floor.presence(far), 0.0);
-        let middle = 0.5 * (floor.fade_start + floor.fade_end);
-        assert!((floor.presence(floor.center + Vec3::Y * middle) - 0.5).abs() < 1e-4);
     }
 }

@@ -108,15 +108,6 @@ impl Material {
         let root = (1.0 - self.ior) / (1.0 + self.ior);
         root * root
     }
-
-    /// The part mirrored by a surface that is met at the absolute `cosine` with the normal; `ratio` is the index
-    /// of refraction on the viewer's side over the one beyond. All of it where refraction ends.
-    pub fn mirrored(&self, cosine: f32, ratio: f32) -> f32 {
-        match self.fresnel {
-            Fresnel::Schlick => schlick(self.r0(), cosine),
-            Fresnel::Exact => dielectric(cosine, ratio),
-        }
-    }
 }
 
 /// The extinction of a medium that leaves `color` of white light after `length`. Of black, a millionth

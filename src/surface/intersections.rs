@@ -150,7 +150,8 @@ impl Intersections {
     }
 
     /// What the first `count` rays meet, one by one.
-    pub fn all(&self, count: usize) -> Vec<Option<Intersection>> {
+    #[cfg(test)]
+    pub(crate) fn all(&self, count: usize) -> Vec<Option<Intersection>> {
         let found = |lane| (self.mask >> lane & 1 == 1).then(|| self.get(lane));
         (0..count).map(found).collect()
     }

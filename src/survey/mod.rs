@@ -13,7 +13,7 @@ use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError, ID_NAMES, ParticleFrame, Radius, choose_origin};
 
-use crate::scene::{Bounds, RgbEncoding, is_rgb};
+use crate::scene::{RgbEncoding, is_rgb};
 
 mod look;
 mod packing;
@@ -259,14 +259,6 @@ impl Survey {
             } else {
                 DVec3::Z
             })),
-        }
-    }
-
-    /// The box as the scene takes it.
-    pub fn bounds(&self) -> Bounds {
-        Bounds {
-            min: self.min,
-            max: self.max,
         }
     }
 }

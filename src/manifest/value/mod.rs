@@ -118,9 +118,6 @@ macro_rules! named {
         }
 
         impl $name {
-            /// All, with the names that users type.
-            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
-
             /// As users type it.
             pub const fn name(self) -> &'static str {
                 match self {

@@ -31,35 +31,11 @@ impl PathSeed {
         unit(scrambled(shuffled.reverse_bits(), seed))
     }
 
-    /// The numbers of sample `sample` in the pair of dimensions `dimension`. The first `2^k` samples lie each in a part
-    /// of its own of every division of the square into `2^k` equal rectangles that halve and halve again.
-    pub fn get_2d(self, dimension: u32, sample: u32) -> [f32; 2] {
-        let [first, second] = self.halves(dimension);
-        let shuffled = scrambled(sample, first ^ second);
-        [
-            unit(scrambled(shuffled.reverse_bits(), first)),
-            unit(scrambled(second_coordinate(shuffled), second)),
-        ]
-    }
-
     #[expect(clippy::cast_possible_truncation, reason = "two halves")]
     fn halves(self, dimension: u32) -> [u32; 2] {
         let bits = mix(self.0 ^ mix(u64::from(dimension)));
         [bits as u32, (bits >> 32) as u32]
     }
-}
-
-/// The second coordinate of point `index` of the Sobol' sequence, as a fraction of 2^32.
-fn second_coordinate(mut index: u32) -> u32 {
-    let (mut direction, mut sum) = (1_u32 << 31, 0);
-    while index != 0 {
-        if index & 1 == 1 {
-            sum ^= direction;
-        }
-        direction ^= direction >> 1;
-        index >>= 1;
-    }
-    sum
 }
 
 /// Owen's scrambling of a fraction of 2^32: each bit is turned or not by a hash of the bits above it. In reverse that is
@@ -105,21 +81,6 @@ mod tests {
             let seed = PathSeed::of_pixel(x, 5).child(1);
             let parts = (0..count).map(|sample| part(seed.get_1d(3, sample), count));
             assert!(is_permutation(parts, count));
-        }
-    }
-
-    #[test]
-    fn samples_are_stratified_in_every_division_of_a_square() {
-        for (x, bits) in [(0, 2), (1, 4), (2, 6), (3, 8)] {
-            let seed = PathSeed::of_pixel(x, 1);
-            let points: Vec<_> = (0..1 << bits).map(|s| seed.get_2d(0, s)).collect();
-            for across in 0..=bits {
-                let (columns, rows) = (1 << across, 1 << (bits - across));
-                let cells = points
-                    .iter()
-                    .map(|[x, y]| part(*x, columns) * rows + part(*y, rows));
-                assert!(is_permutation(cells, 1 << bits), "{bits} {across}");
-            }
         }
     }
 

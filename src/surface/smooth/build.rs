@@ -1,7 +1,5 @@
 //! From particles to bricks.
 
-use std::time::Duration;
-
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
@@ -14,7 +12,6 @@ use super::layout::Layout;
 use super::raw::{Codes, Gather, RawBrick};
 use super::tree::{Block, BrickTree, Node};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
-use crate::accel::{Phase, PhaseClock};
 use crate::metrics::Bytes;
 use crate::surface::SurfaceSettings;
 use crate::surface::field::FieldParticles;
@@ -48,12 +45,6 @@ pub enum SmoothError {
 /// What building a surface took.
 #[derive(Debug, Clone, Default)]
 pub struct SmoothReport {
-    /// Wall-clock time.
-    pub total: Duration,
-    /// By phase, in order.
-    pub phases: Vec<Phase>,
-    /// Bricks that the surface passes.
-    pub bricks: u64,
     /// Bytes of the grid, and of particles that are kept for looking up attributes or exact places.
     pub bytes: u64,
     /// Most bytes held while building, those included.
@@ -81,7 +72,6 @@ pub(super) fn build(
     keep: bool,
     left: Option<u64>,
 ) -> Result<(Built, SmoothReport), SmoothError> {
-    let mut clock = PhaseClock::new();
     let layout = Layout::new(settings, radius);
     let count = centers.len() as u64;
     let refuse = |need: u64| match left {
@@ -97,9 +87,7 @@ pub(super) fn build(
     let keep = keep || settings.exact;
     refuse(count * if keep { 24 } else { 20 })?;
     let mut field = FieldParticles::sorted(centers, layout.support, keep);
-    clock.lap("sort");
     let plan = Plan::of(field.bins(), &layout);
-    clock.lap("plan");
     let need = Need::of(&plan);
     refuse(field.byte_len() + 4 * count + need.total())?;
     let sorted_bytes = field.byte_len() + plan.byte_len();
@@ -113,7 +101,6 @@ pub(super) fn build(
         }
         field.find_volumes(|bin| needed[bin]);
     }
-    clock.lap("volumes");
     let work = Work {
         field: &field,
         layout: &layout,
@@ -121,17 +108,11 @@ pub(super) fn build(
         lanes: ArrayLanes::default(),
     };
     let raw = work.raw();
-    clock.lap("field");
     let (blocks, bricks) = work.bricks(&raw);
     let raw_bytes = raw.byte_len();
     drop(raw);
     let tree = BrickTree::new(&blocks, bricks, layout.voxel, layout.threshold * CODES);
-    clock.lap("bricks");
-    let phases = clock.finish();
     let report = SmoothReport {
-        total: phases.iter().map(|phase| phase.time).sum(),
-        phases,
-        bricks: tree.bricks.len() as u64,
         bytes: tree.byte_len() + if keep { field.byte_len() } else { 0 },
         peak_bytes: sorted_bytes
             .max(field.byte_len() + plan.byte_len() + raw_bytes + tree.byte_len()),

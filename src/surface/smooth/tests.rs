@@ -291,7 +291,7 @@ fn little_and_strange_input_makes_a_surface_or_none() {
     };
     let default = settings(0.75, false);
     let (hit, report) = build(&[], &default);
-    assert_eq!((hit, report.bricks, report.is_empty), (None, 0, false));
+    assert_eq!((hit, report.bytes, report.is_empty), (None, 0, false));
     let (hit, _) = build(&[Vec3::ZERO], &default);
     // A lone particle is a ball of about 1.3 radii, whatever the smoothing.
     assert!((hit.expect("a drop").t - (9.0 - 1.3 * RADIUS)).abs() < 0.15 * RADIUS);
