@@ -14,8 +14,9 @@ use crate::surface::{SurfaceKind, SurfaceSettings};
 
 use key::{Affects, Keys};
 use list::Entries;
-use reader::{Problem, Problems, Section};
-use tree::{Node, Place};
+use problem::{Place, Problem, Problems};
+use reader::Section;
+use tree::Node;
 
 mod camera;
 mod color;
@@ -33,6 +34,7 @@ mod pattern;
 #[cfg(test)]
 mod places_tests;
 mod preset;
+mod problem;
 mod reader;
 mod rebase;
 mod render;

@@ -6,18 +6,7 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Problem;
-
-/// Origin of a value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Place {
-    /// Byte in the file.
-    Byte(usize),
-    /// The option as the user typed it.
-    Option(String),
-    /// The value is missing.
-    Nowhere,
-}
+use super::problem::{Place, Problem};
 
 #[derive(Debug, Clone)]
 pub(super) struct Node {

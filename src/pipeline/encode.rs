@@ -14,9 +14,7 @@ use super::setup::Setup;
 use super::{ClaimedFrame, Event, Stage, StageResult, Watch};
 use crate::metrics::{MemoryPeaks, MemoryUse};
 use crate::mishap::is_place_at_fault;
-use crate::output::{
-    CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
-};
+use crate::output::{CustomAttribute, ExrOptions, OutputError, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
@@ -187,14 +185,6 @@ impl<W: Seek> Seek for MemorySampler<'_, W> {
     fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
-}
-
-/// The EXR of `frame` in memory.
-///
-/// # Errors
-/// If the image cannot be encoded.
-pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, OutputError> {
-    encode_exr(&frame.film, &exr_options(setup, frame))
 }
 
 /// Options for the EXR of `frame`, with an attribute of metadata for compositing.

@@ -33,7 +33,6 @@ mod surface;
 mod trace;
 
 pub use decoded::{DecodedFrame, DecodedShading};
-pub use encode::encode_frame;
 pub use in_place::{StoredFrame, StoredShading};
 pub use load::{LoadedFrame, LoadedParticles, load_frame};
 pub use load_error::LoadError;

@@ -206,7 +206,8 @@ impl Setup {
     fn structure_for(&self, particles: usize) -> Structure {
         self.run.accelerator.unwrap_or_else(|| {
             let threads = rayon::current_num_threads();
-            choose(particles, expected_rays(self), threads)
+            let rays = expected_rays(&self.picture.render, &self.picture.scene);
+            choose(particles, rays, threads)
         })
     }
 }

@@ -181,11 +181,6 @@ impl Camera {
         Ray::new(self.eye, direction.normalize())
     }
 
-    /// Distance along the view axis of the point at `t` on a ray of this camera.
-    pub fn depth(&self, ray: &Ray, t: f32) -> f32 {
-        t * ray.direction.dot(self.forward)
-    }
-
     /// The view axis.
     pub const fn forward(&self) -> Vec3 {
         self.forward

@@ -12,7 +12,7 @@ use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin, names};
 
-use crate::scene::{Bounds, RgbEncoding, is_rgb};
+use crate::scene::{RgbEncoding, is_rgb};
 
 mod look;
 mod packing;
@@ -254,14 +254,6 @@ impl Survey {
             } else {
                 DVec3::Z
             })),
-        }
-    }
-
-    /// The box in the form that scenes use.
-    pub fn bounds(&self) -> Bounds {
-        Bounds {
-            min: self.min,
-            max: self.max,
         }
     }
 }

@@ -118,9 +118,6 @@ macro_rules! named {
         }
 
         impl $name {
-            /// All values with their names.
-            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
-
             /// The name in a manifest.
             pub const fn name(self) -> &'static str {
                 match self {
