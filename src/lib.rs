@@ -25,10 +25,10 @@
 pub mod accel;
 pub mod cli;
 pub mod conversion;
+mod failure;
 pub mod manifest;
 pub mod math;
 pub mod metrics;
-mod mishap;
 pub mod output;
 pub mod pipeline;
 pub mod ray;

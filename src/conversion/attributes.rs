@@ -1,16 +1,16 @@
-//! Which attributes are stored, and how: what `--attributes` says.
+//! The storage of attributes: the value of `--attributes`.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// Stands for all attributes that are not named.
+/// The name that stands for all other attributes.
 const OTHERS: &str = "*";
 
-/// How the values of an attribute are stored.
+/// Storage of the values of an attribute.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Storage {
-    /// As they are.
+    /// Unchanged.
     #[default]
     Keep,
     /// Single precision.
@@ -19,15 +19,15 @@ pub enum Storage {
     F16,
     /// 8 bits over the range of each component.
     U8,
-    /// Not at all.
+    /// Not stored.
     Off,
 }
 
 impl Storage {
-    /// All there are.
+    /// All values.
     pub const ALL: [Self; 5] = [Self::Keep, Self::F32, Self::F16, Self::U8, Self::Off];
 
-    /// Its name on the command line.
+    /// Name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Keep => "keep",
@@ -39,8 +39,8 @@ impl Storage {
     }
 }
 
-/// How each attribute is stored. Written `velocity:f16,density:u8,*:off`, where `*` are those that are not
-/// named; without it they are kept.
+/// The storage of each attribute. Text form: `velocity:f16,density:u8,*:off`. `*` stands for all other attributes;
+/// by default they are kept.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct AttributeChoices {
     named: BTreeMap<String, Storage>,
@@ -48,14 +48,13 @@ pub struct AttributeChoices {
 }
 
 impl AttributeChoices {
-    /// No attribute is stored.
+    /// Stores no attributes.
     pub const NONE: Self = Self {
         named: BTreeMap::new(),
         others: Storage::Off,
     };
 
-    /// How the attribute `name` is stored: as said of exactly that name, or failing that without regard to
-    /// case.
+    /// The storage of the attribute `name`. An exact match has priority over one that ignores case.
     pub fn of(&self, name: &str) -> Storage {
         let alike = || {
             let mut named = self.named.iter();
@@ -67,20 +66,20 @@ impl AttributeChoices {
         }
     }
 
-    /// Whether the attribute `name` is named.
+    /// Whether the attribute `name` is listed.
     pub fn names(&self, name: &str) -> bool {
         self.named
             .keys()
             .any(|known| known.eq_ignore_ascii_case(name))
     }
 
-    /// All that is said: attributes and how they are stored, those not named last and as `*`.
+    /// All listed attributes and their storage, with `*` last.
     pub fn iter(&self) -> impl Iterator<Item = (&str, Storage)> {
         let named = self.named.iter().map(|(name, s)| (name.as_str(), *s));
         named.chain([(OTHERS, self.others)])
     }
 
-    /// The first name that none of the `known` attributes has.
+    /// The first listed name that is not among the `known` attributes.
     pub fn unknown(&self, known: &[String]) -> Option<&str> {
         let is_known = |name: &str| known.iter().any(|k| k.eq_ignore_ascii_case(name));
         let mut names = self.named.keys().map(String::as_str);
@@ -103,7 +102,7 @@ impl FromStr for AttributeChoices {
                 choices.named.insert(name.to_owned(), storage).is_some()
             };
             if is_repeated {
-                return Err(format!("`{name}` is there twice"));
+                return Err(format!("`{name}` occurs twice"));
             }
         }
         Ok(choices)
@@ -118,14 +117,15 @@ fn choice(item: &str) -> Result<(&str, Storage), String> {
         .map(|(name, how)| (name.trim(), how.trim()))
         .filter(|(name, _)| !name.is_empty())
         .ok_or_else(|| {
-            format!("`{item}` does not say how; write NAME:HOW, where HOW is one of {names}")
+            format!("`{item}` has no storage; write NAME:HOW, where HOW is one of {names}")
         })?;
     let storage = Storage::ALL.into_iter().find(|s| s.name() == how);
-    let storage = storage.ok_or_else(|| format!("`{item}`: there is no `{how}`, but {names}"))?;
+    let storage =
+        storage.ok_or_else(|| format!("`{item}`: unknown storage `{how}`; use one of {names}"))?;
     Ok((name, storage))
 }
 
-/// The same text for the same choices, in whatever order they were given.
+/// The text does not depend on the order in which the attributes were given.
 impl fmt::Display for AttributeChoices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, (name, storage)) in self.iter().enumerate() {
@@ -145,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn names_rule_over_the_others() {
+    fn listed_names_have_priority() {
         let choices = parsed("velocity:f16, a:b:u8 ,*:off,Id:keep");
         assert_eq!(choices.of("velocity"), Storage::F16);
         assert_eq!(choices.of("VELOCITY"), Storage::F16);
@@ -159,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_text_is_the_same_for_the_same_choices() {
+    fn equal_choices_have_the_same_text() {
         assert_eq!(AttributeChoices::default().to_string(), "*:keep");
         assert_eq!(AttributeChoices::NONE.to_string(), "*:off");
         let text = parsed("velocity:f16,density:u8").to_string();
@@ -168,22 +168,25 @@ mod tests {
     }
 
     #[test]
-    fn names_that_no_frame_has_are_found() {
+    fn unknown_names_are_found() {
         let known = ["velocity".to_owned(), "id".to_owned()];
         assert_eq!(parsed("ID:off,*:f16").unknown(&known), None);
         assert_eq!(parsed("id:off,vel:f16").unknown(&known), Some("vel"));
     }
 
     #[test]
-    fn what_cannot_be_meant_is_told() {
+    fn invalid_texts_are_rejected() {
         for (text, what) in [
-            ("", "does not say how"),
+            ("", "has no storage"),
             ("velocity", "write NAME:HOW"),
-            (":f16", "does not say how"),
-            ("v:f16,,", "does not say how"),
-            ("v:f64", "there is no `f64`, but keep, f32, f16, u8, off"),
-            ("v:f16,v:off", "`v` is there twice"),
-            ("*:f16,*:off", "`*` is there twice"),
+            (":f16", "has no storage"),
+            ("v:f16,,", "has no storage"),
+            (
+                "v:f64",
+                "unknown storage `f64`; use one of keep, f32, f16, u8, off",
+            ),
+            ("v:f16,v:off", "`v` occurs twice"),
+            ("*:f16,*:off", "`*` occurs twice"),
         ] {
             let error = text.parse::<AttributeChoices>().expect_err(text);
             assert!(error.contains(what), "{text}: {error}");

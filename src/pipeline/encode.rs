@@ -1,4 +1,4 @@
-//! Third stage: images are encoded, published under their final names, and recorded.
+//! Third stage: encodes images, publishes them under their final names, and records them.
 
 use std::io::{self, Seek, Write};
 use std::path::{Path, PathBuf};
@@ -10,9 +10,9 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::{Event, InHand, Passed, Stage, Watch};
+use super::{ClaimedFrame, Event, OnEvent, Stage, StageResult};
+use crate::failure::is_output_unavailable;
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::mishap::is_place_at_fault;
 use crate::output::{
     CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
 };
@@ -20,7 +20,7 @@ use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
 
-/// Why an image is not there.
+/// Why an image cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum WriteError {
     /// It cannot be encoded.
@@ -36,30 +36,30 @@ pub(super) enum WriteError {
     },
 }
 
-/// Who is told when an image is written. They may have ended by then.
-pub(super) struct Written {
-    /// Whoever reads the next frame only then.
+/// Channels to earlier stages, for use after an image is written. The receivers may have ended.
+pub(super) struct AfterWrite {
+    /// To the reader, without overlap: read the next frame.
     pub(super) is_written: Option<SyncSender<()>>,
-    /// Whoever traces into the same planes again.
+    /// To the tracer: reuse the planes.
     pub(super) films: Option<Sender<Film>>,
 }
 
 pub(super) fn write_stage(
     setup: &Setup,
-    traced: Receiver<InHand<TracedFrame>>,
-    next: &Written,
+    traced: Receiver<ClaimedFrame<TracedFrame>>,
+    next: &AfterWrite,
     job: &mut Job,
-    watch: Watch,
+    on_event: OnEvent,
 ) -> Result<(), JobError> {
     let mut peaks = MemoryPeaks::default();
     let mut image_before = Instant::now();
-    for InHand { claim, passed } in traced {
-        match passed {
-            Passed::Frame(frame) => {
-                watch(Event::Entered(frame.task.frame, Stage::Write));
+    for ClaimedFrame { claim, result } in traced {
+        match result {
+            StageResult::Frame(frame) => {
+                on_event(Event::StageEntered(frame.task.frame, Stage::Write));
                 if !claim.is_valid() {
                     let dir = job.state().dir().to_owned();
-                    return Err(JobError::TakenForDead { dir });
+                    return Err(JobError::DeclaredDead { dir });
                 }
                 let task = frame.task.clone();
                 match write_frame(setup, frame, &mut peaks) {
@@ -74,25 +74,25 @@ pub(super) fn write_stage(
                             .cloned()
                             .collect();
                         job.record_done(task.frame, &outputs, json!(report))?;
-                        watch(Event::Done(&task, &report));
+                        on_event(Event::Done(&task, &report));
                     }
-                    // Not the frame's fault: it stays to be done.
-                    Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
+                    // Not a failure of the frame, which stays pending
+                    Err(WriteError::Io { path, source }) if is_output_unavailable(&source) => {
                         return Err(JobError::writing(&path, source));
                     }
                     Err(error) => {
                         let reason = error.to_string();
-                        watch(Event::Failed(task.frame, &reason));
+                        on_event(Event::Failed(task.frame, &reason));
                         job.record_failed(task.frame, &reason, json!(null))?;
                     }
                 }
             }
-            Passed::Failed(task, reason) => {
-                watch(Event::Failed(task.frame, &reason));
+            StageResult::Failed(task, reason) => {
+                on_event(Event::Failed(task.frame, &reason));
                 job.record_failed(task.frame, &reason, json!(null))?;
             }
         }
-        claim.end();
+        claim.complete();
         if let Some(is_written) = &next.is_written {
             let _ = is_written.send(());
         }
@@ -100,7 +100,7 @@ pub(super) fn write_stage(
     Ok(())
 }
 
-/// Encodes and publishes the images of `frame`; the report is complete then, and the planes can serve another.
+/// Encodes and publishes the images of `frame`. Returns the complete report and the planes, which can be reused.
 pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
@@ -113,7 +113,7 @@ pub(super) fn write_frame(
         let path = path.to_owned();
         move |source| WriteError::Io { path, source }
     };
-    // The preview first: a ledger line vouches for both, and the EXR is what people wait for.
+    // The preview first: users wait for the EXR, and the ledger entry covers both
     if let Some(path) = &task.preview {
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
         publish(path, &png).map_err(at(path))?;
@@ -123,14 +123,14 @@ pub(super) fn write_frame(
     }
     peaks.take_in(frame.memory);
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
-    let mut looking = Looking {
+    let mut sampler = MemorySampler {
         out: &mut file,
         peaks,
-        looks: 0,
+        samples: 0,
     };
     let options = exr_options(setup, &frame);
     let (film, clamped) =
-        write_exr(frame.film, &options, &mut looking).map_err(|e| match e.into_io() {
+        write_exr(frame.film, &options, &mut sampler).map_err(|e| match e.into_io() {
             Ok(source) => at(&task.image)(source),
             Err(error) => error.into(),
         })?;
@@ -148,20 +148,20 @@ pub(super) fn write_frame(
     Ok((report, film))
 }
 
-/// Looks at memory when the first bytes come through: then all that encoding takes is there.
-struct Looking<'a, W> {
+/// Samples memory use during the first writes, when all buffers of the encoder exist.
+struct MemorySampler<'a, W> {
     out: &'a mut W,
     peaks: &'a mut MemoryPeaks,
-    looks: u32,
+    samples: u32,
 }
 
-/// Writes looked at: the header is written before blocks are compressed.
-const LOOKS: u32 = 16;
+/// Number of writes with a sample. The header is written before blocks are compressed.
+const MAX_SAMPLES: u32 = 16;
 
-impl<W: Write> Write for Looking<'_, W> {
+impl<W: Write> Write for MemorySampler<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        if self.looks < LOOKS {
-            self.looks += 1;
+        if self.samples < MAX_SAMPLES {
+            self.samples += 1;
             self.peaks.take_in(MemoryUse::now());
         }
         self.out.write(bytes)
@@ -172,21 +172,21 @@ impl<W: Write> Write for Looking<'_, W> {
     }
 }
 
-impl<W: Seek> Seek for Looking<'_, W> {
+impl<W: Seek> Seek for MemorySampler<'_, W> {
     fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
         self.out.seek(to)
     }
 }
 
-/// The EXR of `frame` in memory.
+/// Encodes the EXR of `frame` in memory.
 ///
 /// # Errors
-/// If the image cannot be encoded.
+/// The image cannot be encoded.
 pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, OutputError> {
     encode_exr(&frame.film, &exr_options(setup, frame))
 }
 
-/// How the EXR of `frame` is written, with what a compositor may ask about it in one attribute.
+/// Options of the EXR of `frame`, including an attribute with data for compositing.
 fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,

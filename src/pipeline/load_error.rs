@@ -9,7 +9,7 @@ pub enum LoadError {
     #[error(transparent)]
     Frame(FrameError),
     /// The same for the last frame of the sequence, which a simulation may be at.
-    #[error("{0}; it is the newest frame, perhaps still being written: render again later")]
+    #[error("{0}; it is the newest frame and may still be being written; render again later")]
     Newest(FrameError),
     /// It would not fit.
     #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]

@@ -15,7 +15,7 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
 
 use spherule_formats::sequence::Sequence;
-use spherule_jobs::{Claim, Interrupt, Job, JobError, Queue, QueueNews};
+use spherule_jobs::{Claim, FrameQueue, Interrupt, Job, JobError, QueueEvent};
 
 mod decoded;
 mod encode;
@@ -44,16 +44,16 @@ pub use probe::{Probe, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, Picture, RadiusRule, RunSettings, Setup};
-pub use single::{PictureKind, SingleFault, make_image, make_picture};
+pub use single::{ImageError, PictureKind, make_image, make_picture};
 pub use trace::{CpuRenderer, renderer_of};
 
 use read_threads::ReadThreads;
 
-use crate::mishap::guarded;
+use crate::failure::catch_panic;
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
 
-/// One image to make.
+/// One image to render.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageTask {
     /// Frame number.
@@ -64,11 +64,11 @@ pub struct ImageTask {
     pub image: PathBuf,
     /// The PNG beside it, if wanted.
     pub preview: Option<PathBuf>,
-    /// Why it cannot be made, if that is known before.
+    /// Why it cannot be rendered, if that is known in advance.
     pub refused: Option<String>,
 }
 
-/// What a frame is going through.
+/// A stage of the pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Its files are read.
@@ -79,43 +79,42 @@ pub enum Stage {
     Write,
 }
 
-/// What whoever watches is told.
+/// Progress of a run.
 #[derive(Debug)]
 pub enum Event<'a> {
     /// A frame has entered a stage.
-    Entered(i64, Stage),
-    /// A frame's image is in place and recorded.
+    StageEntered(i64, Stage),
+    /// A frame's image exists and is recorded.
     Done(&'a ImageTask, &'a FrameReport),
-    /// A frame could not be made; it is recorded with this reason and the rest goes on.
+    /// A frame failed and was recorded with this reason. The other frames continue.
     Failed(i64, &'a str),
-    /// Other workers are at frames of the run.
-    Others(QueueNews<'a>),
-    /// Something the user should know.
+    /// Another worker has finished a frame or holds one.
+    OtherWorker(QueueEvent<'a>),
+    /// A note for the user.
     Note(&'a str),
 }
 
-/// Who watches.
-pub type Watch<'a> = &'a (dyn Fn(Event) + Sync);
+/// Receives events, from several threads.
+pub type OnEvent<'a> = &'a (dyn Fn(Event) + Sync);
 
-/// A frame on its way, or why it fell out.
-enum Passed<T> {
+/// A frame between two stages, or the reason why it failed.
+enum StageResult<T> {
     Frame(T),
     Failed(ImageTask, String),
 }
 
-/// A frame on its way that no other worker does meanwhile.
-struct InHand<T> {
+/// A frame between two stages, with the claim of this worker.
+struct ClaimedFrame<T> {
     claim: Claim,
-    passed: Passed<T>,
+    result: StageResult<T>,
 }
 
-/// Renders those of `tasks` that no other worker does, in order, and records each in `job`; returns when all
-/// are ended, by whomever. Ends early, with the frame in hand finished,
-/// once `interrupt` is raised, and without it once it says to stop now. Without `overlap` a frame is read only when the one before is written
-/// and nothing of it is left.
+/// Renders those of `tasks` that no other worker holds, in order, and records each in `job`. Returns when all are
+/// finished, by any worker. Once `interrupt` is raised, returns after the frames in progress, or drops them if the
+/// interrupt says to stop now. Without `overlap`, a frame is read only when the memory of the one before is free.
 ///
 /// # Errors
-/// The ledger cannot be written, or the disk is full: nothing further could be recorded.
+/// The ledger or the output cannot be written, for example because the disk is full.
 pub fn run(
     setup: &Setup,
     sequence: &Sequence,
@@ -123,56 +122,59 @@ pub fn run(
     overlap: Overlap,
     job: &mut Job,
     interrupt: &Interrupt,
-    watch: Watch,
+    on_event: OnEvent,
 ) -> Result<(), JobError> {
-    let is_over = AtomicBool::new(false);
+    let has_failed = AtomicBool::new(false);
     let threads = ReadThreads::new();
     let mut read = Ok(());
     // Capacity 0: a stage holds its result until the next one is free to take it.
     let (to_trace, loaded) = sync_channel(0);
     let (to_write, traced) = sync_channel(0);
-    let (go_on, room) = sync_channel(1);
+    let (continue_reading, may_continue) = sync_channel(1);
     let (films, spare) = channel();
-    // Whoever frees the memory that the next frame needs; without overlap no film is kept for it.
+    // The next frame is read when the tree is built, or without overlap when the image is written
     let (is_built, is_written, films) = match overlap {
-        Overlap::Stages => (Some(go_on), None, Some(films)),
-        Overlap::None => (None, Some(go_on), None),
+        Overlap::Stages => (Some(continue_reading), None, Some(films)),
+        Overlap::None => (None, Some(continue_reading), None),
     };
-    let (begins, has_begun) = sync_channel(0);
+    let (starts, has_started) = sync_channel(0);
     let frames = tasks.iter().map(|task| task.frame);
-    let queue = Queue::new(job.claims(), frames, interrupt);
+    let queue = FrameQueue::new(job.claims(), frames, interrupt);
     let reader = ReadStage {
         setup,
         sequence,
         tasks,
         threads: &threads,
-        next: Next { to_trace, room },
-        watch,
+        next: ToTrace {
+            to_trace,
+            may_continue,
+        },
+        on_event,
     };
     let outcome = &mut read;
     let written = threads.scope(|first| {
         first.spawn(move |_| {
-            let _ = begins.send(());
+            let _ = starts.send(());
             *outcome = reader.run(queue);
         });
-        // The first of the threads finds the memory that whoever looked at the frames has left.
-        let _ = has_begun.recv();
+        // The first new thread reuses the memory that the survey has freed
+        let _ = has_started.recv();
         thread::scope(|scope| {
-            let writer_ended = &is_over;
-            let next = encode::Written { is_written, films };
+            let writer_failed = &has_failed;
+            let next = encode::AfterWrite { is_written, films };
             let writer = scope.spawn(move || {
-                let ended = encode::write_stage(setup, traced, &next, job, watch);
-                writer_ended.store(ended.is_err(), Ordering::Relaxed);
-                ended
+                let result = encode::write_stage(setup, traced, &next, job, on_event);
+                writer_failed.store(result.is_err(), Ordering::Relaxed);
+                result
             });
             let stage = TraceStage {
                 setup,
                 stop: DropFrame {
-                    is_over: &is_over,
+                    has_failed: &has_failed,
                     interrupt,
                 },
                 interrupt,
-                watch,
+                on_event,
             };
             stage.run(loaded, spare, is_built, to_write);
             joined(writer.join())
@@ -182,7 +184,7 @@ pub fn run(
 }
 
 fn joined<T>(result: thread::Result<T>) -> T {
-    result.unwrap_or_else(|fault| panic::resume_unwind(fault))
+    result.unwrap_or_else(|payload| panic::resume_unwind(payload))
 }
 
 /// The first stage; see [`run`].
@@ -191,30 +193,30 @@ struct ReadStage<'a> {
     sequence: &'a Sequence,
     tasks: &'a [ImageTask],
     threads: &'a ReadThreads,
-    next: Next,
-    watch: Watch<'a>,
+    next: ToTrace,
+    on_event: OnEvent<'a>,
 }
 
 impl ReadStage<'_> {
     /// Runs on the thread of the first stage.
-    fn run(&self, mut queue: Queue) -> Result<(), JobError> {
-        let mut told = Told::default();
-        let mut heard = |news: QueueNews| (self.watch)(Event::Others(news));
-        while let Some((place, claim)) = queue.take(&mut heard)? {
-            let task = &self.tasks[place];
-            (self.watch)(Event::Entered(task.frame, Stage::Read));
+    fn run(&self, mut queue: FrameQueue) -> Result<(), JobError> {
+        let mut notes = ReportedNotes::default();
+        let mut on_queue_event = |event: QueueEvent| (self.on_event)(Event::OtherWorker(event));
+        while let Some((index, claim)) = queue.next(&mut on_queue_event)? {
+            let task = &self.tasks[index];
+            (self.on_event)(Event::StageEntered(task.frame, Stage::Read));
             let loaded = match &task.refused {
                 Some(reason) => Err(reason.clone()),
-                None => guarded(|| self.load(task)),
+                None => catch_panic(|| self.load(task)),
             };
-            let passed = match loaded {
+            let result = match loaded {
                 Ok(mut frame) => {
-                    told.tell(std::mem::take(&mut frame.notes), self.watch);
-                    Passed::Frame(frame)
+                    notes.report(std::mem::take(&mut frame.notes), self.on_event);
+                    StageResult::Frame(frame)
                 }
-                Err(reason) => Passed::Failed(task.clone(), reason),
+                Err(reason) => StageResult::Failed(task.clone(), reason),
             };
-            if !self.next.pass_on(InHand { claim, passed }) {
+            if !self.next.send(ClaimedFrame { claim, result }) {
                 break;
             }
         }
@@ -229,32 +231,32 @@ impl ReadStage<'_> {
     }
 }
 
-/// What a stage has told of its frames: what is so in every frame is said once.
+/// The notes that a stage has reported. A note that all frames share is reported once.
 #[derive(Default)]
-struct Told(HashSet<String>);
+struct ReportedNotes(HashSet<String>);
 
-impl Told {
-    fn tell(&mut self, notes: Vec<String>, watch: Watch) {
+impl ReportedNotes {
+    fn report(&mut self, notes: Vec<String>, on_event: OnEvent) {
         for note in notes {
             if !self.0.contains(&note) {
-                watch(Event::Note(&note));
+                on_event(Event::Note(&note));
                 self.0.insert(note);
             }
         }
     }
 }
 
-/// The way from reading to tracing.
-struct Next {
-    to_trace: SyncSender<InHand<LoadedFrame>>,
-    /// Tells when there is memory for another frame.
-    room: Receiver<()>,
+/// The channels from reading to tracing.
+struct ToTrace {
+    to_trace: SyncSender<ClaimedFrame<LoadedFrame>>,
+    /// Signals that there is memory for another frame.
+    may_continue: Receiver<()>,
 }
 
-impl Next {
-    /// Hands over and waits until there is room again; false once a later stage has ended.
-    fn pass_on(&self, frame: InHand<LoadedFrame>) -> bool {
-        self.to_trace.send(frame).is_ok() && self.room.recv().is_ok()
+impl ToTrace {
+    /// Sends the frame and waits until there is memory for another. Returns false once a later stage has ended.
+    fn send(&self, frame: ClaimedFrame<LoadedFrame>) -> bool {
+        self.to_trace.send(frame).is_ok() && self.may_continue.recv().is_ok()
     }
 }
 
@@ -264,15 +266,15 @@ fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     rayon::scope(|_| work())
 }
 
-/// When the frame that is traced is dropped: nothing further can be recorded, or there is no time for it.
+/// Stops tracing when frames can no longer be recorded, or when the interrupt says to stop now.
 struct DropFrame<'a> {
-    is_over: &'a AtomicBool,
+    has_failed: &'a AtomicBool,
     interrupt: &'a Interrupt,
 }
 
 impl Stop for DropFrame<'_> {
     fn is_raised(&self) -> bool {
-        self.is_over.load(Ordering::Relaxed) || self.interrupt.stop_now()
+        self.has_failed.load(Ordering::Relaxed) || self.interrupt.stop_now()
     }
 }
 
@@ -280,59 +282,62 @@ struct TraceStage<'a> {
     setup: &'a Setup,
     stop: DropFrame<'a>,
     interrupt: &'a Interrupt,
-    watch: Watch<'a>,
+    on_event: OnEvent<'a>,
 }
 
 impl TraceStage<'_> {
     /// Its neighbours end when it does: it owns its ends of all channels.
     fn run(
         &self,
-        loaded: Receiver<InHand<LoadedFrame>>,
+        loaded: Receiver<ClaimedFrame<LoadedFrame>>,
         spare: Receiver<Film>,
         is_built: Option<SyncSender<()>>,
-        next: SyncSender<InHand<TracedFrame>>,
+        next: SyncSender<ClaimedFrame<TracedFrame>>,
     ) {
         let mut tracer = renderer_of(self.setup.picture.renderer);
-        let mut told = Told::default();
-        for InHand { claim, passed } in loaded {
-            // A frame that was only read when the interrupt came is dropped, not begun.
+        let mut notes = ReportedNotes::default();
+        for ClaimedFrame { claim, result } in loaded {
+            // Drop a frame that was read but not started when the interrupt was raised
             if self.interrupt.is_raised() {
                 return;
             }
-            let (task, built) = match passed {
-                Passed::Frame(frame) => {
+            let (task, built) = match result {
+                StageResult::Frame(frame) => {
                     let task = frame.task.clone();
-                    (self.watch)(Event::Entered(task.frame, Stage::Trace));
+                    (self.on_event)(Event::StageEntered(task.frame, Stage::Trace));
                     let build = || tracer.prepare(self.setup, frame);
-                    (task, guarded(|| in_pool(build).map_err(|e| e.to_string())))
+                    (
+                        task,
+                        catch_panic(|| in_pool(build).map_err(|e| e.to_string())),
+                    )
                 }
-                Passed::Failed(task, reason) => (task, Err(reason)),
+                StageResult::Failed(task, reason) => (task, Err(reason)),
             };
             if let Some(is_built) = &is_built {
-                // Who reads may have ended by now.
+                // The reader may have ended
                 let _ = is_built.send(());
             }
             let traced = built.and_then(|mut frame| {
-                told.tell(std::mem::take(&mut frame.notes), self.watch);
+                notes.report(std::mem::take(&mut frame.notes), self.on_event);
                 if let Ok(film) = spare.try_recv() {
                     tracer.recycle(film);
                 }
                 let trace = || tracer.render(self.setup, frame, &self.stop);
-                guarded(|| in_pool(trace).map_err(|e| e.to_string()))
+                catch_panic(|| in_pool(trace).map_err(|e| e.to_string()))
             });
-            let passed = match traced {
-                Ok(traced) => Passed::Frame(traced),
+            let result = match traced {
+                Ok(traced) => StageResult::Frame(traced),
                 Err(_) if self.stop.is_raised() => return,
                 Err(reason) => {
-                    // Whatever happened may have left the buffers half filled.
+                    // The failure may have left the buffers in an inconsistent state
                     tracer = renderer_of(self.setup.picture.renderer);
-                    Passed::Failed(task, reason)
+                    StageResult::Failed(task, reason)
                 }
             };
             if is_built.is_none() {
                 tracer = renderer_of(self.setup.picture.renderer);
             }
-            if next.send(InHand { claim, passed }).is_err() {
+            if next.send(ClaimedFrame { claim, result }).is_err() {
                 return;
             }
         }
