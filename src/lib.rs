@@ -26,10 +26,10 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
+mod failure;
 pub mod manifest;
 pub mod math;
 pub mod metrics;
-mod mishap;
 pub mod output;
 pub mod pipeline;
 pub mod ray;

@@ -1,17 +1,17 @@
-//! What can go wrong with a job, by what the caller can do next.
+//! The errors of a job, divided by what the caller can do about them.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// One setting that is not what the plan was made with.
+/// A setting that differs from the one in the plan.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SettingChange {
     /// Dotted key.
     pub key: String,
     /// Value in the plan, if it was set.
     pub old: Option<String>,
-    /// Value asked for now, if it is set.
+    /// Value of this request, if it is set.
     pub new: Option<String>,
 }
 
@@ -28,14 +28,14 @@ impl fmt::Display for SettingChange {
     }
 }
 
-/// One input file of a finished frame that is another file now.
+/// An input file of a finished frame that has changed since.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct InputChange {
     /// The frame.
     pub frame: i64,
     /// The file.
     pub path: PathBuf,
-    /// What is different.
+    /// The difference.
     pub what: String,
 }
 
@@ -51,63 +51,64 @@ impl fmt::Display for InputChange {
     }
 }
 
-/// Why a job cannot start or go on.
+/// Why a job cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum JobError {
-    /// The plan was made with other settings.
-    #[error("{}: settings have changed since this job began: {}; --force starts over, --keep-done keeps what is there", dir.display(), listed(changes))]
+    /// The settings differ from those in the plan.
+    #[error("{}: settings have changed since this job began: {}; --force starts over, --keep-done keeps what is there", dir.display(), list_some(changes))]
     SettingsChanged {
         /// The job's directory.
         dir: PathBuf,
-        /// Which, in the order of the settings.
+        /// The changes, in the order of the settings.
         changes: Vec<SettingChange>,
     },
-    /// Frames were finished from inputs that have been rewritten since.
-    #[error("{}: inputs of finished frames have changed: {}; --force starts over, --keep-done keeps what is there", dir.display(), listed(changes))]
+    /// Inputs of finished frames have changed.
+    #[error("{}: inputs of finished frames have changed: {}; --force starts over, --keep-done keeps what is there", dir.display(), list_some(changes))]
     InputChanged {
         /// The job's directory.
         dir: PathBuf,
-        /// Which, by frame.
+        /// The changes, by frame.
         changes: Vec<InputChange>,
     },
-    /// The job was begun with another input: none of its files is among those given, and the same frames
+    /// The job was started with another input: none of its files is among the given ones, and the same frames
     /// have other contents.
     #[error("{}: this job was made from other files ({}, now {}); choose another output{}, or start over with --force", dir.display(), planned.display(), given.display(), if *is_same_dir { ", keep what is there with --keep-done" } else { "" })]
     OtherInput {
         /// The job's directory.
         dir: PathBuf,
-        /// A file that it was made from.
+        /// A file of the plan.
         planned: PathBuf,
-        /// A file given now.
+        /// A file of this request.
         given: PathBuf,
         /// Whether they are in the same directory.
         is_same_dir: bool,
     },
-    /// Files have the names of outputs, and no worker of the job has made them.
+    /// Files with the names of outputs exist that no worker of this job has written.
     #[error(
-        "{}: there already, and not made by this job; choose another output, move what is there, or replace it with --force",
-        existing(paths)
+        "{}: already exists and was not written by this job; choose another output, move the file away, or \
+         replace it with --force",
+        first_of(paths)
     )]
     OutputsExist {
-        /// Which; at least one.
+        /// The files; at least one.
         paths: Vec<PathBuf>,
     },
-    /// The plan is there but cannot be understood.
+    /// The plan exists but cannot be read.
     #[error("{}: {what}; restore it, or start over with --force", path.display())]
     PlanDamaged {
         /// The plan.
         path: PathBuf,
-        /// Where and why.
+        /// Place and reason.
         what: String,
     },
-    /// There is a ledger but no plan that would say what its lines mean.
+    /// There is a ledger but no plan that gives its lines a meaning.
     #[error("{}: the ledger has lines but {} is missing; restore it, or start over with --force", ledger.display(), crate::PLAN_FILE)]
     PlanMissing {
         /// The ledger.
         ledger: PathBuf,
     },
-    /// A line of a ledger, other than a torn last one, cannot be understood.
-    #[error("{}: line {line}: {what}; remove that line to do its frame again, or start over with --force", path.display())]
+    /// A line of a ledger, other than an incomplete last one, cannot be read.
+    #[error("{}: line {line}: {what}; remove that line to repeat its frame, or start over with --force", path.display())]
     LedgerDamaged {
         /// The ledger.
         path: PathBuf,
@@ -116,62 +117,62 @@ pub enum JobError {
         /// Why.
         what: String,
     },
-    /// What was asked must not be done while another worker is at the job.
-    #[error("{}: {who} is at work here; wait for it, or stop it first", dir.display())]
+    /// The operation is not possible while another worker is active.
+    #[error("{}: {worker} is working on this job; wait for it, or stop it first", dir.display())]
     Busy {
         /// The job's directory.
         dir: PathBuf,
-        /// Who works there.
-        who: String,
+        /// The other worker.
+        worker: String,
     },
-    /// Others have taken this worker for dead, or the directory `job.work` was removed.
-    #[error("{}: this worker gave no sign of life for so long that others have taken it for dead; the same command joins again", dir.display())]
-    TakenForDead {
+    /// Other workers have declared this worker dead, or the directory `job.work` was removed.
+    #[error("{}: this worker missed its heartbeats and its frames were reassigned; the same command rejoins the job", dir.display())]
+    DeclaredDead {
         /// The job's directory.
         dir: PathBuf,
     },
-    /// The directory refuses files.
+    /// The directory is not writable.
     #[error("{}: cannot be written ({source}); check its permissions, or choose another directory", path.display())]
     Unwritable {
         /// The file or directory.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// No room. Nothing that was there is lost.
-    #[error("{}: no space left; free some, then the same command goes on from here", path.display())]
+    /// The disk is full. Existing files are intact.
+    #[error("{}: no space left; free some, then the same command continues", path.display())]
     DiskFull {
-        /// What was being written.
+        /// The file that was being written.
         path: PathBuf,
-        /// What the system said.
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// Any other trouble with a file of the job.
-    #[error("{}: {doing}: {source}", path.display())]
+    /// Any other I/O error on a file of the job.
+    #[error("{}: {action}: {source}", path.display())]
     Io {
         /// The file or directory.
         path: PathBuf,
-        /// What was being done.
-        doing: &'static str,
-        /// What the system said.
+        /// What failed.
+        action: &'static str,
+        /// The error of the operating system.
         source: io::Error,
     },
-    /// The caller could not settle what "auto" means; the message is its own.
+    /// The caller could not resolve the automatic settings.
     #[error(transparent)]
     Resolve(Box<dyn std::error::Error + Send + Sync>),
-    /// The request contradicts itself.
+    /// The request is inconsistent.
     #[error("{0}")]
     Request(String),
 }
 
 impl JobError {
-    /// That a file cannot be written, by what can be done about it.
+    /// The error for a file that cannot be written.
     pub fn writing(path: &Path, source: io::Error) -> Self {
         Self::io(path, "writing", source)
     }
 
-    /// Sorts an error of the system by what can be done about it.
-    pub(crate) fn io(path: &Path, doing: &'static str, source: io::Error) -> Self {
+    /// Chooses the variant by the kind of the I/O error.
+    pub(crate) fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
         let path = path.to_owned();
         match source.kind() {
             io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
@@ -182,15 +183,15 @@ impl JobError {
             }
             _ => Self::Io {
                 path,
-                doing,
+                action,
                 source,
             },
         }
     }
 }
 
-/// The first of `paths`, and how many more there are.
-fn existing(paths: &[PathBuf]) -> String {
+/// The first of `paths`, and the number of the others.
+fn first_of(paths: &[PathBuf]) -> String {
     let first = paths.first().map(|path| path.display().to_string());
     let first = first.unwrap_or_default();
     match paths.len() {
@@ -200,12 +201,13 @@ fn existing(paths: &[PathBuf]) -> String {
     }
 }
 
-/// The first few of `items`, and how many more there are.
-fn listed(items: &[impl fmt::Display]) -> String {
-    const SHOWN: usize = 8;
-    let mut text: Vec<String> = items.iter().take(SHOWN).map(ToString::to_string).collect();
-    if items.len() > SHOWN {
-        text.push(format!("and {} more", items.len() - SHOWN));
+/// The first few of `items`, and the number of the others.
+fn list_some(items: &[impl fmt::Display]) -> String {
+    const MAX_SHOWN: usize = 8;
+    let shown = items.iter().take(MAX_SHOWN);
+    let mut text: Vec<String> = shown.map(ToString::to_string).collect();
+    if items.len() > MAX_SHOWN {
+        text.push(format!("and {} more", items.len() - MAX_SHOWN));
     }
     text.join("; ")
 }

@@ -1,5 +1,4 @@
-//! Why a command could not start. Messages are those of the libraries; commands only add what they
-//! alone know.
+//! Errors of commands.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -26,11 +25,11 @@ pub(super) enum CliError {
     Other(String),
 }
 
-/// The system's words, with the remedy where there is one.
+/// The message of the operating system, with a remedy if there is one.
 fn reason(error: &io::Error) -> String {
     match error.kind() {
         io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-            "no space left; free some and give the same command again".to_owned()
+            "no space left; free some and run the same command again".to_owned()
         }
         _ => error.to_string(),
     }
@@ -42,7 +41,7 @@ impl CliError {
         move |source| Self::Io { path, source }
     }
 
-    /// What is wrong, each on a line of its own.
+    /// The messages, one per line.
     pub(super) fn messages(&self) -> Vec<String> {
         match self {
             Self::Manifest(error) => error.messages().to_vec(),

@@ -13,13 +13,13 @@ use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::write;
 use spherule_jobs::Interrupt;
 
-use super::numbers::{USUAL_BOUND, not_negative, positive};
+use super::numbers::{DEFAULT_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
 use crate::metrics::Bytes;
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping",
-    at_once: "stopped",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping",
+    stopped: "stopped",
 };
 
 const EXAMPLES: &str = "\
@@ -116,8 +116,8 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
             has_velocity: args.velocity,
         })),
     };
-    let signals = signals::listen(WORDS)?;
-    let until = Until(signals.at_work());
+    let signals = signals::listen(SIGNAL_MESSAGES)?;
+    let until = Until(signals.start_work());
     match write(format, &*source, common, &until) {
         Err(ConvertError::Interrupted) => return Ok(Outcome::Interrupted),
         result => result.map_err(|e| CliError::Other(e.to_string()))?,
@@ -128,7 +128,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
         output,
         ..
     } = common;
-    say!("{}: {particles} particles, seed {seed}", output.display());
+    message!("{}: {particles} particles, seed {seed}", output.display());
     Ok(Outcome::Done)
 }
 
@@ -182,7 +182,7 @@ fn write(
             let report = convert(source, path, &args.settings(source), until)?;
             let phases = report.seconds.iter();
             let seconds = phases.map(|(phase, s)| format!("{} {s:.2} s", phase.name()));
-            say!(
+            message!(
                 "{}, largest error {:.3e}, parts {}, memory {}, put aside {}: {}",
                 report.index.encoding(),
                 report.index.max_error,
@@ -199,7 +199,7 @@ fn write(
 impl CommonArgs {
     fn settings(&self, source: &dyn ParticleSource) -> ConvertSettings {
         let is_plain = self.max_error.is_none() && self.encoding.is_none();
-        let usual = source.common_radius().map(|_| USUAL_BOUND);
+        let usual = source.common_radius().map(|_| DEFAULT_BOUND);
         ConvertSettings {
             encoding: self.encoding.or(is_plain.then_some(Encoding::F32)),
             bound: match self.max_error.or(usual) {

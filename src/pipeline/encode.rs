@@ -11,15 +11,15 @@ use spherule_jobs::{Job, JobError, Publisher, publish};
 
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::{ClaimedFrame, Event, Stage, StageResult, Watch};
+use super::{ClaimedFrame, Event, OnEvent, Stage, StageResult};
+use crate::failure::is_output_unavailable;
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::mishap::is_place_at_fault;
 use crate::output::{CustomAttribute, ExrOptions, OutputError, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
 
-/// Reasons why an image could not be written.
+/// Why an image cannot be written.
 #[derive(Debug, thiserror::Error)]
 pub(super) enum WriteError {
     /// Encoding failed.
@@ -35,11 +35,11 @@ pub(super) enum WriteError {
     },
 }
 
-/// Channels to notify when an image has been written. Their receivers may have ended.
-pub(super) struct WriteSignals {
-    /// To the reader, if it waits for that before it reads the next frame.
+/// Channels to earlier stages, for use after an image is written. The receivers may have ended.
+pub(super) struct AfterWrite {
+    /// To the reader, without overlap: read the next frame.
     pub(super) is_written: Option<SyncSender<()>>,
-    /// To the tracer, for the planes to be reused.
+    /// To the tracer: reuse the planes.
     pub(super) films: Option<Sender<Film>>,
 }
 
@@ -47,20 +47,19 @@ pub(super) fn write_stage(
     setup: &Setup,
     sequence: &Sequence,
     traced: Receiver<ClaimedFrame<TracedFrame>>,
-    next: &WriteSignals,
+    next: &AfterWrite,
     job: &mut Job,
-    watch: Watch,
+    on_event: OnEvent,
 ) -> Result<(), JobError> {
     let mut peaks = MemoryPeaks::default();
     let mut image_before = Instant::now();
     for ClaimedFrame { claim, result } in traced {
         match result {
             StageResult::Frame(frame) => {
-                watch(Event::Entered(frame.task.frame, Stage::Write));
-                // Stop if another worker has taken over
+                on_event(Event::StageEntered(frame.task.frame, Stage::Write));
                 if !claim.is_valid() {
                     let dir = job.state().dir().to_owned();
-                    return Err(JobError::TakenForDead { dir });
+                    return Err(JobError::DeclaredDead { dir });
                 }
                 // Encode and publish the image
                 let task = frame.task.clone();
@@ -80,26 +79,25 @@ pub(super) fn write_stage(
                             .cloned()
                             .collect();
                         job.record_done(task.frame, &outputs, json!(report))?;
-                        watch(Event::Done(&task, &report));
+                        on_event(Event::Done(&task, &report));
                     }
-                    // The disk is at fault, not the frame, which remains to be done.
-                    Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
+                    // Not a failure of the frame, which stays pending
+                    Err(WriteError::Io { path, source }) if is_output_unavailable(&source) => {
                         return Err(JobError::writing(&path, source));
                     }
                     Err(error) => {
                         let reason = error.to_string();
-                        watch(Event::Failed(task.frame, &reason));
+                        on_event(Event::Failed(task.frame, &reason));
                         job.record_failed(task.frame, &reason, json!(null))?;
                     }
                 }
             }
             StageResult::Failed(task, reason) => {
-                watch(Event::Failed(task.frame, &reason));
+                on_event(Event::Failed(task.frame, &reason));
                 job.record_failed(task.frame, &reason, json!(null))?;
             }
         }
-        // Release the frame, and let the next one be read
-        claim.end();
+        claim.complete();
         if let Some(is_written) = &next.is_written {
             let _ = is_written.send(());
         }
@@ -107,7 +105,7 @@ pub(super) fn write_stage(
     Ok(())
 }
 
-/// Encodes and publishes the images of `frame`. Returns the completed report, and the planes for reuse.
+/// Encodes and publishes the images of `frame`. Returns the complete report and the planes, which can be reused.
 pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
@@ -120,7 +118,7 @@ pub(super) fn write_frame(
         let path = path.to_owned();
         move |source| WriteError::Io { path, source }
     };
-    // Publish the preview first: a ledger line vouches for both, and the EXR is the file that users wait for
+    // The preview first: users wait for the EXR, and the ledger entry covers both
     if let Some(path) = &task.preview {
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
         publish(path, &png).map_err(at(path))?;
@@ -157,14 +155,14 @@ pub(super) fn write_frame(
     Ok((report, film))
 }
 
-/// Samples the memory in use when the first bytes are written: all memory of encoding is allocated then.
+/// Samples memory use during the first writes, when all buffers of the encoder exist.
 struct MemorySampler<'a, W> {
     out: &'a mut W,
     peaks: &'a mut MemoryPeaks,
     samples: u32,
 }
 
-/// Number of writes to sample: the header is written before blocks are compressed.
+/// Number of writes with a sample. The header is written before blocks are compressed.
 const MAX_SAMPLES: u32 = 16;
 
 impl<W: Write> Write for MemorySampler<'_, W> {
@@ -187,7 +185,7 @@ impl<W: Seek> Seek for MemorySampler<'_, W> {
     }
 }
 
-/// Options for the EXR of `frame`, with an attribute of metadata for compositing.
+/// Options of the EXR of `frame`, including an attribute with data for compositing.
 fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,

@@ -11,8 +11,8 @@ use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
+use crate::failure::may_be_incomplete;
 use crate::metrics::memory::{available, process_room};
-use crate::mishap::may_be_unfinished;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -130,7 +130,7 @@ impl LoadedFrame {
 /// Marks errors of the last frame of a sequence, which may still be growing.
 fn newest(error: LoadError, sequence: &Sequence, task: &ImageTask) -> LoadError {
     match error {
-        LoadError::Frame(error) if may_be_unfinished(sequence, task.index, &error) => {
+        LoadError::Frame(error) if may_be_incomplete(sequence, task.index, &error) => {
             LoadError::Newest(error)
         }
         other => other,

@@ -1,4 +1,4 @@
-//! Renders a single image; no other frame is in memory.
+//! Renders one image, with no other frame in memory.
 
 use std::io;
 use std::path::PathBuf;
@@ -14,54 +14,54 @@ use super::load::load_frame;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use super::trace::renderer_of;
+use crate::failure::{catch_panic, is_output_unavailable};
 use crate::metrics::MemoryPeaks;
-use crate::mishap::{guarded, is_place_at_fault};
 use crate::output::encode_preview;
 use crate::report::FrameReport;
 
 /// Reasons why there is no image.
 #[derive(Debug)]
-pub enum SingleFault {
-    /// The frame is at fault, with the reason.
+pub enum ImageError {
+    /// This frame failed, for this reason.
     Frame(String),
-    /// Further images would fail as well: the file that was being written, and the error of the system.
-    Place(PathBuf, io::Error),
+    /// The output cannot be written, so further images would fail too: the file, and the error of the system.
+    OutputUnavailable(PathBuf, io::Error),
 }
 
-/// File format of a picture outside a job.
+/// The file format of a picture outside a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum PictureKind {
-    /// OpenEXR, as a job writes it.
+    /// OpenEXR, like the images of a job.
     Exr,
-    /// PNG, as the previews of a job.
+    /// PNG, like the previews of a job.
     Png,
 }
 
-/// Renders the image of `task` with its preview; notes for the user go to `note`.
+/// Renders the image of `task` with its preview. Passes notes for the user to `note`.
 ///
 /// # Errors
-/// See [`SingleFault`]; no files remain then.
+/// See [`ImageError`]. No file is left behind.
 pub fn make_image(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
     note: impl FnMut(&str),
-) -> Result<FrameReport, SingleFault> {
+) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
     write_guarded(|| write_exr(setup, traced))
 }
 
-/// Renders only the image of `task`, to a file of this `kind`; notes for the user go to `note`.
+/// Renders only the image of `task`, in a file of this `kind`. Passes notes for the user to `note`.
 ///
 /// # Errors
-/// See [`SingleFault`]; no files remain then.
+/// See [`ImageError`]. No file is left behind.
 pub fn make_picture(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
     kind: PictureKind,
     note: impl FnMut(&str),
-) -> Result<FrameReport, SingleFault> {
+) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
     write_guarded(|| match kind {
         PictureKind::Exr => write_exr(setup, traced),
@@ -74,9 +74,8 @@ fn trace_single(
     sequence: &Sequence,
     task: &ImageTask,
     mut note: impl FnMut(&str),
-) -> Result<TracedFrame, SingleFault> {
-    let traced = guarded(|| {
-        // Read the frame
+) -> Result<TracedFrame, ImageError> {
+    let traced = catch_panic(|| {
         let mut frame = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
         std::mem::take(&mut frame.notes)
             .iter()
@@ -92,7 +91,7 @@ fn trace_single(
             .render(setup, built, &stop)
             .map_err(|e| e.to_string())
     });
-    traced.map_err(SingleFault::Frame)
+    traced.map_err(ImageError::Frame)
 }
 
 fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, WriteError> {
@@ -112,12 +111,12 @@ fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, WriteErr
 
 fn write_guarded(
     write: impl FnOnce() -> Result<FrameReport, WriteError>,
-) -> Result<FrameReport, SingleFault> {
-    match guarded(|| Ok(write())).map_err(SingleFault::Frame)? {
+) -> Result<FrameReport, ImageError> {
+    match catch_panic(|| Ok(write())).map_err(ImageError::Frame)? {
         Ok(report) => Ok(report),
-        Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
-            Err(SingleFault::Place(path, source))
+        Err(WriteError::Io { path, source }) if is_output_unavailable(&source) => {
+            Err(ImageError::OutputUnavailable(path, source))
         }
-        Err(error) => Err(SingleFault::Frame(error.to_string())),
+        Err(error) => Err(ImageError::Frame(error.to_string())),
     }
 }

@@ -1,8 +1,8 @@
-//! A job's frames as work for the engines that clusters and render farms have: texts that call one
-//! program again and again, each time with other frames.
+//! Exports the frames of a job to the schedulers of clusters and render farms: as a script or template that runs
+//! one program repeatedly, each time with other frames.
 //!
-//! Here is known what frames, chunks and a command line are; what the command does is the caller's.
-//! Nothing is written to disk.
+//! This module knows frames, chunks and command lines. It does not know what the command does, and it writes
+//! nothing to disk.
 
 mod chunks;
 pub mod openjd;
@@ -14,23 +14,23 @@ mod tree;
 pub use chunks::{ChunkChoice, Chunks};
 pub use time::TimeLimit;
 
-/// Why there is no text for an engine.
+/// Why a job cannot be exported.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ExportError {
-    /// Something that the engine's text cannot hold.
+    /// A text that the script or template cannot contain.
     #[error("{what}: {text:?} {why}")]
     Text {
-        /// What it is: `log directory`.
+        /// Name of the value: `log directory`.
         what: &'static str,
         /// The text.
         text: String,
-        /// What is wrong with it, and the remedy.
+        /// Reason and remedy.
         why: String,
     },
-    /// Settings that do not go together.
+    /// Inconsistent settings.
     #[error("{0}")]
     Settings(String),
-    /// There is nothing to do.
+    /// There are no frames.
     #[error("there are no frames to export")]
     NoFrames,
 }

@@ -9,8 +9,8 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 use super::ScaleArgs;
 use crate::accel::Structure;
 use crate::cli::CliError;
+use crate::cli::job::useful_threads;
 use crate::cli::paths::absolute;
-use crate::cli::work::useful_threads;
 use crate::scale::report::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 

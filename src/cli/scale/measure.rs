@@ -10,7 +10,7 @@ pub(in crate::cli) const COMMAND: &str = "scale-cell";
 
 /// Reads the task, does it, prints what came of it or why nothing did.
 pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
-    let task: Task = child::task("scale")?;
+    let task: Task = child::read_task("scale")?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(task.threads())
         .build_global()

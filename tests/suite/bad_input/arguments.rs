@@ -252,7 +252,7 @@ fn frame_ranges() {
     for (range, wanted) in [
         (
             "900",
-            "input.frames: 900 has none of the frames that there are: 1-3",
+            "input.frames: 900 contains none of the frames of the input: 1-3",
         ),
         (
             "3-",
@@ -381,7 +381,7 @@ fn patterns_and_ranges_of_any_size() {
     for (range, wanted) in [
         ("1-99999999999999999999", "does not fit in 64 bits"),
         ("1-10x99999999999999999999", "does not fit in 64 bits"),
-        ("0-9000000000000000000x7", "has none of the frames"),
+        ("0-9000000000000000000x7", "contains none of the frames"),
     ] {
         not_rendered(&workshop, &["--frames", range], &[wanted]);
     }
@@ -463,9 +463,9 @@ fn conversions_write_directories() {
     for (output, wanted) in [
         (
             "x.vtk",
-            "x.vtk: is a file's name: convert writes native frames (.spf) alone",
+            "x.vtk: has the extension of another format: convert writes only native frames (.spf)",
         ),
-        ("x.csv.gz", "name a directory, as in -o x"),
+        ("x.csv.gz", "give a directory, as in -o x"),
     ] {
         refused(&workshop, &["convert", "in", "-o", output], &[wanted]);
         assert!(!workshop.join(output).exists());

@@ -124,7 +124,7 @@ fn one_converted_frame_has_the_name_it_was_given() {
     refused(
         &workshop,
         &one,
-        &["one.spf: is one name for 3 frames", "--frames"],
+        &["one.spf: one file name for 3 frames", "--frames"],
     );
 }
 
@@ -132,7 +132,7 @@ fn one_converted_frame_has_the_name_it_was_given() {
 fn a_file_in_the_place_of_the_directory() {
     let workshop = three_frames();
     fs::write(workshop.join("out"), "a file").expect("a file");
-    let wanted = "out: is a file where a directory for the images should be; choose another output";
+    let wanted = "out: is a file, but a directory for the images is needed; choose another output";
     not_there(&workshop, "out/f.####.exr", &[wanted]);
     not_there(&workshop, "out/deep/er/f.####.exr", &[wanted]);
     assert_eq!(fs::read(workshop.join("out")).expect("a file"), b"a file");
@@ -235,8 +235,8 @@ fn a_manifest_of_somebody_else_is_not_overwritten() {
     let ran = workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.toml: is in the way of this job's own manifest")
-        .tells("choose another output directory, or move it away");
+        .tells("out/job.toml: this job would write its manifest here")
+        .tells("choose another output directory, or move the file away");
     assert!(ran.rendered().is_empty());
     workshop.render(&["--force"]).expect(2);
     let left = files(&workshop.join("out"));
