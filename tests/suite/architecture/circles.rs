@@ -35,37 +35,13 @@ const ALLOWED: &[Allowed] = &[
     },
     Allowed {
         source: "jobs/src",
-        files: &["work::claim", "work::desk"],
-        why: "a claim is released at the desk that it was made at",
+        files: &["workers::claim", "workers::registry"],
+        why: "a claim is acquired and released through the registry of its worker",
     },
     Allowed {
         source: "formats/src",
         files: &["attribute", "scalar"],
         why: "a type of numbers and the columns of that type make one another",
-    },
-    Allowed {
-        source: "formats/src",
-        files: &[
-            "detect",
-            "open",
-            "read::csv",
-            "read::input",
-            "read::lammps",
-            "read::remarks",
-            "read::table",
-            "read::xyz",
-            "unpack",
-        ],
-        why: "detection asks the readers of text, which open packed files",
-    },
-    Allowed {
-        source: "formats/src",
-        files: &[
-            "read::vtk::attributes",
-            "read::vtk::keywords",
-            "read::vtk::payload",
-        ],
-        why: "keywords end a payload of text and begin attributes",
     },
     Allowed {
         source: "formats/src",
