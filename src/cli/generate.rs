@@ -183,7 +183,7 @@ fn write(
             let phases = report.seconds.iter();
             let seconds = phases.map(|(phase, s)| format!("{} {s:.2} s", phase.name()));
             message!(
-                "{}, largest error {:.3e}, parts {}, memory {}, put aside {}: {}",
+                "{}, largest error {:.3e}, parts {}, memory {}, temporary files {}: {}",
                 report.index.encoding(),
                 report.index.max_error,
                 report.parts,
@@ -218,7 +218,7 @@ pub(super) fn count(text: &str) -> Result<usize, String> {
     if let Ok(count) = plain.parse() {
         return Ok(count);
     }
-    let wrong = || format!("`{text}` is no number of particles, as 100000 or 1e5");
+    let wrong = || format!("invalid particle count `{text}` (examples: 100000, 1e5)");
     let value: f64 = plain.parse().map_err(|_| wrong())?;
     // All integers to 2^53 are exact in f64, and no frame holds more.
     if value.fract() != 0.0 || !(0.0..=9e15).contains(&value) {

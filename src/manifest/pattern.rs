@@ -118,7 +118,7 @@ fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
         let digits = rest.bytes().take_while(|b| *b == b'#').count();
         return Ok(Some((start, start + digits, at_most(digits)?)));
     }
-    let unknown = || format!("`{rest}` is no frame number; use #### or %04d");
+    let unknown = || format!("invalid frame number `{rest}`; use #### or %04d");
     let width = rest[1..].find('d').ok_or_else(unknown)?;
     let digits = match &rest[1..=width] {
         "" => 1,

@@ -45,7 +45,7 @@ impl Look {
             let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
             let hint = nearest(name, &known).map(|n| format!("; did you mean {n}?"));
             format!(
-                "--look {name}: there is no such look, known are: {}{}",
+                "unknown look `{name}`; available: {}{}",
                 known.join(", "),
                 hint.unwrap_or_default()
             )
@@ -137,7 +137,7 @@ mod tests {
     fn an_unknown_look_names_the_known() {
         let error = Look::named("watre").unwrap_err();
         assert!(
-            error.contains("known are: water; did you mean water?"),
+            error.contains("available: water; did you mean water?"),
             "{error}"
         );
         assert!(!Look::named("lava").unwrap_err().contains("did you mean"));

@@ -480,8 +480,8 @@ fn sets_that_will_not_do() {
     wrong("light.1.intensity=1", "light.1: the list has no such item");
     for (set, part) in [
         ("a", "no `=`"),
-        ("a..b=1", "dotted key"),
-        ("=1", "dotted key"),
+        ("a..b=1", "invalid key"),
+        ("=1", "invalid key"),
         ("a=[1", "--set a=[1: "),
     ] {
         let error = Override::parse(set).unwrap_err();

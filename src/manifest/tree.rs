@@ -96,7 +96,7 @@ impl Override {
 fn split_key(key: &str) -> Result<Vec<String>, String> {
     let keys: Vec<String> = key.split('.').map(|k| k.trim().to_owned()).collect();
     if keys.iter().any(String::is_empty) {
-        return Err(format!("`{key}` is no dotted key, as render.max_depth is"));
+        return Err(format!("invalid key `{key}` (example: render.max_depth)"));
     }
     Ok(keys)
 }

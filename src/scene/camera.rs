@@ -72,7 +72,7 @@ pub enum CameraError {
     #[error("a coordinate is not a finite number")]
     NotFinite,
     /// A coordinate exceeds the range of f32.
-    #[error("eye or look_at is too far away for single precision, whose numbers end at 3e38")]
+    #[error("eye or look_at is too far away for single precision (limit 3e38)")]
     TooFar,
     /// `eye` and `look_at` are the same point.
     #[error("eye and look_at are the same point; move one of them")]
@@ -81,7 +81,7 @@ pub enum CameraError {
     #[error("up is zero or points along the view; choose another camera.up")]
     NoUp,
     /// Field of view outside 0 to 180 degrees.
-    #[error("fov must lie above 0 and below 180 degrees")]
+    #[error("fov must be above 0 and below 180 degrees")]
     FieldOfView,
     /// The aspect ratio is zero, negative or not finite.
     #[error("image width over height must be above 0")]

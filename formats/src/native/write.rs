@@ -118,7 +118,7 @@ impl FrameWriter {
     pub fn create(path: &Path, spec: FrameSpec) -> io::Result<Self> {
         if cfg!(target_endian = "big") {
             let what =
-                "native frames are written as they lie in the memory of little-endian machines";
+                "native frames can only be written on little-endian machines";
             return Err(io::Error::new(io::ErrorKind::Unsupported, what));
         }
         let sections = sections_of(&spec)

@@ -281,11 +281,11 @@ fn every_fault_has_its_name() {
     );
     assert_eq!(
         fault_of(&|owned| owned.nodes[8].child_mask = 3),
-        "node 8 does not have the blocks that lie below it"
+        "node 8 does not have the blocks below it"
     );
     assert_eq!(
         fault_of(&|owned| owned.nodes[7] = bytemuck::Zeroable::zeroed()),
-        "node 7 does not have the blocks that lie below it"
+        "node 7 does not have the blocks below it"
     );
     for (origin, exponent) in [(f32::INFINITY, 100), (1e38, 100), (0.0, 255), (0.0, 254)] {
         let fault = fault_of(&|owned| {

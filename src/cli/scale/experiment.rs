@@ -121,11 +121,11 @@ fn check_pairs(
     }
     if !structures.contains(&Structure::Kdtree) {
         return Err(CliError::other(format!(
-            "--representations {names}: native frames lie in k-d order and are traced where they lie: \
+            "--representations {names}: native frames are in k-d order and are traced in place: \
              add kdtree to --structures, or measure these structures in memory"
         )));
     }
-    note!("native frames ({names}) are traced where they lie, in k-d order: with kdtree alone");
+    note!("native frames ({names}) are traced in place, in k-d order: with kdtree only");
     Ok(())
 }
 

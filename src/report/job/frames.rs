@@ -50,7 +50,7 @@ impl JobReport {
             table.bad_row([
                 frame.number.to_string(),
                 frame.image.clone().unwrap_or_default(),
-                shortened(frame.reason.as_deref().unwrap_or("not told"), MOST_TEXT),
+                shortened(frame.reason.as_deref().unwrap_or("not recorded"), MOST_TEXT),
             ]);
         }
         page.table(&table);

@@ -58,7 +58,7 @@ fn typing_errors_get_the_nearest_word() {
     not_rendered(
         &workshop,
         &["--look", "watr"],
-        &["--look watr: there is no such look", "did you mean water?"],
+        &["unknown look `watr`", "did you mean water?"],
     );
     refused(&workshop, &["render"], &["<INPUT>"]);
 }

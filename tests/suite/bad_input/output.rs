@@ -58,7 +58,7 @@ fn names_that_will_not_do() {
     not_there(
         &workshop,
         "out/%q.exr",
-        &["output.path: `%q.exr` is no frame number; use #### or %04d"],
+        &["output.path: invalid frame number `%q.exr`; use #### or %04d"],
     );
     not_there(
         &workshop,

@@ -98,7 +98,7 @@ fn what_cannot_be_meant_is_refused() {
             &["--no-attributes", "--attributes", "a:off"],
             "cannot be used with",
         ),
-        (&["--memory", "much"], "is no size"),
+        (&["--memory", "much"], "invalid size"),
         (
             &["--frames", "7-9"],
             "--frames: 7-9 contains none of the frames of the input: 1",

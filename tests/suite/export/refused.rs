@@ -38,7 +38,7 @@ fn jobs_that_cannot_be_exported() {
         &with(&["--mem", "16"]),
         "write the unit, as in 4GiB",
     );
-    refused(&workshop, &with(&["--mem", "lots"]), "is no size");
+    refused(&workshop, &with(&["--mem", "lots"]), "invalid size");
     refused(&workshop, &with(&["--chunk", "0"]), "--chunk");
     refused(&workshop, &with(&["--cpus", "0"]), "--cpus");
     let text = fs::read_to_string(&manifest).expect("a manifest");

@@ -101,7 +101,7 @@ impl Compressor {
             Ok(())
         } else {
             Err(format!(
-                "it holds {written} bytes or more, its header says {wanted}"
+                "it holds {written} bytes or more, but its header has {wanted}"
             ))
         }
     }
