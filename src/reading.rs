@@ -31,7 +31,7 @@ pub fn conversion_budget(memory: Option<u64>) -> MemoryBudget {
     least([of_conversion, None])
 }
 
-/// The least of `asked` and of the budgets of process and machine.
+/// The smallest of the `asked` budgets and those of process and machine.
 fn least(asked: [Option<MemoryBudget>; 2]) -> MemoryBudget {
     let of_process = process_room().map(|bytes| {
         let remedy = "raise the memory limit of the process (ulimit, --memory-ceiling)";

@@ -308,7 +308,9 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
     })
 }
 
+/// The source of the colours of particles; "auto" depends on the attributes that exist.
 fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
+    // Maps an attribute. The default range is that of the survey
     let mapped = |name: &str, map: Option<MapName>, range: Option<[f64; 2]>, required: bool| {
         let found = survey
             .color

@@ -101,6 +101,7 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        // Only the fixed mode has the keys `eye` and `look_at`, and requires both
         let own = match self.mode {
             CameraMode::Auto => Some("the automatic camera finds its own; say mode = \"fixed\""),
             CameraMode::Turntable => {
@@ -120,6 +121,7 @@ impl Camera {
                 _ => {}
             }
         }
+        // Check that the view is valid
         if self.mode == CameraMode::Fixed
             && let (Some(eye), Some(look_at)) = (self.eye, self.look_at)
         {

@@ -9,7 +9,7 @@ use super::reader::Section;
 use super::value::{Slot, Value};
 
 /// Declares a table of the manifest: a struct, its defaults and its keys. The doc comment of a field is the text that
-/// users read; its first paragraph is the comment in the file. A field after `@` has keys of its own.
+/// users read; its first paragraph is the comment in the file. A field after `@` is itself a table with keys.
 macro_rules! section {
     ($(#[doc = $about:literal])+ $name:ident {
         $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr

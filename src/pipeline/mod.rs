@@ -2,7 +2,7 @@
 //!
 //! One frame is in flight per stage, handed over without a queue, so memory is constant however long the sequence is.
 //! Reading waits until the tree of the previous frame is built: building takes little time, and releases the
-//! positions of that frame. Reading has threads of its own, so that it never waits for tracing. The planes of a
+//! positions of that frame. Reading uses separate threads, so it never waits for tracing. The planes of a
 //! written image are returned to the tracer. The last stage records every frame in the ledger of the job, after its
 //! image. [`Setup`] defines the pictures in advance.
 

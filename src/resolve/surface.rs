@@ -24,6 +24,7 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
         let what = what.to_owned();
         Err(ResolveError::Unsupported { key, what })
     };
+    // Reject normals and options that the surface does not support
     match (surface.kind, surface.normals) {
         (SurfaceKind::Spheres, NormalKind::Field) => {
             return unsupported(

@@ -35,6 +35,7 @@ pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String>
         .map_err(|e| e.to_string())?;
     let seconds = start.elapsed().as_secs_f64();
     let meta = path.metadata();
+    // The maximum error is also given relative to the smallest radius
     let smallest = match index.radius {
         RadiusIndex::None => 0.0,
         RadiusIndex::Common(radius) => f64::from(radius),

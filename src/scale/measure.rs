@@ -125,6 +125,7 @@ pub(super) fn trace(
     };
     let mut spent = 0.0;
     for index in 0.. {
+        // Stop if the budget is spent, otherwise choose a position on the path
         let place = match request.budget {
             Budget::Images(count) if index == count => break,
             Budget::Images(count) => f64::from(index) / f64::from(count),
@@ -135,6 +136,7 @@ pub(super) fn trace(
             .stage
             .scene(request.motion, place, aspect)
             .map_err(|e| format!("camera: {e}"))?;
+        // Trace one image, and measure its time without preparation or release
         let start = Instant::now();
         let (film, rays) =
             render(&[&surface], &scene, &shading, &settings, &never).map_err(|e| e.to_string())?;

@@ -181,6 +181,7 @@ impl FrameSurvey {
                 path.display()
             ));
         }
+        // Frame the spheres, which extend beyond their centres
         let reach = f64::from(survey.radius.unwrap_or(0.0).max(survey.reach));
         let bounds = Bounds {
             min: survey.min - reach,

@@ -247,6 +247,7 @@ impl Survey {
                 }
             }
         }
+        // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
             _ => Ok(totals.finish(if sequence.is_y_up() {

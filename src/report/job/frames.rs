@@ -86,6 +86,7 @@ impl JobReport {
             page.text("No frame has been tried yet.");
             return;
         }
+        // Choose frames at equal distances, to limit the size of the page
         let mut table = Table::new("all-frames", &HEADS);
         let chosen = evenly(tried.len(), MOST_FRAMES);
         let all = chosen.len() == tried.len();
