@@ -8,25 +8,25 @@ pub(super) const DEFAULT_BOUND: f64 = 0.02;
 /// A number of pixels. The manifest checks the range.
 pub(super) fn pixels(text: &str) -> Result<i64, String> {
     text.parse()
-        .map_err(|_| "wants a number of pixels, as in --width 3840 --height 2160".to_owned())
+        .map_err(|_| "expected a number of pixels, such as --width 3840 --height 2160".to_owned())
 }
 
 /// A whole number in any range.
 pub(super) fn whole(text: &str) -> Result<i64, String> {
     text.parse()
-        .map_err(|_| "wants a whole number, as in 16".to_owned())
+        .map_err(|_| "expected a whole number, such as 16".to_owned())
 }
 
 /// A number in any range.
 pub(super) fn number(text: &str) -> Result<f64, String> {
     text.parse()
-        .map_err(|_| "wants a number, as in 0.5".to_owned())
+        .map_err(|_| "expected a number, such as 0.5".to_owned())
 }
 
 /// A number of seconds in any range.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     text.parse()
-        .map_err(|_| "wants seconds as a number, as in 90 for a minute and a half".to_owned())
+        .map_err(|_| "expected seconds as a number, such as 90 for a minute and a half".to_owned())
 }
 
 /// A number of pixels from 1 to `max`.

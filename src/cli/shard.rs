@@ -27,12 +27,12 @@ impl FromStr for Shard {
     type Err = &'static str;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        const EXPECTED: &str = "wants two whole numbers such as 2/4, the second of four parts";
+        const EXPECTED: &str = "expected two whole numbers such as 2/4, the second of four parts";
         let (index, count) = text.split_once('/').ok_or(EXPECTED)?;
         let parse = |text: &str| text.trim().parse().map_err(|_| EXPECTED);
         let (index, count) = (parse(index)?, parse(count)?);
         if index == 0 || index > count {
-            return Err("the part must be from 1 to the number of parts, as in 1/4 to 4/4");
+            return Err("the part must be from 1 to the number of parts, such as 1/4 to 4/4");
         }
         Ok(Self { index, count })
     }

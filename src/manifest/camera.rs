@@ -116,7 +116,7 @@ impl Camera {
                     section.wrong(key, &format!("is given, but {own}"));
                 }
                 None if section.lacks(key) => {
-                    section.missing(key, "a fixed camera needs it, as [5.0, 5.0, 0.0]");
+                    section.missing(key, "a fixed camera needs it, such as [5.0, 5.0, 0.0]");
                 }
                 _ => {}
             }

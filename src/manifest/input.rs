@@ -163,7 +163,8 @@ impl Value for RadiusSetting {
             return length.map(Self::Length).ok_or(Fault::Unwanted);
         };
         let (mut attribute, mut scale) = (String::new(), 1.0);
-        let name = Key::new("attribute", &[]).required("the name of an attribute, as \"radius\"");
+        let name =
+            Key::new("attribute", &[]).required("the name of an attribute, such as \"radius\"");
         section.read(&name, &mut attribute);
         section.read(&Key::new("scale", &[]).above(0), &mut scale);
         section.finish();

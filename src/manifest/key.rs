@@ -254,7 +254,7 @@ impl Key {
     }
 
     /// Description of the expected value for messages.
-    pub(super) fn wants<T: Value>(&self) -> String {
+    pub(super) fn expected<T: Value>(&self) -> String {
         let kind = T::kind(self);
         match self.word {
             Some(word @ "all") => format!("\"{word}\" or {kind}"),

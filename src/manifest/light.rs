@@ -99,14 +99,14 @@ impl Light {
         match &mut self.kind {
             LightKind::Point { position, falloff } => keys!(keys:
                 /// Position of the light
-                position => *position, required("a point light needs it, as [0.0, 0.0, 10.0]");
+                position => *position, required("a point light needs it, such as [0.0, 0.0, 10.0]");
                 /// Falloff with distance: none | inverse-square
                 falloff => *falloff;
             ),
             LightKind::Directional { direction } => keys!(keys:
                 /// Direction in which the light travels
                 direction => *direction, direction(),
-                    required("a directional light needs the direction in which it travels, as [0.0, 0.0, -1.0]");
+                    required("a directional light needs the direction in which it travels, such as [0.0, 0.0, -1.0]");
             ),
         }
         keys!(keys:

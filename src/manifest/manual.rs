@@ -61,7 +61,7 @@ fn row(entry: &Entry) -> String {
     let key = &entry.declared;
     let range = key.range();
     let kind = entry.kind.replacen(&range, "", 1);
-    let kind = kind.split(", as ").next().unwrap_or_default();
+    let kind = kind.split(", such as ").next().unwrap_or_default();
     let kind = match key.word {
         Some(word) => format!("{kind}, or `\"{word}\"`"),
         None => kind.to_owned(),

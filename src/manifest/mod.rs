@@ -319,7 +319,7 @@ const ABOUT: &str =
     "A spherule job. Paths are relative to this file; lengths are those of the simulation.";
 
 const NEEDS_NUMBER: &str =
-    "several frames would get the same name; put #### into it, as in frame.####.exr";
+    "several frames would get the same name; put #### into the name (example: frame.####.exr)";
 
 const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
                        first and after the last.";

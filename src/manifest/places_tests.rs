@@ -147,11 +147,11 @@ fn keys_in_inline_tables() {
 fn values_in_every_kind_of_table() {
     told_below(
         "[job]\nsettle = \"soon\"",
-        "line 4, column 10: job.settle: wants seconds from 0 to 1e9, not the text \"soon\"",
+        "line 4, column 10: job.settle: expected seconds from 0 to 1e9, found the text \"soon\"",
     );
     told_below(
         "[[light]]\ntype = \"spot\"",
-        "line 4, column 8: light.0.type: wants one of point, directional, not the text \"spot\"",
+        "line 4, column 8: light.0.type: expected one of point, directional, found the text \"spot\"",
     );
     told(
         "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",

@@ -105,7 +105,7 @@ impl<'a> Section<'a> {
         };
         let items = field.items().unwrap_or_else(|| {
             field.fail(&format!(
-                "wants a list of tables, as [[{}]] begins, not {}",
+                "expected a list of tables, such as [[{}]] begins, found {}",
                 field.key,
                 field.node.describe()
             ));
@@ -194,8 +194,8 @@ impl<'a> Field<'a> {
             Err(Fault::Unwanted) => {
                 let text = self.as_text().unwrap_or_default();
                 let hint = nearest(text, &T::words()).map(|n| format!("; did you mean {n}?"));
-                let (wants, hint) = (key.wants::<T>(), hint.unwrap_or_default());
-                format!("wants {wants}, not {}{hint}", self.node.describe())
+                let (expected, hint) = (key.expected::<T>(), hint.unwrap_or_default());
+                format!("expected {expected}, found {}{hint}", self.node.describe())
             }
         };
         self.fail(&what);
@@ -267,7 +267,7 @@ impl<'a> Field<'a> {
     fn section(&self) -> Option<Section<'a>> {
         let table = self.as_table();
         if table.is_none() {
-            self.fail(&format!("wants a table, not {}", self.node.describe()));
+            self.fail(&format!("expected a table, found {}", self.node.describe()));
         }
         table
     }

@@ -44,7 +44,7 @@ impl Override {
     pub fn parse(assignment: &str) -> Result<Self, String> {
         let shown = format!("--set {assignment}");
         let Some((key, value)) = assignment.split_once('=') else {
-            return Err(format!("{shown}: no `=`, as in render.max_depth=5"));
+            return Err(format!("{shown}: no `=` (example: render.max_depth=5)"));
         };
         let keys = split_key(key).map_err(|e| format!("{shown}: {e}"))?;
         let place = Place::Option(shown.clone());

@@ -62,31 +62,40 @@ fn values_that_will_not_do() {
         assert!(error.to_string().starts_with(&wanted), "{error}");
     }
     for wrong in ["0", "-1", "1025", "1.5", "many", "true"] {
-        let wanted = "threads: wants \"all\" or a whole number from 1 to 1024, not";
+        let wanted = "threads: expected \"all\" or a whole number from 1 to 1024, found";
         refused(&format!("threads={wrong}"), wanted);
     }
     refused(
         "progress=jsno",
-        "progress: wants one of auto, plain, json, openjd, none, not the text \"jsno\"; did you mean json?",
+        "progress: expected one of auto, plain, json, openjd, none, found the text \"jsno\"; did you mean json?",
     );
-    refused("isolate=1", "isolate: wants true or false");
-    refused("memory_ceiling=0", "memory_ceiling: wants a size above 0");
+    refused("isolate=1", "isolate: expected true or false");
+    refused(
+        "memory_ceiling=0",
+        "memory_ceiling: expected a size above 0",
+    );
     refused(
         "memory_ceiling=4GiB",
         "memory_ceiling: is that of a frame's own process; say job.isolate = true (--isolate)",
     );
-    refused("retries=-1", "retries: wants a whole number from 0 to 100");
-    refused("retries=101", "retries: wants a whole number from 0 to 100");
+    refused(
+        "retries=-1",
+        "retries: expected a whole number from 0 to 100",
+    );
+    refused(
+        "retries=101",
+        "retries: expected a whole number from 0 to 100",
+    );
     for wrong in ["0", "-1", "1.1e9", "inf", "nan", "soon"] {
         for key in ["takeover_after", "idle"] {
             refused(
                 &format!("{key}={wrong}"),
-                &format!("{key}: wants seconds above 0, at most 1e9, not"),
+                &format!("{key}: expected seconds above 0, at most 1e9, found"),
             );
         }
     }
-    refused("settle=-0.1", "settle: wants seconds from 0 to 1e9");
-    refused("stop_file=\"\"", "stop_file: wants a name in quotes");
+    refused("settle=-0.1", "settle: expected seconds from 0 to 1e9");
+    refused("stop_file=\"\"", "stop_file: expected a name in quotes");
     refused("idel=3", "idel: unknown key; did you mean `job.idle`?");
     assert!(job(["threads=all", ""]).unwrap().job.threads.is_none());
 }

@@ -274,11 +274,7 @@ fn options_have_ranges() {
     let workshop = Workshop::new();
     for (option, value, wanted) in [
         ("--particles", "-5", "invalid particle count `-5`"),
-        (
-            "--particles",
-            "1e3,many",
-            "invalid particle count `many`",
-        ),
+        ("--particles", "1e3,many", "invalid particle count `many`"),
         ("--particles", "", "invalid particle count"),
         (
             "--particles",
@@ -289,12 +285,12 @@ fn options_have_ranges() {
         (
             "--motions",
             "rotate",
-            "wants one of rotation, translation, both",
+            "expected one of rotation, translation, both",
         ),
         (
             "--representations",
             "f16",
-            "wants one of memory, f32, q16, q10",
+            "expected one of memory, f32, q16, q10",
         ),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
@@ -319,7 +315,7 @@ fn options_have_ranges() {
     }
     for seconds in ["0", "-1", "nan", "inf"] {
         let ran = workshop.run(&["scale", "--seconds", seconds]).expect(2);
-        ran.tells("wants seconds above 0");
+        ran.tells("expected seconds above 0");
     }
     refused(&workshop, &["--seconds", "1"], "cannot be used with");
     assert!(files(workshop.path()).is_empty());

@@ -301,7 +301,8 @@ impl<'a> ChunkStore<'a> {
 
     /// For what cannot be.
     fn lost(&self) -> FrameError {
-        let what = std::io::Error::other("an earlier part could not be written to the temporary file");
+        let what =
+            std::io::Error::other("an earlier part could not be written to the temporary file");
         FrameError::io(&self.shared.settings.dir, what)
     }
 }

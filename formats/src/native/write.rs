@@ -117,8 +117,7 @@ impl FrameWriter {
     /// If there are too many particles, the machine is big-endian, or the temporary file beside `path` cannot be made.
     pub fn create(path: &Path, spec: FrameSpec) -> io::Result<Self> {
         if cfg!(target_endian = "big") {
-            let what =
-                "native frames can only be written on little-endian machines";
+            let what = "native frames can only be written on little-endian machines";
             return Err(io::Error::new(io::ErrorKind::Unsupported, what));
         }
         let sections = sections_of(&spec)

@@ -87,7 +87,7 @@ fn memory(text: &str) -> Result<Bytes, String> {
     let size: Bytes = text.parse()?;
     if size < MIN_MEMORY {
         return Err(format!(
-            "{size} is less than {MIN_MEMORY}; write the unit, as in 4GiB"
+            "{size} is less than {MIN_MEMORY}; write the unit, such as 4GiB"
         ));
     }
     Ok(size)

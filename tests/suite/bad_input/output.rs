@@ -35,7 +35,7 @@ fn names_that_will_not_do() {
         &workshop,
         "out/f.exr",
         &[
-            "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into it",
+            "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into the name",
         ],
     );
     // One of those chosen will do if only one is there.
@@ -51,7 +51,7 @@ fn names_that_will_not_do() {
         .tells("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
-    let ending = "--output: output.path: must end in .exr, as in out/frame.####.exr";
+    let ending = "--output: output.path: must end in .exr (example: out/frame.####.exr)";
     for pattern in ["out/f.####.png", "out/", "out", "", "out/f.####"] {
         not_there(&workshop, pattern, &[ending]);
     }
@@ -63,7 +63,7 @@ fn names_that_will_not_do() {
     not_there(
         &workshop,
         "out/##.##.exr",
-        &["output.path: has room for two numbers"],
+        &["output.path: has places for two numbers"],
     );
     not_there(
         &workshop,
@@ -107,10 +107,10 @@ fn one_frame_needs_no_number_in_its_name() {
     assert!(made == image("one/f.exr"));
     for frames in ["1-2", "all"] {
         let several = ["render", "in", "-o", "two/f.exr", "--frames", frames];
-        refused(&workshop, &several, &["put #### into it"]);
+        refused(&workshop, &several, &["put #### into the name"]);
     }
     let follow = ["render", "in", "-o", "two/f.exr", "--follow"];
-    refused(&workshop, &follow, &["put #### into it"]);
+    refused(&workshop, &follow, &["put #### into the name"]);
 }
 
 #[test]

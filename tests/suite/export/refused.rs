@@ -36,7 +36,7 @@ fn jobs_that_cannot_be_exported() {
     refused(
         &workshop,
         &with(&["--mem", "16"]),
-        "write the unit, as in 4GiB",
+        "write the unit, such as 4GiB",
     );
     refused(&workshop, &with(&["--mem", "lots"]), "invalid size");
     refused(&workshop, &with(&["--chunk", "0"]), "--chunk");
