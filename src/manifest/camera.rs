@@ -25,16 +25,16 @@ named! {
 }
 
 section! {
-    /// Where the image is taken from
+    /// Position and motion of the camera
     Camera {
         /// Placement: auto | fixed | turntable | keys
         ///
-        /// Without a mode, the camera is fixed if there is an eye, goes through keys if there are keys, and is
+        /// Without a mode, the camera is fixed if there is an eye, moves through the keys if there are keys, and is
         /// placed automatically otherwise.
         mode: CameraMode = CameraMode::Auto;
         /// fixed: position of the camera
         eye: Option<DVec3> = None, example("[0.0, 0.0, 0.0]");
-        /// fixed: the point in the middle of the image
+        /// fixed: the point in the centre of the image
         look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("input.up");
@@ -62,7 +62,7 @@ section! {
         frame: i64 = 0, required(KEY_NEEDS), example("1");
         /// Position of the camera
         eye: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[0.0, 0.0, 0.0]");
-        /// The point in the middle of the image
+        /// The point in the centre of the image
         look_at: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("camera.up");

@@ -8,8 +8,9 @@ use crate::scene::Falloff;
 
 named!(Falloff: None = "none", InverseSquare = "inverse-square");
 
-pub(super) const ABOUT: &[&str] =
-    &["Light sources; without any, a key light and a soft fill are placed by the camera"];
+pub(super) const ABOUT: &[&str] = &[
+    "Light sources; without any, a key light and a soft fill light are placed relative to the camera",
+];
 
 /// The key `type`.
 #[derive(Clone, Copy, PartialEq)]

@@ -6,12 +6,12 @@ use super::list::{Entries, Entry};
 use super::{ABOUT, Manifest};
 
 const INTRODUCTION: &str = "\
-`spherule init INPUT > job.toml` writes a manifest with every key and its default. Each key can also be set on the command
-line: `--set image.width=1280`; some have an option of their own. `spherule schema` prints a JSON schema of the file for
-editors.
+`spherule init INPUT > job.toml` writes a manifest with every key and its default. `--set image.width=1280` sets a key
+on the command line; this works for every key. The column \"Option\" shows which keys also have an option of their own.
+`spherule schema` prints a JSON schema of the manifest for editors.
 
-Keys that do not change images may differ from run to run of a job. If any other key differs, the job does not resume unless
-`--force` or `--keep-done` is given. *How to add a key:* [adding-a-manifest-key.md](adding-a-manifest-key.md).
+Keys that do not change images may change between runs of a job. If any other key has changed, the job does not resume
+unless you give `--force` or `--keep-done`. [Adding a manifest key](adding-a-manifest-key.md) explains how to add a key.
 ";
 
 /// The page in Markdown.

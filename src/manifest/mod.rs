@@ -315,8 +315,7 @@ impl Manifest {
 }
 
 /// Description of a manifest.
-const ABOUT: &str =
-    "A spherule job. Paths are relative to this file; lengths are those of the simulation.";
+const ABOUT: &str = "A spherule job. Paths are relative to this file; lengths are in the unit of the particle files.";
 
 const NEEDS_NUMBER: &str =
     "several frames would get the same name; put #### into the name (example: frame.####.exr)";
@@ -324,8 +323,8 @@ const NEEDS_NUMBER: &str =
 const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
                        first and after the last.";
 
-const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill are placed by the camera. A directional light has \
-                           a direction instead of position and falloff.";
+const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
+                           directional light has a direction instead of position and falloff.";
 
 /// All keys that are not in lists.
 fn known_keys() -> Vec<String> {
