@@ -77,11 +77,11 @@ impl Affects {
     #[cfg(test)]
     pub(super) const fn text(self) -> &'static str {
         match self {
-            Self::Images => "yes",
-            Self::Nothing => "no",
-            Self::SmoothSurfaces => "smooth surfaces only",
-            Self::Bodies => "unions and smooth surfaces only",
-            Self::BranchingSpheres => "spheres that reflect and transmit only",
+            Self::Images => "Changes images.",
+            Self::Nothing => "Does not change images.",
+            Self::SmoothSurfaces => "Changes images of smooth surfaces.",
+            Self::Bodies => "Changes images of unions and smooth surfaces.",
+            Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
         }
     }
 }
