@@ -1,4 +1,5 @@
-//! A native frame as a source: other encodings of the same particles, without having them in memory.
+//! A native frame as a source, to encode the same particles differently without loading all of them into
+//! memory.
 
 use glam::DVec3;
 
