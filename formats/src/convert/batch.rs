@@ -19,6 +19,7 @@ pub(super) struct Batch {
     kept: Vec<u32>,
     /// World positions of the whole range, in the order of the source.
     pub(super) world: Vec<DVec3>,
+    /// Values of one attribute for the whole range.
     pub(super) values: Vec<u8>,
 }
 

@@ -120,8 +120,8 @@ impl Limits {
         aimed(self.part_len)
     }
 
-    /// Parts begin at multiples of this number, so that each node above the blocks is in one part. The largest
-    /// power of 8 blocks of which a part still has many.
+    /// Parts begin at multiples of this number, so that each node above the blocks is in one part. It is a power of 8
+    /// blocks, chosen so that a part still has many of them.
     pub(super) fn unit(&self) -> usize {
         let mut unit = 1024;
         while unit * 8 * 64 <= self.part_len {

@@ -82,7 +82,7 @@ impl PartData {
 /// Buffers to order parts, reused for each part.
 #[derive(Debug, Default)]
 pub(super) struct OrderedPart {
-    /// In tree order.
+    /// Positions in tree order.
     pub(super) positions: Vec<Vec3>,
     /// Index in the part of each position; empty if there are no rows.
     indices: Vec<u32>,

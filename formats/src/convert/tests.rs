@@ -110,6 +110,7 @@ fn converted(raw: &RawParticles, settings: &ConvertSettings, limits: Limits) -> 
 /// its own values.
 #[track_caller]
 fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &FrameIndex) {
+    // Open the frame
     let file = NativeFile::open(path, Access::Map).expect("whole");
     assert_eq!(file.index(), index);
     let frame = file.frame().expect("unchanged");
@@ -117,10 +118,12 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
     let leaves = frame.leaves().expect("in place");
     let id = frame.attribute("id").expect("kept");
     let kept = |i: usize| crate::is_near(&(raw.positions.get(i) - settings.origin).as_vec3());
+    // Mark the particles that the conversion drops
     let mut seen: Vec<bool> = (0..raw.positions.len()).map(|i| !kept(i)).collect();
     let dropped = seen.iter().filter(|s| **s).count();
     let mut largest = 0.0_f64;
     let mut last_at = HashMap::new();
+    // Compare each stored particle with its source
     for slot in 0..usize::try_from(index.count).expect("few") {
         let place = id.low_bits(slot).expect("an id") as usize;
         assert!(!std::mem::replace(&mut seen[place], true), "{place} twice");
@@ -130,6 +133,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
         assert!(before < Some(place), "{before:?} after {place}");
         let found = leaves.center(slot).as_dvec3() + settings.origin;
         largest = largest.max(found.distance(raw.positions.get(place)));
+        // Compare the attributes
         for attribute in &raw.attributes {
             let Some(view) = frame.attribute(&attribute.name) else {
                 continue;
@@ -147,6 +151,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
                 assert!(difference <= error, "{} {given}", attribute.name);
             }
         }
+        // Check the box of the leaf
         let node = &leaves.nodes[slot / 128];
         let own = leaves.radii.load(slot / 16).map(|r| r.0[slot % 16]);
         if own.is_none() {
@@ -158,6 +163,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
             assert!(node.child_holds(slot / 16 % 8, &point));
         }
     }
+    // Check the counts and the stated errors
     assert!(seen.into_iter().all(|s| s));
     assert_eq!(index.dropped, dropped as u64);
     assert!(largest <= index.max_error, "{largest} {}", index.max_error);

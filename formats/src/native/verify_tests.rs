@@ -1,4 +1,4 @@
-//! Frames with good checksums whose numbers are those of no frame.
+//! Frames with correct checksums whose numbers cannot belong to a frame.
 
 use glam::{DVec3, Vec3};
 
@@ -7,7 +7,7 @@ use super::super::*;
 use super::*;
 use crate::{Attribute, AttributeData, ParticleFrame, Radius};
 
-/// 300 particles of two sizes of block, so that tight bounds keep some as they are.
+/// 300 particles in blocks of two different sizes, so that tight bounds store some blocks as f32.
 fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     let positions: Vec<Vec3> = (0..300_u16)
         .map(|i| {
@@ -49,7 +49,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     std::fs::read(path).expect("readable")
 }
 
-/// `bytes` after `harm`, under checksums that fit.
+/// `bytes` after `harm` changed them, with correct checksums.
 fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let mut index = layout::parse(&bytes).expect("whole");
@@ -76,7 +76,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     bytes
 }
 
-/// Harm is told with these words and this place.
+/// Checks that the fault that `harm` makes is reported with this message at this place.
 #[track_caller]
 fn told(
     bytes: &[u8],
@@ -151,7 +151,7 @@ fn nodes_that_lead_astray() {
         b[at(&i.nodes, 64 + 12)] = 255;
     });
     told(&bytes, "child 3 of node 1 has no box", second, |i, b| {
-        // Lower above upper plane on the last axis.
+        // The lower plane is above the upper plane on the last axis.
         let planes = at(&i.nodes, 64 + 16 + 2 * 16);
         b[planes + 3] = 200;
         b[planes + 8 + 3] = 100;
@@ -160,6 +160,7 @@ fn nodes_that_lead_astray() {
 
 #[test]
 fn positions_that_cannot_be() {
+    // Positions that are not finite, or outside the box of the node
     let bytes = stored(Encoding::F32, false);
     let third = |i: &FrameIndex| i.positions.offset + 2 * 192;
     let set = |value: f32| {
@@ -185,6 +186,7 @@ fn positions_that_cannot_be() {
         third,
         set(1e6),
     );
+    // Positions outside the bounds of the frame
     let first = |i: &FrameIndex| i.positions.offset;
     told(
         &bytes,
@@ -194,7 +196,7 @@ fn positions_that_cannot_be() {
             i.max = i.min;
         },
     );
-    // 300 particles: the last block has 12 and four copies of the last.
+    // Of the 300 particles, 12 are in the last block, followed by four copies of the last one.
     let last = |i: &FrameIndex| i.positions.offset + 18 * 192;
     told(
         &bytes,
