@@ -132,7 +132,7 @@ pub fn smallest_encoding(positions: &[Vec3], bound: Bound, radius: Option<f32>) 
     best.unwrap_or_default()
 }
 
-/// The code for radii within `ends`. Radii are only coded if positions are.
+/// The code for radii within `ends`. If positions are stored as f32, radii are stored without loss.
 pub(crate) fn radius_range(ends: [f32; 2], encoding: Encoding, bound: Bound) -> RadiusRange {
     let [low, high] = ends;
     let bound = match (encoding, bound) {
