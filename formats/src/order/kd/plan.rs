@@ -257,8 +257,8 @@ fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianB
     if rank >= keys.len() {
         return (MedianBracket::everything(axis_number), i64::MAX);
     }
-    let (below, guess, above) = keys.select_nth_unstable(rank);
     // Select the estimate and the ends of the bracket
+    let (below, guess, above) = keys.select_nth_unstable(rank);
     let low = match rank.checked_sub(spread) {
         Some(rank) => *below.select_nth_unstable(rank).1,
         None => i64::MIN,
