@@ -173,6 +173,7 @@ impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
         while to.len() - start < most {
             let left = (most - (to.len() - start)) as u64;
             let before = to.len();
+            // Read from the current stream; at its end, prepare the next one
             match std::mem::replace(&mut self.state, DecompressorState::Ended) {
                 DecompressorState::Plain(mut reader) => {
                     let read = reader.by_ref().take(left).read_to_end(to);

@@ -38,8 +38,7 @@ pub(crate) const POSITION_ARRAYS: [&str; 9] = [
     "r",
 ];
 
-/// Names of position columns without the component: `pos` for `pos_x`. The empty stem stands for plain `x`,
-/// `y`, `z`.
+/// Names of position columns without the component: `pos` for `pos_x`. The empty stem stands for plain `x`, `y`, `z`.
 pub(crate) const POSITION_STEMS: [&str; 11] = [
     "",
     "pos",

@@ -4,8 +4,8 @@ use glam::DVec3;
 
 /// Largest distance of the centre from zero, in diagonals, for which the origin stays at zero.
 ///
-/// At a coordinate `c`, the spacing of f32 is at most `c * 2^-23`, so that a position is rounded by up to `8 *
-/// 2^-24 = 2^-21` of the diagonal. With ten million particles (about 215 along an axis), this is a
+/// At a coordinate `c`, the spacing of f32 is at most `c * 2^-23`, so that a position is rounded by up to
+/// `8 * 2^-24 = 2^-21` of the diagonal. With ten million particles (about 215 along an axis), this is a
 /// ten-thousandth of the particle spacing. Data nearer to zero keeps its coordinates.
 const NEAR: f64 = 8.0;
 

@@ -63,8 +63,7 @@ pub(crate) trait Reader: Sync {
     /// File name extensions, in lower case without the dot.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without
-    /// `.gz`.
+    /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without `.gz`.
     fn matches_name(&self, _stem: &str, extension: &str) -> bool {
         self.extensions().contains(&extension)
     }
@@ -123,9 +122,8 @@ pub(crate) trait Reader: Sync {
         Ok(None)
     }
 
-    /// Bytes held beside the file and the numbers of `particles` while they are read: those of the largest
-    /// array, if the arrays of the file are compressed or encoded. `head` is the part of the file that is in
-    /// memory.
+    /// Bytes held beside the file and the numbers of `particles` while they are read: those of the largest array, if
+    /// the arrays of the file are compressed or encoded. `head` is the part of the file that is in memory.
     fn unpacked_arrays_len(
         &self,
         _head: &[u8],

@@ -6,8 +6,7 @@ use crate::format::Format;
 use crate::native;
 use crate::read::{bgeo, csv, lammps, npy, ply, vtk, vtk_xml, xyz};
 
-/// All formats. If several formats match a file equally well, the first one wins. Messages list them in this
-/// order.
+/// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
 const FORMATS: &[Format] = &[
     native::FORMAT,
     vtk::FORMAT,

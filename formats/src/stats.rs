@@ -1,5 +1,4 @@
-//! The statistics that `inspect` reports about a frame: counts, bounds, means, and the range of every
-//! attribute.
+//! The statistics that `inspect` reports about a frame: counts, bounds, means, and the range of every attribute.
 //!
 //! All numbers are computed from the values in the file, in f64 or exact integers. Sums are computed over fixed
 //! pieces, so that the result does not depend on the number of threads.
@@ -257,8 +256,7 @@ impl IntSum {
     }
 }
 
-/// A sum with compensated rounding errors (Neumaier), so that the mean of ten million equal numbers is that
-/// number.
+/// A sum with compensated rounding errors (Neumaier), so that the mean of ten million equal numbers is that number.
 struct FloatSum {
     count: u64,
     nan: u64,

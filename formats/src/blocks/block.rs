@@ -5,12 +5,10 @@ use glam::Vec3;
 
 use super::Aabb;
 
-/// Particles in a block. 16 fills one AVX-512 register; with 8, tracing was 15-22 % slower, with 32 about
-/// equal.
+/// Particles in a block. 16 fills one AVX-512 register; with 8, tracing was 15-22 % slower, with 32 about equal.
 pub const BLOCK_SIZE: usize = 16;
 
-/// Centres of 16 particles, one array per axis. The unused lanes of a frame's last block repeat its last
-/// particle.
+/// Centres of 16 particles, one array per axis. The unused lanes of a frame's last block repeat its last particle.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Block {

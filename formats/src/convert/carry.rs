@@ -9,8 +9,7 @@ use super::order::PartData;
 /// Particles that one task counts.
 const TASK: usize = 1 << 16;
 
-/// Removes the particles of `part` beyond a multiple of `unit`, the last ones on `curve`. The next part begins
-/// there.
+/// Removes the particles of `part` beyond a multiple of `unit`, the last ones on `curve`. The next part begins there.
 pub(super) fn carry_last(
     part: &mut PartData,
     curve: &Curve,

@@ -70,10 +70,12 @@ impl StoredColumn {
     /// Stores the values of one particle; returns the largest error.
     #[inline]
     pub(super) fn store(&self, values: &[u8], to: &mut [u8]) -> f64 {
+        // Copy values that keep their type
         if self.stored == StoredType::Plain(self.scalar) {
             to.copy_from_slice(values);
             return 0.0;
         }
+        // Convert the others, and measure the largest error
         let plain = StoredType::Plain(self.scalar);
         let values = values.chunks_exact(self.scalar.size());
         let mut largest = 0.0_f64;
@@ -259,6 +261,7 @@ fn check(
     settings: &ConvertSettings,
     path: &Path,
 ) -> Result<(), ConvertError> {
+    // Check that each named attribute exists
     for (name, _) in &settings.attributes {
         if !attributes.iter().any(|a| a.name == *name) {
             let there: Vec<&str> = attributes.iter().map(|a| a.name.as_str()).collect();
@@ -271,6 +274,7 @@ fn check(
             return Err(ConvertError::refused(path, what));
         }
     }
+    // Check that ids are stored without loss
     for attribute in attributes {
         let is_changed = !matches!(
             settings.choice(&attribute.name),
@@ -284,6 +288,7 @@ fn check(
             return Err(ConvertError::refused(path, what));
         }
     }
+    // Check the common radius
     if let RadiusRule::All(radius)
     | RadiusRule::Source {
         otherwise: Some(radius),

@@ -1,4 +1,4 @@
-//! Cuts a space-filling curve into parts of a wanted size, and locates particles on it.
+//! Cuts a space-filling curve into parts of a given size, and locates particles on it.
 
 use glam::Vec3;
 use rayon::prelude::*;

@@ -84,13 +84,15 @@ impl Limits {
         let memory = settings.memory.max(ConvertSettings::LEAST_MEMORY);
         let memory = usize::try_from(memory).unwrap_or(usize::MAX);
         let record = 12 + width;
-        // One part is ordered while the next one is loaded.
+        // Size the parts: one part is ordered while the next one is loaded
         let part_bytes = order_bytes(width) + record;
         let part_len = (memory / 8 / part_bytes).clamp(SMALLEST_PART, LARGEST_PART) / 1024 * 1024;
+        // Size the runs and the batches
         let run_len = (memory / 16 / run_bytes(width)).clamp(8192, LARGEST_RUN) / 1024 * 1024;
         let batch_bytes = 24 + widest + 4 + 2 * record + 4;
         let window = (4 * rayon::current_num_threads()).clamp(16, 64);
         let batch_len = (memory / 16 / window / batch_bytes).clamp(256, LARGEST_BATCH);
+        // Size the parts of a division and the chunks
         let aimed = aimed(part_len) as u64;
         let parts = count.div_ceil(aimed).clamp(2, MOST_PARTS) as usize;
         let chunk_len = (memory / 32 / parts / record).clamp(SMALLEST_CHUNK, LARGEST_CHUNK);
@@ -98,6 +100,7 @@ impl Limits {
         let window_bytes = window * batch_len * batch_bytes;
         let fixed = part_len * part_bytes + run_len * run_bytes(width) + window_bytes + memory / 32;
         let chunks = memory.saturating_sub(fixed) / (chunk_len * record);
+        // Find out whether all particles fit at once
         let whole = count.saturating_mul(order_bytes(width) as u64);
         let beside = run_len * run_bytes(width) + memory / 16;
         Self {

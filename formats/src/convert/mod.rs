@@ -67,9 +67,8 @@ pub fn convert(
     convert_within(asked, columns, limits)
 }
 
-/// [`convert`] for a source that is much larger than the memory: with the smallest parts, all of them spilled
-/// to disk. Used for fuzzing, because the smallest memory that settings allow holds any source of a few
-/// megabytes.
+/// [`convert`] for a source that is much larger than the memory: with the smallest parts, all of them spilled to
+/// disk. Used for fuzzing, because the smallest memory that settings allow holds any source of a few megabytes.
 ///
 /// # Errors
 /// As [`convert`].

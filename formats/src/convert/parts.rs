@@ -1,5 +1,4 @@
-//! Converts a source that does not fit into memory: one part is ordered and written while the next one is
-//! loaded.
+//! Converts a source that does not fit into memory: one part is ordered and written while the next one is loaded.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

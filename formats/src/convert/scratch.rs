@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::FrameError;
 
-/// A file that is deleted when it is dropped; on Unix it never has a name after creation.
+/// A file that is deleted when it is dropped; on Unix its name is removed right after creation.
 #[derive(Debug)]
 pub(super) struct ScratchFile {
     /// The directory that error messages name.

@@ -114,8 +114,7 @@ impl Phase {
     }
 }
 
-/// Receives the progress of a conversion and may cancel it. Many threads call it, at least several times a
-/// second.
+/// Receives the progress of a conversion and may cancel it. Many threads call it, at least several times a second.
 pub trait Progress: Sync {
     /// `done` of `total` particles have passed `phase`. Returning `Break` cancels the conversion with
     /// [`ConvertError::Interrupted`].

@@ -1,5 +1,4 @@
-//! The first pass over the source: number of particles, ranges of their values, and a sample of their
-//! positions.
+//! The first pass over the source: number of particles, ranges of their values, and a sample of their positions.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -233,6 +232,7 @@ impl Survey {
         path: &Path,
         mut columns: StoredColumns,
     ) -> Result<(StoredColumns, Option<f32>), ConvertError> {
+        // Check and set the ranges
         for (column, ranges) in columns.attributes.iter_mut().zip(&self.ranges) {
             if column.stored != StoredType::Ranged {
                 continue;
@@ -251,6 +251,7 @@ impl Survey {
                 vec![[0.0; 2]; column.components]
             };
         }
+        // Replace equal radii by a common one
         let common = self.radii.filter(|[low, high]| low == high);
         if common.is_some() || self.count == 0 {
             columns.radius = None;

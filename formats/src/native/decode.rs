@@ -102,8 +102,7 @@ impl NativeFrame<'_> {
         self.around_some(queries, count)
     }
 
-    /// The results of `tell` for the squared distances from some particles to the particles around them in the
-    /// file.
+    /// The results of `tell` for the squared distances from some particles to the particles around them in the file.
     fn around_some<T: Send>(
         &self,
         queries: usize,

@@ -191,6 +191,7 @@ fn gather<T: Pod + Send + Sync>(values: &[T], components: usize, indices: &[u32]
 
 fn check(frame: &ParticleFrame) -> io::Result<()> {
     let bad = |what: String| Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+    // Check the attributes
     for a in &frame.attributes {
         if a.components == 0 || frame.len().checked_mul(a.components) != Some(a.data.len()) {
             return bad(format!(
@@ -202,6 +203,7 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
             ));
         }
     }
+    // Check the radii
     if let Some(Radius::PerParticle(radii)) = &frame.radius {
         if radii.len() != frame.len() {
             let (radii, particles) = (radii.len(), frame.len());
@@ -214,6 +216,7 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
             );
         }
     }
+    // Check the positions
     if !frame.positions.par_iter().all(is_near) {
         return bad("a position is not a number or too far away".to_owned());
     }

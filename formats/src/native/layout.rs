@@ -122,8 +122,8 @@ pub enum RadiusIndex {
     PerParticle(RadiiIndex),
 }
 
-/// Radii that differ, in blocks of 16 like the positions: f32, or `low + code * step`, where `step` is `(high -
-/// low)` divided by the largest code.
+/// Radii that differ, in blocks of 16 like the positions: f32, or `low + code * step`, where `step` is
+/// `(high - low)` divided by the largest code.
 #[derive(Debug, Clone, Copy, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct RadiiIndex {
     /// The code of the stored type, see [`RadiusCode`].
@@ -442,10 +442,12 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
         let what = format!("attribute {} {what}", attribute.name);
         Err(ParseError::malformed(check.end, what))
     };
+    // Check the number of components
     let width = u64::from(attribute.components) * stored.size() as u64;
     if width == 0 || attribute.components > MOST_COMPONENTS {
         return bad("has no components, or absurdly many");
     }
+    // Check the ranges
     let ranges = match stored {
         StoredType::Ranged => attribute.components as usize,
         _ => 0,
@@ -454,6 +456,7 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
     if attribute.ranges.len() != ranges || !is_finite {
         return bad("has ranges that do not fit its type");
     }
+    // Check the section
     let what = format!("attribute {}", attribute.name);
     check.length(&what, &attribute.section, check.count.checked_mul(width))
 }

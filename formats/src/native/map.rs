@@ -307,9 +307,8 @@ mod guard {
     }
 
     fn install() -> Option<Installed> {
-        // SAFETY: `sysconf` accepts any number. A zeroed sigaction is valid and is filled in below. Both
-        // pointers that `sigaction` gets are to live values, and the handler has the signature that SA_SIGINFO
-        // requires.
+        // SAFETY: `sysconf` accepts any number. A zeroed sigaction is valid and is filled in below. Both pointers
+        // that `sigaction` gets are to live values, and the handler has the signature that SA_SIGINFO requires.
         unsafe {
             let page = usize::try_from(libc::sysconf(libc::_SC_PAGESIZE)).ok()?;
             let mut action: libc::sigaction = std::mem::zeroed();

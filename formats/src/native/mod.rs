@@ -91,8 +91,7 @@ pub fn verify(bytes: &[u8]) -> Result<(), ParseError> {
     with_frame(bytes, |frame| frame.verify_all())
 }
 
-/// Calls the function with the native frame `bytes`, or with an aligned copy if they are not aligned like
-/// sections.
+/// Calls the function with the native frame `bytes`, or with an aligned copy if they are not aligned like sections.
 fn with_frame<T>(
     bytes: &[u8],
     look: impl FnOnce(&NativeFrame) -> Result<T, ParseError>,

@@ -338,7 +338,7 @@ fn block_of(positions: &[Vec3]) -> Block {
 }
 
 /// Arranges each block of `positions` as coded blocks require (z of the first particle not above z of the
-/// last), and `indices` likewise unless it is empty. Call it before attributes are gathered by the indices.
+/// last), and `indices` in the same way unless it is empty. Call it before attributes are gathered by the indices.
 /// Coincident particles keep their order, because it decides which of them a ray hits first.
 pub fn arrange(positions: &mut [Vec3], indices: &mut [u32]) {
     if indices.is_empty() {

@@ -88,6 +88,7 @@ impl NativeFrame<'_> {
     /// Checks that sections do not overlap and that all bytes between them are zero.
     fn verify_padding(&self) -> Result<(), ParseError> {
         let (bytes, index) = (self.bytes(), self.index());
+        // Check the reserved bytes of the header
         if bytes
             .get(RESERVED)
             .is_none_or(|b| b.iter().any(|b| *b != 0))
@@ -97,6 +98,7 @@ impl NativeFrame<'_> {
                 "the header has numbers where zeros belong",
             ));
         }
+        // Check the gaps between sections in file order
         let mut sections = index.sections();
         sections.retain(|(_, section)| section.len > 0);
         sections.sort_by_key(|(_, section)| section.offset);

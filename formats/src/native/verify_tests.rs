@@ -9,6 +9,7 @@ use crate::{Attribute, AttributeData, ParticleFrame, Radius};
 
 /// 300 particles in blocks of two different sizes, so that tight bounds store some blocks as f32.
 fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
+    // Make positions, a few of them far away
     let positions: Vec<Vec3> = (0..300_u16)
         .map(|i| {
             let far = if i % 50 == 0 { 40.0 } else { 1.0 };
@@ -38,6 +39,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
         dropped: 0,
         file_index: None,
     };
+    // Store the frame and read its bytes
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let settings = StoreSettings {
@@ -54,6 +56,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     let mut bytes = bytes.to_vec();
     let mut index = layout::parse(&bytes).expect("whole");
     harm(&mut index, &mut bytes);
+    // Update the checksums of the sections
     let sum = |section: &mut Section| {
         let found = section_of(&bytes, section).expect("inside");
         section.xxh3 = xxh3_64(found);
@@ -67,6 +70,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     for attribute in &mut index.attributes {
         sum(&mut attribute.section);
     }
+    // Replace the index and the header
     let packed = rkyv::to_bytes::<rkyv::rancor::Error>(&index).expect("memory");
     let offset = u64::from_le_bytes(bytes[24..32].try_into().expect("8 bytes"));
     bytes.truncate(usize::try_from(offset).expect("small"));

@@ -216,6 +216,7 @@ impl FrameWriter {
         positions: &[Vec3],
         radii: Option<&CodedRadii>,
     ) -> io::Result<()> {
+        // Encode the leaves
         let allowed = EncodeLimits {
             bound: self.spec.bound,
             radius: match self.spec.radius {
@@ -226,9 +227,11 @@ impl FrameWriter {
         let mut leaves: EncodedLeaves<B> = encode(positions, radii, allowed);
         // There are fewer wide blocks than blocks, which are counted in 32 bits.
         leaves.shift(u32::try_from(self.wide).map_err(io::Error::other)?);
+        // Update the summary of the frame
         self.wide += leaves.wide.len() as u64;
         self.max_error = self.max_error.max(leaves.max_error);
         self.bounds = self.bounds.union(leaves.bounds);
+        // Append the sections
         self.sections.append(POSITIONS, piece(leaves.blocks))?;
         self.sections.append(NODES, piece(leaves.nodes))?;
         if !leaves.wide.is_empty() {

@@ -21,8 +21,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// The number of levels for `count` particles: the fewest for which an even distribution is near the
-    /// target.
+    /// The number of levels for `count` particles: the fewest for which an even distribution is near the target.
     pub fn levels_for(count: usize) -> u32 {
         let mut levels = 0;
         while levels < TopCells::MAX_LEVELS && (count >> (3 * levels)) > 8 * CELL_TARGET {

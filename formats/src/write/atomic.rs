@@ -9,8 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A file under a temporary name in the directory of its final name. Dropping it before it is published removes
-/// it.
+/// A file under a temporary name in the directory of its final name. Dropping it before it is published removes it.
 #[derive(Debug)]
 pub(crate) struct Unpublished {
     path: PathBuf,

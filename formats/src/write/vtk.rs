@@ -40,8 +40,7 @@ pub fn stream(
     publish_stream(path, |file| fill_from(file, source, progress, cells))
 }
 
-/// Largest number of particles for version 4.2: the list of cells has two i32 per particle, and its length is
-/// an i32.
+/// Largest number of particles for version 4.2: the list of cells has two i32 per particle, and its length is an i32.
 const MOST_SHORT: u64 = (i32::MAX / 2) as u64;
 
 /// The format of the cells.

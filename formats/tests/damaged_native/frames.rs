@@ -115,8 +115,7 @@ fn check_kinds(frames: &[Stored]) {
     assert_eq!(code("q10, radii"), Some(RadiusCode::U8));
 }
 
-/// 150 particles in two nodes, the second one not full. A few particles are far away, so that their blocks are
-/// wide.
+/// 150 particles in two nodes, the second one not full. A few particles are far away, so that their blocks are wide.
 fn frame(radius: Option<Radius>, origin: DVec3) -> ParticleFrame {
     let mut numbers = Numbers(1);
     let mut unit = || numbers.below(1 << 16) as f32 / 65_536.0;

@@ -1,5 +1,4 @@
-//! Damages native frames at every place: reading gives an error that names the file, or the damage has no
-//! effect.
+//! Damages native frames at every place: reading gives an error that names the file, or the damage has no effect.
 
 use std::fs;
 use std::hint::black_box;

@@ -39,6 +39,7 @@ fn read_whole(path: &Path) -> Result<RawParticles, FrameError> {
 #[track_caller]
 fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
     let count = raw.positions.len();
+    // Compare the positions
     for first in (0..count).step_by(run) {
         let mut positions = vec![DVec3::NAN; run.min(count - first)];
         let asked = source.read_positions(first as u64, &mut positions);
@@ -49,6 +50,7 @@ fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
             assert_eq!(bits(*position), bits(expected), "{position} {expected}");
         }
     }
+    // Compare the attributes
     for (number, attribute) in raw.attributes.iter().enumerate() {
         let all: Vec<u8> = with_values!(&attribute.data, values => {
             values.iter().flat_map(|value| value.to_le_bytes()).collect()

@@ -1,5 +1,4 @@
-//! Makes the upper cuts exact: one pass over all particles decides most of them, and the rest is decided
-//! afterwards.
+//! Makes the upper cuts exact: one pass over all particles decides most of them, and the rest is decided afterwards.
 
 use std::sync::atomic::{AtomicU16, Ordering};
 

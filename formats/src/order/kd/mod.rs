@@ -7,8 +7,7 @@
 //! moves every particle into its cell, which fits into the cache. The cells are then cut further, one by one
 //! (`cell.rs`). All steps are parallel, and the cells have equal sizes for any distribution of the particles.
 //!
-//! Particles with equal coordinates are ordered by index, so that the order does not depend on the number of
-//! threads.
+//! Particles with equal coordinates are ordered by index, so that the order does not depend on the number of threads.
 
 use glam::Vec3;
 use rayon::prelude::*;

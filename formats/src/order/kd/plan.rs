@@ -1,9 +1,7 @@
-//! The upper cuts, as far as a sample determines them: the axis, and a bracket of keys that contains the
-//! median.
+//! The upper cuts, as far as a sample determines them: the axis, and a bracket of keys that contains the median.
 //!
-//! The rank of a value in a sample of m particles gives its rank among all particles within a few times
-//! sqrt(m)/2 (as in the selection of Floyd & Rivest 1975). One comparison decides every particle outside of the
-//! bracket.
+//! The rank of a value in a sample of m particles gives its rank among all particles within a few times sqrt(m)/2 (as
+//! in the selection of Floyd & Rivest 1975). One comparison decides every particle outside of the bracket.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -22,9 +20,8 @@ const STRIDE: usize = 12;
 const SELECT_LEN: usize = 256 * 1024;
 /// Largest number of sampled particles that an axis is chosen from.
 const AXIS_LEN: usize = 512;
-/// Half the width of a bracket, standard deviations of the rank. The value leaves room for the cuts above,
-/// whose places are estimates too: with 3.5, builds over 10^7 particles took several passes, with 4.5 a single
-/// one.
+/// Half the width of a bracket, standard deviations of the rank. The value leaves room for the cuts above, whose
+/// places are estimates too: with 3.5, builds over 10^7 particles took several passes, with 4.5 a single one.
 const DEVIATIONS: f64 = 4.5;
 /// Below this length, a parallel task costs more than it saves.
 const PARALLEL_LEN: usize = 4096;

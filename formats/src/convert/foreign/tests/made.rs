@@ -1,5 +1,4 @@
-//! Generated files with cases that the sample files lack: axes of different types, two axes, integers, times,
-//! bits.
+//! Generated files with cases that the sample files lack: axes of different types, two axes, integers, times, bits.
 
 use super::*;
 
