@@ -1,11 +1,12 @@
-//! Modules use only those others that ARCHITECTURE.md lists, and neither they nor files use themselves by way of
-//! others.
+//! Modules use only the modules that ARCHITECTURE.md lists, and there are no dependency cycles between modules or
+//! files.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::fs;
 use std::path::Path;
 
-mod circles;
+mod cycles;
+mod paths;
 mod source;
 
 /// Other modules, by the module that uses them.

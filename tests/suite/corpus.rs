@@ -48,7 +48,7 @@ fn replay(name: &str, target: Target) -> bool {
 
 #[test]
 fn every_target_replays_its_corpus() {
-    // The target that traces does so with every level.
+    // The target `trace` uses every level.
     tested_levels();
     for (name, target) in TARGETS {
         // Else the target would check nothing but errors.

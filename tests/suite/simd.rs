@@ -1,4 +1,4 @@
-//! The SIMD levels that tests run with: the same list as for the tests next to the code.
+//! The SIMD levels that tests use: the same list as in unit tests.
 
 use spherule::accel::simd::SimdLevel;
 

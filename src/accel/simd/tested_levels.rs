@@ -1,15 +1,18 @@
-//! The SIMD levels that tests run with. `tests/suite` has this file as a module too.
+//! The SIMD levels that tests use. `tests/suite` includes this file as a module, too.
 
 use std::cell::Cell;
 
 use super::SimdLevel;
 
-/// Every level of this machine, slowest first. Prints them, once per thread: each test has one of its own, unless the
-/// harness runs on a single thread.
+/// All levels of this machine, slowest first. Prints them once per thread; each test has its own thread unless the
+/// harness runs on a single one.
 ///
 /// # Panics
-/// If the crate offers other levels than the machine has: a test would skip one.
-#[expect(clippy::print_stdout, reason = "whoever runs the tests is to see it")]
+/// If the levels that the crate supports are not those of the machine, so that a test would skip one.
+#[expect(
+    clippy::print_stdout,
+    reason = "test output shows which levels were tested"
+)]
 #[track_caller]
 pub(crate) fn tested_levels() -> Vec<SimdLevel> {
     thread_local!(static IS_PRINTED: Cell<bool> = const { Cell::new(false) });
@@ -37,7 +40,7 @@ pub(crate) fn tested_levels() -> Vec<SimdLevel> {
     offered
 }
 
-/// What the machine has, found without the crate's own detection.
+/// The levels of the machine, detected independently of the crate.
 fn detected_levels() -> Vec<SimdLevel> {
     let mut levels = vec![SimdLevel::Portable];
     #[cfg(target_arch = "aarch64")]

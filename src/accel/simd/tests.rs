@@ -14,7 +14,7 @@ impl KernelTask for KernelName {
     }
 }
 
-/// No level falls back to the kernel of another, which would pass every comparison.
+/// A level that falls back to the kernel of another would pass all comparisons.
 #[test]
 fn each_level_runs_its_own_kernel() {
     for level in tested_levels() {

@@ -1,12 +1,12 @@
-//! Source files as the tests of the architecture read them.
+//! Source files of a crate.
 
 use std::fs;
 use std::path::Path;
 
-/// The names of the modules that lead to a file, as `["accel", "simd"]`; none for the root of a crate.
+/// The names of a module and its ancestors, such as `["accel", "simd"]`; empty for the root of a crate.
 pub(super) type ModulePath = Vec<String>;
 
-/// The files of a library under the directory `source`, tests excluded, by module, with their code.
+/// The files of a library under the directory `source` without tests, as modules and their code.
 pub(super) fn files(source: &Path) -> Vec<(ModulePath, String)> {
     let mut found = Vec::new();
     collect(source, &[], &mut found);
@@ -35,7 +35,7 @@ fn collect(dir: &Path, parents: &[String], found: &mut Vec<(ModulePath, String)>
     }
 }
 
-/// `text` without comments and without the tests at its end.
+/// `text` without comments and without the tests at the end.
 pub(super) fn code(text: &str) -> String {
     let lines = text
         .lines()
