@@ -45,11 +45,11 @@ pub struct AttributeStats {
 /// Statistics of one component of an attribute over all particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ComponentStats {
-    /// Smallest value that is not NaN; `None` if all are.
+    /// Smallest value that is not NaN; `None` if all values are NaN.
     pub min: Option<Number>,
-    /// Largest value that is not NaN; `None` if all are.
+    /// Largest value that is not NaN; `None` if all values are NaN.
     pub max: Option<Number>,
-    /// Mean of the values that are not NaN; `None` if all are.
+    /// Mean of the values that are not NaN; `None` if all values are NaN.
     pub mean: Option<f64>,
     /// Sum of the values that are not NaN; exact for integers.
     pub sum: Number,

@@ -76,16 +76,16 @@ pub enum RadiusRule {
 /// How an attribute is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AttributeChoice {
-    /// In the type of the source.
+    /// The attribute is stored in the type of the source.
     #[default]
     AsIs,
-    /// In single precision.
+    /// The attribute is stored in single precision.
     Single,
-    /// In half precision: 11 bits, up to 65504.
+    /// The attribute is stored in half precision: 11 bits, up to 65504.
     Half,
-    /// In 8 bits over the range of the frame; each component has its own range.
+    /// The attribute is stored in 8 bits over the range of the frame; each component has its own range.
     Ranged,
-    /// Not at all.
+    /// The attribute is not stored.
     LeaveOut,
 }
 

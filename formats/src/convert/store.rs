@@ -350,7 +350,7 @@ impl SharedState {
         self.freed.notify_all();
     }
 
-    /// Counts one chunk less as waiting.
+    /// Counts a waiting chunk as written, and wakes the threads that wait for one.
     fn left(&self) {
         self.state().leaving -= 1;
         self.freed.notify_all();

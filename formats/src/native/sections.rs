@@ -1,5 +1,5 @@
 //! The sections of a frame that is being written. A separate thread writes and checksums them, so that the
-//! encoder waits neither for copies nor for the disk unless a few pieces are pending.
+//! encoder waits neither for copies nor for the disk unless too many pieces are pending.
 
 use std::fmt;
 use std::io;

@@ -36,7 +36,7 @@ impl NativeFrame<'_> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Compares the nodes with their checksum. Rays need no other section before tracing starts.
+    /// Compares the nodes with their checksum. No other section is read before rays are traced.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] if they differ.
