@@ -73,7 +73,7 @@ fn values_that_will_not_do() {
     refused("memory_ceiling=0", "memory_ceiling: wants a size above 0");
     refused(
         "memory_ceiling=4GiB",
-        "memory_ceiling: is that of a frame's own process; say job.isolate = true (--isolate)",
+        "memory_ceiling: is that of a frame's own process; say job.isolate = true too",
     );
     refused("retries=-1", "retries: wants a whole number from 0 to 100");
     refused("retries=101", "retries: wants a whole number from 0 to 100");

@@ -30,13 +30,8 @@ const ALLOWED: &[Allowed] = &[
     },
     Allowed {
         source: "jobs/src",
-        files: &["error", "fingerprint", "plan"],
-        why: "messages name the file of the plan and the settings that changed",
-    },
-    Allowed {
-        source: "jobs/src",
-        files: &["work::claim", "work::desk"],
-        why: "a claim is released at the desk that it was made at",
+        files: &["workers::claim", "workers::registry"],
+        why: "a claim is released at the registry that it was made at",
     },
     Allowed {
         source: "formats/src",

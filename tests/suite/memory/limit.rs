@@ -98,7 +98,7 @@ fn frames_go_one_at_a_time_where_that_fits() {
     run("free", &[]).expect(0);
     run("tight", &["--memory-limit", "65MiB"])
         .expect(0)
-        .tells("one frame at a time, to take less memory");
+        .tells("one frame at a time, to reduce memory");
     assert_eq!(
         images(&workshop.join("free")),
         images(&workshop.join("tight"))
