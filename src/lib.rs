@@ -26,7 +26,7 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
-mod failure;
+pub mod failure;
 pub mod manifest;
 pub mod math;
 pub mod metrics;

@@ -12,29 +12,25 @@ const MIN_BYTES: u64 = 8 << 20;
 /// both in bytes.
 pub fn read_budget(limit: Option<u64>, ceiling: Option<u64>) -> MemoryBudget {
     let of_job = limit.map(|bytes| {
-        let remedy = "raise render.memory_limit (--memory-limit) if there is more memory";
+        let remedy = "raise render.memory_limit if there is more memory";
         MemoryBudget::new(bytes, remedy)
     });
     let of_frame = ceiling.map(|bytes| {
-        let remedy = "raise job.memory_ceiling (--memory-ceiling) if there is more memory";
+        let remedy = "raise job.memory_ceiling if there is more memory";
         MemoryBudget::new(reading_share(bytes), remedy)
     });
     smallest([of_job, of_frame])
 }
 
-/// Budget for reading one file in a conversion that may use `memory` bytes.
-pub fn conversion_budget(memory: Option<u64>) -> MemoryBudget {
-    let of_conversion = memory.map(|bytes| {
-        let remedy = "raise --memory if there is more memory";
-        MemoryBudget::new(bytes, remedy)
-    });
-    smallest([of_conversion, None])
+/// Budget for reading one file in a conversion with the limit `memory`.
+pub fn conversion_budget(memory: Option<MemoryBudget>) -> MemoryBudget {
+    smallest([memory, None])
 }
 
 /// The smallest of the `requested` budgets and of those of the process and the machine.
 fn smallest(requested: [Option<MemoryBudget>; 2]) -> MemoryBudget {
     let of_process = process_room().map(|bytes| {
-        let remedy = "raise the memory limit of the process (ulimit, --memory-ceiling)";
+        let remedy = "raise the memory limit of the process (ulimit, job.memory_ceiling)";
         MemoryBudget::new(reading_share(bytes), remedy)
     });
     let of_machine = available().map(|bytes| {
@@ -63,7 +59,8 @@ mod tests {
         assert_eq!(read_budget(Some(20 << 20), Some(1 << 40)).bytes(), 20 << 20);
         assert_eq!(read_budget(Some(1 << 40), Some(40 << 20)).bytes(), 30 << 20);
         assert_eq!(read_budget(Some(1), None).bytes(), MIN_BYTES);
-        assert_eq!(conversion_budget(Some(20 << 20)).bytes(), 20 << 20);
+        let limit = MemoryBudget::new(20 << 20, "");
+        assert_eq!(conversion_budget(Some(limit)).bytes(), 20 << 20);
         assert_eq!(conversion_budget(None), read_budget(None, None));
     }
 }

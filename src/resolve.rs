@@ -56,7 +56,7 @@ pub enum ResolveError {
     /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
         "input.radius: the frames bring none, and particles that are few, in one place or far apart \
-         do not tell it; give a length with --radius"
+         do not tell it"
     )]
     NoRadius,
     /// The radius is too small: squares of lengths would underflow.

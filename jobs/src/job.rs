@@ -21,8 +21,8 @@ use crate::ledger::{
 use crate::planning::{ExtendedPlan, merged_plan, new_plan, stored_path};
 use crate::workers::{WorkerRegistry, WorkerStatus, remove_stale_parts, worker_statuses};
 use crate::{
-    EntryStatus, FrameClaims, FrameState, InputChange, JobError, JobRequest, JobState, JobSummary,
-    Ledger, LedgerEntry, OutputFile, Plan, ResumeMode,
+    EntryStatus, FrameClaims, FrameFailure, FrameState, InputChange, JobError, JobRequest,
+    JobState, JobSummary, Ledger, LedgerEntry, OutputFile, Plan, ResumeMode,
 };
 
 /// Number of ledgers of ended workers above which they are compacted into one.
@@ -315,19 +315,15 @@ impl Job {
         self.record(entry, FrameState::Done)
     }
 
-    /// Records that `frame` failed, and why.
+    /// Records the failure of a frame.
     ///
     /// # Errors
     /// The frame is not in the plan, or the ledger cannot be written.
-    pub fn record_failed(
-        &mut self,
-        frame: i64,
-        reason: &str,
-        details: Value,
-    ) -> Result<(), JobError> {
-        let mut entry =
-            LedgerEntry::new(self.claims.next_seq(), frame, EntryStatus::Failed, &details);
-        entry.reason = Some(reason.to_owned());
+    pub fn record_failed(&mut self, failure: &FrameFailure) -> Result<(), JobError> {
+        let seq = self.claims.next_seq();
+        let mut entry = LedgerEntry::new(seq, failure.frame, EntryStatus::Failed, &Value::Null);
+        entry.reason = Some(failure.to_string());
+        entry.failure = Some(failure.kind);
         self.record(entry, FrameState::Failed)
     }
 
@@ -343,9 +339,7 @@ impl Job {
     pub(crate) fn record(&mut self, entry: LedgerEntry, state: FrameState) -> Result<(), JobError> {
         let frame = entry.frame;
         let Some(slot) = self.state.states.get_mut(&frame) else {
-            return Err(JobError::Request(format!(
-                "frame {frame} is not in the plan"
-            )));
+            return Err(JobError::UnknownFrame { frame });
         };
         self.writer
             .append(&entry, self.claims.has_other_workers())?;

@@ -12,11 +12,14 @@
 //! progress. [`export`] describes frames as work for other engines.
 #![deny(unsafe_code)]
 
+mod changes;
 mod claims;
 mod error;
 mod existing_outputs;
 pub mod export;
 mod extend;
+mod failure;
+mod file_error;
 mod fingerprint;
 mod fingerprint_cache;
 mod input;
@@ -37,13 +40,16 @@ mod requeue;
 mod state;
 mod workers;
 
+pub use changes::{InputChange, SettingChange};
 pub use claims::FrameClaims;
-pub use error::{InputChange, JobError, SettingChange};
+pub use error::{EntryError, JobError, PlanError};
+pub use failure::{FailureKind, FrameFailure};
+pub use file_error::FileError;
 pub use fingerprint::{Fingerprint, compare_settings, settings_hash, text_hash};
 pub use interrupt::{Interrupt, InterruptLevel};
 pub use job::{DryRun, Job};
 pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};
-pub use plan::{PLAN_FILE, Plan, PlannedFrame, PlannedInput};
+pub use plan::{Plan, PlannedFrame, PlannedInput};
 pub use process::{owner, set_owner};
 pub use publish::{Publisher, discard_own_parts, discard_parts, publish, publish_with};
 pub use queue::{FrameQueue, QueueEvent};
@@ -52,3 +58,6 @@ pub use regular::{open_regular, read_regular, read_regular_text};
 pub use request::{DEFAULT_TAKEOVER_AFTER, FrameRequest, JobRequest, ResumeMode};
 pub use state::{FrameState, JobState, JobSummary};
 pub use workers::{Claim, ClaimOutcome, WorkerStatus, start_heartbeat_thread};
+
+/// Name of the plan in the job's directory.
+pub const PLAN_FILE: &str = "job.plan.json";

@@ -2,13 +2,13 @@
 
 use crate::ledger::parse_lines;
 use crate::workers::WorkerRecord;
-use crate::{LedgerEntry, Plan};
+use crate::{EntryError, LedgerEntry, Plan, PlanError};
 
 /// Parses the file of a plan.
 ///
 /// # Errors
 /// Why it is invalid.
-pub fn plan(bytes: &[u8]) -> Result<Plan, String> {
+pub fn plan(bytes: &[u8]) -> Result<Plan, PlanError> {
     Plan::parse(bytes)
 }
 
@@ -16,7 +16,7 @@ pub fn plan(bytes: &[u8]) -> Result<Plan, String> {
 ///
 /// # Errors
 /// The number of the invalid line, from 1, and why it is invalid.
-pub fn ledger(bytes: &[u8]) -> Result<Vec<LedgerEntry>, (usize, String)> {
+pub fn ledger(bytes: &[u8]) -> Result<Vec<LedgerEntry>, (usize, EntryError)> {
     parse_lines(bytes)
 }
 

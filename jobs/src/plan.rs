@@ -10,12 +10,9 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 
 use crate::{
-    Fingerprint, JobError, SettingChange, compare_settings, publish, read_regular, settings_hash,
-    text_hash,
+    Fingerprint, JobError, PLAN_FILE, PlanError, SettingChange, compare_settings, publish,
+    read_regular, settings_hash, text_hash,
 };
-
-/// Name of the plan in the job's directory.
-pub const PLAN_FILE: &str = "job.plan.json";
 
 /// The version that is written. Version 1, of spherule 0.1.0, has a checksum of the settings only and no
 /// `input_dirs`. It is read, and replaced when the job is resumed.
@@ -141,7 +138,7 @@ impl Plan {
         };
         Self::parse(&bytes)
             .map(Some)
-            .map_err(|what| JobError::PlanDamaged { path, what })
+            .map_err(|source| JobError::PlanDamaged { path, source })
     }
 
     /// Parses the file of a plan. The error does not contain the file's name.
@@ -149,49 +146,46 @@ impl Plan {
     /// # Errors
     /// The bytes are not a plan, are damaged, or have an unknown version.
     #[doc(hidden)]
-    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+    pub fn parse(bytes: &[u8]) -> Result<Self, PlanError> {
         #[derive(Deserialize)]
         struct Versioned {
             version: u32,
         }
-        let version = serde_json::from_slice::<Versioned>(bytes)
-            .map_err(damaged)?
-            .version;
+        let version = serde_json::from_slice::<Versioned>(bytes)?.version;
         let plan = match version {
             VERSION => Self::parse_version_2(bytes)?,
             1 => Self::parse_version_1(bytes)?,
-            _ => {
-                return Err(format!(
-                    "the plan has version {version}; this program reads versions 1 to {VERSION}"
-                ));
+            found => {
+                return Err(PlanError::Version {
+                    found,
+                    latest: VERSION,
+                });
             }
         };
         if !plan.frames.is_sorted_by(|a, b| a.number < b.number) {
-            return Err("the frames in the plan are not in ascending order".to_owned());
+            return Err(PlanError::Unordered);
         }
         Ok(plan)
     }
 
-    fn parse_version_2(bytes: &[u8]) -> Result<Self, String> {
-        let checksummed: ChecksummedPlan = serde_json::from_slice(bytes).map_err(damaged)?;
+    fn parse_version_2(bytes: &[u8]) -> Result<Self, PlanError> {
+        let checksummed: ChecksummedPlan = serde_json::from_slice(bytes)?;
         let text = checksummed.plan.get();
         if text_hash(text) != checksummed.blake3 {
-            return Err(
-                "the plan does not match its checksum; it is damaged or was edited".to_owned(),
-            );
+            return Err(PlanError::Checksum);
         }
-        serde_json::from_str(text).map_err(damaged)
+        Ok(serde_json::from_str(text)?)
     }
 
-    fn parse_version_1(bytes: &[u8]) -> Result<Self, String> {
+    fn parse_version_1(bytes: &[u8]) -> Result<Self, PlanError> {
         #[derive(Deserialize)]
         struct Hashed {
             settings_blake3: String,
         }
-        let hash: Hashed = serde_json::from_slice(bytes).map_err(damaged)?;
-        let mut plan: Self = serde_json::from_slice(bytes).map_err(damaged)?;
+        let hash: Hashed = serde_json::from_slice(bytes)?;
+        let mut plan: Self = serde_json::from_slice(bytes)?;
         if settings_hash(&plan.settings) != hash.settings_blake3 {
-            return Err("the settings in the plan do not match their fingerprint".to_owned());
+            return Err(PlanError::SettingsChecksum);
         }
         plan.version = 1;
         Ok(plan)
@@ -199,9 +193,10 @@ impl Plan {
 
     pub(crate) fn store(&self, dir: &Path) -> Result<(), JobError> {
         let path = Self::path_in(dir);
-        let bytes = self
-            .to_bytes()
-            .map_err(|e| JobError::Request(format!("cannot serialise the plan: {e}")))?;
+        let bytes = self.to_bytes().map_err(|source| JobError::Serialize {
+            path: path.clone(),
+            source,
+        })?;
         publish(&path, &bytes).map_err(|e| JobError::io(&path, "writing the plan", e))
     }
 
@@ -229,10 +224,6 @@ impl Plan {
             }
         }
     }
-}
-
-fn damaged(error: serde_json::Error) -> String {
-    format!("not a readable plan ({error})")
 }
 
 impl PlannedFrame {

@@ -86,12 +86,11 @@ fn refuse_shared_outputs(dir: &Path, plan: &Plan) -> Result<(), JobError> {
     for frame in plan.frames() {
         for output in &frame.outputs {
             if let Some(other) = owners.insert(output, frame.number) {
-                return Err(JobError::Request(format!(
-                    "{}: frame {other} of the job has this output, frame {} would have the same; put #### into the \
-                     name, choose another one, or start over with --force",
-                    dir.join(output).display(),
-                    frame.number
-                )));
+                return Err(JobError::PlannedOutput {
+                    path: dir.join(output),
+                    planned: other,
+                    requested: frame.number,
+                });
             }
         }
     }
@@ -188,10 +187,9 @@ pub(crate) fn stored_path(dir: &Path, path: &Path) -> Result<String, JobError> {
 }
 
 fn utf8(path: &Path) -> Result<String, JobError> {
-    path.to_str().map(str::to_owned).ok_or_else(|| {
-        JobError::Request(format!(
-            "{}: the path is not UTF-8 and cannot be stored in a plan; rename it",
-            path.display()
-        ))
-    })
+    path.to_str()
+        .map(str::to_owned)
+        .ok_or_else(|| JobError::NotUtf8 {
+            path: path.to_owned(),
+        })
 }

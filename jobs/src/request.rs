@@ -68,17 +68,15 @@ impl JobRequest {
         let mut outputs = HashMap::new();
         for frame in &self.frames {
             if !numbers.insert(frame.number) {
-                let what = format!("frame {} occurs twice", frame.number);
-                return Err(JobError::Request(what));
+                let frame = frame.number;
+                return Err(JobError::DuplicateFrame { frame });
             }
             for path in &frame.outputs {
                 if let Some(other) = outputs.insert(path, frame.number) {
-                    let what = format!(
-                        "{}: frames {other} and {} have the same output; put #### into the output's name",
-                        path.display(),
-                        frame.number
-                    );
-                    return Err(JobError::Request(what));
+                    return Err(JobError::SharedOutput {
+                        path: path.clone(),
+                        frames: [other, frame.number],
+                    });
                 }
             }
         }

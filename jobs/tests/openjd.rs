@@ -185,5 +185,5 @@ fn a_frame_list_beyond_the_length_limit_is_rejected() {
     let chunks = chunks(&frames, 1);
     let error = template(&frames, &chunks).text(TemplateFormat::Yaml);
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("in parts with --frames"), "{error}");
+    assert!(error.contains("exceeds the 1024 characters"), "{error}");
 }

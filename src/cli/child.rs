@@ -26,9 +26,26 @@ pub(super) enum ChildResult<T> {
     /// It printed a result, which may be a failure.
     Completed(T),
     /// It ended without a result: why.
-    Crashed(String),
+    Crashed(Crash),
     /// It was killed because of an interrupt.
     Interrupted,
+}
+
+/// Why a child process has no result.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Crash {
+    /// The task cannot be serialised.
+    #[error("cannot serialise the task: {0}")]
+    Serialize(#[from] serde_json::Error),
+    /// The process cannot be started.
+    #[error("cannot start a process: {0}")]
+    Start(#[source] io::Error),
+    /// The state of the process is unknown.
+    #[error("lost the process: {0}")]
+    Lost(#[source] io::Error),
+    /// The process ended without a result: how, and what it printed.
+    #[error("the process died: {0}")]
+    Died(String),
 }
 
 /// Runs `task` in a child process with the hidden command `command`. Kills the child if `stop` returns true.
@@ -42,11 +59,11 @@ pub(super) fn run<T: DeserializeOwned>(
     }
     let line = match serde_json::to_string(task) {
         Ok(line) => line,
-        Err(e) => return ChildResult::Crashed(format!("cannot serialise the task: {e}")),
+        Err(e) => return ChildResult::Crashed(e.into()),
     };
     let mut child = match spawn(command) {
         Ok(child) => child,
-        Err(e) => return ChildResult::Crashed(format!("cannot start a process: {e}")),
+        Err(e) => return ChildResult::Crashed(Crash::Start(e)),
     };
     let output = reader(child.stdout.take());
     let errors = reader(child.stderr.take());
@@ -59,7 +76,7 @@ pub(super) fn run<T: DeserializeOwned>(
         match child.try_wait() {
             Ok(Some(status)) => break status,
             Ok(None) => {}
-            Err(e) => return ChildResult::Crashed(format!("lost the process: {e}")),
+            Err(e) => return ChildResult::Crashed(Crash::Lost(e)),
         }
         if stop() {
             let _ = child.kill();
@@ -73,7 +90,7 @@ pub(super) fn run<T: DeserializeOwned>(
     let (output, errors) = (text(output), text(errors));
     match serde_json::from_str(&output) {
         Ok(result) if status.success() => ChildResult::Completed(result),
-        _ => ChildResult::Crashed(reason(status, &errors)),
+        _ => ChildResult::Crashed(Crash::Died(reason(status, &errors))),
     }
 }
 

@@ -6,10 +6,10 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use serde_json::{Value, json};
-use spherule_formats::SequenceInput;
 use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
 use spherule_formats::sequence::{Sequence, SequenceFrame};
+use spherule_formats::{MemoryBudget, SequenceInput};
 use spherule_jobs::{DEFAULT_TAKEOVER_AFTER, FrameRange, Job, JobRequest, ResumeMode};
 
 use super::job::{
@@ -29,6 +29,9 @@ use crate::survey::Survey;
 
 /// Value of [`KIND`] in the plan of a conversion.
 const CONVERT: &str = "convert";
+
+/// What the user can do if a frame does not fit into the memory limit.
+const MEMORY_REMEDY: &str = "raise --memory if there is more memory";
 
 const EXAMPLES: &str = "\
 Examples:
@@ -118,7 +121,8 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     guard_name(&args.output)?;
     use_threads(args.threads)?;
     let input = SequenceInput::from_paths(args.input.clone());
-    let budget = conversion_budget(args.memory.map(|memory| memory.0));
+    let limit = |memory: Bytes| MemoryBudget::new(memory.0, MEMORY_REMEDY);
+    let budget = conversion_budget(args.memory.map(limit));
     let sequence = in_thread(|| Sequence::open_within(&input, budget))?;
     for note in sequence.notes() {
         note!("{note}");
@@ -192,7 +196,7 @@ fn show_event(progress: &Progress, event: &Event) {
             facts["output"] = json!(task.output.display().to_string());
             progress.done(task.frame, &task.output, &converted.to_string(), facts);
         }
-        Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Failed(failure) => progress.failed(failure),
         Event::OtherWorker(event) => progress.other_worker(*event),
         Event::Note(note) => progress.note(note),
     }
@@ -290,7 +294,8 @@ impl ConvertJob<'_> {
     }
 
     fn conversion(&self, survey: &Survey) -> Result<Conversion, CliError> {
-        Conversion::new(self.settings.clone(), survey).map_err(CliError::Other)
+        Conversion::new(self.settings.clone(), survey)
+            .map_err(|e| CliError::other(format!("--attributes: {e}")))
     }
 
     /// The conversion with the survey that is stored in the plan.

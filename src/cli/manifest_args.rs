@@ -149,7 +149,11 @@ impl ManifestArgs {
             list.push(over("material.color.range", range.clone(), "--range")?);
         }
         if let Some(look) = &self.look {
-            list.extend(Look::named(look).map_err(CliError::Other)?.settings());
+            list.extend(
+                Look::named(look)
+                    .map_err(|e| CliError::other(format!("--look {e}")))?
+                    .settings(&format!("--look {look}")),
+            );
         }
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(CliError::Other)?);

@@ -10,7 +10,7 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use spherule_jobs::{EntryStatus, QueueEvent};
+use spherule_jobs::{EntryStatus, FrameFailure, QueueEvent};
 
 use super::{events, print};
 use crate::manifest::ProgressMode;
@@ -117,8 +117,9 @@ impl Progress {
         self.line(done, &plain);
     }
 
-    /// `frame` has failed.
-    pub(super) fn failed(&self, frame: i64, reason: &str) {
+    /// A frame has failed.
+    pub(super) fn failed(&self, failure: &FrameFailure) {
+        let (frame, reason) = (failure.frame, failure.to_string());
         let done = self.count(Some(frame));
         self.message(&format!("error: frame {frame}: {reason}"));
         let facts = json!({"frame": frame, "reason": reason, "done": done, "total": self.total()});

@@ -15,16 +15,13 @@ use super::manifest_args::{ManifestArgs, RequestedManifest, in_thread};
 use super::paths::absolute;
 use super::schema::{is_schema, schema_text};
 use super::shard::Shard;
-use crate::accel::Structure;
 use crate::manifest::{
     Manifest, OutputPattern, SCHEMA_FILE, is_marked, marked, named_place, read_manifest, real_dir,
 };
-use crate::metrics::Bytes;
 use crate::metrics::memory::available;
-use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::{self, check_views, question};
-use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
 /// The manifest that is written next to the images.
@@ -246,7 +243,7 @@ impl RenderJob {
         let frames = sequence.frames().iter().map(|frame| frame.number);
         let setup = resolve::setup(&self.manifest, survey);
         let setup = setup.and_then(|setup| check_views(&setup, frames).map(|()| setup));
-        setup.map_err(|e| CliError::Other(e.to_string()))
+        Ok(setup?)
     }
 
     /// The setup with the survey that is stored in the plan.
@@ -272,17 +269,9 @@ impl RenderJob {
             .map(|task| FrameSize::of(sequence, task.index, setup.run.weight.as_ref()))
             .collect();
         let limit = self.manifest.render.memory_limit;
-        let model = MemoryModel::new(setup);
-        let schedule = model.schedule(&sizes, limit.map(|l| l.0), available());
-        if let Some(limit) = limit {
-            for (index, need) in &schedule.too_large {
-                tasks[*index].refused = Some(format!(
-                    "it needs about {} ({need}){}, render.memory_limit is {limit}: {}",
-                    Bytes(need.total()),
-                    surface_text(setup),
-                    remedy(setup, &sizes[*index], limit)
-                ));
-            }
+        let mut schedule = MemoryModel::new(setup).schedule(&sizes, limit, available());
+        for (index, error) in schedule.too_large.drain(..) {
+            tasks[index].refused = Some(error);
         }
         schedule
     }
@@ -370,47 +359,9 @@ pub(super) fn require_one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
     }
 }
 
-/// Radius and voxel size of a smooth surface. A grid that is too large usually has a wrong radius.
-fn surface_text(setup: &Setup) -> String {
-    if setup.picture.surface.kind != SurfaceKind::Smooth {
-        return String::new();
-    }
-    let voxel = setup.picture.surface.voxel;
-    match setup.picture.radius {
-        RadiusRule::Common(radius) | RadiusRule::FileOr(radius) if radius > 0.0 => format!(
-            " for a smooth surface of particles of radius {radius} in voxels of {}",
-            voxel * radius
-        ),
-        _ => format!(
-            " for a smooth surface of particles of their own radius in voxels of {voxel} of it"
-        ),
-    }
-}
-
-/// Ways to reduce the memory of a frame that needs more than `limit`.
-fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
-    let mut ways = Vec::new();
-    let others = Structure::ALL.into_iter().filter(|structure| {
-        let mut setup = setup.clone();
-        setup.run.accelerator = Some(*structure);
-        MemoryModel::new(&setup).alone(frame).total() <= limit.0
-    });
-    ways.extend(others.map(|other| format!("choose --accelerator {other}")));
-    let alone = MemoryModel::new(setup).alone(frame);
-    let image_only = MemoryModel::new(setup).alone(&FrameSize::default());
-    if 4 * (image_only.images + image_only.encoding) > limit.0 {
-        ways.push("make the image smaller or ask for fewer channels".to_owned());
-    }
-    if setup.picture.surface.kind == SurfaceKind::Smooth && 4 * alone.surface > limit.0 {
-        ways.push("give larger voxels (surface.voxel)".to_owned());
-    }
-    ways.push("raise the limit".to_owned());
-    ways.join(", or ")
-}
-
 /// Makes the paths in `manifest` relative to `dir`, the directory of its images.
 fn move_into(manifest: &mut Manifest, base: &Path, dir: &Path) -> Result<(), CliError> {
-    manifest.rebase(base, dir).map_err(CliError::Other)?;
+    manifest.rebase(base, dir)?;
     // Store only the file name, so that the directory can be moved with its manifest
     if real_dir(&dir.join(manifest.output.path.dir())) == dir {
         manifest.output.path =

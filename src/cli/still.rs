@@ -16,7 +16,7 @@ use super::paths::absolute;
 use super::render::print_summary;
 use super::render_job::{RenderJob, require_one_fits};
 use super::{CliError, Outcome, print, signals};
-use crate::pipeline::{ImageError, PictureKind, make_picture};
+use crate::pipeline::{ImageError, PictureKind, WriteError, make_picture};
 use crate::render::Channels;
 
 /// Signatures of the files that `still` may replace: OpenEXR and PNG.
@@ -107,11 +107,11 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
             )])?;
             Ok(Outcome::Done)
         }
-        Err(ImageError::Frame(reason)) => {
-            message!("error: frame {frame}: {reason}");
+        Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(&shown)(source)),
+        Err(error) => {
+            message!("error: frame {frame}: {error}");
             Ok(Outcome::SomeFailed)
         }
-        Err(ImageError::OutputUnavailable(_, error)) => Err(CliError::io(&shown)(error)),
     }
 }
 

@@ -8,20 +8,22 @@ use std::ops::ControlFlow;
 use std::path::PathBuf;
 
 use serde_json::json;
-use spherule_formats::convert::{ConvertError, Phase, Progress};
+use spherule_formats::Sequence;
+use spherule_formats::convert::{Phase, Progress};
 use spherule_formats::write::own_temporaries;
-use spherule_formats::{FrameError, Sequence};
-use spherule_jobs::{FrameQueue, Interrupt, Job, JobError, QueueEvent};
+use spherule_jobs::{FrameFailure, FrameQueue, Interrupt, Job, JobError, QueueEvent};
 
 mod attributes;
+mod error;
 mod frame;
 mod settings;
 
 pub use attributes::{AttributeChoices, Storage};
+pub use error::{ConversionError, UnknownAttribute};
 pub use frame::{ConvertedFrame, convert_frame};
 pub use settings::{Conversion, ConvertSettings};
 
-use crate::failure::{catch_panic, is_output_unavailable, may_be_incomplete};
+use crate::failure::catch_panic;
 
 /// One frame to convert.
 #[derive(Debug, Clone, PartialEq, Eq)]
@@ -43,8 +45,8 @@ pub enum Event<'a> {
     Advanced(i64, Phase, u64, u64),
     /// A frame's file exists and is recorded.
     Done(&'a ConvertTask, &'a ConvertedFrame),
-    /// A frame failed and was recorded with this reason. The other frames continue.
-    Failed(i64, &'a str),
+    /// A frame failed, and the failure was recorded. The other frames continue.
+    Failed(&'a FrameFailure),
     /// Another worker has finished a frame or holds one.
     OtherWorker(QueueEvent<'a>),
     /// A note for the user.
@@ -93,8 +95,12 @@ pub fn run(
             frame: task.frame,
             on_event,
         };
-        match catch_panic(|| Ok(convert_frame(conversion, sequence, task, &progress))) {
-            Ok(Ok(converted)) => {
+        let result = catch_panic(|| {
+            convert_frame(conversion, sequence, task, &progress)
+                .map_err(|e| ConversionError::new(e, sequence, task.index))
+        });
+        match result {
+            Ok(converted) => {
                 // Report a note that all frames share once
                 for note in &converted.notes {
                     if reported_notes.insert(note.clone()) {
@@ -105,39 +111,16 @@ pub fn run(
                 job.record_done(task.frame, outputs, json!(converted))?;
                 on_event(Event::Done(task, &converted));
             }
-            // Not a failure of the frame, which stays pending
-            Ok(Err(ConvertError::Frame(FrameError::Io { path, source })))
-                if path.starts_with(task.output.parent().unwrap_or(&task.output))
-                    && is_output_unavailable(&source) =>
-            {
-                return Err(JobError::writing(&path, source));
+            Err(error) => {
+                let failure = error.into_failure(task);
+                if failure.kind.stops_run() {
+                    return Err(JobError::Stopped(failure));
+                }
+                on_event(Event::Failed(&failure));
+                job.record_failed(&failure)?;
             }
-            Ok(Err(error)) => fail(job, on_event, task, &reason(sequence, task, &error))?,
-            Err(reason) => fail(job, on_event, task, &reason)?,
         }
         claim.complete();
     }
     Ok(())
-}
-
-fn fail(
-    job: &mut Job,
-    on_event: OnEvent,
-    task: &ConvertTask,
-    reason: &str,
-) -> Result<(), JobError> {
-    on_event(Event::Failed(task.frame, reason));
-    job.record_failed(task.frame, reason, json!(null))
-}
-
-/// Why a frame cannot be converted, with a remedy.
-fn reason(sequence: &Sequence, task: &ConvertTask, error: &ConvertError) -> String {
-    if let ConvertError::Frame(error) = error
-        && may_be_incomplete(sequence, task.index, error)
-    {
-        return format!(
-            "{error}; it is the newest frame and may still be being written; convert again later"
-        );
-    }
-    error.to_string()
 }

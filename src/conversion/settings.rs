@@ -5,6 +5,7 @@ use spherule_formats::native::layout::VERSION;
 use spherule_formats::native::{Bound, Encoding};
 
 use super::attributes::AttributeChoices;
+use super::error::UnknownAttribute;
 use crate::metrics::Bytes;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
@@ -88,12 +89,12 @@ impl Conversion {
     ///
     /// # Errors
     /// The settings name an attribute that no frame has.
-    pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, String> {
+    pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, UnknownAttribute> {
         if let Some(name) = settings.attributes.unknown(&survey.attributes) {
-            let has = crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..]));
-            return Err(format!(
-                "--attributes: no frame has `{name}`; there are {has}"
-            ));
+            return Err(UnknownAttribute {
+                name: name.to_owned(),
+                known: crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..])),
+            });
         }
         Ok(Self {
             estimate: survey.radius.filter(|_| settings.radius.is_none()),

@@ -63,7 +63,7 @@ pub use preset::Look;
 pub(crate) use reader::nearest;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
-pub use rebase::{named_place, real_dir};
+pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use tree::Override;
@@ -263,7 +263,7 @@ impl Manifest {
         };
         Err(ManifestError {
             lines: vec![format!(
-                "output.path: {} for {count}: {NEEDS_NUMBER}, or choose one frame with --frames",
+                "output.path: {} for {count}: {NEEDS_NUMBER}, or select one frame (input.frames)",
                 self.output.path
             )],
         })

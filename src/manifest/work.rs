@@ -94,7 +94,7 @@ impl Work {
         {
             section.wrong(
                 "memory_ceiling",
-                "is that of a frame's own process; say job.isolate = true (--isolate) too, or render.memory_limit",
+                "is that of a frame's own process; say job.isolate = true too, or render.memory_limit",
             );
         }
     }

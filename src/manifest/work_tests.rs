@@ -76,7 +76,7 @@ fn values_that_will_not_do() {
     );
     refused(
         "memory_ceiling=4GiB",
-        "memory_ceiling: is that of a frame's own process; say job.isolate = true (--isolate)",
+        "memory_ceiling: is that of a frame's own process; say job.isolate = true too",
     );
     refused(
         "retries=-1",

@@ -1,7 +1,7 @@
 //! Third stage: encodes images, publishes them under their final names, and records them.
 
 use std::io::{self, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
@@ -9,31 +9,15 @@ use serde_json::json;
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{Job, JobError, Publisher, publish};
 
+use super::error::{ImageError, WriteError};
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::{ClaimedFrame, Event, OnEvent, Stage, StageResult};
-use crate::failure::is_output_unavailable;
+use super::{ClaimedFrame, Event, ImageTask, OnEvent, Stage, StageResult};
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::output::{CustomAttribute, ExrOptions, OutputError, encode_preview, write_exr};
+use crate::output::{CustomAttribute, ExrOptions, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
-
-/// Why an image cannot be written.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum WriteError {
-    /// Encoding failed.
-    #[error(transparent)]
-    Encode(#[from] OutputError),
-    /// Writing failed.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The image.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: io::Error,
-    },
-}
 
 /// Channels to earlier stages, for use after an image is written. The receivers may have ended.
 pub(super) struct AfterWrite {
@@ -81,20 +65,12 @@ pub(super) fn write_stage(
                         job.record_done(task.frame, &outputs, json!(report))?;
                         on_event(Event::Done(&task, &report));
                     }
-                    // Not a failure of the frame, which stays pending
-                    Err(WriteError::Io { path, source }) if is_output_unavailable(&source) => {
-                        return Err(JobError::writing(&path, source));
-                    }
-                    Err(error) => {
-                        let reason = error.to_string();
-                        on_event(Event::Failed(task.frame, &reason));
-                        job.record_failed(task.frame, &reason, json!(null))?;
-                    }
+                    Err(error) => fail(&task, error.into(), job, on_event)?,
                 }
             }
-            StageResult::Failed(task, reason) => {
-                on_event(Event::Failed(task.frame, &reason));
-                job.record_failed(task.frame, &reason, json!(null))?;
+            StageResult::Failed(failed) => {
+                let (task, error) = *failed;
+                fail(&task, error, job, on_event)?;
             }
         }
         claim.complete();
@@ -103,6 +79,21 @@ pub(super) fn write_stage(
         }
     }
     Ok(())
+}
+
+/// Records that `task` failed, or stops the run if further images would fail too.
+fn fail(
+    task: &ImageTask,
+    error: ImageError,
+    job: &mut Job,
+    on_event: OnEvent,
+) -> Result<(), JobError> {
+    let failure = error.into_failure(task.frame);
+    if failure.kind.stops_run() {
+        return Err(JobError::Stopped(failure));
+    }
+    on_event(Event::Failed(&failure));
+    job.record_failed(&failure)
 }
 
 /// Encodes and publishes the images of `frame`. Returns the complete report and the planes, which can be reused.

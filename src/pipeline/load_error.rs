@@ -9,7 +9,9 @@ pub enum LoadError {
     #[error(transparent)]
     Frame(FrameError),
     /// The same for the last frame of the sequence, which a simulation may be at.
-    #[error("{0}; it is the newest frame and may still be being written; render again later")]
+    #[error(
+        "{0}; this is the newest frame: if the simulation is still writing it, render again later"
+    )]
     Newest(FrameError),
     /// It does not fit into memory.
     #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]

@@ -14,13 +14,15 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
 
 use spherule_formats::sequence::Sequence;
-use spherule_jobs::{Claim, FrameQueue, Interrupt, Job, JobError, QueueEvent};
+use spherule_jobs::{Claim, FrameFailure, FrameQueue, Interrupt, Job, JobError, QueueEvent};
 
 mod decoded;
 mod encode;
+mod error;
 mod in_place;
 mod load;
 mod load_error;
+mod memory_limit;
 mod predict;
 mod probe;
 mod rays;
@@ -33,16 +35,18 @@ mod surface;
 mod trace;
 
 pub use decoded::{DecodedFrame, DecodedShading};
+pub use error::{ImageError, WriteError};
 pub use in_place::{StoredFrame, StoredShading};
 pub use load::{LoadedFrame, LoadedParticles, load_frame};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
+pub use memory_limit::{MemoryLimitError, MemoryRemedy};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
-pub use probe::{Probe, probe};
+pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, Picture, RadiusRule, RunSettings, Setup};
-pub use single::{ImageError, PictureKind, make_image, make_picture};
+pub use single::{PictureKind, make_image, make_picture};
 pub use trace::{CpuRenderer, renderer_of};
 
 use read_threads::ReadThreads;
@@ -63,7 +67,7 @@ pub struct ImageTask {
     /// Path of the optional PNG.
     pub preview: Option<PathBuf>,
     /// Why it cannot be rendered, if that is known in advance.
-    pub refused: Option<String>,
+    pub refused: Option<MemoryLimitError>,
 }
 
 /// A stage of the pipeline.
@@ -84,8 +88,8 @@ pub enum Event<'a> {
     StageEntered(i64, Stage),
     /// A frame's image exists and is recorded.
     Done(&'a ImageTask, &'a FrameReport),
-    /// A frame failed and was recorded with this reason. The other frames continue.
-    Failed(i64, &'a str),
+    /// A frame failed, and the failure was recorded. The other frames continue.
+    Failed(&'a FrameFailure),
     /// Another worker has finished a frame or holds one.
     OtherWorker(QueueEvent<'a>),
     /// A note for the user.
@@ -98,7 +102,7 @@ pub type OnEvent<'a> = &'a (dyn Fn(Event) + Sync);
 /// A frame between two stages, or the reason why it failed.
 enum StageResult<T> {
     Frame(T),
-    Failed(ImageTask, String),
+    Failed(Box<(ImageTask, ImageError)>),
 }
 
 /// A frame between two stages, with the claim of this worker.
@@ -204,7 +208,7 @@ impl ReadStage<'_> {
             let task = &self.tasks[index];
             (self.on_event)(Event::StageEntered(task.frame, Stage::Read));
             let loaded = match &task.refused {
-                Some(reason) => Err(reason.clone()),
+                Some(error) => Err(error.clone().into()),
                 None => catch_panic(|| self.load(task)),
             };
             let result = match loaded {
@@ -212,7 +216,7 @@ impl ReadStage<'_> {
                     notes.report(std::mem::take(&mut frame.notes), self.on_event);
                     StageResult::Frame(frame)
                 }
-                Err(reason) => StageResult::Failed(task.clone(), reason),
+                Err(error) => StageResult::Failed(Box::new((task.clone(), error))),
             };
             if !self.next.send(ClaimedFrame { claim, result }) {
                 break;
@@ -221,11 +225,10 @@ impl ReadStage<'_> {
         Ok(())
     }
 
-    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, String> {
+    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, ImageError> {
         let size = FrameSize::of(self.sequence, task.index, self.setup.run.weight.as_ref());
         let load = || load_frame(self.setup, self.sequence, task);
-        let loaded = self.threads.read(size.read_bytes(), load);
-        loaded.map_err(|e| e.to_string())
+        Ok(self.threads.read(size.read_bytes(), load)?)
     }
 }
 
@@ -304,12 +307,12 @@ impl TraceStage<'_> {
                     let task = frame.task.clone();
                     (self.on_event)(Event::StageEntered(task.frame, Stage::Trace));
                     let build = || tracer.prepare(self.setup, frame);
-                    (
-                        task,
-                        catch_panic(|| in_pool(build).map_err(|e| e.to_string())),
-                    )
+                    (task, catch_panic(|| Ok(in_pool(build)?)))
                 }
-                StageResult::Failed(task, reason) => (task, Err(reason)),
+                StageResult::Failed(failed) => {
+                    let (task, error) = *failed;
+                    (task, Err(error))
+                }
             };
             if let Some(is_built) = &is_built {
                 // The reader may have ended
@@ -322,15 +325,15 @@ impl TraceStage<'_> {
                     tracer.recycle(film);
                 }
                 let trace = || tracer.render(self.setup, frame, &self.stop);
-                catch_panic(|| in_pool(trace).map_err(|e| e.to_string()))
+                catch_panic(|| Ok(in_pool(trace)?))
             });
             let result = match traced {
                 Ok(traced) => StageResult::Frame(traced),
                 Err(_) if self.stop.is_raised() => return,
-                Err(reason) => {
+                Err(error) => {
                     // The failure may have left the buffers in an inconsistent state
                     tracer = renderer_of(self.setup.picture.renderer);
-                    StageResult::Failed(task, reason)
+                    StageResult::Failed(Box::new((task, error)))
                 }
             };
             if is_built.is_none() {

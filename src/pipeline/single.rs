@@ -1,7 +1,5 @@
 //! Renders one image, with no other frame in memory.
 
-use std::io;
-use std::path::PathBuf;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
@@ -9,24 +7,16 @@ use spherule_formats::Sequence;
 use spherule_jobs::publish;
 
 use super::ImageTask;
-use super::encode::{WriteError, write_frame};
+use super::encode::write_frame;
+use super::error::{ImageError, WriteError};
 use super::load::load_frame;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use super::trace::renderer_of;
-use crate::failure::{catch_panic, is_output_unavailable};
+use crate::failure::catch_panic;
 use crate::metrics::MemoryPeaks;
 use crate::output::encode_preview;
 use crate::report::FrameReport;
-
-/// Reasons why there is no image.
-#[derive(Debug)]
-pub enum ImageError {
-    /// This frame failed, for this reason.
-    Frame(String),
-    /// The output cannot be written, so further images would fail too: the file, and the error of the system.
-    OutputUnavailable(PathBuf, io::Error),
-}
 
 /// The file format of a picture outside a job.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -48,7 +38,7 @@ pub fn make_image(
     note: impl FnMut(&str),
 ) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
-    write_guarded(|| write_exr(setup, traced))
+    catch_panic(|| write_exr(setup, traced))
 }
 
 /// Renders only the image of `task`, in a file of this `kind`. Passes notes for the user to `note`.
@@ -63,7 +53,7 @@ pub fn make_picture(
     note: impl FnMut(&str),
 ) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
-    write_guarded(|| match kind {
+    catch_panic(|| match kind {
         PictureKind::Exr => write_exr(setup, traced),
         PictureKind::Png => write_png(setup, &traced),
     })
@@ -75,48 +65,32 @@ fn trace_single(
     task: &ImageTask,
     mut note: impl FnMut(&str),
 ) -> Result<TracedFrame, ImageError> {
-    let traced = catch_panic(|| {
-        let mut frame = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
-        std::mem::take(&mut frame.notes)
-            .iter()
-            .for_each(|n| note(n));
+    let mut report = |notes: &mut Vec<String>| notes.drain(..).for_each(|n| note(&n));
+    catch_panic(|| {
+        let mut frame = load_frame(setup, sequence, task)?;
+        report(&mut frame.notes);
         // Build its tree, and trace the image
         let mut tracer = renderer_of(setup.picture.renderer);
-        let mut built = tracer.prepare(setup, frame).map_err(|e| e.to_string())?;
-        std::mem::take(&mut built.notes)
-            .iter()
-            .for_each(|n| note(n));
+        let mut built = tracer.prepare(setup, frame)?;
+        report(&mut built.notes);
         let stop = AtomicBool::new(false);
-        tracer
-            .render(setup, built, &stop)
-            .map_err(|e| e.to_string())
-    });
-    traced.map_err(ImageError::Frame)
+        Ok(tracer.render(setup, built, &stop)?)
+    })
 }
 
-fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, WriteError> {
-    write_frame(setup, frame, &mut MemoryPeaks::default()).map(|(report, _)| report)
+fn write_exr(setup: &Setup, frame: TracedFrame) -> Result<FrameReport, ImageError> {
+    let (report, _) = write_frame(setup, frame, &mut MemoryPeaks::default())?;
+    Ok(report)
 }
 
 /// Writes the preview of `frame` in place of its image.
-fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, WriteError> {
+fn write_png(setup: &Setup, frame: &TracedFrame) -> Result<FrameReport, ImageError> {
     let start = Instant::now();
-    let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
+    let options = setup.preview_from(&frame.camera);
+    let png = encode_preview(&frame.film, &options).map_err(WriteError::Encode)?;
     let path = frame.task.image.clone();
     publish(&path, &png).map_err(|source| WriteError::Io { path, source })?;
     let mut report = frame.report.clone();
     report.seconds.encode = start.elapsed().as_secs_f64();
     Ok(report)
-}
-
-fn write_guarded(
-    write: impl FnOnce() -> Result<FrameReport, WriteError>,
-) -> Result<FrameReport, ImageError> {
-    match catch_panic(|| Ok(write())).map_err(ImageError::Frame)? {
-        Ok(report) => Ok(report),
-        Err(WriteError::Io { path, source }) if is_output_unavailable(&source) => {
-            Err(ImageError::OutputUnavailable(path, source))
-        }
-        Err(error) => Err(ImageError::Frame(error.to_string())),
-    }
 }

@@ -110,7 +110,7 @@ impl JobTemplate<'_> {
             TemplateFormat::Yaml => tree.to_yaml(),
             TemplateFormat::Json => {
                 let text = serde_json::to_string_pretty(&tree);
-                text.map_err(|e| ExportError::Settings(e.to_string()))? + "\n"
+                text.map_err(|e| ExportError::Serialize(e.to_string()))? + "\n"
             }
         })
     }
@@ -265,10 +265,7 @@ fn frames_text(frames: &[i64]) -> Result<String, ExportError> {
     // Steps are written with `:`
     let text = range.to_string().replace('x', ":");
     if text.len() > MAX_VALUE {
-        return Err(ExportError::Settings(format!(
-            "the frames have so many gaps that their list exceeds the {MAX_VALUE} characters of \
-             a template value; export them in parts with --frames"
-        )));
+        return Err(ExportError::TooManyGaps { max: MAX_VALUE });
     }
     Ok(text)
 }

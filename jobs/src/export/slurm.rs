@@ -86,14 +86,16 @@ impl ArrayScript<'_> {
     fn check_times(&self) -> Result<(), ExportError> {
         let ahead = self.signal_ahead;
         if !(1..=MAX_SIGNAL_AHEAD).contains(&ahead) {
-            return Err(ExportError::Settings(format!(
-                "the signal must be sent 1 to {MAX_SIGNAL_AHEAD} seconds before the time limit, not {ahead}"
-            )));
+            return Err(ExportError::SignalAhead {
+                seconds: ahead,
+                max: MAX_SIGNAL_AHEAD,
+            });
         }
         match self.resources.time {
-            Some(time) if time.seconds <= u64::from(ahead) => Err(ExportError::Settings(format!(
-                "a time limit of {time} leaves no time to work if the signal is sent {ahead} s before it"
-            ))),
+            Some(time) if time.seconds <= u64::from(ahead) => Err(ExportError::NoTimeToWork {
+                limit: time,
+                signal_ahead: ahead,
+            }),
             _ => Ok(()),
         }
     }

@@ -16,15 +16,23 @@ const DAY: u64 = 24 * HOUR;
 /// Slurm stores minutes in 32 bits. A hundred years are enough.
 const MAX_SECONDS: u64 = 36_500 * DAY;
 
-impl FromStr for TimeLimit {
-    type Err = String;
+/// The text is not a time limit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "invalid time limit {text:?} (examples: 02:00:00 for hours, minutes and seconds, 1-12:00:00 with days, 90 for \
+     minutes)"
+)]
+pub struct TimeLimitError {
+    /// The text.
+    pub text: String,
+}
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let invalid = || {
-            format!(
-                "invalid time limit {text:?} (examples: 02:00:00 for hours, minutes and seconds, \
-                 1-12:00:00 with days, 90 for minutes)"
-            )
+impl FromStr for TimeLimit {
+    type Err = TimeLimitError;
+
+    fn from_str(text: &str) -> Result<Self, TimeLimitError> {
+        let invalid = || TimeLimitError {
+            text: text.to_owned(),
         };
         let number = |part: &str| {
             let digits = !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
@@ -105,7 +113,7 @@ mod tests {
             "18446744073709551615-0",
             "2\n",
         ] {
-            let error = text.parse::<TimeLimit>().unwrap_err();
+            let error = text.parse::<TimeLimit>().unwrap_err().to_string();
             assert!(error.contains("02:00:00"), "{text}: {error}");
         }
     }

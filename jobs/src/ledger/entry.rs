@@ -8,6 +8,7 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 
 use crate::process::now_ms;
+use crate::{EntryError, FailureKind};
 
 /// The result of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -45,6 +46,9 @@ pub struct LedgerEntry {
     /// Why the frame failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
+    /// The kind of the failure, if it failed. Entries of spherule 0.1.0 have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<FailureKind>,
     /// Whether the frame was requeued: any worker repeats it, also in runs in progress. The status of such an
     /// entry is failed.
     #[serde(default, rename = "set_back", skip_serializing_if = "is_false")]
@@ -162,6 +166,7 @@ impl LedgerEntry {
             status,
             outputs: Vec::new(),
             reason: None,
+            failure: None,
             is_requeued: false,
             details: details.into(),
         }
@@ -180,7 +185,7 @@ impl LedgerEntry {
     ///
     /// # Errors
     /// The line is not an entry.
-    pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
-        serde_json::from_slice(line).map_err(|e| format!("not a ledger entry ({e})"))
+    pub(crate) fn parse(line: &[u8]) -> Result<Self, EntryError> {
+        Ok(serde_json::from_slice(line)?)
     }
 }

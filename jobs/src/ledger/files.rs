@@ -5,7 +5,7 @@ use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
 use super::LedgerEntry;
-use crate::{JobError, open_regular};
+use crate::{EntryError, JobError, open_regular};
 
 /// The worker name in the file name of the compacted ledger.
 pub(crate) const COMPACTED: &str = "ended";
@@ -83,57 +83,48 @@ pub(crate) fn read_entries(
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(false),
         Err(e) => return Err(failed(e)),
     };
-    read_lines(&mut reader, position, add).map_err(|error| match error {
-        LineError::Io(e) => failed(e),
-        LineError::Damaged(line, what) => JobError::LedgerDamaged {
+    read_lines(&mut reader, position, add).map_err(|(line, error)| match error {
+        EntryError::Io(e) => failed(e),
+        source => JobError::LedgerDamaged {
             path: path.to_owned(),
             line,
-            what,
+            source,
         },
     })?;
     Ok(true)
 }
 
-/// Why lines cannot be read.
-enum LineError {
-    Io(io::Error),
-    /// The line number, from 1, and why.
-    Damaged(usize, String),
-}
-
 /// Parses the complete lines of a ledger in memory.
-pub(crate) fn parse_lines(mut bytes: &[u8]) -> Result<Vec<LedgerEntry>, (usize, String)> {
+pub(crate) fn parse_lines(mut bytes: &[u8]) -> Result<Vec<LedgerEntry>, (usize, EntryError)> {
     let mut entries = Vec::new();
-    match read_lines(&mut bytes, &mut ReadPosition::default(), |e| {
-        entries.push(e)
-    }) {
-        Ok(()) => Ok(entries),
-        Err(LineError::Damaged(line, what)) => Err((line, what)),
-        Err(LineError::Io(e)) => Err((0, e.to_string())),
-    }
+    read_lines(&mut bytes, &mut ReadPosition::default(), |entry| {
+        entries.push(entry);
+    })?;
+    Ok(entries)
 }
 
-/// Reads complete lines. An incomplete last line was never finished.
+/// Reads complete lines. An incomplete last line was never finished. The error has the line number, from 1.
 fn read_lines(
     reader: &mut impl BufRead,
     position: &mut ReadPosition,
     mut add: impl FnMut(LedgerEntry),
-) -> Result<(), LineError> {
+) -> Result<(), (usize, EntryError)> {
     let mut line = Vec::new();
     loop {
+        let at_line = |error| (position.lines + 1, error);
         line.clear();
         let mut limited = Read::by_ref(reader).take(MAX_LINE);
         let read = limited.read_until(b'\n', &mut line);
-        let length = read.map_err(LineError::Io)? as u64;
+        let length = read.map_err(|e| at_line(e.into()))? as u64;
         if !line.ends_with(b"\n") && length < MAX_LINE {
             return Ok(());
         }
         let entry = if length < MAX_LINE {
             LedgerEntry::parse(&line)
         } else {
-            Err(format!("not a ledger entry (longer than {MAX_LINE} bytes)"))
+            Err(EntryError::TooLong { max: MAX_LINE })
         };
-        add(entry.map_err(|what| LineError::Damaged(position.lines + 1, what))?);
+        add(entry.map_err(at_line)?);
         position.lines += 1;
         position.bytes += length;
     }

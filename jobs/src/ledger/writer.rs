@@ -43,7 +43,7 @@ impl LedgerWriter {
     /// visible to other machines, if `sync_now` is set or if the last sync is long ago. After an error the ledger
     /// is unchanged.
     pub(crate) fn append(&mut self, entry: &LedgerEntry, sync_now: bool) -> Result<(), JobError> {
-        let line = line(entry)?;
+        let line = to_line(&self.path, entry)?;
         let failed = |e| JobError::io(&self.path, "writing the ledger", e);
         let file = match &mut self.file {
             Some(file) => file,
@@ -94,9 +94,11 @@ fn create(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-fn line(entry: &LedgerEntry) -> Result<Vec<u8>, JobError> {
-    let mut line = serde_json::to_vec(entry)
-        .map_err(|e| JobError::Request(format!("cannot serialise the ledger entry: {e}")))?;
+fn to_line(path: &Path, entry: &LedgerEntry) -> Result<Vec<u8>, JobError> {
+    let mut line = serde_json::to_vec(entry).map_err(|source| JobError::Serialize {
+        path: path.to_owned(),
+        source,
+    })?;
     line.push(b'\n');
     Ok(line)
 }
@@ -109,7 +111,7 @@ pub(crate) fn compact(dir: &Path, ledger: &Ledger, files: &[LedgerFile]) -> Resu
     entries.sort_by_key(|entry| (entry.seq, entry.frame));
     let written = publish_with(&path, |file| {
         entries.into_iter().try_for_each(|entry| {
-            let line = line(entry).map_err(|e| io::Error::other(e.to_string()))?;
+            let line = to_line(&path, entry).map_err(io::Error::other)?;
             file.write_all(&line)
         })
     });

@@ -46,7 +46,7 @@ fn refused(text: &str, what: &str) {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join(PLAN_FILE), text).unwrap();
     let error = Plan::load(dir.path()).unwrap_err().to_string();
-    assert!(error.contains(what) && error.contains("--force"), "{error}");
+    assert!(error.contains(what), "{error}");
 }
 
 #[test]
@@ -80,7 +80,7 @@ fn no_flipped_bit_changes_a_plan() {
             damaged[at] ^= 1 << bit;
             match Plan::parse(&damaged) {
                 Ok(read) => assert_eq!(read, plan(), "byte {at}, bit {bit}"),
-                Err(what) => assert!(!what.is_empty()),
+                Err(error) => assert!(!error.to_string().is_empty()),
             }
         }
     }

@@ -5,7 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
-use spherule_jobs::export::{Chunks, ExportError};
+use spherule_jobs::export::Chunks;
 use spherule_jobs::{ResumeMode, publish};
 
 use super::manifest_args::{RequestedManifest, is_manifest, read_manifest};
@@ -210,10 +210,4 @@ fn write_output(args: &CommonArgs, content: &str) -> Result<(), CliError> {
         )));
     }
     publish(path, content.as_bytes()).map_err(CliError::io(path))
-}
-
-impl From<ExportError> for CliError {
-    fn from(error: ExportError) -> Self {
-        Self::Other(error.to_string())
-    }
 }

@@ -11,7 +11,8 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use spherule_jobs::{
-    FrameQueue, Interrupt, Job, JobError, QueueEvent, discard_parts, owner, set_owner,
+    FailureKind, FrameFailure, FrameQueue, Interrupt, Job, JobError, QueueEvent, discard_parts,
+    owner, set_owner,
 };
 
 use crate::cli::child::{self, ChildResult};
@@ -20,7 +21,8 @@ use crate::cli::manifest_args::RequestedManifest;
 use crate::cli::render_job::RenderJob;
 use crate::cli::{CliError, Outcome, print};
 use crate::manifest::Manifest;
-use crate::pipeline::{Event, ImageError, ImageTask, OnEvent, Stage, make_image};
+use crate::pipeline::{Event, ImageError, ImageTask, OnEvent, Stage, WriteError, make_image};
+use crate::render::RenderError;
 use crate::report::FrameReport;
 
 /// The hidden command of the process.
@@ -49,11 +51,12 @@ enum IsolatedResult {
         report: Box<FrameReport>,
         notes: Vec<String>,
     },
-    Failed(String),
+    /// The frame failed.
+    Failed { kind: FailureKind, reason: String },
     /// The frame is no longer in the sequence.
     Missing,
-    /// The output cannot be written: the file and the error number of the system.
-    OutputUnavailable(PathBuf, Option<i32>),
+    /// A file cannot be written: the file and the error number of the system.
+    Unwritable(PathBuf, Option<i32>),
 }
 
 /// Renders frames in child processes.
@@ -73,74 +76,87 @@ impl IsolatedRender<'_> {
         let frames = self.tasks.iter().map(|task| task.frame);
         let mut queue = FrameQueue::new(job.claims(), frames, interrupt);
         let mut on_queue_event = |event: QueueEvent| on_event(Event::OtherWorker(event));
+        let attempts = self.render_job.manifest.job.retries + 1;
         while let Some((index, claim)) = queue.next(&mut on_queue_event)? {
             let task = &self.tasks[index];
             on_event(Event::StageEntered(task.frame, Stage::Trace));
-            if !self.render(task, job, interrupt, on_event)? {
-                return Ok(());
+            for attempt in 1..=attempts {
+                match self.render(task, job, interrupt, on_event) {
+                    Ok(report) => {
+                        job.record_done(task.frame, &outputs(task), json!(report))?;
+                        on_event(Event::Done(task, &report));
+                        break;
+                    }
+                    Err(failure) if failure.kind == FailureKind::Interrupted => return Ok(()),
+                    Err(failure) if failure.kind.stops_run() => {
+                        return Err(JobError::Stopped(failure));
+                    }
+                    Err(failure) => {
+                        job.record_failed(&failure)?;
+                        if failure.kind.is_retryable() && attempt < attempts {
+                            let note = format!(
+                                "frame {}: attempt {attempt} of {attempts} failed: {failure}",
+                                task.frame
+                            );
+                            on_event(Event::Note(&note));
+                        } else {
+                            on_event(Event::Failed(&failure));
+                            break;
+                        }
+                    }
+                }
             }
             claim.complete();
         }
         Ok(())
     }
 
-    /// Renders one frame, with retries. Returns false if it was dropped because of an interrupt.
+    /// Renders one frame in a child process.
     fn render(
         &self,
         task: &ImageTask,
-        job: &mut Job,
+        job: &Job,
         interrupt: &Interrupt,
         on_event: OnEvent,
-    ) -> Result<bool, JobError> {
-        if let Some(reason) = &task.refused {
-            fail(job, on_event, task, reason)?;
-            return Ok(true);
+    ) -> Result<FrameReport, FrameFailure> {
+        let frame = task.frame;
+        if let Some(error) = &task.refused {
+            return Err(ImageError::from(error.clone()).into_failure(frame));
         }
-        let attempts = self.render_job.manifest.job.retries + 1;
-        let request = self.isolated_task(task, job.resolved());
-        for attempt in 1..=attempts {
-            let start = Instant::now();
-            match child::run(COMMAND, &request, || interrupt.stop_now()) {
-                ChildResult::Interrupted => {
-                    discard(task);
-                    return Ok(false);
-                }
-                ChildResult::Completed(IsolatedResult::Done { mut report, notes }) => {
-                    for note in &notes {
-                        on_event(Event::Note(note));
-                    }
-                    report.seconds.wall = start.elapsed().as_secs_f64();
-                    job.record_done(task.frame, &outputs(task), json!(report))?;
-                    on_event(Event::Done(task, &report));
-                    return Ok(true);
-                }
-                ChildResult::Completed(IsolatedResult::Missing) => {
-                    fail(job, on_event, task, &missing_reason(job, task.frame))?;
-                    return Ok(true);
-                }
-                ChildResult::Completed(IsolatedResult::Failed(reason)) => {
-                    fail(job, on_event, task, &reason)?;
-                    return Ok(true);
-                }
-                ChildResult::Completed(IsolatedResult::OutputUnavailable(path, number)) => {
-                    let unknown = || io::Error::other("the file cannot be written");
-                    let source = number.map_or_else(unknown, io::Error::from_raw_os_error);
-                    return Err(JobError::writing(&path, source));
-                }
-                ChildResult::Crashed(reason) => {
-                    discard(task);
-                    let reason =
-                        format!("the process died (attempt {attempt} of {attempts}): {reason}");
-                    if attempt == attempts {
-                        fail(job, on_event, task, &reason)?;
-                    } else {
-                        on_event(Event::Note(&format!("frame {}: {reason}", task.frame)));
-                        job.record_failed(task.frame, &reason, json!(null))?;
-                    }
-                }
+        let start = Instant::now();
+        let child_task = self.isolated_task(task, job.resolved());
+        let result = match child::run(COMMAND, &child_task, || interrupt.stop_now()) {
+            ChildResult::Completed(result) => result,
+            ChildResult::Crashed(crash) => {
+                discard(task);
+                return Err(FrameFailure::new(FailureKind::Crash, frame, crash));
+            }
+            ChildResult::Interrupted => {
+                discard(task);
+                return Err(FrameFailure::new(
+                    FailureKind::Interrupted,
+                    frame,
+                    RenderError::Interrupted,
+                ));
+            }
+        };
+        match result {
+            IsolatedResult::Done { mut report, notes } => {
+                notes.iter().for_each(|note| on_event(Event::Note(note)));
+                report.seconds.wall = start.elapsed().as_secs_f64();
+                Ok(*report)
+            }
+            IsolatedResult::Failed { kind, reason } => Err(FrameFailure::new(kind, frame, reason)),
+            IsolatedResult::Missing => {
+                let error = MissingFrame::new(job, frame);
+                Err(FrameFailure::new(FailureKind::Frame, frame, error))
+            }
+            IsolatedResult::Unwritable(path, number) => {
+                let unknown = || io::Error::other("the file cannot be written");
+                let source = number.map_or_else(unknown, io::Error::from_raw_os_error);
+                Err(FrameFailure::writing(frame, &path, source))
             }
         }
-        Ok(true)
     }
 
     fn isolated_task(&self, task: &ImageTask, resolved: &Value) -> IsolatedTask {
@@ -160,17 +176,20 @@ impl IsolatedRender<'_> {
     }
 }
 
-fn fail(job: &mut Job, on_event: OnEvent, task: &ImageTask, reason: &str) -> Result<(), JobError> {
-    on_event(Event::Failed(task.frame, reason));
-    job.record_failed(task.frame, reason, json!(null))
+/// The files of a frame were removed after the job was planned.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: removed since the job was planned", paths.join(", "))]
+struct MissingFrame {
+    paths: Vec<String>,
 }
 
-/// The reason why a frame that is no longer in the sequence fails.
-fn missing_reason(job: &Job, frame: i64) -> String {
-    let planned = job.state().plan().frame(frame);
-    let inputs = planned.map_or(&[][..], |planned| &planned.inputs);
-    let paths: Vec<&str> = inputs.iter().map(|input| input.path.as_str()).collect();
-    format!("{}: removed since the job was planned", paths.join(", "))
+impl MissingFrame {
+    fn new(job: &Job, frame: i64) -> Self {
+        let planned = job.state().plan().frame(frame);
+        let inputs = planned.map_or(&[][..], |planned| &planned.inputs);
+        let paths = inputs.iter().map(|input| input.path.clone()).collect();
+        Self { paths }
+    }
 }
 
 fn outputs(task: &ImageTask) -> Vec<PathBuf> {
@@ -221,9 +240,15 @@ fn render(request: IsolatedTask) -> Result<IsolatedResult, CliError> {
             report: Box::new(report),
             notes,
         },
-        Err(ImageError::Frame(reason)) => IsolatedResult::Failed(reason),
-        Err(ImageError::OutputUnavailable(path, error)) => {
-            IsolatedResult::OutputUnavailable(path, error.raw_os_error())
+        Err(ImageError::Write(WriteError::Io { path, source })) => {
+            IsolatedResult::Unwritable(path, source.raw_os_error())
+        }
+        Err(error) => {
+            let failure = error.into_failure(request.frame);
+            IsolatedResult::Failed {
+                kind: failure.kind,
+                reason: failure.to_string(),
+            }
         }
     })
 }

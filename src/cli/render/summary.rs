@@ -25,7 +25,7 @@ pub(super) fn show_event(progress: &Progress, event: &Event) {
             let facts = json!({"image": image, "seconds": report.seconds});
             progress.done(task.frame, &task.image, &frame_summary(report), facts);
         }
-        Event::Failed(frame, reason) => progress.failed(*frame, reason),
+        Event::Failed(failure) => progress.failed(failure),
         Event::OtherWorker(event) => progress.other_worker(*event),
         Event::Note(note) => progress.note(note),
     }

@@ -164,7 +164,7 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
         );
     }
     let aspect = f64::from(args.width) / f64::from(args.height);
-    FrameSurvey::of(&sequence, &path, index, aspect).map_err(CliError::Other)
+    FrameSurvey::of(&sequence, &path, index, aspect).map_err(|e| CliError::other(e.to_string()))
 }
 
 /// The `asked` counts that there are particles for; in place of those above, all `there` are, once.

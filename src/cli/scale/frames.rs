@@ -55,9 +55,9 @@ impl Frames {
                 remove(&self.dir);
                 match self.make(request, interrupt) {
                     ChildResult::Completed(made) => Now { key, made },
-                    ChildResult::Crashed(reason) => Now {
+                    ChildResult::Crashed(crash) => Now {
                         key,
-                        made: Err(reason),
+                        made: Err(crash.to_string()),
                     },
                     ChildResult::Interrupted => return ChildResult::Interrupted,
                 }
@@ -82,7 +82,7 @@ impl Frames {
             ChildResult::Completed(made) => {
                 ChildResult::Completed(made.map(|conversion| (path, conversion)))
             }
-            ChildResult::Crashed(reason) => ChildResult::Completed(Err(reason)),
+            ChildResult::Crashed(crash) => ChildResult::Completed(Err(crash.to_string())),
             ChildResult::Interrupted => ChildResult::Interrupted,
         }
     }

@@ -214,7 +214,8 @@ fn measure_one(
     if request.representation.encoding().is_some() {
         match frames.of(request, interrupt) {
             ChildResult::Interrupted => return ChildResult::Interrupted,
-            ChildResult::Crashed(reason) => {
+            ChildResult::Crashed(crash) => {
+                let reason = crash.to_string();
                 return ChildResult::Completed(CellOutcome::Failed { reason });
             }
             ChildResult::Completed(Ok(frame)) => made = Some(frame),
@@ -233,7 +234,7 @@ fn measure_one(
     {
         ChildResult::Interrupted => return ChildResult::Interrupted,
         ChildResult::Completed(measured) => measured,
-        ChildResult::Crashed(reason) => Err(reason),
+        ChildResult::Crashed(crash) => Err(crash.to_string()),
     };
     ChildResult::Completed(match measured {
         Err(reason) => CellOutcome::Failed { reason },

@@ -15,16 +15,23 @@ pub(super) enum ExpectedOutput {
     Frames,
 }
 
+/// A setting of the plan is missing or invalid.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the plan's setting {key} is missing or invalid")]
+pub(super) struct InvalidSetting {
+    key: &'static str,
+}
+
 impl ExpectedOutput {
     /// Reads the settings of `plan`.
     ///
     /// # Errors
     /// A setting is missing or invalid.
-    pub(super) fn of(plan: &Plan) -> Result<Self, String> {
+    pub(super) fn of(plan: &Plan) -> Result<Self, InvalidSetting> {
         Self::of_settings(plan.settings())
     }
 
-    fn of_settings(settings: &[(String, String)]) -> Result<Self, String> {
+    fn of_settings(settings: &[(String, String)]) -> Result<Self, InvalidSetting> {
         let find = |wanted: &str| {
             let found = settings.iter().find(|(key, _)| key == wanted);
             found.map(|(_, value)| value.as_str())
@@ -36,8 +43,8 @@ impl ExpectedOutput {
             let table = format!("value = {}", find(key)?).parse::<toml::Table>();
             table.ok()?.remove("value")
         };
-        let wrong = |key: &str| format!("the plan's setting {key} is missing or invalid");
-        let side = |key: &str| {
+        let wrong = |key| InvalidSetting { key };
+        let side = |key: &'static str| {
             let side = value(key).and_then(|v| u32::try_from(v.as_integer()?).ok());
             side.ok_or_else(|| wrong(key))
         };
@@ -86,7 +93,7 @@ mod tests {
             let mut wrong = settings.clone();
             set(&mut wrong, key, value);
             let error = ExpectedOutput::of_settings(&wrong).unwrap_err();
-            assert!(error.contains(key), "{error}");
+            assert_eq!(error, InvalidSetting { key });
         }
         settings.retain(|(key, _)| key != "image.width");
         assert!(ExpectedOutput::of_settings(&settings).is_err());

@@ -6,15 +6,16 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::prelude::*;
+use spherule_formats::FrameError;
 use spherule_formats::native::{Access, NativeFile};
 use spherule_jobs::{EntryStatus, FrameRange, Job, JobState, LedgerEntry, PLAN_FILE, PlannedFrame};
 
 use super::job::{job_directory, list, no_job, use_threads};
 use super::print::{self, Reader};
 use super::{CliError, Outcome};
-use crate::failure::catch_panic;
+use crate::failure::{Panic, catch_panic};
 use crate::manifest::MAX_THREADS;
-use crate::output::{verify_exr, verify_preview};
+use crate::output::{ImageFault, verify_exr, verify_preview};
 use expected::ExpectedOutput;
 
 mod expected;
@@ -93,7 +94,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
         return Err(no_job(&dir));
     };
     let expected = ExpectedOutput::of(state.plan())
-        .map_err(|what| CliError::other(format!("{}: {what}", dir.join(PLAN_FILE).display())))?;
+        .map_err(|e| CliError::other(format!("{}: {e}", dir.join(PLAN_FILE).display())))?;
     let frames = selected(&state, args.frames.as_ref())?;
     let mut verdicts = Vec::with_capacity(frames.len());
     let mut damaged = Vec::new();
@@ -196,7 +197,7 @@ fn check_file(
         Err((verdict, reason)) => (verdict, Some(reason)),
         Ok(file) => match catch_panic(|| decode(&file, expected)) {
             Ok(()) => (Verdict::Sound, None),
-            Err(reason) => (Verdict::Damaged, Some(reason)),
+            Err(error) => (Verdict::Damaged, Some(error.reason(&file))),
         },
     };
     FileVerdict {
@@ -230,41 +231,53 @@ fn find_file(dir: &Path, path: &str, entry: &LedgerEntry) -> Result<PathBuf, (Ve
     Ok(file)
 }
 
+/// Why a file cannot be decoded.
+#[derive(Debug, thiserror::Error)]
+enum DecodeError {
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
+    #[error(transparent)]
+    Image(#[from] ImageFault),
+    #[error(transparent)]
+    Native(#[from] FrameError),
+    #[error(transparent)]
+    Panic(#[from] Panic),
+}
+
+impl DecodeError {
+    /// The message without the path of the file, which is printed before it.
+    fn reason(&self, file: &Path) -> String {
+        let text = self.to_string();
+        let path = format!("{}: ", file.display());
+        text.strip_prefix(&path).unwrap_or(&text).to_owned()
+    }
+}
+
 /// Reads all of `file`.
-fn decode(file: &Path, expected: ExpectedOutput) -> Result<(), String> {
+fn decode(file: &Path, expected: ExpectedOutput) -> Result<(), DecodeError> {
     let shape = match expected {
-        ExpectedOutput::Frames => return decode_native(file),
+        ExpectedOutput::Frames => return Ok(decode_native(file)?),
         ExpectedOutput::Images(shape) => shape,
     };
-    let opened = File::open(file).map_err(|e| format!("cannot be read: {e}"))?;
-    let reader = BufReader::with_capacity(1 << 16, opened);
+    let reader = BufReader::with_capacity(1 << 16, File::open(file)?);
     let is_preview = file
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if is_preview {
-        verify_preview(reader, &shape)
+        verify_preview(reader, &shape)?;
     } else {
-        verify_exr(reader, &shape)
+        verify_exr(reader, &shape)?;
     }
-    .map_err(|fault| fault.to_string())
+    Ok(())
 }
 
 /// The same check as `inspect --verify`.
-fn decode_native(path: &Path) -> Result<(), String> {
-    let verify = || {
-        let file = NativeFile::open(path, Access::Map)?;
-        let verified = file
-            .frame()
-            .and_then(|frame| frame.verify_all().map_err(|e| e.in_file(path)));
-        // A change of the file meanwhile explains any other error
-        file.check()?;
-        verified
-    };
-    verify().map_err(|e| without_path(&e.to_string(), path))
-}
-
-/// Removes the path, which is printed before the reason already.
-fn without_path(text: &str, path: &Path) -> String {
-    let path = format!("{}: ", path.display());
-    text.strip_prefix(&path).unwrap_or(text).to_owned()
+fn decode_native(path: &Path) -> Result<(), FrameError> {
+    let file = NativeFile::open(path, Access::Map)?;
+    let verified = file
+        .frame()
+        .and_then(|frame| frame.verify_all().map_err(|e| e.in_file(path)));
+    // A change of the file meanwhile explains any other error
+    file.check()?;
+    verified
 }

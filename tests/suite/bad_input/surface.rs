@@ -77,7 +77,7 @@ fn radii_that_vary_a_thousandfold() {
     smooth(&workshop, &[])
         .expect(0)
         .tells("radii differ; a smooth surface has one for all, here their median")
-        .tells("(--radius gives another)");
+        .tells("(input.radius sets another)");
     let options = [&["--surface", "union", "--force"][..], &BACKGROUND].concat();
     let ran = workshop.render(&options).expect(0);
     assert!(!ran.errors().contains("radii differ"), "{}", ran.errors());
