@@ -31,11 +31,6 @@ const ALLOWED: &[Allowed] = &[
     },
     Allowed {
         source: "jobs/src",
-        files: &["error", "fingerprint", "plan"],
-        why: "messages name the file of the plan and the changed settings",
-    },
-    Allowed {
-        source: "jobs/src",
         files: &["workers::claim", "workers::registry"],
         why: "a claim is released at the registry that made it",
     },
