@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::mishap::guarded;
+use crate::failure::{Panic, catch_panic};
 use crate::scene::RadianceMap;
 use crate::scene::environment::MapError;
 
@@ -69,7 +69,7 @@ pub fn read_radiance_map(path: &Path) -> Result<RadianceMap, HdrError> {
         source,
     })?;
     // Decoders of files from elsewhere may panic
-    match guarded(|| Ok(decode(BufReader::new(file.0)))) {
+    match catch_panic(|| Ok::<_, Panic>(decode(BufReader::new(file.0)))) {
         Ok(Ok(map)) => Ok(map),
         Ok(Err(Fault::Io(source))) => Err(HdrError::Io {
             path: path.to_owned(),

@@ -144,7 +144,8 @@ fn light_inside_a_ball_is_a_geometric_series() {
     scene.lights = vec![light];
     let albedo = 0.6_f32;
     let direct = albedo / PI * 800.0 / 400.0;
-    for (bounces, limit) in [(0, 1e-4), (1, 1e-4), (2, 1e-4), (9, 0.02)] {
+    // Rays start at a small distance from the wall, which is nearer to the light
+    for (bounces, limit) in [(0, 4e-4), (1, 4e-4), (2, 4e-4), (9, 0.02)] {
         let settings = settings(8, 256, bounces);
         let film = image(&ball, &scene, Vec3::splat(albedo), &settings);
         let (mean, _) = statistics(&covered(&film));
@@ -239,14 +240,15 @@ fn a_white_floor_below_glass_is_white() {
     for shape in shapes {
         let mut scene = floor_from_above(white(), Vec3::ONE);
         scene.material = GLASS;
-        for (bounces, wanted) in [(1000, 1.0), (0, 0.95)] {
+        // Without diffuse reflections, light that the glass sends back to the floor is lost
+        for (bounces, low, high) in [(1000, 0.99, 1.01), (0, 0.8, 0.97)] {
             let settings = RenderSettings {
                 max_depth: 24,
                 ..settings(16, 64, bounces)
             };
             let film = image(shape, &scene, Vec3::ONE, &settings);
             let (mean, _) = statistics(&covered(&film));
-            assert!(mean > wanted - 0.01 && mean < 1.01, "{bounces}: {mean}");
+            assert!(mean > low && mean < high, "{bounces}: {mean}");
         }
     }
 }
@@ -304,7 +306,10 @@ fn the_same_bits_on_any_threads_and_instructions() {
         };
         let (film, counts) = on(1);
         assert!(film.color.iter().flatten().all(|v| v.is_finite()));
-        assert!(counts.shadow > counts.primary / 2 && counts.reflection > 0);
+        assert!(
+            counts.shadow > counts.primary / 2 && counts.reflection > 0,
+            "{transmission}: {counts:?}"
+        );
         assert_eq!((film.clone(), counts), on(2));
         assert_eq!((film, counts), on(5));
         // Instruction sets

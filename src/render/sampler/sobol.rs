@@ -28,7 +28,7 @@ impl PathSeed {
     #[inline(always)]
     pub fn get_1d(self, dimension: u32, sample: u32) -> f32 {
         let [order, seed] = self.halves(dimension);
-        // Each dimension has an order of its own, otherwise a sample would be low or high in all dimensions.
+        // Each dimension has a different order; otherwise a sample would be low or high in all dimensions.
         let shuffled = scramble(sample, order);
         unit(scramble(shuffled.reverse_bits(), seed))
     }
@@ -98,12 +98,13 @@ lane_kernel! {
 /// fast, elegant, and compact", 2024).
 #[inline(always)]
 fn second_coordinate(index: u32) -> u32 {
+    // The bits of the index are a polynomial over GF(2). Substitute x + 1 for x, half by half
     let mut bits = index;
-    bits ^= bits << 16;
-    bits ^= (bits & 0x00ff_00ff) << 8;
-    bits ^= (bits & 0x0f0f_0f0f) << 4;
-    bits ^= (bits & 0x3333_3333) << 2;
-    bits ^= (bits & 0x5555_5555) << 1;
+    bits ^= bits >> 16;
+    bits ^= (bits & 0xff00_ff00) >> 8;
+    bits ^= (bits & 0xf0f0_f0f0) >> 4;
+    bits ^= (bits & 0xcccc_cccc) >> 2;
+    bits ^= (bits & 0xaaaa_aaaa) >> 1;
     bits.reverse_bits()
 }
 
