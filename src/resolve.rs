@@ -4,9 +4,7 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{
-    ColorSetting, DEFAULT_MAP, GroundPattern, LightKind, Manifest, MapName, RadiusSetting,
-};
+use crate::manifest::{ColorSetting, DEFAULT_MAP, GroundPattern, Manifest, MapName, RadiusSetting};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
@@ -14,14 +12,15 @@ use crate::pipeline::{
 };
 use crate::render::{Channels, IntegratorKind, RenderSettings};
 use crate::scene::{
-    Background, Bounds, CameraError, Checker, ColorMap, Ground, Light, PathError, RadianceMap,
-    Scene, default_lights, material,
+    Background, Bounds, CameraError, Checker, ColorMap, Ground, PathError, RadianceMap, Scene,
+    default_lights, material,
 };
 use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
 mod environment;
+mod lights;
 mod surface;
 
 pub use camera::check_views;
@@ -153,7 +152,7 @@ pub fn setup(
     // Set up lights and ground
     let environment = environment::environment(manifest, map, &path.start(), up)?;
     let lights = match (manifest.lights.is_empty(), manifest.render.integrator) {
-        (false, _) => lights(manifest, survey.origin),
+        (false, _) => lights::lights(manifest, survey.origin, up)?,
         (true, IntegratorKind::Whitted) => default_lights(&bounds, up, &path.start()),
         // The environment is the light
         (true, IntegratorKind::Path) => Vec::new(),
@@ -380,24 +379,6 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
             mapped(attribute, *map, *range, true)
         }
     }
-}
-
-fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
-    manifest
-        .lights
-        .iter()
-        .filter_map(|light| {
-            let radiance = light.color * light.intensity;
-            match &light.kind {
-                LightKind::Point { position, falloff } => {
-                    Some(Light::point_with(*position, origin, radiance, *falloff))
-                }
-                LightKind::Directional { direction } => {
-                    Light::directional(direction.as_vec3(), radiance)
-                }
-            }
-        })
-        .collect()
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {

@@ -318,7 +318,7 @@ impl Manifest {
     fn examples() -> Self {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
-        manifest.lights = Light::examples().to_vec();
+        manifest.lights = Light::examples();
         manifest
     }
 }

@@ -98,6 +98,7 @@ fn the_example_reads() {
         },
         color: Vec3::ONE,
         intensity: 1.0,
+        visible: false,
     }];
     assert_eq!(manifest, wanted);
 }
@@ -572,6 +573,7 @@ fn commented_file_reads_back_and_shows_every_key() {
         .to_string();
     assert!(error.contains("camera.eye: is given"), "{error}");
     let all = uncommented.replace("mode = \"auto\"", "mode = \"fixed\"");
+    let all = all.replace("type = \"studio\"", "type = \"image\"");
     let all = parse(&all.replace("isolate = false", "isolate = true"));
     assert_eq!(all.lights.len(), 1);
     assert_eq!(all.camera.keys.len(), 1);
@@ -610,6 +612,7 @@ proptest! {
             kind: LightKind::Point { position: wide.into(), falloff: Falloff::None },
             color: Vec3::splat(narrow),
             intensity: narrow,
+            visible: false,
         }];
         manifest.material.color = ColorSetting::Rgb(Vec3::splat(narrow));
         prop_assert_eq!(&parse(&manifest.to_commented_toml()), &manifest);

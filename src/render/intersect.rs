@@ -58,10 +58,15 @@ impl RenderContext<'_> {
         depth > 1 || !self.settings.transparent_background
     }
 
-    /// Adds the background for rays without an intersection, and behind surfaces that are not fully opaque.
-    pub(super) fn add_background(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+    /// Adds the background for rays of `lanes` without an intersection, and behind surfaces that are not fully opaque.
+    pub(super) fn add_background(
+        &self,
+        segments: &SegmentPacket,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
         let hits = &packet.hits;
-        let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
             return;
         }

@@ -21,6 +21,7 @@ mod attributes;
 pub(crate) mod brute;
 mod bsdf;
 mod context;
+mod dimensions;
 mod film;
 mod film_rows;
 mod generate;

@@ -12,10 +12,11 @@
 use super::{
     bsdf::{Bsdf, bsdfs_of, reflect_samples, surface_points},
     context::{Interior, RenderContext},
+    dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
-    lights::{environment_along, sample_environment},
+    lights::{Emission, environment_along, sample_environment},
     materials::{Material, materials_of},
-    roulette::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, SplitRule},
+    roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
     scratch::PacketScratch,
     shading::{add, product, scale},
@@ -42,6 +43,8 @@ pub(super) struct PathIntegrator<'a> {
     /// The specular surface of transmissive particles.
     interface: Box<dyn Material>,
     split: SplitRule,
+    /// Whether rays can hit a light.
+    has_extents: bool,
 }
 
 impl<'a> PathIntegrator<'a> {
@@ -54,6 +57,7 @@ impl<'a> PathIntegrator<'a> {
             bsdfs: bsdfs_of(),
             interface,
             split: SplitRule::new(context.settings, context.interior),
+            has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
         }
     }
@@ -75,8 +79,10 @@ impl Integrator for PathIntegrator<'_> {
         packet: &mut PacketScratch,
         next: &mut RayStreams,
     ) {
-        // Add what rays see infinitely far away
-        self.add_escaped(segments, depth, packet);
+        // Add what rays see of lights, and infinitely far away
+        let ended = self.add_emitted(segments, packet);
+        packet.hits.mask &= !ended;
+        self.add_escaped(segments, depth, segments.lanes() & !ended, packet);
         if packet.hits.mask == 0 {
             return;
         }
@@ -118,13 +124,80 @@ fn lanes_where(holds: impl Fn(usize) -> bool) -> u32 {
 }
 
 impl PathIntegrator<'_> {
-    /// Adds the radiance for rays without an intersection, and behind surfaces that are not fully opaque: camera rays
-    /// see the background, unless the environment is visible.
-    fn add_escaped(&self, segments: &SegmentPacket, depth: u32, packet: &mut PacketScratch) {
+    /// Whether rays of a BSDF sample light sources too, so that the balance heuristic weights both. Behind transmissive
+    /// surfaces, only shadow rays find light sources.
+    fn rays_hit_lights(&self) -> bool {
+        self.context.interior == Interior::Opaque
+    }
+
+    /// Adds the radiance of lights that rays hit: of rays sampled from a BSDF, weighted against the sampling of the light,
+    /// and of visible lights before everything else. Returns the lanes of rays that end at visible lights.
+    fn add_emitted(&self, segments: &SegmentPacket, packet: &mut PacketScratch) -> u32 {
+        if !self.has_extents {
+            return 0;
+        }
+        let sampled = match self.rays_hit_lights() {
+            true => segments.lanes() & lanes_where(|l| segments.pdf[l] < f32::INFINITY),
+            false => 0,
+        };
+        let seen = segments.lanes() & lanes_where(|l| segments.bounces[l] == 0);
+        let mut emission = Emission::default();
+        let (mut nearest, mut color) = ([None; LANES], [Vec3::ZERO; LANES]);
+        for light in self
+            .context
+            .lights
+            .iter()
+            .filter(|light| light.has_extent())
+        {
+            // Find the rays that hit the light before a surface
+            let lanes = sampled | if light.is_visible() { seen } else { 0 };
+            if lanes == 0 {
+                continue;
+            }
+            light.intersect(self.context.simd, &segments.rays, &mut emission);
+            for lane in lanes_in(lanes & emission.lanes) {
+                let is_first = match packet.hits.mask >> lane & 1 {
+                    0 => true,
+                    _ => emission.t[lane] < segments.rays.t_max[lane],
+                };
+                if !is_first {
+                    continue;
+                }
+                // Add its radiance, or keep the nearest visible light
+                if sampled >> lane & 1 == 1 {
+                    let pdf = segments.pdf[lane];
+                    let weight = pdf / (pdf + emission.pdf[lane]);
+                    let arriving = lane3(&packet.throughput, lane) * (weight * emission.radiance);
+                    let sum = lane3(&packet.radiance, lane) + arriving;
+                    set_lane3(&mut packet.radiance, lane, sum);
+                } else if nearest[lane].is_none_or(|t| emission.t[lane] < t) {
+                    nearest[lane] = Some(emission.t[lane]);
+                    color[lane] = emission.radiance;
+                }
+            }
+        }
+        // Add the visible lights
+        let ended = lanes_where(|l| nearest[l].is_some());
+        for lane in lanes_in(ended) {
+            let sum = lane3(&packet.radiance, lane) + lane3(&packet.throughput, lane) * color[lane];
+            set_lane3(&mut packet.radiance, lane, sum);
+        }
+        ended
+    }
+
+    /// Adds the radiance for rays of `lanes` without an intersection, and behind surfaces that are not fully opaque:
+    /// camera rays see the background, unless the environment is visible.
+    fn add_escaped(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
         let context = &self.context;
         if depth == 1 && !context.scene.is_environment_visible {
             if context.sees_background(depth) {
-                context.add_background(segments, packet);
+                context.add_background(segments, lanes, packet);
             }
             return;
         }
@@ -141,7 +214,7 @@ impl PathIntegrator<'_> {
             weight,
             ..
         } = packet;
-        let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
             return;
         }
@@ -253,21 +326,24 @@ impl PathIntegrator<'_> {
 
     /// Adds the light of each light source.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let context = &self.context;
-        for light in &context.lights {
+        let (context, simd) = (&self.context, self.context.simd);
+        for (light, dimension) in context.lights.iter().zip(LIGHTS..) {
             // Sample the light, and evaluate the BSDF for its direction
-            packet.light.pdf = splat(f32::INFINITY);
-            light.sample_li(context.simd, &packet.surface.start, &mut packet.light);
+            let mut u = [splat(0.0); 2];
+            if light.has_extent() {
+                get_2d_lanes(
+                    simd,
+                    &surface.segments.path,
+                    dimension,
+                    &surface.sample,
+                    &mut u,
+                );
+            }
+            light.sample_li(simd, &packet.surface.start, &u, &mut packet.light);
             self.eval(surface, packet);
+            let competes = light.has_extent() && self.rays_hit_lights();
             let (values, weight, lanes) = (&packet.bsdf, &packet.weight, surface.lanes);
-            reflect_samples(
-                context.simd,
-                values,
-                weight,
-                false,
-                lanes,
-                &mut packet.light,
-            );
+            reflect_samples(simd, values, weight, competes, lanes, &mut packet.light);
             if packet.light.lanes == 0 {
                 continue;
             }
@@ -323,13 +399,13 @@ impl PathIntegrator<'_> {
         let throughput = &rays.throughput;
         let has_weight = |l| bounce.pdf[l] > 0.0 && lane3(throughput, l).max_element() > 0.0;
         let lanes = surface.lanes & lanes_where(has_weight);
-        // Trace the last segment of a path to the environment only
+        // The last segment of a path may be a shadow ray to the environment
         let max = self.context.settings.bounces;
         let is_last = |l: usize| segments.bounces[l] == max;
         let last = match self.context.interior {
-            Interior::Opaque => lanes & lanes_where(is_last),
-            // Transmissive surfaces do not end it
-            Interior::Spheres | Interior::Body => 0,
+            Interior::Opaque if !self.has_extents => lanes & lanes_where(is_last),
+            // It may hit a light, or pass through transmissive surfaces
+            _ => 0,
         };
         let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
         next.reflected

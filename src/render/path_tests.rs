@@ -307,7 +307,7 @@ fn the_same_bits_on_any_threads_and_instructions() {
         let (film, counts) = on(1);
         assert!(film.color.iter().flatten().all(|v| v.is_finite()));
         assert!(
-            counts.shadow > counts.primary / 2 && counts.reflection > 0,
+            counts.shadow > counts.primary / 4 && counts.reflection > 0,
             "{transmission}: {counts:?}"
         );
         assert_eq!((film.clone(), counts), on(2));
@@ -337,13 +337,14 @@ fn more_samples_converge_to_the_same_picture() {
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
     let scene = scene(studio(axes, Vec3::ONE));
     let of = |samples| {
-        let film = image(
-            &heap,
-            &scene,
-            Vec3::new(0.7, 0.5, 0.2),
-            &settings(12, samples, 6),
-        );
-        covered(&film).iter().sum::<Vec3>()
+        // Without the background, which would hide differences
+        let settings = RenderSettings {
+            transparent_background: true,
+            ..settings(12, samples, 6)
+        };
+        let film = image(&heap, &scene, Vec3::new(0.7, 0.5, 0.2), &settings);
+        let pixels = film.color.iter().map(|c| Vec3::from_slice(&c[..3]));
+        pixels.sum::<Vec3>()
     };
     let (few, many) = (of(16), of(1024));
     assert!(

@@ -3,8 +3,9 @@
 
 use super::{
     context::{Interior, RenderContext},
+    dimensions::{REFLECTED, REFRACTED},
     materials::WhittedMaterial,
-    roulette::{REFLECTED, REFRACTED, SplitRule},
+    roulette::SplitRule,
     scratch::PacketScratch,
     shading::scale,
     stream::{RayStreams, SegmentPacket},

@@ -1,6 +1,6 @@
 //! Streams of path segments, in packets of 16.
 
-use super::roulette::BOUNCED;
+use super::dimensions::BOUNCED;
 use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;

@@ -62,7 +62,7 @@ impl Integrator for WhittedIntegrator<'_> {
         let context = &self.context;
         // Add the background for rays that leave the scene
         if context.sees_background(depth) {
-            context.add_background(segments, packet);
+            context.add_background(segments, segments.lanes(), packet);
         }
         if packet.hits.mask == 0 {
             return;
@@ -149,7 +149,7 @@ impl WhittedIntegrator<'_> {
             return;
         }
         for light in &self.context.lights {
-            light.sample_li(simd, &points.start, samples);
+            light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
             material.reflect(simd, rays, points, base, weight, lanes, samples);
             if samples.lanes == 0 {

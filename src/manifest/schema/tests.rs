@@ -17,7 +17,7 @@ camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 
 render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true }
 material = { color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
-light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }]
+light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
 environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
 job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
@@ -82,7 +82,7 @@ fn what_the_program_writes_is_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 16] = [
+const TABLES: [(&str, &str); 20] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -101,6 +101,22 @@ const TABLES: [(&str, &str); 16] = [
     (
         "/properties/light/items/oneOf/1",
         "[[light]]\ntype = \"directional\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/2",
+        "[[light]]\ntype = \"sun\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/3",
+        "[[light]]\ntype = \"sphere\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/4",
+        "[[light]]\ntype = \"rect\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/5",
+        "[[light]]\ntype = \"disc\"\n",
     ),
     ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),

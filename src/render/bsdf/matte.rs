@@ -2,10 +2,10 @@
 
 use std::f32::consts::FRAC_1_PI;
 
-use super::frame::{disc, to_world};
 use super::{Bsdf, BsdfSamples, BsdfValues, SurfacePoints};
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
+use crate::render::shading::{disc, to_world};
 
 /// See the module.
 #[derive(Debug, Clone, Copy)]

@@ -8,7 +8,6 @@ use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;
 use crate::surface::{Intersections, MaterialId};
 
-mod frame;
 mod matte;
 
 use matte::Matte;

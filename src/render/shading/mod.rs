@@ -7,7 +7,9 @@
 mod arithmetic;
 mod background;
 mod camera;
+mod frame;
 
 pub(super) use arithmetic::{add, product, scale};
 pub(super) use background::{BackgroundLanes, add_background};
 pub(super) use camera::{CameraLanes, camera_rays, depths};
+pub(super) use frame::{disc, tangents, to_world};

@@ -126,7 +126,7 @@ const BEYOND: [(&str, &str); 1] = [
 const BASE: &str = r#"
 input = { path = "data" }
 camera = { mode = "fixed", eye = [5, 6, 7.5], look_at = [9, 9, 9.25], key = [{ frame = 0, eye = [5, 6, 7.5], look_at = [9, 9, 9.25] }] }
-light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }]
+light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }, { type = "sun", direction = [0, 0, -1] }, { type = "sphere", position = [0, 0, 10], radius = 1 }, { type = "rect", position = [0, 0, 10], direction = [0, 0, -1], width = 2, height = 1 }, { type = "disc", position = [0, 0, 10], direction = [0, 0, -1], radius = 1 }]
 job = { isolate = true }
 "#;
 

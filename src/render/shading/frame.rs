@@ -7,7 +7,7 @@ use crate::math::functions::sin_cos;
 /// Two unit vectors perpendicular to the unit vector `n` and to each other (Duff et al., "Building an orthonormal
 /// basis, revisited", 2017).
 #[inline(always)]
-pub(super) fn tangents(n: [f32; 3]) -> [[f32; 3]; 2] {
+pub(in crate::render) fn tangents(n: [f32; 3]) -> [[f32; 3]; 2] {
     let sign = if n[2] < 0.0 { -1.0 } else { 1.0 };
     let a = -1.0 / (sign + n[2]);
     let b = n[0] * n[1] * a;
@@ -20,7 +20,7 @@ pub(super) fn tangents(n: [f32; 3]) -> [[f32; 3]; 2] {
 /// A point of the unit disc, uniform if `u` is uniform in the unit square; neighbours stay neighbours (Shirley and
 /// Chiu, "A low distortion map between disk and square", 1997).
 #[inline(always)]
-pub(super) fn disc(u: [f32; 2]) -> [f32; 2] {
+pub(in crate::render) fn disc(u: [f32; 2]) -> [f32; 2] {
     let (a, b) = (2.0 * u[0] - 1.0, 2.0 * u[1] - 1.0);
     let is_steep = b.abs() > a.abs();
     let (radius, other) = if is_steep { (b, a) } else { (a, b) };
@@ -33,7 +33,7 @@ pub(super) fn disc(u: [f32; 2]) -> [f32; 2] {
 
 /// The vector with the components `local` along the tangents of `n` and `n`, normalised.
 #[inline(always)]
-pub(super) fn to_world(local: [f32; 3], n: [f32; 3]) -> [f32; 3] {
+pub(in crate::render) fn to_world(local: [f32; 3], n: [f32; 3]) -> [f32; 3] {
     let [s, t] = tangents(n);
     let mut world = [0.0; 3];
     for axis in 0..3 {
