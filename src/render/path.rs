@@ -54,7 +54,7 @@ impl<'a> PathIntegrator<'a> {
         let environment = context.scene.environment.as_deref();
         Self {
             environment: environment.filter(|environment| !environment.is_black()),
-            bsdfs: bsdfs_of(),
+            bsdfs: bsdfs_of(context.scene.material.finish),
             interface,
             split: SplitRule::new(context.settings, context.interior),
             has_extents: context.lights.iter().any(|light| light.has_extent()),

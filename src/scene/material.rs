@@ -34,6 +34,26 @@ pub struct Material {
     /// Extinction coefficient of the medium inside, per length: light is attenuated by `exp(-extinction * length)`
     /// (Beer-Lambert law). Not negative. Shadows of separate spheres ignore it.
     pub extinction: Vec3,
+    /// The opaque surface for path tracing.
+    pub finish: Finish,
+}
+
+/// How path tracing reflects light at opaque particles. The base colour is that of the particle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Finish {
+    /// Light leaves in all directions alike.
+    #[default]
+    Matte,
+    /// A matte base under a clear coat.
+    Plastic {
+        /// Roughness of the coat, 0 to 1.
+        roughness: f32,
+    },
+    /// A mirror in the base colour.
+    Metal {
+        /// Roughness, 0 to 1.
+        roughness: f32,
+    },
 }
 
 /// Formulas for the Fresnel reflectance.
@@ -60,6 +80,7 @@ impl Material {
         transmission: 0.0,
         fresnel: Fresnel::Schlick,
         extinction: Vec3::ZERO,
+        finish: Finish::Matte,
     };
 
     /// Whether two rays leave a surface: reflected and refracted.

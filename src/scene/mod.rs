@@ -25,7 +25,7 @@ pub use colormap::{ColorMap, UnknownColorMap};
 pub use environment::{Environment, EnvironmentAxes, RadianceMap};
 pub use ground::{Checker, Ground};
 pub use light::{Falloff, Light, LightKind, default_lights};
-pub use material::{Fresnel, Material, MaterialError};
+pub use material::{Finish, Fresnel, Material, MaterialError};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
 

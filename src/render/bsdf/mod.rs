@@ -6,11 +6,20 @@
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;
+use crate::scene::Finish;
 use crate::surface::{Intersections, MaterialId};
 
+mod local;
 mod matte;
+mod metal;
+mod microfacet;
+mod plastic;
+#[cfg(test)]
+mod tests;
 
 use matte::Matte;
+use metal::Metal;
+use plastic::Plastic;
 
 /// Points on opaque surfaces.
 #[derive(Debug, Clone, Default)]
@@ -73,9 +82,17 @@ pub(super) trait Bsdf: Sync {
     );
 }
 
-/// The BSDFs of opaque surfaces by [`MaterialId`].
-pub(super) fn bsdfs_of() -> [Box<dyn Bsdf>; MaterialId::COUNT] {
-    [Box::new(Matte), Box::new(Matte), Box::new(Matte)]
+/// The BSDFs of opaque surfaces by [`MaterialId`]. `particles`: the finish of the particles.
+pub(super) fn bsdfs_of(particles: Finish) -> [Box<dyn Bsdf>; MaterialId::COUNT] {
+    [bsdf_of(particles), Box::new(Matte), Box::new(Matte)]
+}
+
+fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {
+    match finish {
+        Finish::Matte => Box::new(Matte),
+        Finish::Plastic { roughness } => Box::new(Plastic::new(roughness)),
+        Finish::Metal { roughness } => Box::new(Metal::new(roughness)),
+    }
 }
 
 /// Computes the points of intersections on opaque surfaces, with normals on the side of the rays.
