@@ -16,12 +16,14 @@ use crate::math::functions::{acos, atan2, sin_cos};
 
 mod distribution;
 mod map;
+mod sky;
 mod studio;
 #[cfg(test)]
 mod tests;
 
 use distribution::Distribution;
 pub use map::{MAX_MAP_PIXELS, MapError, RadianceMap};
+pub use sky::{sky, sky_direction};
 pub use studio::studio;
 
 /// Columns of the table: 0.7 degrees each.
