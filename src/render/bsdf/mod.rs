@@ -9,6 +9,8 @@ use crate::render::lights::LightSamples;
 use crate::surface::{Intersections, MaterialId};
 
 mod matte;
+#[cfg(test)]
+mod tests;
 
 use matte::Matte;
 
