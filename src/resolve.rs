@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{ColorSetting, DEFAULT_MAP, GroundPattern, Manifest, MapName, RadiusSetting};
+use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
@@ -12,14 +12,15 @@ use crate::pipeline::{
 };
 use crate::render::{Channels, IntegratorKind, RenderSettings};
 use crate::scene::{
-    Background, Bounds, CameraError, Checker, ColorMap, Ground, PathError, RadianceMap, Scene,
-    default_lights, material,
+    Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
+    material,
 };
 use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
 mod environment;
+mod ground;
 mod lights;
 mod surface;
 
@@ -27,10 +28,6 @@ pub use camera::check_views;
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
-
-/// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
-/// through the particles, and none is only a few pixels wide.
-const TILE: f64 = 1.0 / 8.0;
 
 /// Reasons why there can be no images.
 #[derive(Debug, thiserror::Error)]
@@ -157,15 +154,7 @@ pub fn setup(
         // The environment is the light
         (true, IntegratorKind::Path) => Vec::new(),
     };
-    let mut ground = ground(manifest, &bounds, up, survey.origin);
-    if surface.kind != SurfaceKind::Spheres
-        && manifest.render.ground_height.is_none()
-        && let Some(ground) = &mut ground
-    {
-        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
-        // a thin layer of air, which reflects all light at grazing angles.
-        ground.raise(narrow(reach.x));
-    }
+    let ground = ground::ground(manifest, &bounds, reach.x, up, survey.origin)?;
     let scene = Scene {
         origin: survey.origin,
         camera,
@@ -384,30 +373,6 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
 fn background(manifest: &Manifest, up: Vec3) -> Background {
     let asked = manifest.render.background;
     asked.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
-}
-
-fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Option<Ground> {
-    let render = &manifest.render;
-    if !render.ground {
-        return None;
-    }
-    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
-    if let Some(height) = render.ground_height {
-        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
-        ground.center += (relative - ground.height) * ground.up;
-        ground.height = relative;
-    }
-    ground.color = render.ground_color;
-    ground.checker = match render.ground_pattern {
-        GroundPattern::Plain => None,
-        GroundPattern::Checker => Some(Checker {
-            tile: match render.ground_tile {
-                Some(tile) => narrow(tile),
-                None => surface::round(bounds.diagonal() * TILE),
-            },
-        }),
-    };
-    Some(ground)
 }
 
 /// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.

@@ -90,7 +90,8 @@ pub(super) fn over(
 
 fn argument(key: &KeyFlag) -> Arg {
     let is_switch = key.kind == FlagKind::Switch;
-    let default = key.default.as_ref().filter(|_| !is_switch);
+    let needs_value = !is_switch && !matches!(key.kind, FlagKind::SwitchOrText(_));
+    let default = key.default.as_ref().filter(|_| needs_value);
     let default = default.map(|default| format!(" [default: {default}]"));
     let help = format!("{}{}", key.help, default.unwrap_or_default());
     let mut argument = Arg::new(key.flag.name)
@@ -121,6 +122,11 @@ fn argument(key: &KeyFlag) -> Arg {
         FlagKind::Text(may_begin_with_hyphen) => {
             argument.allow_hyphen_values(may_begin_with_hyphen)
         }
+        // With `=`, so that an argument that follows is not taken as the value
+        FlagKind::SwitchOrText(usual) => argument
+            .num_args(0..=1)
+            .require_equals(true)
+            .default_missing_value(usual),
         FlagKind::NumberOrText | FlagKind::Switch => argument,
     }
     .allow_negative_numbers(!matches!(key.kind, FlagKind::Text(_) | FlagKind::List))
@@ -139,7 +145,7 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
         FlagKind::Number | FlagKind::Seconds => {
             matches.get_one::<f64>(name).map(|v| Value::from(*v))
         }
-        FlagKind::Text(_) => text().map(Value::from),
+        FlagKind::Text(_) | FlagKind::SwitchOrText(_) => text().map(Value::from),
         FlagKind::NumberOrText => text().map(|text| {
             let whole = text.parse::<i64>().map(Value::from);
             let number = whole.or_else(|_| text.parse::<f64>().map(Value::from));

@@ -14,7 +14,7 @@ const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard
 const COLORS: [&str; 3] = ["color_by", "map", "range"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 32] = [
+const FLAGS: [(&str, &str); 33] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
@@ -31,6 +31,10 @@ const FLAGS: [(&str, &str); 32] = [
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
+    (
+        "--ground=shadow_catcher",
+        "render.ground = \"shadow_catcher\"",
+    ),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--exact-surface", "surface.exact = true"),

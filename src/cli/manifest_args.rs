@@ -26,7 +26,7 @@ pub(super) struct ManifestArgs {
     #[command(flatten)]
     pub(super) keys: KeyFlags,
 
-    /// Look, for everything that is not set otherwise: water.
+    /// Look, for everything that is not set otherwise: water, studio or paper.
     #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
     pub(super) look: Option<String>,
     /// Attribute to colour by [default: velocity, else the particles' own colours]

@@ -177,13 +177,24 @@ impl Value for ColorSetting {
     }
 }
 
+/// Name of the background of a photo studio.
+const STUDIO: &str = "studio";
+
 /// The up direction is set by [`Background::with_up`].
 impl Value for Background {
     fn kind(_: &Key) -> String {
-        "three numbers from 0, such as [0.1, 0.1, 0.1], { bottom = [...], top = [...] },".to_owned()
+        "three numbers from 0, such as [0.1, 0.1, 0.1], { bottom = [...], top = [...] }, \"studio\""
+            .to_owned()
+    }
+
+    fn words() -> Vec<&'static str> {
+        vec![STUDIO]
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
+        if field.as_text() == Some(STUDIO) {
+            return Ok(Self::Studio { up: Vec3::Z });
+        }
         let Some(mut section) = field.as_table() else {
             return Vec3::parse(field, key).map(Self::Constant);
         };
@@ -203,6 +214,7 @@ impl Value for Background {
             Self::Gradient { bottom, top, .. } => {
                 format!("{{ bottom = {}, top = {} }}", bottom.toml(), top.toml())
             }
+            Self::Studio { .. } => quoted(STUDIO),
         }
     }
 
@@ -216,6 +228,7 @@ impl Value for Background {
                 "required": ["bottom", "top"],
                 "additionalProperties": false,
             },
+            { "const": STUDIO },
         ] })
     }
 }

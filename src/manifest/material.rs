@@ -27,6 +27,16 @@ pub struct Material {
     pub absorption_length: Option<f64>,
 }
 
+/// Terms of the thesis's model. All but `transmission` have no effect on opaque surfaces in path tracing.
+pub(super) const THESIS_TERMS: [&str; 6] = [
+    "ambient",
+    "diffuse",
+    "specular",
+    "shininess",
+    "reflection",
+    "transmission",
+];
+
 impl Default for Material {
     fn default() -> Self {
         Self {

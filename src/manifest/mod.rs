@@ -23,6 +23,7 @@ mod color;
 mod environment;
 mod file;
 mod flags;
+mod ground;
 mod input;
 mod key;
 mod light;
@@ -55,6 +56,7 @@ pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
 pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
+pub use ground::{GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
@@ -181,6 +183,12 @@ impl Manifest {
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
+        if !tree.contains("render", "integrator") {
+            let is_of_thesis =
+                (material::THESIS_TERMS.iter()).any(|term| tree.contains("material", term));
+            manifest.render.integrator =
+                usual_integrator(is_of_thesis, Render::default().integrator);
+        }
         manifest.check(&mut root);
         root.finish();
         let errors = problems.errors.into_inner();
@@ -320,6 +328,14 @@ impl Manifest {
         manifest.camera.keys = vec![CameraKey::default()];
         manifest.lights = Light::examples();
         manifest
+    }
+}
+
+/// The integrator of a manifest that names none: `usual`, unless the manifest names terms of the thesis's model.
+fn usual_integrator(is_of_thesis: bool, usual: IntegratorKind) -> IntegratorKind {
+    match is_of_thesis {
+        true => IntegratorKind::Whitted,
+        false => usual,
     }
 }
 

@@ -151,7 +151,7 @@ fn values_in_every_kind_of_table() {
     );
     told_below(
         "[[light]]\ntype = \"spot\"",
-        "line 4, column 8: light.0.type: expected one of point, directional, found the text \"spot\"",
+        "line 4, column 8: light.0.type: expected one of point, directional, sun, sphere, rect, disc, found the text \"spot\"",
     );
     told(
         "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",

@@ -9,6 +9,10 @@ use super::{Override, nearest};
 pub enum Look {
     /// Clear water on a checkerboard, under a sky.
     Water,
+    /// Matte particles in a photo studio, with path tracing.
+    Studio,
+    /// The same in front of white, for print.
+    Paper,
 }
 
 /// Water: one body with a smooth surface. It has no diffuse reflection, so its colour comes from absorption, and its
@@ -31,9 +35,27 @@ material.transmission = 1.0
 material.absorption = [0.42, 0.78, 0.86]
 "#;
 
+/// A photo studio, whose light is the default environment.
+const STUDIO: &str = r#"
+render.integrator = "path"
+render.ground = "shadow_catcher"
+render.background = "studio"
+"#;
+
+/// White paper in the light of a studio.
+const PAPER: &str = r#"
+render.integrator = "path"
+render.ground = "shadow_catcher"
+render.background = [1.0, 1.0, 1.0]
+"#;
+
 impl Look {
     /// All looks with their names.
-    pub const ALL: &[(Self, &'static str)] = &[(Self::Water, "water")];
+    pub const ALL: &[(Self, &'static str)] = &[
+        (Self::Water, "water"),
+        (Self::Studio, "studio"),
+        (Self::Paper, "paper"),
+    ];
 
     /// The look with a name.
     ///
@@ -56,6 +78,8 @@ impl Look {
     pub fn settings(self, shown: &str) -> Vec<Override> {
         let text = match self {
             Self::Water => WATER,
+            Self::Studio => STUDIO,
+            Self::Paper => PAPER,
         };
         let sections: toml::Table = text.parse().expect("a look of our own is TOML");
         let key = |(section, keys): (String, Value)| match keys {
@@ -80,7 +104,8 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::manifest::{GroundPattern, Manifest};
+    use crate::manifest::{GroundKind, GroundPattern, Manifest};
+    use crate::render::IntegratorKind;
     use crate::scene::Background;
     use crate::surface::SurfaceKind;
 
@@ -114,7 +139,32 @@ mod tests {
         assert_eq!(plain.render.max_depth, 8);
         assert_eq!(plain.render.ground_pattern, GroundPattern::Checker);
         assert_eq!(plain.material.constants.transmission, 1.0);
-        assert!(plain.render.ground && plain.material.absorption[0] < 1.0);
+        assert!(plain.render.ground.0 == GroundKind::Plain && plain.material.absorption[0] < 1.0);
+    }
+
+    #[test]
+    fn studio_and_paper_trace_paths_above_a_shadow_catcher() {
+        let look = |look: Look, text: &str| {
+            let text = format!("input.path = \"data\"\n{text}");
+            Manifest::parse_with(&text, Path::new("job.toml"), look.settings("--look")).unwrap()
+        };
+        for (name, background) in [
+            (Look::Studio, Background::Studio { up: Vec3::Z }),
+            (Look::Paper, Background::Constant(Vec3::ONE)),
+        ] {
+            let plain = look(name, "").render;
+            assert_eq!(plain.integrator, IntegratorKind::Path);
+            assert_eq!(plain.ground.0, GroundKind::ShadowCatcher);
+            assert_eq!(plain.background, Some(background));
+            // A source of light of the manifest's own
+            look(name, "environment.image = \"hall.exr\"");
+        }
+        let own = look(
+            Look::Studio,
+            "render.integrator = \"whitted\"\nrender.ground = false",
+        );
+        assert_eq!(own.render.integrator, IntegratorKind::Whitted);
+        assert_eq!(own.render.ground.0, GroundKind::None);
     }
 
     #[test]
@@ -129,7 +179,7 @@ mod tests {
         assert_eq!(mixed.material.absorption, Vec3::ONE);
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
-        assert!(mixed.render.ground);
+        assert_eq!(mixed.render.ground.0, GroundKind::Plain);
         // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
         let error = Manifest::parse_with(
@@ -146,7 +196,7 @@ mod tests {
     fn an_unknown_look_names_the_known() {
         let error = Look::named("watre").unwrap_err();
         assert!(
-            error.contains("available: water; did you mean water?"),
+            error.contains("available: water, studio, paper; did you mean water?"),
             "{error}"
         );
         assert!(!Look::named("lava").unwrap_err().contains("did you mean"));

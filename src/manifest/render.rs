@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::ground::{GroundKind, GroundSetting};
 use super::key::{Affects, section};
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
@@ -67,16 +68,23 @@ section! {
         /// both
         min_weight: f32 = DEFAULT_MIN_WEIGHT, affects(Affects::BranchingSpheres), or_zero(),
             from(*MIN_WEIGHTS.start()), to(*MIN_WEIGHTS.end());
-        /// Background: auto, linear RGB, or { bottom = [...], top = [...] }
+        /// Background: auto, studio, linear RGB, or { bottom = [...], top = [...] }
+        ///
+        /// studio is a grey gradient over the image with darker corners. It does not move with the camera.
         background: Option<Background> = None, or("auto");
-        /// A ground plane under the particles, which receives shadows
-        ground: bool = false, flag("ground", "", "Look");
+        /// Ground under the particles: false | true (plain) | checker | shadow_catcher
+        ///
+        /// A shadow catcher is invisible: it shows the background, darker where particles take light away. It needs
+        /// integrator = "path" and has no colour. `[render.ground]` with `type = "checker"` means the same.
+        ground: GroundSetting = GroundSetting(GroundKind::None), flag("ground", "KIND", "Look");
         /// Height of the ground along input.up, or auto
         ground_height: Option<f64> = None, or("auto"), unit("a height");
         /// Colour of the ground, linear RGB
         ground_color: Vec3 = ground::DEFAULT_COLOR;
         /// Pattern of the ground: plain | checker (every other square is darker)
         ground_pattern: GroundPattern = GroundPattern::Plain;
+        /// Strength of the shadows on a shadow catcher; 1 is physical
+        ground_shadow: f32 = 1.0, from(0), to(1), affects(Affects::PathTracing);
         /// Edge length of the squares of the pattern, or auto
         ground_tile: Option<f64> = None, or("auto"), unit("a length"), above(0), single();
         /// Maximum memory to use: 4GiB, 512MiB; frames that need more fail

@@ -158,7 +158,9 @@ fn wrong_types_say_what_is_wanted() {
     refused("[image]\nheight = 10.5", &["image.height", "whole"]);
     refused(
         "[render]\nground = 1",
-        &["render.ground: expected true or false, found 1"],
+        &[
+            "render.ground: expected true, false or one of none, plain, checker, shadow_catcher, found 1",
+        ],
     );
     refused(
         "[render]\nbackground = [1, 2]",
@@ -636,4 +638,26 @@ fn many_problems_are_told_in_part() {
     );
     assert!(told.ends_with("job.toml: and more like these"), "{told}");
     assert_eq!(told.lines().count(), 51);
+}
+
+#[test]
+fn terms_of_the_thesis_select_its_model() {
+    for (is_of_thesis, wanted) in [
+        (true, IntegratorKind::Whitted),
+        (false, IntegratorKind::Path),
+    ] {
+        let usual = usual_integrator(is_of_thesis, IntegratorKind::Path);
+        assert_eq!(usual, wanted);
+    }
+    let integrator = |text: &str| {
+        parse(&format!("input.path = \"a\"\n{text}"))
+            .render
+            .integrator
+    };
+    let whitted = IntegratorKind::Whitted;
+    assert_eq!(integrator("material.shininess = 5"), whitted);
+    assert_eq!(integrator(""), whitted);
+    // The integrator that a manifest names is the one that it gets
+    let both = "render.integrator = \"path\"\nmaterial.shininess = 5";
+    assert_eq!(integrator(both), IntegratorKind::Path);
 }

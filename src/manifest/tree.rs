@@ -102,6 +102,15 @@ fn split_key(key: &str) -> Result<Vec<String>, String> {
 }
 
 impl Node {
+    /// Whether `table` is a table with `key`.
+    pub(super) fn contains(&self, table: &str, key: &str) -> bool {
+        let Kind::Table(tables) = &self.kind else {
+            return false;
+        };
+        let table = tables.get(table).map(|(_, node)| &node.kind);
+        matches!(table, Some(Kind::Table(keys)) if keys.contains_key(key))
+    }
+
     /// Parses a whole file.
     pub(super) fn parse(text: &str) -> Result<Self, (Place, String)> {
         match DeTable::parse(text) {

@@ -6,13 +6,19 @@ use super::{film::FilmTile, scratch::SampleGroup};
 use crate::math::{LANES, Lanes, Lanes3, fold};
 
 impl SampleGroup {
-    /// Stores the mean of the `samples` of each pixel, and the data of the pixel.
-    pub(super) fn accumulate(&self, samples: u32, tile: &mut FilmTile<'_>) {
+    /// Stores the mean of the `samples` of each pixel, and the data of the pixel. `is_bounded`: samples may have
+    /// negative radiance or a coverage above 1, but pixels may not.
+    pub(super) fn accumulate(&self, samples: u32, is_bounded: bool, tile: &mut FilmTile<'_>) {
         let (share, samples) = (1.0 / samples as f32, samples as usize);
         for (number, pixel) in self.pixels.iter().enumerate() {
             let range = number * samples..(number + 1) * samples;
             let sum = pixel_sum(&self.radiance, &self.coverage, range);
-            tile.set_color(pixel.column, pixel.row, sum.map(|v| v * share));
+            let [r, g, b, a] = sum.map(|v| v * share);
+            let color = match is_bounded {
+                true => [r.max(0.0), g.max(0.0), b.max(0.0), a.min(1.0)],
+                false => [r, g, b, a],
+            };
+            tile.set_color(pixel.column, pixel.row, color);
             tile.set_data(pixel.column, pixel.row, &pixel.data);
         }
     }

@@ -66,11 +66,11 @@ impl RenderContext<'_> {
         }
     }
 
-    /// Fraction of each sample that surfaces cover. A ground that fades out still covers all of it, unless the
-    /// background is transparent.
-    pub(super) fn coverage(&self, hits: &Intersections) -> Lanes {
+    /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
+    /// covers all of it, unless the background is transparent.
+    pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
-            0 => 0.0,
+            0 => otherwise[lane],
             _ if self.settings.transparent_background => hits.opacity[lane],
             _ => 1.0,
         })

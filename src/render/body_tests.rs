@@ -77,6 +77,7 @@ fn floor(height: f32) -> Ground {
         fade_start: 1e4,
         fade_end: 2e4,
         checker: None,
+        shadow_catcher: None,
     }
 }
 
@@ -316,6 +317,7 @@ fn the_floor_is_seen_bent_through_a_slab() {
     for (tile, is_light) in [(0.54, true), (0.53, false)] {
         scene.ground = Some(Ground {
             checker: Some(Checker { tile }),
+            shadow_catcher: None,
             // The corner of four squares; the camera looks along y.
             center: Vec3::new(-0.1, 0.0, 0.0),
             ..floor(0.0)

@@ -106,6 +106,12 @@ impl<'a> RenderContext<'a> {
         self.particles.filter(|shape| shape.is_connected())
     }
 
+    /// Whether camera rays see nothing but shadows on the ground.
+    pub(super) fn catches_shadows(&self) -> bool {
+        let ground = self.scene.ground.as_ref();
+        ground.is_some_and(|ground| ground.shadow_catcher.is_some())
+    }
+
     /// The coherence of a packet at `depth`.
     pub(super) fn coherence(depth: u32) -> Coherence {
         match depth {

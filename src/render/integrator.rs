@@ -69,7 +69,8 @@ pub(super) trait Integrator: Sync {
             let group = pixels.by_ref().take(group_len);
             context.place_samples(tile, group, &mut scratch.group);
             trace_group(self, stop, scratch)?;
-            scratch.group.accumulate(samples, tile);
+            let is_bounded = context.catches_shadows();
+            scratch.group.accumulate(samples, is_bounded, tile);
         }
         Some(scratch.packet.counts)
     }
@@ -132,7 +133,7 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         trace_packet(integrator, segments, 1, stop, packet, &mut scratch.next)?;
         // Store radiance, coverage and data channels of the samples
         group.radiance[number] = packet.radiance;
-        group.coverage[number] = context.coverage(&packet.hits);
+        group.coverage[number] = context.coverage(&packet.hits, &packet.coverage);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
     }
     Some(())
@@ -171,6 +172,7 @@ fn trace_packet<I: Integrator + ?Sized>(
     }
     integrator.context().intersect(segments, depth, packet);
     packet.radiance = [splat(0.0); 3];
+    packet.coverage = splat(0.0);
     integrator.shade(segments, depth, packet, next);
     Some(())
 }

@@ -6,9 +6,10 @@ use super::{
     context::{Interior, RenderContext},
     materials::{attenuate, leaving},
     scratch::PacketScratch,
-    shading::{add_background, scale},
+    shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
 };
+use crate::scene::Background;
 use crate::surface::MaterialId;
 
 impl RenderContext<'_> {
@@ -58,10 +59,12 @@ impl RenderContext<'_> {
         depth > 1 || !self.settings.transparent_background
     }
 
-    /// Adds the background for rays of `lanes` without an intersection, and behind surfaces that are not fully opaque.
+    /// Adds the background for rays of `lanes` at `depth` without an intersection, and behind surfaces that are not
+    /// fully opaque.
     pub(super) fn add_background(
         &self,
         segments: &SegmentPacket,
+        depth: u32,
         lanes: u32,
         packet: &mut PacketScratch,
     ) {
@@ -83,6 +86,10 @@ impl RenderContext<'_> {
         );
         let direction = &segments.rays.direction;
         let (weight, radiance) = (&packet.weight, &mut packet.radiance);
+        if depth == 1 && matches!(self.scene.background, Background::Studio { .. }) {
+            add_backdrop(self.simd, &self.camera, direction, weight, lanes, radiance);
+            return;
+        }
         add_background(
             self.simd,
             &self.background,

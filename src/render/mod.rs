@@ -49,6 +49,8 @@ mod body_tests;
 #[cfg(test)]
 mod branch_tests;
 #[cfg(test)]
+mod catcher_tests;
+#[cfg(test)]
 mod image_tests;
 #[cfg(test)]
 mod path_tests;

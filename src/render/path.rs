@@ -14,7 +14,7 @@ use super::{
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
-    lights::{Emission, environment_along, sample_environment},
+    lights::{environment_along, sample_environment},
     materials::{Material, materials_of},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
@@ -23,10 +23,15 @@ use super::{
     specular::SpecularHits,
     stream::{RayStreams, SegmentPacket},
 };
-use crate::math::{LANES, Lanes, Lanes3, lane3, lanes_in, set_lane3, splat};
+use crate::math::{LANES, Lanes3, lane3, lanes_in, set_lane3, splat};
 use crate::scene::Environment;
 use crate::surface::MaterialId;
 use glam::Vec3;
+
+mod catcher;
+mod emission;
+
+use catcher::Catcher;
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;
@@ -45,6 +50,7 @@ pub(super) struct PathIntegrator<'a> {
     split: SplitRule,
     /// Whether rays can hit a light.
     has_extents: bool,
+    catcher: Option<Catcher>,
 }
 
 impl<'a> PathIntegrator<'a> {
@@ -57,6 +63,7 @@ impl<'a> PathIntegrator<'a> {
             bsdfs: bsdfs_of(context.scene.material.finish),
             interface,
             split: SplitRule::new(context.settings, context.interior),
+            catcher: Catcher::of(context.scene),
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
         }
@@ -82,6 +89,12 @@ impl Integrator for PathIntegrator<'_> {
         // Add what rays see of lights, and infinitely far away
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
+        if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
+            let lanes = packet.hits.lanes_of(MaterialId::GROUND);
+            if lanes != 0 {
+                self.catch_shadows(catcher, &self.surface(segments, depth, lanes), packet);
+            }
+        }
         self.add_escaped(segments, depth, segments.lanes() & !ended, packet);
         if packet.hits.mask == 0 {
             return;
@@ -94,13 +107,7 @@ impl Integrator for PathIntegrator<'_> {
         let max = self.context.settings.bounces;
         let opaque = packet.hits.mask & !clear & lanes_where(|l| segments.bounces[l] <= max);
         if opaque != 0 {
-            let surface = Surface {
-                segments,
-                depth,
-                lanes: opaque,
-                sample: segments.sample.map(|s| s % self.context.settings.samples),
-            };
-            self.shade_opaque(&surface, packet, next);
+            self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
         }
         // Reflect and refract rays at transmissive surfaces
         if clear != 0 {
@@ -123,122 +130,26 @@ fn lanes_where(holds: impl Fn(usize) -> bool) -> u32 {
     (0..LANES).fold(0, |lanes, lane| lanes | u32::from(holds(lane)) << lane)
 }
 
+/// Dimension of the samples of a light source.
+#[expect(clippy::cast_possible_truncation, reason = "there are few lights")]
+const fn light_dimension(index: usize) -> u32 {
+    LIGHTS + index as u32
+}
+
 impl PathIntegrator<'_> {
+    fn surface<'s>(&self, segments: &'s SegmentPacket, depth: u32, lanes: u32) -> Surface<'s> {
+        Surface {
+            segments,
+            depth,
+            lanes,
+            sample: segments.sample.map(|s| s % self.context.settings.samples),
+        }
+    }
+
     /// Whether rays of a BSDF sample light sources too, so that the balance heuristic weights both. Behind transmissive
     /// surfaces, only shadow rays find light sources.
     fn rays_hit_lights(&self) -> bool {
         self.context.interior == Interior::Opaque
-    }
-
-    /// Adds the radiance of lights that rays hit: of rays sampled from a BSDF, weighted against the sampling of the light,
-    /// and of visible lights before everything else. Returns the lanes of rays that end at visible lights.
-    fn add_emitted(&self, segments: &SegmentPacket, packet: &mut PacketScratch) -> u32 {
-        if !self.has_extents {
-            return 0;
-        }
-        let sampled = match self.rays_hit_lights() {
-            true => segments.lanes() & lanes_where(|l| segments.pdf[l] < f32::INFINITY),
-            false => 0,
-        };
-        let seen = segments.lanes() & lanes_where(|l| segments.bounces[l] == 0);
-        let mut emission = Emission::default();
-        let (mut nearest, mut color) = ([None; LANES], [Vec3::ZERO; LANES]);
-        for light in self
-            .context
-            .lights
-            .iter()
-            .filter(|light| light.has_extent())
-        {
-            // Find the rays that hit the light before a surface
-            let lanes = sampled | if light.is_visible() { seen } else { 0 };
-            if lanes == 0 {
-                continue;
-            }
-            light.intersect(self.context.simd, &segments.rays, &mut emission);
-            for lane in lanes_in(lanes & emission.lanes) {
-                let is_first = match packet.hits.mask >> lane & 1 {
-                    0 => true,
-                    _ => emission.t[lane] < segments.rays.t_max[lane],
-                };
-                if !is_first {
-                    continue;
-                }
-                // Add its radiance, or keep the nearest visible light
-                if sampled >> lane & 1 == 1 {
-                    let pdf = segments.pdf[lane];
-                    let weight = pdf / (pdf + emission.pdf[lane]);
-                    let arriving = lane3(&packet.throughput, lane) * (weight * emission.radiance);
-                    let sum = lane3(&packet.radiance, lane) + arriving;
-                    set_lane3(&mut packet.radiance, lane, sum);
-                } else if nearest[lane].is_none_or(|t| emission.t[lane] < t) {
-                    nearest[lane] = Some(emission.t[lane]);
-                    color[lane] = emission.radiance;
-                }
-            }
-        }
-        // Add the visible lights
-        let ended = lanes_where(|l| nearest[l].is_some());
-        for lane in lanes_in(ended) {
-            let sum = lane3(&packet.radiance, lane) + lane3(&packet.throughput, lane) * color[lane];
-            set_lane3(&mut packet.radiance, lane, sum);
-        }
-        ended
-    }
-
-    /// Adds the radiance for rays of `lanes` without an intersection, and behind surfaces that are not fully opaque:
-    /// camera rays see the background, unless the environment is visible.
-    fn add_escaped(
-        &self,
-        segments: &SegmentPacket,
-        depth: u32,
-        lanes: u32,
-        packet: &mut PacketScratch,
-    ) {
-        let context = &self.context;
-        if depth == 1 && !context.scene.is_environment_visible {
-            if context.sees_background(depth) {
-                context.add_background(segments, lanes, packet);
-            }
-            return;
-        }
-        if depth == 1 && !context.sees_background(depth) {
-            return;
-        }
-        let Some(environment) = self.environment else {
-            return;
-        };
-        let PacketScratch {
-            hits,
-            throughput,
-            radiance,
-            weight,
-            ..
-        } = packet;
-        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
-        if lanes == 0 {
-            return;
-        }
-        let part = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
-            0 => 1.0,
-            _ => 1.0 - hits.opacity[lane],
-        });
-        scale(context.simd, throughput, &part, weight);
-        // Shadow rays do not pass a ground that fades out, so its paths have the full weight
-        let pdf: Lanes = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
-            0 => segments.pdf[lane],
-            _ => f32::INFINITY,
-        });
-        let direction = &segments.rays.direction;
-        let mut seen = [splat(0.0); 3];
-        environment_along(
-            context.simd,
-            environment,
-            direction,
-            &pdf,
-            weight,
-            &mut seen,
-        );
-        add(context.simd, &seen, &Vec3::ONE, lanes, radiance);
     }
 
     fn shade_opaque(
@@ -287,23 +198,27 @@ impl PathIntegrator<'_> {
         let Some(environment) = self.environment.filter(|_| lanes != 0) else {
             return;
         };
+        self.reflect_environment(environment, surface, lanes, packet);
+        self.add_unoccluded(surface, packet);
+    }
+
+    /// Samples a direction from the environment, and the light from there that `lanes` reflect: `packet.light`.
+    fn reflect_environment(
+        &self,
+        environment: &Environment,
+        surface: &Surface<'_>,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
         // Sample a direction, and evaluate the BSDF for it
-        let simd = self.context.simd;
+        let (simd, path) = (self.context.simd, &surface.segments.path);
         let mut u = [splat(0.0); 2];
-        get_2d_lanes(
-            simd,
-            &surface.segments.path,
-            ENVIRONMENT,
-            &surface.sample,
-            &mut u,
-        );
+        get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
         let start = &packet.surface.start;
         sample_environment(simd, environment, start, &u, &mut packet.light);
         self.eval(surface, packet);
         let (values, weight) = (&packet.bsdf, &packet.weight);
         reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
-        // Trace the shadow rays
-        self.add_unoccluded(surface, packet);
     }
 
     /// Traces the shadow rays of environment samples, and adds those that arrive.
@@ -326,24 +241,10 @@ impl PathIntegrator<'_> {
 
     /// Adds the light of each light source.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let (context, simd) = (&self.context, self.context.simd);
-        for (light, dimension) in context.lights.iter().zip(LIGHTS..) {
-            // Sample the light, and evaluate the BSDF for its direction
-            let mut u = [splat(0.0); 2];
-            if light.has_extent() {
-                get_2d_lanes(
-                    simd,
-                    &surface.segments.path,
-                    dimension,
-                    &surface.sample,
-                    &mut u,
-                );
-            }
-            light.sample_li(simd, &packet.surface.start, &u, &mut packet.light);
-            self.eval(surface, packet);
+        let context = &self.context;
+        for (index, light) in context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
-            let (values, weight, lanes) = (&packet.bsdf, &packet.weight, surface.lanes);
-            reflect_samples(simd, values, weight, competes, lanes, &mut packet.light);
+            self.reflect_light(index, competes, surface, packet);
             if packet.light.lanes == 0 {
                 continue;
             }
@@ -371,9 +272,53 @@ impl PathIntegrator<'_> {
         }
     }
 
+    /// Samples a light source, and the light from there that the surface reflects: `packet.light`. `competes`: rays
+    /// of the BSDF find the light, too.
+    fn reflect_light(
+        &self,
+        index: usize,
+        competes: bool,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
+        let (simd, light) = (self.context.simd, &self.context.lights[index]);
+        let mut u = [splat(0.0); 2];
+        if light.has_extent() {
+            let path = &surface.segments.path;
+            let (dimension, sample) = (light_dimension(index), &surface.sample);
+            get_2d_lanes(simd, path, dimension, sample, &mut u);
+        }
+        light.sample_li(simd, &packet.surface.start, &u, &mut packet.light);
+        self.eval(surface, packet);
+        let (values, weight, lanes) = (&packet.bsdf, &packet.weight, surface.lanes);
+        reflect_samples(simd, values, weight, competes, lanes, &mut packet.light);
+    }
+
     /// Continues the paths in directions that are sampled from the BSDFs.
     fn bounce(&self, surface: &Surface<'_>, packet: &mut PacketScratch, next: &mut RayStreams) {
-        // Sample directions
+        let segments = surface.segments;
+        let lanes = self.sample_bsdf(surface, packet);
+        let rays = &mut packet.points.reflected;
+        // The last segment of a path may be a shadow ray to the environment
+        let max = self.context.settings.bounces;
+        let is_last = |l: usize| segments.bounces[l] == max;
+        let last = match self.context.interior {
+            Interior::Opaque if !self.has_extents => lanes & lanes_where(is_last),
+            // It may hit a light, or pass through transmissive surfaces
+            _ => 0,
+        };
+        let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
+        next.reflected
+            .push(deeper, rays, segments, segments.inside, BOUNCED);
+        // Infinite densities mark specular rays
+        if last != 0 {
+            self.add_last(surface, last, packet);
+        }
+        packet.points.reflected.pdf = splat(f32::INFINITY);
+    }
+
+    /// Samples directions from the BSDFs: `packet.points.reflected`. Returns the lanes that have one.
+    fn sample_bsdf(&self, surface: &Surface<'_>, packet: &mut PacketScratch) -> u32 {
         let (segments, simd) = (surface.segments, self.context.simd);
         let mut u = [splat(0.0); 2];
         get_2d_lanes(simd, &segments.path, BSDF, &surface.sample, &mut u);
@@ -398,30 +343,24 @@ impl PathIntegrator<'_> {
         product(simd, weight, &bounce.weight, &mut rays.throughput);
         let throughput = &rays.throughput;
         let has_weight = |l| bounce.pdf[l] > 0.0 && lane3(throughput, l).max_element() > 0.0;
-        let lanes = surface.lanes & lanes_where(has_weight);
-        // The last segment of a path may be a shadow ray to the environment
-        let max = self.context.settings.bounces;
-        let is_last = |l: usize| segments.bounces[l] == max;
-        let last = match self.context.interior {
-            Interior::Opaque if !self.has_extents => lanes & lanes_where(is_last),
-            // It may hit a light, or pass through transmissive surfaces
-            _ => 0,
-        };
-        let deeper = self.roulette(surface, lanes & !last, &mut rays.throughput);
-        next.reflected
-            .push(deeper, rays, segments, segments.inside, BOUNCED);
-        // Infinite densities mark specular rays
-        if last != 0 {
-            self.add_last(surface, last, packet);
-        }
-        packet.points.reflected.pdf = splat(f32::INFINITY);
+        surface.lanes & lanes_where(has_weight)
     }
 
     /// Adds the light of the environment along the last segments of paths, which are `lanes` of the reflected rays.
     fn add_last(&self, surface: &Surface<'_>, lanes: u32, packet: &mut PacketScratch) {
-        let Some(environment) = self.environment else {
-            return;
-        };
+        if let Some(environment) = self.environment {
+            self.aim_at_environment(environment, lanes, packet);
+            self.add_unoccluded(surface, packet);
+        }
+    }
+
+    /// Prepares the light of the environment along `lanes` of the reflected rays: `packet.light`.
+    fn aim_at_environment(
+        &self,
+        environment: &Environment,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
         let (rays, samples) = (&packet.points.reflected, &mut packet.light);
         samples.rays.origin = rays.origin;
         samples.rays.direction = rays.direction;
@@ -442,7 +381,6 @@ impl PathIntegrator<'_> {
         let is_traced = |l: usize| samples.lanes >> l & 1 == 1;
         samples.rays.t_max =
             std::array::from_fn(|l| if is_traced(l) { f32::INFINITY } else { -1.0 });
-        self.add_unoccluded(surface, packet);
     }
 
     /// Ends some of the long paths in `lanes` at random, and compensates the throughput of the others. Returns the

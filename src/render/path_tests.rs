@@ -16,7 +16,7 @@ use crate::math::{SimdLevel, Supported};
 use crate::scene::environment::studio;
 use crate::scene::{
     Background, Camera, CameraView, Environment, EnvironmentAxes, Falloff, Fresnel, Ground, Light,
-    Material,
+    LightKind, Material,
 };
 
 /// Looks along +y from a distance of 10.
@@ -178,6 +178,7 @@ fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
             fade_start: 1e4,
             fade_end: 2e4,
             checker: None,
+            shadow_catcher: None,
         }),
         ..scene(environment)
     }
@@ -294,9 +295,25 @@ fn the_same_bits_on_any_threads_and_instructions() {
     let heap = heap();
     let source = ParticleShading::constant(Vec3::new(0.8, 0.6, 0.3));
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
-    for transmission in [0.0, 0.9] {
+    for (transmission, shadow_catcher) in
+        [(0.0, None), (0.9, None), (0.0, Some(1.0)), (0.9, Some(1.0))]
+    {
         let mut scene = floor_from_above(studio(axes, Vec3::ONE), Vec3::splat(0.5));
         scene.material.transmission = transmission;
+        scene.background = Background::Studio { up: Vec3::Z };
+        let kind = LightKind::Sphere {
+            center: Vec3::new(1.0, 2.0, 2.0),
+            radius: 0.5,
+        };
+        scene.lights = vec![Light {
+            kind,
+            radiance: Vec3::ONE,
+            casts_shadow: true,
+            is_visible: true,
+        }];
+        if let Some(ground) = &mut scene.ground {
+            ground.shadow_catcher = shadow_catcher;
+        }
         let settings = settings(33, 5, 4);
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);

@@ -74,6 +74,8 @@ pub(super) struct PacketScratch {
     /// Intersections of shadow rays with transmissive surfaces.
     pub(super) crossings: Intersections,
     pub(super) weight: Lanes3,
+    /// Coverage of samples by what leaves no intersection: visible lights, and shadows on a transparent background.
+    pub(super) coverage: Lanes,
     /// Particles that contribute to the colour of a point, with weights.
     pub(super) blend: Vec<(u32, f32)>,
     /// Rays traced for the tile.

@@ -62,7 +62,7 @@ impl Integrator for WhittedIntegrator<'_> {
         let context = &self.context;
         // Add the background for rays that leave the scene
         if context.sees_background(depth) {
-            context.add_background(segments, segments.lanes(), packet);
+            context.add_background(segments, depth, segments.lanes(), packet);
         }
         if packet.hits.mask == 0 {
             return;

@@ -404,6 +404,7 @@ fn the_ground_takes_shadows_and_stops_light_from_below() {
         fade_start: 100.0,
         fade_end: 200.0,
         checker: None,
+        shadow_catcher: None,
     });
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     // The ball is above the point that the camera looks at, outside the picture.

@@ -26,6 +26,12 @@ const FADE_START: f32 = 1.5;
 /// Default distance at which it has faded out.
 const FADE_END: f32 = 6.0;
 
+/// The same two distances for a shadow catcher, whose horizon is not visible.
+const CATCHER_FADE: [f32; 2] = [2.0, 8.0];
+
+/// Colour in which a shadow catcher reflects light to the particles.
+const CATCHER_COLOR: Vec3 = Vec3::splat(0.55);
+
 /// A plane `dot(up, x) = height`.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Ground {
@@ -43,6 +49,9 @@ pub struct Ground {
     pub fade_end: f32,
     /// Optional checkerboard.
     pub checker: Option<Checker>,
+    /// Strength of the shadows, 0 to 1, if camera rays see nothing but shadows on the ground: a shadow catcher. Only
+    /// for path tracing.
+    pub shadow_catcher: Option<f32>,
 }
 
 /// A checkerboard on the ground. Four corners meet at the centre of the ground.
@@ -71,6 +80,22 @@ impl Ground {
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,
             checker: None,
+            shadow_catcher: None,
+        }
+    }
+
+    /// A shadow catcher with shadows of a `strength` from 0 to 1, in place of this ground under `bounds`.
+    #[must_use]
+    pub fn into_shadow_catcher(self, bounds: &Bounds, strength: f32) -> Self {
+        let diagonal = (bounds.max - bounds.min).as_vec3().length();
+        let [fade_start, fade_end] = CATCHER_FADE.map(|distance| distance * diagonal);
+        Self {
+            color: CATCHER_COLOR,
+            fade_start,
+            fade_end,
+            checker: None,
+            shadow_catcher: Some(strength),
+            ..self
         }
     }
 

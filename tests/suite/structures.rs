@@ -95,6 +95,12 @@ fn dam_break_of_pysph() {
 }
 
 #[test]
+fn dam_break_in_a_studio() {
+    let look = ["--look", "studio"];
+    same_on_sample("pysph/dam_break_3d_fluid_00100.vtu", &look);
+}
+
+#[test]
 fn molecules() {
     same_on_sample("lammps_drop/steps", ALL_CHANNELS);
 }

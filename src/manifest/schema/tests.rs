@@ -82,7 +82,7 @@ fn what_the_program_writes_is_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 20] = [
+const TABLES: [(&str, &str); 21] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -132,6 +132,10 @@ const TABLES: [(&str, &str); 20] = [
     (
         "/properties/render/properties/background/anyOf/2",
         "[render.background]\n",
+    ),
+    (
+        "/properties/render/properties/ground/anyOf/2",
+        "[render.ground]\n",
     ),
 ];
 

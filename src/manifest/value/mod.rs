@@ -34,6 +34,8 @@ pub enum FlagKind {
     Seconds,
     /// Text; it may begin with a hyphen if `true`.
     Text(bool),
+    /// Text, or no value, which means this text.
+    SwitchOrText(&'static str),
     /// A number or a word.
     NumberOrText,
     /// Text, with commas between items.

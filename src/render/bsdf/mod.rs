@@ -15,6 +15,8 @@ mod metal;
 mod microfacet;
 mod plastic;
 #[cfg(test)]
+mod finish_tests;
+#[cfg(test)]
 mod tests;
 
 use matte::Matte;

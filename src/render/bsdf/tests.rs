@@ -1,293 +1,231 @@
-//! Properties that every BSDF has: reciprocity, conservation of energy, and a density that matches its samples.
+//! Every BSDF against the laws of reflection, and its samples against its density.
 
-use super::*;
-use crate::accel::simd::tested_levels::tested_levels;
-use crate::math::{splat, splat3};
-use crate::ray::Ray;
+use std::f32::consts::PI;
+
 use glam::Vec3;
 
-const FINISHES: [Finish; 8] = [
-    Finish::Matte,
-    Finish::Plastic { roughness: 0.2 },
-    Finish::Plastic { roughness: 0.55 },
-    Finish::Plastic { roughness: 1.0 },
-    Finish::Metal { roughness: 0.1 },
-    Finish::Metal { roughness: 0.4 },
-    Finish::Metal { roughness: 0.7 },
-    Finish::Metal { roughness: 1.0 },
-];
+use super::*;
+use crate::math::{lane3, set_lane3, splat, splat3};
+use crate::ray::Ray;
 
-/// Whether its lobe is wide compared with the cells of an integral.
-fn is_integrable(finish: &Finish) -> bool {
-    match finish {
-        Finish::Matte => true,
-        Finish::Plastic { roughness } | Finish::Metal { roughness } => *roughness > 0.3,
+const ALBEDO: Vec3 = Vec3::new(0.9, 0.5, 0.1);
+
+/// Points with a shading normal and a geometric normal.
+fn points(normal: Vec3, geometric: Vec3) -> SurfacePoints {
+    SurfacePoints {
+        normal: splat3(normal),
+        geometric: splat3(geometric),
+        start: [splat(0.0); 3],
+        albedo: splat3(ALBEDO),
     }
 }
 
-/// Outgoing directions by their angle from the normal in degrees.
-const ANGLES: [f32; 4] = [0.0, 30.0, 60.0, 82.0];
-
-/// A surface point whose normal is z, seen from `out`.
-struct Point {
-    rays: RayPacket,
-    points: SurfacePoints,
+fn rays_along(direction: Vec3) -> RayPacket {
+    let mut rays = RayPacket::default();
+    for _ in 0..LANES {
+        rays.push(&Ray::new(-direction, direction));
+    }
+    rays
 }
 
-impl Point {
-    fn new(out: Vec3, albedo: Vec3) -> Self {
-        let mut rays = RayPacket::default();
-        for _ in 0..LANES {
-            rays.push(&Ray::new(out, -out));
-        }
-        Self {
-            rays,
-            points: SurfacePoints {
-                normal: splat3(Vec3::Z),
-                geometric: splat3(Vec3::Z),
-                start: splat3(Vec3::ZERO),
-                albedo: splat3(albedo),
-            },
-        }
+/// Values for light from the `directions` of a packet that leaves towards `outgoing`.
+fn eval(
+    bsdf: &dyn Bsdf,
+    points: &SurfacePoints,
+    outgoing: Vec3,
+    directions: &[Vec3; LANES],
+) -> BsdfValues {
+    let mut lanes = [splat(0.0); 3];
+    for (lane, direction) in directions.iter().enumerate() {
+        set_lane3(&mut lanes, lane, *direction);
+    }
+    let mut values = BsdfValues::default();
+    let rays = rays_along(-outgoing);
+    bsdf.eval(
+        Supported::default(),
+        &rays,
+        points,
+        &lanes,
+        0xffff,
+        &mut values,
+    );
+    values
+}
+
+/// Independent numbers in 0..1 (xorshift, Marsaglia 2003).
+struct Random(u32);
+
+impl Random {
+    fn next(&mut self) -> f32 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        (self.0 >> 8) as f32 / 16_777_216.0
     }
 
-    /// The values for 16 directions.
-    fn eval(&self, simd: Supported, bsdf: &dyn Bsdf, into: &Lanes3) -> BsdfValues {
-        let mut values = BsdfValues::default();
-        bsdf.eval(simd, &self.rays, &self.points, into, 0xffff, &mut values);
-        values
-    }
-
-    fn value(&self, bsdf: &dyn Bsdf, into: Vec3) -> Vec3 {
-        let values = self.eval(Supported::default(), bsdf, &splat3(into));
-        crate::math::lane3(&values.value, 0)
-    }
-
-    /// Samples by `numbers`: directions, weights and densities.
-    fn samples(
-        &self,
-        simd: Supported,
-        bsdf: &dyn Bsdf,
-        numbers: &[[f32; 2]],
-    ) -> Vec<(Vec3, Vec3, f32)> {
-        let mut found = Vec::new();
-        for chunk in numbers.chunks(LANES) {
-            let mut u = [splat(0.0); 2];
-            for (lane, number) in chunk.iter().enumerate() {
-                (u[0][lane], u[1][lane]) = (number[0], number[1]);
-            }
-            let mut samples = BsdfSamples::default();
-            bsdf.sample(simd, &self.rays, &self.points, &u, 0xffff, &mut samples);
-            for lane in 0..chunk.len() {
-                let vector = |lanes| crate::math::lane3(lanes, lane);
-                found.push((
-                    vector(&samples.direction),
-                    vector(&samples.weight),
-                    samples.pdf[lane],
-                ));
-            }
-        }
-        found
-    }
-}
-
-/// The centres of the cells of a grid.
-fn grid(side: u16) -> Vec<[f32; 2]> {
-    let center = |k: u16| (f32::from(k) + 0.5) / f32::from(side);
-    let cells = (0..side).flat_map(|i| (0..side).map(move |j| (i, j)));
-    cells.map(|(i, j)| [center(i), center(j)]).collect()
-}
-
-/// Pseudo-random points.
-fn random(count: usize) -> Vec<[f32; 2]> {
-    let mut state = 1_u64;
-    let mut next = || {
-        state = state
-            .wrapping_mul(6_364_136_223_846_793_005)
-            .wrapping_add(1_442_695_040_888_963_407);
-        (state >> 40) as f32 / (1 << 24) as f32
-    };
-    (0..count).map(|_| [next(), next()]).collect()
-}
-
-fn direction(degrees: f32, azimuth: f32) -> Vec3 {
-    let (sin, cos) = degrees.to_radians().sin_cos();
-    let (y, x) = azimuth.to_radians().sin_cos();
-    Vec3::new(sin * x, sin * y, cos)
-}
-
-/// The integral of `of` over the hemisphere, by cells of equal solid angle.
-fn integral(of: impl Fn(&Lanes3) -> Lanes) -> f64 {
-    const ROWS: usize = 400;
-    const COLUMNS: usize = 800;
-    let mut sum = 0.0;
-    for row in 0..ROWS {
-        let z = (row as f32 + 0.5) / ROWS as f32;
+    /// A unit vector, uniform over the sphere.
+    fn direction(&mut self) -> Vec3 {
+        let z = 1.0 - 2.0 * self.next();
         let level = (1.0 - z * z).sqrt();
-        for first in (0..COLUMNS).step_by(LANES) {
-            let angle = |l: usize| (first + l) as f32 * std::f32::consts::TAU / COLUMNS as f32;
-            let into = [
-                std::array::from_fn(|l| level * angle(l).cos()),
-                std::array::from_fn(|l| level * angle(l).sin()),
-                splat(z),
-            ];
-            sum += of(&into).iter().map(|v| f64::from(*v)).sum::<f64>();
-        }
-    }
-    sum * std::f64::consts::TAU / (ROWS * COLUMNS) as f64
-}
-
-#[test]
-fn directions_can_be_exchanged() {
-    let albedo = Vec3::new(0.9, 0.4, 0.1);
-    for finish in FINISHES {
-        let bsdf = bsdf_of(finish);
-        for (a, b) in [(10.0, 50.0), (0.0, 80.0), (45.0, 45.0), (85.0, 20.0)] {
-            let (a, b) = (direction(a, 10.0), direction(b, 130.0));
-            // The value contains the cosine of the second direction
-            let there = Point::new(a, albedo).value(&*bsdf, b) / b.z;
-            let back = Point::new(b, albedo).value(&*bsdf, a) / a.z;
-            let error = (there - back).abs().max_element();
-            assert!(
-                error <= 1e-4 * there.max_element(),
-                "{finish:?}: {there} {back}"
-            );
-        }
+        let (sin, cos) = (2.0 * PI * self.next()).sin_cos();
+        Vec3::new(level * cos, level * sin, z)
     }
 }
 
-/// In a white furnace, a white surface is as bright as its surroundings, and a dark one never brighter.
+/// Normals, and a direction in which light leaves.
+fn cases() -> [[Vec3; 2]; 3] {
+    let normals = [
+        Vec3::Z,
+        Vec3::new(0.36, 0.48, -0.8),
+        Vec3::new(-0.6, 0.8, 0.0),
+    ];
+    normals.map(|normal| [normal, (normal + 0.7 * Vec3::X).normalize()])
+}
+
 #[test]
-fn energy_is_kept() {
-    for finish in FINISHES {
-        let bsdf = bsdf_of(finish);
-        for angle in ANGLES {
-            for (albedo, range) in [(1.0, 0.985..1.01), (0.3, 0.0..1.0)] {
-                let point = Point::new(direction(angle, 0.0), Vec3::splat(albedo));
-                let samples = point.samples(Supported::default(), &*bsdf, &grid(256));
-                let sum: f64 = samples
-                    .iter()
-                    .map(|(_, weight, _)| f64::from(weight.y))
-                    .sum();
-                let reflected = sum / samples.len() as f64;
-                assert!(
-                    range.contains(&reflected),
-                    "{finish:?} at {angle}, albedo {albedo}: {reflected}"
-                );
+fn densities_integrate_to_one_and_no_light_is_created() {
+    for (bsdf, [normal, outgoing]) in bsdfs_of().iter().zip(cases()) {
+        let (mut random, packets) = (Random(7), 20_000_u16);
+        let (mut density, mut reflected) = (0.0, Vec3::ZERO);
+        for _ in 0..packets {
+            let directions = std::array::from_fn(|_| random.direction());
+            let values = eval(&**bsdf, &points(normal, normal), outgoing, &directions);
+            density += values.pdf.iter().sum::<f32>();
+            for lane in 0..LANES {
+                reflected += lane3(&values.value, lane);
             }
         }
+        let share = 4.0 * PI / (f32::from(packets) * LANES as f32);
+        // The standard error of both is 0.003
+        assert!((density * share - 1.0).abs() < 0.015, "{}", density * share);
+        let reflected = share * reflected;
+        assert!(
+            (reflected / ALBEDO - 1.0).abs().max_element() < 0.015,
+            "{reflected}"
+        );
     }
 }
 
-/// The density integrates to the fraction of samples that leave the surface, and the weight of samples is that of
-/// the values.
 #[test]
-fn densities_are_those_of_the_samples() {
-    for finish in FINISHES.into_iter().filter(is_integrable) {
-        let bsdf = bsdf_of(finish);
-        for angle in ANGLES {
-            let point = Point::new(direction(angle, 20.0), Vec3::new(0.8, 0.5, 0.2));
-            let simd = Supported::default();
-            let samples = point.samples(simd, &*bsdf, &grid(256));
-            let total = integral(|into| point.eval(simd, &*bsdf, into).pdf);
-            let left = samples.iter().filter(|(_, _, pdf)| *pdf > 0.0).count();
-            let left = left as f64 / samples.len() as f64;
-            assert!(
-                (total - left).abs() < 0.01,
-                "{finish:?} at {angle}: {total} {left}"
-            );
-            for (into, weight, pdf) in samples.iter().step_by(97).filter(|(_, _, pdf)| *pdf > 0.0) {
-                let values = point.eval(simd, &*bsdf, &splat3(*into));
-                assert!(
-                    (values.pdf[0] - pdf).abs() <= 2e-3 * pdf,
-                    "{finish:?}: {} {pdf}",
-                    values.pdf[0]
-                );
-                let expected = values.value[1][0] / values.pdf[0];
-                assert!((expected - weight.y).abs() <= 2e-3 * expected.max(0.01));
-            }
-        }
-    }
-}
-
-/// A chi-square test of the directions of samples against the integral of the density over cells.
-#[test]
-fn samples_follow_their_density() {
-    const ROWS: usize = 8;
-    const COLUMNS: usize = 16;
-    for finish in FINISHES.into_iter().filter(is_integrable) {
-        let bsdf = bsdf_of(finish);
-        for angle in [0.0, 50.0] {
-            let point = Point::new(direction(angle, 20.0), Vec3::splat(0.5));
-            let simd = Supported::default();
-            // Count samples
-            let samples = point.samples(simd, &*bsdf, &random(100_000));
-            let cell = |v: Vec3| {
-                let row = ((v.z * ROWS as f32) as usize).min(ROWS - 1);
-                let turn = v.y.atan2(v.x) / std::f32::consts::TAU + 1.0;
-                row * COLUMNS + ((turn * COLUMNS as f32) as usize % COLUMNS)
+fn reflection_is_reciprocal() {
+    let mut random = Random(99);
+    for (bsdf, [normal, _]) in bsdfs_of().iter().zip(cases()) {
+        let above = |random: &mut Random| {
+            let direction = random.direction();
+            direction * direction.dot(normal).signum()
+        };
+        for _ in 0..200 {
+            let (a, b) = (above(&mut random), above(&mut random));
+            let reflectance = |from: Vec3, to: Vec3| {
+                let values = eval(&**bsdf, &points(normal, normal), to, &[from; LANES]);
+                lane3(&values.value, 3) / from.dot(normal)
             };
-            let mut counts = [0.0; ROWS * COLUMNS];
-            for (into, _, _) in samples.iter().filter(|(_, _, pdf)| *pdf > 0.0) {
-                counts[cell(*into)] += 1.0;
-            }
-            // Integrate the density over each cell
-            let mut expected = [0.0; ROWS * COLUMNS];
-            let (fine_rows, fine_columns) = (ROWS * 256, COLUMNS * 128);
-            for row in 0..fine_rows {
-                let z = (row as f32 + 0.5) / fine_rows as f32;
-                let level = (1.0 - z * z).sqrt();
-                for first in (0..fine_columns).step_by(LANES) {
-                    let angle = |l: usize| {
-                        (first as f32 + l as f32 + 0.5) * std::f32::consts::TAU
-                            / fine_columns as f32
-                    };
-                    let into = [
-                        std::array::from_fn(|l| level * angle(l).cos()),
-                        std::array::from_fn(|l| level * angle(l).sin()),
-                        splat(z),
-                    ];
-                    let values = point.eval(simd, &*bsdf, &into);
-                    for lane in 0..LANES {
-                        let at = crate::math::lane3(&into, lane);
-                        expected[cell(at)] += f64::from(values.pdf[lane]);
-                    }
-                }
-            }
-            let share = std::f64::consts::TAU / (fine_rows * fine_columns) as f64;
-            let mut statistic = 0.0;
-            let mut cells = 0.0;
-            for (count, density) in counts.iter().zip(expected) {
-                let expected = density * share * samples.len() as f64;
-                if expected < 5.0 {
-                    assert!(
-                        *count < 40.0,
-                        "{finish:?}: {count} samples where {expected} are expected"
-                    );
-                    continue;
-                }
-                statistic += (count - expected) * (count - expected) / expected;
-                cells += 1.0;
-            }
-            assert!(
-                statistic < 1.5 * cells + 20.0,
-                "{finish:?} at {angle}: {statistic} of {cells}"
-            );
+            let [forth, back] = [reflectance(a, b), reflectance(b, a)];
+            assert!((forth - back).abs().max_element() < 1e-5, "{forth} {back}");
         }
     }
 }
 
+/// Bins of the sine of the elevation, and of the azimuth around the normal.
+const BINS: [usize; 2] = [8, 16];
+
+#[expect(
+    clippy::cast_possible_truncation,
+    clippy::cast_sign_loss,
+    reason = "in 0..bins"
+)]
+fn bin_of(direction: Vec3, normal: Vec3) -> Option<usize> {
+    let [s, t] = crate::render::shading::tangents(normal.to_array()).map(Vec3::from_array);
+    let height = direction.dot(normal);
+    let turns = direction.dot(t).atan2(direction.dot(s)) / (2.0 * PI) + 0.5;
+    let row = ((height * BINS[0] as f32) as usize).min(BINS[0] - 1);
+    let column = ((turns * BINS[1] as f32) as usize).min(BINS[1] - 1);
+    (height > 0.0).then_some(row * BINS[1] + column)
+}
+
 #[test]
-fn instruction_sets_give_the_same_bits() {
-    for finish in FINISHES {
-        let bsdf = bsdf_of(finish);
-        let point = Point::new(direction(40.0, 20.0), Vec3::new(0.8, 0.5, 0.2));
-        let all: Vec<_> = tested_levels()
-            .into_iter()
-            .map(|level| point.samples(Supported::or_best(level), &*bsdf, &grid(32)))
-            .collect();
-        for others in &all[1..] {
-            assert_eq!(&all[0], others, "{finish:?}");
+fn samples_have_their_density() {
+    for (bsdf, [normal, outgoing]) in bsdfs_of().iter().zip(cases()) {
+        let (points, packets) = (points(normal, normal), 8192_u16);
+        let mut random = Random(3);
+        // Count samples, and check each against the values for its direction
+        let mut counts = [0_u32; BINS[0] * BINS[1]];
+        let mut samples = BsdfSamples::default();
+        let rays = rays_along(-outgoing);
+        for _ in 0..packets {
+            let u = [0, 1].map(|_| std::array::from_fn(|_| random.next()));
+            bsdf.sample(
+                Supported::default(),
+                &rays,
+                &points,
+                &u,
+                0xffff,
+                &mut samples,
+            );
+            let directions = std::array::from_fn(|lane| lane3(&samples.direction, lane));
+            let values = eval(&**bsdf, &points, outgoing, &directions);
+            for (lane, direction) in directions.iter().enumerate() {
+                assert!((direction.length() - 1.0).abs() < 1e-5);
+                let pdf = samples.pdf[lane];
+                assert!((pdf - values.pdf[lane]).abs() < 1e-4, "{direction}");
+                let value = lane3(&samples.weight, lane) * pdf;
+                assert!((value - lane3(&values.value, lane)).abs().max_element() < 1e-4);
+                if let Some(bin) = bin_of(*direction, normal) {
+                    counts[bin] += 1;
+                }
+            }
         }
+        // Integrate the density over each bin
+        let (mut expected, trials) = ([0.0_f64; BINS[0] * BINS[1]], 60_000_u32);
+        let total = f64::from(packets) * LANES as f64;
+        for _ in 0..trials {
+            let directions = std::array::from_fn(|_| random.direction());
+            let values = eval(&**bsdf, &points, outgoing, &directions);
+            for (lane, direction) in directions.iter().enumerate() {
+                if let Some(bin) = bin_of(*direction, normal) {
+                    let solid_angle =
+                        4.0 * std::f64::consts::PI / (f64::from(trials) * LANES as f64);
+                    expected[bin] += total * solid_angle * f64::from(values.pdf[lane]);
+                }
+            }
+        }
+        // Chi-square test: 127 degrees of freedom, and the variance of the integral adds about a quarter
+        let chi2: f64 = counts
+            .iter()
+            .zip(&expected)
+            .map(|(count, expected)| (f64::from(*count) - expected).powi(2) / expected)
+            .sum();
+        assert!(chi2 < 260.0, "{chi2}");
+    }
+}
+
+#[test]
+fn nothing_is_reflected_below_the_surface() {
+    let (normal, geometric) = (Vec3::new(0.8, 0.0, 0.6), Vec3::Z);
+    let below = Vec3::new(0.9, 0.0, -0.2).normalize();
+    let (mut random, mut samples) = (Random(5), BsdfSamples::default());
+    for bsdf in bsdfs_of() {
+        let points = points(normal, geometric);
+        let values = eval(&*bsdf, &points, normal, &[below; LANES]);
+        assert_eq!((values.pdf[0], lane3(&values.value, 0)), (0.0, Vec3::ZERO));
+        let mut dropped = 0;
+        for _ in 0..64 {
+            let u = [0, 1].map(|_| std::array::from_fn(|_| random.next()));
+            let rays = rays_along(-normal);
+            bsdf.sample(
+                Supported::default(),
+                &rays,
+                &points,
+                &u,
+                0xffff,
+                &mut samples,
+            );
+            for lane in 0..LANES {
+                let is_below = lane3(&samples.direction, lane).z <= 0.0;
+                assert_eq!(samples.pdf[lane] == 0.0, is_below);
+                dropped += u32::from(is_below);
+            }
+        }
+        assert!(dropped > 20, "{dropped}");
     }
 }

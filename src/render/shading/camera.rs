@@ -39,6 +39,19 @@ impl CameraLanes {
     }
 }
 
+impl CameraLanes {
+    /// The position on the film of a unit `direction` in front of the camera; (0, 0) is the top left corner, (1, 1) the
+    /// bottom right one.
+    #[inline(always)]
+    pub(super) fn film_position(&self, d: [f32; 3]) -> [f32; 2] {
+        let (r, u, f) = (self.right, self.up, self.forward);
+        let depth = d[0] * f.x + d[1] * f.y + d[2] * f.z;
+        let across = (d[0] * r.x + d[1] * r.y + d[2] * r.z) / (depth * self.half_extent[0]);
+        let along = (d[0] * u.x + d[1] * u.y + d[2] * u.z) / (depth * self.half_extent[1]);
+        [0.5 + 0.5 * across, 0.5 - 0.5 * along]
+    }
+}
+
 /// Camera rays through points of the film, which are in pixels from its top left corner.
 #[inline(always)]
 fn camera_rays_body(camera: &CameraLanes, x: &Lanes, y: &Lanes, rays: &mut RayPacket) {

@@ -257,6 +257,7 @@ fn floor(height: f32) -> Ground {
         fade_start: 4.0,
         fade_end: 12.0,
         checker: None,
+        shadow_catcher: None,
     }
 }
 

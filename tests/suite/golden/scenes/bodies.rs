@@ -35,6 +35,7 @@ pub(in super::super) fn union() -> Shot {
     shot.scene.background = SUNSET;
     shot.scene.ground = Some(Ground {
         checker: Some(Checker { tile: 1.0 }),
+        shadow_catcher: None,
         ..floor(0.0)
     });
     shot.settings.max_depth = 6;

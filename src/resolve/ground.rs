@@ -1,0 +1,123 @@
+//! The ground under the particles.
+
+use glam::DVec3;
+
+use super::{ResolveError, narrow, surface};
+use crate::manifest::{GroundKind, GroundPattern, Manifest};
+use crate::render::IntegratorKind;
+use crate::scene::{Bounds, Checker, Ground};
+use crate::surface::SurfaceKind;
+
+/// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
+/// through the particles, and none is only a few pixels wide.
+const TILE: f64 = 1.0 / 8.0;
+
+/// The ground of `render.ground`, if there is one. `bounds` contain the particles, which reach `reach` beyond their
+/// centres.
+///
+/// # Errors
+/// It is a shadow catcher, but the integrator cannot use one.
+pub(super) fn ground(
+    manifest: &Manifest,
+    bounds: &Bounds,
+    reach: f64,
+    up: DVec3,
+    origin: DVec3,
+) -> Result<Option<Ground>, ResolveError> {
+    let render = &manifest.render;
+    let kind = render.ground.0;
+    if kind == GroundKind::None {
+        return Ok(None);
+    }
+    let is_catcher = kind == GroundKind::ShadowCatcher;
+    if is_catcher && render.integrator == IntegratorKind::Whitted {
+        return Err(ResolveError::Unsupported {
+            key: "render.ground",
+            what: "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a \
+                   plain ground"
+                .to_owned(),
+        });
+    }
+    // Place it under the particles
+    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
+    if let Some(height) = render.ground_height {
+        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
+        ground.center += (relative - ground.height) * ground.up;
+        ground.height = relative;
+    } else if is_catcher || manifest.surface.kind != SurfaceKind::Spheres {
+        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
+        // a thin layer of air, which reflects all light at grazing angles. Spheres that only touched a shadow catcher
+        // would seem to float.
+        ground.raise(narrow(reach));
+    }
+    if is_catcher {
+        let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow);
+        return Ok(Some(catcher));
+    }
+    // Colour it
+    ground.color = render.ground_color;
+    let is_checkered =
+        kind == GroundKind::Checker || render.ground_pattern == GroundPattern::Checker;
+    ground.checker = is_checkered.then(|| Checker {
+        tile: match render.ground_tile {
+            Some(tile) => narrow(tile),
+            None => surface::round(bounds.diagonal() * TILE),
+        },
+    });
+    Ok(Some(ground))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::GroundSetting;
+
+    const BOUNDS: Bounds = Bounds {
+        min: DVec3::new(-1.0, -2.0, 3.0),
+        max: DVec3::new(1.0, 2.0, 7.0),
+    };
+
+    fn of(
+        kind: GroundKind,
+        change: impl Fn(&mut Manifest),
+    ) -> Result<Option<Ground>, ResolveError> {
+        let mut manifest = Manifest::new("in");
+        manifest.render.ground = GroundSetting(kind);
+        manifest.render.integrator = IntegratorKind::Path;
+        change(&mut manifest);
+        ground(&manifest, &BOUNDS, 0.25, DVec3::Z, DVec3::ZERO)
+    }
+
+    #[test]
+    fn each_kind_has_its_height_and_colour() {
+        assert_eq!(of(GroundKind::None, |_| {}).unwrap(), None);
+        let plain = of(GroundKind::Plain, |_| {}).unwrap().unwrap();
+        assert_eq!((plain.height, plain.checker), (3.0, None));
+        let checker = of(GroundKind::Checker, |_| {}).unwrap().unwrap();
+        assert!(checker.checker.is_some());
+        let pattern = |manifest: &mut Manifest| {
+            manifest.render.ground_pattern = GroundPattern::Checker;
+        };
+        assert_eq!(of(GroundKind::Plain, pattern).unwrap(), Some(checker));
+        // A shadow catcher goes through the lowest centres and fades from 2 to 8 diagonals, which are 6 long
+        let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
+        let catcher = catcher.unwrap().unwrap();
+        assert_eq!((catcher.height, catcher.shadow_catcher), (3.25, Some(0.5)));
+        assert_eq!([catcher.fade_start, catcher.fade_end], [12.0, 48.0]);
+        let low = of(GroundKind::ShadowCatcher, |m| {
+            m.render.ground_height = Some(2.0)
+        });
+        assert_eq!(low.unwrap().unwrap().height, 2.0);
+    }
+
+    #[test]
+    fn whitted_has_no_shadow_catcher() {
+        let whitted =
+            |manifest: &mut Manifest| manifest.render.integrator = IntegratorKind::Whitted;
+        let error = of(GroundKind::ShadowCatcher, whitted)
+            .unwrap_err()
+            .to_string();
+        assert!(error.starts_with("render.ground: ") && error.contains("--integrator path"));
+        assert!(of(GroundKind::Checker, whitted).unwrap().is_some());
+    }
+}
