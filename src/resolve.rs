@@ -148,12 +148,13 @@ pub fn setup(
     let camera = camera::at_start(&path, aspect, survey.origin)?;
     // Set up lights and ground
     let environment = environment::environment(manifest, map, &path.start(), up)?;
-    let lights = match (manifest.lights.is_empty(), manifest.render.integrator) {
+    let mut lights = match (manifest.lights.is_empty(), manifest.render.integrator) {
         (false, _) => lights::lights(manifest, survey.origin, up)?,
         (true, IntegratorKind::Whitted) => default_lights(&bounds, up, &path.start()),
         // The environment is the light
         (true, IntegratorKind::Path) => Vec::new(),
     };
+    lights.extend(environment::sun(manifest, &path.start(), up));
     let ground = ground::ground(manifest, &bounds, reach.x, up, survey.origin)?;
     let scene = Scene {
         origin: survey.origin,

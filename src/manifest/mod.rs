@@ -10,6 +10,7 @@ use std::path::Path;
 use spherule_jobs::FrameRange;
 
 use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
+use crate::scene::Fresnel;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
 use key::{Affects, Keys};
@@ -42,6 +43,7 @@ mod rebase;
 mod render;
 mod same;
 mod schema;
+mod sun;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -60,7 +62,7 @@ pub use ground::{GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
-pub use material::Material;
+pub use material::{Material, MaterialKind};
 pub use output::{Channel, Output};
 pub use pattern::OutputPattern;
 pub use preset::Look;
@@ -70,6 +72,7 @@ pub(crate) use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
+pub use sun::Sun;
 pub use tree::Override;
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
@@ -249,7 +252,8 @@ impl Manifest {
 
     /// Whether rays at spheres split into reflected and refracted ones; `render.min_weight` has no effect otherwise.
     fn branches_at_spheres(&self) -> bool {
-        self.surface.kind == SurfaceKind::Spheres && self.material.constants.branches()
+        self.surface.kind == SurfaceKind::Spheres
+            && self.material.resolved(Fresnel::Schlick).branches()
     }
 
     /// Whether images of this manifest depend on keys with this `affects`.

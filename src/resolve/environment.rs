@@ -2,14 +2,14 @@
 
 use std::sync::Arc;
 
-use glam::DVec3;
+use glam::{DVec3, Vec3};
 
 use super::ResolveError;
 use crate::manifest::{EnvironmentKind, Manifest};
 use crate::render::IntegratorKind;
 use crate::scene::camera::view_direction;
-use crate::scene::environment::studio;
-use crate::scene::{CameraView, Environment, EnvironmentAxes, RadianceMap};
+use crate::scene::environment::{sky, sky_direction, studio};
+use crate::scene::{self, CameraView, Environment, EnvironmentAxes, Light, RadianceMap};
 
 /// Whether the environment is an image.
 pub(super) fn needs_image(manifest: &Manifest) -> bool {
@@ -32,6 +32,11 @@ pub(super) fn environment(
     let axes = |forward| EnvironmentAxes::of_view(forward, up, settings.rotation);
     let environment = match settings.kind {
         EnvironmentKind::Studio => studio(axes(view.look_at - view.eye), scale),
+        EnvironmentKind::Sky => {
+            let sun = &settings.sun;
+            let direction = sky_direction(sun.elevation, sun.azimuth);
+            sky(axes(view.look_at - view.eye), direction, scale)
+        }
         EnvironmentKind::Constant => Environment::constant(scale),
         EnvironmentKind::Image => {
             let map = map.ok_or_else(|| ResolveError::Unsupported {
@@ -43,4 +48,27 @@ pub(super) fn environment(
         }
     };
     Ok(Some(Arc::new(environment)))
+}
+
+/// Irradiance of the sun of a sky on a surface that faces it, over pi: warm, and brighter than the sky.
+const SUN: Vec3 = Vec3::new(1.8, 1.674, 1.476);
+
+/// The sun of the sky, if that is the environment.
+pub(super) fn sun(manifest: &Manifest, view: &CameraView, up: DVec3) -> Option<Light> {
+    let settings = &manifest.environment;
+    let is_sky =
+        manifest.render.integrator == IntegratorKind::Path && settings.kind == EnvironmentKind::Sky;
+    is_sky.then(|| {
+        let axes = EnvironmentAxes::of_view(view.look_at - view.eye, up, settings.rotation);
+        let sun = &settings.sun;
+        Light {
+            kind: scene::LightKind::Sun {
+                to_light: axes.to_world(sky_direction(sun.elevation, sun.azimuth)),
+                half_angle: (0.5 * sun.size).to_radians(),
+            },
+            radiance: std::f32::consts::PI * SUN * settings.intensity * settings.color,
+            casts_shadow: true,
+            is_visible: settings.visible,
+        }
+    })
 }

@@ -81,9 +81,8 @@ pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
         SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
     };
     Material {
-        fresnel: m.fresnel.unwrap_or(usual),
         extinction: material::extinction(m.absorption, length),
-        ..m.constants
+        ..m.resolved(usual)
     }
 }
 

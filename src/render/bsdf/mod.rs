@@ -9,13 +9,13 @@ use crate::render::lights::LightSamples;
 use crate::scene::Finish;
 use crate::surface::{Intersections, MaterialId};
 
+#[cfg(test)]
+mod finish_tests;
 mod local;
 mod matte;
 mod metal;
 mod microfacet;
 mod plastic;
-#[cfg(test)]
-mod finish_tests;
 #[cfg(test)]
 mod tests;
 

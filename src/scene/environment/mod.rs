@@ -76,6 +76,13 @@ impl EnvironmentAxes {
     }
 }
 
+impl EnvironmentAxes {
+    /// The world direction with the components `own` along these axes, normalised.
+    pub fn to_world(&self, own: Vec3) -> Vec3 {
+        (own.x * self.right + own.y * self.back + own.z * self.up).normalize()
+    }
+}
+
 /// An environment, see the module.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Environment {

@@ -164,8 +164,7 @@ mod tests {
         let sun = sky_direction(42.0, 140.0);
         let (axes, level) = (axes(), Vec3::new(-1.0, -1.0, 1.0));
         let sky = sky(axes, sun, Vec3::ONE);
-        let [there, away] = [sun, level * sun]
-            .map(|at| sky.radiance(at.x * axes.right + at.y * axes.back + at.z * axes.up));
+        let [there, away] = [sun, level * sun].map(|at| sky.radiance(axes.to_world(at)));
         assert!(away.z > 1.5 * away.x, "{away}");
         assert!(
             there.dot(LUMINANCE) > 2.0 * away.dot(LUMINANCE),

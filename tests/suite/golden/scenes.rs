@@ -39,6 +39,7 @@ const MATT: Material = Material {
     transmission: 0.0,
     fresnel: Fresnel::Schlick,
     extinction: Vec3::ZERO,
+    finish: spherule::scene::Finish::Matte,
 };
 
 /// Each particle a ball of its own; a smooth surface has voxels of a particle radius. Spelled out, too.
