@@ -188,7 +188,7 @@ fn in_transparent_images_shadows_are_coverage() {
 fn a_shadow_catcher_has_no_data_and_fades_out() {
     let mut scene = with_catcher(scene(studio_light()), 1.0);
     let all = RenderSettings {
-        channels: Channels::from_names(["Z", "N"].into_iter()).unwrap(),
+        channels: Channels::from_names(["Z", "N"]).unwrap(),
         ..settings(16, 4, 0)
     };
     let film = image(&nothing(), &scene, &all);

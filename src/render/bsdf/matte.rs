@@ -1,5 +1,10 @@
 //! Matte surfaces: Lambert's law. The same fraction of the light, the albedo, leaves in every direction.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use std::f32::consts::FRAC_1_PI;
 
 use super::{Bsdf, BsdfSamples, BsdfValues, SurfacePoints};

@@ -3,6 +3,11 @@
 //!
 //! To add one, add a file with a [`Bsdf`] here and a line in [`bsdfs_of`].
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;

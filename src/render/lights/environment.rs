@@ -1,5 +1,10 @@
 //! The environment for packets of rays.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use super::light::LightSamples;
 use crate::math::{LANES, Lanes, Lanes3, lane_kernel, set_lane3};
 use crate::scene::Environment;

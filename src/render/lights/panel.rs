@@ -3,6 +3,11 @@
 //! 2013), and discs, sampled uniformly in area. Small rectangles are sampled in area as well, where the solid angle
 //! would be inexact and the difference is small.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use std::f32::consts::PI;
 
 use glam::Vec3;
@@ -47,7 +52,7 @@ impl PanelLight {
 
     /// The vector from `point` to the centre in the axes of the light.
     #[inline(always)]
-    fn to_center(&self, point: [f32; 3]) -> [f32; 3] {
+    fn center_from(&self, point: [f32; 3]) -> [f32; 3] {
         let mut own = [0.0; 3];
         for (own, along) in own.iter_mut().zip(&self.axes) {
             for axis in 0..3 {
@@ -169,7 +174,7 @@ fn sample_panel_body(
     let is_rectangle = light.outline == Outline::Rectangle;
     let area = light.area();
     for l in 0..LANES {
-        let center = light.to_center([start[0][l], start[1][l], start[2][l]]);
+        let center = light.center_from([start[0][l], start[1][l], start[2][l]]);
         // Choose a point in the area, or in the solid angle
         let u = [u[0][l], u[1][l]];
         let [a, b] = if is_rectangle {
@@ -241,7 +246,7 @@ fn intersect_panel_body(light: &PanelLight, rays: &RayPacket, emission: &mut Emi
     for l in 0..LANES {
         // Intersect the ray with the plane of the light
         let o = [rays.origin[0][l], rays.origin[1][l], rays.origin[2][l]];
-        let center = light.to_center(o);
+        let center = light.center_from(o);
         let mut along = [0.0; 3];
         for own in 0..3 {
             for axis in 0..3 {

@@ -1,5 +1,10 @@
 //! Spheres that emit the same radiance in all directions, sampled uniformly in the solid angle that they cover.
 
+#![expect(
+    clippy::needless_range_loop,
+    reason = "one index for the lanes of many arrays"
+)]
+
 use std::f32::consts::PI;
 
 use glam::Vec3;

@@ -245,10 +245,10 @@ fn the_density_of_hits_is_that_of_uniform_directions() {
         let mut emission = Emission::default();
         for u in points().chain(points().map(|[a, b]| [b, a])) {
             let mut rays = RayPacket::default();
-            for lane in 0..LANES {
-                let z = 1.0 - 2.0 * u[0][lane];
+            for (a, b) in u[0].iter().zip(&u[1]) {
+                let z = 1.0 - 2.0 * a;
                 let level = (1.0 - z * z).sqrt();
-                let (sin, cos) = (2.0 * PI * u[1][lane]).sin_cos();
+                let (sin, cos) = (2.0 * PI * b).sin_cos();
                 rays.push(&Ray::new(
                     Vec3::ZERO,
                     Vec3::new(level * cos, level * sin, z),
