@@ -8,10 +8,10 @@ use clap::{Args, Subcommand};
 use spherule_jobs::export::Chunks;
 use spherule_jobs::{ResumeMode, publish};
 
-use super::manifest_args::{RequestedManifest, is_manifest, read_manifest};
+use super::manifest_args::{is_manifest, read_manifest};
 use super::paths::absolute;
-use super::render_job::RenderJob;
 use super::{CliError, Outcome, print};
+use crate::job::{JobManifest, RenderJob};
 use crate::manifest::{Manifest, Override, named_place};
 use crate::metrics::Bytes;
 
@@ -117,7 +117,7 @@ impl ExportJob {
     /// Reads the manifest, finds the frames, and refuses what `render` would refuse.
     fn read(args: &CommonArgs, max_tasks: NonZeroUsize) -> Result<Self, CliError> {
         let requested = requested_manifest(args)?;
-        let sequence = requested.sequence()?;
+        let sequence = requested.open_sequence()?;
         for note in sequence.notes() {
             note!("{note}");
         }
@@ -127,8 +127,8 @@ impl ExportJob {
             .absolute_base()?
             .join(requested.manifest.output.path.dir());
         let render_job = RenderJob::new(requested, &sequence, None)?;
-        render_job.guard_directory(ResumeMode::Resume)?;
-        render_job.guard_manifest()?;
+        render_job.check_output_dir(ResumeMode::Resume)?;
+        render_job.check_manifest_file()?;
         let frames = render_job.selected(&sequence);
         let chunks = Chunks::of(&frames, args.chunk, max_tasks)?;
         let manifest_file = absolute(&args.manifest)?;
@@ -141,8 +141,8 @@ impl ExportJob {
             program: std::env::current_exe().map_err(CliError::io(Path::new("spherule")))?,
             out_dir: normalized(&out),
             input_dir: common_dir(&inputs),
-            image_name: render_job.manifest.output.path.file_name().to_owned(),
-            memory_limit: render_job.manifest.render.memory_limit,
+            image_name: render_job.manifest().output.path.file_name().to_owned(),
+            memory_limit: render_job.manifest().render.memory_limit,
             manifest_file,
             frames,
             chunks,
@@ -162,7 +162,7 @@ impl ExportJob {
 }
 
 /// The manifest with its frames. Each task reads everything else from the file.
-fn requested_manifest(args: &CommonArgs) -> Result<RequestedManifest, CliError> {
+fn requested_manifest(args: &CommonArgs) -> Result<JobManifest, CliError> {
     let path = &args.manifest;
     if !is_manifest(path) {
         return Err(CliError::other(format!(
@@ -180,7 +180,7 @@ fn requested_manifest(args: &CommonArgs) -> Result<RequestedManifest, CliError> 
     for warning in warnings {
         note!("{warning}");
     }
-    Ok(RequestedManifest {
+    Ok(JobManifest {
         manifest,
         base: path.parent().map_or_else(PathBuf::new, Path::to_owned),
         file: Some(path.clone()),

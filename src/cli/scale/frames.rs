@@ -8,8 +8,8 @@ use std::path::{Path, PathBuf};
 
 use spherule_jobs::Interrupt;
 
-use super::measure::COMMAND;
-use crate::cli::child::{self, ChildResult};
+use super::measure::run_child;
+use crate::job::ChildResult;
 use crate::scale::report::Conversion;
 use crate::scale::{CellRequest, Representation, Task};
 
@@ -76,8 +76,7 @@ impl Frames {
             request: request.clone(),
             path: path.clone(),
         };
-        let ended: ChildResult<Result<_, String>> =
-            child::run(COMMAND, &task, || interrupt.is_raised());
+        let ended: ChildResult<Result<_, String>> = run_child(&task, || interrupt.is_raised());
         match ended {
             ChildResult::Completed(made) => {
                 ChildResult::Completed(made.map(|conversion| (path, conversion)))

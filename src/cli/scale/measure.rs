@@ -1,8 +1,10 @@
 //! The hidden command that does one task of `spherule scale`: it measures a cell, or makes its particles.
 
+use serde::de::DeserializeOwned;
 use serde_json::Value;
 
 use crate::cli::{CliError, Outcome, child, print};
+use crate::job::{ChildCommand, ChildResult, Crash};
 use crate::scale::{Task, cell, convert};
 
 /// Its name.
@@ -19,6 +21,17 @@ pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
     let text = serde_json::to_string(&told).map_err(|e| CliError::Other(e.to_string()))?;
     print::file(&(text + "\n"))?;
     Ok(Outcome::Done)
+}
+
+/// Runs `task` in a child process.
+pub(super) fn run_child<T: DeserializeOwned>(
+    task: &Task,
+    stop: impl Fn() -> bool,
+) -> ChildResult<T> {
+    match ChildCommand::own_program([COMMAND]) {
+        Ok(command) => command.run(task, stop),
+        Err(error) => ChildResult::Crashed(Crash::Start(error)),
+    }
 }
 
 /// Runs the task. The parent reads the result as JSON: errors are text there.

@@ -12,7 +12,7 @@ use super::numbers::pixels_to;
 use super::progress::{duration, openjd};
 use super::{CliError, Outcome, events, print, signals};
 use crate::accel::Structure;
-use crate::cli::child::{self, ChildResult};
+use crate::job::ChildResult;
 use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
@@ -230,8 +230,7 @@ fn measure_one(
         file: made.map(|(path, _)| path.clone()),
     };
     let stop = || interrupt.is_raised();
-    let measured: Result<CellMeasurement, String> = match child::run(measure::COMMAND, &task, stop)
-    {
+    let measured: Result<CellMeasurement, String> = match measure::run_child(&task, stop) {
         ChildResult::Interrupted => return ChildResult::Interrupted,
         ChildResult::Completed(measured) => measured,
         ChildResult::Crashed(crash) => Err(crash.to_string()),

@@ -2,7 +2,7 @@
 
 use spherule_jobs::Plan;
 
-use crate::cli::job::KIND;
+use crate::job::KIND;
 use crate::output::ImageShape;
 use crate::render::Channels;
 

@@ -8,12 +8,14 @@ use clap::Args;
 use rayon::prelude::*;
 use spherule_formats::FrameError;
 use spherule_formats::native::{Access, NativeFile};
-use spherule_jobs::{EntryStatus, FrameRange, Job, JobState, LedgerEntry, PLAN_FILE, PlannedFrame};
+use spherule_jobs::{
+    EntryStatus, FrameRange, Job, JobState, LedgerEntry, PLAN_FILE, Panic, PlannedFrame,
+    catch_panic,
+};
 
 use super::job::{job_directory, list, no_job, use_threads};
 use super::print::{self, Reader};
 use super::{CliError, Outcome};
-use crate::failure::{Panic, catch_panic};
 use crate::manifest::MAX_THREADS;
 use crate::output::{ImageFault, verify_exr, verify_preview};
 use expected::ExpectedOutput;
