@@ -31,7 +31,6 @@ pub mod parse;
 mod plan;
 mod planning;
 mod process;
-mod publish;
 mod queue;
 mod range;
 mod regular;
@@ -50,12 +49,13 @@ pub use interrupt::{Interrupt, InterruptLevel};
 pub use job::{DryRun, Job};
 pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};
 pub use plan::{Plan, PlannedFrame, PlannedInput};
-pub use process::{owner, set_owner};
-pub use publish::{Publisher, discard_own_parts, discard_parts, publish, publish_with};
 pub use queue::{FrameQueue, QueueEvent};
 pub use range::{FrameRange, RangeError};
 pub use regular::{open_regular, read_regular, read_regular_text};
 pub use request::{DEFAULT_TAKEOVER_AFTER, FrameRequest, JobRequest, ResumeMode};
+pub use spherule_publish::{
+    Publisher, discard_own_parts, discard_parts, owner, publish, publish_with, set_owner,
+};
 pub use state::{FrameState, JobState, JobSummary};
 pub use workers::{Claim, ClaimOutcome, WorkerStatus, start_heartbeat_thread};
 

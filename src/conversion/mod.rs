@@ -10,7 +10,6 @@ use std::path::PathBuf;
 use serde_json::json;
 use spherule_formats::Sequence;
 use spherule_formats::convert::{Phase, Progress};
-use spherule_formats::write::own_temporaries;
 use spherule_jobs::{FrameFailure, FrameQueue, Interrupt, Job, JobError, QueueEvent};
 
 mod attributes;
@@ -83,8 +82,6 @@ pub fn run(
     on_event: OnEvent,
 ) -> Result<(), JobError> {
     let mut reported_notes = HashSet::new();
-    // The job can then find the temporary files of a killed run
-    own_temporaries(spherule_jobs::owner());
     let frames = tasks.iter().map(|task| task.frame);
     let mut queue = FrameQueue::new(job.claims(), frames, interrupt);
     let mut on_queue_event = |event: QueueEvent| on_event(Event::OtherWorker(event));

@@ -2,19 +2,21 @@
 //! the others.
 
 use std::collections::HashSet;
-use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::Duration;
 
+use spherule_publish::{owner, part_owner, publish};
+
 use super::claim::{Claim, ClaimOutcome};
 use super::files::{list_files, list_records, remove_if_exists, remove_stale_parts};
 use super::record::is_worker_name;
 use super::{Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord, heartbeat};
-use crate::process::{Process, now_ms, owner};
+use crate::process::{Process, now_ms};
 
 /// Longest time between heartbeats.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(5);
@@ -22,7 +24,7 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(5);
 /// Shortest time between heartbeats.
 const MIN_HEARTBEAT_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Suffix of the file name of a record that is being written.
+/// Suffix of the file name of a record that spherule 0.1.0 was writing.
 const DRAFT_SUFFIX: &str = ".new";
 
 /// See the module. The worker is registered until this is dropped.
@@ -204,7 +206,8 @@ fn is_ours(path: &Path) -> bool {
     let name = path.file_name().map(|name| name.to_string_lossy());
     name.is_some_and(|name| {
         let is_claim = name.starts_with("frame.") || name.starts_with("lock.");
-        is_claim || name.ends_with(RECORD_SUFFIX) || name.ends_with(DRAFT_SUFFIX)
+        let is_record = name.ends_with(RECORD_SUFFIX) || name.ends_with(DRAFT_SUFFIX);
+        is_claim || is_record || part_owner(&name).is_some()
     })
 }
 
@@ -221,22 +224,14 @@ fn new_worker_name() -> String {
 /// Writes the record into the directory, which is created if needed. The last worker to leave may remove the
 /// directory at any time, hence the retries.
 fn write_record(work_dir: &Path, record_path: &Path, line: &[u8]) -> io::Result<()> {
-    let draft = record_path.with_extension(&DRAFT_SUFFIX[1..]);
     let write = || {
         fs::create_dir_all(work_dir)?;
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&draft)?;
-        file.write_all(line)?;
-        fs::rename(&draft, record_path)
+        publish(record_path, line)
     };
     for _ in 0..100 {
         match write() {
             Err(e) if e.kind() == io::ErrorKind::NotFound => {}
             Err(e) => {
-                let _ = remove_if_exists(&draft);
                 let _ = fs::remove_dir(work_dir);
                 return Err(e);
             }

@@ -16,7 +16,13 @@ struct Allowed {
     why: &'static str,
 }
 
-const SOURCES: [&str; 3] = ["src", "jobs/src", "formats/src"];
+/// Directories of crates, and how many files they have at least.
+const SOURCES: [(&str, usize); 4] = [
+    ("src", 100),
+    ("jobs/src", 30),
+    ("formats/src", 30),
+    ("publish/src", 4),
+];
 
 const ALLOWED: &[Allowed] = &[
     Allowed {
@@ -124,9 +130,9 @@ fn reached(
 
 #[test]
 fn files_have_no_dependency_cycles() {
-    for source in SOURCES {
+    for (source, min_count) in SOURCES {
         let files = files(&root().join(source));
-        assert!(files.len() > 20, "{source}: {} files", files.len());
+        assert!(files.len() >= min_count, "{source}: {} files", files.len());
         let found = Modules::new(files).cycles();
         let allowed = ALLOWED.iter().filter(|allowed| allowed.source == source);
         let set = |files: &[&str]| files.iter().map(|file| (*file).to_owned()).collect();
