@@ -14,6 +14,7 @@
 
 mod changes;
 mod claims;
+mod clock;
 mod error;
 mod existing_outputs;
 pub mod export;

@@ -7,15 +7,14 @@ use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::thread;
 use std::time::Duration;
 
 use spherule_publish::{owner, part_owner, publish};
 
-use super::claim::{Claim, ClaimOutcome};
 use super::files::{list_files, list_records, remove_if_exists, remove_stale_parts};
 use super::record::is_worker_name;
-use super::{Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord, heartbeat};
+use super::{HeartbeatSchedule, Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord};
+use crate::clock::Clock;
 use crate::process::{Process, now_ms};
 
 /// Longest time between heartbeats.
@@ -37,6 +36,7 @@ pub(crate) struct WorkerRegistry {
     /// The first line of the record's file.
     pub(super) record_line: Vec<u8>,
     pub(super) monitor: LivenessMonitor,
+    heartbeats: &'static HeartbeatSchedule,
     is_declared_dead: Arc<AtomicBool>,
     /// Directories in which workers of this job create temporary files.
     output_dirs: OnceLock<Vec<PathBuf>>,
@@ -46,6 +46,15 @@ impl WorkerRegistry {
     /// Registers a worker in the job's directory `dir`. Other workers are declared dead after
     /// `takeover_after` without a heartbeat.
     pub(crate) fn register(dir: &Path, takeover_after: Duration) -> io::Result<Arc<Self>> {
+        Self::register_with(dir, takeover_after, HeartbeatSchedule::of_process())
+    }
+
+    /// Like [`Self::register`], with the heartbeats and the clock of `heartbeats`.
+    pub(super) fn register_with(
+        dir: &Path,
+        takeover_after: Duration,
+        heartbeats: &'static HeartbeatSchedule,
+    ) -> io::Result<Arc<Self>> {
         let work_dir = dir.join(WORK_DIR);
         let interval = HEARTBEAT_INTERVAL
             .min(takeover_after / 4)
@@ -60,13 +69,14 @@ impl WorkerRegistry {
         let record_path = work_dir.join(record.file_name());
         write_record(&work_dir, &record_path, &record_line)?;
         let is_declared_dead = Arc::new(AtomicBool::new(false));
-        heartbeat::start(&record_path, interval, &is_declared_dead);
+        heartbeats.add(&record_path, interval, &is_declared_dead);
         Ok(Arc::new(Self {
             work_dir,
             record,
             record_path,
             record_line,
-            monitor: LivenessMonitor::new(takeover_after),
+            monitor: LivenessMonitor::new(takeover_after, heartbeats.clock().clone()),
+            heartbeats,
             is_declared_dead,
             output_dirs: OnceLock::new(),
         }))
@@ -88,21 +98,9 @@ impl WorkerRegistry {
         self.is_declared_dead.load(Ordering::Relaxed)
     }
 
-    /// Claims `frame`.
-    pub(crate) fn claim_frame(self: &Arc<Self>, frame: i64) -> io::Result<ClaimOutcome> {
-        Claim::acquire(self, format!("frame.{frame}"))
-    }
-
-    /// Claims the right to change the plan and to remove files of dead workers. Blocks until it is free.
-    pub(crate) fn lock(self: &Arc<Self>) -> io::Result<Claim> {
-        loop {
-            match Claim::acquire(self, "lock".to_owned())? {
-                ClaimOutcome::Acquired(claim) => return Ok(claim),
-                ClaimOutcome::Held(_) | ClaimOutcome::Finished(_) => {
-                    thread::sleep(Duration::from_millis(5));
-                }
-            }
-        }
+    /// The clock by which this worker judges others.
+    pub(crate) const fn clock(&self) -> &Clock {
+        self.heartbeats.clock()
     }
 
     /// The other living workers.
@@ -142,7 +140,7 @@ impl WorkerRegistry {
 impl Drop for WorkerRegistry {
     /// The last worker removes what dead workers have left. The next run finds what could not be removed.
     fn drop(&mut self) {
-        heartbeat::stop(&self.record_path);
+        self.heartbeats.remove(&self.record_path);
         let _ = remove_if_exists(&self.record_path);
         let Ok(mut living) = remove_dead(&self.work_dir, &self.monitor, None) else {
             return;
