@@ -8,6 +8,7 @@
 
 mod attribute;
 mod budget;
+mod decode;
 mod decompress;
 mod error;
 mod format;

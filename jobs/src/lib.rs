@@ -15,6 +15,7 @@
 
 mod changes;
 mod claims;
+mod clock;
 mod error;
 mod existing_outputs;
 pub mod export;
@@ -33,7 +34,6 @@ pub mod parse;
 mod plan;
 mod planning;
 mod process;
-mod publish;
 mod queue;
 mod range;
 mod regular;
@@ -54,8 +54,6 @@ pub use job::{DryRun, Job};
 pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};
 pub use panic::{Panic, catch_panic};
 pub use plan::{Plan, PlannedFrame, PlannedInput};
-pub use process::{owner, set_owner};
-pub use publish::{Publisher, discard_own_parts, discard_parts, publish, publish_with};
 pub use queue::{ClaimedFrame, FrameQueue, QueueEvent};
 pub use range::{FrameRange, RangeError};
 pub use regular::{open_regular, read_regular, read_regular_text};
@@ -63,6 +61,9 @@ pub use request::{DEFAULT_TAKEOVER_AFTER, FrameRequest, JobRequest, ResumeMode};
 pub use run::{
     FinishedFrame, FrameEvent, FrameRecorder, FrameWork, OnFrameEvent, Recorded, RunContext,
     RunOptions, run_frames,
+};
+pub use spherule_publish::{
+    Publisher, discard_own_parts, discard_parts, owner, publish, publish_with, set_owner,
 };
 pub use state::{FrameState, JobState, JobSummary};
 pub use workers::{Claim, ClaimOutcome, WorkerStatus, start_heartbeat_thread};

@@ -1,7 +1,6 @@
 //! The order of work of one worker: the frames of its run that no other worker holds.
 
 use std::collections::VecDeque;
-use std::thread;
 use std::time::Duration;
 
 use crate::{Claim, ClaimOutcome, EntryStatus, FrameClaims, Interrupt, JobError};
@@ -99,7 +98,7 @@ impl<'a> FrameQueue<'a> {
             if !std::mem::replace(&mut has_reported, true) {
                 (self.on_event)(QueueEvent::Waiting(frame, &holder));
             }
-            thread::sleep(interval);
+            self.claims.clock().sleep(interval);
             interval = (2 * interval).min(POLL_INTERVALS.1);
         }
     }

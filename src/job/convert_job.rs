@@ -179,8 +179,6 @@ impl ConvertJob {
             sequence: &self.sequence,
             tasks: &tasks,
         };
-        // The job can then find the temporary files of a killed run
-        spherule_formats::write::own_temporaries(spherule_jobs::owner());
         Ok(run_frames(job, &work, &options, on_event)?)
     }
 }

@@ -4,8 +4,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
+use spherule_publish::publish_with;
 
-use super::atomic::publish;
 use super::stream::{publish_stream, write_positions};
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Progress};
@@ -15,7 +15,8 @@ use crate::convert::{ConvertError, ParticleSource, Progress};
 /// # Errors
 /// [`FrameError::Io`].
 pub fn write(path: &Path, positions: &[Vec3]) -> Result<(), FrameError> {
-    publish(path, |file| fill(file, positions)).map_err(|e| FrameError::io(path, e))
+    let written = publish_with(path, |file| fill(file, positions));
+    written.map(|_| ()).map_err(|e| FrameError::io(path, e))
 }
 
 /// Writes the positions of `source` to `path` in source order, rounded to f32. The file appears complete or not

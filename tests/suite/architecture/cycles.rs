@@ -16,30 +16,24 @@ struct Allowed {
     why: &'static str,
 }
 
-const SOURCES: [&str; 3] = ["src", "jobs/src", "formats/src"];
-
-const ALLOWED: &[Allowed] = &[
-    Allowed {
-        source: "src",
-        files: &[
-            "manifest::key",
-            "manifest::list",
-            "manifest::reader",
-            "manifest::value",
-        ],
-        why: "the declaration of a key is used to read and to list it, and values parse themselves from fields",
-    },
-    Allowed {
-        source: "jobs/src",
-        files: &["workers::claim", "workers::registry"],
-        why: "a claim is released at the registry that made it",
-    },
-    Allowed {
-        source: "formats/src",
-        files: &["attribute", "scalar"],
-        why: "a scalar type decodes the data of attributes, which know their scalar type",
-    },
+/// Directories of crates, and how many files they have at least.
+const SOURCES: [(&str, usize); 4] = [
+    ("src", 100),
+    ("jobs/src", 30),
+    ("formats/src", 30),
+    ("publish/src", 4),
 ];
+
+const ALLOWED: &[Allowed] = &[Allowed {
+    source: "src",
+    files: &[
+        "manifest::key",
+        "manifest::list",
+        "manifest::reader",
+        "manifest::value",
+    ],
+    why: "the declaration of a key is used to read and to list it, and values parse themselves from fields",
+}];
 
 /// The modules of a crate.
 struct Modules {
@@ -124,9 +118,9 @@ fn reached(
 
 #[test]
 fn files_have_no_dependency_cycles() {
-    for source in SOURCES {
+    for (source, min_count) in SOURCES {
         let files = files(&root().join(source));
-        assert!(files.len() > 20, "{source}: {} files", files.len());
+        assert!(files.len() >= min_count, "{source}: {} files", files.len());
         let found = Modules::new(files).cycles();
         let allowed = ALLOWED.iter().filter(|allowed| allowed.source == source);
         let set = |files: &[&str]| files.iter().map(|file| (*file).to_owned()).collect();

@@ -137,6 +137,9 @@ fn a_second_term_stops_at_once() {
         }
         assert_eq!(status.code(), Some(75), "{told}");
         assert!(natives(&shop.join("out")).is_empty());
+        let left = files(&shop.join("out"));
+        let is_part = |name: &String| name.ends_with(".part");
+        assert!(!left.keys().any(is_part), "{:?}", left.keys());
         // Without a frame in progress the first signal is enough
         asked && told.contains("stopped; the same command continues")
     });

@@ -1,13 +1,19 @@
 //! A program that is still running: waiting for what it says or writes, and signals to it.
 
 use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
+use std::time::{Duration, Instant};
+
+/// Longest wait for a line, a file or the end. Only a program that hangs reaches it.
+const DEADLINE: Duration = Duration::from_secs(600);
 
 /// Killed when dropped.
 pub(crate) struct Running {
     child: Child,
-    errors: BufReader<ChildStderr>,
+    /// Standard error, line by line.
+    lines: Receiver<String>,
     told: String,
 }
 
@@ -20,31 +26,45 @@ impl Running {
             .spawn()
             .expect("the program starts");
         let errors = child.stderr.take().expect("it is piped");
+        let (sender, lines) = channel();
+        thread::spawn(move || send_lines(errors, &sender));
         Self {
             child,
-            errors: BufReader::new(errors),
+            lines,
             told: String::new(),
         }
     }
 
     /// Waits for a line on standard error that has `text`; false if the program ends before.
     pub(crate) fn wait_for_line(&mut self, text: &str) -> bool {
-        let mut line = String::new();
-        while self.errors.read_line(&mut line).is_ok_and(|n| n > 0) {
-            let found = line.contains(text);
-            self.told.push_str(&line);
-            line.clear();
-            if found {
+        let deadline = Instant::now() + DEADLINE;
+        while let Some(line) = self.next_line(deadline) {
+            if line.contains(text) {
                 return true;
             }
         }
         false
     }
 
+    /// The next line on standard error; None at its end.
+    fn next_line(&mut self, deadline: Instant) -> Option<String> {
+        let left = deadline.saturating_duration_since(Instant::now());
+        match self.lines.recv_timeout(left) {
+            Ok(line) => {
+                self.told.push_str(&line);
+                Some(line)
+            }
+            Err(RecvTimeoutError::Disconnected) => None,
+            Err(RecvTimeoutError::Timeout) => panic!("it hangs after:\n{}", self.told),
+        }
+    }
+
     /// Waits until `holds`, at the latest until the program ends. Looks without pause: the moment
     /// counts.
     pub(crate) fn wait_until(&mut self, holds: impl Fn() -> bool) -> bool {
+        let deadline = Instant::now() + DEADLINE;
         loop {
+            assert!(Instant::now() < deadline, "it hangs: {}", self.told);
             if holds() {
                 return true;
             }
@@ -76,9 +96,8 @@ impl Running {
 
     /// Waits for the end; what it said, and how it ended.
     pub(crate) fn end(mut self) -> (String, ExitStatus) {
-        let mut rest = Vec::new();
-        let _ = self.errors.read_to_end(&mut rest);
-        self.told.push_str(&String::from_utf8_lossy(&rest));
+        let deadline = Instant::now() + DEADLINE;
+        while self.next_line(deadline).is_some() {}
         let status = self.child.wait().expect("it ends");
         (std::mem::take(&mut self.told), status)
     }
@@ -88,5 +107,19 @@ impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+fn send_lines(errors: impl Read, lines: &Sender<String>) {
+    let mut errors = BufReader::new(errors);
+    let mut line = Vec::new();
+    while errors.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+        if lines
+            .send(String::from_utf8_lossy(&line).into_owned())
+            .is_err()
+        {
+            return;
+        }
+        line.clear();
     }
 }

@@ -94,6 +94,16 @@ fn child_of(id: u32) -> Option<i64> {
     listed.split_ascii_whitespace().next()?.parse().ok()
 }
 
+/// The processor time that a process has used, in clock ticks (usually 10 ms); None once it is gone.
+#[cfg(target_os = "linux")]
+fn used_ticks(id: i64) -> Option<u64> {
+    let stat = fs::read_to_string(format!("/proc/{id}/stat")).ok()?;
+    // Fields 14 and 15 of proc(5); the first after the name is field 3
+    let fields = stat.rsplit_once(')')?.1.split_ascii_whitespace();
+    let times = fields.skip(11).take(2).map(|field| field.parse::<u64>());
+    times.sum::<Result<u64, _>>().ok()
+}
+
 #[cfg(target_os = "linux")]
 #[test]
 fn a_killed_process_is_tried_again() {
@@ -108,11 +118,11 @@ fn a_killed_process_is_tried_again() {
         if !running.wait_until(|| child_of(parent).is_some()) {
             break;
         }
-        std::thread::sleep(std::time::Duration::from_millis(5 * kills));
-        if let Some(id) = child_of(parent) {
-            let killed = Command::new("kill").args(["-9", &id.to_string()]).output();
-            kills += u64::from(killed.expect("kill is there").status.success());
-        }
+        let Some(id) = child_of(parent) else { continue };
+        // Each a little further in its work than the one before
+        running.wait_until(|| used_ticks(id).is_none_or(|ticks| ticks >= kills));
+        let killed = Command::new("kill").args(["-9", &id.to_string()]).output();
+        kills += u64::from(killed.expect("kill is there").status.success());
     }
     let (told, status) = running.end();
     assert_eq!(status.code(), Some(0), "{told}");

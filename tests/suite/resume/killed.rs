@@ -14,8 +14,12 @@ const KILLS: usize = 50;
 /// When to kill.
 #[derive(Debug, Clone, Copy)]
 enum Moment {
-    /// After so many thousandths of a second.
-    After(u64),
+    /// At once.
+    Start,
+    /// Once it has registered as a worker.
+    Registered,
+    /// Once it has printed that a frame is finished.
+    Reported,
     /// Once this file is there.
     File(&'static str),
     /// While an image is being written.
@@ -32,7 +36,7 @@ enum Moment {
 
 /// In an order in which each can still come: what is there once stays.
 const FIRST: [Moment; 6] = [
-    Moment::After(0),
+    Moment::Start,
     Moment::File("job.work"),
     Moment::File("job.plan.json"),
     Moment::File("job.toml"),
@@ -44,10 +48,10 @@ const FIRST: [Moment; 6] = [
 const LATER: [Moment; 6] = [
     Moment::Writing,
     Moment::Claimed,
-    Moment::After(3),
+    Moment::Registered,
     Moment::Recorded,
     Moment::Previews(1),
-    Moment::After(60),
+    Moment::Reported,
 ];
 
 type Files = BTreeMap<String, Vec<u8>>;
@@ -155,11 +159,15 @@ fn wait(running: &mut Running, moment: Moment, out: &Path) {
         ledger_paths(out).iter().map(length).sum()
     };
     let recorded = lengths();
+    let id = format!("-{}-", running.id());
     match moment {
-        Moment::After(time) => {
-            std::thread::sleep(std::time::Duration::from_millis(time));
-            true
-        }
+        Moment::Start => true,
+        Moment::Registered => running.wait_until(|| {
+            let names = files(&out.join("job.work"));
+            let is_own = |name: &String| name.contains(&id) && name.ends_with(".worker");
+            names.keys().any(is_own)
+        }),
+        Moment::Reported => running.wait_for_line("] frame "),
         Moment::File(name) => running.wait_until(|| out.join(name).exists()),
         Moment::Writing => running.wait_until(|| {
             files(out)
