@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_as_people_write_them() {
+    fn parses_sizes_with_units() {
         for (text, bytes) in [
             ("4096", 4096),
             ("0", 0),
@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn sizes_as_people_read_them() {
+    fn formats_sizes_with_three_digits() {
         for (bytes, text) in [
             (0, "0 B"),
             (1023, "1023 B"),
