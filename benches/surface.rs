@@ -225,8 +225,8 @@ fn run(arguments: &[&str]) {
         .stdout(Stdio::null())
         .output()
         .expect("the program starts");
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {told}");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
 }
 
 fn text(seconds: &[f64]) -> String {

@@ -44,7 +44,7 @@ pub enum ResolveError {
         what: String,
     },
     /// No frame has the requested attribute.
-    #[error("{key}: no attribute `{name}` in any frame looked at; there are {has}")]
+    #[error("{key}: no attribute `{name}` in the sampled frames; available: {has}")]
     MissingAttribute {
         /// The manifest's key.
         key: &'static str,
@@ -384,8 +384,8 @@ fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {
-    let asked = manifest.render.background;
-    asked.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
+    let background = manifest.render.background;
+    background.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
 }
 
 fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Option<Ground> {

@@ -126,7 +126,7 @@ mod tests {
 
     /// Large spheres among small ones are cut; the test removes one part.
     #[test]
-    fn a_lost_part_is_found() {
+    fn missing_part_is_detected() {
         let centers: Vec<Vec3> = (0..1000_u16)
             .map(|i| {
                 Vec3::new(

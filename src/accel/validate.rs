@@ -193,7 +193,7 @@ impl WideTree {
             }
         }
         // Check that no particle is missing
-        if let Some(lost) = is_stored.iter().position(|seen| !seen) {
+        if let Some(lost) = is_stored.iter().position(|stored| !stored) {
             return Err(format!("particle {lost} is nowhere"));
         }
         Ok(())

@@ -50,7 +50,7 @@ enum What {
 struct BoxArgs {
     #[command(flatten)]
     common: CommonArgs,
-    /// Radius of all particles, which native frames tell.
+    /// Radius of all particles, stored in native frames.
     #[arg(long, value_parser = positive)]
     radius: Option<f32>,
 }
@@ -103,7 +103,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
     let format = Format::of(&common.output)?;
     if common.max_error.is_some() && matches!(args.what, What::Box(_)) && radius.is_none() {
         return Err(CliError::other(
-            "--max-error is a fraction of the radius; say --radius too",
+            "--max-error is a fraction of the radius and needs --radius",
         ));
     }
     let settings = BoxSettings::thesis(common.particles, common.seed);
@@ -233,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_are_whole() {
+    fn counts_are_integers() {
         assert_eq!(count("100000"), Ok(100_000));
         assert_eq!(count("1e6"), Ok(1_000_000));
         assert_eq!(count("2_000"), Ok(2000));

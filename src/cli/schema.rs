@@ -38,7 +38,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_schema_in_the_repository_is_the_programs() {
+    fn schema_in_the_repository_is_current() {
         let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/job.schema.json");
         assert_eq!(
             fs::read_to_string(path).unwrap_or_default(),

@@ -103,7 +103,7 @@ impl Camera {
     fn check(&self, section: &Section<'_>) {
         // Only the fixed mode has the keys `eye` and `look_at`, and requires both
         let own = match self.mode {
-            CameraMode::Auto => Some("the automatic camera finds its own; say mode = \"fixed\""),
+            CameraMode::Auto => Some("the automatic camera chooses its own; set mode = \"fixed\""),
             CameraMode::Turntable => {
                 Some("a turntable finds its own; azimuth and elevation place it")
             }

@@ -57,7 +57,7 @@ impl Look {
         let text = match self {
             Self::Water => WATER,
         };
-        let sections: toml::Table = text.parse().expect("a look of our own is TOML");
+        let sections: toml::Table = text.parse().expect("built-in looks are valid TOML");
         let key = |(section, keys): (String, Value)| match keys {
             Value::Table(keys) => keys
                 .into_iter()
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn water_is_one_clear_body_on_a_floor() {
+    fn water_preset_is_a_transparent_union_on_a_ground() {
         let plain = water("input.path = \"data\"", &[]);
         assert_eq!(plain.surface.kind, SurfaceKind::Smooth);
         assert_eq!(plain.render.max_depth, 8);
@@ -118,7 +118,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_goes_before_a_look() {
+    fn explicit_settings_override_a_look() {
         let text = "input.path = \"data\"\n[render]\nmax_depth = 5\nground_tile = 2\n[material]\nabsorption = [1, 1, 1]";
         let mixed = water(
             text,
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_look_names_the_known() {
+    fn unknown_look_lists_the_known_ones() {
         let error = Look::named("watre").unwrap_err();
         assert!(
             error.contains("available: water; did you mean water?"),

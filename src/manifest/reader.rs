@@ -10,7 +10,7 @@ use super::value::{Fault, Slot, Value};
 pub(super) struct Section<'a> {
     path: String,
     node: Option<&'a Node>,
-    asked: Vec<&'static str>,
+    known: Vec<&'static str>,
     problems: &'a Problems,
     /// Number of errors before the first key was read.
     errors_before: usize,
@@ -33,7 +33,7 @@ impl<'a> Section<'a> {
         Self {
             path,
             node,
-            asked: Vec::new(),
+            known: Vec::new(),
             problems,
             errors_before: problems.errors.borrow().len(),
             is_closed: false,
@@ -50,7 +50,7 @@ impl<'a> Section<'a> {
 
     /// The value of `key`, if it is present.
     pub(super) fn get(&mut self, key: &'static str) -> Option<Field<'a>> {
-        self.asked.push(key);
+        self.known.push(key);
         let Some(Kind::Table(table)) = self.node.map(|n| &n.kind) else {
             return None;
         };
@@ -166,17 +166,17 @@ impl<'a> Section<'a> {
             return;
         };
         for (key, (place, _)) in table {
-            if self.asked.contains(&key.as_str()) {
+            if self.known.contains(&key.as_str()) {
                 continue;
             }
             if self.problems.errors.borrow().len() > super::MOST_SHOWN {
                 break;
             }
-            let what = match nearest(key, &self.asked) {
+            let what = match nearest(key, &self.known) {
                 Some(known) => format!("unknown key; did you mean `{}`?", self.full_key(known)),
                 None => match elsewhere(key, &self.path) {
                     Some(known) => format!("unknown key here; did you mean `{known}`?"),
-                    None => format!("unknown key; known here: {}", self.asked.join(", ")),
+                    None => format!("unknown key; known here: {}", self.known.join(", ")),
                 },
             };
             self.problem(place.clone(), key, &what);

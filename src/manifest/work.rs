@@ -94,7 +94,7 @@ impl Work {
         {
             section.wrong(
                 "memory_ceiling",
-                "is that of a frame's own process; say job.isolate = true too, or render.memory_limit",
+                "applies to the process of a frame; set job.isolate = true too, or use render.memory_limit",
             );
         }
     }

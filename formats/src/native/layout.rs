@@ -282,7 +282,7 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     };
     let archived = rkyv::access::<ArchivedFrameIndex, rancor::Error>(&aligned).map_err(damaged)?;
     let index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
-    let again = |error: ParseError| error.retold(|what| format!("{what}; convert it again"));
+    let again = |error: ParseError| error.map_message(|what| format!("{what}; convert it again"));
     check_index(&index, offset).map_err(again)?;
     Ok(index)
 }

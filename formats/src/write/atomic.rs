@@ -143,7 +143,7 @@ mod tests {
             w.write_all(b"new")?;
             Err(io::Error::other("full"))
         });
-        assert_eq!(failed.expect_err("told").to_string(), "full");
+        assert_eq!(failed.expect_err("an error").to_string(), "full");
         assert_eq!(fs::read(&path).expect("readable"), b"old");
         assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 1);
     }

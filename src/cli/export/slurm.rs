@@ -33,7 +33,7 @@ pub(super) struct SlurmArgs {
     /// Account to charge.
     #[arg(long, value_name = "NAME")]
     account: Option<String>,
-    /// Seconds before the time limit at which a task is told to finish its frame.
+    /// Seconds before the time limit at which a task receives the signal to finish its frame.
     ///
     /// Longer than a frame takes.
     #[arg(long, value_name = "SECONDS", default_value_t = 120)]

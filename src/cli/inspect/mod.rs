@@ -55,11 +55,11 @@ struct Inspected<'a> {
     stats: FrameStats,
     /// Bytes of the file for each particle; none without particles.
     bytes_per_particle: Option<f64>,
-    /// What a native frame says of itself.
+    /// Summary of a native frame.
     native: Option<NativeFacts>,
-    /// What the file says that is not in its particles.
+    /// Metadata of the file that is not per particle.
     notes: Vec<String>,
-    /// Whether everything was checked because it was asked for.
+    /// Whether a full verification was requested and done.
     verified: bool,
 }
 
@@ -94,7 +94,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
 
 /// What an argument stands for.
 enum Meant {
-    /// A file, with the frame number that its name tells where it is one of a sequence.
+    /// A file, with the frame number from its name if it belongs to a sequence.
     File(PathBuf, Option<i64>),
     /// No file, and why.
     Nothing(PathBuf, String),
@@ -145,7 +145,7 @@ fn inspect(
         return Ok(inspected.print(args.json));
     }
     let file = FrameFile::open_within(path, read_budget(None, None))?;
-    // Of many steps the first one says what holds for all.
+    // For several steps, the metadata come from the first one.
     let mut remarks = remarks(path);
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, number)?;

@@ -1,4 +1,4 @@
-//! What a native frame says of itself: index, sections, bytes for each particle. Large frames are not read
+//! The index of a native frame: sections, sizes, bytes per particle. Large frames are not read
 //! for that.
 
 use std::path::Path;
@@ -18,7 +18,7 @@ const LARGEST_READ: u64 = 4_000_000;
 /// Particles of the sample: pages of a file that is not in memory come at some 20 µs each.
 const SAMPLE: usize = 32_768;
 
-/// What a native frame says of itself.
+/// Summary of a native frame.
 pub(super) struct NativeFacts {
     pub(super) index: FrameIndex,
     /// Of the file.
@@ -37,10 +37,10 @@ pub(super) fn inspect(
     verify: bool,
 ) -> Result<Inspected<'_>, FrameError> {
     let file = NativeFile::open(path, Access::Map)?;
-    let looked = look(&file, verify);
+    let summary = summarise(&file, verify);
     // That the file was changed explains whatever was found.
     file.check()?;
-    let (stats, sample) = looked?;
+    let (stats, sample) = summary?;
     let index = file.index().clone();
     let bytes = file.byte_len();
     Ok(Inspected {
@@ -58,7 +58,7 @@ pub(super) fn inspect(
 }
 
 /// Numbers of the frame, and of how many particles if it is a sample.
-fn look(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usize>), FrameError> {
+fn summarise(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usize>), FrameError> {
     let frame = file.frame()?;
     let index = file.index();
     let is_large = index.count > LARGEST_READ;

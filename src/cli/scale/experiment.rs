@@ -14,7 +14,7 @@ use crate::cli::paths::absolute;
 use crate::scale::report::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 
-/// Seconds a cell where nothing else is said: the thesis's minute.
+/// Default seconds per cell, as in the thesis.
 const SECONDS: f64 = 60.0;
 
 /// Everything that is settled before the first cell runs.
@@ -104,7 +104,7 @@ impl Experiment {
     }
 }
 
-/// Sees that every representation has a structure to go with, and tells where not all do.
+/// Checks that every representation has a structure, and reports combinations that are skipped.
 fn check_pairs(
     structures: &[Structure],
     representations: &[Representation],
@@ -129,11 +129,11 @@ fn check_pairs(
     Ok(())
 }
 
-/// What was asked for, once each; all there is if nothing was.
-fn each_once<T: Copy + Eq + Hash>(asked: &[T], all: &[T]) -> Vec<T> {
-    let mut seen = HashSet::new();
-    let wanted = if asked.is_empty() { all } else { asked };
-    wanted.iter().copied().filter(|t| seen.insert(*t)).collect()
+/// The requested items without duplicates; all items if none were requested.
+fn each_once<T: Copy + Eq + Hash>(requested: &[T], all: &[T]) -> Vec<T> {
+    let mut known = HashSet::new();
+    let items = if requested.is_empty() { all } else { requested };
+    items.iter().copied().filter(|t| known.insert(*t)).collect()
 }
 
 fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
@@ -167,9 +167,9 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
     FrameSurvey::of(&sequence, &path, index, aspect).map_err(|e| CliError::other(e.to_string()))
 }
 
-/// The `asked` counts that there are particles for; in place of those above, all `there` are, once.
-fn at_most(there: usize, asked: &[usize]) -> Vec<usize> {
-    let (mut fit, above): (Vec<_>, Vec<_>) = asked.iter().partition(|count| **count <= there);
+/// The `requested` counts that there are particles for; in place of those above, all `there` are, once.
+fn at_most(there: usize, requested: &[usize]) -> Vec<usize> {
+    let (mut fit, above): (Vec<_>, Vec<_>) = requested.iter().partition(|count| **count <= there);
     if !above.is_empty() {
         let above: Vec<String> = above.iter().map(usize::to_string).collect();
         note!(

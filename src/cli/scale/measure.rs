@@ -15,8 +15,8 @@ pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
         .num_threads(task.threads())
         .build_global()
         .map_err(|e| CliError::other(format!("{} threads: {e}", task.threads())))?;
-    let told = do_task(&task);
-    let text = serde_json::to_string(&told).map_err(|e| CliError::Other(e.to_string()))?;
+    let result = do_task(&task);
+    let text = serde_json::to_string(&result).map_err(|e| CliError::Other(e.to_string()))?;
     print::file(&(text + "\n"))?;
     Ok(Outcome::Done)
 }

@@ -54,7 +54,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn names_are_known_or_guessed() {
+    fn unknown_names_have_suggestions() {
         assert_eq!(structure("lbvh"), Ok(Structure::Lbvh));
         let wrong = structure("lbhv").unwrap_err();
         assert!(wrong.ends_with("; did you mean lbvh?"), "{wrong}");

@@ -44,7 +44,7 @@ fn no_particles_one_and_many_in_one_place() {
 }
 
 #[test]
-fn a_threshold_that_nothing_reaches_is_an_empty_image() {
+fn unreachable_threshold_gives_an_empty_image() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     smooth(&workshop, &["--set", "surface.threshold=4"])
@@ -85,11 +85,11 @@ fn radii_that_vary_a_thousandfold() {
 }
 
 #[test]
-fn surfaces_that_there_are_not() {
+fn unknown_surfaces() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     not_rendered(&workshop, &["--surface", "smoth"], &["smoth", "smooth"]);
     let voxel = [&SMOOTH[..], &["--set", "surface.voxel=0"]].concat();
-    let wanted = "surface.voxel: expected a number of particle radii from 0.25 to 4";
-    not_rendered(&workshop, &voxel, &[wanted]);
+    let expected = "surface.voxel: expected a number of particle radii from 0.25 to 4";
+    not_rendered(&workshop, &voxel, &[expected]);
 }

@@ -26,7 +26,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn native_frames_hold_what_the_foreign_ones_did() {
+fn native_frames_contain_the_source_data() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     for (encoding, options) in [

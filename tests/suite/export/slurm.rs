@@ -55,7 +55,7 @@ fn every_frame_is_in_one_task() {
 }
 
 #[test]
-fn frames_are_those_of_the_manifest_or_asked_for() {
+fn frames_come_from_the_manifest_or_the_option() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
     let tasks = |options: &[&str]| {
@@ -125,14 +125,14 @@ fn a_script_comes_with_a_place_for_its_logs() {
 }
 
 #[test]
-fn what_is_asked_of_the_cluster() {
+fn requested_resources() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1, 2]);
-    let has = |options: &[&str], wanted: &[&str]| {
+    let has = |options: &[&str], expected: &[&str]| {
         let options = [&["data/job.toml"], options].concat();
         let script = export(&workshop, &options).expect(0).text();
         sound(&script);
-        for line in wanted {
+        for line in expected {
             let line = format!("#SBATCH --{line}");
             assert!(script.lines().any(|l| l == line), "no {line} in\n{script}");
         }
@@ -199,7 +199,7 @@ fn run(script: &str, task: usize) -> Output {
 }
 
 #[test]
-fn tasks_make_what_one_run_makes() {
+fn tasks_give_the_same_files_as_one_run() {
     let workshop = Workshop::new();
     job(&workshop, ODD, &FRAMES);
     let manifest = format!("{ODD}/job.toml");

@@ -186,7 +186,7 @@ shots! {
 
 /// The limits must let nothing through that can be seen, and say where it is.
 #[test]
-fn a_changed_image_is_noticed() {
+fn changed_image_is_detected() {
     let good = Picture::decode(&encode(&trace(&scenes::data_channels(), SimdLevel::best())));
     assert!(differences(&good, &good, &LIMITS).is_empty());
     let with = |channel: &str, pixels: usize, change: fn(f32) -> f32| {

@@ -8,7 +8,7 @@ use std::thread;
 pub(crate) struct Running {
     child: Child,
     errors: BufReader<ChildStderr>,
-    told: String,
+    stderr: String,
 }
 
 impl Running {
@@ -23,7 +23,7 @@ impl Running {
         Self {
             child,
             errors: BufReader::new(errors),
-            told: String::new(),
+            stderr: String::new(),
         }
     }
 
@@ -32,7 +32,7 @@ impl Running {
         let mut line = String::new();
         while self.errors.read_line(&mut line).is_ok_and(|n| n > 0) {
             let found = line.contains(text);
-            self.told.push_str(&line);
+            self.stderr.push_str(&line);
             line.clear();
             if found {
                 return true;
@@ -78,9 +78,9 @@ impl Running {
     pub(crate) fn end(mut self) -> (String, ExitStatus) {
         let mut rest = Vec::new();
         let _ = self.errors.read_to_end(&mut rest);
-        self.told.push_str(&String::from_utf8_lossy(&rest));
+        self.stderr.push_str(&String::from_utf8_lossy(&rest));
         let status = self.child.wait().expect("it ends");
-        (std::mem::take(&mut self.told), status)
+        (std::mem::take(&mut self.stderr), status)
     }
 }
 

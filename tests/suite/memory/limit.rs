@@ -14,7 +14,7 @@ fn one_heavy() -> Workshop {
 }
 
 #[test]
-fn what_cannot_fit_is_not_begun() {
+fn frames_beyond_memory_are_not_started() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 1000, false);
     vtk(&workshop.join("in/f_2.vtk"), 1000, false);
@@ -48,7 +48,7 @@ fn what_cannot_fit_is_not_begun() {
 }
 
 #[test]
-fn sizes_that_are_none() {
+fn invalid_sizes() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 10, false);
     for size in ["0", "", "-5", "much", "4 gallons", "1e3"] {

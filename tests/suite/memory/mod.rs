@@ -38,7 +38,7 @@ fn particles(count: usize) -> Vec<Vec3> {
     fill_box(&BoxSettings::thesis(count, 1))
 }
 
-/// A legacy VTK file of them, with a velocity and an id if wanted.
+/// A legacy VTK file of them, with a velocity and an id on request.
 fn vtk(path: &Path, count: usize, with_attributes: bool) {
     fs::create_dir_all(path.parent().expect("a file in a directory")).expect("a directory");
     let velocity = Attribute {

@@ -124,9 +124,9 @@ impl<'a> EncodedBytes<'a> {
 
 /// Decodes the characters that hold `count` bytes, up to two bytes more; and what follows them.
 fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), String> {
-    let wanted = count.div_ceil(3).checked_mul(4);
-    let wanted = wanted.ok_or_else(|| format!("{count} bytes are too many"))?;
-    let (run, rest) = take_chars(chars, wanted);
+    let needed = count.div_ceil(3).checked_mul(4);
+    let needed = needed.ok_or_else(|| format!("{count} bytes are too many"))?;
+    let (run, rest) = take_chars(chars, needed);
     let bytes = BASE64
         .decode(run)
         .map_err(|error| format!("bad base64: {error}"))?;

@@ -70,7 +70,7 @@ impl Compressor {
         output: &mut [u8],
         memory: u64,
     ) -> Result<(), String> {
-        let wanted = output.len();
+        let expected = output.len();
         let written = match self {
             Self::Zlib => {
                 let mut zlib = Decompress::new(true);
@@ -79,7 +79,9 @@ impl Compressor {
                         usize::try_from(zlib.total_out()).unwrap_or(usize::MAX)
                     }
                     Ok(_) => {
-                        return Err(format!("zlib stream is not {wanted} bytes or is cut short"));
+                        return Err(format!(
+                            "zlib stream is not {expected} bytes or is cut short"
+                        ));
                     }
                     Err(error) => return Err(format!("zlib: {error}")),
                 }
@@ -94,14 +96,14 @@ impl Compressor {
                     .map_err(|error| format!("xz: {error}"))?;
                 // Reading on to the end also verifies the checksum.
                 let beyond = xz.read(&mut [0]).map_err(|error| format!("xz: {error}"))?;
-                wanted + beyond
+                expected + beyond
             }
         };
-        if written == wanted {
+        if written == expected {
             Ok(())
         } else {
             Err(format!(
-                "it holds {written} bytes or more, but its header has {wanted}"
+                "it holds {written} bytes or more, but its header has {expected}"
             ))
         }
     }
