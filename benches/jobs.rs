@@ -1,7 +1,7 @@
 //! What a job costs beside its images: 2,000 frames of 1,000 particles at 64x64, and `status` on 10,000 frames; and how
 //! much longer 200 frames of 10,000 particles at 640x360 take than the slowest of the stages that overlap.
 //!
-//! Stages overlap, so that the sum of their times says nothing of the rest. Writing images, with what syncing
+//! Stages overlap, so the sum of their times does not give the rest. Writing images, with what syncing
 //! them takes, is by far the longest here: what the run took beyond it is an upper bound of claims, ledger and
 //! all else, and of reading, building and tracing where these were not hidden behind it.
 

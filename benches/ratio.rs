@@ -1,7 +1,7 @@
 //! Each of our structures against obvhs on the thesis's scene: one table.
 //!
 //! The two take turns, so that whatever else the machine does hits both; a ratio of the same turn
-//! is worth more than either rate. Ratios say how many times better ours is, in every row.
+//! is worth more than either rate. Ratios above 1 are in our favour, in every row.
 #![expect(clippy::print_stdout, reason = "the table is what it is for")]
 
 use std::env;

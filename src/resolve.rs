@@ -55,8 +55,8 @@ pub enum ResolveError {
     },
     /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
-        "input.radius: the frames bring none, and particles that are few, in one place or far apart \
-         do not tell it"
+        "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \
+         distant particles"
     )]
     NoRadius,
     /// The radius is too small: squares of lengths would underflow.

@@ -3,7 +3,7 @@
 use glam::Vec3;
 
 use super::color::ColorSetting;
-use super::key::{Keys, keys};
+use super::keys::{Keys, keys};
 use super::value::named;
 use crate::scene::{self, Fresnel};
 

@@ -1,8 +1,10 @@
 //! Looks: named sets of defaults, which values in a manifest and options override.
 
+use spherule_formats::ValueError;
 use toml::Value;
 
-use super::{Override, nearest};
+use super::Override;
+use super::nearest::nearest;
 
 /// A look, see the module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -39,16 +41,11 @@ impl Look {
     ///
     /// # Errors
     /// The name is unknown; lists the known ones.
-    pub fn named(name: &str) -> Result<Self, String> {
+    pub fn named(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.iter().find(|(_, known)| *known == name);
         found.map(|(look, _)| *look).ok_or_else(|| {
             let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
-            let hint = nearest(name, &known).map(|n| format!("; did you mean {n}?"));
-            format!(
-                "unknown look `{name}`; available: {}{}",
-                known.join(", "),
-                hint.unwrap_or_default()
-            )
+            ValueError::one_of(&known, name).with_similar(nearest(name, &known))
         })
     }
 
@@ -145,10 +142,10 @@ mod tests {
     #[test]
     fn unknown_look_lists_the_known_ones() {
         let error = Look::named("watre").unwrap_err();
-        assert!(
-            error.contains("available: water; did you mean water?"),
-            "{error}"
+        assert_eq!(
+            error.to_string(),
+            "expected one of water, found \"watre\"; did you mean water?"
         );
-        assert!(!Look::named("lava").unwrap_err().contains("did you mean"));
+        assert_eq!(Look::named("lava").unwrap_err().similar, None);
     }
 }

@@ -484,7 +484,7 @@ fn invalid_overrides() {
         ("=1", "invalid key"),
         ("a=[1", "--set a=[1: "),
     ] {
-        let error = Override::parse(set).unwrap_err();
+        let error = Override::parse(set).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
 }

@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use serde_json::{Value as Json, json};
 
-use super::key::{Affects, Keys, section};
+use super::key::Affects;
+use super::keys::{Keys, section};
 use super::value::named;
 use crate::metrics::Bytes;
 

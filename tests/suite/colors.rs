@@ -1,4 +1,4 @@
-//! Attributes that hold colours are used as colours, and the user is told.
+//! Attributes with colours are used as colours, and a note says so.
 
 use std::fs;
 

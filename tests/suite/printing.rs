@@ -22,7 +22,7 @@ fn clean(ran: &Ran) {
     }
 }
 
-/// Text that tells of [`HOSTILE`] all the same.
+/// The escaped form of [`HOSTILE`].
 const TOLD: &str = "\\nforged: b";
 
 #[cfg(unix)]

@@ -1,4 +1,4 @@
-//! `--progress json`: standard output has events and nothing else, and every event is as `docs/progress.md` says.
+//! `--progress json`: standard output has only events, as documented in `docs/progress.md`.
 
 use std::fs;
 

@@ -32,7 +32,7 @@ fn report(workshop: &Workshop) -> Value {
     serde_json::from_slice(&text).expect("JSON")
 }
 
-/// Starts nothing, says why, leaves nothing.
+/// Checks that nothing starts, with this reason, and that no files remain.
 #[track_caller]
 fn refused(workshop: &Workshop, options: &[&str], expected: &str) {
     let before = files(workshop.path());
@@ -190,8 +190,7 @@ fn representations_need_a_structure() {
             "--representations",
             "memory,q10",
         ],
-        "--representations q10: native frames are in k-d order and are traced in place: add \
-         kdtree to --structures",
+        "--representations q10: native frames can only be traced with kdtree; add kdtree to --structures",
     );
 }
 
@@ -236,7 +235,7 @@ fn user_particles() {
         ],
     );
     ran.expect(0)
-        .tells("all of them are measured, once, instead of 1000000, 10000000");
+        .tells("particles, which replace 1000000, 10000000");
     let report = report(&workshop);
     assert_eq!(report["settings"]["input"]["frame"], 2);
     let all = &report["settings"]["input"]["particles"];
@@ -251,7 +250,7 @@ fn user_particles() {
     }
     run(&workshop, &["--input", "in", "--particles", "1"])
         .expect(0)
-        .tells("has 2 frames; frame 1 is measured, --frame chooses another");
+        .tells("has 2 frames; measuring frame 1 (--frame selects another)");
 }
 
 #[test]
@@ -277,14 +276,18 @@ fn one_particle_and_coincident_particles() {
 fn options_have_ranges() {
     let workshop = Workshop::new();
     for (option, value, expected) in [
-        ("--particles", "-5", "invalid particle count `-5`"),
-        ("--particles", "1e3,many", "invalid particle count `many`"),
-        ("--particles", "", "invalid particle count"),
         (
             "--particles",
-            "1e10",
-            "a tree holds fewer than 2^32 particles",
+            "-5",
+            "expected a particle count, such as 100000 or 1e5, found \"-5\"",
         ),
+        (
+            "--particles",
+            "1e3,many",
+            "expected a particle count, such as 100000 or 1e5, found \"many\"",
+        ),
+        ("--particles", "", "expected a particle count"),
+        ("--particles", "1e10", "expected fewer than 2^32 particles"),
         ("--structures", "lbhv", "did you mean lbvh?"),
         (
             "--motions",
@@ -298,8 +301,16 @@ fn options_have_ranges() {
         ),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
-        ("--width", "0", "0 is not in 1..=65536"),
-        ("--height", "-1", "-1 is not in 1..=65536"),
+        (
+            "--width",
+            "0",
+            "expected a number of pixels from 1 to 65536",
+        ),
+        (
+            "--height",
+            "-1",
+            "expected a number of pixels from 1 to 65536",
+        ),
         ("--samples", "0", "0 is not in 1..=4096"),
         ("--max-depth", "0", "0 is not in 1..=64"),
         ("--depth", "65", "65 is not in 1..=64"),

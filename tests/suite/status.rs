@@ -1,4 +1,4 @@
-//! `spherule status`: what is told of a job that runs, has failures, was killed, is done.
+//! `spherule status` for jobs that run, have failures, were killed, or are done.
 
 use std::fs;
 

@@ -1,5 +1,5 @@
 //! Jobs of one body with spray: the same on any number of threads and when they are resumed, and what the
-//! surface took is told apart.
+//! surface is reported separately.
 
 use std::fs;
 

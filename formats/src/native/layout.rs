@@ -21,8 +21,8 @@ use rkyv::util::AlignedVec;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::stored::{RadiusCode, StoredType};
-use crate::ParseError;
 use crate::blocks::{BLOCK_SIZE, Block, Node, Q10Block, Q16Block, WIDTH};
+use crate::{ParseError, ValueError};
 
 /// The first bytes of every native frame.
 pub const MAGIC: &[u8; 8] = b"SPHERULE";
@@ -87,14 +87,11 @@ impl fmt::Display for Encoding {
 }
 
 impl FromStr for Encoding {
-    type Err = String;
+    type Err = ValueError;
 
-    fn from_str(name: &str) -> Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.into_iter().find(|e| e.name() == name);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("no encoding {name:?}; there are {names}")
-        })
+        found.ok_or_else(|| ValueError::one_of(&Self::ALL.map(Self::name), name))
     }
 }
 

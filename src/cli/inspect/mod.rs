@@ -1,4 +1,4 @@
-//! `spherule inspect`: what is in particle files, for people and (`--json`) for scripts.
+//! `spherule inspect`: the content of particle files as text or JSON.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -26,9 +26,9 @@ Examples:
   spherule inspect run1/frame_0001.vtk
       Counts, bounds and attributes of one file
   spherule inspect --json run1
-      The same of all frames of a directory, for scripts
+      The same for all frames of a directory, as JSON
   spherule inspect --verify run1-native
-      Whether all of them are sound";
+      Check all frames for damage";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -36,7 +36,7 @@ pub(super) struct InspectArgs {
     /// Files, directories or patterns.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// One JSON object a particle frame, one a line.
+    /// One JSON object per frame, one per line.
     #[arg(long)]
     json: bool,
     /// Check everything: all sections of native frames, every number of other files.
@@ -53,7 +53,7 @@ struct Inspected<'a> {
     /// How positions are stored.
     encoding: &'static str,
     stats: FrameStats,
-    /// Bytes of the file for each particle; none without particles.
+    /// Bytes of the file per particle; None without particles.
     bytes_per_particle: Option<f64>,
     /// Summary of a native frame.
     native: Option<NativeFacts>,
@@ -92,15 +92,15 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-/// What an argument stands for.
+/// The file that an argument refers to.
 enum Meant {
     /// A file, with the frame number from its name if it belongs to a sequence.
     File(PathBuf, Option<i64>),
-    /// No file, and why.
+    /// An error.
     Nothing(PathBuf, String),
 }
 
-/// All that is meant; an argument that means nothing does not hinder the others.
+/// The files of all arguments. An invalid argument does not affect the others.
 fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
     let mut all = Vec::new();
     let mut known = HashSet::new();
@@ -134,7 +134,7 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
     all
 }
 
-/// Looks at one file; the outer error is the file's, the inner one the output's.
+/// Inspects one file. The outer error is of the file, the inner one of the output.
 fn inspect(
     path: &Path,
     number: Option<i64>,

@@ -1,14 +1,14 @@
-//! The hidden command that does one task of `spherule scale`: it measures a cell, or makes its particles.
+//! The hidden command for one task of `spherule scale`: measure a cell, or convert its particles.
 
 use serde_json::Value;
 
 use crate::cli::{CliError, Outcome, child, print};
 use crate::scale::{Task, cell, convert};
 
-/// Its name.
+/// Name of the command.
 pub(in crate::cli) const COMMAND: &str = "scale-cell";
 
-/// Reads the task, does it, prints what came of it or why nothing did.
+/// Reads the task, runs it, and prints the result or the error.
 pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
     let task: Task = child::read_task("scale")?;
     rayon::ThreadPoolBuilder::new()

@@ -24,7 +24,7 @@ use crate::scale::{Budget, CellRequest, Motion, Representation, Task};
 mod experiment;
 mod frames;
 pub(super) mod measure;
-mod words;
+mod values;
 
 use experiment::Experiment;
 use frames::Frames;
@@ -43,21 +43,21 @@ Examples:
 pub(super) struct ScaleArgs {
     /// Particle counts, such as 1e6.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1e5,1e6,1e7",
-        value_parser = words::particles, allow_hyphen_values = true, help_heading = "Experiment")]
+        value_parser = values::particles, allow_hyphen_values = true, help_heading = "Experiment")]
     particles: Vec<usize>,
     /// Acceleration structures: lbvh, kdtree, bvh, sbvh [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::structure, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::structure, help_heading = "Experiment")]
     structures: Vec<Structure>,
     /// Camera motions: rotation, translation, both [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::motion, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::motion, help_heading = "Experiment")]
     motions: Vec<Motion>,
     /// Where positions are stored: memory, f32, q16, q10 [default: memory]
     ///
     /// All except memory use a memory-mapped native frame of that encoding, traced in place (kdtree only).
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::representation, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::representation, help_heading = "Experiment")]
     representations: Vec<Representation>,
     /// Tracing time per cell, in seconds [default: 60]
-    #[arg(long, value_parser = words::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
+    #[arg(long, value_parser = values::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
     seconds: Option<f64>,
     /// Number of images per cell, instead of a time.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_hyphen_values = true, help_heading = "Experiment")]

@@ -20,16 +20,6 @@ const SOURCES: [&str; 3] = ["src", "jobs/src", "formats/src"];
 
 const ALLOWED: &[Allowed] = &[
     Allowed {
-        source: "src",
-        files: &[
-            "manifest::key",
-            "manifest::list",
-            "manifest::reader",
-            "manifest::value",
-        ],
-        why: "the declaration of a key is used to read and to list it, and values parse themselves from fields",
-    },
-    Allowed {
         source: "jobs/src",
         files: &["workers::claim", "workers::registry"],
         why: "a claim is released at the registry that made it",

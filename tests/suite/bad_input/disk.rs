@@ -137,7 +137,7 @@ fn an_image_that_cannot_be_written_costs_one_frame() {
     workshop.render_to("whole", &[]).expect(0);
     let whole = images(&workshop.join("whole"));
     let largest = whole.values().map(Vec::len).max().expect("images");
-    // In blocks of 512 bytes; the signal that tells of it is let pass.
+    // In blocks of 512 bytes; the signal about the limit is ignored.
     let script = format!(
         "trap '' XFSZ; ulimit -f {}; exec \"$@\"",
         (largest - 1) / 512

@@ -83,7 +83,8 @@ fn a_single_particle_is_in_the_middle() {
         &workshop,
         &[],
         &[
-            "input.radius: the frames bring none, and particles that are few, in one place or far apart do not tell it; give a length with --radius",
+            "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \
+             distant particles; give a length with --radius",
         ],
     );
     workshop

@@ -39,7 +39,7 @@ fn closed_pipe_is_not_an_error() {
     }
 }
 
-/// A job does not end because nobody reads what it says.
+/// A job does not end because nobody reads its messages.
 #[test]
 fn job_continues_without_standard_error() {
     let workshop = Workshop::new();

@@ -31,14 +31,22 @@ fn no_particles_one_and_many_in_one_place() {
 
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::ONE]).expect("a file");
     fs::remove_dir_all(workshop.join("out")).expect("the images");
-    not_rendered(&workshop, &SMOOTH, &["input.radius: the frames bring none"]);
+    not_rendered(
+        &workshop,
+        &SMOOTH,
+        &["input.radius: the frames contain no radius"],
+    );
     smooth(&workshop, &["--radius", "0.1"]).expect(0);
     assert!(!is_empty(&workshop, 1));
 
     let many = vec![Vec3::ONE; 100_000];
     write::npy::write(&workshop.join("in/f_1.npy"), &many).expect("a file");
     fs::remove_dir_all(workshop.join("out")).expect("the images");
-    not_rendered(&workshop, &SMOOTH, &["input.radius: the frames bring none"]);
+    not_rendered(
+        &workshop,
+        &SMOOTH,
+        &["input.radius: the frames contain no radius"],
+    );
     smooth(&workshop, &["--radius", "0.1"]).expect(0);
     assert!(!is_empty(&workshop, 1));
 }

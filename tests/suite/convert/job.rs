@@ -26,7 +26,7 @@ fn the_same_command_again_does_nothing() {
     let before = stamps(&out);
     // The frames, plan and ledger.
     assert_eq!(before.len(), 5 + 2);
-    // The usual bound, said; what does not change the frames.
+    // The default bound given explicitly, and options that do not change the frames.
     for options in [
         &Q16[..],
         &["--encoding", "q16", "--max-error", "0.02"],

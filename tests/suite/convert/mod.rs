@@ -15,7 +15,7 @@ fn convert(shop: &Workshop, options: &[&str]) -> Ran {
     shop.run(&[&["convert", "in", "-o", "out"], options].concat())
 }
 
-/// What `inspect --json` says of the file.
+/// The output of `inspect --json` for the file.
 fn inspected(shop: &Workshop, file: &str) -> Value {
     let ran = shop.run(&["inspect", "--json", file]).expect(0);
     serde_json::from_str(&ran.text()).expect("one line of JSON")

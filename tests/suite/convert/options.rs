@@ -1,4 +1,4 @@
-//! What can be said to `spherule convert`, and what cannot be meant.
+//! Options of `spherule convert`, and combinations that are rejected.
 
 use std::fs;
 
@@ -98,7 +98,7 @@ fn contradictory_options_are_rejected() {
             &["--no-attributes", "--attributes", "a:off"],
             "cannot be used with",
         ),
-        (&["--memory", "much"], "invalid size"),
+        (&["--memory", "much"], "expected a size, such as 4GiB"),
         (
             &["--frames", "7-9"],
             "--frames: 7-9 contains none of the frames of the input: 1",

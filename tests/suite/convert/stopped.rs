@@ -22,7 +22,7 @@ enum Moment {
     Writing,
     /// Once it has made so many frames; the ledger may not know of the last.
     Frames(usize),
-    /// Once it has told of a frame.
+    /// After its first message about a frame.
     Told,
 }
 
@@ -170,7 +170,7 @@ fn a_frame_that_cannot_be_written_costs_one_frame() {
     let whole = natives(&shop.join("out"));
     fs::remove_dir_all(shop.join("out")).expect("a directory");
     let smallest = whole.values().map(Vec::len).min().expect("frames");
-    // In blocks of 512 bytes; the signal that tells of it is let pass.
+    // In blocks of 512 bytes; the signal about the limit is ignored.
     let script = format!(
         "trap '' XFSZ; ulimit -f {}; exec \"$@\"",
         (smallest - 1) / 512

@@ -61,7 +61,7 @@ fn paths_are_declared_as_they_are_seen_from_the_template() {
     assert_eq!(flows[0], ["PATH", "FILE", "IN"]);
     assert_eq!(flows[1], ["PATH", "DIRECTORY", "IN"]);
     assert_eq!(flows[2], ["PATH", "DIRECTORY", "OUT"]);
-    // What is not below the template has no default, and the way to say it is told.
+    // Paths outside the template have no default; a note names the option.
     fs::create_dir(workshop.join("elsewhere")).expect("a directory");
     let (found, ran) = template(&workshop, "elsewhere/t.json", &["data/job.toml"]);
     assert_eq!(defaults(&found), [Value::Null, Value::Null, Value::Null]);

@@ -40,9 +40,13 @@ fn jobs_that_cannot_be_exported() {
     refused(
         &workshop,
         &with(&["--mem", "16"]),
-        "write the unit, such as 4GiB",
+        "expected at least 16.0 MiB, with a unit, such as 4GiB",
     );
-    refused(&workshop, &with(&["--mem", "lots"]), "invalid size");
+    refused(
+        &workshop,
+        &with(&["--mem", "lots"]),
+        "expected a size, such as 4GiB",
+    );
     refused(&workshop, &with(&["--chunk", "0"]), "--chunk");
     refused(&workshop, &with(&["--cpus", "0"]), "--cpus");
     let text = fs::read_to_string(&manifest).expect("a manifest");

@@ -54,6 +54,34 @@ fn every_frame_is_in_one_task() {
     }
 }
 
+/// Options of the program in the script, which are on the lines that call it or set its arguments.
+fn options(script: &str) -> Vec<&str> {
+    let is_call = |line: &&str| line.contains("set -- ") || line.contains("exec \"$program\"");
+    let words = script
+        .lines()
+        .filter(is_call)
+        .flat_map(str::split_whitespace);
+    words
+        .filter(|word| word.len() > 2 && word.starts_with("--"))
+        .collect()
+}
+
+#[test]
+fn tasks_use_options_that_render_has() {
+    let workshop = Workshop::new();
+    job(&workshop, "data", &FRAMES);
+    let script = export(&workshop, &["data/job.toml", "--mem", "4GiB"])
+        .expect(0)
+        .text();
+    let help = workshop.run(&["render", "--help"]).expect(0).text();
+    let used = options(&script);
+    assert_eq!(used, ["--frames", "--threads", "--memory-limit", "--grace"]);
+    let known: Vec<&str> = help.split_whitespace().collect();
+    for option in used {
+        assert!(known.contains(&option), "{option}");
+    }
+}
+
 #[test]
 fn frames_come_from_the_manifest_or_the_option() {
     let workshop = Workshop::new();
@@ -98,7 +126,7 @@ fn tasks_are_few_enough_for_an_array() {
         ran.text()
             .contains("# 5 frames per task, because 2 would give 7 tasks")
     );
-    // Nobody said how many.
+    // Without an option for the count.
     let ran = export(&workshop, &["data/job.toml"]).expect(0);
     assert_eq!(chunks(&ran.text()).len(), FRAMES.len());
 }

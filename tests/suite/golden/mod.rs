@@ -184,7 +184,7 @@ shots! {
     water;
 }
 
-/// The limits must let nothing through that can be seen, and say where it is.
+/// The limits must detect every visible difference and report its position.
 #[test]
 fn changed_image_is_detected() {
     let good = Picture::decode(&encode(&trace(&scenes::data_channels(), SimdLevel::best())));

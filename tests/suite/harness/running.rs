@@ -1,4 +1,4 @@
-//! A program that is still running: waiting for what it says or writes, and signals to it.
+//! A running program: waits for its messages or files, and sends signals to it.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
@@ -74,7 +74,7 @@ impl Running {
         let _ = self.child.kill();
     }
 
-    /// Waits for the end; what it said, and how it ended.
+    /// Waits for the end; returns standard error and the exit status.
     pub(crate) fn end(mut self) -> (String, ExitStatus) {
         let mut rest = Vec::new();
         let _ = self.errors.read_to_end(&mut rest);

@@ -1,4 +1,4 @@
-//! `check` tells what `render` would do, and touches nothing.
+//! `check` predicts what `render` would do, and changes nothing.
 
 use std::fs;
 

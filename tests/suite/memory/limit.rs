@@ -121,7 +121,7 @@ fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
     let right = ["--radius", "0.02", "--memory-limit", "40MiB", "--force"];
     let ran = workshop.render(&[&smooth[..], &right].concat()).expect(0);
     assert_eq!(ran.rendered(), [1]);
-    // What is foreseen not to fit says as much of the surface.
+    // A predicted excess reports the memory of the surface.
     let tight = ["--radius", "0.02", "--memory-limit", "5MiB", "--force"];
     workshop
         .render(&[&smooth[..], &tight].concat())

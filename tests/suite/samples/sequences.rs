@@ -1,4 +1,4 @@
-//! Sample sequences: found, ordered, gaps told, every frame read, and rendered.
+//! Sample sequences: found, ordered, gaps reported, every frame read and rendered.
 
 use std::fs;
 

@@ -36,7 +36,7 @@ fn intact_job_by_directory_or_manifest() {
         let ran = workshop.run(&["verify", job]).expect(0);
         assert_eq!(ran.text(), "sound              3 (1-3)\n");
     }
-    // The user's own manifest says where the images are.
+    // The manifest of the user contains the directory of the images.
     let mine = "input.path = \"../in\"\noutput.path = \"../out/f.####.exr\"\n";
     fs::create_dir(workshop.join("mine")).expect("a directory");
     fs::write(workshop.join("mine/my.toml"), mine).expect("a file");
@@ -120,7 +120,7 @@ fn a_picture_of_another_job_is_damage() {
     let from = workshop.join("other/f.0001.exr");
     let to = workshop.join("out/f.0001.exr");
     let length = fs::metadata(&to).expect("a file").len();
-    // Padded to the length of what was there: only its header tells.
+    // Padded to the original length: only the header shows the damage.
     let mut bytes = fs::read(from).expect("a file");
     bytes.resize(usize::try_from(length).expect("it is short"), 0);
     fs::write(&to, bytes).expect("a file");
