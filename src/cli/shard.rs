@@ -2,6 +2,8 @@
 
 use std::str::FromStr;
 
+use spherule_formats::ValueError;
+
 /// Shard `index` (from 1) of `count`: every `count`-th frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Shard {
@@ -24,15 +26,18 @@ impl std::fmt::Display for Shard {
 }
 
 impl FromStr for Shard {
-    type Err = &'static str;
+    type Err = ValueError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
-        const EXPECTED: &str = "expected two whole numbers such as 2/4, the second of four parts";
-        let (index, count) = text.split_once('/').ok_or(EXPECTED)?;
-        let parse = |text: &str| text.trim().parse().map_err(|_| EXPECTED);
+        let error = |expected: &str| ValueError::new(expected, text);
+        let malformed = || error("two whole numbers such as 2/4, the second of four parts");
+        let (index, count) = text.split_once('/').ok_or_else(malformed)?;
+        let parse = |text: &str| text.trim().parse().map_err(|_| malformed());
         let (index, count) = (parse(index)?, parse(count)?);
         if index == 0 || index > count {
-            return Err("the part must be from 1 to the number of parts, such as 1/4 to 4/4");
+            return Err(error(
+                "a part from 1 to the number of parts, such as 1/4 to 4/4",
+            ));
         }
         Ok(Self { index, count })
     }

@@ -74,7 +74,7 @@ fn wrong_size_or_channels_are_faults() {
     expected.height = 38;
     assert_eq!(
         verify(&bytes, &expected).unwrap_err(),
-        "is 40x37, 40x38 is expected"
+        "is 40x37, expected 40x38"
     );
     let expected = shape(Channels {
         id: true,
@@ -83,7 +83,7 @@ fn wrong_size_or_channels_are_faults() {
     assert_eq!(
         verify(&bytes, &expected).unwrap_err(),
         "has the channels A (half), B (half), G (half), R (half), \
-         R (half), G (half), B (half), A (half), id.I (uint) are expected"
+         expected R (half), G (half), B (half), A (half), id.I (uint)"
     );
     let more = exr(&film(40, 37, Channels::ALL), Compression::Zip);
     assert!(verify(&more, &shape(Channels::COLOR)).is_err());
@@ -171,6 +171,6 @@ fn previews_are_decoded_to_their_last_byte() {
     other.width = 41;
     assert_eq!(
         verify(&png, &other).unwrap_err(),
-        "is 40x37, 41x37 is expected"
+        "is 40x37, expected 41x37"
     );
 }

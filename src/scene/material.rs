@@ -240,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn absorption_is_what_it_leaves_behind() {
+    fn absorption_is_the_colour_after_its_length() {
         let loss = extinction(Vec3::new(0.5, 1.0, 0.0), 2.0);
         let left = (-3.0 * loss).exp();
         assert!((left.x - 0.5_f32.powf(1.5)).abs() < 1e-6);

@@ -16,7 +16,7 @@ fn still(workshop: &Workshop, options: &[&str]) -> Ran {
 }
 
 #[test]
-fn one_picture_and_nothing_else() {
+fn still_writes_only_the_image() {
     let workshop = workshop();
     let made = still(&workshop, &["-o", "looks/a.png"]).expect(0);
     // The frame in the middle.
@@ -82,7 +82,7 @@ fn picture_equals_that_of_a_job() {
 }
 
 #[test]
-fn replaces_images_and_nothing_else() {
+fn only_images_are_replaced() {
     let workshop = workshop();
     still(&workshop, &["-o", "a.png"]).expect(0);
     let before = fs::read(workshop.join("a.png")).expect("a picture");

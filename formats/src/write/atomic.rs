@@ -135,7 +135,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_failed_write_leaves_the_old_file_and_nothing_else() {
+    fn failed_write_keeps_only_the_old_file() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("a.spf");
         publish(&path, |w| w.write_all(b"old")).expect("writable");

@@ -18,7 +18,7 @@ fn five_frames() -> Workshop {
 }
 
 #[test]
-fn the_same_command_again_does_nothing() {
+fn repeated_command_does_nothing() {
     let shop = five_frames();
     let ran = convert(&shop, &Q16).expect(0).tells("5 of 5 frames done");
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);

@@ -15,7 +15,7 @@ fn names(shop: &Workshop, file: &str) -> Vec<String> {
 }
 
 #[test]
-fn attributes_are_left_out_by_name_or_all_but_some() {
+fn attributes_are_omitted_by_name_or_wildcard() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), [1]);
     convert(&shop, &[]).expect(0);

@@ -66,7 +66,7 @@ fn read_all(path: &Path, file: Result<FrameFile, FrameError>) -> Result<(u64, u6
 }
 
 #[test]
-fn every_file_gives_its_named_error() {
+fn every_damaged_file_gives_its_expected_error() {
     let made = make::files();
     if std::env::var_os("SPHERULE_BLESS").is_some() {
         for (name, bytes) in &made {

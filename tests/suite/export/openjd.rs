@@ -43,7 +43,7 @@ fn all_frames_are_in_the_template() {
 }
 
 #[test]
-fn paths_are_declared_as_they_are_seen_from_the_template() {
+fn paths_are_relative_to_the_template() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1, 2]);
     let defaults = |found: &Value| {

@@ -132,7 +132,7 @@ fn tasks_are_few_enough_for_an_array() {
 }
 
 #[test]
-fn a_script_comes_with_a_place_for_its_logs() {
+fn script_creates_the_log_directory() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1, 2]);
     let logs = workshop.join("data/slurm-logs");

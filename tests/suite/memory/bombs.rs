@@ -111,7 +111,7 @@ fn wide_rows(prefix: &str) -> String {
 }
 
 #[test]
-fn packed_text_is_never_in_memory_as_a_whole() {
+fn compressed_text_is_streamed() {
     let count = 400_000;
     let ply = format!(
         "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\

@@ -88,7 +88,7 @@ fn check_does_not_change_a_started_job() {
 }
 
 #[test]
-fn all_done_needs_no_time() {
+fn finished_job_needs_no_time() {
     let workshop = frames();
     workshop.render(&[]).expect(0);
     let json = answer(&check(&workshop, &["--json"]).expect(0));

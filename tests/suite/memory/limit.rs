@@ -82,7 +82,7 @@ fn one_heavy_frame_costs_one_frame() {
 }
 
 #[test]
-fn frames_go_one_at_a_time_where_that_fits() {
+fn frames_run_one_at_a_time_if_two_do_not_fit() {
     let workshop = Workshop::new();
     for frame in 1..=3 {
         vtk(&workshop.join(format!("in/f_{frame}.vtk")), 1000, false);
@@ -105,7 +105,7 @@ fn frames_go_one_at_a_time_where_that_fits() {
 }
 
 #[test]
-fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
+fn grid_beyond_memory_is_rejected_with_its_radius() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     let smooth = ["--surface", "smooth", "--set=output.preview=false"];
