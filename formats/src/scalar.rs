@@ -11,7 +11,7 @@ pub enum Endian {
 
 /// The type of one stored number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub enum ScalarType {
     I8,
     U8,

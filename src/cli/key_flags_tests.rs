@@ -68,8 +68,8 @@ fn manifest(flags: &str) -> Manifest {
 
 #[test]
 fn every_option_is_a_key() {
-    for (flags, wanted) in FLAGS.iter() {
-        let (key, value) = wanted.split_once(" = ").unwrap();
+    for (flags, expected) in FLAGS.iter() {
+        let (key, value) = expected.split_once(" = ").unwrap();
         let mut plain = Manifest::new("data");
         assert_ne!(manifest(flags), plain, "{flags}");
         let mut sets = vec![format!("{key}={value}")];

@@ -23,7 +23,7 @@ pub(super) struct ManifestArgs {
     #[command(flatten)]
     pub(super) keys: KeyFlags,
 
-    /// Look, for everything that is not set otherwise: water.
+    /// Preset for all settings that are not given explicitly: water.
     #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
     pub(super) look: Option<String>,
     /// Attribute to colour by [default: velocity, else the particles' own colours]
@@ -135,12 +135,12 @@ impl ManifestArgs {
         if let Some(look) = &self.look {
             list.extend(
                 Look::named(look)
-                    .map_err(|e| CliError::other(format!("--look {e}")))?
+                    .map_err(|e| CliError::other(format!("--look: {e}")))?
                     .settings(&format!("--look {look}")),
             );
         }
         for assignment in &self.set {
-            list.push(Override::parse(assignment).map_err(CliError::Other)?);
+            list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);
         }
         Ok(())
     }

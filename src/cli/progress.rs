@@ -30,9 +30,9 @@ impl ValueEnum for ProgressMode {
         Some(PossibleValue::new(self.name()).help(match self {
             Self::Auto => "Bars on a terminal, plain lines elsewhere",
             Self::Plain => "One line per frame",
-            Self::Json => "Events as JSON, one a line, on standard output",
-            Self::Openjd => "The lines that Open Job Description engines read",
-            Self::None => "Nothing but warnings and errors",
+            Self::Json => "JSON events, one per line, on standard output",
+            Self::Openjd => "Messages for Open Job Description engines",
+            Self::None => "Only warnings and errors",
         }))
     }
 }

@@ -1,4 +1,4 @@
-//! `spherule still`: renders one picture of one frame, to try a look. No job: no plan, ledger, manifest or report.
+//! `spherule still`: renders a single frame to try settings. No job: no plan, ledger, manifest or report.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -22,8 +22,7 @@ use crate::render::Channels;
 /// Signatures of the files that `still` may replace: OpenEXR and PNG.
 const IMAGE_SIGNATURES: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
 
-const OUTPUT_HELP: &str =
-    "Picture to write: look.png or look.exr. An image of that name is replaced.";
+const OUTPUT_HELP: &str = "Image to write, .png or .exr; an existing image is replaced";
 
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png
@@ -61,7 +60,7 @@ fn no_job(option: clap::Arg) -> clap::Arg {
 
 const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
     stopping: "stopping",
-    stopped: "stopped; no picture was written",
+    stopped: "stopped; no image was written",
 };
 
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {

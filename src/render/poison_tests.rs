@@ -103,7 +103,7 @@ fn check(shape: &dyn Shape, transmission: f32) {
         "there is something to see"
     );
     for lane in [0, 5, 6, 15] {
-        let wanted = left(&integrator, &clean, lane);
+        let expected = left(&integrator, &clean, lane);
         for poison in POISON {
             let bad = Vec3::new(1.0, poison, -0.5);
             let mut poisoned = [clean.clone(), clean.clone(), clean.clone()];
@@ -113,7 +113,7 @@ fn check(shape: &dyn Shape, transmission: f32) {
             for segments in poisoned {
                 assert_eq!(
                     left(&integrator, &segments, lane),
-                    wanted,
+                    expected,
                     "{lane} {poison}"
                 );
             }
@@ -134,7 +134,7 @@ fn heap() -> Vec<Ball> {
 }
 
 #[test]
-fn poisoned_rays_change_nothing_for_their_neighbours() {
+fn nan_rays_do_not_affect_other_rays() {
     let centers: Vec<Vec3> = heap().iter().map(|ball| ball.center).collect();
     let mut builder = TreeBuilder::new();
     let (centers, radius) = (&centers[..], SphereRadius::Common(0.6));
@@ -184,7 +184,7 @@ impl Shape for Poisoned<'_> {
 }
 
 #[test]
-fn poisoned_particles_change_nothing_for_rays_at_others() {
+fn nan_particles_do_not_affect_other_particles() {
     let (balls, solid) = (Balls(heap()), Solid::ball(1.0));
     let shapes: [&dyn Shape; 2] = [&balls, &solid];
     for (shape, transmission) in shapes.into_iter().flat_map(|s| [(s, 0.0), (s, 0.8)]) {

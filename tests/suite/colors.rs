@@ -1,4 +1,4 @@
-//! Attributes that hold colours are used as colours, and the user is told.
+//! Attributes with colours are used as colours, and a note says so.
 
 use std::fs;
 
@@ -76,7 +76,7 @@ fn bytes_of_vtk_and_ply_are_colours() {
 }
 
 #[test]
-fn speed_goes_before_colours_unless_they_are_named() {
+fn speed_has_precedence_over_unnamed_colours() {
     let shop = Workshop::new();
     table(&shop, "vx,vy,vz,rgb_x,rgb_y,rgb_z", "1,2,3,0.25,0.5,0.75");
     render(&shop, "in", &[]).tells("colour by `velocity`, range");

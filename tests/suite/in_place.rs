@@ -46,8 +46,8 @@ fn same_in_all_ways(
     ] {
         let out = format!("{native}-{way}");
         let ran = render(shop, native, &out, &[&options, how].concat()).expect(0);
-        let told = ran.errors().contains("decoded before they are traced");
-        assert_eq!(told, is_decoded(way), "{way}");
+        let is_reported = ran.errors().contains("decoded before they are traced");
+        assert_eq!(is_reported, is_decoded(way), "{way}");
         let made = images(&shop.join(&out));
         assert!(!made.is_empty());
         let expected = first.get_or_insert_with(|| made.clone());
@@ -89,7 +89,7 @@ fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
 
 /// Radii over a hundredfold, so that boxes hold spheres; ids that are not the places in the file.
 #[test]
-fn radii_and_ids_of_their_own() {
+fn per_particle_radii_and_ids() {
     let shop = Workshop::new();
     let mut text = "x,y,z,radius,id\n".to_owned();
     for i in 0..3_000_u32 {

@@ -22,12 +22,12 @@ fn clean(ran: &Ran) {
     }
 }
 
-/// Text that tells of [`HOSTILE`] all the same.
+/// The escaped form of [`HOSTILE`].
 const TOLD: &str = "\\nforged: b";
 
 #[cfg(unix)]
 #[test]
-fn names_from_outside_are_shown_escaped() {
+fn external_names_are_printed_escaped() {
     let workshop = Workshop::new();
     dam_break(&workshop.join(HOSTILE), 1..=3);
     let damaged = workshop.join(HOSTILE).join("f_2.bgeo");
@@ -75,7 +75,7 @@ fn names_from_outside_are_shown_escaped() {
 }
 
 #[test]
-fn attributes_are_shown_escaped() {
+fn attributes_are_printed_escaped() {
     let workshop = Workshop::new();
     // VTK files can spell any character.
     let spell = |c: char| {
@@ -94,8 +94,8 @@ fn attributes_are_shown_escaped() {
     assert!(ran.text().contains(TOLD), "{}", ran.text());
     let ran = workshop.run(&["inspect", "a.vtk", "--json"]).expect(0);
     clean(&ran);
-    let told: serde_json::Value = serde_json::from_str(&ran.text()).expect("JSON");
-    assert_eq!(told["attributes"][0]["name"], HOSTILE);
+    let json: serde_json::Value = serde_json::from_str(&ran.text()).expect("JSON");
+    assert_eq!(json["attributes"][0]["name"], HOSTILE);
     let render = ["render", "a.vtk", "-o", "out/f.exr"];
     let unknown = [&render[..], &SMALL, &["--color-by", "nosuch"]].concat();
     clean(&workshop.run(&unknown).expect(2).tells(TOLD));

@@ -16,7 +16,7 @@ fn still(workshop: &Workshop, options: &[&str]) -> Ran {
 }
 
 #[test]
-fn one_picture_and_nothing_else() {
+fn still_writes_only_the_image() {
     let workshop = workshop();
     let made = still(&workshop, &["-o", "looks/a.png"]).expect(0);
     // The frame in the middle.
@@ -37,7 +37,7 @@ fn one_picture_and_nothing_else() {
 }
 
 #[test]
-fn the_picture_is_that_of_a_job() {
+fn picture_equals_that_of_a_job() {
     let workshop = workshop();
     let look = [
         "--color-by",
@@ -82,7 +82,7 @@ fn the_picture_is_that_of_a_job() {
 }
 
 #[test]
-fn replaces_images_and_nothing_else() {
+fn only_images_are_replaced() {
     let workshop = workshop();
     still(&workshop, &["-o", "a.png"]).expect(0);
     let before = fs::read(workshop.join("a.png")).expect("a picture");
@@ -125,7 +125,7 @@ fn replaces_images_and_nothing_else() {
 }
 
 #[test]
-fn images_of_a_job_are_its_own() {
+fn images_of_a_job_are_not_replaced() {
     let workshop = workshop();
     workshop.render(&["--frames", "1-2"]).expect(0);
     for name in ["out/f.0001.exr", "out/f.0001.png", "out/f.0005.exr"] {
@@ -151,7 +151,7 @@ fn a_frame_that_cannot_be_read_has_failed() {
 }
 
 #[test]
-fn help_has_examples_and_no_options_of_jobs() {
+fn help_has_examples_and_no_job_options() {
     let workshop = Workshop::new();
     let help = workshop.run(&["still", "--help"]).expect(0).text();
     for shown in [

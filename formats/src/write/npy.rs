@@ -62,7 +62,7 @@ mod tests {
     use crate::generate::{BoxSettings, fill_box};
 
     #[test]
-    fn the_file_is_what_numpy_writes() {
+    fn output_equals_that_of_numpy() {
         for count in [0usize, 1, 1000] {
             let mut bytes = Vec::new();
             fill(&mut bytes, &vec![Vec3::new(1.0, 2.0, -3.0); count]).expect("memory");

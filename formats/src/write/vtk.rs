@@ -211,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn attributes_that_do_not_fit_are_refused() {
+    fn oversized_attributes_are_rejected() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("a.vtk");
         let error = write(&path, &[Vec3::ZERO], &[attribute(vec![])]).expect_err("no value");
@@ -221,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_hold_what_their_source_has() {
+    fn streams_contain_their_source() {
         let source = BlockSource::new(BlockSettings {
             count: 40_000,
             seed: 2,

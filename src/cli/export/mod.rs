@@ -5,6 +5,7 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use spherule_formats::ValueError;
 use spherule_jobs::export::Chunks;
 use spherule_jobs::{ResumeMode, publish};
 
@@ -39,7 +40,7 @@ pub(super) struct ExportArgs {
 
 #[derive(Debug, Subcommand)]
 enum Engine {
-    /// A script for sbatch: a job array whose tasks render some of the frames each.
+    /// A script for sbatch: a job array whose tasks each render a part of the frames.
     Slurm(slurm::SlurmArgs),
     /// A job template of Open Job Description, for AWS Deadline Cloud and `openjd run`.
     Openjd(openjd::OpenjdArgs),
@@ -83,12 +84,11 @@ struct CommonArgs {
 /// Smallest memory that is accepted. A smaller value probably lacks its unit.
 const MIN_MEMORY: Bytes = Bytes(16 << 20);
 
-fn memory(text: &str) -> Result<Bytes, String> {
+fn memory(text: &str) -> Result<Bytes, ValueError> {
     let size: Bytes = text.parse()?;
     if size < MIN_MEMORY {
-        return Err(format!(
-            "{size} is less than {MIN_MEMORY}; write the unit, such as 4GiB"
-        ));
+        let expected = format!("at least {MIN_MEMORY}, with a unit, such as 4GiB");
+        return Err(ValueError::new(expected, text));
     }
     Ok(size)
 }
@@ -173,7 +173,8 @@ fn requested_manifest(args: &CommonArgs) -> Result<JobManifest, CliError> {
     }
     let content = read_manifest(path)?;
     let frames = args.frames.as_ref().map(|range| {
-        Override::new("input.frames", range.clone(), "--frames").map_err(CliError::Other)
+        Override::new("input.frames", range.clone(), "--frames")
+            .map_err(|e| CliError::other(e.to_string()))
     });
     let overrides = frames.transpose()?.into_iter().collect();
     let (manifest, warnings) = Manifest::parse_with_warnings(&content, path, overrides)?;

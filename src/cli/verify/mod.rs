@@ -37,7 +37,7 @@ pub(super) struct VerifyArgs {
     /// those of another length are repeated in any case.
     #[arg(long)]
     requeue_bad: bool,
-    /// Threads to use [default: all]; at most 4 for each processor are used.
+    /// Threads to use [default: all]; at most 4 per processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
     threads: Option<u32>,
 }

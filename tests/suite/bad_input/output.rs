@@ -16,12 +16,12 @@ fn three_frames() -> Workshop {
 }
 
 #[track_caller]
-fn not_there(workshop: &Workshop, pattern: &str, wanted: &[&str]) {
+fn not_there(workshop: &Workshop, pattern: &str, expected: &[&str]) {
     let before = fs::read_dir(workshop.path())
         .expect("the directory")
         .count();
     let arguments = [&["render", "in", "-o", pattern][..], &SMALL].concat();
-    refused(workshop, &arguments, wanted);
+    refused(workshop, &arguments, expected);
     let after = fs::read_dir(workshop.path())
         .expect("the directory")
         .count();
@@ -29,7 +29,7 @@ fn not_there(workshop: &Workshop, pattern: &str, wanted: &[&str]) {
 }
 
 #[test]
-fn names_that_will_not_do() {
+fn invalid_output_names() {
     let workshop = three_frames();
     not_there(
         &workshop,
@@ -129,18 +129,19 @@ fn one_converted_frame_has_the_name_it_was_given() {
 }
 
 #[test]
-fn a_file_in_the_place_of_the_directory() {
+fn file_in_place_of_the_directory() {
     let workshop = three_frames();
     fs::write(workshop.join("out"), "a file").expect("a file");
-    let wanted = "out: is a file, but a directory for the images is needed; choose another output";
-    not_there(&workshop, "out/f.####.exr", &[wanted]);
-    not_there(&workshop, "out/deep/er/f.####.exr", &[wanted]);
+    let expected =
+        "out: is a file, but a directory for the images is needed; choose another output";
+    not_there(&workshop, "out/f.####.exr", &[expected]);
+    not_there(&workshop, "out/deep/er/f.####.exr", &[expected]);
     assert_eq!(fs::read(workshop.join("out")).expect("a file"), b"a file");
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_place_where_even_root_may_not_write() {
+fn unwritable_file_system() {
     let workshop = three_frames();
     not_there(&workshop, "/proc/nope/f.####.exr", &["error: /proc/nope: "]);
 }
@@ -186,7 +187,7 @@ fn as_plain_user(command: Command) -> Option<Command> {
 
 #[cfg(target_os = "linux")]
 #[test]
-#[expect(clippy::print_stderr, reason = "a test that is left out says so")]
+#[expect(clippy::print_stderr, reason = "a skipped test is reported")]
 fn a_directory_that_is_closed_while_a_job_runs() {
     use std::os::unix::fs::PermissionsExt;
     let workshop = Workshop::new();
@@ -213,11 +214,14 @@ fn a_directory_that_is_closed_while_a_job_runs() {
         let mut running = Running::new(command);
         assert!(running.wait_for_line("] frame 1:"));
         open(0o555);
-        let (told, status) = running.end();
+        let (errors, status) = running.end();
         open(0o777);
-        assert_eq!(status.code(), Some(1), "{told}");
-        assert!(told.contains("cannot be written") && told.contains("check its permissions"));
-        assert!(!told.contains("failed:"), "no frame is at fault: {told}");
+        assert_eq!(status.code(), Some(1), "{errors}");
+        assert!(errors.contains("cannot be written") && errors.contains("check its permissions"));
+        assert!(
+            !errors.contains("failed:"),
+            "no frame is at fault: {errors}"
+        );
         workshop.run(&arguments).expect(0);
         assert!(images(&out) == images(&workshop.join("whole")));
         no_leftovers(&out);
@@ -227,7 +231,7 @@ fn a_directory_that_is_closed_while_a_job_runs() {
 }
 
 #[test]
-fn a_manifest_of_somebody_else_is_not_overwritten() {
+fn existing_manifest_is_not_overwritten() {
     let workshop = three_frames();
     fs::create_dir(workshop.join("out")).expect("a directory");
     let theirs = "# not spherule's\nbuild = true\n";

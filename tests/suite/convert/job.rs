@@ -18,7 +18,7 @@ fn five_frames() -> Workshop {
 }
 
 #[test]
-fn the_same_command_again_does_nothing() {
+fn repeated_command_does_nothing() {
     let shop = five_frames();
     let ran = convert(&shop, &Q16).expect(0).tells("5 of 5 frames done");
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
@@ -26,7 +26,7 @@ fn the_same_command_again_does_nothing() {
     let before = stamps(&out);
     // The frames, plan and ledger.
     assert_eq!(before.len(), 5 + 2);
-    // The usual bound, said; what does not change the frames.
+    // The default bound given explicitly, and options that do not change the frames.
     for options in [
         &Q16[..],
         &["--encoding", "q16", "--max-error", "0.02"],
@@ -46,11 +46,11 @@ fn the_same_command_again_does_nothing() {
 }
 
 #[test]
-fn changed_settings_are_refused_with_old_and_new_value() {
+fn changed_settings_are_rejected_with_both_values() {
     let shop = five_frames();
     convert(&shop, &Q16).expect(0);
     let before = stamps(&shop.join("out"));
-    for (options, told) in [
+    for (options, message) in [
         (&["--encoding", "q10"][..], "encoding: q16 -> q10;"),
         (
             &["--encoding", "q16", "--max-error", "0.1"],
@@ -68,7 +68,7 @@ fn changed_settings_are_refused_with_old_and_new_value() {
         let ran = convert(&shop, options)
             .expect(2)
             .tells("out: settings have changed since this job began: ")
-            .tells(told)
+            .tells(message)
             .tells("--force starts over, --keep-done keeps what is there");
         let errors = ran.errors();
         let told_errors = errors.lines().filter(|line| line.starts_with("error:"));
@@ -78,7 +78,7 @@ fn changed_settings_are_refused_with_old_and_new_value() {
 }
 
 #[test]
-fn force_starts_over_and_keep_done_keeps_what_is_there() {
+fn force_starts_over_and_keep_done_continues() {
     let shop = five_frames();
     convert(&shop, &[&Q16[..], &["--frames", "1-3"]].concat()).expect(0);
     let old = natives(&shop.join("out"));
@@ -105,7 +105,7 @@ fn force_starts_over_and_keep_done_keeps_what_is_there() {
 }
 
 #[test]
-fn a_rewritten_input_is_refused_by_name() {
+fn changed_input_is_rejected_by_name() {
     let shop = five_frames();
     convert(&shop, &Q16).expect(0);
     fs::copy(shop.join("in/f_5.bgeo"), shop.join("in/f_2.bgeo")).expect("a copy");
@@ -173,7 +173,7 @@ fn one_damaged_frame_costs_one_frame() {
 }
 
 #[test]
-fn lost_and_shortened_frames_are_made_again() {
+fn lost_and_truncated_frames_are_redone() {
     let shop = five_frames();
     convert(&shop, &Q16).expect(0);
     let whole = natives(&shop.join("out"));
@@ -186,7 +186,7 @@ fn lost_and_shortened_frames_are_made_again() {
 }
 
 #[test]
-fn frames_are_converted_as_asked_for() {
+fn conversion_options_take_effect() {
     let shop = five_frames();
     for (range, frames) in [("3-4", &[3, 4][..]), ("5,1", &[5, 1]), ("1-9", &[2])] {
         let ran = convert(&shop, &["--frames", range]).expect(0);

@@ -1,4 +1,4 @@
-//! What can be said to `spherule convert`, and what cannot be meant.
+//! Options of `spherule convert`, and combinations that are rejected.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ fn names(shop: &Workshop, file: &str) -> Vec<String> {
 }
 
 #[test]
-fn attributes_are_left_out_by_name_or_all_but_some() {
+fn attributes_are_omitted_by_name_or_wildcard() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), [1]);
     convert(&shop, &[]).expect(0);
@@ -55,10 +55,10 @@ fn attributes_are_stored_in_fewer_bits() {
         convert(&shop, &["--attributes", choices, "--force"]).expect(0);
         let object = inspected(&shop, "out/frame.0001.spf");
         let list = object["native"]["attributes"].as_array().expect("a list");
-        for (name, wanted) in ["id", "density", "velocity"].into_iter().zip(stored) {
+        for (name, expected) in ["id", "density", "velocity"].into_iter().zip(stored) {
             let found = list.iter().find(|a| a["name"] == name);
             let found = found.map_or("", |a| a["stored"].as_str().expect("a name"));
-            assert_eq!(found, wanted, "{choices}: {name}");
+            assert_eq!(found, expected, "{choices}: {name}");
         }
     }
     convert(&shop, &["--attributes", "id:f16", "--force"])
@@ -68,7 +68,7 @@ fn attributes_are_stored_in_fewer_bits() {
 
 /// Native frames are in another order than their files.
 #[test]
-fn places_in_the_file_are_kept_as_ids_if_asked() {
+fn file_indices_are_stored_as_ids_on_request() {
     let shop = Workshop::new();
     npy(&shop.join("in/f_1.npy"), 3000, 1, glam::Vec3::ZERO);
     convert(&shop, &[]).expect(0);
@@ -85,11 +85,11 @@ fn places_in_the_file_are_kept_as_ids_if_asked() {
 }
 
 #[test]
-fn what_cannot_be_meant_is_refused() {
+fn contradictory_options_are_rejected() {
     let shop = Workshop::new();
     shop.run(&["convert", "nothing", "-o", "x"]).expect(2);
     dam_break(&shop.join("in"), 1..=1);
-    for (options, told) in [
+    for (options, message) in [
         (&["--encoding", "q11"][..], "f32, q16, q10"),
         (&["--max-error", "-1"], "-1"),
         (&["--attributes", "velocity"], "write NAME:HOW"),
@@ -98,7 +98,7 @@ fn what_cannot_be_meant_is_refused() {
             &["--no-attributes", "--attributes", "a:off"],
             "cannot be used with",
         ),
-        (&["--memory", "much"], "invalid size"),
+        (&["--memory", "much"], "expected a size, such as 4GiB"),
         (
             &["--frames", "7-9"],
             "--frames: 7-9 contains none of the frames of the input: 1",
@@ -106,13 +106,13 @@ fn what_cannot_be_meant_is_refused() {
         (&["--frames", "x"], "--frames"),
         (&["--force", "--keep-done"], "cannot be used with"),
     ] {
-        convert(&shop, options).expect(2).tells(told);
+        convert(&shop, options).expect(2).tells(message);
         assert!(!shop.join("out").exists(), "{options:?}");
     }
 }
 
 #[test]
-fn a_directory_of_something_else_is_refused() {
+fn foreign_output_directory_is_rejected() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     fs::write(shop.join("out"), "a file").expect("a file");
@@ -145,7 +145,7 @@ fn a_directory_of_something_else_is_refused() {
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_place_where_even_root_may_not_write() {
+fn unwritable_file_system() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=1);
     shop.run(&["convert", "in", "-o", "/proc/nope/frames"])
@@ -154,7 +154,7 @@ fn a_place_where_even_root_may_not_write() {
 }
 
 #[test]
-fn progress_is_told_as_it_is_asked_for() {
+fn progress_modes() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     let text = convert(&shop, &["--progress", "json"]).expect(0).text();

@@ -1,4 +1,4 @@
-//! A program that is still running: waiting for what it says or writes, and signals to it.
+//! A running program: waits for its messages or files, and sends signals to it.
 
 use std::io::{BufRead, BufReader, Read};
 use std::process::{Child, Command, ExitStatus, Stdio};
@@ -14,7 +14,7 @@ pub(crate) struct Running {
     child: Child,
     /// Standard error, line by line.
     lines: Receiver<String>,
-    told: String,
+    stderr: String,
 }
 
 impl Running {
@@ -31,7 +31,7 @@ impl Running {
         Self {
             child,
             lines,
-            told: String::new(),
+            stderr: String::new(),
         }
     }
 
@@ -51,11 +51,11 @@ impl Running {
         let left = deadline.saturating_duration_since(Instant::now());
         match self.lines.recv_timeout(left) {
             Ok(line) => {
-                self.told.push_str(&line);
+                self.stderr.push_str(&line);
                 Some(line)
             }
             Err(RecvTimeoutError::Disconnected) => None,
-            Err(RecvTimeoutError::Timeout) => panic!("it hangs after:\n{}", self.told),
+            Err(RecvTimeoutError::Timeout) => panic!("it hangs after:\n{}", self.stderr),
         }
     }
 
@@ -64,7 +64,7 @@ impl Running {
     pub(crate) fn wait_until(&mut self, holds: impl Fn() -> bool) -> bool {
         let deadline = Instant::now() + DEADLINE;
         loop {
-            assert!(Instant::now() < deadline, "it hangs: {}", self.told);
+            assert!(Instant::now() < deadline, "it hangs: {}", self.stderr);
             if holds() {
                 return true;
             }
@@ -94,12 +94,12 @@ impl Running {
         let _ = self.child.kill();
     }
 
-    /// Waits for the end; what it said, and how it ended.
+    /// Waits for the end; returns standard error and the exit status.
     pub(crate) fn end(mut self) -> (String, ExitStatus) {
         let deadline = Instant::now() + DEADLINE;
         while self.next_line(deadline).is_some() {}
         let status = self.child.wait().expect("it ends");
-        (std::mem::take(&mut self.told), status)
+        (std::mem::take(&mut self.stderr), status)
     }
 }
 

@@ -97,10 +97,10 @@ fn check_and_inspect_name_a_bomb() {
     let ran = limited(&workshop, &[&check[..], &SMALL, &AWAY].concat());
     assert!(matches!(ran.code(), Some(0 | 1)), "{}", ran.errors());
     let ran = limited(&workshop, &["inspect", "in"]).expect(1);
-    let told = ran.text() + &ran.errors();
+    let output = ran.text() + &ran.errors();
     assert!(
-        told.contains("f_2.csv.gz") && told.contains("larger than"),
-        "{told}"
+        output.contains("f_2.csv.gz") && output.contains("larger than"),
+        "{output}"
     );
 }
 
@@ -111,7 +111,7 @@ fn wide_rows(prefix: &str) -> String {
 }
 
 #[test]
-fn packed_text_is_never_in_memory_as_a_whole() {
+fn compressed_text_is_streamed() {
     let count = 400_000;
     let ply = format!(
         "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\

@@ -14,7 +14,7 @@ fn one_heavy() -> Workshop {
 }
 
 #[test]
-fn what_cannot_fit_is_not_begun() {
+fn frames_beyond_memory_are_not_started() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 1000, false);
     vtk(&workshop.join("in/f_2.vtk"), 1000, false);
@@ -48,7 +48,7 @@ fn what_cannot_fit_is_not_begun() {
 }
 
 #[test]
-fn sizes_that_are_none() {
+fn invalid_sizes() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 10, false);
     for size in ["0", "", "-5", "much", "4 gallons", "1e3"] {
@@ -82,7 +82,7 @@ fn one_heavy_frame_costs_one_frame() {
 }
 
 #[test]
-fn frames_go_one_at_a_time_where_that_fits() {
+fn frames_run_one_at_a_time_if_two_do_not_fit() {
     let workshop = Workshop::new();
     for frame in 1..=3 {
         vtk(&workshop.join(format!("in/f_{frame}.vtk")), 1000, false);
@@ -105,7 +105,7 @@ fn frames_go_one_at_a_time_where_that_fits() {
 }
 
 #[test]
-fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
+fn grid_beyond_memory_is_rejected_with_its_radius() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     let smooth = ["--surface", "smooth", "--set=output.preview=false"];
@@ -121,7 +121,7 @@ fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
     let right = ["--radius", "0.02", "--memory-limit", "40MiB", "--force"];
     let ran = workshop.render(&[&smooth[..], &right].concat()).expect(0);
     assert_eq!(ran.rendered(), [1]);
-    // What is foreseen not to fit says as much of the surface.
+    // A predicted excess reports the memory of the surface.
     let tight = ["--radius", "0.02", "--memory-limit", "5MiB", "--force"];
     workshop
         .render(&[&smooth[..], &tight].concat())

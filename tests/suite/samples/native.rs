@@ -37,7 +37,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn the_index_is_told_and_the_parts_make_the_file() {
+fn index_is_printed_and_parts_add_up() {
     for encoding in ["f32", "q16", "q10"] {
         let shop = converted(&["--encoding", encoding]);
         let object = inspected(&shop, &[]);
@@ -103,7 +103,7 @@ fn the_index_is_told_and_the_parts_make_the_file() {
 }
 
 #[test]
-fn verify_finds_what_reading_does_not() {
+fn verify_detects_damage_that_reading_does_not() {
     let shop = converted(&["--encoding", "q16"]);
     assert_eq!(inspected(&shop, &["--verify"])["verified"], true);
     let text = shop.run(&["inspect", "--verify", FILE]).expect(0).text();
@@ -133,8 +133,8 @@ fn verify_finds_what_reading_does_not() {
     harm(padding);
     shop.run(&["inspect", FILE]).expect(0);
     let ran = shop.run(&["inspect", "--verify", FILE]).expect(1);
-    let told = format!("error: {FILE}: byte {padding}: between the sections are numbers");
-    let ran = ran.tells(&told).tells("convert again");
+    let message = format!("error: {FILE}: byte {padding}: between the sections are numbers");
+    let ran = ran.tells(&message).tells("convert again");
     assert!(ran.text().is_empty());
     // Nor is it overlooked when the frame is packed.
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
@@ -161,7 +161,7 @@ fn verify_finds_what_reading_does_not() {
 }
 
 #[test]
-fn large_frames_are_looked_at_by_a_sample() {
+fn large_frames_are_sampled() {
     let shop = Workshop::new();
     let count = 4_000_001;
     let particles = count.to_string();
