@@ -22,7 +22,7 @@ use crate::render::Channels;
 /// Signatures of the files that `still` may replace: OpenEXR and PNG.
 const IMAGE_SIGNATURES: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
 
-const OUTPUT_HELP: &str = "Image to write, .png or .exr; an existing image is replaced";
+const OUTPUT_HELP: &str = "Image to write: look.png or look.exr; an existing image is replaced";
 
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png

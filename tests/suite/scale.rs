@@ -210,9 +210,9 @@ fn unwritable_frame_is_reported() {
         .current_dir(workshop.path())
         .output()
         .expect("a shell");
-    Ran(output)
-        .expect(1)
-        .tells("error: 100000 particles, kdtree in a q16 file, both: no native frame: ");
+    Ran(output).expect(1).tells(
+        "error: 100000 particles, kdtree in a q16 file, both: cannot make the native frame: ",
+    );
     let report = report(&workshop);
     assert_eq!(report["cells"][0]["status"], "done");
     assert_eq!(report["cells"][1]["status"], "failed");
@@ -377,7 +377,7 @@ fn unwritable_output_directories() {
         refused(
             &workshop,
             &["-o", "theirs"],
-            &format!("{name}: is in the way"),
+            &format!("{name}: exists and was not written by `spherule scale`"),
         );
         fs::remove_file(workshop.join("theirs").join(name)).expect("a file");
     }

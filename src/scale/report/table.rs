@@ -72,7 +72,7 @@ pub fn subject(report: &ScaleReport) -> String {
         Budget::Images(images) => format!("{images} images"),
     };
     format!(
-        "{what}; {}x{}, {} samples per pixel, depth {}, {budget} per cell",
+        "{what}; {}x{}, samples per pixel {}, depth {}, {budget} per cell",
         s.width, s.height, s.samples, s.max_depth
     )
 }
