@@ -106,7 +106,7 @@ fn a_job_with_failures_only_has_a_page_that_names_them() {
     fs::write(&file, &fs::read(&file).expect("a frame")[..100]).expect("a file");
     workshop.render(&[]).expect(1);
     let shown = page(&workshop);
-    assert!(shown.contains("0 of 1 done") && shown.contains("No frame is done yet"));
+    assert!(shown.contains("0 of 1 done") && shown.contains("No frame is finished yet"));
     assert!(shown.contains("in/f_1.bgeo"), "{shown}");
 }
 
