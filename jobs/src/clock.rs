@@ -11,7 +11,7 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub(crate) enum Clock {
     /// The clock of this machine.
     System,
-    /// A clock that only advances when it is told to, or by the time that somebody sleeps.
+    /// A clock that only advances when it is messages to, or by the time that somebody sleeps.
     #[cfg(test)]
     Manual(Arc<Mutex<Instant>>),
 }

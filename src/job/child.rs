@@ -189,7 +189,7 @@ mod tests {
     #[test]
     fn reasons() {
         let by_signal = |n| ExitStatus::from_raw(n);
-        for (status, errors, wanted) in [
+        for (status, errors, expected) in [
             (
                 by_signal(6),
                 "memory allocation of 48000000000 bytes failed\n",
@@ -213,7 +213,7 @@ mod tests {
                 "exit status: 2: standard input: not a task",
             ),
         ] {
-            assert_eq!(reason(status, errors), wanted);
+            assert_eq!(reason(status, errors), expected);
         }
     }
 }

@@ -4,7 +4,7 @@
 //! value into anonymous and file-backed pages. If no data are mapped, the file-backed pages are the code of the
 //! program, a few MiB that only grow. So [`MemoryPeaks`] computes the peak of anonymous memory as `VmHWM` minus the
 //! largest sampled file-backed part, which misses nothing between two samples. If frames are mapped, their pages come
-//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::looks_only`]), so
+//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::use_samples_only`]), so
 //! samples must be taken where it is highest, at the ends of phases.
 
 use std::fs;
@@ -79,7 +79,7 @@ impl MemoryUse {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryPeaks {
     /// Heap and stacks: the larger of `total` minus `file` and any sample of `RssAnon`, or only the latter
-    /// ([`Self::looks_only`]).
+    /// ([`Self::use_samples_only`]).
     pub anonymous: u64,
     /// Mapped files, largest sample ([`MemoryUse::file`]).
     pub file: u64,
@@ -92,12 +92,12 @@ pub struct MemoryPeaks {
 
 impl MemoryPeaks {
     /// From now on data files are mapped: only samples of anonymous memory count.
-    pub fn looks_only(&mut self) {
+    pub fn use_samples_only(&mut self) {
         self.use_samples_only = true;
     }
 
     /// Adds the sample `now`.
-    pub fn take_in(&mut self, now: MemoryUse) {
+    pub fn update(&mut self, now: MemoryUse) {
         self.file = self.file.max(now.file);
         self.total = self.total.max(now.peak);
         self.sampled_anonymous = self.sampled_anonymous.max(now.anonymous);
@@ -122,22 +122,22 @@ mod tests {
             anonymous,
             file,
         };
-        peaks.take_in(use_of(100, 30, 8));
+        peaks.update(use_of(100, 30, 8));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (92, 8, 100));
-        peaks.take_in(use_of(100, 40, 10));
+        peaks.update(use_of(100, 40, 10));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (90, 10, 100));
         // The maps were closed before the second sample; the peak remains.
-        peaks.take_in(use_of(140, 95, 60));
+        peaks.update(use_of(140, 95, 60));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (95, 60, 140));
     }
 
     #[test]
     fn mapped_pages_are_not_anonymous_memory() {
         let mut peaks = MemoryPeaks::default();
-        peaks.looks_only();
+        peaks.use_samples_only();
         // The map was larger between two samples.
         for (peak, anonymous, file) in [(1000, 50, 600), (1000, 40, 20)] {
-            peaks.take_in(MemoryUse {
+            peaks.update(MemoryUse {
                 peak,
                 anonymous,
                 file,

@@ -35,9 +35,9 @@ pub(super) fn write_frame(
         publish(path, &png).map_err(at(path))?;
     }
     if report.bytes.file.total() > 0 {
-        peaks.looks_only();
+        peaks.use_samples_only();
     }
-    peaks.take_in(frame.memory);
+    peaks.update(frame.memory);
     // Encode and publish the EXR
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
     let mut sampler = MemorySampler {
@@ -56,7 +56,7 @@ pub(super) fn write_frame(
     file.commit().map_err(at(&task.image))?;
     report.seconds.encode = start.elapsed().as_secs_f64();
     let now = MemoryUse::now();
-    peaks.take_in(now);
+    peaks.update(now);
     report.rss = RssSummary {
         anonymous_peak: peaks.anonymous,
         file_peak: peaks.file,
@@ -80,7 +80,7 @@ impl<W: Write> Write for MemorySampler<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.samples < MAX_SAMPLES {
             self.samples += 1;
-            self.peaks.take_in(MemoryUse::now());
+            self.peaks.update(MemoryUse::now());
         }
         self.out.write(bytes)
     }

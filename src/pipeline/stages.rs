@@ -209,7 +209,7 @@ impl WriteStage<'_> {
     ) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
         let (number, outputs) = (frame.task.frame, frame.task.outputs());
         if self.maps_files {
-            peaks.looks_only();
+            peaks.use_samples_only();
         }
         let write = || Ok(write_frame(self.setup, frame, peaks)?);
         let (report, film) =

@@ -63,8 +63,8 @@ fn turntable_has_a_constant_distance() {
     let matrices = matrices(&workshop);
     // On the axis of the thesis's box; there the nearer lower rim is as far from the middle of the picture as
     // the farther upper one: a little lower than the middle of the box.
-    let told = &check(&workshop, &[])["camera"]["look_at"];
-    let look_at: [f64; 3] = std::array::from_fn(|i| told[i].as_f64().expect("a number"));
+    let messages = &check(&workshop, &[])["camera"]["look_at"];
+    let look_at: [f64; 3] = std::array::from_fn(|i| messages[i].as_f64().expect("a number"));
     let look_at = DVec3::from_array(look_at);
     assert!(
         look_at.distance(DVec3::new(5.0, 5.88, 0.0)) < 0.05,
@@ -187,7 +187,7 @@ fn changed_key_is_rejected_by_name() {
     workshop
         .run(&["render", "my.toml", "--set", "camera.key.0.up=[1,0,0]"])
         .expect(2)
-        .tells("camera.key.1.up: (not set) -> [1.0, 0.0, 0.0]");
+        .prints("camera.key.1.up: (not set) -> [1.0, 0.0, 0.0]");
 }
 
 fn check(workshop: &Workshop, options: &[&str]) -> Value {
@@ -241,10 +241,10 @@ look_at = [5.0, 6.5, 0.0]
     let workshop = workshop(over);
     let what = "error: camera.key: frame 4, between the keys of frames 2 and 6: up is zero or points \
                 along the view";
-    workshop.run(&["check", "my.toml"]).expect(2).tells(what);
+    workshop.run(&["check", "my.toml"]).expect(2).prints(what);
     // Whichever frames are expected now.
     let arguments = ["render", "my.toml", "--frames", "1-3"];
-    workshop.run(&arguments).expect(2).tells(what);
+    workshop.run(&arguments).expect(2).prints(what);
     assert!(!workshop.join("out").exists());
 }
 

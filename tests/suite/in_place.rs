@@ -27,7 +27,7 @@ fn same_as_decoded(shop: &Workshop, native: &str, options: &[&str]) {
 }
 
 /// The images of `native` are the same, to the byte, however its particles come to be traced; `is_decoded` says in
-/// which ways the user must be told that they are decoded.
+/// which ways the user must be messages that they are decoded.
 #[track_caller]
 fn same_in_all_ways(
     shop: &Workshop,
@@ -164,16 +164,16 @@ fn damage_costs_the_frame_and_is_named() {
     flip(&file(2), 4096 + 100);
     render(&shop, "native", "out", &[])
         .expect(1)
-        .tells("frame.0002.spf")
-        .tells("the positions are damaged")
-        .tells("convert again");
+        .prints("frame.0002.spf")
+        .prints("the positions are damaged")
+        .prints("convert again");
     assert_eq!(images(&shop.join("out")).len(), 2 * 2);
     // Cut off.
     let bytes = fs::read(file(3)).expect("readable");
     fs::write(file(3), &bytes[..bytes.len() / 2]).expect("writable");
     render(&shop, "native", "cut", &[])
         .expect(1)
-        .tells("frame.0003.spf");
+        .prints("frame.0003.spf");
     assert_eq!(images(&shop.join("cut")).len(), 2);
 }
 
@@ -211,7 +211,7 @@ fn far_from_zero() {
     }
     render(&shop, "apart", "apart-out", &[])
         .expect(0)
-        .tells("another origin");
+        .prints("another origin");
 }
 
 /// Memory for the program and the image, not for two million particles: as plain numbers they and a tree

@@ -65,7 +65,7 @@ fn a_render_from_start_to_end() {
     for options in [&[][..], &["--isolate"]] {
         let workshop = one_damaged();
         let ran = workshop.render(&[&["--progress", "json"], options].concat());
-        let ran = ran.expect(1).tells("error: frame 2: ");
+        let ran = ran.expect(1).prints("error: frame 2: ");
         let events = events(&ran);
         assert_eq!(
             kinds(&events),
@@ -147,7 +147,7 @@ fn a_conversion_and_an_experiment() {
     let ran = workshop
         .run(&arguments)
         .expect(0)
-        .tells("Images per second");
+        .prints("Images per second");
     let found = events(&ran);
     assert_eq!(kinds(&found), ["start", "cell_done", "cell_done", "end"]);
     assert_eq!(found[3]["done"], 2);

@@ -36,7 +36,7 @@ fn report(workshop: &Workshop) -> Value {
 #[track_caller]
 fn refused(workshop: &Workshop, options: &[&str], expected: &str) {
     let before = files(workshop.path());
-    let ran = run(workshop, options).expect(2).tells(expected);
+    let ran = run(workshop, options).expect(2).prints(expected);
     assert!(ran.text().is_empty(), "{}", ran.text());
     assert!(!ran.errors().contains("panicked"), "{}", ran.errors());
     assert!(!workshop.join("scale").exists());
@@ -111,7 +111,7 @@ fn native_frames_are_traced_in_place() {
     let representations = ["--representations", "memory,f32,q16,q10"];
     let structures = ["--structures", "lbvh,kdtree"];
     let ran = run(&workshop, &[counts, representations, structures].concat()).expect(0);
-    let ran = ran.tells("native frames (f32, q16, q10) are traced in place");
+    let ran = ran.prints("native frames (f32, q16, q10) are traced in place");
     for expected in [
         "kdtree, q10 file",
         "Memory by part",
@@ -210,7 +210,7 @@ fn unwritable_frame_is_reported() {
         .current_dir(workshop.path())
         .output()
         .expect("a shell");
-    Ran(output).expect(1).tells(
+    Ran(output).expect(1).prints(
         "error: 100000 particles, kdtree in a q16 file, both: cannot make the native frame: ",
     );
     let report = report(&workshop);
@@ -235,7 +235,7 @@ fn user_particles() {
         ],
     );
     ran.expect(0)
-        .tells("particles, which replace 1000000, 10000000");
+        .prints("particles, which replace 1000000, 10000000");
     let report = report(&workshop);
     assert_eq!(report["settings"]["input"]["frame"], 2);
     let all = &report["settings"]["input"]["particles"];
@@ -250,7 +250,7 @@ fn user_particles() {
     }
     run(&workshop, &["--input", "in", "--particles", "1"])
         .expect(0)
-        .tells("has 2 frames; measuring frame 1 (--frame selects another)");
+        .prints("has 2 frames; measuring frame 1 (--frame selects another)");
 }
 
 #[test]
@@ -326,11 +326,11 @@ fn options_have_ranges() {
             .chain([option, value])
             .collect();
         let ran = workshop.run(&[&["scale"], &options[..]].concat());
-        ran.expect(2).tells(expected);
+        ran.expect(2).prints(expected);
     }
     for seconds in ["0", "-1", "nan", "inf"] {
         let ran = workshop.run(&["scale", "--seconds", seconds]).expect(2);
-        ran.tells("expected seconds above 0");
+        ran.prints("expected seconds above 0");
     }
     refused(&workshop, &["--seconds", "1"], "cannot be used with");
     assert!(files(workshop.path()).is_empty());
@@ -401,7 +401,7 @@ fn cell_beyond_memory_is_listed_as_failed() {
         .expect("a shell");
     let ran = Ran(output)
         .expect(1)
-        .tells("error: 4000000000 particles, lbvh in memory, both: out of memory: ");
+        .prints("error: 4000000000 particles, lbvh in memory, both: out of memory: ");
     assert!(
         ran.text().contains("failed: 4000000000 particles"),
         "{}",

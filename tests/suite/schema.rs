@@ -64,9 +64,9 @@ fn job_settings_are_kept_and_may_change() {
     workshop
         .render(&["--progress", "sideways"])
         .expect(2)
-        .tells("sideways");
+        .prints("sideways");
     workshop
         .render(&["--threads", "-3"])
         .expect(2)
-        .tells("--threads: job.threads: expected \"all\" or a whole number from 1");
+        .prints("--threads: job.threads: expected \"all\" or a whole number from 1");
 }

@@ -18,7 +18,7 @@ fn status_from_first_to_last_frame() {
     workshop
         .run(&["status", "out"])
         .expect(2)
-        .tells("out: no job here");
+        .prints("out: no job here");
     let path = workshop.join("in/f_2.bgeo");
     let bytes = fs::read(&path).expect("a frame");
     fs::write(&path, &bytes[..bytes.len() / 2]).expect("a file");

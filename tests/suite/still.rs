@@ -91,7 +91,7 @@ fn only_images_are_replaced() {
 
     fs::write(workshop.join("notes.png"), b"not a picture").expect("a file");
     let refused = |options: &[&str], why: &str| {
-        still(&workshop, options).expect(2).tells(why);
+        still(&workshop, options).expect(2).prints(why);
     };
     refused(
         &["-o", "notes.png"],
@@ -121,7 +121,7 @@ fn only_images_are_replaced() {
     std::os::unix::fs::symlink("../a.png", workshop.join("in/f_6.bgeo")).expect("a link");
     let ran = still(&workshop, &["--frame", "1", "-o", "a.png"]);
     ran.expect(2)
-        .tells("a.png: is an input and would be overwritten;");
+        .prints("a.png: is an input and would be overwritten;");
 }
 
 #[test]
@@ -131,7 +131,7 @@ fn images_of_a_job_are_not_replaced() {
     for name in ["out/f.0001.exr", "out/f.0001.png", "out/f.0005.exr"] {
         still(&workshop, &["-o", name])
             .expect(2)
-            .tells("is an image of the job in that directory; choose another name");
+            .prints("is an image of the job in that directory; choose another name");
     }
     still(&workshop, &["-o", "out/look.png"]).expect(0);
     workshop.run(&["verify", "out"]).expect(0);
@@ -145,7 +145,7 @@ fn a_frame_that_cannot_be_read_has_failed() {
     fs::write(&file, &good[..good.len() / 2]).expect("a file");
     still(&workshop, &["--frame", "5", "-o", "a.png"])
         .expect(1)
-        .tells("error: frame 5: ");
+        .prints("error: frame 5: ");
     assert!(!workshop.join("a.png").exists());
     still(&workshop, &["--frame", "4", "-o", "a.png"]).expect(0);
 }

@@ -117,11 +117,11 @@ fn damage_in_the_middle_is_an_error_and_changes_nothing() {
         (with_details("{\"\\ud800\":1}"), 1),
         (with_details(&("[".repeat(300) + &"]".repeat(300))), 1),
     ];
-    for (damaged, wanted) in cases {
+    for (damaged, expected) in cases {
         fs::write(ledger_path(dir.path(), "w"), &damaged).unwrap();
         let error = Ledger::read(dir.path()).unwrap_err();
         assert!(
-            matches!(&error, JobError::LedgerDamaged { line, .. } if *line == wanted),
+            matches!(&error, JobError::LedgerDamaged { line, .. } if *line == expected),
             "{error}"
         );
         let text_of = error.to_string();

@@ -313,7 +313,7 @@ fn map_applies_to_the_existing_colour() {
     workshop
         .render(&["--map", "turbo"])
         .expect(0)
-        .tells("colour by `velocity`");
+        .prints("colour by `velocity`");
     assert!(kept("color = ").starts_with("color = { map = \"turbo\" }"));
     let plain = workshop.render_to("plain", &[]).expect(0);
     drop(plain);
@@ -433,7 +433,7 @@ fn thread_count_is_limited() {
     workshop
         .render(&["--threads", "1000"])
         .expect(0)
-        .tells("note: --threads 1000: ");
+        .prints("note: --threads 1000: ");
     for command in [
         &["verify", "out"][..],
         &["convert", "in", "-o", "native"],
@@ -441,7 +441,7 @@ fn thread_count_is_limited() {
     ] {
         let arguments = [command, &["--threads", "2000"]].concat();
         let ran = workshop.run(&arguments).expect(2);
-        ran.tells("2000 is not in 1..=1024");
+        ran.prints("2000 is not in 1..=1024");
     }
 }
 

@@ -42,7 +42,7 @@ fn frames_without_particles_show_the_background() {
     let ran = workshop
         .render(&BACKGROUND)
         .expect(0)
-        .tells("3 frames, up to 0 particles");
+        .prints("3 frames, up to 0 particles");
     assert_eq!(ran.rendered(), [1, 2, 3]);
     assert!(!ran.errors().contains("radius"), "{}", ran.errors());
     let pixels = pixels(&workshop, "out/f.0002.exr");
@@ -115,12 +115,12 @@ fn nan_particles_are_dropped_and_counted() {
     workshop
         .render(&[])
         .expect(0)
-        .tells("frame 1: 2 particles left out");
+        .prints("frame 1: 2 particles left out");
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::NAN; 9]).expect("a file");
     workshop
         .render(&["--force"])
         .expect(0)
-        .tells("frame 1: 9 particles left out");
+        .prints("frame 1: 9 particles left out");
 }
 
 #[test]
@@ -150,7 +150,7 @@ fn truncated_file_may_still_be_growing() {
         let ran = workshop
             .render(&[])
             .expect(1)
-            .tells("error: frame 3: in/f_3.bgeo: ");
+            .prints("error: frame 3: in/f_3.bgeo: ");
         assert!(ran.errors().contains("failed: 3"));
         if length > 1 {
             assert!(

@@ -71,8 +71,8 @@ fn inspect_continues_after_a_missing_path() {
     let ran = workshop
         .run(&[&["inspect"], &arguments[..]].concat())
         .expect(1)
-        .tells("error: nowhere")
-        .tells("error: in/f_7.bgeo: ");
+        .prints("error: nowhere")
+        .prints("error: in/f_7.bgeo: ");
     assert_eq!(ran.text().matches("10422 particles").count(), 2);
 }
 

@@ -48,7 +48,7 @@ fn invalid_output_names() {
     workshop
         .run(&[&several("3-9")[..], &SMALL].concat())
         .expect(0)
-        .tells("1 of 1 frames done");
+        .prints("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
     let ending = "--output: output.path: must end in .exr (example: out/frame.####.exr)";
@@ -79,7 +79,7 @@ fn one_frame_needs_no_number_in_its_name() {
     let arguments = [&one[..], &SMALL].concat();
     let check = [&["check"], &arguments[1..]].concat();
     workshop.run(&check).expect(0);
-    workshop.run(&arguments).expect(0).tells("1 of 1 frames");
+    workshop.run(&arguments).expect(0).prints("1 of 1 frames");
     // The picture is that of the whole sequence.
     let all = [&["render", "in", "-o", "all/f.####.exr"][..], &SMALL].concat();
     workshop.run(&all).expect(0);
@@ -90,7 +90,7 @@ fn one_frame_needs_no_number_in_its_name() {
     workshop
         .run(&arguments)
         .expect(0)
-        .tells("1 of 1 frames are done already");
+        .prints("1 of 1 frames are done already");
     workshop.run(&["render", "one/job.toml"]).expect(0);
     // Another frame would take the place of the first.
     let mut other = arguments.clone();
@@ -239,8 +239,8 @@ fn existing_manifest_is_not_overwritten() {
     let ran = workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.toml: this job would write its manifest here")
-        .tells("choose another output directory, or move the file away");
+        .prints("out/job.toml: this job would write its manifest here")
+        .prints("choose another output directory, or move the file away");
     assert!(ran.rendered().is_empty());
     workshop.render(&["--force"]).expect(2);
     let left = files(&workshop.join("out"));

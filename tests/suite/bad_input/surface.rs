@@ -57,8 +57,8 @@ fn unreachable_threshold_gives_an_empty_image() {
     dam_break(&workshop.join("in"), [1]);
     smooth(&workshop, &["--set", "surface.threshold=4"])
         .expect(0)
-        .tells("the smooth surface is empty: with radius")
-        .tells("surface.threshold = 4");
+        .prints("the smooth surface is empty: with radius")
+        .prints("surface.threshold = 4");
     assert!(is_empty(&workshop, 1));
 }
 
@@ -84,8 +84,8 @@ fn radii_that_vary_a_thousandfold() {
     write::vtk::write(&workshop.join("in/f_1.vtk"), &centers, &[radius]).expect("a file");
     smooth(&workshop, &[])
         .expect(0)
-        .tells("radii differ; a smooth surface has one for all, here their median")
-        .tells("(input.radius sets another)");
+        .prints("radii differ; a smooth surface has one for all, here their median")
+        .prints("(input.radius sets another)");
     let options = [&["--surface", "union", "--force"][..], &BACKGROUND].concat();
     let ran = workshop.render(&options).expect(0);
     assert!(!ran.errors().contains("radii differ"), "{}", ran.errors());

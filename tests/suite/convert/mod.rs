@@ -35,7 +35,7 @@ fn native_frames_contain_the_source_data() {
         ("q10", &["--encoding", "q10", "--max-error", "0.05"][..]),
     ] {
         let arguments = [&["convert", "in", "-o", encoding][..], options].concat();
-        shop.run(&arguments).expect(0).tells("2 of 2 frames");
+        shop.run(&arguments).expect(0).prints("2 of 2 frames");
         for frame in 1..=2 {
             let from = inspected(&shop, &format!("in/f_{frame}.bgeo"));
             let to = inspected(&shop, &format!("{encoding}/frame.000{frame}.spf"));

@@ -39,8 +39,8 @@ fn attributes_are_omitted_by_name_or_wildcard() {
     }
     convert(&shop, &["--attributes", "pressure:off", "--force"])
         .expect(2)
-        .tells("--attributes: no frame has `pressure`; there are ")
-        .tells("`density`");
+        .prints("--attributes: no frame has `pressure`; there are ")
+        .prints("`density`");
 }
 
 #[test]
@@ -63,7 +63,7 @@ fn attributes_are_stored_in_fewer_bits() {
     }
     convert(&shop, &["--attributes", "id:f16", "--force"])
         .expect(1)
-        .tells("attribute id holds ids");
+        .prints("attribute id holds ids");
 }
 
 /// Native frames are in another order than their files.
@@ -106,7 +106,7 @@ fn contradictory_options_are_rejected() {
         (&["--frames", "x"], "--frames"),
         (&["--force", "--keep-done"], "cannot be used with"),
     ] {
-        convert(&shop, options).expect(2).tells(message);
+        convert(&shop, options).expect(2).prints(message);
         assert!(!shop.join("out").exists(), "{options:?}");
     }
 }
@@ -118,7 +118,7 @@ fn foreign_output_directory_is_rejected() {
     fs::write(shop.join("out"), "a file").expect("a file");
     convert(&shop, &[])
         .expect(2)
-        .tells("out: is a file, but a directory for the frames is needed");
+        .prints("out: is a file, but a directory for the frames is needed");
     fs::remove_file(shop.join("out")).expect("a file");
 
     // A job that renders, and the other way round.
@@ -126,12 +126,12 @@ fn foreign_output_directory_is_rejected() {
     let before = files(&shop.join("out"));
     convert(&shop, &[])
         .expect(2)
-        .tells("out: contains a job of `render`, not of `convert`; choose another directory");
+        .prints("out: contains a job of `render`, not of `convert`; choose another directory");
     assert!(files(&shop.join("out")) == before);
     shop.run(&["convert", "in", "-o", "native"]).expect(0);
     shop.render_to("native", &[])
         .expect(2)
-        .tells("native: contains a job of `convert`, not of `render`");
+        .prints("native: contains a job of `convert`, not of `render`");
 
     // Frames are not converted onto themselves.
     let before = natives(&shop.join("native"));
@@ -139,7 +139,7 @@ fn foreign_output_directory_is_rejected() {
     fs::remove_file(ledger_path(&shop.join("native"))).expect("the ledger");
     shop.run(&["convert", "native", "-o", "native"])
         .expect(2)
-        .tells("native/frame.0001.spf: the conversion would overwrite its own input");
+        .prints("native/frame.0001.spf: the conversion would overwrite its own input");
     assert!(natives(&shop.join("native")) == before);
 }
 
@@ -150,7 +150,7 @@ fn unwritable_file_system() {
     dam_break(&shop.join("in"), 1..=1);
     shop.run(&["convert", "in", "-o", "/proc/nope/frames"])
         .expect(2)
-        .tells("error: /proc/nope");
+        .prints("error: /proc/nope");
 }
 
 #[test]

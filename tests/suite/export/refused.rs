@@ -17,7 +17,7 @@ fn refused(workshop: &Workshop, arguments: &[&str], expected: &str) {
 
 #[track_caller]
 fn only(workshop: &Workshop, arguments: &[&str], expected: &str) {
-    let ran = workshop.run(arguments).expect(2).tells(expected);
+    let ran = workshop.run(arguments).expect(2).prints(expected);
     assert!(ran.text().is_empty() && !ran.errors().contains("panicked"));
     assert!(!workshop.join("new.yaml").exists() && !workshop.join("data/slurm-logs").exists());
 }
@@ -96,7 +96,7 @@ fn the_manifest_is_not_overwritten() {
     for to in ["data/job.toml", "data/../data/job.toml"] {
         let arguments = ["export", "slurm", "data/job.toml", "-o", to];
         let ran = workshop.run(&arguments).expect(2);
-        let _ = ran.tells("is the manifest itself");
+        let _ = ran.prints("is the manifest itself");
     }
     assert_eq!(
         fs::read(workshop.join("data/job.toml")).expect("a manifest"),

@@ -120,7 +120,7 @@ fn tasks_are_few_enough_for_an_array() {
         &["data/job.toml", "--max-tasks", "3", "--chunk", "2"],
     )
     .expect(0);
-    let ran = ran.tells("3 tasks of 5 frames, because 2 would give 7 tasks");
+    let ran = ran.prints("3 tasks of 5 frames, because 2 would give 7 tasks");
     assert_eq!(chunks(&ran.text()).concat(), FRAMES);
     assert!(
         ran.text()
@@ -138,11 +138,11 @@ fn script_creates_the_log_directory() {
     let logs = workshop.join("data/slurm-logs");
     let ran = export(&workshop, &["data/job.toml"]).expect(0);
     assert!(!logs.exists(), "what only prints makes nothing");
-    let ran = ran.tells("mkdir -p '");
+    let ran = ran.prints("mkdir -p '");
     let options = ["data/job.toml", "-o", "array.sh"];
     export(&workshop, &options)
         .expect(0)
-        .tells("sbatch array.sh");
+        .prints("sbatch array.sh");
     assert!(logs.is_dir());
     let script = fs::read_to_string(workshop.join("array.sh")).expect("a script");
     assert_eq!(script, ran.text());

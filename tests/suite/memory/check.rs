@@ -80,8 +80,8 @@ fn check_does_not_change_a_started_job() {
     assert_eq!(answer(&ran)["frames"], json["frames"]);
     check(&workshop, &["--max-depth", "5"])
         .expect(2)
-        .tells("error: ")
-        .tells("render.max_depth: 3 -> 5");
+        .prints("error: ")
+        .prints("render.max_depth: 3 -> 5");
     check(&workshop, &["--max-depth", "5", "--force"]).expect(0);
     check(&workshop, &["--max-depth", "5", "--keep-done"]).expect(0);
     assert_eq!(before, (files(&out), stamps(&out)));
@@ -102,17 +102,17 @@ fn check_names_reasons_why_render_fails() {
     let workshop = frames();
     check(&workshop, &["--memory-limit", "1MiB"])
         .expect(2)
-        .tells("error: no frame fits into memory");
+        .prints("error: no frame fits into memory");
     fs::write(workshop.join("out"), "a file").expect("a file");
     check(&workshop, &[])
         .expect(2)
-        .tells("out: is a file, but a directory for the images is needed");
+        .prints("out: is a file, but a directory for the images is needed");
     fs::remove_file(workshop.join("out")).expect("the file");
     fs::create_dir(workshop.join("out")).expect("a directory");
     fs::write(workshop.join("out/job.toml"), "theirs = true\n").expect("a file");
     let ran = check(&workshop, &["--json"])
         .expect(2)
-        .tells("out/job.toml: this job would write its manifest here");
+        .prints("out/job.toml: this job would write its manifest here");
     let json = answer(&ran);
     assert_eq!(json["problems"].as_array().map(Vec::len), Some(1));
     assert_eq!(files(&workshop.join("out")).len(), 1);
@@ -130,7 +130,7 @@ fn a_directory_without_permission() {
     if fs::write(out.join("probe"), "").is_err() {
         check(&workshop, &[])
             .expect(2)
-            .tells("cannot be written")
-            .tells("check its permissions");
+            .prints("cannot be written")
+            .prints("check its permissions");
     }
 }

@@ -88,12 +88,12 @@ fn torture(workers: usize) {
         let mut running = team.remove(0);
         wait(&mut running, moment, &out);
         running.kill();
-        let (told, status) = running.end();
+        let (messages, status) = running.end();
         if status.code().is_none() {
             kills += 1;
         } else {
             // It was faster; there is no other way to end.
-            assert_eq!(status.code(), Some(0), "{moment:?}: {told}");
+            assert_eq!(status.code(), Some(0), "{moment:?}: {messages}");
             done += 1;
         }
         all_is_whole(&out, &whole, moment);
@@ -135,8 +135,8 @@ fn torture(workers: usize) {
 #[track_caller]
 fn finish(team: Vec<Running>) {
     for running in team {
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(0), "{told}");
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{messages}");
     }
 }
 
@@ -179,8 +179,8 @@ fn wait(running: &mut Running, moment: Moment, out: &Path) {
             names.keys().any(|name| name.starts_with("frame."))
         }),
         Moment::Recorded => running.wait_until(|| lengths() != recorded),
-        Moment::Images(wanted) => running.wait_until(|| count(".exr") >= wanted),
-        Moment::Previews(wanted) => running.wait_until(|| count(".png") >= wanted),
+        Moment::Images(expected) => running.wait_until(|| count(".exr") >= expected),
+        Moment::Previews(expected) => running.wait_until(|| count(".png") >= expected),
     };
 }
 
@@ -199,7 +199,11 @@ fn all_is_whole(out: &Path, whole: &Files, moment: Moment) {
     for (name, length) in reported {
         let bytes = made.get(&name).map_or(length, |b| b.len() as u64);
         assert_eq!(bytes, length, "{moment:?}: {name} is reported done");
-        let wanted = whole.get(&name).map(|b| b.len() as u64);
-        assert_eq!(wanted, Some(length), "{moment:?}: {name} is reported done");
+        let expected = whole.get(&name).map(|b| b.len() as u64);
+        assert_eq!(
+            expected,
+            Some(length),
+            "{moment:?}: {name} is reported done"
+        );
     }
 }

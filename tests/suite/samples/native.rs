@@ -134,7 +134,7 @@ fn verify_detects_damage_that_reading_does_not() {
     shop.run(&["inspect", FILE]).expect(0);
     let ran = shop.run(&["inspect", "--verify", FILE]).expect(1);
     let message = format!("error: {FILE}: byte {padding}: between the sections are numbers");
-    let ran = ran.tells(&message).tells("convert again");
+    let ran = ran.prints(&message).prints("convert again");
     assert!(ran.text().is_empty());
     // Nor is it overlooked when the frame is packed.
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
@@ -146,7 +146,7 @@ fn verify_detects_damage_that_reading_does_not() {
     assert!(ran.text().contains("bytes per particle"));
     shop.run(&["inspect", "--verify", "packed.spf.gz"])
         .expect(1)
-        .tells("error: packed.spf.gz: byte ");
+        .prints("error: packed.spf.gz: byte ");
     // In a section: all of a small frame is read and compared.
     for section in &sections {
         let at = whole(&section["offset"]);
@@ -154,8 +154,8 @@ fn verify_detects_damage_that_reading_does_not() {
         for options in [&["inspect", FILE][..], &["inspect", "--verify", FILE]] {
             shop.run(options)
                 .expect(1)
-                .tells(&format!("error: {FILE}: byte {at}: "))
-                .tells("are damaged: the checksum differs; convert again");
+                .prints(&format!("error: {FILE}: byte {at}: "))
+                .prints("are damaged: the checksum differs; convert again");
         }
     }
 }
@@ -194,12 +194,12 @@ fn large_frames_are_sampled() {
     bytes[64 + 192 * 3 + 7] ^= 0x7f;
     fs::write(shop.join("a.spf"), bytes).expect("a file");
     assert_eq!(json(&[])["bounds"], object["bounds"]);
-    inspect(&["--verify"]).expect(1).tells(
+    inspect(&["--verify"]).expect(1).prints(
         "error: a.spf: byte 64: the positions are damaged: the checksum differs; convert again",
     );
 }
 
-/// Foreign files are read whole anyway; that it is asked for is told.
+/// Foreign files are read whole anyway; that it is asked for is messages.
 #[test]
 fn verify_reads_other_formats() {
     let shop = Workshop::new();
@@ -213,5 +213,5 @@ fn verify_reads_other_formats() {
     fs::write(shop.join("a.xyz"), "2\n\nA 0 0 0\nA 0 x 0\n").expect("a file");
     shop.run(&["inspect", "--verify", "a.xyz"])
         .expect(1)
-        .tells("error: a.xyz: byte ");
+        .prints("error: a.xyz: byte ");
 }

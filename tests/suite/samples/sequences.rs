@@ -165,16 +165,16 @@ fn part_can_be_selected_on_the_command_line() {
     workshop
         .run(&[&arguments[..], &size, &["--force"]].concat())
         .expect(0)
-        .tells("each step has the parts fluid, obstacle; used: obstacle");
+        .prints("each step has the parts fluid, obstacle; used: obstacle");
     let arguments = ["render", &input, "-o", "g.exr", "--parts", "wall"];
     workshop
         .run(&arguments)
         .expect(2)
-        .tells("no part is called `wall`; the parts are fluid, obstacle");
+        .prints("no part is called `wall`; the parts are fluid, obstacle");
     workshop
         .run(&["inspect", &input])
         .expect(0)
-        .tells("each step has the parts fluid, obstacle");
+        .prints("each step has the parts fluid, obstacle");
 }
 
 #[test]
@@ -198,9 +198,9 @@ fn file_metadata_is_reported() {
     workshop
         .run(&[&arguments[..], &size].concat())
         .expect(0)
-        .tells(cell)
-        .tells(names)
-        .tells("colour by `element`, range 1 to 8");
+        .prints(cell)
+        .prints(names)
+        .prints("colour by `element`, range 1 to 8");
 }
 
 #[test]

@@ -159,7 +159,7 @@ fn directory_without_a_job() {
     let workshop = rendered("1");
     let refused = |arguments: &[&str], what: &str| {
         let ran = workshop.run(&[&["verify"][..], arguments].concat());
-        ran.expect(2).tells(what);
+        ran.expect(2).prints(what);
     };
     refused(&["in"], "in: no job here (no job.plan.json)");
     refused(&["none"], "none: no job here");
@@ -187,7 +187,7 @@ fn damaged_frames_are_redone_on_request() {
     let damaged = images(&out);
     let ran = workshop.run(&["verify", "out", "--requeue-bad"]);
     ran.expect(1)
-        .tells("requeued: 1,3; the next run of the job repeats them");
+        .prints("requeued: 1,3; the next run of the job repeats them");
     assert_eq!(images(&out), damaged);
     let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
     let first = &objects(&ran)[0];
