@@ -191,7 +191,7 @@ fn by_the_crate(film: &Film) -> usize {
 
 /// The planes of `film` that are among `channels`.
 fn with(film: &Film, channels: Channels) -> Film {
-    let plane = |plane: &Option<Vec<Vec3>>, wanted: bool| plane.clone().filter(|_| wanted);
+    let plane = |plane: &Option<Vec<Vec3>>, is_stored: bool| plane.clone().filter(|_| is_stored);
     Film {
         width: film.width,
         height: film.height,

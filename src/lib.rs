@@ -26,8 +26,8 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
-pub mod failure;
 pub mod hdr;
+pub mod job;
 pub mod manifest;
 pub mod math;
 pub mod metrics;

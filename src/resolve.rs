@@ -41,7 +41,7 @@ pub enum ResolveError {
         what: String,
     },
     /// No frame has the requested attribute.
-    #[error("{key}: no attribute `{name}` in any frame looked at; there are {has}")]
+    #[error("{key}: no attribute `{name}` in the sampled frames; available: {has}")]
     MissingAttribute {
         /// The manifest's key.
         key: &'static str,
@@ -52,8 +52,8 @@ pub enum ResolveError {
     },
     /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
-        "input.radius: the frames bring none, and particles that are few, in one place or far apart \
-         do not tell it"
+        "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \
+         distant particles"
     )]
     NoRadius,
     /// The radius is too small: squares of lengths would underflow.
@@ -372,8 +372,8 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {
-    let asked = manifest.render.background;
-    asked.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
+    let background = manifest.render.background;
+    background.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
 }
 
 /// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.

@@ -15,7 +15,7 @@ pub struct Attribute {
 
 /// The numbers of an attribute in the type of the file, so that ids stay exact.
 #[derive(Debug, Clone, PartialEq)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub enum AttributeData {
     I8(Vec<i8>),
     U8(Vec<u8>),

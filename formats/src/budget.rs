@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_left_is_told_in_plain_units() {
+    fn remaining_time_has_readable_units() {
         let budget = MemoryBudget::new(64 << 20, "raise the limit");
         assert_eq!(budget.check(64 << 20, "it is"), Ok(()));
         let error = |budget: MemoryBudget| budget.check(u64::MAX, "it is").unwrap_err().to_string();

@@ -73,14 +73,14 @@ impl ParseError {
 
     /// The same fault at the same offset, with the message changed by `reword`.
     #[must_use]
-    pub fn retold(self, tell: impl FnOnce(&str) -> String) -> Self {
+    pub fn map_message(self, message: impl FnOnce(&str) -> String) -> Self {
         match self {
             Self::Malformed { at, what } => Self::Malformed {
                 at,
-                what: one_line(tell(&what)),
+                what: one_line(message(&what)),
             },
-            Self::Unsupported { what } => Self::unsupported(tell(&what)),
-            Self::TooLarge { what } => Self::too_large(tell(&what)),
+            Self::Unsupported { what } => Self::unsupported(message(&what)),
+            Self::TooLarge { what } => Self::too_large(message(&what)),
         }
     }
 
@@ -149,13 +149,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_errors_quote_stays_in_its_line() {
+    fn quoted_text_stays_on_its_line() {
         let name = "a\nb\u{1b}[2J";
         let errors = [
             ParseError::malformed(3, name),
             ParseError::unsupported(name),
-            ParseError::unsupported("it").retold(|it| format!("{name}: {it}")),
-            ParseError::malformed(3, "it").retold(|it| format!("{name}: {it}")),
+            ParseError::unsupported("it").map_message(|it| format!("{name}: {it}")),
+            ParseError::malformed(3, "it").map_message(|it| format!("{name}: {it}")),
         ];
         for error in errors {
             let text = error.to_string();

@@ -227,10 +227,10 @@ fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
     reason = "radii are f32 in the renderer"
 )]
 pub(crate) fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
-    let named = |wanted: &str| {
+    let named = |name: &str| {
         attributes.iter().find(|a| {
             a.components == 1
-                && a.name.eq_ignore_ascii_case(wanted)
+                && a.name.eq_ignore_ascii_case(name)
                 && matches!(a.data, AttributeData::F32(_) | AttributeData::F64(_))
         })
     };

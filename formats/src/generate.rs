@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_box_is_the_serial_recipe() {
+    fn parallel_box_equals_the_serial_one() {
         let settings = BoxSettings::thesis(1000, 7);
         let mut state = settings.seed;
         let mut next = || {

@@ -8,6 +8,7 @@
 
 mod attribute;
 mod budget;
+mod decode;
 mod decompress;
 mod error;
 mod format;
@@ -20,6 +21,7 @@ mod registry;
 mod regular;
 mod scalar;
 mod step;
+mod value_error;
 
 pub mod blocks;
 pub mod convert;
@@ -43,3 +45,4 @@ pub use open::FrameFile;
 pub use origin::choose_origin;
 pub use scalar::{Endian, ScalarType};
 pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput};
+pub use value_error::ValueError;

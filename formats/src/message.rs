@@ -73,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn what_would_control_a_terminal_is_escaped() {
+    fn terminal_control_characters_are_escaped() {
         shown("a `b\\c` d", "a `b\\c` d");
         shown("größe \u{3b1}", "größe \u{3b1}");
         shown("a\nb\r\tc", "a\\nb\\r\\tc");
@@ -86,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn long_text_keeps_its_start_and_its_remedy() {
+    fn long_messages_keep_start_and_remedy() {
         let text = format!("start {}; remedy", "\u{3b1}\n".repeat(400));
         let line = one_line(text);
         assert!(line.starts_with("start \u{3b1}\\n") && line.ends_with("\\n; remedy"));

@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_of_nothing_give_zero() {
+    fn empty_bounds_have_a_zero_origin() {
         assert_eq!(
             choose_origin(DVec3::INFINITY, DVec3::NEG_INFINITY),
             DVec3::ZERO

@@ -76,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_growing_file_is_noticed() {
+    fn growing_file_is_detected() {
         let stamp = |len, seconds| FileStamp {
             len,
             modified: Some(SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(seconds)),

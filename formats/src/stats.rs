@@ -366,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn dropped_particles_take_part_in_nothing() {
+    fn dropped_particles_are_excluded_from_statistics() {
         let positions = vec![
             Vec3::new(1.0, 2.0, 3.0),
             Vec3::new(f32::NAN, 0.0, 0.0),
@@ -407,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_bounds() {
+    fn empty_frames_have_no_bounds() {
         let ids = vec![
             ("id", 1, AttributeData::U8(vec![])),
             ("v", 3, AttributeData::F64(vec![])),
@@ -429,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn means_lose_nothing_over_many_particles() {
+    fn means_are_accurate_over_many_particles() {
         let point = DVec3::new(1e6 + 0.1, -0.3, 1e-9);
         let stats = FrameStats::of(&raw(Positions::F64(vec![point; 3 * PIECE + 7]), vec![]));
         assert_eq!(stats.mean, Some(point));

@@ -162,7 +162,7 @@ fn other_formats_in_gzip() {
 }
 
 #[test]
-fn absurd_counts_in_gzip() {
+fn huge_counts_in_gzip() {
     let dir = Dir::new();
     let rows = "1 2 3\n".repeat(500_000);
     let count = usize::MAX / 32;
@@ -242,7 +242,7 @@ fn all(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameEr
 }
 
 #[test]
-fn texts_in_pieces_are_what_they_are_as_a_whole() {
+fn chunked_text_reads_as_whole_text() {
     let dir = Dir::new();
     for (name, text) in texts(30_000) {
         let whole = FrameFile::from_bytes(Path::new(name), text.clone().into_bytes());
@@ -280,7 +280,7 @@ fn texts_may_be_larger_than_the_budget() {
 }
 
 #[test]
-fn faults_of_texts_in_pieces_are_told_at_their_place() {
+fn errors_in_chunked_text_have_the_file_offset() {
     let dir = Dir::new();
     for (name, text) in texts(30_000) {
         // Damage one line, and truncate the text
@@ -477,7 +477,7 @@ fn table(rows: usize, turn: usize) -> String {
 }
 
 #[test]
-fn tables_in_pieces_are_what_they_are_as_a_whole() {
+fn chunked_tables_read_as_whole_tables() {
     let dir = Dir::new();
     let rows = 150_000;
     for turn in [0, rows / 2, rows - 1, rows] {
@@ -503,7 +503,7 @@ fn tables_in_pieces_are_what_they_are_as_a_whole() {
 }
 
 #[test]
-fn faults_in_pieces_are_told_at_their_place() {
+fn errors_in_chunked_tables_have_the_file_offset() {
     let dir = Dir::new();
     let text = table(150_000, 150_000);
     let at = text.len() - 100_000;

@@ -4,6 +4,7 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
+use crate::clock::Clock;
 use crate::ledger::LedgerWatcher;
 use crate::workers::{ClaimOutcome, WorkerRegistry};
 use crate::{EntryStatus, JobError, LedgerEntry};
@@ -30,6 +31,10 @@ impl FrameClaims {
 
     pub(crate) const fn registry(&self) -> &Arc<WorkerRegistry> {
         &self.registry
+    }
+
+    pub(crate) fn clock(&self) -> &Clock {
+        self.registry.clock()
     }
 
     /// Claims `frame`, which was pending when this worker started.
@@ -69,7 +74,8 @@ impl FrameClaims {
         let workers = workers.map_err(|e| JobError::io(&self.dir, "listing workers", e))?;
         self.has_other_workers
             .store(workers.len() > 1, Ordering::Relaxed);
-        self.watcher().refresh(&workers)
+        let now = self.clock().now();
+        self.watcher().refresh(&workers, now)
     }
 
     /// Whether other workers may be waiting for the entries of this worker.

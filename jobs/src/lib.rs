@@ -9,11 +9,13 @@
 //! only when frames are added. The *ledger* ([`Ledger`]) only grows: one line per finished or failed frame, in
 //! one file per worker. Workers claim frames ([`FrameClaims`]) before they work on them. Outputs are published
 //! complete ([`Publisher`]) before they are recorded, so a kill at any moment loses at most the frames in
-//! progress. [`export`] describes frames as work for other engines.
+//! progress. [`run_frames`] is the loop that claims, processes and records frames; the work is a [`FrameWork`].
+//! [`export`] describes frames as work for other engines.
 #![deny(unsafe_code)]
 
 mod changes;
 mod claims;
+mod clock;
 mod error;
 mod existing_outputs;
 pub mod export;
@@ -26,17 +28,18 @@ mod input;
 mod interrupt;
 mod job;
 mod ledger;
+mod panic;
 #[doc(hidden)]
 pub mod parse;
 mod plan;
 mod planning;
 mod process;
-mod publish;
 mod queue;
 mod range;
 mod regular;
 mod request;
 mod requeue;
+mod run;
 mod state;
 mod workers;
 
@@ -49,13 +52,19 @@ pub use fingerprint::{Fingerprint, compare_settings, settings_hash, text_hash};
 pub use interrupt::{Interrupt, InterruptLevel};
 pub use job::{DryRun, Job};
 pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};
+pub use panic::{Panic, catch_panic};
 pub use plan::{Plan, PlannedFrame, PlannedInput};
-pub use process::{owner, set_owner};
-pub use publish::{Publisher, discard_own_parts, discard_parts, publish, publish_with};
-pub use queue::{FrameQueue, QueueEvent};
+pub use queue::{ClaimedFrame, FrameQueue, QueueEvent};
 pub use range::{FrameRange, RangeError};
 pub use regular::{open_regular, read_regular, read_regular_text};
 pub use request::{DEFAULT_TAKEOVER_AFTER, FrameRequest, JobRequest, ResumeMode};
+pub use run::{
+    FinishedFrame, FrameEvent, FrameRecorder, FrameWork, OnFrameEvent, Recorded, RunContext,
+    RunOptions, run_frames,
+};
+pub use spherule_publish::{
+    Publisher, discard_own_parts, discard_parts, owner, publish, publish_with, set_owner,
+};
 pub use state::{FrameState, JobState, JobSummary};
 pub use workers::{Claim, ClaimOutcome, WorkerStatus, start_heartbeat_thread};
 

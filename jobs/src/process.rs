@@ -1,11 +1,11 @@
 //! Identifies processes, and finds out whether a process of this machine is still running.
 
 use std::fs;
-use std::hash::{BuildHasher, Hasher, RandomState};
 use std::sync::OnceLock;
 use std::time::{SystemTime, UNIX_EPOCH};
 
 use serde::{Deserialize, Serialize};
+use spherule_publish::{host_name, process_token};
 
 /// Identifies a process uniquely, even if its process number is reused later.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -29,13 +29,9 @@ impl Process {
     pub(crate) fn current() -> &'static Self {
         CURRENT.get_or_init(|| {
             let pid = std::process::id();
-            let host = host_name();
-            let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '_' };
-            let short: String = host.chars().map(plain).take(32).collect();
-            let unique = RandomState::new().build_hasher().finish();
             Self {
-                token: format!("{short}-{pid}-{:08x}", unique >> 32),
-                host,
+                token: process_token().to_owned(),
+                host: host_name(),
                 machine: machine(),
                 pid,
                 start: find_process(pid).and_then(|s| s.start),
@@ -54,21 +50,6 @@ impl Process {
             Some(found) => !found.is_running || (self.start.is_some() && found.start != self.start),
         }
     }
-}
-
-static OWNER: OnceLock<String> = OnceLock::new();
-
-/// Assigns the temporary files of this process to the [`owner`] of another process, which removes them if this
-/// process dies. Call it once, before the first file is created.
-pub fn set_owner(owner: &str) {
-    let _ = OWNER.set(owner.to_owned());
-}
-
-/// The owner that the names of temporary files contain.
-pub fn owner() -> &'static str {
-    OWNER
-        .get()
-        .map_or_else(|| Process::current().token.as_str(), String::as_str)
 }
 
 /// Milliseconds since 1970 by the clock of this machine.
@@ -123,19 +104,6 @@ fn exists(pid: u32) -> bool {
 #[cfg(not(unix))]
 fn exists(_pid: u32) -> bool {
     true
-}
-
-#[cfg(unix)]
-fn host_name() -> String {
-    rustix::system::uname()
-        .nodename()
-        .to_string_lossy()
-        .into_owned()
-}
-
-#[cfg(not(unix))]
-fn host_name() -> String {
-    std::env::var("COMPUTERNAME").unwrap_or_default()
 }
 
 /// Identifies the boot of a machine and its PID namespace: containers have their own.

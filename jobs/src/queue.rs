@@ -1,7 +1,6 @@
 //! The order of work of one worker: the frames of its run that no other worker holds.
 
 use std::collections::VecDeque;
-use std::thread;
 use std::time::Duration;
 
 use crate::{Claim, ClaimOutcome, EntryStatus, FrameClaims, Interrupt, JobError};
@@ -10,14 +9,24 @@ use crate::{Claim, ClaimOutcome, EntryStatus, FrameClaims, Interrupt, JobError};
 const POLL_INTERVALS: (Duration, Duration) = (Duration::from_millis(5), Duration::from_millis(500));
 
 /// Claims the frames of a run one after the other.
-#[derive(Debug)]
-pub struct FrameQueue {
+pub struct FrameQueue<'a> {
     claims: FrameClaims,
     interrupt: Interrupt,
+    on_event: &'a (dyn Fn(QueueEvent<'_>) + Sync),
     /// Indices in the run and frames that were not tried yet.
     untried: VecDeque<(usize, i64)>,
     /// Frames that other workers held at the last check.
     held: VecDeque<(usize, i64)>,
+}
+
+/// A frame that no other worker processes meanwhile.
+#[derive(Debug)]
+pub struct ClaimedFrame {
+    /// Its index in the frames of the run.
+    pub index: usize,
+    /// Frame number.
+    pub frame: i64,
+    pub(crate) claim: Claim,
 }
 
 /// What other workers do with the frames of a queue.
@@ -29,30 +38,33 @@ pub enum QueueEvent<'a> {
     Waiting(i64, &'a str),
 }
 
-impl FrameQueue {
+impl<'a> FrameQueue<'a> {
     /// A queue of the `frames` of a run, which were pending when the worker started.
-    pub fn new(
+    pub(crate) fn new(
         claims: FrameClaims,
         frames: impl IntoIterator<Item = i64>,
         interrupt: &Interrupt,
+        on_event: &'a (dyn Fn(QueueEvent<'_>) + Sync),
     ) -> Self {
         Self {
             claims,
             interrupt: interrupt.clone(),
+            on_event,
             untried: frames.into_iter().enumerate().collect(),
             held: VecDeque::new(),
         }
     }
 
-    /// Claims the next frame; returns its index in the run. If other workers hold all remaining frames, blocks
-    /// until they have finished or died. None at the end of the run, or once the interrupt is raised.
+    /// Claims the next frame. If other workers hold all remaining frames, blocks until they have finished or died.
+    /// None at the end of the run, or once the interrupt is raised.
     ///
     /// # Errors
     /// Those of [`FrameClaims::claim`].
-    pub fn next(
-        &mut self,
-        on_event: &mut dyn FnMut(QueueEvent),
-    ) -> Result<Option<(usize, Claim)>, JobError> {
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "an iterator cannot return errors with `?`"
+    )]
+    pub fn next(&mut self) -> Result<Option<ClaimedFrame>, JobError> {
         let mut interval = POLL_INTERVALS.0;
         let mut has_reported = false;
         loop {
@@ -64,9 +76,15 @@ impl FrameQueue {
                 let next = self.untried.pop_front().or_else(|| self.held.pop_front());
                 let Some((index, frame)) = next else { break };
                 match self.claims.claim(frame)? {
-                    ClaimOutcome::Acquired(claim) => return Ok(Some((index, claim))),
+                    ClaimOutcome::Acquired(claim) => {
+                        return Ok(Some(ClaimedFrame {
+                            index,
+                            frame,
+                            claim,
+                        }));
+                    }
                     ClaimOutcome::Finished(status) => {
-                        on_event(QueueEvent::FinishedElsewhere(frame, status));
+                        (self.on_event)(QueueEvent::FinishedElsewhere(frame, status));
                     }
                     ClaimOutcome::Held(holder) => {
                         self.held.push_back((index, frame));
@@ -78,9 +96,9 @@ impl FrameQueue {
                 return Ok(None);
             };
             if !std::mem::replace(&mut has_reported, true) {
-                on_event(QueueEvent::Waiting(frame, &holder));
+                (self.on_event)(QueueEvent::Waiting(frame, &holder));
             }
-            thread::sleep(interval);
+            self.claims.clock().sleep(interval);
             interval = (2 * interval).min(POLL_INTERVALS.1);
         }
     }

@@ -124,11 +124,11 @@ fn frames(text: &str) -> Vec<i64> {
 
 #[test]
 fn valid_texts_are_read_like_fileseq_does() {
-    for (text, wanted) in SAME {
-        assert_eq!(frames(text), wanted, "{text:?}");
+    for (text, expected) in SAME {
+        assert_eq!(frames(text), expected, "{text:?}");
         // The canonical text is read in the same way
         let range: FrameRange = text.parse().unwrap();
-        assert_eq!(frames(&range.to_string()), wanted, "{text:?} as {range}");
+        assert_eq!(frames(&range.to_string()), expected, "{text:?} as {range}");
     }
 }
 
@@ -145,8 +145,8 @@ fn texts_that_fileseq_rejects_are_rejected() {
 
 #[test]
 fn a_colon_is_a_step() {
-    for (text, wanted) in STEPS_OF_ENGINES {
-        assert_eq!(frames(text), wanted, "{text:?}");
+    for (text, expected) in STEPS_OF_ENGINES {
+        assert_eq!(frames(text), expected, "{text:?}");
     }
 }
 

@@ -82,7 +82,7 @@ fn set_resources_are_requested() {
     };
     script.log_dir = "/data/100% it's";
     let found = directives(&script);
-    for wanted in [
+    for expected in [
         "array=0-3%2",
         "cpus-per-task=2",
         "mem=4097M",
@@ -91,7 +91,7 @@ fn set_resources_are_requested() {
         "account=sim_42",
         "output=\"/data/100%% it's/%A_%a.log\"",
     ] {
-        assert!(found.iter().any(|d| d == wanted), "{wanted}: {found:?}");
+        assert!(found.iter().any(|d| d == expected), "{expected}: {found:?}");
     }
 }
 
@@ -338,8 +338,8 @@ exit "${CODE:-75}"
                 .output()
                 .unwrap();
             let printed = String::from_utf8(output.stdout).unwrap();
-            let wanted = format!("[{text}][--frames][1][--threads][1]");
-            prop_assert_eq!(printed.lines().last(), Some(wanted.as_str()));
+            let expected = format!("[{text}][--frames][1][--threads][1]");
+            prop_assert_eq!(printed.lines().last(), Some(expected.as_str()));
         }
     }
 

@@ -37,6 +37,7 @@ pub mod stored;
 mod top_levels;
 mod topology;
 pub mod traverse;
+mod tree_fault;
 mod validate;
 pub mod view;
 mod walk;
@@ -50,6 +51,7 @@ pub use preset::BvhPreset;
 pub use report::{BuildReport, Phase};
 pub use settings::{BuildSettings, BvhLeaves, BvhSettings, SbvhSettings, Structure};
 pub use spherule_formats::blocks::Aabb;
+pub use tree_fault::{ChildFault, ParticleFault, TreeFault};
 
 /// Radii of the spheres of a frame, scene units.
 #[derive(Debug, Clone, Copy)]

@@ -4,6 +4,8 @@ use std::fmt;
 use std::ops::RangeInclusive;
 use std::str::FromStr;
 
+use spherule_formats::ValueError;
+
 use super::preset::BvhPreset;
 
 /// How particles are ordered and grouped. The structure affects speed and memory, not the picture.
@@ -42,14 +44,11 @@ impl fmt::Display for Structure {
 }
 
 impl FromStr for Structure {
-    type Err = String;
+    type Err = ValueError;
 
-    fn from_str(name: &str) -> Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.into_iter().find(|s| s.name() == name);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name);
-            format!("no structure {name:?}; there are {}", names.join(", "))
-        })
+        found.ok_or_else(|| ValueError::one_of(&Self::ALL.map(Self::name), name))
     }
 }
 

@@ -322,7 +322,7 @@ fn tested_fused_levels() -> Vec<SimdLevel> {
 }
 
 #[test]
-fn levels_with_fused_multiply_add_agree_to_the_bit() {
+fn fma_levels_agree_to_the_bit() {
     let fused = tested_fused_levels();
     for settings in all_settings() {
         for scene in awkward_scenes() {
@@ -430,7 +430,7 @@ fn tree_by_threads(
 
 /// Also if the last frame was built with another structure.
 #[test]
-fn a_builder_forgets_the_last_frame() {
+fn builder_keeps_no_state_between_frames() {
     let mut builder = TreeBuilder::new();
     for scene in awkward_scenes() {
         for settings in all_settings() {
@@ -457,7 +457,7 @@ fn large_among_small(count: usize) -> Scene {
 }
 
 #[test]
-fn cut_spheres_are_found_once() {
+fn clipped_spheres_are_hit_once() {
     let scene = large_among_small(3000);
     let settings = every_sbvh().map(|sbvh| BuildSettings {
         sbvh,

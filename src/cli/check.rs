@@ -7,8 +7,9 @@ use spherule_formats::Sequence;
 use spherule_jobs::{DryRun, FrameState, Job, ResumeMode};
 
 use super::job::use_threads;
-use super::render_job::{RenderJob, RunArgs, require_one_fits};
+use super::render::RunArgs;
 use super::{CliError, Outcome, disk, print};
+use crate::job::{RenderJob, require_one_fits};
 use crate::metrics::Bytes;
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
@@ -39,7 +40,7 @@ pub(super) struct CheckArgs {
 pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     let requested = args.run.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
-    let sequence = requested.sequence()?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
@@ -96,16 +97,16 @@ impl<'a> Check<'a> {
     }
 
     /// Returns the value, or adds the error to the problems.
-    fn or_problem<T>(&mut self, result: Result<T, CliError>) -> Option<T> {
+    fn or_problem<T, E: Into<CliError>>(&mut self, result: Result<T, E>) -> Option<T> {
         result
-            .map_err(|error| self.problems.extend(error.messages()))
+            .map_err(|error| self.problems.extend(error.into().messages()))
             .ok()
     }
 
     fn run(&mut self, args: &RunArgs) {
         if self.check_output_dir(args.job.mode()) {
             let request = self.render_job.request(self.sequence, args.job.mode());
-            let dry_run = request.and_then(|r| Ok(Job::dry_run(&self.render_job.dir, &r)?));
+            let dry_run = request.and_then(|r| Ok(Job::dry_run(self.render_job.dir(), &r)?));
             self.dry_run = self.or_problem(dry_run);
             for change in self.dry_run.iter().flat_map(|d| &d.requeued) {
                 note!("{change} since it was rendered; it would be rendered again");
@@ -114,7 +115,10 @@ impl<'a> Check<'a> {
         let start = Instant::now();
         let setup = match self.dry_run.as_ref().and_then(|d| d.resolved.as_ref()) {
             Some(resolved) => self.render_job.stored_setup(resolved, self.sequence),
-            None => self.render_job.survey(self.sequence),
+            None => {
+                message!("surveying the sequence");
+                self.render_job.survey(self.sequence)
+            }
         };
         self.setup = self.or_problem(setup);
         self.survey_time = start.elapsed();
@@ -124,7 +128,7 @@ impl<'a> Check<'a> {
         };
         let mut tasks = self.render_job.tasks(self.sequence, &frames);
         if let Some((_, setup)) = &self.setup {
-            let schedule = self.render_job.fit(self.sequence, setup, &mut tasks);
+            let schedule = self.render_job.schedule(self.sequence, setup, &mut tasks);
             let fits = require_one_fits(&tasks);
             self.tasks = tasks;
             self.check_memory(&schedule);
@@ -138,13 +142,13 @@ impl<'a> Check<'a> {
     /// Checks the output directory. Returns whether it is, or could be, a directory.
     fn check_output_dir(&mut self, mode: ResumeMode) -> bool {
         if self
-            .or_problem(self.render_job.guard_directory(mode))
+            .or_problem(self.render_job.check_output_dir(mode))
             .is_none()
         {
             return false;
         }
-        self.or_problem(self.render_job.guard_manifest());
-        let existing = disk::nearest_existing(&self.render_job.dir);
+        self.or_problem(self.render_job.check_manifest_file());
+        let existing = disk::nearest_existing(self.render_job.dir());
         self.free_disk = disk::free(&existing);
         if let Err(error) = disk::check_writable(&existing) {
             self.problems.push(format!(
@@ -189,7 +193,7 @@ impl<'a> Check<'a> {
         if let Some(free) = self.free_disk.filter(|free| needed > *free as f64) {
             self.problems.push(format!(
                 "{}: the images need about {}, {} are free; choose another directory",
-                self.render_job.shown_output.display(),
+                self.render_job.shown_output().display(),
                 Bytes(whole(needed)),
                 Bytes(free)
             ));

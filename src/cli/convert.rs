@@ -1,6 +1,5 @@
 //! `spherule convert`: converts a sequence to native frames, as a job.
 
-use std::ffi::{OsStr, OsString};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -8,27 +7,19 @@ use clap::Args;
 use serde_json::{Value, json};
 use spherule_formats::detect::Format;
 use spherule_formats::native::{Bound, Encoding, FORMAT};
-use spherule_formats::sequence::{Sequence, SequenceFrame};
+use spherule_formats::sequence::Sequence;
 use spherule_formats::{MemoryBudget, SequenceInput};
-use spherule_jobs::{DEFAULT_TAKEOVER_AFTER, FrameRange, Job, JobRequest, ResumeMode};
+use spherule_jobs::FrameRange;
 
-use super::job::{
-    FinishedRun, JobArgs, KIND, frames_in, guard_directory, guard_kind, report_kept, requests,
-    saved_survey, selection, use_threads,
-};
-use super::manifest_args::in_thread;
+use super::job::{FinishedRun, JobArgs, report_kept, use_threads};
 use super::numbers::{DEFAULT_BOUND, duration, not_negative, positive};
-use super::paths::absolute;
-use super::progress::Progress;
+use super::progress::{Progress, ShowReport};
 use super::{CliError, Outcome, events, signals};
-use crate::conversion::{self, AttributeChoices, Conversion, ConvertSettings, ConvertTask, Event};
-use crate::manifest::{MAX_THREADS, ProgressMode, real_dir};
+use crate::conversion::{AttributeChoices, ConvertSettings, ConvertedFrame};
+use crate::job::{ConvertJob, RunError, in_thread};
+use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::metrics::Bytes;
 use crate::reading::conversion_budget;
-use crate::survey::Survey;
-
-/// Value of [`KIND`] in the plan of a conversion.
-const CONVERT: &str = "convert";
 
 /// What the user can do if a frame does not fit into the memory limit.
 const MEMORY_REMEDY: &str = "raise --memory if there is more memory";
@@ -127,44 +118,45 @@ pub(super) fn run(args: &ConvertArgs) -> Result<Outcome, CliError> {
     for note in sequence.notes() {
         note!("{note}");
     }
-    let (dir, name) = args.output_dir();
-    let convert_job = ConvertJob {
-        args,
-        dir: real_dir(&absolute(&dir)?),
-        name,
-        settings: args.settings(),
+    let mode = args.job.mode();
+    let convert_job = ConvertJob::new(
+        &args.output,
+        args.settings(),
         sequence,
-    };
-    convert_job.guard()?;
-    let mut job = convert_job.open()?;
-    let conversion = convert_job.stored_conversion(job.resolved())?;
-    let tasks = convert_job.tasks(&job.pending());
+        args.frames.clone(),
+        args.job.shard,
+    )
+    .map_err(|error| match error {
+        RunError::NoFrames { range, available } => CliError::other(format!(
+            "--frames: {range} contains none of the frames of the input: {available}"
+        )),
+        error => error.into(),
+    })?;
+    let (mut job, conversion) = convert_job.open(mode).map_err(|error| match error {
+        RunError::UnknownAttribute(error) => CliError::other(format!("--attributes: {error}")),
+        error => error.into(),
+    })?;
+    let task_count = job.pending().len();
     if let Some(radius) = conversion.estimate {
         message!("radius {radius}, half the typical distance of neighbours (--radius sets it)");
     }
-    report_kept(&job, tasks.len());
-    let progress = Progress::new(args.progress, CONVERT, tasks.len(), &args.output);
+    report_kept(&job, task_count);
+    let progress = Progress::new(args.progress, "convert", task_count, &args.output);
     let start = Instant::now();
     let interrupt = signals.start_work_with_grace(args.grace);
-    let result = conversion::run(
-        &conversion,
-        &convert_job.sequence,
-        &tasks,
-        &mut job,
-        interrupt,
-        &|event| show_event(&progress, &event),
-    );
+    let result =
+        convert_job.convert_pending(&mut job, &conversion, interrupt, &|e| progress.show(&e));
     // Other workers may have finished some of the frames
-    let result = result.and(job.refresh());
+    let result = result.and(job.refresh().map_err(RunError::from));
     let finished = FinishedRun {
         job: &job,
-        tasks: tasks.len(),
+        task_count,
         frames: progress.finish(),
         start,
         interrupt,
         output: &args.output,
     };
-    Ok(finished.report(result.map_err(CliError::from)))
+    Ok(finished.report(result))
 }
 
 /// Refuses an output with the extension of another file format.
@@ -183,151 +175,19 @@ fn guard_name(output: &Path) -> Result<(), CliError> {
     )))
 }
 
-fn show_event(progress: &Progress, event: &Event) {
-    match event {
-        Event::Started(frame) => progress.stage(*frame, "converting"),
-        Event::Advanced(frame, phase, done, total) => {
-            let percent = 100 * u128::from(*done) / u128::from(*total).max(1);
-            let stage = format!("converting ({} {percent} %)", phase.name());
-            progress.stage(*frame, &stage);
-        }
-        Event::Done(task, converted) => {
-            let mut facts = json!(converted);
-            facts["output"] = json!(task.output.display().to_string());
-            progress.done(task.frame, &task.output, &converted.to_string(), facts);
-        }
-        Event::Failed(failure) => progress.failed(failure),
-        Event::OtherWorker(event) => progress.other_worker(*event),
-        Event::Note(note) => progress.note(note),
-    }
-}
-
-/// A conversion job before anything is written.
-struct ConvertJob<'a> {
-    args: &'a ConvertArgs,
-    /// Directory of the frames, absolute.
-    dir: PathBuf,
-    /// File name of the only frame, if the user gave one.
-    name: Option<OsString>,
-    settings: ConvertSettings,
-    sequence: Sequence,
-}
-
-impl ConvertJob<'_> {
-    const fn mode(&self) -> ResumeMode {
-        self.args.job.mode()
+impl ShowReport for ConvertedFrame {
+    fn summary(&self) -> String {
+        self.to_string()
     }
 
-    fn output(&self, frame: i64) -> PathBuf {
-        match &self.name {
-            Some(name) => self.dir.join(name),
-            None => self.dir.join(format!("frame.{frame:04}.spf")),
-        }
-    }
-
-    /// Refuses impossible requests before anything is written.
-    fn guard(&self) -> Result<(), CliError> {
-        let frames = frames_in(&self.sequence, self.args.frames.as_ref(), "--frames")?;
-        if self.name.is_some() && frames.len() > 1 {
-            return Err(CliError::other(format!(
-                "{}: one file name for {} frames; give a directory, or select one frame with --frames",
-                self.args.output.display(),
-                frames.len()
-            )));
-        }
-        guard_directory(&self.dir, "frames")?;
-        guard_kind(&self.dir, Some(CONVERT), self.mode())?;
-        let is_selected = |(_, frame): &(usize, &SequenceFrame)| frames.contains(&frame.number);
-        let is_named = self.name.is_some();
-        let all = self.sequence.frames().iter().enumerate();
-        for (index, frame) in all.filter(|frame| !is_named || is_selected(frame)) {
-            let output = self.output(frame.number);
-            let is_output = |path: &&Path| path.canonicalize().is_ok_and(|real| real == output);
-            if let Some(input) = self.sequence.inputs(index).into_iter().find(is_output) {
-                return Err(CliError::other(format!(
-                    "{}: the conversion would overwrite its own input; choose another output directory",
-                    input.display()
-                )));
-            }
-        }
-        Ok(())
-    }
-
-    fn request(&self) -> JobRequest {
-        let mut settings = vec![(KIND.to_owned(), CONVERT.to_owned())];
-        settings.extend(self.settings.settings());
-        let mut frames = requests(&self.sequence, |frame| vec![self.output(frame)]);
-        if let Some(range) = self.args.frames.as_ref().filter(|_| self.name.is_some()) {
-            frames.retain(|frame| range.contains(frame.number));
-        }
-        JobRequest {
-            settings,
-            frames,
-            extra_outputs: Vec::new(),
-            selection: Some(selection(
-                &self.sequence,
-                self.args.frames.as_ref(),
-                self.args.job.shard,
-            )),
-            mode: self.mode(),
-            takeover_after: DEFAULT_TAKEOVER_AFTER,
-        }
-    }
-
-    fn open(&self) -> Result<Job, CliError> {
-        // Start a new job, or discard an old one, only if the conversion is possible
-        let surveyed = if self.mode() == ResumeMode::Force || Job::read_plan(&self.dir)?.is_none() {
-            Some(self.survey()?)
-        } else {
-            None
-        };
-        Ok(Job::open(&self.dir, self.request(), |_| {
-            surveyed.map_or_else(|| self.survey(), Ok)
-        })?)
-    }
-
-    /// Surveys the sequence: its origin, and the radius of frames without one.
-    fn survey(&self) -> Result<Value, CliError> {
-        let survey = in_thread(|| Survey::of(&self.sequence, self.settings.question()))?;
-        self.conversion(&survey)?;
-        serde_json::to_value(&survey).map_err(|e| CliError::Other(e.to_string()))
-    }
-
-    fn conversion(&self, survey: &Survey) -> Result<Conversion, CliError> {
-        Conversion::new(self.settings.clone(), survey)
-            .map_err(|e| CliError::other(format!("--attributes: {e}")))
-    }
-
-    /// The conversion with the survey that is stored in the plan.
-    fn stored_conversion(&self, resolved: &Value) -> Result<Conversion, CliError> {
-        self.conversion(&saved_survey(resolved, &self.dir)?)
-    }
-
-    fn tasks(&self, pending: &[i64]) -> Vec<ConvertTask> {
-        let frames = self.sequence.frames();
-        let task = |number: &i64| {
-            let index = frames.binary_search_by_key(number, |f| f.number).ok()?;
-            Some(ConvertTask {
-                frame: *number,
-                index,
-                output: self.output(*number),
-            })
-        };
-        pending.iter().filter_map(task).collect()
+    fn facts(&self, output: String) -> Value {
+        let mut facts = json!(self);
+        facts["output"] = json!(output);
+        facts
     }
 }
 
 impl ConvertArgs {
-    /// The directory of the frames, and the file name of the only frame if one was given.
-    fn output_dir(&self) -> (PathBuf, Option<OsString>) {
-        let is_frame = |e: &OsStr| e.eq_ignore_ascii_case("spf");
-        let is_file = self.output.extension().is_some_and(is_frame) && !self.output.is_dir();
-        match (self.output.parent(), self.output.file_name()) {
-            (Some(dir), Some(name)) if is_file => (dir.to_owned(), Some(name.to_owned())),
-            _ => (self.output.clone(), None),
-        }
-    }
-
     fn settings(&self) -> ConvertSettings {
         let bound = match (self.max_error, self.max_error_length) {
             (Some(fraction), _) => Bound::OfRadius(fraction),

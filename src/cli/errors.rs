@@ -10,33 +10,34 @@ use spherule_formats::sequence::SequenceError;
 use spherule_jobs::export::ExportError;
 use spherule_jobs::{FileError, JobError};
 
-use crate::hdr::HdrError;
-use crate::manifest::{ManifestError, RebaseError};
+use crate::job::RunError;
+use crate::manifest::ManifestError;
 use crate::resolve::ResolveError;
 
 #[derive(Debug, thiserror::Error)]
 pub(super) enum CliError {
-    #[error(transparent)]
-    Manifest(#[from] ManifestError),
-    #[error(transparent)]
-    Rebase(#[from] RebaseError),
-    #[error(transparent)]
-    Sequence(#[from] SequenceError),
-    #[error("{}", WithRemedy(.0, job_remedy(.0)))]
-    Job(#[from] JobError),
-    #[error("{}", WithRemedy(.0, resolve_remedy(.0)))]
-    Resolve(#[from] ResolveError),
+    #[error("{}", WithRemedy(.0, run_remedy(.0)))]
+    Run(#[from] RunError),
     #[error("{}", WithRemedy(.0, export_remedy(.0)))]
     Export(#[from] ExportError),
-    #[error("environment.image: {0}")]
-    Environment(#[from] HdrError),
-    #[error("no frame can be read: {0}")]
-    Frame(#[from] FrameError),
     #[error("{}: {}", path.display(), io_message(source))]
     Io { path: PathBuf, source: io::Error },
     #[error("{0}")]
     Other(String),
 }
+
+/// Converts errors of libraries by way of [`RunError`].
+macro_rules! from_run_error {
+    ($($error:ty),*) => {
+        $(impl From<$error> for CliError {
+            fn from(error: $error) -> Self {
+                Self::Run(error.into())
+            }
+        })*
+    };
+}
+
+from_run_error!(ManifestError, SequenceError, FrameError, JobError);
 
 /// An error followed by its remedy.
 struct WithRemedy<'a, E>(&'a E, Option<&'static str>);
@@ -46,6 +47,24 @@ impl<E: fmt::Display> fmt::Display for WithRemedy<'_, E> {
         self.0.fmt(f)?;
         self.1.map_or(Ok(()), |remedy| write!(f, "; {remedy}"))
     }
+}
+
+/// What the user can do about an error of a run.
+fn run_remedy(error: &RunError) -> Option<&'static str> {
+    Some(match error {
+        RunError::Job(error) => return job_remedy(error),
+        RunError::Resolve(error) => return resolve_remedy(error),
+        RunError::File(error) => return file_remedy(error),
+        RunError::OutputIsFile { .. } => "choose another output",
+        RunError::OtherKind { .. } => "choose another directory, or discard that job with --force",
+        RunError::ForeignManifest { .. } => {
+            "render that file, choose another output directory, or move the file away"
+        }
+        RunError::OverwritesInput { .. } => "choose another output directory",
+        RunError::OneName { .. } => "give a directory, or select one frame with --frames",
+        RunError::StoredSurvey { .. } => "start over with --force",
+        _ => return None,
+    })
 }
 
 /// What the user can do about an error of a job.
@@ -75,7 +94,7 @@ fn job_remedy(error: &JobError) -> Option<&'static str> {
             "put #### into the name, choose another one, or start over with --force"
         }
         JobError::Stopped(failure) => return file_remedy(failure.source.downcast_ref()?),
-        JobError::Resolve(source) => return source.downcast_ref().and_then(resolve_remedy),
+        JobError::Resolve(source) => return source.downcast_ref().and_then(run_remedy),
         _ => return None,
     })
 }
@@ -119,7 +138,7 @@ impl CliError {
     /// The messages, one per line.
     pub(super) fn messages(&self) -> Vec<String> {
         match self {
-            Self::Manifest(error) => error.messages().to_vec(),
+            Self::Run(RunError::Manifest(error)) => error.messages().to_vec(),
             other => vec![other.to_string()],
         }
     }
@@ -148,7 +167,9 @@ mod tests {
                 "out/f.exr: no space left; free some, then the same command continues",
             ),
             (
-                CliError::from(JobError::Resolve(Box::new(ResolveError::NoRadius))),
+                CliError::from(JobError::Resolve(Box::new(RunError::from(
+                    ResolveError::NoRadius,
+                )))),
                 "give a length with --radius",
             ),
             (

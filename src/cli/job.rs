@@ -5,20 +5,15 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Args;
-use serde_json::{Value, json};
-use spherule_formats::Sequence;
-use spherule_jobs::{FrameRange, FrameRequest, Interrupt, Job, JobError, PLAN_FILE, ResumeMode};
+use serde_json::json;
+use spherule_jobs::{FrameRange, Interrupt, Job, JobError, PLAN_FILE, ResumeMode};
 
 use super::manifest_args::{is_manifest, read_manifest};
 use super::paths::absolute;
 use super::progress::{FinishedFrames, duration};
-use super::shard::Shard;
 use super::{CliError, Outcome, events};
+use crate::job::{RunError, Shard};
 use crate::manifest::{Manifest, real_dir};
-use crate::survey::Survey;
-
-/// The setting that stores the kind of a job. Jobs that render do not have it.
-pub(super) const KIND: &str = "job";
 
 /// How one run treats the results of earlier runs. These options are not in the manifest: a manifest that always
 /// starts over would discard finished work.
@@ -77,88 +72,6 @@ pub(super) fn useful_threads(requested: usize) -> usize {
     requested.min(max)
 }
 
-/// The frames of `sequence` in `range`, or all. `option` is the option or key that set the range.
-pub(super) fn frames_in(
-    sequence: &Sequence,
-    range: Option<&FrameRange>,
-    option: &str,
-) -> Result<Vec<i64>, CliError> {
-    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
-    let Some(range) = range else {
-        return Ok(numbers);
-    };
-    let selected = range.select(&numbers);
-    if selected.is_empty() {
-        return Err(CliError::other(format!(
-            "{option}: {range} contains none of the frames of the input: {}",
-            list(&numbers)
-        )));
-    }
-    Ok(selected)
-}
-
-/// The frames of this run: those in `range` and in the shard.
-pub(super) fn selection(
-    sequence: &Sequence,
-    range: Option<&FrameRange>,
-    shard: Option<Shard>,
-) -> Vec<i64> {
-    let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
-    let selected = range.map_or_else(|| numbers.clone(), |range| range.select(&numbers));
-    shard.map_or_else(|| selected.clone(), |shard| shard.select(&selected))
-}
-
-/// Requests for all frames of `sequence`; `outputs` returns the output files of a frame.
-pub(super) fn requests(
-    sequence: &Sequence,
-    outputs: impl Fn(i64) -> Vec<PathBuf>,
-) -> Vec<FrameRequest> {
-    let request = |(index, number)| FrameRequest {
-        number,
-        inputs: sequence
-            .inputs(index)
-            .into_iter()
-            .map(Path::to_owned)
-            .collect(),
-        outputs: outputs(number),
-    };
-    let numbers = sequence.frames().iter().map(|frame| frame.number);
-    numbers.enumerate().map(request).collect()
-}
-
-/// Refuses an output directory whose path leads to a file. `what` is what the directory is for.
-pub(super) fn guard_directory(dir: &Path, what: &str) -> Result<(), CliError> {
-    match dir.ancestors().find(|p| p.exists()) {
-        Some(found) if !found.is_dir() => Err(CliError::other(format!(
-            "{}: is a file, but a directory for the {what} is needed; choose another output",
-            found.display()
-        ))),
-        _ => Ok(()),
-    }
-}
-
-/// Refuses a directory with a job of another kind. `kind` is the value of [`KIND`], if any.
-pub(super) fn guard_kind(dir: &Path, kind: Option<&str>, mode: ResumeMode) -> Result<(), CliError> {
-    if mode == ResumeMode::Force {
-        return Ok(());
-    }
-    let Some(plan) = Job::read_plan(dir)? else {
-        return Ok(());
-    };
-    let mut settings = plan.settings().iter();
-    let found = settings.find(|(key, _)| key == KIND).map(|(_, v)| &v[..]);
-    if found == kind {
-        return Ok(());
-    }
-    let command = |kind: Option<&str>| kind.unwrap_or("render").to_owned();
-    Err(CliError::other(format!(
-        "{}: contains a job of `{}`, not of `{}`; choose another directory, or discard that job with --force",
-        dir.display(),
-        command(found),
-        command(kind)
-    )))
-}
-
 /// The directory of a job that is given as a directory or as a manifest.
 pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
     if !is_manifest(job) || job.is_dir() {
@@ -178,16 +91,6 @@ pub(super) fn no_job(dir: &Path) -> CliError {
     ))
 }
 
-/// The survey that is stored in the plan of the job in `dir`.
-pub(super) fn saved_survey(resolved: &Value, dir: &Path) -> Result<Survey, CliError> {
-    serde_json::from_value(resolved.clone()).map_err(|e| {
-        CliError::other(format!(
-            "{}: its resolved values cannot be read ({e}); start over with --force",
-            dir.join(PLAN_FILE).display()
-        ))
-    })
-}
-
 /// Reports how many frames of the run are done already.
 pub(super) fn report_kept(job: &Job, tasks: usize) {
     let selected = job.selected().len();
@@ -200,7 +103,7 @@ pub(super) fn report_kept(job: &Job, tasks: usize) {
 pub(super) struct FinishedRun<'a> {
     pub(super) job: &'a Job,
     /// Number of frames that were pending.
-    pub(super) tasks: usize,
+    pub(super) task_count: usize,
     /// The finished frames.
     pub(super) frames: FinishedFrames,
     pub(super) start: Instant,
@@ -211,7 +114,7 @@ pub(super) struct FinishedRun<'a> {
 
 impl FinishedRun<'_> {
     /// Reports finished and failed frames, and the error if `result` is one. Returns the exit status.
-    pub(super) fn report(&self, result: Result<(), CliError>) -> Outcome {
+    pub(super) fn report(&self, result: Result<(), RunError>) -> Outcome {
         let summary = self.job.summary();
         message!(
             "{} of {} frames done in {}: {}",
@@ -231,15 +134,17 @@ impl FinishedRun<'_> {
         }));
         match result {
             Err(error) => {
+                // The same command rejoins the job
+                let is_temporary = matches!(error, RunError::Job(JobError::DeclaredDead { .. }));
+                let error = CliError::from(error).to_string();
                 message!("error: {error}");
-                events::add_to_end(json!({"errors": [error.to_string()]}));
-                match error {
-                    // The same command rejoins the job
-                    CliError::Job(JobError::DeclaredDead { .. }) => Outcome::Interrupted,
-                    _ => Outcome::SomeFailed,
+                events::add_to_end(json!({"errors": [error]}));
+                match is_temporary {
+                    true => Outcome::Interrupted,
+                    false => Outcome::SomeFailed,
                 }
             }
-            Ok(()) if self.interrupt.is_raised() && self.frames.count < self.tasks => {
+            Ok(()) if self.interrupt.is_raised() && self.frames.count < self.task_count => {
                 Outcome::Interrupted
             }
             Ok(()) if summary.done < summary.total => Outcome::SomeFailed,

@@ -33,7 +33,7 @@ impl KeyFlags {
         value.as_str().map(str::to_owned)
     }
 
-    /// What was asked for; `from_file` if it replaces values of a manifest from a file.
+    /// Adds the given options; `from_file` if they replace values of a manifest from a file.
     pub(super) fn add_overrides(
         &self,
         list: &mut Vec<Override>,
@@ -85,7 +85,7 @@ pub(super) fn over(
     value: impl Into<toml::Value>,
     shown: &str,
 ) -> Result<Override, CliError> {
-    Override::new(key, value, shown).map_err(CliError::Other)
+    Override::new(key, value, shown).map_err(|e| CliError::other(e.to_string()))
 }
 
 fn argument(key: &KeyFlag) -> Arg {

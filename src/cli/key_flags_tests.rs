@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::cli::render_job::RunArgs;
+use crate::cli::render::RunArgs;
 use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
@@ -72,8 +72,8 @@ fn manifest(flags: &str) -> Manifest {
 
 #[test]
 fn every_option_is_a_key() {
-    for (flags, wanted) in FLAGS.iter() {
-        let (key, value) = wanted.split_once(" = ").unwrap();
+    for (flags, expected) in FLAGS.iter() {
+        let (key, value) = expected.split_once(" = ").unwrap();
         let mut plain = Manifest::new("data");
         assert_ne!(manifest(flags), plain, "{flags}");
         let mut sets = vec![format!("{key}={value}")];

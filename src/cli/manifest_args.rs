@@ -1,20 +1,17 @@
 //! Makes a manifest and its sequence from command-line arguments.
 
 use std::io;
-use std::panic;
 use std::path::{Path, PathBuf};
-use std::thread;
 
 use clap::Args;
-use spherule_formats::sequence::{Sequence, SequenceError, SequenceInput};
+use spherule_formats::sequence::SequenceError;
 
 use super::CliError;
 use super::key_flags::{KeyFlags, over};
 use super::numbers::number;
-use super::paths::{absolute, text};
+use super::paths::text;
+use crate::job::JobManifest;
 use crate::manifest::{self, Look, Manifest, Override};
-use crate::metrics::Bytes;
-use crate::reading::read_budget;
 
 /// Options that set keys of the manifest: `--set` for any key, and options for common keys.
 #[derive(Debug, Args)]
@@ -26,7 +23,7 @@ pub(super) struct ManifestArgs {
     #[command(flatten)]
     pub(super) keys: KeyFlags,
 
-    /// Look, for everything that is not set otherwise: water, studio or paper.
+    /// Preset for all settings that are not given explicitly: water, studio or paper.
     #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
     pub(super) look: Option<String>,
     /// Attribute to colour by [default: velocity, else the particles' own colours]
@@ -61,22 +58,9 @@ pub(super) struct ManifestArgs {
     pub(super) set: Vec<String>,
 }
 
-/// The manifest of a command, with all options applied.
-#[derive(Clone)]
-pub(super) struct RequestedManifest {
-    /// The manifest with all options applied.
-    pub(super) manifest: Manifest,
-    /// The directory that its paths are relative to; empty for the current directory.
-    pub(super) base: PathBuf,
-    /// The file of the manifest, if there is one.
-    pub(super) file: Option<PathBuf>,
-    /// The manifest in that file without the options, if it is valid.
-    pub(super) unchanged: Option<Manifest>,
-}
-
 impl ManifestArgs {
     /// Reads the manifest, or makes one from the arguments.
-    pub(super) fn manifest(&self) -> Result<RequestedManifest, CliError> {
+    pub(super) fn manifest(&self) -> Result<JobManifest, CliError> {
         let mut overrides = Vec::new();
         let file = self.manifest_file()?;
         let (text, base) = match &file {
@@ -103,7 +87,7 @@ impl ManifestArgs {
         let unchanged = file
             .as_ref()
             .and_then(|path| Manifest::parse(&text, path).ok());
-        Ok(RequestedManifest {
+        Ok(JobManifest {
             manifest,
             base,
             file,
@@ -151,39 +135,14 @@ impl ManifestArgs {
         if let Some(look) = &self.look {
             list.extend(
                 Look::named(look)
-                    .map_err(|e| CliError::other(format!("--look {e}")))?
+                    .map_err(|e| CliError::other(format!("--look: {e}")))?
                     .settings(&format!("--look {look}")),
             );
         }
         for assignment in &self.set {
-            list.push(Override::parse(assignment).map_err(CliError::Other)?);
+            list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);
         }
         Ok(())
-    }
-}
-
-impl RequestedManifest {
-    /// Finds the frames of the input.
-    pub(super) fn sequence(&self) -> Result<Sequence, CliError> {
-        let input = &self.manifest.input;
-        let paths = input.path.iter().map(|p| self.base.join(p)).collect();
-        let limit = |size: &Option<Bytes>| size.as_ref().map(|size| size.0);
-        let limits = &self.manifest;
-        let budget = read_budget(
-            limit(&limits.render.memory_limit),
-            limit(&limits.job.memory_ceiling),
-        );
-        let paths = SequenceInput::from_paths(paths);
-        let mut sequence = in_thread(|| Sequence::open_within(&paths, budget))?;
-        if let Some(parts) = &input.parts {
-            sequence.keep_parts(parts)?;
-        }
-        Ok(sequence)
-    }
-
-    /// The directory that paths are relative to, absolute.
-    pub(super) fn absolute_base(&self) -> Result<PathBuf, CliError> {
-        absolute(&self.base)
     }
 }
 
@@ -199,15 +158,4 @@ pub(super) fn read_manifest(path: &Path) -> Result<String, CliError> {
 pub(super) fn is_manifest(path: &Path) -> bool {
     path.extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-}
-
-/// Runs `work` in a new thread. Allocators keep the memory that a thread has freed for the next new thread, which
-/// reads frames and needs as much. Memory freed by the main thread would stay unused.
-pub(super) fn in_thread<T: Send>(work: impl FnOnce() -> T + Send) -> T {
-    thread::scope(|scope| {
-        let thread = scope.spawn(work);
-        thread
-            .join()
-            .unwrap_or_else(|payload| panic::resume_unwind(payload))
-    })
 }

@@ -43,10 +43,8 @@ mod paths;
 mod print;
 mod progress;
 mod render;
-mod render_job;
 mod scale;
 mod schema;
-mod shard;
 mod signals;
 mod status;
 mod still;
@@ -66,7 +64,7 @@ struct Cli {
 enum Command {
     /// Render a directory, pattern or list of particle files, or a manifest, to images.
     Render(Box<render::RenderArgs>),
-    /// Render one picture of one frame, PNG or EXR, without a job, to try a look.
+    /// Render a single frame to a PNG or EXR, without a job, to try settings.
     Still(Box<still::StillArgs>),
     /// Print what `render` would do, with memory and time. Changes nothing.
     Check(Box<check::CheckArgs>),
@@ -82,7 +80,7 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Convert particle files to compact native frames (.spf).
     Convert(Box<convert::ConvertArgs>),
-    /// Generate particles for measurements.
+    /// Generate test particles.
     Generate(generate::GenerateArgs),
     /// Export a job to a cluster (Slurm) or a render farm (Open Job Description).
     Export(export::ExportArgs),

@@ -121,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_stays_one_line() {
+    fn lines_stay_single_lines() {
         assert_eq!(line("a.xyz: 3 particles"), "a.xyz: 3 particles\n");
         assert_eq!(
             line("a\nerror: b\u{1b}[31m\u{202e}"),

@@ -10,7 +10,7 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use spherule_jobs::{EntryStatus, FrameFailure, QueueEvent};
+use spherule_jobs::{EntryStatus, FinishedFrame, FrameEvent, FrameFailure, QueueEvent};
 
 use super::{events, print};
 use crate::manifest::ProgressMode;
@@ -30,11 +30,20 @@ impl ValueEnum for ProgressMode {
         Some(PossibleValue::new(self.name()).help(match self {
             Self::Auto => "Bars on a terminal, plain lines elsewhere",
             Self::Plain => "One line per frame",
-            Self::Json => "Events as JSON, one a line, on standard output",
-            Self::Openjd => "The lines that Open Job Description engines read",
-            Self::None => "Nothing but warnings and errors",
+            Self::Json => "JSON events, one per line, on standard output",
+            Self::Openjd => "Messages for Open Job Description engines",
+            Self::None => "Only warnings and errors",
         }))
     }
+}
+
+/// A report of a finished frame that can be shown.
+pub(super) trait ShowReport {
+    /// A summary for people.
+    fn summary(&self) -> String;
+
+    /// Fields of the event for programs. `output` is the main output.
+    fn facts(&self, output: String) -> Value;
 }
 
 /// Shows the progress of one run.
@@ -97,18 +106,39 @@ impl Progress {
         self.total.load(Ordering::Relaxed)
     }
 
+    /// Shows an event of a run. Called from several threads.
+    pub(super) fn show<R: ShowReport>(&self, event: &FrameEvent<'_, R>) {
+        match event {
+            FrameEvent::Stage { frame, stage } => self.stage(*frame, stage),
+            FrameEvent::Done { frame, finished } => self.done(*frame, finished),
+            FrameEvent::Failed(failure) => self.failed(failure),
+            FrameEvent::Retrying {
+                failure,
+                attempt,
+                attempts,
+            } => self.note(&format!(
+                "frame {}: attempt {attempt} of {attempts} failed: {failure}",
+                failure.frame
+            )),
+            FrameEvent::OtherWorker(event) => self.other_worker(*event),
+            FrameEvent::Note(note) => self.note(note),
+        }
+    }
+
     /// A frame has entered a stage: `reading`.
-    pub(super) fn stage(&self, frame: i64, stage: &str) {
+    fn stage(&self, frame: i64, stage: &str) {
         if let Display::Bar(bar) = &self.display {
             bar.set_message(format!("{stage} frame {frame}"));
         }
     }
 
-    /// `frame` is done and `output` exists. `summary` is shown, `facts` are sent with the event.
-    pub(super) fn done(&self, frame: i64, output: &Path, summary: &str, facts: Value) {
+    fn done<R: ShowReport>(&self, frame: i64, finished: &FinishedFrame<R>) {
         let done = self.count(None);
-        let output = output.display().to_string();
+        let output = finished.outputs.first();
+        let output = output.map_or_else(String::new, |path| path.display().to_string());
+        let summary = finished.report.summary();
         let plain = format!("frame {frame}: {output} ({summary})");
+        let facts = finished.report.facts(output);
         let mut event = json!({"frame": frame, "done": done, "total": self.total()});
         if let (Value::Object(event), Value::Object(facts)) = (&mut event, facts) {
             event.extend(facts);
@@ -117,8 +147,7 @@ impl Progress {
         self.line(done, &plain);
     }
 
-    /// A frame has failed.
-    pub(super) fn failed(&self, failure: &FrameFailure) {
+    fn failed(&self, failure: &FrameFailure) {
         let (frame, reason) = (failure.frame, failure.to_string());
         let done = self.count(Some(frame));
         self.message(&format!("error: frame {frame}: {reason}"));
@@ -128,7 +157,7 @@ impl Progress {
     }
 
     /// Another worker has finished a frame or holds one.
-    pub(super) fn other_worker(&self, event: QueueEvent) {
+    fn other_worker(&self, event: QueueEvent) {
         match event {
             QueueEvent::Waiting(frame, worker) => {
                 let text = format!("waiting for frame {frame}: {worker} is working on it");
@@ -154,7 +183,7 @@ impl Progress {
     }
 
     /// Prints a note, whatever the mode.
-    pub(super) fn note(&self, text: &str) {
+    fn note(&self, text: &str) {
         match &self.display {
             Display::Bar(bar) => bar.suspend(|| note!("{text}")),
             _ => note!("{text}"),

@@ -1,4 +1,4 @@
-//! `spherule still`: renders one picture of one frame, to try a look. No job: no plan, ledger, manifest or report.
+//! `spherule still`: renders a single frame to try settings. No job: no plan, ledger, manifest or report.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -10,20 +10,19 @@ use clap::Args;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
-use super::job::{frames_in, list, use_threads};
-use super::manifest_args::{ManifestArgs, RequestedManifest};
+use super::job::{list, use_threads};
+use super::manifest_args::ManifestArgs;
 use super::paths::absolute;
 use super::render::print_summary;
-use super::render_job::{RenderJob, require_one_fits};
 use super::{CliError, Outcome, print, signals};
+use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
 use crate::pipeline::{ImageError, PictureKind, WriteError, make_picture};
 use crate::render::Channels;
 
 /// Signatures of the files that `still` may replace: OpenEXR and PNG.
 const IMAGE_SIGNATURES: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
 
-const OUTPUT_HELP: &str =
-    "Picture to write: look.png or look.exr. An image of that name is replaced.";
+const OUTPUT_HELP: &str = "Image to write: look.png or look.exr; an existing image is replaced";
 
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png
@@ -61,7 +60,7 @@ fn no_job(option: clap::Arg) -> clap::Arg {
 
 const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
     stopping: "stopping",
-    stopped: "stopped; no picture was written",
+    stopped: "stopped; no image was written",
 };
 
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
@@ -73,7 +72,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let output = absolute(&shown)?;
     let mut requested = args.manifest.manifest()?;
     use_threads(requested.manifest.job.threads)?;
-    let sequence = requested.sequence()?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
@@ -82,7 +81,11 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     requested.manifest.input.frames = FrameRange::from_frames([frame]);
 
     let render_job = RenderJob::new(requested, &sequence, None)?;
+    message!("surveying the sequence");
     let (survey, mut setup) = render_job.survey(&sequence)?;
+    for note in render_job.environment_notes()? {
+        note!("{note}");
+    }
     if kind == PictureKind::Png {
         setup.picture.render.channels = Channels::COLOR;
     }
@@ -92,7 +95,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
         task.image.clone_from(&output);
         task.preview = None;
     }
-    render_job.fit(&sequence, &setup, &mut tasks);
+    render_job.schedule(&sequence, &setup, &mut tasks);
     require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
@@ -132,12 +135,12 @@ fn kind(path: &Path) -> Result<PictureKind, CliError> {
 /// rarely typical.
 fn frame(
     number: Option<i64>,
-    requested: &RequestedManifest,
+    requested: &JobManifest,
     sequence: &Sequence,
 ) -> Result<i64, CliError> {
     let Some(number) = number else {
         let range = requested.manifest.input.frames.as_ref();
-        let frames = frames_in(sequence, range, "input.frames")?;
+        let frames = frames_in(sequence, range)?;
         return Ok(frames[frames.len() / 2]);
     };
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();

@@ -5,7 +5,6 @@ use spherule_formats::{FrameError, Sequence};
 use spherule_jobs::{FailureKind, FrameFailure};
 
 use super::ConvertTask;
-use crate::failure::Panic;
 
 /// Why a frame cannot be converted.
 #[derive(Debug, thiserror::Error)]
@@ -18,9 +17,6 @@ pub enum ConversionError {
         "{0}; this is the newest frame: if the simulation is still writing it, convert again later"
     )]
     Newest(ConvertError),
-    /// A bug.
-    #[error(transparent)]
-    Panic(#[from] Panic),
 }
 
 impl ConversionError {
@@ -42,7 +38,6 @@ impl ConversionError {
             {
                 FrameFailure::writing(task.frame, &path, source)
             }
-            Self::Panic(_) => FrameFailure::new(FailureKind::Bug, task.frame, self),
             _ => FrameFailure::new(FailureKind::Frame, task.frame, self),
         }
     }

@@ -8,9 +8,9 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
-use crate::failure::{Panic, catch_panic};
 use crate::scene::RadianceMap;
 use crate::scene::environment::MapError;
+use spherule_jobs::{Panic, catch_panic};
 
 mod openexr;
 mod radiance;

@@ -5,7 +5,7 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
-use super::key::{Keys, section};
+use super::keys::{Keys, section};
 use super::reader::Section;
 use super::value::named;
 use crate::scene::camera::DEFAULT_FOV;
@@ -34,7 +34,7 @@ section! {
         mode: CameraMode = CameraMode::Auto;
         /// fixed: position of the camera
         eye: Option<DVec3> = None, example("[0.0, 0.0, 0.0]");
-        /// fixed: the point in the centre of the image
+        /// fixed: target point, in the centre of the image
         look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("input.up");
@@ -62,7 +62,7 @@ section! {
         frame: i64 = 0, required(KEY_NEEDS), example("1");
         /// Position of the camera
         eye: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[0.0, 0.0, 0.0]");
-        /// The point in the centre of the image
+        /// Target point, in the centre of the image
         look_at: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("camera.up");
@@ -103,7 +103,7 @@ impl Camera {
     fn check(&self, section: &Section<'_>) {
         // Only the fixed mode has the keys `eye` and `look_at`, and requires both
         let own = match self.mode {
-            CameraMode::Auto => Some("the automatic camera finds its own; say mode = \"fixed\""),
+            CameraMode::Auto => Some("the automatic camera chooses its own; set mode = \"fixed\""),
             CameraMode::Turntable => {
                 Some("a turntable finds its own; azimuth and elevation place it")
             }

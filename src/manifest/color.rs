@@ -3,8 +3,9 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
+use super::field::Field;
 use super::key::Key;
-use super::reader::{Field, nearest};
+use super::nearest::nearest;
 use super::value::{Fault, Value, numbers_schema, quoted};
 use crate::scene::Background;
 

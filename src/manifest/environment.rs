@@ -3,7 +3,8 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
-use super::key::{Affects, Key, Keys, keys};
+use super::key::{Affects, Key};
+use super::keys::{Keys, keys};
 use super::reader::Section;
 use super::sun::Sun;
 use super::value::named;

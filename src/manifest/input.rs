@@ -5,8 +5,9 @@ use std::ops::{Deref, DerefMut};
 use serde_json::{Value as Json, json};
 use spherule_jobs::FrameRange;
 
-use super::key::{Affects, Key, section};
-use super::reader::Field;
+use super::field::Field;
+use super::key::{Affects, Key};
+use super::keys::section;
 use super::value::{Fault, FlagKind, Value, named};
 
 named! {
@@ -79,11 +80,11 @@ section! {
         /// `auto` is y for BGEO files and files of SPlisHSPlasH, and z for all others. To set the camera itself, use
         /// --set with camera.eye, camera.look_at, camera.fov or camera.mode.
         up: Option<UpAxis> = None, or("auto"), flag("up", "UP", "Camera");
-        /// Map native frames into memory; --no-mmap reads them instead
+        /// Memory-map native frames; --no-mmap reads them instead
         ///
         /// Use --no-mmap if another program may truncate the files during the render.
         mmap: bool = true, affects(Affects::Nothing), flag("no-mmap", "", "Input");
-        /// Compare native frames with their checksums: auto (up to 1 GiB) | true | false
+        /// Verify the checksums of native frames: auto (up to 1 GiB) | true | false
         verify: Option<bool> = None, or("auto"), affects(Affects::Nothing);
     }
 }

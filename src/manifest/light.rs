@@ -2,7 +2,8 @@
 
 use glam::{DVec3, Vec3};
 
-use super::key::{Key, Keys, keys};
+use super::key::Key;
+use super::keys::{Keys, keys};
 use super::value::{Named, named};
 use crate::scene::Falloff;
 

@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::color::ColorSetting;
-use super::key::{Affects, Key, Keys, keys};
+use super::key::{Affects, Key};
+use super::keys::{Keys, keys};
 use super::value::named;
 use crate::scene::{self, Finish, Fresnel};
 
@@ -155,7 +156,7 @@ impl Material {
             /// Fresnel equations: auto | schlick | exact; auto is schlick for spheres, exact for union and smooth
             fresnel => self.fresnel, or("auto");
             /// Colour of white light after absorption_length inside, linear RGB; [1, 1, 1] is clear
-            absorption => self.absorption, to(1);
+            absorption => self.absorption, from(0), to(1);
             /// Distance after which white light has the colour absorption, or auto
             absorption_length => self.absorption_length, or("auto"), unit("a length"), above(0), single();
         );

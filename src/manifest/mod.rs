@@ -1,6 +1,6 @@
 //! The manifest: all settings of a job with their types and defaults, read from TOML.
 //!
-//! Each key is declared once (`key.rs`). Options of the command line replace values of the file ([`Override`]). All
+//! Each key is declared once (`keys.rs`). Options of the command line replace values of the file ([`Override`]). All
 //! problems are reported at once, each with line and column (or the option) and key. `resolve` determines the meaning
 //! of "auto" for the given particles.
 
@@ -13,7 +13,8 @@ use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
 use crate::scene::Fresnel;
 use crate::surface::{SurfaceKind, SurfaceSettings};
 
-use key::{Affects, Keys};
+use key::Affects;
+use keys::Keys;
 use list::Entries;
 use problem::{Place, Problem, Problems};
 use reader::Section;
@@ -22,16 +23,19 @@ use tree::Node;
 mod camera;
 mod color;
 mod environment;
+mod field;
 mod file;
 mod flags;
 mod ground;
 mod input;
 mod key;
+mod keys;
 mod light;
 mod list;
 #[cfg(test)]
 mod manual;
 mod material;
+mod nearest;
 mod output;
 mod pattern;
 #[cfg(test)]
@@ -63,17 +67,17 @@ pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
 pub use material::{Material, MaterialKind};
+pub(crate) use nearest::nearest;
 pub use output::{Channel, Output};
 pub use pattern::OutputPattern;
 pub use preset::Look;
-pub(crate) use reader::nearest;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
 pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use sun::Sun;
-pub use tree::Override;
+pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
 

@@ -2,9 +2,10 @@
 
 use serde_json::{Value as Json, json};
 
-use super::key::{Key, section};
+use super::field::Field;
+use super::key::Key;
+use super::keys::section;
 use super::pattern::OutputPattern;
-use super::reader::Field;
 use super::value::{Fault, Value, named, quoted};
 use crate::output::Compression;
 
@@ -48,7 +49,7 @@ section! {
         preview: bool = true;
         /// Exposure of the PNG, stops
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
-        /// Leave the background out of the EXR, for compositing; previews show it
+        /// Omit the background from the EXR, for compositing; previews show it
         transparent: bool = false;
         /// Frames per second, stored in the images
         fps: Option<f64> = None, above(0), example("24.0"), unset("not stored");

@@ -146,9 +146,9 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn path(pattern: &str, frame: i64, wanted: &str) {
+    fn path(pattern: &str, frame: i64, expected: &str) {
         let pattern = OutputPattern::parse(pattern).unwrap();
-        assert_eq!(pattern.path_for(frame), Path::new(wanted));
+        assert_eq!(pattern.path_for(frame), Path::new(expected));
     }
 
     #[test]
@@ -194,7 +194,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals() {
+    fn rejected_patterns() {
         refused("", ".exr");
         refused("out/", ".exr");
         refused("out/.exr", ".exr");

@@ -1,8 +1,10 @@
 //! Looks: named sets of defaults, which values in a manifest and options override.
 
+use spherule_formats::ValueError;
 use toml::Value;
 
-use super::{Override, nearest};
+use super::Override;
+use super::nearest::nearest;
 
 /// A look, see the module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -61,16 +63,11 @@ impl Look {
     ///
     /// # Errors
     /// The name is unknown; lists the known ones.
-    pub fn named(name: &str) -> Result<Self, String> {
+    pub fn named(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.iter().find(|(_, known)| *known == name);
         found.map(|(look, _)| *look).ok_or_else(|| {
             let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
-            let hint = nearest(name, &known).map(|n| format!("; did you mean {n}?"));
-            format!(
-                "unknown look `{name}`; available: {}{}",
-                known.join(", "),
-                hint.unwrap_or_default()
-            )
+            ValueError::one_of(&known, name).with_similar(nearest(name, &known))
         })
     }
 
@@ -81,7 +78,7 @@ impl Look {
             Self::Studio => STUDIO,
             Self::Paper => PAPER,
         };
-        let sections: toml::Table = text.parse().expect("a look of our own is TOML");
+        let sections: toml::Table = text.parse().expect("built-in looks are valid TOML");
         let key = |(section, keys): (String, Value)| match keys {
             Value::Table(keys) => keys
                 .into_iter()
@@ -133,7 +130,7 @@ mod tests {
     }
 
     #[test]
-    fn water_is_one_clear_body_on_a_floor() {
+    fn water_preset_is_a_transparent_union_on_a_ground() {
         let plain = water("input.path = \"data\"", &[]);
         assert_eq!(plain.surface.kind, SurfaceKind::Smooth);
         assert_eq!(plain.render.max_depth, 8);
@@ -168,7 +165,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_said_goes_before_a_look() {
+    fn explicit_settings_override_a_look() {
         let text = "input.path = \"data\"\n[render]\nmax_depth = 5\nground_tile = 2\n[material]\nabsorption = [1, 1, 1]";
         let mixed = water(
             text,
@@ -193,12 +190,12 @@ mod tests {
     }
 
     #[test]
-    fn an_unknown_look_names_the_known() {
+    fn unknown_look_lists_the_known_ones() {
         let error = Look::named("watre").unwrap_err();
-        assert!(
-            error.contains("available: water, studio, paper; did you mean water?"),
-            "{error}"
+        assert_eq!(
+            error.to_string(),
+            "expected one of water, studio, paper, found \"watre\"; did you mean water?"
         );
-        assert!(!Look::named("lava").unwrap_err().contains("did you mean"));
+        assert_eq!(Look::named("lava").unwrap_err().similar, None);
     }
 }

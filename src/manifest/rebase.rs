@@ -177,11 +177,11 @@ mod tests {
         }
         std::os::unix::fs::symlink(at("disk/deep/out"), at("work/out")).unwrap();
         std::os::unix::fs::symlink(at("disk/data"), at("work/data")).unwrap();
-        let seen = |path: &str, to: &str| rebased(path, &at("work"), &at(to)).unwrap();
-        assert_eq!(seen("in/f_#.vtk", "work/out"), "../../../work/in/f_#.vtk");
-        assert_eq!(seen("out/../f_#.vtk", "work/in"), "../../disk/deep/f_#.vtk");
-        assert_eq!(seen("data/f_#.vtk", "work/in"), "../data/f_#.vtk");
-        assert_eq!(seen("in/f_#.vtk", "work/new/out"), "../../in/f_#.vtk");
+        let from = |path: &str, to: &str| rebased(path, &at("work"), &at(to)).unwrap();
+        assert_eq!(from("in/f_#.vtk", "work/out"), "../../../work/in/f_#.vtk");
+        assert_eq!(from("out/../f_#.vtk", "work/in"), "../../disk/deep/f_#.vtk");
+        assert_eq!(from("data/f_#.vtk", "work/in"), "../data/f_#.vtk");
+        assert_eq!(from("in/f_#.vtk", "work/new/out"), "../../in/f_#.vtk");
         let real = root.path().canonicalize().unwrap();
         assert_eq!(
             real_dir(&at("work/out/../new/../a")),

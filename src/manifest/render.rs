@@ -3,7 +3,8 @@
 use glam::Vec3;
 
 use super::ground::{GroundKind, GroundSetting};
-use super::key::{Affects, section};
+use super::key::Affects;
+use super::keys::section;
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::metrics::Bytes;

@@ -115,9 +115,9 @@ mod tests {
     }
 
     #[test]
-    fn the_least_weight_matters_to_transmissive_spheres_alone() {
+    fn min_weight_affects_only_transmissive_spheres() {
         let glass = "material.transmission = 1\n";
-        for (rest, planned, wanted) in [
+        for (rest, planned, expected) in [
             ("", None, ""),
             ("", Some("0.5"), ""),
             ("render.min_weight = 0.5", None, ""),
@@ -133,12 +133,12 @@ mod tests {
             let manifest = manifest(rest);
             let planned = rewritten(&manifest, MIN_WEIGHT, planned);
             let found = changes(&manifest, &planned, false);
-            assert_eq!(found.join("; "), wanted, "{rest}");
+            assert_eq!(found.join("; "), expected, "{rest}");
         }
     }
 
     #[test]
-    fn a_key_that_was_added_later_has_its_default() {
+    fn missing_keys_have_their_defaults() {
         let key = "image.samples";
         let plain = manifest("");
         let without = rewritten(&plain, key, None);
@@ -149,7 +149,7 @@ mod tests {
     }
 
     #[test]
-    fn a_union_was_once_called_a_medium() {
+    fn medium_is_an_obsolete_name_of_union() {
         let union = manifest("render.surface = \"union\"");
         let planned = rewritten(&union, SURFACE, Some("\"medium\""));
         assert!(changes(&union, &planned, false).is_empty());
@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn the_usual_map_may_be_named_or_not() {
+    fn default_map_may_be_explicit() {
         let by = |rest: &str| format!("{{ attribute = \"density\"{rest} }}");
         let (plain, viridis, turbo) = (by(""), by(", map = \"viridis\""), by(", map = \"turbo\""));
         let range = ", range = [1.0, 2.0]";

@@ -2,8 +2,8 @@
 
 use serde_json::{Value as Json, json};
 
+use super::field::Field;
 use super::key::Key;
-use super::reader::Field;
 use super::value::{Fault, Value};
 
 /// The sun of a clear sky.

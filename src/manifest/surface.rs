@@ -1,6 +1,7 @@
 //! `[surface]` and `render.surface`: the surface that rays hit.
 
-use super::key::{Affects, Keys, keys};
+use super::key::Affects;
+use super::keys::{Keys, keys};
 use super::value::named;
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 

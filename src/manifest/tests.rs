@@ -80,18 +80,18 @@ fn refused(section: &str, parts: &[&str]) {
 }
 
 #[test]
-fn the_example_reads() {
+fn example_manifest_is_valid() {
     let manifest = parse(EXAMPLE);
-    let mut wanted = Manifest::new("ParticleData_Fluid_#.vtk");
-    wanted.input.frames = Some("1-17".parse().unwrap());
-    wanted.input.up = Some(UpAxis::Y);
-    wanted.camera.mode = CameraMode::Fixed;
-    wanted.camera.eye = Some(DVec3::ZERO);
-    wanted.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
-    wanted.camera.up = Some(DVec3::Z);
-    wanted.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
-    wanted.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
-    wanted.lights = vec![Light {
+    let mut expected = Manifest::new("ParticleData_Fluid_#.vtk");
+    expected.input.frames = Some("1-17".parse().unwrap());
+    expected.input.up = Some(UpAxis::Y);
+    expected.camera.mode = CameraMode::Fixed;
+    expected.camera.eye = Some(DVec3::ZERO);
+    expected.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
+    expected.camera.up = Some(DVec3::Z);
+    expected.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
+    expected.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
+    expected.lights = vec![Light {
         kind: LightKind::Point {
             position: DVec3::new(0.0, 0.0, 10.0),
             falloff: Falloff::None,
@@ -100,11 +100,11 @@ fn the_example_reads() {
         intensity: 1.0,
         visible: false,
     }];
-    assert_eq!(manifest, wanted);
+    assert_eq!(manifest, expected);
 }
 
 #[test]
-fn a_path_is_enough() {
+fn path_is_the_only_required_key() {
     assert_eq!(parse("[input]\npath = \"data\""), Manifest::new("data"));
     let overlay = Override::new("input.path", "5", "INPUT").unwrap();
     let manifest = Manifest::parse_with("", path(), vec![overlay]).unwrap();
@@ -145,7 +145,7 @@ fn unknown_keys_name_the_nearest() {
 }
 
 #[test]
-fn wrong_types_say_what_is_wanted() {
+fn wrong_types_name_the_expected_type() {
     refused(
         "[image]\nwidth = \"wide\"",
         &[
@@ -377,7 +377,7 @@ fn input_is_checked() {
 }
 
 #[test]
-fn no_toml_names_the_place() {
+fn toml_errors_have_line_and_column() {
     let error = Manifest::parse("[input]\npath = \n", path())
         .unwrap_err()
         .to_string();
@@ -389,7 +389,7 @@ fn no_toml_names_the_place() {
 }
 
 #[test]
-fn everything_wrong_is_told_at_once() {
+fn all_problems_are_reported_at_once() {
     let error = Manifest::parse("[image]\nwidth = 0\n[render]\nx = 1\n", path()).unwrap_err();
     let messages = error.messages();
     assert_eq!(messages.len(), 3, "{error}");
@@ -399,7 +399,7 @@ fn everything_wrong_is_told_at_once() {
 }
 
 #[test]
-fn sets_lie_over_the_file() {
+fn overrides_replace_file_values() {
     let manifest = with_sets(&[
         "render.max_depth=5",
         "output.compression = piz",
@@ -427,7 +427,7 @@ fn sets_lie_over_the_file() {
 }
 
 #[test]
-fn a_map_alone_is_laid_into_what_is_there() {
+fn map_alone_keeps_the_attribute() {
     let auto = |range| ColorSetting::AutoWith {
         map: MapName::named("turbo"),
         range,
@@ -451,7 +451,7 @@ fn a_map_alone_is_laid_into_what_is_there() {
 }
 
 #[test]
-fn strings_that_control_a_terminal_are_escapes() {
+fn control_characters_in_strings_are_escaped() {
     let hostile = "a\u{1b}[2J\nb\u{9b}\u{202e}\"\\";
     let text = Manifest::new(hostile).to_commented_toml();
     let raw = text
@@ -463,7 +463,7 @@ fn strings_that_control_a_terminal_are_escapes() {
 }
 
 #[test]
-fn sets_that_will_not_do() {
+fn invalid_overrides() {
     let wrong = |set: &str, part: &str| {
         let error = with_sets(&[set]).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
@@ -487,7 +487,7 @@ fn sets_that_will_not_do() {
         ("=1", "invalid key"),
         ("a=[1", "--set a=[1: "),
     ] {
-        let error = Override::parse(set).unwrap_err();
+        let error = Override::parse(set).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
 }
@@ -551,7 +551,7 @@ fn settings_are_what_images_depend_on() {
 }
 
 #[test]
-fn commented_file_reads_back_and_shows_every_key() {
+fn commented_file_round_trips_with_every_key() {
     let plain = Manifest::new("a \"quoted\"\\path\n#.vtk");
     let text = plain.to_commented_toml();
     assert_eq!(parse(&text), plain);
@@ -585,7 +585,7 @@ fn commented_file_reads_back_and_shows_every_key() {
 }
 
 #[test]
-fn lists_of_everything_read_back() {
+fn lists_of_all_kinds_round_trip() {
     let text = r#"
 input = { path = ["a", "b"], radius = { attribute = "d", scale = 0.5 }, up = "-y" }
 camera.key = [{ frame = 9, eye = [1,2,3], look_at = [0,0,0], fov = 30 }, { frame = -1, eye = [1,1,1], look_at = [0,0,0], up = [0,1,0] }]
@@ -603,7 +603,7 @@ light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", posit
 
 proptest! {
     #[test]
-    fn numbers_read_back_to_the_bit(
+    fn numbers_round_trip_to_the_bit(
         wide in prop::array::uniform3(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL),
         narrow in prop::num::f32::POSITIVE | prop::num::f32::SUBNORMAL,
         path in "[^\\PC]{1,8}x",
@@ -621,23 +621,26 @@ proptest! {
     }
 
     #[test]
-    fn any_text_is_answered(text in "[a-z\\[\\]=.\"0-9{}, \n#]{0,60}") {
+    fn arbitrary_text_never_panics(text in "[a-z\\[\\]=.\"0-9{}, \n#]{0,60}") {
         let _ = Manifest::parse(&text, path());
     }
 }
 
 #[test]
-fn many_problems_are_told_in_part() {
+fn number_of_reported_problems_is_limited() {
     let keys: String = (0..100_000).map(|i| format!("widt{i} = 1\n")).collect();
     let text = format!("input.path = \"a\"\n[image]\n{keys}");
     let error = Manifest::parse(&text, Path::new("job.toml")).expect_err("unknown keys");
-    let told = error.to_string();
+    let message = error.to_string();
     assert!(
-        told.contains("line 3, column 1: image.widt0: unknown key; did you mean"),
-        "{told}"
+        message.contains("line 3, column 1: image.widt0: unknown key; did you mean"),
+        "{message}"
     );
-    assert!(told.ends_with("job.toml: and more like these"), "{told}");
-    assert_eq!(told.lines().count(), 51);
+    assert!(
+        message.ends_with("job.toml: and more like these"),
+        "{message}"
+    );
+    assert_eq!(message.lines().count(), 51);
 }
 
 #[test]

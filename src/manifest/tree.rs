@@ -35,18 +35,41 @@ pub struct Override {
     is_under: bool,
 }
 
+/// Why an override is invalid.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{shown}: {fault}")]
+pub struct OverrideError {
+    /// The option as the user typed it.
+    shown: String,
+    fault: OverrideFault,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum OverrideFault {
+    #[error("no `=` (example: render.max_depth=5)")]
+    NoValue,
+    #[error("invalid key `{0}` (example: render.max_depth)")]
+    Key(String),
+    #[error("{0}")]
+    Toml(String),
+}
+
 impl Override {
     /// Parses `render.max_depth=5`: a dotted key and a TOML value. A value that is not TOML is treated as text, so
     /// that quotes are not needed.
     ///
     /// # Errors
     /// There is no `=`, a key is empty, or a list, table or quoted text is incomplete.
-    pub fn parse(assignment: &str) -> Result<Self, String> {
+    pub fn parse(assignment: &str) -> Result<Self, OverrideError> {
         let shown = format!("--set {assignment}");
-        let Some((key, value)) = assignment.split_once('=') else {
-            return Err(format!("{shown}: no `=` (example: render.max_depth=5)"));
+        let error = |fault| OverrideError {
+            shown: shown.clone(),
+            fault,
         };
-        let keys = split_key(key).map_err(|e| format!("{shown}: {e}"))?;
+        let Some((key, value)) = assignment.split_once('=') else {
+            return Err(error(OverrideFault::NoValue));
+        };
+        let keys = split_key(key).map_err(error)?;
         let place = Place::Option(shown.clone());
         let value = value.trim();
         let kind = match DeValue::parse(value) {
@@ -55,7 +78,7 @@ impl Override {
                 kind => kind,
             },
             Err(e) if value.starts_with(['[', '{', '"', '\'']) => {
-                return Err(format!("{shown}: {}", e.message()));
+                return Err(error(OverrideFault::Toml(e.message().to_owned())));
             }
             Err(_) => Kind::Text(value.to_owned()),
         };
@@ -70,10 +93,17 @@ impl Override {
     ///
     /// # Errors
     /// A part of the key is empty.
-    pub fn new(key: &str, value: impl Into<toml::Value>, shown: &str) -> Result<Self, String> {
+    pub fn new(
+        key: &str,
+        value: impl Into<toml::Value>,
+        shown: &str,
+    ) -> Result<Self, OverrideError> {
         let place = Place::Option(shown.to_owned());
         Ok(Self {
-            keys: split_key(key).map_err(|e| format!("{shown}: {e}"))?,
+            keys: split_key(key).map_err(|fault| OverrideError {
+                shown: shown.to_owned(),
+                fault,
+            })?,
             node: Node::from_value(value.into(), &place),
             is_under: false,
         })
@@ -93,10 +123,10 @@ impl Override {
     }
 }
 
-fn split_key(key: &str) -> Result<Vec<String>, String> {
+fn split_key(key: &str) -> Result<Vec<String>, OverrideFault> {
     let keys: Vec<String> = key.split('.').map(|k| k.trim().to_owned()).collect();
     if keys.iter().any(String::is_empty) {
-        return Err(format!("invalid key `{key}` (example: render.max_depth)"));
+        return Err(OverrideFault::Key(key.to_owned()));
     }
     Ok(keys)
 }

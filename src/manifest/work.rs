@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use serde_json::{Value as Json, json};
 
-use super::key::{Affects, Keys, section};
+use super::key::Affects;
+use super::keys::{Keys, section};
 use super::value::named;
 use crate::metrics::Bytes;
 
@@ -94,7 +95,7 @@ impl Work {
         {
             section.wrong(
                 "memory_ceiling",
-                "is that of a frame's own process; say job.isolate = true too, or render.memory_limit",
+                "applies to the process of a frame; set job.isolate = true too, or use render.memory_limit",
             );
         }
     }

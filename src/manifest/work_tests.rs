@@ -36,7 +36,7 @@ fn job(sets: [&str; 2]) -> Result<Manifest, ManifestError> {
 }
 
 #[test]
-fn no_image_depends_on_how_the_work_is_gone_about() {
+fn images_do_not_depend_on_job_settings() {
     let plain = Manifest::new("data");
     for entry in plain.entries().list() {
         let is_execution = entry.section == "job";
@@ -53,17 +53,17 @@ fn no_image_depends_on_how_the_work_is_gone_about() {
 }
 
 #[test]
-fn values_that_will_not_do() {
+fn invalid_values() {
     #[track_caller]
     fn refused(set: &str, what: &str) {
         let error = job([set, ""]).unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
-        let wanted = format!("--set job.{set}: job.{what}");
-        assert!(error.to_string().starts_with(&wanted), "{error}");
+        let expected = format!("--set job.{set}: job.{what}");
+        assert!(error.to_string().starts_with(&expected), "{error}");
     }
     for wrong in ["0", "-1", "1025", "1.5", "many", "true"] {
-        let wanted = "threads: expected \"all\" or a whole number from 1 to 1024, found";
-        refused(&format!("threads={wrong}"), wanted);
+        let expected = "threads: expected \"all\" or a whole number from 1 to 1024, found";
+        refused(&format!("threads={wrong}"), expected);
     }
     refused(
         "progress=jsno",
@@ -76,7 +76,7 @@ fn values_that_will_not_do() {
     );
     refused(
         "memory_ceiling=4GiB",
-        "memory_ceiling: is that of a frame's own process; say job.isolate = true too",
+        "memory_ceiling: applies to the process of a frame; set job.isolate = true too",
     );
     refused(
         "retries=-1",
@@ -102,14 +102,14 @@ fn values_that_will_not_do() {
 
 #[test]
 fn any_time_is_a_duration() {
-    for (set, wanted) in [
+    for (set, expected) in [
         ("settle=0", Duration::ZERO),
         ("settle=1e-300", Duration::ZERO),
         ("settle=0.25", Duration::from_millis(250)),
         ("settle=1e9", Duration::from_secs(1_000_000_000)),
     ] {
         let work = job([set, ""]).unwrap().job;
-        assert_eq!(work.settle, wanted, "{set}");
+        assert_eq!(work.settle, expected, "{set}");
     }
 }
 

@@ -196,15 +196,15 @@ mod tests {
         bound: impl Fn(f64, f64) -> f64,
     ) {
         for x in steps(low, high) {
-            let wanted = exact(f64::from(x));
-            let error = (f64::from(own(x)) - wanted).abs();
-            let most = bound(f64::from(x), wanted);
-            assert!(error <= most, "{x}: {} instead of {wanted}", own(x));
+            let expected = exact(f64::from(x));
+            let error = (f64::from(own(x)) - expected).abs();
+            let most = bound(f64::from(x), expected);
+            assert!(error <= most, "{x}: {} instead of {expected}", own(x));
         }
     }
 
     #[test]
-    fn powers_of_two_keep_their_error() {
+    fn exp2_is_within_its_error_bound() {
         check(-125.0, 127.9, exp2, f64::exp2, |_, y| 2e-7 * y);
         check(-1.0, 1.0, exp2, f64::exp2, |_, y| 2e-7 * y);
         check(-80.0, 80.0, exp, f64::exp, |x, y| {
@@ -220,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_keep_their_error() {
+    fn log2_is_within_its_error_bound() {
         let bound = |_: f64, y: f64| 2e-7 + 1e-7 * y.abs();
         check(0.3, 3.0, log2, f64::log2, bound);
         check(1e-30, 1e-20, log2, f64::log2, bound);
@@ -231,11 +231,12 @@ mod tests {
     }
 
     #[test]
-    fn powers_keep_their_error() {
+    fn pow_is_within_its_error_bound() {
         for y in [0.5_f32, 1.0, 2.2, 32.0, 500.0] {
             let exponent = f64::from(y);
-            let bound =
-                |x: f64, wanted: f64| wanted * (2e-7 + 2e-7 * exponent * x.log2().abs()) + 1e-37;
+            let bound = |x: f64, expected: f64| {
+                expected * (2e-7 + 2e-7 * exponent * x.log2().abs()) + 1e-37
+            };
             check(1e-3, 1.0, |x| pow(x, y), |x| x.powf(exponent), bound);
         }
         assert_eq!(pow(0.0, 0.0), 1.0);
@@ -245,22 +246,26 @@ mod tests {
     }
 
     #[test]
-    fn arcs_keep_their_error() {
+    fn arc_functions_are_within_their_error_bounds() {
         check(-1.0, 1.0, asin, f64::asin, |_, _| 3e-7);
         check(-1.0, 1.0, acos, f64::acos, |_, _| 4e-7);
         assert_eq!((asin(0.0), acos(1.0)), (0.0, 0.0));
     }
 
     #[test]
-    fn angles_of_vectors_keep_their_error() {
+    fn angles_of_vectors_are_within_their_error_bounds() {
         for angle in steps(-std::f32::consts::PI, std::f32::consts::PI) {
             let exact = f64::from(angle);
             for length in [1e-20, 1.0, 3e4] {
                 #[expect(clippy::cast_possible_truncation, reason = "the argument is f32")]
                 let (x, y) = ((length * exact.cos()) as f32, (length * exact.sin()) as f32);
-                let wanted = f64::from(y).atan2(f64::from(x));
-                let error = (f64::from(atan2(y, x)) - wanted).abs();
-                assert!(error < 4e-7, "{x} {y}: {} instead of {wanted}", atan2(y, x));
+                let expected = f64::from(y).atan2(f64::from(x));
+                let error = (f64::from(atan2(y, x)) - expected).abs();
+                assert!(
+                    error < 4e-7,
+                    "{x} {y}: {} instead of {expected}",
+                    atan2(y, x)
+                );
             }
         }
         assert_eq!(atan2(0.0, 0.0), 0.0);
@@ -271,7 +276,7 @@ mod tests {
     }
 
     #[test]
-    fn sine_and_cosine_keep_their_error() {
+    fn sine_and_cosine_are_within_their_error_bounds() {
         for (low, high) in [(-8.0, 8.0), (-8192.0, 8192.0)] {
             check(low, high, |x| sin_cos(x).0, f64::sin, |_, _| 2e-7);
             check(low, high, |x| sin_cos(x).1, f64::cos, |_, _| 2e-7);

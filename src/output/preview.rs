@@ -77,8 +77,8 @@ mod tests {
     }
 
     fn assert_near(shown: f32, linear: f32) {
-        let wanted = 255.0 * srgb_from_linear(linear);
-        assert!((shown - wanted).abs() < 0.05, "{shown} {wanted}");
+        let expected = 255.0 * srgb_from_linear(linear);
+        assert!((shown - expected).abs() < 0.05, "{shown} {expected}");
     }
 
     #[test]
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn a_faint_gradient_has_no_bands() {
+    fn faint_gradient_has_no_banding() {
         // The gradient spans about three 8-bit values. Without dithering, each band would be hundreds of pixels wide.
         let mut film = Film::new(600, 16, Channels::COLOR);
         for (index, color) in film.color.iter_mut().enumerate() {
@@ -112,12 +112,15 @@ mod tests {
         }
         let image = decode(&encode_preview(&film, &PreviewOptions::default()).unwrap());
         for left in (0..600).step_by(16).filter(|left| left + 16 <= 600) {
-            let (mut shown, mut wanted) = (0.0, 0.0);
+            let (mut shown, mut expected) = (0.0, 0.0);
             for (x, y) in (0..256).map(|i| (left + i % 16, i / 16)) {
                 shown += f32::from(image.get_pixel(x, y).0[0]) / 256.0;
-                wanted += 255.0 * srgb_from_linear(0.2 + 0.006 * x as f32 / 600.0) / 256.0;
+                expected += 255.0 * srgb_from_linear(0.2 + 0.006 * x as f32 / 600.0) / 256.0;
             }
-            assert!((shown - wanted).abs() < 0.05, "{left}: {shown} {wanted}");
+            assert!(
+                (shown - expected).abs() < 0.05,
+                "{left}: {shown} {expected}"
+            );
         }
     }
 

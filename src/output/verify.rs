@@ -30,20 +30,20 @@ pub struct ImageShape {
 #[derive(Debug, Error)]
 pub enum ImageFault {
     /// It has another size.
-    #[error("is {}x{}, {}x{} is wanted", found.0, found.1, wanted.0, wanted.1)]
+    #[error("is {}x{}, expected {}x{}", found.0, found.1, expected.0, expected.1)]
     Size {
         /// Width and height of the image, pixels.
         found: (usize, usize),
         /// Expected width and height, pixels.
-        wanted: (u32, u32),
+        expected: (u32, u32),
     },
     /// It has other channels, or channels of another type.
-    #[error("has the channels {found}, {wanted} are wanted")]
+    #[error("has the channels {found}, expected {expected}")]
     Channels {
         /// The channels of the file, with their types.
         found: String,
         /// The expected channels, with their types.
-        wanted: String,
+        expected: String,
     },
     /// The file violates its format, or cannot be read.
     #[error("{0}")]
@@ -62,11 +62,11 @@ impl From<png::DecodingError> for ImageFault {
     }
 }
 
-/// Decodes the OpenEXR file `file` and compares it with `wanted`.
+/// Decodes the OpenEXR file `file` and compares it with `expected`.
 ///
 /// # Errors
 /// The first fault found.
-pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), ImageFault> {
+pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), ImageFault> {
     let reader = exr::block::read(file, true)?;
     let meta = reader.meta_data().clone();
     let [header] = &meta.headers[..] else {
@@ -74,7 +74,7 @@ pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), Ima
         return Err(ImageFault::Damaged(format!("has {count} parts, not one")));
     };
     // Check the size before memory is allocated for the size in the header
-    check_header(header, wanted)?;
+    check_header(header, expected)?;
     // Decode the blocks at the offsets in the file, like viewers do
     let mut rows = 0;
     for chunk in reader.filter_chunks(true, |_, _, _| true)? {
@@ -97,13 +97,13 @@ pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), Ima
     }
 }
 
-fn check_header(header: &Header, wanted: &ImageShape) -> Result<(), ImageFault> {
+fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
-    check_size(size, wanted)?;
+    check_size(size, expected)?;
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
-    let planes = planes(wanted.channels).into_iter();
+    let planes = planes(expected.channels).into_iter();
     let planes: Vec<_> = planes
         .map(|plane| (plane.name.to_owned(), plane.sample_type()))
         .collect();
@@ -114,16 +114,16 @@ fn check_header(header: &Header, wanted: &ImageShape) -> Result<(), ImageFault> 
     }
     Err(ImageFault::Channels {
         found: listed(&found),
-        wanted: listed(&planes),
+        expected: listed(&planes),
     })
 }
 
-fn check_size(found: (usize, usize), wanted: &ImageShape) -> Result<(), ImageFault> {
-    let wanted = (wanted.width, wanted.height);
-    if found == (wanted.0 as usize, wanted.1 as usize) {
+fn check_size(found: (usize, usize), expected: &ImageShape) -> Result<(), ImageFault> {
+    let expected = (expected.width, expected.height);
+    if found == (expected.0 as usize, expected.1 as usize) {
         Ok(())
     } else {
-        Err(ImageFault::Size { found, wanted })
+        Err(ImageFault::Size { found, expected })
     }
 }
 
@@ -141,16 +141,16 @@ fn listed(planes: &[(String, SampleType)]) -> String {
         .join(", ")
 }
 
-/// Decodes the PNG file `file` and compares its size with `wanted`.
+/// Decodes the PNG file `file` and compares its size with `expected`.
 ///
 /// # Errors
 /// The first fault found.
-pub fn verify_preview(file: impl BufRead + Seek, wanted: &ImageShape) -> Result<(), ImageFault> {
+pub fn verify_preview(file: impl BufRead + Seek, expected: &ImageShape) -> Result<(), ImageFault> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_checksums(false);
     let mut decoder = png::Decoder::new_with_options(file, options);
     let header = decoder.read_header_info()?;
-    check_size((header.width as usize, header.height as usize), wanted)?;
+    check_size((header.width as usize, header.height as usize), expected)?;
     let mut reader = decoder.read_info()?;
     while reader.next_row()?.is_some() {}
     Ok(reader.finish()?)

@@ -33,8 +33,8 @@ const fn shape(channels: Channels) -> ImageShape {
     }
 }
 
-fn verify(bytes: &[u8], wanted: &ImageShape) -> Result<(), String> {
-    verify_exr(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
+fn verify(bytes: &[u8], expected: &ImageShape) -> Result<(), String> {
+    verify_exr(Cursor::new(bytes), expected).map_err(|e| e.to_string())
 }
 
 /// All combinations of channels.
@@ -50,7 +50,7 @@ fn channel_sets() -> impl Iterator<Item = Channels> {
 }
 
 #[test]
-fn written_files_are_sound() {
+fn written_files_verify() {
     for channels in channel_sets() {
         let bytes = exr(&film(40, 37, channels), Compression::Zip);
         assert_eq!(verify(&bytes, &shape(channels)), Ok(()), "{channels:?}");
@@ -68,22 +68,22 @@ fn written_files_are_sound() {
 }
 
 #[test]
-fn another_size_or_other_channels_are_a_fault() {
+fn wrong_size_or_channels_are_faults() {
     let bytes = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
-    let mut wanted = shape(Channels::COLOR);
-    wanted.height = 38;
+    let mut expected = shape(Channels::COLOR);
+    expected.height = 38;
     assert_eq!(
-        verify(&bytes, &wanted).unwrap_err(),
-        "is 40x37, 40x38 is wanted"
+        verify(&bytes, &expected).unwrap_err(),
+        "is 40x37, expected 40x38"
     );
-    let wanted = shape(Channels {
+    let expected = shape(Channels {
         id: true,
         ..Channels::COLOR
     });
     assert_eq!(
-        verify(&bytes, &wanted).unwrap_err(),
+        verify(&bytes, &expected).unwrap_err(),
         "has the channels A (half), B (half), G (half), R (half), \
-         R (half), G (half), B (half), A (half), id.I (uint) are wanted"
+         expected R (half), G (half), B (half), A (half), id.I (uint)"
     );
     let more = exr(&film(40, 37, Channels::ALL), Compression::Zip);
     assert!(verify(&more, &shape(Channels::COLOR)).is_err());
@@ -116,7 +116,7 @@ fn end_of_header(bytes: &[u8]) -> usize {
 }
 
 #[test]
-fn flipped_bits_that_change_a_pixel_are_found() {
+fn flipped_bits_that_change_a_pixel_are_detected() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Zip);
     let good = samples(&bytes);
     let start = end_of_header(&bytes);
@@ -136,7 +136,7 @@ fn flipped_bits_that_change_a_pixel_are_found() {
 }
 
 #[test]
-fn truncated_files_are_found_and_absurd_sizes_allocate_nothing() {
+fn truncated_files_are_detected_and_huge_sizes_allocate_nothing() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Piz);
     for length in 0..bytes.len() {
         assert!(verify(&bytes[..length], &shape(Channels::ALL)).is_err());
@@ -156,21 +156,21 @@ fn truncated_files_are_found_and_absurd_sizes_allocate_nothing() {
 #[test]
 fn previews_are_decoded_to_their_last_byte() {
     let png = encode_preview(&film(40, 37, Channels::COLOR), &PreviewOptions::default()).unwrap();
-    let verify = |bytes: &[u8], wanted: &ImageShape| {
-        verify_preview(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
+    let verify = |bytes: &[u8], expected: &ImageShape| {
+        verify_preview(Cursor::new(bytes), expected).map_err(|e| e.to_string())
     };
-    let wanted = shape(Channels::COLOR);
-    assert_eq!(verify(&png, &wanted), Ok(()));
+    let expected = shape(Channels::COLOR);
+    assert_eq!(verify(&png, &expected), Ok(()));
     for at in 0..png.len() {
         let mut damaged = png.clone();
         damaged[at] ^= 4;
-        assert!(verify(&damaged, &wanted).is_err(), "byte {at} flipped");
-        assert!(verify(&png[..at], &wanted).is_err(), "cut at byte {at}");
+        assert!(verify(&damaged, &expected).is_err(), "byte {at} flipped");
+        assert!(verify(&png[..at], &expected).is_err(), "cut at byte {at}");
     }
-    let mut other = wanted;
+    let mut other = expected;
     other.width = 41;
     assert_eq!(
         verify(&png, &other).unwrap_err(),
-        "is 40x37, 41x37 is wanted"
+        "is 40x37, expected 41x37"
     );
 }

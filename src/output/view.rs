@@ -131,12 +131,12 @@ mod tests {
             .map(|i| f32::from(i) / 4900.0 - 0.01)
             .collect();
         let thresholds: Vec<f32> = (0..5000).map(|i| dither_threshold(i, i / 7)).collect();
-        let wanted = linear.iter().zip(&thresholds);
-        let wanted: Vec<u8> = wanted.map(|(l, t)| byte_from_linear(*l, *t)).collect();
+        let expected = linear.iter().zip(&thresholds);
+        let expected: Vec<u8> = expected.map(|(l, t)| byte_from_linear(*l, *t)).collect();
         for level in SimdLevel::ALL {
             let mut bytes = vec![7; linear.len()];
             bytes_from_linear(Supported::or_best(level), &linear, &thresholds, &mut bytes);
-            assert!(bytes == wanted, "{level:?}");
+            assert!(bytes == expected, "{level:?}");
         }
     }
 
@@ -144,7 +144,7 @@ mod tests {
     fn dithering_keeps_the_mean_of_few_neighbours() {
         let side = 16;
         for (left, top) in [(0, 0), (1000, 3), (65_520, 65_520)] {
-            for (level, wanted) in [(0.25, 100.25), (0.5, 100.5), (0.9, 100.9)] {
+            for (level, expected) in [(0.25, 100.25), (0.5, 100.5), (0.9, 100.9)] {
                 let mut sum = 0.0;
                 for (x, y) in (0..side * side).map(|i| (left + i % side, top + i / side)) {
                     let threshold = dither_threshold(x, y);
@@ -152,7 +152,10 @@ mod tests {
                     sum += (100.0 + level + threshold).floor();
                 }
                 let mean = sum / (side * side) as f32;
-                assert!((mean - wanted).abs() < 0.02, "{left} {top} {level}: {mean}");
+                assert!(
+                    (mean - expected).abs() < 0.02,
+                    "{left} {top} {level}: {mean}"
+                );
             }
         }
     }

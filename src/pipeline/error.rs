@@ -3,12 +3,11 @@
 use std::io;
 use std::path::PathBuf;
 
-use spherule_jobs::{FailureKind, FrameFailure};
+use spherule_jobs::{FailureKind, FrameFailure, Panic};
 
 use super::load_error::LoadError;
 use super::memory_limit::MemoryLimitError;
 use super::renderer::TraceError;
-use crate::failure::Panic;
 use crate::output::OutputError;
 use crate::render::RenderError;
 

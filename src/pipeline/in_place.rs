@@ -229,7 +229,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     }
     if DVec3::from_array(index.origin) != setup.picture.origin {
         return Err(
-            "they are relative to another origin than the sequence, for 12 bytes a particle \
+            "they are relative to another origin than the sequence, for 12 bytes per particle \
                     and more; convert the sequence as a whole to save that"
                 .to_owned(),
         );
@@ -237,7 +237,9 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     // Find the radii
     let common = match (&setup.picture.radius, &index.radius) {
         (RadiusRule::Attribute { .. }, _) => {
-            return Err("the radius is an attribute, for 12 bytes a particle and more".to_owned());
+            return Err(
+                "the radius is an attribute, for 12 bytes per particle and more".to_owned(),
+            );
         }
         (RadiusRule::Common(radius), _) | (RadiusRule::FileOr(radius), RadiusIndex::None) => {
             *radius

@@ -182,16 +182,16 @@ impl Setup {
         let structure = self.stored_structure();
         if matches!(structure, Structure::Bvh | Structure::Sbvh) {
             return Some(format!(
-                "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
+                "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
         let why = match self.picture.surface {
             SurfaceSettings {
                 kind: SurfaceKind::Smooth,
                 ..
-            } => "a smooth surface sorts a copy of them, 12 bytes a particle and more",
+            } => "a smooth surface sorts a copy of them, 12 bytes per particle and more",
             SurfaceSettings { spray: true, .. } => {
-                "spray is parted from them, for 12 bytes a particle and more"
+                "spray is parted from them, for 12 bytes per particle and more"
             }
             _ => return None,
         };

@@ -4,7 +4,7 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
 use spherule_formats::Sequence;
-use spherule_jobs::publish;
+use spherule_jobs::{catch_panic, publish};
 
 use super::ImageTask;
 use super::encode::write_frame;
@@ -13,7 +13,6 @@ use super::load::load_frame;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
 use super::trace::renderer_of;
-use crate::failure::catch_panic;
 use crate::metrics::MemoryPeaks;
 use crate::output::encode_preview;
 use crate::report::FrameReport;
@@ -35,7 +34,7 @@ pub fn make_image(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-    note: impl FnMut(&str),
+    note: impl FnMut(String),
 ) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
     catch_panic(|| write_exr(setup, traced))
@@ -50,7 +49,7 @@ pub fn make_picture(
     sequence: &Sequence,
     task: &ImageTask,
     kind: PictureKind,
-    note: impl FnMut(&str),
+    note: impl FnMut(String),
 ) -> Result<FrameReport, ImageError> {
     let traced = trace_single(setup, sequence, task, note)?;
     catch_panic(|| match kind {
@@ -63,10 +62,11 @@ fn trace_single(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-    mut note: impl FnMut(&str),
+    mut note: impl FnMut(String),
 ) -> Result<TracedFrame, ImageError> {
-    let mut report = |notes: &mut Vec<String>| notes.drain(..).for_each(|n| note(&n));
+    let mut report = |notes: &mut Vec<String>| notes.drain(..).for_each(&mut note);
     catch_panic(|| {
+        task.check()?;
         let mut frame = load_frame(setup, sequence, task)?;
         report(&mut frame.notes);
         // Build its tree, and trace the image

@@ -125,7 +125,7 @@ impl Film {
     /// A film of zeros. Its pages are allocated when they are first written.
     fn zeroed(width: u32, height: u32, channels: Channels) -> Self {
         let count = width as usize * height as usize;
-        let vectors = |wanted: bool| wanted.then(|| zeroed_vec::<Vec3>(count));
+        let vectors = |is_stored: bool| is_stored.then(|| zeroed_vec::<Vec3>(count));
         Self {
             width,
             height,

@@ -90,7 +90,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_lie_where_they_lay() {
+    fn parts_keep_their_position() {
         let mut film = Film::new(3, 10, Channels::ALL);
         for (at, id) in (0..).zip(film.id.iter_mut().flatten()) {
             *id = at;

@@ -126,7 +126,7 @@ fn the_same_film_on_any_number_of_threads() {
 }
 
 #[test]
-fn nothing_is_left_of_what_was_in_a_film() {
+fn reused_film_is_cleared() {
     let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
     let never = AtomicBool::new(false);
     let scene = heap_scene(0.0);
@@ -208,8 +208,8 @@ fn data_planes_hold_the_nearest_sample() {
     let middle = 16 * 33 + 16;
     assert!((film.depth.as_ref().unwrap()[middle] - 4.0).abs() < 1e-5);
     assert!((film.normal.as_ref().unwrap()[middle] - Vec3::NEG_Z).length() < 1e-5);
-    let wanted = Vec3::new(100.0, 200.0, -1.0);
-    assert!((film.position.as_ref().unwrap()[middle] - wanted).length() < 1e-4);
+    let expected = Vec3::new(100.0, 200.0, -1.0);
+    assert!((film.position.as_ref().unwrap()[middle] - expected).length() < 1e-4);
     assert_eq!(film.velocity.as_ref().unwrap()[middle], velocities[0]);
     assert_eq!(film.albedo.as_ref().unwrap()[middle].z, 0.3);
     assert_eq!(film.id.as_ref().unwrap()[middle], 77);

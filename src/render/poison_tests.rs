@@ -112,7 +112,7 @@ fn check_integrator(integrator: &dyn Integrator, scene: &Scene) {
         "there is something to see"
     );
     for lane in [0, 5, 6, 15] {
-        let wanted = left(integrator, &clean, lane);
+        let expected = left(integrator, &clean, lane);
         for poison in POISON {
             let bad = Vec3::new(1.0, poison, -0.5);
             let mut poisoned = [clean.clone(), clean.clone(), clean.clone()];
@@ -120,7 +120,11 @@ fn check_integrator(integrator: &dyn Integrator, scene: &Scene) {
             set_lane3(&mut poisoned[1].rays.direction, lane, bad);
             set_lane3(&mut poisoned[2].throughput, lane, bad);
             for segments in poisoned {
-                assert_eq!(left(integrator, &segments, lane), wanted, "{lane} {poison}");
+                assert_eq!(
+                    left(integrator, &segments, lane),
+                    expected,
+                    "{lane} {poison}"
+                );
             }
         }
     }
@@ -139,7 +143,7 @@ fn heap() -> Vec<Ball> {
 }
 
 #[test]
-fn poisoned_rays_change_nothing_for_their_neighbours() {
+fn nan_rays_do_not_affect_other_rays() {
     let centers: Vec<Vec3> = heap().iter().map(|ball| ball.center).collect();
     let mut builder = TreeBuilder::new();
     let (centers, radius) = (&centers[..], SphereRadius::Common(0.6));
@@ -189,7 +193,7 @@ impl Shape for Poisoned<'_> {
 }
 
 #[test]
-fn poisoned_particles_change_nothing_for_rays_at_others() {
+fn nan_particles_do_not_affect_other_particles() {
     let (balls, solid) = (Balls(heap()), Solid::ball(1.0));
     let shapes: [&dyn Shape; 2] = [&balls, &solid];
     for (shape, transmission) in shapes.into_iter().flat_map(|s| [(s, 0.0), (s, 0.8)]) {

@@ -182,7 +182,7 @@ mod tests {
         let mut stream = RayStream::default();
         for round in 0..2 {
             stream.clear();
-            let mut wanted = Vec::new();
+            let mut expected = Vec::new();
             for first in [0_u32, 100, 200, 300] {
                 let mut rays = ScatteredRays::default();
                 let mut next = first;
@@ -199,19 +199,19 @@ mod tests {
                 let lanes = (0b1010_1100_0000_0111 << (first / 100 % 2)) & 0xffff;
                 let odd = 0b1010_1010_1010_1010;
                 stream.push(lanes, &rays, &parents, odd, 1);
-                wanted.extend(lanes_in(lanes).map(|lane| sample[lane]));
+                expected.extend(lanes_in(lanes).map(|lane| sample[lane]));
             }
-            assert_eq!(stream.len(), wanted.len(), "{round}");
+            assert_eq!(stream.len(), expected.len(), "{round}");
             let packets = stream.packets();
             let found: Vec<u32> = packets
                 .iter()
                 .flat_map(|p| p.sample[..p.rays.len()].to_vec())
                 .collect();
-            assert_eq!(found, wanted);
+            assert_eq!(found, expected);
             let origins = packets
                 .iter()
                 .flat_map(|p| p.rays.rays().map(|r| r.origin.x));
-            assert!(origins.eq(wanted.iter().map(|s| *s as f32)));
+            assert!(origins.eq(expected.iter().map(|s| *s as f32)));
             for packet in packets {
                 for lane in 0..packet.rays.len() {
                     let sample = packet.sample[lane];

@@ -34,7 +34,7 @@ pub struct FrameReport {
 /// Wall-clock seconds of the stages, from the moment that they have a thread; neighbouring frames overlap.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub struct StageSeconds {
     pub read: f64,
     pub build: f64,
@@ -99,7 +99,7 @@ pub struct FileBytes {
 /// Rays by purpose.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub struct RaySummary {
     pub primary: u64,
     pub shadow: u64,

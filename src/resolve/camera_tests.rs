@@ -49,7 +49,7 @@ fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {
 }
 
 #[test]
-fn keys_take_from_the_camera_what_they_leave_out() {
+fn keys_inherit_missing_values_from_the_camera() {
     let setup = setup(|camera| {
         camera.mode = CameraMode::Keys;
         camera.up = Some(3.0 * DVec3::Y);
@@ -85,7 +85,7 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
 }
 
 #[test]
-fn what_lies_behind_a_preview_is_what_its_camera_looks_at() {
+fn preview_backdrop_follows_the_camera() {
     let keys = [key(1, [5.0, 0.0, -4.0]), key(2, [5.0, 0.0, 4.0])];
     let setup = keyed_setup(keys).unwrap();
     let behind = |frame| {
@@ -101,24 +101,24 @@ fn what_lies_behind_a_preview_is_what_its_camera_looks_at() {
 }
 
 #[test]
-fn a_key_without_a_picture_is_named() {
-    let told = |keys: [Key; 2]| keyed_setup(keys).unwrap_err().to_string();
+fn invalid_key_view_is_named() {
+    let message = |keys: [Key; 2]| keyed_setup(keys).unwrap_err().to_string();
     assert_eq!(
-        told([key(1, [5.0, 0.0, 0.0]), key(-7, [0.0, 0.0, 5.0])]),
+        message([key(1, [5.0, 0.0, 0.0]), key(-7, [0.0, 0.0, 5.0])]),
         "camera.key: the key of frame -7: up is zero or points along the view; choose another camera.up"
     );
     assert_eq!(
-        told([key(1, [5.0, 0.0, 0.0]), key(1, [6.0, 0.0, 5.0])]),
+        message([key(1, [5.0, 0.0, 0.0]), key(1, [6.0, 0.0, 5.0])]),
         "camera.key: two keys have frame 1; a frame has one view"
     );
     let mut over = [key(1, [5.0, 0.0, 0.0]), key(9, [5.0, 0.0, 0.0])];
     over[1].up = Some(DVec3::NEG_Z);
-    let error = told(over);
+    let error = message(over);
     assert!(error.starts_with("camera.key: up turns upside down from frame 1 to frame 9"));
 }
 
 #[test]
-fn a_frame_without_a_picture_is_named() {
+fn invalid_frame_view_is_named() {
     // Paths through the point that the camera looks at, and vertically above it.
     for (eyes, what) in [
         (

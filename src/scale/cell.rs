@@ -73,7 +73,7 @@ fn check_image(request: &CellRequest) -> Result<(), CellError> {
 mod tests {
     use super::*;
     use crate::accel::Structure;
-    use crate::scale::measure::LEAST_IMAGES;
+    use crate::scale::measure::MIN_IMAGES;
     use crate::scale::{Budget, Motion, Representation, Source, Stage, convert};
 
     fn request(particles: usize, structure: Structure) -> CellRequest {
@@ -95,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn any_count_can_be_measured() {
+    fn measures_any_particle_count() {
         for particles in [0, 1, 2, 500] {
             let cell = measure(&request(particles, Structure::default()), None).unwrap();
             assert_eq!(cell.images, 3);
@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_in_place_trace_as_in_memory() {
+    fn tracing_in_place_matches_tracing_in_memory() {
         for particles in [0, 1, 2000] {
             let request = request(particles, Structure::Kdtree);
             let memory = measure(&request, None).unwrap();
@@ -153,27 +153,27 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_frame_is_told() {
+    fn error_names_a_file_that_is_not_a_frame() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("particles.spf");
         std::fs::write(&path, "no frame").unwrap();
-        let told = measure(&request(10, Structure::Kdtree), Some(&path));
-        let told = told.unwrap_err().to_string();
-        assert!(told.contains("particles.spf"), "{told}");
+        let result = measure(&request(10, Structure::Kdtree), Some(&path));
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains("particles.spf"), "{message}");
     }
 
     #[test]
-    fn time_ends_a_cell_after_a_few_images_at_least() {
+    fn short_budget_gives_the_minimum_number_of_images() {
         let mut request = request(10, Structure::default());
         request.budget = Budget::Seconds(1e-9);
         assert_eq!(
             measure(&request, None).unwrap().images,
-            u64::from(LEAST_IMAGES)
+            u64::from(MIN_IMAGES)
         );
     }
 
     #[test]
-    fn requests_survive_the_way_to_another_process() {
+    fn requests_round_trip_as_json() {
         let request = request(10, Structure::default());
         let text = serde_json::to_string(&request).unwrap();
         assert_eq!(serde_json::from_str::<CellRequest>(&text).unwrap(), request);

@@ -13,12 +13,12 @@ use crate::scene::Bounds;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
-const LEAST_RADIUS: f64 = 1e-6;
+const MIN_RADIUS: f64 = 1e-6;
 /// Radius if there is no estimate (a single particle, or all in one place), as a fraction of the distance of the
 /// framing camera.
-const LONE_RADIUS: f64 = 0.1;
+const SINGLE_RADIUS: f64 = 0.1;
 /// Minimum memory per particle during the build, in bytes: the positions of the input, and those in the tree.
-const LEAST_BYTES: u64 = 24;
+const MIN_BYTES: u64 = 24;
 
 /// Spheres in memory.
 #[derive(Debug, Clone, PartialEq)]
@@ -35,7 +35,7 @@ impl Particles {
     /// # Errors
     /// They do not fit into memory, or the frame cannot be read.
     pub fn of(request: &CellRequest) -> Result<Self, CellError> {
-        let need = LEAST_BYTES.saturating_mul(request.particles as u64);
+        let need = MIN_BYTES.saturating_mul(request.particles as u64);
         if let Some(free) = memory::available()
             && need > free
         {
@@ -95,11 +95,11 @@ impl Particles {
             return;
         }
         let growth = narrow((all as f64 / count.max(1) as f64).cbrt());
-        retain_chosen(&mut self.centers, count, seed);
+        retain_random(&mut self.centers, count, seed);
         match &mut self.radius {
             Radius::Common(radius) => *radius *= growth,
             Radius::PerParticle(radii) => {
-                retain_chosen(radii, count, seed);
+                retain_random(radii, count, seed);
                 radii.iter_mut().for_each(|r| *r *= growth);
             }
         }
@@ -132,16 +132,16 @@ impl Particles {
 
 /// Keeps `count` of `items` in their order; all selections are equally likely (selection sampling, Knuth, The Art of
 /// Computer Programming 2, 3.4.2, algorithm S).
-fn retain_chosen<T>(items: &mut Vec<T>, count: usize, seed: u64) {
-    let mut left = items.len() as u64;
-    let mut wanted = count as u64;
+fn retain_random<T>(items: &mut Vec<T>, count: usize, seed: u64) {
+    let mut unvisited = items.len() as u64;
+    let mut remaining = count as u64;
     let mut draw = 0_u64;
     items.retain(|_| {
         draw += 1;
-        let below = (u128::from(splitmix64(seed, draw)) * u128::from(left)) >> 64;
-        left -= 1;
-        let chosen = below < u128::from(wanted);
-        wanted -= u64::from(chosen);
+        let below = (u128::from(splitmix64(seed, draw)) * u128::from(unvisited)) >> 64;
+        unvisited -= 1;
+        let chosen = below < u128::from(remaining);
+        remaining -= u64::from(chosen);
         chosen
     });
 }
@@ -194,8 +194,8 @@ impl FrameSurvey {
                 path: path.to_owned(),
                 frame,
                 origin: survey.origin,
-                radius: survey.radius.unwrap_or(narrow(LONE_RADIUS * distance)),
-                least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
+                radius: survey.radius.unwrap_or(narrow(SINGLE_RADIUS * distance)),
+                least_radius: narrow(bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
             },
             stage,
         })
@@ -212,20 +212,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exactly_as_many_are_kept_in_order() {
+    fn keeps_the_exact_count_in_order() {
         for (all, count) in [(0, 0), (1, 0), (1, 1), (10, 3), (1000, 999), (1000, 100)] {
             let mut items: Vec<usize> = (0..all).collect();
-            retain_chosen(&mut items, count, 7);
+            retain_random(&mut items, count, 7);
             assert_eq!(items.len(), count);
             assert!(items.is_sorted());
         }
     }
 
     #[test]
-    fn the_choice_is_even_and_seeded() {
+    fn selection_is_uniform_and_seeded() {
         let chosen = |seed| {
             let mut items: Vec<u32> = (0..100_000).collect();
-            retain_chosen(&mut items, 10_000, seed);
+            retain_random(&mut items, 10_000, seed);
             items
         };
         assert_eq!(chosen(1), chosen(1));
@@ -236,7 +236,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_left_fills_as_much_space() {
+    fn thinning_keeps_the_total_volume() {
         let mut particles = Particles {
             centers: (0..800_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
             radius: Radius::PerParticle((0..800_u16).map(f32::from).collect()),

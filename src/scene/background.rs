@@ -91,8 +91,8 @@ mod tests {
         for (degrees, part) in [(-90.0_f32, 0.0), (-45.0, 0.25), (0.0, 0.5), (90.0, 1.0)] {
             let angle = degrees.to_radians();
             let color = sky.color(Vec3::new(angle.cos(), 0.0, angle.sin()));
-            let wanted = part * Vec3::new(1.0, 2.0, 4.0);
-            assert!((color - wanted).length() < 1e-3, "{degrees}: {color}");
+            let expected = part * Vec3::new(1.0, 2.0, 4.0);
+            assert!((color - expected).length() < 1e-3, "{degrees}: {color}");
         }
         // Rounding past one must not make NaN.
         assert!(sky.color(Vec3::new(0.0, 0.0, 1.000_001)).is_finite());

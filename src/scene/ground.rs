@@ -162,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn lies_under_the_box_relative_to_the_origin() {
+    fn ground_is_below_the_box() {
         let floor = floor();
         assert!((floor.height - 1.0).abs() < 1e-6);
         assert!((floor.center - Vec3::new(0.0, 0.0, 1.0)).length() < 1e-6);

@@ -213,7 +213,7 @@ mod tests {
     fn schlick_at_known_angles() {
         // By hand: R0 = (0.33/2.33)^2 = 0.0200593, (0.5/2.5)^2 = 0.04.
         // (1-cos)^5: 45 deg 0.2928932^5 = 0.00215548, 60 deg 1/32, 80 deg 0.8263518^5 = 0.385316.
-        for (ior, degrees, wanted) in [
+        for (ior, degrees, expected) in [
             (1.33, 0.0_f32, 0.020_059_3),
             (1.33, 45.0, 0.022_171_5),
             (1.33, 60.0, 0.050_682_4),
@@ -224,7 +224,10 @@ mod tests {
             (1.5, 80.0, 0.409_910),
         ] {
             let r = schlick(with_ior(ior).r0(), degrees.to_radians().cos());
-            assert!((r - wanted).abs() < 2e-6, "{ior} {degrees}: {r} {wanted}");
+            assert!(
+                (r - expected).abs() < 2e-6,
+                "{ior} {degrees}: {r} {expected}"
+            );
         }
         assert!((schlick(0.04, 0.0) - 1.0).abs() < 1e-6);
         assert_eq!(schlick(0.04, 1.000_001), 0.04);
@@ -237,7 +240,7 @@ mod tests {
         // that. 60 degrees: cos_out = 0.816497, s (0.5 - 1.224745) / 1.724745 = -0.420204, p (0.75 -
         // 0.816497) / 1.566497 = -0.042449.
         let brewster = 1.5_f32.atan().cos();
-        for (cosine, ratio, wanted) in [
+        for (cosine, ratio, expected) in [
             (1.0, 1.0 / 1.5, 0.04),
             (1.0, 1.5, 0.04),
             (brewster, 1.0 / 1.5, 0.073_964_5),
@@ -247,7 +250,10 @@ mod tests {
             (0.3, 1.0, 0.0),
         ] {
             let r = dielectric(cosine, ratio);
-            assert!((r - wanted).abs() < 2e-6, "{cosine} {ratio}: {r} {wanted}");
+            assert!(
+                (r - expected).abs() < 2e-6,
+                "{cosine} {ratio}: {r} {expected}"
+            );
         }
         // The same on the same path in reverse.
         let inside = (1.0 - 0.75_f32 / 2.25).sqrt();
@@ -255,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn absorption_is_what_it_leaves_behind() {
+    fn absorption_is_the_colour_after_its_length() {
         let loss = extinction(Vec3::new(0.5, 1.0, 0.0), 2.0);
         let left = (-3.0 * loss).exp();
         assert!((left.x - 0.5_f32.powf(1.5)).abs() < 1e-6);

@@ -93,7 +93,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_are_all_there() {
+    fn box_has_eight_corners() {
         let bounds = Bounds {
             min: DVec3::new(-1.0, 2.0, 3.0),
             max: DVec3::new(4.0, 5.0, 6.0),

@@ -163,7 +163,7 @@ mod tests {
     }
 
     #[test]
-    fn is_met_from_above_only_and_within_range() {
+    fn is_hit_only_from_above_and_within_range() {
         let ground = ground();
         let distance = |ray: &Ray| {
             let mut packet = RayPacket::default();

@@ -14,15 +14,15 @@ use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_orig
 
 use crate::scene::{RgbEncoding, is_rgb};
 
-mod look;
 mod packing;
 mod robust;
+mod sample;
 mod stream;
 
-use look::Look;
 use packing::Spacing;
 use packing::narrow;
 use robust::{estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range};
+use sample::FrameSample;
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -115,8 +115,8 @@ pub struct RgbAttribute {
 impl RgbAttribute {
     /// The first of `attributes` that contains colours; with a `name`, only the attribute of that name.
     fn of(attributes: &[Attribute], name: Option<&str>) -> Option<Self> {
-        let is_wanted = |a: &&Attribute| name.is_none_or(|name| a.name.eq_ignore_ascii_case(name));
-        let found = attributes.iter().filter(is_wanted).find(|a| is_rgb(a))?;
+        let has_name = |a: &&Attribute| name.is_none_or(|name| a.name.eq_ignore_ascii_case(name));
+        let found = attributes.iter().filter(has_name).find(|a| is_rgb(a))?;
         Some(Self {
             attribute: found.name.clone(),
             encoding: RgbEncoding::of(found.data.scalar_type()),
@@ -240,8 +240,8 @@ impl Survey {
         };
         let mut failure = None;
         for index in indices {
-            match Look::at(sequence, index, question.radius) {
-                Ok(look) => totals.take_in(look, question),
+            match FrameSample::of(sequence, index, question.radius) {
+                Ok(sample) => totals.add(sample, question),
                 Err(error) => {
                     failure.get_or_insert(error);
                 }
@@ -310,12 +310,12 @@ pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
 }
 
 /// The spacing of neighbours in a frame.
-fn spacing_of(frame: &ParticleFrame, how_packed: bool) -> Option<Spacing> {
+fn spacing_of(frame: &ParticleFrame, needs_packed: bool) -> Option<Spacing> {
     let touching = estimate_radius(&frame.positions)?;
     let packed = || estimate_packed(&frame.positions, touching);
     Some(Spacing {
         touching,
-        packed: how_packed.then(packed).flatten(),
+        packed: needs_packed.then(packed).flatten(),
     })
 }
 
@@ -330,17 +330,17 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
-    fn take_in(&mut self, look: Look, question: Question) {
+    fn add(&mut self, sample: FrameSample, question: Question) {
         self.frames += 1;
-        self.origin = self.origin.and(look.origin);
-        let Look {
+        self.origin = self.origin.and(sample.origin);
+        let FrameSample {
             particles: raw,
             count,
             extremes,
             spacing,
             mut weight,
             ..
-        } = look;
+        } = sample;
         self.attributes
             .extend(raw.attributes.iter().map(|a| a.name.clone()));
         // Extend the bounds
@@ -350,7 +350,7 @@ impl Totals {
                 None => (min, max),
             });
         }
-        // Look for velocity and colours
+        // Find velocity and colours
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
         }
@@ -365,10 +365,10 @@ impl Totals {
             .bounds
             .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
         // Count particles, and remember the heaviest frame
-        let seen = raw.positions.len();
+        let sampled = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
         // In a sample, only the sampled particles are checked for being finite.
-        let count = count - (seen - frame.len());
+        let count = count - (sampled - frame.len());
         self.most_particles = self.most_particles.max(count);
         if !weight.in_place {
             weight.own_radii = matches!(frame.radius, Some(Radius::PerParticle(_)));
@@ -377,13 +377,13 @@ impl Totals {
             self.weight = Some(weight);
         }
         // Update the ranges of colour and radius
-        self.take_in_color(&frame, question.color);
+        self.add_color(&frame, question.color);
         match question.radius {
             RadiusQuestion::None => {}
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
                 let estimate =
                     || spacing.or_else(|| spacing_of(&frame, question.radius.is_packed()));
-                self.take_in_radius(&frame, count, estimate);
+                self.add_radius(&frame, count, estimate);
             }
             RadiusQuestion::Attribute(name, scale) => {
                 if let Some(attribute) = frame.attribute(name) {
@@ -394,13 +394,13 @@ impl Totals {
         }
     }
 
-    fn take_in_color(&mut self, frame: &ParticleFrame, question: ColorQuestion) {
-        let wanted = match question {
+    fn add_color(&mut self, frame: &ParticleFrame, question: ColorQuestion) {
+        let name = match question {
             ColorQuestion::None => None,
             ColorQuestion::Speed => self.velocity.clone(),
             ColorQuestion::Attribute(name) => Some(name.to_owned()),
         };
-        let Some(name) = wanted else { return };
+        let Some(name) = name else { return };
         if let Some(attribute) = frame.attribute(&name)
             && let Some((low, high)) = robust_range(attribute)
         {
@@ -410,7 +410,7 @@ impl Totals {
         self.color = Some(name);
     }
 
-    fn take_in_radius(
+    fn add_radius(
         &mut self,
         frame: &ParticleFrame,
         count: usize,
@@ -427,8 +427,8 @@ impl Totals {
             }
             None => {
                 // The estimate is best in the frame with the most particles.
-                let fuller = self.radius.is_none_or(|(known, _)| count > known);
-                if fuller && let Some(spacing) = estimate() {
+                let is_fuller = self.radius.is_none_or(|(known, _)| count > known);
+                if is_fuller && let Some(spacing) = estimate() {
                     self.radius = Some((count, spacing));
                 }
             }
@@ -441,8 +441,8 @@ impl Totals {
             .unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
         // Speed has precedence over colours.
         let rgb = self.rgb.filter(|rgb| {
-            let is_asked = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
-            self.color.as_ref().is_none_or(is_asked)
+            let is_colored_by = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
+            self.color.as_ref().is_none_or(is_colored_by)
         });
         let color = self.color.map(|attribute| {
             let (low, high) = self.range.unwrap_or((0.0, 1.0));

@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn order_and_disorder_have_the_same_radius() {
+    fn lattice_and_fluid_have_the_same_packed_radius() {
         for (positions, touching) in [(lattice(18), 0.1), (block(6000), 0.085)] {
             let half = estimate_radius(&positions).expect("some");
             assert!((half / touching - 1.0).abs() < 0.1, "{half}");
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_body_does_not_swell() {
+    fn packed_radius_is_limited_outside_bodies() {
         assert_eq!(packed(&[]), None);
         assert_eq!(packed(&[Vec3::ONE]), None);
         assert_eq!(packed(&[Vec3::ONE; 100]), None);
@@ -111,7 +111,7 @@ mod tests {
     }
 
     #[test]
-    fn a_large_native_frame_tells_what_all_its_particles_tell() {
+    fn sampled_native_frame_gives_the_radius_of_all_particles() {
         let all = block(u16::MAX);
         let whole = packed(&all).expect("a radius");
         // Three distant blocks, with more particles than the limit for inspecting each.
@@ -130,18 +130,18 @@ mod tests {
         let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);
         native::write(&path, &frame, None).expect("a file");
         let sequence = Sequence::open(&SequenceInput::from_path(&path)).expect("a frame");
-        let look = |radius| {
+        let survey = |radius| {
             let color = ColorQuestion::None;
             Survey::of(&sequence, Question { color, radius }).expect("readable")
         };
-        let stored = look(RadiusQuestion::AutoOfBody);
-        let radius = stored.packed_radius.expect("asked for");
+        let stored = survey(RadiusQuestion::AutoOfBody);
+        let radius = stored.packed_radius.expect("requested");
         assert!((radius / whole - 1.0).abs() < 0.1, "{radius} {whole}");
-        let plain = look(RadiusQuestion::Auto);
+        let plain = survey(RadiusQuestion::Auto);
         assert_eq!(
             (plain.packed_radius, plain.radius),
             (None, stored.radius),
-            "spheres are as ever"
+            "the radius of spheres does not change"
         );
     }
 }

@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_formats::{Attribute, Positions};
 
-use super::packing::{self};
+use super::packing;
 
 /// Number of particles of a frame from which percentiles are computed.
 const SAMPLE: usize = 20_000;
@@ -89,9 +89,9 @@ pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
 }
 
 /// An even selection of the particles, for queries.
-fn asked(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
-    let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
-    let stride = positions.len().div_ceil(queries).max(1);
+fn queries(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
+    let count = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
+    let stride = positions.len().div_ceil(count).max(1);
     positions.iter().step_by(stride)
 }
 
@@ -108,12 +108,12 @@ pub(super) fn estimate_packed(positions: &[Vec3], touching: f32) -> Option<f32> 
         };
         chunks.map(near).sum()
     };
-    packing::packed_radius(touching, asked(positions).map(count).collect())
+    packing::packed_radius(touching, queries(positions).map(count).collect())
 }
 
 /// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
 pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
-    let distances: Vec<f32> = asked(positions)
+    let distances: Vec<f32> = queries(positions)
         .filter_map(|from| {
             let nearest = positions
                 .par_chunks(64 * 1024)
@@ -128,11 +128,11 @@ pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
             nearest.is_finite().then(|| nearest.sqrt())
         })
         .collect();
-    middle(distances).map(|d| 0.5 * d)
+    median(distances).map(|d| 0.5 * d)
 }
 
 /// The median of `values`.
-pub(super) fn middle(mut values: Vec<f32>) -> Option<f32> {
+pub(super) fn median(mut values: Vec<f32>) -> Option<f32> {
     values.sort_unstable_by(f32::total_cmp);
     values.get(values.len() / 2).copied()
 }
@@ -152,7 +152,7 @@ mod tests {
     }
 
     #[test]
-    fn one_escaped_particle_is_left_out_of_many_and_of_few() {
+    fn bounds_exclude_a_single_outlier() {
         for side in [5, 20] {
             for escaped in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
                 let (min, max) = plane_and(side, 1e4 * escaped);
@@ -164,7 +164,7 @@ mod tests {
     }
 
     #[test]
-    fn one_of_few_that_lies_near_is_kept() {
+    fn bounds_include_a_near_particle_of_a_few() {
         assert_eq!(plane_and(5, DVec3::new(0.5, 0.5, 0.9)).1.z, 0.9);
         // Of fewer than sixteen particles, none is omitted.
         assert_eq!(plane_and(3, DVec3::new(0.5, 0.5, 1e4)).1.z, 1e4);

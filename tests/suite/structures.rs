@@ -113,7 +113,7 @@ fn random_box() {
 }
 
 #[test]
-fn random_glass_far_out() {
+fn random_glass_far_from_the_origin() {
     let workshop = Workshop::new();
     npy(
         &workshop.join("box.npy"),
@@ -145,7 +145,7 @@ fn radii_of_their_own() {
 }
 
 #[test]
-fn water_of_one_body() {
+fn water_as_a_union() {
     for surface in ["union", "smooth"] {
         let water = ["--look", "water", "--spray", "--surface", surface];
         let file = "emitter_sph/ParticleData_Fluid_10.bgeo";

@@ -188,13 +188,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn codes_come_back(words: [[u32; BLOCK_SIZE]; 3]) {
+        fn codes_round_trip(words: [[u32; BLOCK_SIZE]; 3]) {
             there_and_back::<Q10Block>(words);
             there_and_back::<Q16Block>(words);
         }
 
         #[test]
-        fn references_come_back(index: u32) {
+        fn references_round_trip(index: u32) {
             prop_assert_eq!(Q10Block::referring_to(index).wide_index(), Some(index));
             prop_assert_eq!(Q16Block::referring_to(index).wide_index(), Some(index));
         }

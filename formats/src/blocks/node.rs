@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn children_without_extent_are_held_exactly() {
+    fn empty_extents_are_quantised_exactly() {
         let point = Aabb {
             min: Vec3::splat(1e4),
             max: Vec3::splat(1e4),
@@ -147,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_of_absurd_spread_hold_their_children() {
+    fn huge_boxes_contain_their_children() {
         // The differences of these values are rounded in f64.
         let values = [
             -147_573_952_589_676_412_928.0,
@@ -175,7 +175,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_quantised_box_holds_its_child(
+        fn every_quantised_box_contains_its_child(
             corners in prop::collection::vec(
                 (prop::array::uniform3(-1e4_f32..1e4), prop::array::uniform3(0.0_f32..100.0)),
                 1..=8,

@@ -48,8 +48,8 @@ fn last_on(positions: &[Vec3], curve: &Curve, count: usize) -> Vec<u32> {
     let (mut last, mut own): (Vec<u32>, Vec<u32>) =
         among.into_iter().partition(|number| cell_of(number) > cell);
     // Sort the particles of the cell, unless there are too many
-    let wanted = count - behind;
-    let rest = own.len() - wanted;
+    let needed = count - behind;
+    let rest = own.len() - needed;
     if rest > 0 && own.len() <= positions.len() / 8 {
         let place = |number: &u32| (curve.place(positions[*number as usize]), *number);
         let mut places: Vec<(u64, u32)> = own.par_iter().map(place).collect();
@@ -85,20 +85,20 @@ mod tests {
     /// Each particle of `all` is in exactly one of `parts`, with its own row, which holds its index.
     #[track_caller]
     fn assert_complete(all: &[Vec3], parts: [&PartData; 2]) {
-        let mut seen = vec![false; all.len()];
+        let mut visited = vec![false; all.len()];
         for part in parts {
             assert_eq!(part.rows.len(), 4 * part.len());
             for (position, row) in part.positions.iter().zip(part.rows.as_chunks().0) {
                 let number = u32::from_le_bytes(*row) as usize;
                 assert_eq!(all[number], *position);
-                assert!(!std::mem::replace(&mut seen[number], true));
+                assert!(!std::mem::replace(&mut visited[number], true));
             }
         }
-        assert!(seen.into_iter().all(|s| s));
+        assert!(visited.into_iter().all(|s| s));
     }
 
     #[test]
-    fn the_last_on_the_curve_go_on() {
+    fn samples_include_the_end_of_the_curve() {
         let coincident = vec![Vec3::splat(2.0); 3000];
         for all in [
             clustered(10_000),

@@ -243,8 +243,8 @@ fn is_float(attribute: &SourceAttribute) -> bool {
 
 /// The attribute that holds radii, by the names that simulations and Houdini use.
 fn radius_of(attributes: &[SourceAttribute]) -> Option<RadiusColumn> {
-    let named = |(wanted, scale): (&str, f64)| {
-        let is_it = |a: &SourceAttribute| is_float(a) && a.name.eq_ignore_ascii_case(wanted);
+    let named = |(name, scale): (&str, f64)| {
+        let is_it = |a: &SourceAttribute| is_float(a) && a.name.eq_ignore_ascii_case(name);
         let attribute = attributes.iter().position(is_it)?;
         let scalar = attributes[attribute].scalar;
         Some(RadiusColumn {

@@ -52,9 +52,9 @@ pub(super) fn divide_source(
     limits: &Limits,
     store: &ChunkStore,
 ) -> Result<Vec<UnorderedPart>, ConvertError> {
-    let (asked, columns) = (output.asked, output.columns);
+    let (request, columns) = (output.request, output.columns);
     let width = columns.width();
-    let total = asked.source.count();
+    let total = request.source.count();
     let stretches = total.div_ceil(limits.batch_len as u64);
     let (batches, stages) = (
         BufferPool::<Batch>::default(),
@@ -72,9 +72,9 @@ pub(super) fn divide_source(
             .map(|number| {
                 let (mut batch, mut staged) = (batches.take(), stages.take());
                 let stretch = ParticleRange::nth(number, limits.batch_len, total);
-                batch.read_positions(asked.source, asked.settings.origin, stretch)?;
+                batch.read_positions(request.source, request.settings.origin, stretch)?;
                 let mut own_errors = vec![0.0; columns.attributes.len()];
-                batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
+                batch.read_rows(request.source, columns, stretch, &mut own_errors)?;
                 // Raise the errors of the attributes
                 let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());
                 for (all, own) in errors.iter_mut().zip(own_errors) {
@@ -91,14 +91,14 @@ pub(super) fn divide_source(
         staged.into_iter().for_each(|s| stages.put(s));
         first = end;
         let done = total.min(first * limits.batch_len as u64);
-        asked.advance(Phase::Divide, done, total)?;
+        request.advance(Phase::Divide, done, total)?;
     }
     // Check that the source still has the surveyed number of particles
     output.errors = errors.into_inner().unwrap_or_else(|e| e.into_inner());
     let piles = closed(heaps, cuts, 1, store)?;
     let found: u64 = piles.iter().map(|pile| pile.len as u64).sum();
     if found != output.survey.count {
-        return Err(asked.changed());
+        return Err(request.changed());
     }
     Ok(piles)
 }

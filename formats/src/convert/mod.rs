@@ -56,7 +56,7 @@ pub fn convert(
     settings: &ConvertSettings,
     progress: &dyn Progress,
 ) -> Result<ConvertReport, ConvertError> {
-    let asked = ConvertRequest {
+    let request = ConvertRequest {
         source,
         path,
         settings,
@@ -64,7 +64,7 @@ pub fn convert(
     };
     let columns = StoredColumns::choose(source, settings, path)?;
     let limits = Limits::of(settings, source.count(), columns.width(), columns.widest());
-    convert_within(asked, columns, limits)
+    convert_within(request, columns, limits)
 }
 
 /// [`convert`] for a source that is much larger than the memory: with the smallest parts, all of them spilled to
@@ -78,19 +78,19 @@ pub fn convert_in_parts(
     path: &Path,
     settings: &ConvertSettings,
 ) -> Result<ConvertReport, ConvertError> {
-    let asked = ConvertRequest {
+    let request = ConvertRequest {
         source,
         path,
         settings,
         progress: &(),
     };
     let columns = StoredColumns::choose(source, settings, path)?;
-    convert_within(asked, columns, Limits::SMALLEST)
+    convert_within(request, columns, Limits::SMALLEST)
 }
 
 /// Converts within `limits`.
 fn convert_within(
-    asked: ConvertRequest,
+    request: ConvertRequest,
     columns: StoredColumns,
     limits: Limits,
 ) -> Result<ConvertReport, ConvertError> {
@@ -102,14 +102,14 @@ fn convert_within(
         sample_stride: if limits.is_whole {
             0
         } else {
-            asked.source.count().div_ceil(limits.sample_len).max(1)
+            request.source.count().div_ceil(limits.sample_len).max(1)
         },
     };
-    let survey = survey(asked, &columns, reading)?;
+    let survey = survey(request, &columns, reading)?;
     clock.lap(Phase::Survey);
     // Choose the columns that are stored
-    let (columns, common) = survey.settled(asked.path, columns)?;
-    let mut output = FrameOutput::new(asked, &columns, &survey, common, limits.run_len);
+    let (columns, common) = survey.settled(request.path, columns)?;
+    let mut output = FrameOutput::new(request, &columns, &survey, common, limits.run_len);
     // Order and write the particles
     let divided = if limits.is_whole {
         whole::convert(&mut output, &limits, &account)?;

@@ -11,7 +11,7 @@ use crate::native::{
 
 /// Writes ordered parts to the output frame.
 pub(super) struct FrameOutput<'a> {
-    pub(super) asked: ConvertRequest<'a>,
+    pub(super) request: ConvertRequest<'a>,
     pub(super) columns: &'a StoredColumns,
     pub(super) survey: &'a Survey,
     /// Largest error of each attribute, known before the first part is written.
@@ -25,14 +25,14 @@ pub(super) struct FrameOutput<'a> {
 
 impl<'a> FrameOutput<'a> {
     pub(super) fn new(
-        asked: ConvertRequest<'a>,
+        request: ConvertRequest<'a>,
         columns: &'a StoredColumns,
         survey: &'a Survey,
         common: Option<f32>,
         run_len: usize,
     ) -> Self {
         Self {
-            asked,
+            request,
             columns,
             survey,
             errors: vec![0.0; columns.attributes.len()],
@@ -58,9 +58,9 @@ impl<'a> FrameOutput<'a> {
             let end = part.len().min(first + self.run_len);
             ordered
                 .push(part, self.columns, first..end, &mut writer)
-                .map_err(|e| FrameError::io(self.asked.path, e))?;
+                .map_err(|e| FrameError::io(self.request.path, e))?;
             self.pushed += (end - first) as u64;
-            self.asked
+            self.request
                 .advance(Phase::Order, self.pushed, self.survey.count)?;
             first = end;
         }
@@ -74,11 +74,11 @@ impl<'a> FrameOutput<'a> {
             Some(writer) => writer,
             None => self.begin(&OrderedPart::default())?,
         };
-        self.asked.source.check()?;
+        self.request.source.check()?;
         let total = self.survey.count;
-        self.asked.advance(Phase::Finish, total, total)?;
+        self.request.advance(Phase::Finish, total, total)?;
         let finished = writer.finish();
-        Ok(finished.map_err(|e| FrameError::io(self.asked.path, e))?)
+        Ok(finished.map_err(|e| FrameError::io(self.request.path, e))?)
     }
 
     /// Starts the frame; `ordered` are its first particles.
@@ -88,7 +88,7 @@ impl<'a> FrameOutput<'a> {
             settings,
             path,
             ..
-        } = self.asked;
+        } = self.request;
         // Find the common radius
         let own = self.survey.radii.filter(|_| self.columns.radius.is_some());
         let common = match settings.radius {
@@ -105,7 +105,7 @@ impl<'a> FrameOutput<'a> {
         // Describe the frame
         let attributes = self.columns.attributes.iter().zip(&self.errors);
         let spec = FrameSpec {
-            is_y_up: self.asked.settings.is_y_up,
+            is_y_up: self.request.settings.is_y_up,
             count: self.survey.count,
             encoding,
             bound: settings.bound,

@@ -72,12 +72,12 @@ pub(super) fn convert(
 }
 
 fn scratch_dir(output: &FrameOutput) -> PathBuf {
-    let beside = || match output.asked.path.parent() {
+    let beside = || match output.request.path.parent() {
         Some(parent) if parent != Path::new("") => parent.to_owned(),
         _ => PathBuf::from("."),
     };
-    let wanted = output.asked.settings.scratch_dir.clone();
-    wanted.unwrap_or_else(beside)
+    let requested = output.request.settings.scratch_dir.clone();
+    requested.unwrap_or_else(beside)
 }
 
 /// Parts that wait to be ordered.
@@ -200,7 +200,7 @@ impl PartQueue<'_> {
         let mut sample = Vec::with_capacity(pile.len / each + pile.held.len());
         // This reads spilled chunks too; few parts need it.
         for held in &pile.held {
-            self.store.look(held, |chunk| {
+            self.store.peek(held, |chunk| {
                 sample.extend(chunk.positions.iter().step_by(each));
             })?;
         }

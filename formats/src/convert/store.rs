@@ -192,50 +192,50 @@ impl<'a> ChunkStore<'a> {
         Ok(StoredChunk::Away { slot, len })
     }
 
-    /// Calls `see` with the records of `held`, then frees them.
+    /// Calls `visit` with the records of `held`, then frees them.
     ///
     /// # Errors
     /// If the records cannot be read.
     pub(super) fn give_back<T>(
         &self,
         held: StoredChunk,
-        see: impl FnOnce(&Chunk) -> T,
+        visit: impl FnOnce(&Chunk) -> T,
     ) -> Result<T, FrameError> {
         match held {
             StoredChunk::Here(chunk) => {
-                let seen = see(&chunk);
+                let result = visit(&chunk);
                 self.shared.state().kept -= 1;
                 self.shared.free(chunk);
-                Ok(seen)
+                Ok(result)
             }
             StoredChunk::Away { slot, len } => {
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, slot, len);
-                let seen = read.map(|()| see(&chunk));
+                let result = read.map(|()| visit(&chunk));
                 self.shared.free(chunk);
                 self.shared.state().free_slots.push(slot);
-                seen
+                result
             }
         }
     }
 
-    /// Calls `see` with the records of `held`, which stay stored.
+    /// Calls `visit` with the records of `held`, which stay stored.
     ///
     /// # Errors
     /// If the records cannot be read.
-    pub(super) fn look<T>(
+    pub(super) fn peek<T>(
         &self,
         held: &StoredChunk,
-        see: impl FnOnce(&Chunk) -> T,
+        visit: impl FnOnce(&Chunk) -> T,
     ) -> Result<T, FrameError> {
         match held {
-            StoredChunk::Here(chunk) => Ok(see(chunk)),
+            StoredChunk::Here(chunk) => Ok(visit(chunk)),
             StoredChunk::Away { slot, len } => {
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, *slot, *len);
-                let seen = read.map(|()| see(&chunk));
+                let result = read.map(|()| visit(&chunk));
                 self.shared.free(chunk);
-                seen
+                result
             }
         }
     }

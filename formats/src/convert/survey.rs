@@ -73,20 +73,21 @@ impl ConvertRequest<'_> {
 
     /// The error for a source that no longer returns the same data.
     pub(super) fn changed(&self) -> ConvertError {
-        let told = self.source.check().map_err(ConvertError::from);
+        let checked = self.source.check().map_err(ConvertError::from);
         let what = "the source changed while it was converted; convert again when it rests";
-        told.err()
+        checked
+            .err()
             .unwrap_or_else(|| ConvertError::refused(self.path, what))
     }
 }
 
 /// Reads all particles once.
 pub(super) fn survey(
-    asked: ConvertRequest,
+    request: ConvertRequest,
     columns: &StoredColumns,
     reading: BatchSettings,
 ) -> Result<Survey, ConvertError> {
-    let total = asked.source.count();
+    let total = request.source.count();
     let stretches = total.div_ceil(reading.batch_len as u64);
     let (batches, done) = (BufferPool::<Batch>::default(), AtomicU64::new(0));
     let found: Vec<BatchSurvey> = (0..stretches)
@@ -94,26 +95,26 @@ pub(super) fn survey(
         .map(|number| {
             let stretch = ParticleRange::nth(number, reading.batch_len, total);
             let mut batch = batches.take();
-            let found = look(asked, columns, &mut batch, stretch, reading.sample_stride)?;
+            let found = survey_range(request, columns, &mut batch, stretch, reading.sample_stride)?;
             batches.put(batch);
             let now = done.fetch_add(stretch.len as u64, Ordering::Relaxed) + stretch.len as u64;
-            asked.advance(Phase::Survey, now, total)?;
+            request.advance(Phase::Survey, now, total)?;
             Ok(found)
         })
         .collect::<Result<_, ConvertError>>()?;
-    gathered(asked.path, columns, found)
+    gathered(request.path, columns, found)
 }
 
-fn look(
-    asked: ConvertRequest,
+fn survey_range(
+    request: ConvertRequest,
     columns: &StoredColumns,
     batch: &mut Batch,
     stretch: ParticleRange,
     stride: u64,
 ) -> Result<BatchSurvey, ConvertError> {
-    let origin = asked.settings.origin;
+    let origin = request.settings.origin;
     // Read the positions
-    batch.read_positions(asked.source, origin, stretch)?;
+    batch.read_positions(request.source, origin, stretch)?;
     let mut found = BatchSurvey {
         kept: u32::try_from(batch.positions.len()).unwrap_or(u32::MAX),
         ..BatchSurvey::default()
@@ -130,8 +131,8 @@ fn look(
     found.sample = sample_of(batch, origin, stretch, stride);
     // Find the range of the radii
     if let Some(radius) = &columns.radius {
-        let width = asked.source.attributes()[radius.attribute].width();
-        batch.read_values(asked.source, radius.attribute, width, stretch)?;
+        let width = request.source.attributes()[radius.attribute].width();
+        batch.read_values(request.source, radius.attribute, width, stretch)?;
         batch.for_each_place(|place| {
             for radius in radius.radii(&batch.values[place * width..][..width]) {
                 found.bad_radii |= !is_radius(radius);
@@ -145,7 +146,7 @@ fn look(
         let mut ranges = Vec::new();
         if let (StoredType::Ranged, Some(attribute)) = (column.stored, column.attribute) {
             let (width, size) = (column.source_width(), column.scalar.size());
-            batch.read_values(asked.source, attribute, width, stretch)?;
+            batch.read_values(request.source, attribute, width, stretch)?;
             ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; column.components];
             batch.for_each_place(|place| {
                 let values = batch.values[place * width..][..width].chunks_exact(size);
@@ -199,7 +200,7 @@ fn gathered(
     // Merge the surveys of the batches in order
     for one in found {
         if one.bad_radii {
-            let what = "a radius is negative or no number; give one for all (--radius)";
+            let what = "a radius is negative or not a number; give one radius for all particles";
             return Err(ConvertError::refused(path, what));
         }
         survey.count += u64::from(one.kept);

@@ -27,7 +27,7 @@ pub(super) fn convert(
 
 /// All finite particles in the order of the source.
 fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertError> {
-    let (asked, columns) = (output.asked, output.columns);
+    let (request, columns) = (output.request, output.columns);
     let kept = &output.survey.kept;
     let (count, width) = (output.survey.count, columns.width());
     let count = usize::try_from(count).unwrap_or(usize::MAX);
@@ -55,15 +55,15 @@ fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertEr
         .into_par_iter()
         .try_for_each(|(number, positions, rows)| {
             let mut batch = batches.take();
-            let stretch = ParticleRange::nth(number, limits.batch_len, asked.source.count());
-            batch.read_positions(asked.source, asked.settings.origin, stretch)?;
+            let stretch = ParticleRange::nth(number, limits.batch_len, request.source.count());
+            batch.read_positions(request.source, request.settings.origin, stretch)?;
             // Check that the source has not changed since the survey
             if batch.positions.len() != positions.len() {
-                return Err(asked.changed());
+                return Err(request.changed());
             }
             // Store the rows and the errors of the attributes
             let mut own_errors = vec![0.0; columns.attributes.len()];
-            batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
+            batch.read_rows(request.source, columns, stretch, &mut own_errors)?;
             positions.copy_from_slice(&batch.positions);
             rows.copy_from_slice(&batch.rows);
             let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());

@@ -102,11 +102,11 @@ impl NativeFrame<'_> {
         self.around_some(queries, count)
     }
 
-    /// The results of `tell` for the squared distances from some particles to the particles around them in the file.
+    /// The results of `reduce` for the squared distances from some particles to the particles around them in the file.
     fn around_some<T: Send>(
         &self,
         queries: usize,
-        tell: impl Fn(&mut dyn Iterator<Item = f32>) -> T + Sync,
+        reduce: impl Fn(&mut dyn Iterator<Item = f32>) -> T + Sync,
     ) -> Result<Vec<T>, ParseError> {
         /// Particles on either side of the given one: one cell of the order and half of the next.
         const AROUND: usize = 1536;
@@ -118,10 +118,10 @@ impl NativeFrame<'_> {
             let blocks =
                 i.saturating_sub(AROUND) / BLOCK_SIZE..(i + AROUND).min(count).div_ceil(BLOCK_SIZE);
             let others = blocks.flat_map(|block| leaves.block(block).centers());
-            tell(&mut others.map(|to| from.distance_squared(to)))
+            reduce(&mut others.map(|to| from.distance_squared(to)))
         };
-        let asked: Vec<usize> = (0..count).step_by(stride).collect();
-        Ok(asked.into_par_iter().map(of).collect())
+        let indices: Vec<usize> = (0..count).step_by(stride).collect();
+        Ok(indices.into_par_iter().map(of).collect())
     }
 
     /// The number of particles, if it fits `usize`.

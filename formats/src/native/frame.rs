@@ -211,7 +211,7 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
         }
         if !radii.iter().all(|r| is_radius(*r)) {
             return bad(
-                "a radius is negative, no number or too large; give one for all (--radius)"
+                "a radius is negative, not a number or too large; give one radius for all particles"
                     .to_owned(),
             );
         }

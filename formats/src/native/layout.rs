@@ -21,8 +21,8 @@ use rkyv::util::AlignedVec;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::stored::{RadiusCode, StoredType};
-use crate::ParseError;
 use crate::blocks::{BLOCK_SIZE, Block, Node, Q10Block, Q16Block, WIDTH};
+use crate::{ParseError, ValueError};
 
 /// The first bytes of every native frame.
 pub const MAGIC: &[u8; 8] = b"SPHERULE";
@@ -87,14 +87,11 @@ impl fmt::Display for Encoding {
 }
 
 impl FromStr for Encoding {
-    type Err = String;
+    type Err = ValueError;
 
-    fn from_str(name: &str) -> Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.into_iter().find(|e| e.name() == name);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("no encoding {name:?}; there are {names}")
-        })
+        found.ok_or_else(|| ValueError::one_of(&Self::ALL.map(Self::name), name))
     }
 }
 
@@ -282,7 +279,7 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     };
     let archived = rkyv::access::<ArchivedFrameIndex, rancor::Error>(&aligned).map_err(damaged)?;
     let index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
-    let again = |error: ParseError| error.retold(|what| format!("{what}; convert it again"));
+    let again = |error: ParseError| error.map_message(|what| format!("{what}; convert it again"));
     check_index(&index, offset).map_err(again)?;
     Ok(index)
 }

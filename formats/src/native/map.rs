@@ -102,7 +102,8 @@ impl MappedFile {
         } else {
             return Ok(());
         };
-        let what = format!("{what}; leave it alone, or read it instead of mapping (--no-mmap)");
+        let what =
+            format!("{what}; do not change it during the run, or read it instead of mapping it");
         Err(ParseError::malformed(0, what).in_file(&self.path))
     }
 }

@@ -94,7 +94,7 @@ pub fn verify(bytes: &[u8]) -> Result<(), ParseError> {
 /// Calls the function with the native frame `bytes`, or with an aligned copy if they are not aligned like sections.
 fn with_frame<T>(
     bytes: &[u8],
-    look: impl FnOnce(&NativeFrame) -> Result<T, ParseError>,
+    visit: impl FnOnce(&NativeFrame) -> Result<T, ParseError>,
 ) -> Result<T, ParseError> {
     let index = layout::parse(bytes)?;
     let mut aligned = AlignedVec::<64>::new();
@@ -104,7 +104,7 @@ fn with_frame<T>(
         aligned.extend_from_slice(bytes);
         &aligned
     };
-    look(&NativeFrame::with_index(bytes, &index))
+    visit(&NativeFrame::with_index(bytes, &index))
 }
 
 /// The bytes of a section; `bytes` is the whole file.

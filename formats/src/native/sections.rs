@@ -2,16 +2,16 @@
 //! encoder waits neither for copies nor for the disk unless too many pieces are pending.
 
 use std::fmt;
-use std::io;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::panic;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use bytemuck::Pod;
+use spherule_publish::Publisher;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::layout::{ALIGN, Section};
-use crate::write::atomic::Unpublished;
 
 /// Largest number of pieces that wait to be written.
 const WAITING: usize = 4;
@@ -63,8 +63,9 @@ impl fmt::Debug for SectionProgress {
 }
 
 impl SectionProgress {
-    fn append(&mut self, file: &Unpublished, bytes: &[u8]) -> io::Result<()> {
-        file.write_all_at(bytes, self.offset + self.filled)?;
+    fn append(&mut self, file: &mut Publisher, bytes: &[u8]) -> io::Result<()> {
+        file.seek(SeekFrom::Start(self.offset + self.filled))?;
+        file.write_all(bytes)?;
         self.filled += bytes.len() as u64;
         self.hash.update(bytes);
         Ok(())
@@ -97,7 +98,7 @@ struct WriterThread {
 #[derive(Debug)]
 pub(super) struct WrittenSections {
     /// The file, which is not published yet.
-    pub(super) file: Unpublished,
+    pub(super) file: Publisher,
     /// The sections, in the order in which they were passed to [`SectionWriter::begin`].
     pub(super) sections: Vec<SectionProgress>,
 }
@@ -107,7 +108,7 @@ impl SectionWriter {
     ///
     /// # Errors
     /// If the thread cannot be started.
-    pub(super) fn begin(file: Unpublished, sections: Vec<SectionProgress>) -> io::Result<Self> {
+    pub(super) fn begin(file: Publisher, sections: Vec<SectionProgress>) -> io::Result<Self> {
         let (pieces, to_write) = sync_channel(WAITING);
         let filled = WrittenSections { file, sections };
         let thread = thread::Builder::new()
@@ -170,7 +171,7 @@ fn fill(
     pieces: &Receiver<(usize, Piece)>,
 ) -> io::Result<WrittenSections> {
     for (section, piece) in pieces {
-        filled.sections[section].append(&filled.file, (*piece).as_ref())?;
+        filled.sections[section].append(&mut filled.file, (*piece).as_ref())?;
     }
     Ok(filled)
 }

@@ -84,7 +84,7 @@ fn by_id(raw: &RawParticles, count: usize) -> Vec<(DVec3, [f64; 3])> {
 }
 
 #[test]
-fn frames_come_back_in_another_order() {
+fn frames_round_trip_in_tree_order() {
     for count in [0, 1, 15, 16, 17, 100] {
         let frame = frame(count, DVec3::ZERO);
         let raw = read_back(&bytes(&frame)).expect("whole");
@@ -107,7 +107,7 @@ fn the_origin_is_added_again() {
 }
 
 #[test]
-fn radii_come_back() {
+fn radii_round_trip() {
     let mut common = frame(3, DVec3::ZERO);
     common.radius = Some(Radius::Common(0.5));
     let raw = read_back(&bytes(&common)).expect("whole");
@@ -129,7 +129,7 @@ fn radii_come_back() {
 }
 
 #[test]
-fn radii_that_an_attribute_has_are_stored_once() {
+fn radii_of_an_attribute_are_stored_once() {
     let mut frame = frame(64, DVec3::ZERO);
     let radii: Vec<f32> = (1..=64u8).map(f32::from).collect();
     frame.attributes.push(Attribute {
@@ -170,7 +170,7 @@ fn mapped_and_read_files_give_leaves_in_place() {
 
 #[test]
 #[cfg_attr(miri, ignore = "maps a file")]
-fn a_file_cut_short_under_the_map_is_noticed() {
+fn truncation_of_a_mapped_file_is_detected() {
     let written = written(&frame(100, DVec3::ZERO));
     let file = NativeFile::open(&written.path, Access::Map).expect("whole");
     let handle = fs::OpenOptions::new().write(true).open(&written.path);
@@ -233,7 +233,7 @@ fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
 }
 
 #[test]
-fn an_index_that_lies_is_an_error() {
+fn inconsistent_index_is_an_error() {
     let malformed = |e: ParseError| assert!(matches!(e, ParseError::Malformed { .. }), "{e}");
     malformed(forged(|i| i.count = u64::MAX));
     malformed(forged(|i| i.count = 1 << 60));
@@ -339,11 +339,11 @@ fn stored_within(
         panic!("ids changed their type")
     };
     // Compare each particle with the given one
-    let mut seen = vec![false; frame.len()];
+    let mut visited = vec![false; frame.len()];
     let mut largest = 0.0_f64;
     for (slot, id) in ids.iter().enumerate() {
         let id = usize::try_from(*id).expect("an id of ours");
-        assert!(!std::mem::replace(&mut seen[id], true));
+        assert!(!std::mem::replace(&mut visited[id], true));
         let found = raw.positions.get(slot);
         assert_eq!(found, leaves.center(slot).as_dvec3());
         largest = largest.max(found.distance(frame.positions[id].as_dvec3()));
@@ -370,14 +370,14 @@ fn stored_within(
             assert!((own - radii[id]).abs() <= coded.max_error);
         }
     }
-    assert!(seen.into_iter().all(|s| s));
+    assert!(visited.into_iter().all(|s| s));
     assert!(largest <= index.max_error, "{largest} {}", index.max_error);
     index
 }
 
 #[test]
 #[cfg_attr(miri, ignore = "too many particles for an interpreter")]
-fn no_particle_is_farther_than_the_file_says() {
+fn position_errors_are_within_the_stored_maximum() {
     for encoding in Encoding::ALL {
         for count in [0, 1, 2, 15, 16, 17, 127, 128, 129, 1025, 20_000] {
             for bound in [Bound::None, Bound::Length(1e-4), Bound::OfRadius(0.02)] {
@@ -397,7 +397,7 @@ fn no_particle_is_farther_than_the_file_says() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many particles for an interpreter")]
-fn radii_of_their_own_are_held_and_bounded() {
+fn per_particle_radii_are_stored_within_the_bound() {
     let radii = |count: u32| (0..count).map(|i| 0.001 * 100_f32.powf((i % 97) as f32 / 97.0));
     for encoding in Encoding::ALL {
         for bound in [Bound::None, Bound::OfRadius(0.1), Bound::OfRadius(0.001)] {
@@ -443,7 +443,7 @@ fn flat_and_coincident_particles_are_stored() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many particles for an interpreter")]
-fn the_smallest_encoding_within_the_bound_is_taken() {
+fn smallest_encoding_within_the_bound_is_chosen() {
     let even = crate::generate::fill_box(&crate::generate::BoxSettings::thesis(50_000, 1));
     let taken = |bound: Bound| {
         let settings = StoreSettings {
@@ -487,7 +487,7 @@ fn a_file_does_not_depend_on_threads() {
 /// A file that is truncated while it is mapped: missing bytes read as zeros, and the check detects it.
 #[cfg(all(target_os = "linux", not(miri)))]
 #[test]
-fn pages_that_are_gone_are_zeros_and_told() {
+fn lost_pages_read_as_zeros_and_are_reported() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let mut frame = frame(0, DVec3::ZERO);
@@ -505,7 +505,7 @@ fn pages_that_are_gone_are_zeros_and_told() {
 }
 
 #[test]
-fn an_empty_frame_cannot_ask_for_memory() {
+fn empty_frame_cannot_request_memory() {
     let whole = bytes(&frame(0, DVec3::ZERO));
     let mut index = layout::parse(&whole).expect("whole");
     index.attributes[0].components = u32::MAX;

@@ -82,7 +82,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
 
 /// Checks that the fault that `harm` makes is reported with this message at this place.
 #[track_caller]
-fn told(
+fn fails_with(
     bytes: &[u8],
     words: &str,
     place: impl Fn(&FrameIndex) -> u64,
@@ -107,7 +107,7 @@ fn at(section: &Section, by: usize) -> usize {
 }
 
 #[test]
-fn whole_frames_are_found_whole() {
+fn intact_frames_pass_verification() {
     for encoding in Encoding::ALL {
         for own_radii in [false, true] {
             let bytes = stored(encoding, own_radii);
@@ -119,7 +119,7 @@ fn whole_frames_are_found_whole() {
 }
 
 #[test]
-fn every_flipped_byte_of_a_frame_is_found() {
+fn every_flipped_byte_of_a_frame_is_detected() {
     let whole = stored(Encoding::Q10, true);
     let offset = u64::from_le_bytes(whole[24..32].try_into().expect("8 bytes"));
     let mut aligned = AlignedVec::<64>::new();
@@ -137,10 +137,10 @@ fn every_flipped_byte_of_a_frame_is_found() {
 }
 
 #[test]
-fn nodes_that_lead_astray() {
+fn invalid_node_links() {
     let bytes = stored(Encoding::F32, false);
     let second = |i: &FrameIndex| i.nodes.offset + 64;
-    told(
+    fails_with(
         &bytes,
         "node 1 has children 01111111 for 8 blocks",
         second,
@@ -148,13 +148,13 @@ fn nodes_that_lead_astray() {
             b[at(&i.nodes, 64 + 15)] = 0x7f;
         },
     );
-    told(&bytes, "child 0 of node 1 has no box", second, |i, b| {
+    fails_with(&bytes, "child 0 of node 1 has no box", second, |i, b| {
         b[at(&i.nodes, 64)..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     });
-    told(&bytes, "child 0 of node 1 has no box", second, |i, b| {
+    fails_with(&bytes, "child 0 of node 1 has no box", second, |i, b| {
         b[at(&i.nodes, 64 + 12)] = 255;
     });
-    told(&bytes, "child 3 of node 1 has no box", second, |i, b| {
+    fails_with(&bytes, "child 3 of node 1 has no box", second, |i, b| {
         // The lower plane is above the upper plane on the last axis.
         let planes = at(&i.nodes, 64 + 16 + 2 * 16);
         b[planes + 3] = 200;
@@ -163,7 +163,7 @@ fn nodes_that_lead_astray() {
 }
 
 #[test]
-fn positions_that_cannot_be() {
+fn invalid_positions() {
     // Positions that are not finite, or outside the box of the node
     let bytes = stored(Encoding::F32, false);
     let third = |i: &FrameIndex| i.positions.offset + 2 * 192;
@@ -172,19 +172,19 @@ fn positions_that_cannot_be() {
             b[at(&i.positions, 2 * 192 + 4)..][..4].copy_from_slice(&value.to_le_bytes());
         }
     };
-    told(
+    fails_with(
         &bytes,
         "block 2 has a position that is not finite",
         third,
         set(f32::NAN),
     );
-    told(
+    fails_with(
         &bytes,
         "block 2 has a position that is not finite",
         third,
         set(f32::INFINITY),
     );
-    told(
+    fails_with(
         &bytes,
         "block 2 has a particle outside its box",
         third,
@@ -192,7 +192,7 @@ fn positions_that_cannot_be() {
     );
     // Positions outside the bounds of the frame
     let first = |i: &FrameIndex| i.positions.offset;
-    told(
+    fails_with(
         &bytes,
         "block 0 has a particle outside the bounds",
         first,
@@ -202,7 +202,7 @@ fn positions_that_cannot_be() {
     );
     // Of the 300 particles, 12 are in the last block, followed by four copies of the last one.
     let last = |i: &FrameIndex| i.positions.offset + 18 * 192;
-    told(
+    fails_with(
         &bytes,
         "block 18 has particles beyond the last one",
         last,
@@ -215,7 +215,7 @@ fn positions_that_cannot_be() {
 }
 
 #[test]
-fn references_to_nowhere() {
+fn dangling_references() {
     let bytes = stored(Encoding::Q10, false);
     let index = layout::parse(&bytes).expect("whole");
     let wide = index.wide.len / 192;
@@ -233,13 +233,13 @@ fn references_to_nowhere() {
         })
         .expect("a reference");
     let place = |i: &FrameIndex| i.positions.offset + 64 * reference as u64;
-    told(&bytes, "refers to wide block 4096", place, |i, b| {
+    fails_with(&bytes, "refers to wide block 4096", place, |i, b| {
         b[at(&i.positions, 64 * reference + 4)..][..4].copy_from_slice(&4096_u32.to_le_bytes());
     });
 }
 
 #[test]
-fn radii_that_cannot_be() {
+fn invalid_radii() {
     let bytes = stored(Encoding::F32, true);
     let section = |i: &FrameIndex| match &i.radius {
         RadiusIndex::PerParticle(radii) => radii.section,
@@ -253,12 +253,12 @@ fn radii_that_cannot_be() {
         ),
         (-1.0, "block 1 has a radius that is negative or no number"),
     ] {
-        told(&bytes, words, second, |i, b| {
+        fails_with(&bytes, words, second, |i, b| {
             b[at(&section(i), 64)..][..4].copy_from_slice(&value.to_le_bytes());
         });
     }
     let positions = |i: &FrameIndex| i.positions.offset + 192;
-    told(
+    fails_with(
         &bytes,
         "block 1 has a particle outside its box",
         positions,
@@ -269,13 +269,13 @@ fn radii_that_cannot_be() {
 }
 
 #[test]
-fn numbers_where_zeros_belong() {
+fn non_zero_padding() {
     let bytes = stored(Encoding::F32, false);
     let end = |i: &FrameIndex| i.attributes[0].section.offset + i.attributes[0].section.len;
-    told(&bytes, "between the sections", end, |i, b| {
+    fails_with(&bytes, "between the sections", end, |i, b| {
         b[at(&i.attributes[0].section, 300)] = 1;
     });
-    told(
+    fails_with(
         &bytes,
         "attribute id overlap the section before",
         |i| i.positions.offset,
@@ -287,7 +287,7 @@ fn numbers_where_zeros_belong() {
         let ends = i.sections().into_iter().map(|(_, s)| s.offset + s.len);
         ends.max().expect("sections")
     };
-    told(&bytes, "a largest error is not a number", last, |i, _| {
+    fails_with(&bytes, "a largest error is not a number", last, |i, _| {
         i.attributes[0].max_error = -1.0;
     });
 }

@@ -1,12 +1,13 @@
 //! Writes native frames. The offsets of the sections are known in advance, and the sections are filled run by
 //! run in tree order, so that a frame of any size can be written in pieces.
 
-use std::io;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use glam::DVec3;
 use glam::Vec3;
 use rkyv::rancor;
+use spherule_publish::Publisher;
 
 use super::layout::{
     ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,
@@ -18,7 +19,6 @@ use super::sections::{SectionOffsets, SectionProgress, SectionWriter, piece};
 use super::{Bound, RadiusRange, StoredType};
 use crate::blocks::{Aabb, BLOCK_SIZE, Block, Q10Block, Q16Block};
 use crate::order::index_u32;
-use crate::write::atomic::Unpublished;
 
 /// Describes a native frame that will be written.
 #[derive(Debug, Clone, PartialEq)]
@@ -125,7 +125,7 @@ impl FrameWriter {
             .filter(|_| u32::try_from(blocks_of(spec.count)).is_ok())
             .ok_or_else(|| invalid(format!("{} particles are too many for a frame", spec.count)))?;
         Ok(Self {
-            sections: SectionWriter::begin(Unpublished::create(path)?, sections)?,
+            sections: SectionWriter::begin(Publisher::create(path)?, sections)?,
             pushed: 0,
             wide: 0,
             max_error: 0.0,
@@ -172,7 +172,7 @@ impl FrameWriter {
             )));
         }
         // Wait for the sections
-        let filled = self.sections.finish()?;
+        let mut filled = self.sections.finish()?;
         let sections: Vec<Section> = filled.sections.iter().map(SectionProgress::done).collect();
         let measured = FrameSummary {
             max_error: self.max_error,
@@ -185,12 +185,14 @@ impl FrameWriter {
         let end = index.wide.offset + index.wide.len;
         let offset = end.next_multiple_of(ALIGN);
         // The gap between the sections and the index is a hole in the file, which reads as zeros.
-        filled.file.write_all_at(&bytes, offset)?;
+        filled.file.seek(SeekFrom::Start(offset))?;
+        filled.file.write_all(&bytes)?;
         // Write the header and publish the file
         let file_len = offset + bytes.len() as u64;
         let header = header(file_len, offset, &bytes);
-        filled.file.write_all_at(&header, 0)?;
-        filled.file.publish()?;
+        filled.file.rewind()?;
+        filled.file.write_all(&header)?;
+        filled.file.commit()?;
         Ok(index)
     }
 

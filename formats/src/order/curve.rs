@@ -275,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_can_be_taken_in_pieces() {
+    fn levels_can_be_computed_in_pieces() {
         let morton = 0x1234_5678_9abc_def0 & ((1 << 63) - 1);
         let (whole, _) = hilbert(morton, 0, 21, CurveState::default());
         for split in 0..=21 {
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn points_outside_go_to_the_border() {
+    fn points_outside_are_clamped_to_the_border() {
         let grid = Grid::new(Vec3::ZERO, Vec3::ONE);
         assert_eq!(grid.morton(Vec3::splat(-5.0)), 0);
         assert_eq!(grid.morton(Vec3::splat(1e30)), (1 << 63) - 1);

@@ -1,10 +1,6 @@
 //! Writers of foreign formats, to compare particles in other programs. Files appear complete or not at all.
 //! [`crate::native`] writes native frames.
 
-pub(crate) mod atomic;
-
-pub use atomic::own_temporaries;
-
 pub mod npy;
 pub mod vtk;
 

@@ -4,8 +4,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
+use spherule_publish::publish_with;
 
-use super::atomic::publish;
 use super::stream::{publish_stream, write_positions};
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Progress};
@@ -15,7 +15,8 @@ use crate::convert::{ConvertError, ParticleSource, Progress};
 /// # Errors
 /// [`FrameError::Io`].
 pub fn write(path: &Path, positions: &[Vec3]) -> Result<(), FrameError> {
-    publish(path, |file| fill(file, positions)).map_err(|e| FrameError::io(path, e))
+    let written = publish_with(path, |file| fill(file, positions));
+    written.map(|_| ()).map_err(|e| FrameError::io(path, e))
 }
 
 /// Writes the positions of `source` to `path` in source order, rounded to f32. The file appears complete or not
@@ -61,7 +62,7 @@ mod tests {
     use crate::generate::{BoxSettings, fill_box};
 
     #[test]
-    fn the_file_is_what_numpy_writes() {
+    fn output_equals_that_of_numpy() {
         for count in [0usize, 1, 1000] {
             let mut bytes = Vec::new();
             fill(&mut bytes, &vec![Vec3::new(1.0, 2.0, -3.0); count]).expect("memory");

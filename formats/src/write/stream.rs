@@ -1,14 +1,14 @@
 //! Writes particles from a source to a file in pieces: all threads read and convert pieces, which are written
 //! in order.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use spherule_publish::{Publisher, publish_with};
 
-use super::atomic::publish;
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Phase, Progress};
 
@@ -40,12 +40,13 @@ impl From<FrameError> for WriteError {
 /// Writes the file `path` with `fill`. The file appears complete or not at all.
 pub(super) fn publish_stream(
     path: &Path,
-    fill: impl FnOnce(&mut BufWriter<&std::fs::File>) -> Result<(), WriteError>,
+    fill: impl FnOnce(&mut Publisher) -> Result<(), WriteError>,
 ) -> Result<(), ConvertError> {
-    publish(path, fill).map_err(|ended| match ended {
-        WriteError::Io(error) => FrameError::io(path, error).into(),
-        WriteError::Told(error) => error,
-    })
+    match publish_with(path, fill) {
+        Ok(_) => Ok(()),
+        Err(WriteError::Io(error)) => Err(FrameError::io(path, error).into()),
+        Err(WriteError::Told(error)) => Err(error),
+    }
 }
 
 /// Writes the bytes that `make` appends for each range of particles, in order.

@@ -5,8 +5,8 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
+use spherule_publish::publish_with;
 
-use super::atomic::publish;
 use super::stream::{WriteError, publish_stream, write_numbers, write_positions, write_values};
 use crate::attribute::with_values;
 use crate::convert::{ConvertError, ParticleSource, Progress};
@@ -19,7 +19,8 @@ use crate::{Attribute, FrameError, ScalarType};
 /// [`FrameError::Io`], also if an attribute has another count, or if there are more particles than VTK's 32-bit
 /// cells can count.
 pub fn write(path: &Path, positions: &[Vec3], attributes: &[Attribute]) -> Result<(), FrameError> {
-    publish(path, |file| fill(file, positions, attributes)).map_err(|e| FrameError::io(path, e))
+    let written = publish_with(path, |file| fill(file, positions, attributes));
+    written.map(|_| ()).map_err(|e| FrameError::io(path, e))
 }
 
 /// Writes the particles of `source` to `path` in source order, with positions rounded to f32. The file appears
@@ -210,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn attributes_that_do_not_fit_are_refused() {
+    fn oversized_attributes_are_rejected() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("a.vtk");
         let error = write(&path, &[Vec3::ZERO], &[attribute(vec![])]).expect_err("no value");
@@ -220,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_hold_what_their_source_has() {
+    fn streams_contain_their_source() {
         let source = BlockSource::new(BlockSettings {
             count: 40_000,
             seed: 2,

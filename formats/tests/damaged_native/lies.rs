@@ -44,7 +44,7 @@ const FIELDS: [Field; 13] = [
 ];
 
 #[test]
-fn sizes_that_overflow_are_told() {
+fn overflowing_sizes_are_rejected() {
     for stored in frames::all() {
         for field in FIELDS {
             for huge in HUGE {
@@ -63,7 +63,7 @@ fn sizes_that_overflow_are_told() {
 
 /// All lengths match the count, as far as they can be computed.
 #[test]
-fn counts_that_agree_with_their_sections_are_told() {
+fn inconsistent_counts_are_rejected() {
     for stored in frames::all() {
         for count in HUGE
             .into_iter()
@@ -91,7 +91,7 @@ fn counts_that_agree_with_their_sections_are_told() {
 }
 
 #[test]
-fn headers_that_lie_are_told() {
+fn inconsistent_headers_are_rejected() {
     let stored = &frames::all()[0];
     let index = stored.index_range();
     for lie in HUGE
@@ -117,7 +117,7 @@ fn headers_that_lie_are_told() {
 
 /// Any index that passes the checks can be accessed, and verified data equals the data that was written.
 #[test]
-fn random_changes_of_an_index_under_right_checksums_never_panic() {
+fn changed_index_with_valid_checksum_never_panics() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let all = frames::all();

@@ -92,7 +92,7 @@ fn named_or_same(stored: &Stored, damaged: &[u8], places: &[usize]) {
 }
 
 #[test]
-fn every_byte_of_a_section_is_told_under_its_name() {
+fn every_flipped_byte_names_its_section() {
     for stored in frames::all() {
         for at in layout::HEADER_LEN..stored.index_range().start {
             let mut damaged = stored.bytes.clone();
@@ -103,7 +103,7 @@ fn every_byte_of_a_section_is_told_under_its_name() {
 }
 
 #[test]
-fn many_random_flips_are_told_under_the_name_of_a_section() {
+fn random_flips_name_a_section() {
     let all = frames::all();
     let mut numbers = Numbers(0x5eed);
     for round in 0..10_000 {
@@ -140,7 +140,7 @@ fn nodes_are_verified_alone() {
 }
 
 #[test]
-fn every_truncation_is_told() {
+fn every_truncation_is_rejected() {
     for stored in frames::all() {
         for len in 0..stored.bytes.len() {
             let error = read(stored.bytes[..len].to_vec()).expect_err("cut short");
@@ -154,7 +154,7 @@ fn every_truncation_is_told() {
 }
 
 #[test]
-fn cuts_at_sections_are_told_of_files() {
+fn truncation_at_section_borders_is_rejected() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     for stored in frames::all() {

@@ -23,12 +23,12 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
 
 /// An OpenEXR file.
 pub fn exr(bytes: &[u8]) -> usize {
-    verified(bytes, |file, wanted| verify_exr(file, wanted))
+    verified(bytes, |file, expected| verify_exr(file, expected))
 }
 
 /// A preview.
 pub fn png(bytes: &[u8]) -> usize {
-    verified(bytes, |file, wanted| verify_preview(file, wanted))
+    verified(bytes, |file, expected| verify_preview(file, expected))
 }
 
 fn verified(
@@ -38,8 +38,8 @@ fn verified(
     let Some((choice, bytes)) = bytes.split_first() else {
         return 0;
     };
-    let wanted = &SHAPES[usize::from(*choice) % SHAPES.len()];
-    match verify(Cursor::new(bytes), wanted) {
+    let expected = &SHAPES[usize::from(*choice) % SHAPES.len()];
+    match verify(Cursor::new(bytes), expected) {
         Ok(()) => 1,
         Err(fault) => {
             assert!(!fault.to_string().is_empty());

@@ -190,7 +190,7 @@ pub fn claim(bytes: &[u8]) -> usize {
         }
     };
     write(&["a.worker", "frame.1.0", "frame.1.1", "frame.2.0"]);
-    let seen = Job::workers(&job_dir.job())
+    let found = Job::workers(&job_dir.job())
         .expect("a readable directory")
         .len();
     if let Ok(job) = open(&job_dir.job()) {
@@ -202,7 +202,7 @@ pub fn claim(bytes: &[u8]) -> usize {
         "a file outside the job is gone"
     );
     assert!(job_dir.job().join(PLAN_FILE).exists());
-    seen
+    found
 }
 
 fn claim_all(job: &Job) {

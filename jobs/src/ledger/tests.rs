@@ -1,10 +1,12 @@
 //! Ledgers that are complete, incomplete and damaged.
 
 use std::fs;
+use std::time::{Duration, Instant};
 
 use serde_json::json;
 
 use super::files::ledger_path;
+use super::watcher::RESCAN_INTERVAL;
 use super::*;
 
 /// Appends an entry that supersedes all others.
@@ -115,17 +117,17 @@ fn damage_in_the_middle_is_an_error_and_changes_nothing() {
         (with_details("{\"\\ud800\":1}"), 1),
         (with_details(&("[".repeat(300) + &"]".repeat(300))), 1),
     ];
-    for (damaged, wanted) in cases {
+    for (damaged, expected) in cases {
         fs::write(ledger_path(dir.path(), "w"), &damaged).unwrap();
         let error = Ledger::read(dir.path()).unwrap_err();
         assert!(
-            matches!(&error, JobError::LedgerDamaged { line, .. } if *line == wanted),
+            matches!(&error, JobError::LedgerDamaged { line, .. } if *line == expected),
             "{error}"
         );
         let text_of = error.to_string();
         assert!(text_of.contains("job.ledger.w.jsonl") && text_of.contains("not a ledger entry"));
         let mut watcher = LedgerWatcher::new(dir.path(), "me", &Ledger::default());
-        assert!(watcher.refresh(&["w".to_owned()]).is_err());
+        assert!(watcher.refresh(&["w".to_owned()], Instant::now()).is_err());
         assert_eq!(text(dir.path(), "w"), damaged);
     }
 }
@@ -137,7 +139,7 @@ fn the_watcher_reads_complete_lines() {
     let ledger = Ledger::read(dir.path()).unwrap();
     let mut watcher = LedgerWatcher::new(dir.path(), "me", &ledger);
     let others = ["b".to_owned()];
-    watcher.refresh(&others).unwrap();
+    watcher.refresh(&others, Instant::now()).unwrap();
     assert_eq!(
         watcher.finished_by_other(1),
         None,
@@ -147,10 +149,10 @@ fn the_watcher_reads_complete_lines() {
     append(dir.path(), "2", "b", 1, EntryStatus::Done);
     let whole = text(dir.path(), "b");
     fs::write(ledger_path(dir.path(), "b"), &whole[..whole.len() - 3]).unwrap();
-    watcher.refresh(&others).unwrap();
+    watcher.refresh(&others, Instant::now()).unwrap();
     assert_eq!(watcher.finished_by_other(1), None, "the line is incomplete");
     fs::write(ledger_path(dir.path(), "b"), &whole).unwrap();
-    watcher.refresh(&others).unwrap();
+    watcher.refresh(&others, Instant::now()).unwrap();
     assert_eq!(watcher.finished_by_other(1), Some(EntryStatus::Done));
     assert!(watcher.next_seq() > 1);
 }
@@ -162,7 +164,7 @@ fn compacted_entries_are_still_found() {
     let names = ["a", "b", "c"].map(str::to_owned);
     append(dir.path(), "1", "a", 1, EntryStatus::Done);
     append(dir.path(), "2", "b", 2, EntryStatus::Failed);
-    watcher.refresh(&names).unwrap();
+    watcher.refresh(&names, Instant::now()).unwrap();
     append(dir.path(), "3", "c", 2, EntryStatus::Done);
     for _ in 0..2 {
         let before = Ledger::read(dir.path()).unwrap();
@@ -172,7 +174,7 @@ fn compacted_entries_are_still_found() {
         let files = ledger_files(dir.path()).unwrap();
         assert_eq!(files.len(), 1);
         assert_eq!(files[0].worker, COMPACTED);
-        watcher.refresh(&[]).unwrap();
+        watcher.refresh(&[], Instant::now()).unwrap();
         assert_eq!(watcher.finished_by_other(2), Some(EntryStatus::Done));
     }
 }
@@ -195,16 +197,34 @@ fn a_requeued_frame_is_pending_for_all_workers() {
     let dir = tempfile::tempdir().unwrap();
     let mut watcher = LedgerWatcher::new(dir.path(), "me", &Ledger::default());
     append(dir.path(), "1", "a", 1, EntryStatus::Done);
-    watcher.refresh(&["a".to_owned()]).unwrap();
+    watcher.refresh(&["a".to_owned()], Instant::now()).unwrap();
     assert_eq!(watcher.finished_by_other(1), Some(EntryStatus::Done));
     let entry = LedgerEntry::requeued(watcher.next_seq(), 1, "f.vtk: grown".to_owned());
     let mut writer = LedgerWriter::new(dir.path(), "b");
     writer.append(&entry, true).unwrap();
-    watcher.refresh(&["b".to_owned()]).unwrap();
+    watcher.refresh(&["b".to_owned()], Instant::now()).unwrap();
     assert_eq!(watcher.finished_by_other(1), None);
     let ledger = Ledger::read(dir.path()).unwrap();
     assert!(ledger.entry(1).unwrap().is_requeued);
     append(dir.path(), "3", "c", 1, EntryStatus::Done);
-    watcher.refresh(&["c".to_owned()]).unwrap();
+    watcher.refresh(&["c".to_owned()], Instant::now()).unwrap();
+    assert_eq!(watcher.finished_by_other(1), Some(EntryStatus::Done));
+}
+
+#[test]
+fn the_ledger_of_a_worker_that_came_and_went_is_found_at_the_next_scan() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut watcher = LedgerWatcher::new(dir.path(), "me", &Ledger::default());
+    let alone = ["me".to_owned()];
+    let start = Instant::now();
+    watcher.refresh(&alone, start).unwrap();
+    watcher.refresh(&alone, start).unwrap();
+    append(dir.path(), "1", "a", 1, EntryStatus::Done);
+    let scan = start + RESCAN_INTERVAL;
+    watcher
+        .refresh(&alone, scan - Duration::from_millis(1))
+        .unwrap();
+    assert_eq!(watcher.finished_by_other(1), None);
+    watcher.refresh(&alone, scan).unwrap();
     assert_eq!(watcher.finished_by_other(1), Some(EntryStatus::Done));
 }

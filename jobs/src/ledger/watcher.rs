@@ -9,7 +9,7 @@ use super::{EntryStatus, Ledger, LedgerEntry};
 use crate::JobError;
 
 /// How often the only worker of a job looks for ledgers of workers that have started and ended since.
-const RESCAN_INTERVAL: Duration = Duration::from_secs(2);
+pub(super) const RESCAN_INTERVAL: Duration = Duration::from_secs(2);
 
 /// The parts of an entry that are kept in memory.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -44,7 +44,7 @@ pub(crate) struct LedgerWatcher {
     /// The latest entries when this worker started, or when the frame was requeued.
     baseline: HashMap<i64, EntrySummary>,
     next_seq: u64,
-    last_scan: Instant,
+    last_scan: Option<Instant>,
     /// Whether there were other workers at the last refresh.
     had_other_workers: bool,
 }
@@ -63,7 +63,7 @@ impl LedgerWatcher {
             baseline: latest.clone(),
             latest,
             next_seq: ledger.next_seq,
-            last_scan: Instant::now(),
+            last_scan: None,
             had_other_workers: true,
         }
     }
@@ -81,18 +81,19 @@ impl LedgerWatcher {
         seq
     }
 
-    /// Reads new entries in the ledgers of these `workers` and in the known ledgers.
-    pub(crate) fn refresh(&mut self, workers: &[String]) -> Result<(), JobError> {
+    /// Reads new entries in the ledgers of these `workers` and in the known ledgers, at the time `now`.
+    pub(crate) fn refresh(&mut self, workers: &[String], now: Instant) -> Result<(), JobError> {
         for worker in workers {
             self.watch(ledger_path(&self.dir, worker));
         }
         // A worker may have started and ended since the last refresh. That is rare if there are no others
         let is_alone = workers.len() < 2 && !self.had_other_workers;
         self.had_other_workers = workers.len() > 1;
-        let mut scan = !is_alone || self.last_scan.elapsed() >= RESCAN_INTERVAL;
+        let is_recent = |last: Instant| now.duration_since(last) < RESCAN_INTERVAL;
+        let mut scan = !is_alone || !self.last_scan.is_some_and(is_recent);
         loop {
             if scan {
-                self.last_scan = Instant::now();
+                self.last_scan = Some(now);
                 for file in ledger_files(&self.dir)? {
                     self.watch(file.path);
                 }

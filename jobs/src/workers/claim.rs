@@ -3,6 +3,7 @@
 use std::io;
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::Duration;
 
 use super::files::{link_exclusively, remove_if_exists};
 use super::{Liveness, WorkerRecord, WorkerRegistry};
@@ -31,12 +32,31 @@ pub struct Claim {
 /// More than the number of dead workers at one frame that any job can have.
 const MAX_GENERATIONS: u32 = 1 << 20;
 
+/// Time between attempts to lock the job. Locks are held for milliseconds.
+const LOCK_INTERVAL: Duration = Duration::from_millis(5);
+
+impl WorkerRegistry {
+    /// Claims `frame`.
+    pub(crate) fn claim_frame(self: &Arc<Self>, frame: i64) -> io::Result<ClaimOutcome> {
+        Claim::acquire(self, format!("frame.{frame}"))
+    }
+
+    /// Claims the right to change the plan and to remove files of dead workers. Blocks until it is free.
+    pub(crate) fn lock(self: &Arc<Self>) -> io::Result<Claim> {
+        loop {
+            match Claim::acquire(self, "lock".to_owned())? {
+                ClaimOutcome::Acquired(claim) => return Ok(claim),
+                ClaimOutcome::Held(_) | ClaimOutcome::Finished(_) => {
+                    self.clock().sleep(LOCK_INTERVAL);
+                }
+            }
+        }
+    }
+}
+
 impl Claim {
     /// Claims `name`; [`ClaimOutcome::Held`] if a living worker has it.
-    pub(super) fn acquire(
-        registry: &Arc<WorkerRegistry>,
-        name: String,
-    ) -> io::Result<ClaimOutcome> {
+    fn acquire(registry: &Arc<WorkerRegistry>, name: String) -> io::Result<ClaimOutcome> {
         let mut generation = 0;
         while generation < MAX_GENERATIONS {
             let path = registry.work_dir.join(file_name(&name, generation));

@@ -5,8 +5,9 @@ use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use spherule_publish::part_owner;
+
 use super::{RECORD_SUFFIX, WorkerRecord};
-use crate::publish::part_owner;
 
 /// Links the file `record_path` to the new name `to`. Returns false if `to` exists. On file systems without
 /// hard links a file with the same `text` is created instead.
@@ -92,4 +93,34 @@ pub(crate) fn remove_stale_parts(dir: &Path, living_owners: &HashSet<String>) ->
         removed += usize::from(fs::remove_file(entry.path()).is_ok());
     }
     Ok(removed)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Publisher, owner};
+
+    #[test]
+    fn only_parts_of_the_dead_are_removed() {
+        let dir = tempfile::tempdir().unwrap();
+        let keep = [
+            "notes.part",
+            ".a.exr.part",
+            ".a.exr.h-1-ff.part",
+            ".a.exr.12.1.part",
+            ".h-1-ff.1.part",
+            "a.h-1-ff.2.part",
+            ".a.exr.h-2-ff.7.part",
+        ];
+        for name in keep {
+            fs::write(dir.path().join(name), b"mine").unwrap();
+        }
+        fs::write(dir.path().join(".a.exr.h-1-ff.0.part"), b"dead").unwrap();
+        let mut living = Publisher::create(&dir.path().join("b.exr")).unwrap();
+        living.write_all(b"x").unwrap();
+        let living_owners = [owner(), "h-2-ff"].map(str::to_owned).into();
+        assert_eq!(remove_stale_parts(dir.path(), &living_owners).unwrap(), 1);
+        living.commit().unwrap();
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), keep.len() + 1);
+    }
 }

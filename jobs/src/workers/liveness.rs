@@ -7,6 +7,7 @@ use std::sync::Mutex;
 use std::time::{Duration, Instant};
 
 use super::WorkerRecord;
+use crate::clock::Clock;
 use crate::open_regular;
 
 /// Heartbeats that a worker must have missed before it counts as unresponsive, however short the timeout of
@@ -29,14 +30,16 @@ pub(super) enum Liveness {
 pub(super) struct LivenessMonitor {
     /// A worker without a heartbeat for this long is unresponsive.
     timeout: Duration,
+    clock: Clock,
     /// Last observed length of each file, and when that length was first observed.
     observed: Mutex<HashMap<PathBuf, (u64, Instant)>>,
 }
 
 impl LivenessMonitor {
-    pub(super) fn new(timeout: Duration) -> Self {
+    pub(super) fn new(timeout: Duration, clock: Clock) -> Self {
         Self {
             timeout,
+            clock,
             observed: Mutex::default(),
         }
     }
@@ -66,7 +69,7 @@ impl LivenessMonitor {
             Err(_) => u64::MAX,
         };
         let mut observed = self.observed.lock().unwrap_or_else(|e| e.into_inner());
-        let now = Instant::now();
+        let now = self.clock.now();
         let (last_length, since) = observed.entry(path.to_owned()).or_insert((length, now));
         if *last_length != length {
             (*last_length, *since) = (length, now);

@@ -26,6 +26,7 @@ mod tests;
 
 pub use claim::{Claim, ClaimOutcome};
 pub(crate) use files::remove_stale_parts;
+use heartbeat::HeartbeatSchedule;
 pub use heartbeat::start_heartbeat_thread;
 use liveness::{Liveness, LivenessMonitor};
 pub(crate) use record::WorkerRecord;

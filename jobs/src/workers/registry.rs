@@ -2,19 +2,20 @@
 //! the others.
 
 use std::collections::HashSet;
-use std::fs::{self, OpenOptions};
-use std::io::{self, Write};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, OnceLock};
-use std::thread;
 use std::time::Duration;
 
-use super::claim::{Claim, ClaimOutcome};
+use spherule_publish::{owner, part_owner, publish};
+
 use super::files::{list_files, list_records, remove_if_exists, remove_stale_parts};
 use super::record::is_worker_name;
-use super::{Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord, heartbeat};
-use crate::process::{Process, now_ms, owner};
+use super::{HeartbeatSchedule, Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord};
+use crate::clock::Clock;
+use crate::process::{Process, now_ms};
 
 /// Longest time between heartbeats.
 const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(5);
@@ -22,7 +23,7 @@ const HEARTBEAT_INTERVAL: Duration = Duration::from_secs(5);
 /// Shortest time between heartbeats.
 const MIN_HEARTBEAT_INTERVAL: Duration = Duration::from_millis(10);
 
-/// Suffix of the file name of a record that is being written.
+/// Suffix of the file name of a record that spherule 0.1.0 was writing.
 const DRAFT_SUFFIX: &str = ".new";
 
 /// See the module. The worker is registered until this is dropped.
@@ -35,6 +36,7 @@ pub(crate) struct WorkerRegistry {
     /// The first line of the record's file.
     pub(super) record_line: Vec<u8>,
     pub(super) monitor: LivenessMonitor,
+    heartbeats: &'static HeartbeatSchedule,
     is_declared_dead: Arc<AtomicBool>,
     /// Directories in which workers of this job create temporary files.
     output_dirs: OnceLock<Vec<PathBuf>>,
@@ -44,6 +46,15 @@ impl WorkerRegistry {
     /// Registers a worker in the job's directory `dir`. Other workers are declared dead after
     /// `takeover_after` without a heartbeat.
     pub(crate) fn register(dir: &Path, takeover_after: Duration) -> io::Result<Arc<Self>> {
+        Self::register_with(dir, takeover_after, HeartbeatSchedule::of_process())
+    }
+
+    /// Like [`Self::register`], with the heartbeats and the clock of `heartbeats`.
+    pub(super) fn register_with(
+        dir: &Path,
+        takeover_after: Duration,
+        heartbeats: &'static HeartbeatSchedule,
+    ) -> io::Result<Arc<Self>> {
         let work_dir = dir.join(WORK_DIR);
         let interval = HEARTBEAT_INTERVAL
             .min(takeover_after / 4)
@@ -58,13 +69,14 @@ impl WorkerRegistry {
         let record_path = work_dir.join(record.file_name());
         write_record(&work_dir, &record_path, &record_line)?;
         let is_declared_dead = Arc::new(AtomicBool::new(false));
-        heartbeat::start(&record_path, interval, &is_declared_dead);
+        heartbeats.add(&record_path, interval, &is_declared_dead);
         Ok(Arc::new(Self {
             work_dir,
             record,
             record_path,
             record_line,
-            monitor: LivenessMonitor::new(takeover_after),
+            monitor: LivenessMonitor::new(takeover_after, heartbeats.clock().clone()),
+            heartbeats,
             is_declared_dead,
             output_dirs: OnceLock::new(),
         }))
@@ -86,21 +98,9 @@ impl WorkerRegistry {
         self.is_declared_dead.load(Ordering::Relaxed)
     }
 
-    /// Claims `frame`.
-    pub(crate) fn claim_frame(self: &Arc<Self>, frame: i64) -> io::Result<ClaimOutcome> {
-        Claim::acquire(self, format!("frame.{frame}"))
-    }
-
-    /// Claims the right to change the plan and to remove files of dead workers. Blocks until it is free.
-    pub(crate) fn lock(self: &Arc<Self>) -> io::Result<Claim> {
-        loop {
-            match Claim::acquire(self, "lock".to_owned())? {
-                ClaimOutcome::Acquired(claim) => return Ok(claim),
-                ClaimOutcome::Held(_) | ClaimOutcome::Finished(_) => {
-                    thread::sleep(Duration::from_millis(5));
-                }
-            }
-        }
+    /// The clock by which this worker judges others.
+    pub(crate) const fn clock(&self) -> &Clock {
+        self.heartbeats.clock()
     }
 
     /// The other living workers.
@@ -140,7 +140,7 @@ impl WorkerRegistry {
 impl Drop for WorkerRegistry {
     /// The last worker removes what dead workers have left. The next run finds what could not be removed.
     fn drop(&mut self) {
-        heartbeat::stop(&self.record_path);
+        self.heartbeats.remove(&self.record_path);
         let _ = remove_if_exists(&self.record_path);
         let Ok(mut living) = remove_dead(&self.work_dir, &self.monitor, None) else {
             return;
@@ -204,7 +204,8 @@ fn is_ours(path: &Path) -> bool {
     let name = path.file_name().map(|name| name.to_string_lossy());
     name.is_some_and(|name| {
         let is_claim = name.starts_with("frame.") || name.starts_with("lock.");
-        is_claim || name.ends_with(RECORD_SUFFIX) || name.ends_with(DRAFT_SUFFIX)
+        let is_record = name.ends_with(RECORD_SUFFIX) || name.ends_with(DRAFT_SUFFIX);
+        is_claim || is_record || part_owner(&name).is_some()
     })
 }
 
@@ -221,22 +222,14 @@ fn new_worker_name() -> String {
 /// Writes the record into the directory, which is created if needed. The last worker to leave may remove the
 /// directory at any time, hence the retries.
 fn write_record(work_dir: &Path, record_path: &Path, line: &[u8]) -> io::Result<()> {
-    let draft = record_path.with_extension(&DRAFT_SUFFIX[1..]);
     let write = || {
         fs::create_dir_all(work_dir)?;
-        let mut file = OpenOptions::new()
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&draft)?;
-        file.write_all(line)?;
-        fs::rename(&draft, record_path)
+        publish(record_path, line)
     };
     for _ in 0..100 {
         match write() {
             Err(e) if e.kind() == io::ErrorKind::NotFound => {}
             Err(e) => {
-                let _ = remove_if_exists(&draft);
                 let _ = fs::remove_dir(work_dir);
                 return Err(e);
             }

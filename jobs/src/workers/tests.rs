@@ -1,4 +1,4 @@
-//! Claims of workers that are alive, end, become unresponsive and come back.
+//! Claims of workers that are alive, end, become unresponsive and come back. Time passes only where a test says so.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -6,6 +6,7 @@ use std::sync::Arc;
 use std::thread;
 use std::time::Duration;
 
+use crate::clock::Clock;
 use crate::process::Process;
 
 use super::*;
@@ -14,6 +15,37 @@ const LONG: Duration = Duration::from_secs(3600);
 
 fn register(dir: &Path) -> Arc<WorkerRegistry> {
     WorkerRegistry::register(dir, LONG).unwrap()
+}
+
+/// A machine whose clock and heartbeats the test drives.
+struct Machine {
+    clock: Clock,
+    heartbeats: &'static HeartbeatSchedule,
+}
+
+impl Machine {
+    /// A machine with this clock. Machines may share one.
+    fn new(clock: &Clock) -> Self {
+        let heartbeats = Box::leak(Box::new(HeartbeatSchedule::new(clock.clone())));
+        Self {
+            clock: clock.clone(),
+            heartbeats,
+        }
+    }
+
+    fn register(&self, dir: &Path, takeover_after: Duration) -> Arc<WorkerRegistry> {
+        WorkerRegistry::register_with(dir, takeover_after, self.heartbeats).unwrap()
+    }
+
+    /// Lets `time` pass, then the heartbeats that are due.
+    fn pass(&self, time: Duration) {
+        self.clock.sleep(time);
+        self.heartbeats.beat_due();
+    }
+}
+
+const fn millis(count: u64) -> Duration {
+    Duration::from_millis(count)
 }
 
 fn acquired(outcome: ClaimOutcome) -> Claim {
@@ -139,19 +171,20 @@ fn the_claim_of_an_ended_process_is_free_at_once() {
 fn the_claim_of_another_machine_is_free_after_missed_heartbeats() {
     let dir = tempfile::tempdir().unwrap();
     let record = remote_worker(dir.path(), "far", 3);
-    let a = WorkerRegistry::register(dir.path(), Duration::from_millis(300)).unwrap();
-    let step = Duration::from_millis(100);
+    let here = Machine::new(&Clock::manual());
+    let a = here.register(dir.path(), millis(300));
     for _ in 0..8 {
         assert!(is_held(&a, 3));
         assert_eq!(a.others().unwrap().len(), 1);
         let text = fs::read_to_string(&record).unwrap();
         fs::write(&record, text + ".").unwrap();
-        thread::sleep(step);
+        here.pass(millis(299));
     }
+    assert!(is_held(&a, 3), "it has just appended");
+    here.pass(millis(299));
     assert!(is_held(&a, 3));
-    while is_held(&a, 3) {
-        thread::sleep(step);
-    }
+    here.pass(millis(1));
+    assert!(!is_held(&a, 3));
     assert!(!record.exists(), "all workers must agree that it is dead");
     let other = register(dir.path());
     assert!(!is_held(&other, 3));
@@ -162,16 +195,92 @@ fn the_claim_of_another_machine_is_free_after_missed_heartbeats() {
 #[test]
 fn a_worker_notices_that_it_was_declared_dead() {
     let dir = tempfile::tempdir().unwrap();
-    let a = WorkerRegistry::register(dir.path(), Duration::from_millis(40)).unwrap();
+    let here = Machine::new(&Clock::manual());
+    let a = here.register(dir.path(), millis(400));
     let claim = acquired(a.claim_frame(1).unwrap());
     let b = register(dir.path());
+    here.pass(millis(100));
     assert!(is_held(&b, 1) && claim.is_valid());
     b.declare_dead(&a.record).unwrap();
     assert!(!claim.is_valid());
     let _claim = acquired(b.claim_frame(1).unwrap());
+    here.pass(millis(99));
+    assert!(!a.is_declared_dead(), "it notices at its next heartbeat");
+    here.pass(millis(1));
+    assert!(a.is_declared_dead());
+}
+
+/// The thread that serves the registries of a process.
+#[test]
+fn the_heartbeat_thread_notices_a_lost_record() {
+    let dir = tempfile::tempdir().unwrap();
+    let a = WorkerRegistry::register(dir.path(), millis(40)).unwrap();
+    register(dir.path()).declare_dead(&a.record).unwrap();
     while !a.is_declared_dead() {
         thread::yield_now();
     }
+}
+
+#[test]
+fn a_worker_keeps_its_claims_as_long_as_its_heart_beats() {
+    let dir = tempfile::tempdir().unwrap();
+    let clock = Clock::manual();
+    let (here, there) = (Machine::new(&clock), Machine::new(&clock));
+    let observer = here.register(dir.path(), millis(60_000));
+    let worker = there.register(dir.path(), millis(60_000));
+    let claim = acquired(worker.claim_frame(1).unwrap());
+    let length = || fs::metadata(&worker.record_path).unwrap().len();
+    let first_length = length();
+    for beats in 1..=24 {
+        there.pass(millis(4_999));
+        assert_eq!(length(), first_length + beats - 1, "a beat every 5 s");
+        there.pass(millis(1));
+        assert_eq!(length(), first_length + beats);
+        assert!(is_held(&observer, 1));
+    }
+    // The machine is suspended
+    here.pass(millis(59_999));
+    assert!(is_held(&observer, 1));
+    here.pass(millis(1));
+    let taken = acquired(observer.claim_frame(1).unwrap());
+    // It comes back, notices, and must not overwrite
+    assert!(!claim.is_valid());
+    there.pass(Duration::ZERO);
+    assert!(worker.is_declared_dead());
+    drop((claim, worker));
+    assert!(taken.is_valid());
+    let other = there.register(dir.path(), millis(60_000));
+    assert!(is_held(&other, 1), "the claim of the dead removes no other");
+}
+
+/// A worker that beats slowly must not be declared dead by one with a short timeout.
+#[test]
+fn a_short_timeout_waits_for_several_heartbeats() {
+    let dir = tempfile::tempdir().unwrap();
+    let clock = Clock::manual();
+    let (here, there) = (Machine::new(&clock), Machine::new(&clock));
+    let worker = there.register(dir.path(), millis(60_000));
+    let _claim = acquired(worker.claim_frame(1).unwrap());
+    let hasty = here.register(dir.path(), millis(100));
+    assert!(is_held(&hasty, 1));
+    here.pass(millis(19_999));
+    assert!(is_held(&hasty, 1), "four beats of 5 s");
+    here.pass(millis(1));
+    assert!(!is_held(&hasty, 1));
+}
+
+#[test]
+fn the_lock_of_an_unresponsive_worker_is_taken_over() {
+    let dir = tempfile::tempdir().unwrap();
+    let clock = Clock::manual();
+    let (here, there) = (Machine::new(&clock), Machine::new(&clock));
+    let worker = there.register(dir.path(), millis(300));
+    let lost = worker.lock().unwrap();
+    let start = clock.now();
+    let a = here.register(dir.path(), millis(300));
+    a.lock().unwrap().complete();
+    assert_eq!(clock.now() - start, millis(300));
+    assert!(!lost.is_valid());
 }
 
 #[test]
@@ -198,11 +307,12 @@ fn damaged_and_unknown_files_are_harmless() {
     fs::write(work_dir.join("notes.txt"), "mine").unwrap();
     fs::create_dir(work_dir.join("frame.4.0")).unwrap();
     fs::create_dir(work_dir.join("folder.worker")).unwrap();
-    let a = WorkerRegistry::register(dir.path(), Duration::from_millis(50)).unwrap();
+    let here = Machine::new(&Clock::manual());
+    let a = here.register(dir.path(), millis(50));
     a.remove_dead().unwrap();
     assert!(!is_held(&a, 4), "workers create no directories");
     assert!(is_held(&a, 1) && is_held(&a, 2));
-    thread::sleep(Duration::from_millis(100));
+    here.pass(millis(50));
     assert!(!is_held(&a, 1) && !is_held(&a, 2));
     a.remove_dead().unwrap();
     assert!(work_dir.join("notes.txt").exists() && !work_dir.join("torn.worker").exists());
@@ -225,13 +335,14 @@ fn a_forged_claim_deletes_nothing_elsewhere() {
     // A record must not replace that of another worker
     let other = register(dir.path());
     fs::write(work_dir.join("liar.worker"), forged(other.worker())).unwrap();
-    let a = WorkerRegistry::register(dir.path(), Duration::from_millis(40)).unwrap();
-    while is_held(&a, 1) {
-        thread::sleep(Duration::from_millis(10));
-    }
-    while work_dir.join("forged.worker").exists() {
-        a.remove_dead().unwrap();
-    }
+    let here = Machine::new(&Clock::manual());
+    let a = here.register(dir.path(), millis(40));
+    assert!(is_held(&a, 1));
+    a.remove_dead().unwrap();
+    here.pass(millis(40));
+    assert!(!is_held(&a, 1));
+    a.remove_dead().unwrap();
+    assert!(!work_dir.join("forged.worker").exists());
     assert_eq!(fs::read_to_string(&victim).unwrap(), "mine");
     assert!(other.record_path.exists());
     drop((a, other));

@@ -189,7 +189,7 @@ fn structures_and_kernels_agree_on_unions_to_the_bit() {
 }
 
 #[test]
-fn stored_spheres_unite_as_they_are_stored() {
+fn stored_spheres_form_a_union_as_stored() {
     let common = Scene::common("body", random_points(3000, 37), 0.1);
     for scene in [common, nested()] {
         let radius = (scene.radii.len() == 1).then(|| scene.radii[0]);
@@ -236,7 +236,7 @@ fn spheres_that_end_together_go_to_the_lower_index() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn any_spheres_on_a_line_unite(
+    fn spheres_on_a_line_form_a_union(
         spheres in prop::collection::vec((0_u8..60, 1_u8..20, -3_i8..4), 1..40),
         start in 0_u8..60,
     ) {

@@ -139,7 +139,7 @@ fn linked(tree: &WideTree) -> Vec<Link> {
 }
 
 #[test]
-fn packets_find_what_single_rays_find() {
+fn packets_match_single_rays() {
     for scene in awkward_scenes() {
         for settings in all_settings() {
             for keep_indices in [true, false] {
@@ -179,7 +179,7 @@ fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
 }
 
 #[test]
-fn an_empty_packet_finds_nothing() {
+fn empty_packet_hits_nothing() {
     let scene = Scene::common("one", vec![Vec3::ZERO], 1.0);
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());

@@ -183,7 +183,7 @@ fn spheres_of_slots_are_those_stored() {
 
 /// The upper levels are built from planes and not from particles, and rays find the same hits.
 #[test]
-fn stored_and_built_trees_find_the_same() {
+fn stored_and_built_trees_agree() {
     let scene = Scene::common("cloud", random_points(20_000, 5), 0.02);
     let owned = OwnedLeaves::encode(&scene, Positions::F32, Radii::None);
     let mut tree = StoredTree::new();
@@ -196,12 +196,12 @@ fn stored_and_built_trees_find_the_same() {
     let built = builder.tree().view();
     let mut hits = 0;
     for ray in rays(&stored, 2000, 6) {
-        let told = |view: &TreeView| {
+        let nearest = |view: &TreeView| {
             let hit = view.nearest(&ray)?;
             Some((hit.t.to_bits(), view.particle(hit.slot)))
         };
-        assert_eq!(told(&view), told(&built), "{ray:?}");
-        hits += usize::from(told(&view).is_some());
+        assert_eq!(nearest(&view), nearest(&built), "{ray:?}");
+        hits += usize::from(nearest(&view).is_some());
     }
     assert!(hits > 1000, "{hits}");
 }
@@ -213,7 +213,7 @@ fn sound() -> OwnedLeaves {
 }
 
 #[test]
-fn the_lowest_faulty_node_is_told_whatever_the_threads() {
+fn lowest_faulty_node_is_reported_for_any_threads() {
     let mut owned = sound();
     let good = owned.nodes.clone();
     owned.nodes[2500].child_mask = 0;
@@ -241,7 +241,7 @@ fn the_lowest_faulty_node_is_told_whatever_the_threads() {
 }
 
 #[test]
-fn every_fault_has_its_name() {
+fn every_fault_has_its_message() {
     let scene = Scene {
         name: "cloud",
         centers: random_points(1025, 2),

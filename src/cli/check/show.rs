@@ -15,7 +15,7 @@ use crate::survey::Survey;
 
 impl Check<'_> {
     pub(super) fn to_json(&self) -> Value {
-        let manifest = &self.render_job.manifest;
+        let manifest = self.render_job.manifest();
         let mut all = Map::new();
         let mut put = |key: &str, value: Value| all.insert(key.to_owned(), value);
         put("problems", json!(self.problems));
@@ -33,7 +33,7 @@ impl Check<'_> {
             "images",
             self.tasks.iter().map(|t| json!(t.image)).collect(),
         );
-        put("directory", json!(self.render_job.dir));
+        put("directory", json!(self.render_job.dir()));
         put(
             "image",
             json!({
@@ -80,11 +80,11 @@ impl Check<'_> {
 
     pub(super) fn to_lines(&self) -> Vec<String> {
         let mut lines = vec![self.frames_line()];
-        let manifest = &self.render_job.manifest;
+        let manifest = self.render_job.manifest();
         let names: Vec<&str> = manifest.output.channels.iter().map(|c| c.name()).collect();
         lines.push(format!(
             "images     {}: {}x{}, {} samples per pixel, {}{}",
-            self.render_job.shown_output.display(),
+            self.render_job.shown_output().display(),
             manifest.image.width,
             manifest.image.height,
             manifest.image.samples,
@@ -111,7 +111,7 @@ impl Check<'_> {
     }
 
     fn camera<'a>(&self, setup: &'a Setup) -> CameraSummary<'a> {
-        let mode = self.render_job.manifest.camera.mode;
+        let mode = self.render_job.manifest().camera.mode;
         CameraSummary::new(setup, mode, &self.render_job.selected(self.sequence))
     }
 
@@ -137,7 +137,7 @@ impl Check<'_> {
             return Vec::new();
         };
         let mut line = format!("memory     about {}", Bytes(schedule.need.total()));
-        if let Some(limit) = self.render_job.manifest.render.memory_limit {
+        if let Some(limit) = self.render_job.manifest().render.memory_limit {
             line += &format!(", the limit is {limit}");
         }
         if let Some(free) = self.free_memory {

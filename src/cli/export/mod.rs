@@ -5,13 +5,14 @@ use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
 use clap::{Args, Subcommand};
+use spherule_formats::ValueError;
 use spherule_jobs::export::Chunks;
 use spherule_jobs::{ResumeMode, publish};
 
-use super::manifest_args::{RequestedManifest, is_manifest, read_manifest};
+use super::manifest_args::{is_manifest, read_manifest};
 use super::paths::absolute;
-use super::render_job::RenderJob;
 use super::{CliError, Outcome, print};
+use crate::job::{JobManifest, RenderJob};
 use crate::manifest::{Manifest, Override, named_place};
 use crate::metrics::Bytes;
 
@@ -39,7 +40,7 @@ pub(super) struct ExportArgs {
 
 #[derive(Debug, Subcommand)]
 enum Engine {
-    /// A script for sbatch: a job array whose tasks render some of the frames each.
+    /// A script for sbatch: a job array whose tasks each render a part of the frames.
     Slurm(slurm::SlurmArgs),
     /// A job template of Open Job Description, for AWS Deadline Cloud and `openjd run`.
     Openjd(openjd::OpenjdArgs),
@@ -83,12 +84,11 @@ struct CommonArgs {
 /// Smallest memory that is accepted. A smaller value probably lacks its unit.
 const MIN_MEMORY: Bytes = Bytes(16 << 20);
 
-fn memory(text: &str) -> Result<Bytes, String> {
+fn memory(text: &str) -> Result<Bytes, ValueError> {
     let size: Bytes = text.parse()?;
     if size < MIN_MEMORY {
-        return Err(format!(
-            "{size} is less than {MIN_MEMORY}; write the unit, such as 4GiB"
-        ));
+        let expected = format!("at least {MIN_MEMORY}, with a unit, such as 4GiB");
+        return Err(ValueError::new(expected, text));
     }
     Ok(size)
 }
@@ -117,7 +117,7 @@ impl ExportJob {
     /// Reads the manifest, finds the frames, and refuses what `render` would refuse.
     fn read(args: &CommonArgs, max_tasks: NonZeroUsize) -> Result<Self, CliError> {
         let requested = requested_manifest(args)?;
-        let sequence = requested.sequence()?;
+        let sequence = requested.open_sequence()?;
         for note in sequence.notes() {
             note!("{note}");
         }
@@ -127,8 +127,8 @@ impl ExportJob {
             .absolute_base()?
             .join(requested.manifest.output.path.dir());
         let render_job = RenderJob::new(requested, &sequence, None)?;
-        render_job.guard_directory(ResumeMode::Resume)?;
-        render_job.guard_manifest()?;
+        render_job.check_output_dir(ResumeMode::Resume)?;
+        render_job.check_manifest_file()?;
         let frames = render_job.selected(&sequence);
         let chunks = Chunks::of(&frames, args.chunk, max_tasks)?;
         let manifest_file = absolute(&args.manifest)?;
@@ -141,8 +141,8 @@ impl ExportJob {
             program: std::env::current_exe().map_err(CliError::io(Path::new("spherule")))?,
             out_dir: normalized(&out),
             input_dir: common_dir(&inputs),
-            image_name: render_job.manifest.output.path.file_name().to_owned(),
-            memory_limit: render_job.manifest.render.memory_limit,
+            image_name: render_job.manifest().output.path.file_name().to_owned(),
+            memory_limit: render_job.manifest().render.memory_limit,
             manifest_file,
             frames,
             chunks,
@@ -162,7 +162,7 @@ impl ExportJob {
 }
 
 /// The manifest with its frames. Each task reads everything else from the file.
-fn requested_manifest(args: &CommonArgs) -> Result<RequestedManifest, CliError> {
+fn requested_manifest(args: &CommonArgs) -> Result<JobManifest, CliError> {
     let path = &args.manifest;
     if !is_manifest(path) {
         return Err(CliError::other(format!(
@@ -173,14 +173,15 @@ fn requested_manifest(args: &CommonArgs) -> Result<RequestedManifest, CliError> 
     }
     let content = read_manifest(path)?;
     let frames = args.frames.as_ref().map(|range| {
-        Override::new("input.frames", range.clone(), "--frames").map_err(CliError::Other)
+        Override::new("input.frames", range.clone(), "--frames")
+            .map_err(|e| CliError::other(e.to_string()))
     });
     let overrides = frames.transpose()?.into_iter().collect();
     let (manifest, warnings) = Manifest::parse_with_warnings(&content, path, overrides)?;
     for warning in warnings {
         note!("{warning}");
     }
-    Ok(RequestedManifest {
+    Ok(JobManifest {
         manifest,
         base: path.parent().map_or_else(PathBuf::new, Path::to_owned),
         file: Some(path.clone()),

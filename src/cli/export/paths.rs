@@ -104,10 +104,10 @@ mod tests {
 
     #[test]
     fn relative_paths_inside_a_directory() {
-        let seen = |path: &str, dir: &str| inside(Path::new(path), Path::new(dir));
-        assert_eq!(seen("/a/b/c", "/a"), Some("b/c".into()));
-        assert_eq!(seen("/a/b", "/a/b"), Some(".".into()));
-        assert_eq!(seen("/a/bc", "/a/b"), None);
+        let inside_of = |path: &str, dir: &str| inside(Path::new(path), Path::new(dir));
+        assert_eq!(inside_of("/a/b/c", "/a"), Some("b/c".into()));
+        assert_eq!(inside_of("/a/b", "/a/b"), Some(".".into()));
+        assert_eq!(inside_of("/a/bc", "/a/b"), None);
         let temporary = tempfile::tempdir().unwrap();
         let dir = temporary.path().canonicalize().unwrap();
         std::fs::create_dir(dir.join("real")).unwrap();

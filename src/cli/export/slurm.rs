@@ -24,7 +24,7 @@ pub(super) struct SlurmArgs {
     /// Time limit of a task: 02:00:00, 1-12:00:00, or minutes [default: the partition's]
     #[arg(long, value_name = "TIME")]
     time: Option<TimeLimit>,
-    /// Largest number of tasks that run at the same time.
+    /// Maximum number of tasks that run at the same time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     concurrent: Option<u32>,
     /// Partition to run in.
@@ -33,15 +33,15 @@ pub(super) struct SlurmArgs {
     /// Account to charge.
     #[arg(long, value_name = "NAME")]
     account: Option<String>,
-    /// Seconds before the time limit at which a task is told to finish its frame.
+    /// Seconds before the time limit at which a task receives the signal to finish its frame.
     ///
-    /// Longer than a frame takes.
+    /// Choose a longer time than one frame takes.
     #[arg(long, value_name = "SECONDS", default_value_t = 120)]
     signal_ahead: u32,
     /// Directory for the tasks' logs [default: slurm-logs next to the manifest]
     #[arg(long, value_name = "DIR")]
     logs: Option<PathBuf>,
-    /// Largest number of tasks of an array on this cluster: its MaxArraySize minus 1.
+    /// Maximum number of tasks in an array on this cluster: its MaxArraySize minus 1.
     ///
     /// If there would be more tasks, each task gets more frames.
     #[arg(long, value_name = "N", default_value_t = default_max_tasks())]

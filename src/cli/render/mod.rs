@@ -2,12 +2,11 @@
 
 use clap::Args;
 
-use super::job::use_threads;
-use super::render_job::RunArgs;
+use super::job::{JobArgs, use_threads};
+use super::manifest_args::ManifestArgs;
 use super::{CliError, Outcome, events, signals};
 use crate::manifest::ProgressMode;
 
-mod complete_frames;
 mod follow;
 pub(super) mod isolate;
 mod run;
@@ -25,6 +24,15 @@ Examples:
   spherule render run1 --color-by density --map turbo --set camera.mode=turntable
       Coloured by an attribute, from a camera that goes around";
 
+/// Arguments of `render` and `check`.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    #[command(flatten)]
+    pub(super) manifest: ManifestArgs,
+    #[command(flatten)]
+    pub(super) job: JobArgs,
+}
+
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct RenderArgs {
@@ -40,21 +48,20 @@ const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
     let signals = signals::listen(SIGNAL_MESSAGES)?;
     let requested = args.run.manifest.manifest()?;
-    if requested.manifest.job.progress == ProgressMode::Json {
+    let settings = requested.manifest.job.clone();
+    if settings.progress == ProgressMode::Json {
         events::start();
     }
-    use_threads(requested.manifest.job.threads)?;
-    if requested.manifest.job.follow {
+    use_threads(settings.threads)?;
+    if settings.follow {
         return follow::run(&args.run.job, requested, &signals);
     }
-    let grace = requested.manifest.job.grace;
-    let sequence = requested.sequence()?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
     let mut run = Run::start(&args.run.job, requested, sequence)?;
-    run.report_kept();
-    let interrupt = signals.start_work_with_grace(grace);
+    let interrupt = signals.start_work_with_grace(settings.grace);
     let result = run.render_pending(interrupt);
     Ok(run.end(result, interrupt))
 }

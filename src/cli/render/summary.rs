@@ -1,46 +1,30 @@
 //! Messages of a render: the resolved settings, and progress.
 
-use serde_json::json;
+use serde_json::{Value, json};
 use spherule_formats::Sequence;
 
-use crate::cli::progress::Progress;
-use crate::pipeline::{self, Event, RadiusRule, Setup, Stage};
+use crate::cli::progress::ShowReport;
+use crate::pipeline::{self, RadiusRule, Setup};
 use crate::report::FrameReport;
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
-/// Shows an event of the pipeline. Called from all stages.
-pub(super) fn show_event(progress: &Progress, event: &Event) {
-    match event {
-        Event::StageEntered(frame, stage) => progress.stage(
-            *frame,
-            match stage {
-                Stage::Read => "reading",
-                Stage::Trace => "tracing",
-                Stage::Write => "writing",
-            },
-        ),
-        Event::Done(task, report) => {
-            let image = task.image.display().to_string();
-            let facts = json!({"image": image, "seconds": report.seconds});
-            progress.done(task.frame, &task.image, &frame_summary(report), facts);
-        }
-        Event::Failed(failure) => progress.failed(failure),
-        Event::OtherWorker(event) => progress.other_worker(*event),
-        Event::Note(note) => progress.note(note),
+impl ShowReport for FrameReport {
+    fn summary(&self) -> String {
+        let s = &self.seconds;
+        let surface = match s.surface {
+            none if none < 5e-4 => String::new(),
+            seconds => format!("surface {seconds:.3} s, "),
+        };
+        format!(
+            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s",
+            self.particles, self.build.structure, s.build, s.trace
+        )
     }
-}
 
-fn frame_summary(report: &FrameReport) -> String {
-    let s = &report.seconds;
-    let surface = match s.surface {
-        none if none < 5e-4 => String::new(),
-        seconds => format!("surface {seconds:.3} s, "),
-    };
-    format!(
-        "{} particles, {} built in {:.3} s, {surface}trace {:.2} s",
-        report.particles, report.build.structure, s.build, s.trace
-    )
+    fn facts(&self, output: String) -> Value {
+        json!({"image": output, "seconds": self.seconds})
+    }
 }
 
 /// Prints the resolved settings.

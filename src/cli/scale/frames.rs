@@ -1,6 +1,5 @@
-//! Native frames for cells that trace in place: made once for all cells of a particle count and an
-//! encoding, one at a time, in a directory of ours beside the results, which is gone in the end. What a run
-//! that was killed has left of it goes with the next run.
+//! Native frames for cells that trace in place: one frame for all cells of a particle count and an encoding. There is
+//! one frame at a time, in a temporary directory next to the results. The next run removes what a killed run left.
 
 use std::fs;
 use std::io;
@@ -8,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use spherule_jobs::Interrupt;
 
-use super::measure::COMMAND;
-use crate::cli::child::{self, ChildResult};
+use super::measure::run_child;
+use crate::job::ChildResult;
 use crate::scale::report::Conversion;
 use crate::scale::{CellRequest, Representation, Task};
 
@@ -18,10 +17,10 @@ const DIR: &str = ".scale-frames";
 /// Name of the frame in it.
 const FILE: &str = "particles.spf";
 
-/// A native frame, and how it was made; or why there is none.
+/// A native frame and the measurements of its conversion, or the error message of its process.
 pub(super) type Made = Result<(PathBuf, Conversion), String>;
 
-/// The frame that is there now.
+/// The current frame.
 pub(super) struct Frames {
     dir: PathBuf,
     now: Option<Now>,
@@ -34,14 +33,14 @@ struct Now {
 }
 
 impl Frames {
-    /// Clears away what an earlier run has left in `output`.
+    /// Removes the temporary directory of an earlier run in `output`.
     pub(super) fn in_dir(output: &Path) -> Self {
         let dir = output.join(DIR);
         remove(&dir);
         Self { dir, now: None }
     }
 
-    /// That of the cell of `request`, whose representation has one.
+    /// The frame for `request`, whose representation must have one.
     pub(super) fn of(
         &mut self,
         request: &CellRequest,
@@ -51,7 +50,7 @@ impl Frames {
         let now = match self.now.take() {
             Some(now) if now.key == key => now,
             _ => {
-                // First, so that there is never room for two needed.
+                // Remove the previous frame first, so that there is never more than one on the disk.
                 remove(&self.dir);
                 match self.make(request, interrupt) {
                     ChildResult::Completed(made) => Now { key, made },
@@ -76,8 +75,7 @@ impl Frames {
             request: request.clone(),
             path: path.clone(),
         };
-        let ended: ChildResult<Result<_, String>> =
-            child::run(COMMAND, &task, || interrupt.is_raised());
+        let ended: ChildResult<Result<_, String>> = run_child(&task, || interrupt.is_raised());
         match ended {
             ChildResult::Completed(made) => {
                 ChildResult::Completed(made.map(|conversion| (path, conversion)))
@@ -94,7 +92,7 @@ impl Drop for Frames {
     }
 }
 
-/// Removes `dir` with all that is in it, if it is there.
+/// Removes `dir` and its content, if it exists.
 fn remove(dir: &Path) {
     match fs::remove_dir_all(dir) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => {

@@ -12,7 +12,7 @@ use super::numbers::pixels_to;
 use super::progress::{duration, openjd};
 use super::{CliError, Outcome, events, print, signals};
 use crate::accel::Structure;
-use crate::cli::child::{self, ChildResult};
+use crate::job::ChildResult;
 use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
@@ -24,7 +24,7 @@ use crate::scale::{Budget, CellRequest, Motion, Representation, Task};
 mod experiment;
 mod frames;
 pub(super) mod measure;
-mod words;
+mod values;
 
 use experiment::Experiment;
 use frames::Frames;
@@ -34,32 +34,32 @@ Examples:
   spherule scale -o scale
       The whole experiment: 36 cells of a minute each
   spherule scale --particles 1e5,1e6 --structures lbvh,kdtree --seconds 10
-      Two structures, quickly
+      Two structures, in short
   spherule scale --input run1 --frame 100 --images 20
-      Particles of your own";
+      Your own particles";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct ScaleArgs {
-    /// Particle counts; 1e6 is understood.
+    /// Particle counts, such as 1e6.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1e5,1e6,1e7",
-        value_parser = words::particles, allow_hyphen_values = true, help_heading = "Experiment")]
+        value_parser = values::particles, allow_hyphen_values = true, help_heading = "Experiment")]
     particles: Vec<usize>,
     /// Acceleration structures: lbvh, kdtree, bvh, sbvh [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::structure, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::structure, help_heading = "Experiment")]
     structures: Vec<Structure>,
     /// Camera motions: rotation, translation, both [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::motion, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::motion, help_heading = "Experiment")]
     motions: Vec<Motion>,
-    /// Where positions are: memory, f32, q16, q10 [default: memory]
+    /// Where positions are stored: memory, f32, q16, q10 [default: memory]
     ///
-    /// All but memory are a mapped native frame of that encoding, traced where it lies (kdtree alone).
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::representation, help_heading = "Experiment")]
+    /// All except memory use a memory-mapped native frame of that encoding, traced in place (kdtree only).
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::representation, help_heading = "Experiment")]
     representations: Vec<Representation>,
-    /// Seconds that the images of a cell are traced for [default: 60]
-    #[arg(long, value_parser = words::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
+    /// Tracing time per cell, in seconds [default: 60]
+    #[arg(long, value_parser = values::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
     seconds: Option<f64>,
-    /// Images of a cell, instead of a time.
+    /// Number of images per cell, instead of a time.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_hyphen_values = true, help_heading = "Experiment")]
     images: Option<u32>,
     /// Image width in pixels.
@@ -70,7 +70,7 @@ pub(super) struct ScaleArgs {
     #[arg(long, default_value_t = 1080, allow_hyphen_values = true,
         value_parser = pixels_to(MAX_SIDE), help_heading = "Image")]
     height: u32,
-    /// Reflections and refractions followed; 1 is direct light only.
+    /// Maximum depth of reflections and refractions; 1 is direct light only.
     #[arg(long, visible_alias = "depth", default_value_t = 3, allow_hyphen_values = true,
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_DEPTH)), help_heading = "Image")]
     max_depth: u32,
@@ -78,13 +78,13 @@ pub(super) struct ScaleArgs {
     #[arg(long, default_value_t = 1, allow_hyphen_values = true,
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)), help_heading = "Image")]
     samples: u32,
-    /// Seed of the box, or of the choice among the input's particles.
+    /// Seed of the box, or of the selection of input particles.
     #[arg(long, default_value_t = 1, help_heading = "Input")]
     seed: u64,
-    /// Particles of your own instead of the box: a file, a pattern or a directory.
+    /// Your own particles instead of the box: a file, a pattern or a directory.
     #[arg(long, value_name = "PATH", help_heading = "Input")]
     input: Option<PathBuf>,
-    /// Which frame of the input [default: the first]
+    /// Frame of the input [default: the first]
     #[arg(
         long,
         value_name = "NUMBER",
@@ -102,7 +102,7 @@ pub(super) struct ScaleArgs {
         help_heading = "Output"
     )]
     output: PathBuf,
-    /// Threads to use [default: all]; at most 4 for each processor are used.
+    /// Threads to use [default: all]; at most 4 per processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
     threads: Option<u32>,
     /// How progress is shown.
@@ -111,7 +111,7 @@ pub(super) struct ScaleArgs {
 }
 
 const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
-    stopping: "stopping; what is measured is kept",
+    stopping: "stopping; finished cells are kept",
     stopped: "stopped",
 };
 
@@ -167,15 +167,15 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     })
 }
 
-/// What came of the run as a whole.
+/// How the run ended.
 #[derive(Default)]
 struct EndOfRun {
     interrupted: bool,
-    /// What the last try to write results met.
+    /// The error of the last attempt to write the results.
     unwritten: Option<(PathBuf, io::Error)>,
 }
 
-/// Runs `cells` one after the other and puts what they tell into `report` and the files.
+/// Runs `cells` one after the other, and adds their results to `report` and the files.
 fn measure_all(
     cells: &[CellRequest],
     report: &mut ScaleReport,
@@ -197,8 +197,8 @@ fn measure_all(
         };
         report.cells.push(cell_report(request, outcome));
         progress.show(report);
-        // After every cell: a long run that is killed has not run for nothing. One that finds the
-        // disk full goes on, in the hope of room and for its tables.
+        // Write after every cell, so that a killed run keeps its results. If the disk is full, continue: there may be
+        // space later, and the tables are printed in any case.
         ended.unwritten = files::write(&args.output, report).err();
     }
     ended
@@ -220,7 +220,7 @@ fn measure_one(
             }
             ChildResult::Completed(Ok(frame)) => made = Some(frame),
             ChildResult::Completed(Err(reason)) => {
-                let reason = format!("no native frame: {reason}");
+                let reason = format!("cannot make the native frame: {reason}");
                 return ChildResult::Completed(CellOutcome::Failed { reason });
             }
         }
@@ -230,8 +230,7 @@ fn measure_one(
         file: made.map(|(path, _)| path.clone()),
     };
     let stop = || interrupt.is_raised();
-    let measured: Result<CellMeasurement, String> = match child::run(measure::COMMAND, &task, stop)
-    {
+    let measured: Result<CellMeasurement, String> = match measure::run_child(&task, stop) {
         ChildResult::Interrupted => return ChildResult::Interrupted,
         ChildResult::Completed(measured) => measured,
         ChildResult::Crashed(crash) => Err(crash.to_string()),
@@ -255,17 +254,17 @@ fn cell_report(request: &CellRequest, outcome: CellOutcome) -> CellReport {
     }
 }
 
-/// Sees that results can be written, before hours are spent on them.
+/// Checks that results can be written, before hours are spent on them.
 fn prepare(dir: &Path) -> Result<(), CliError> {
     if let Some(file) = dir.ancestors().find(|p| p.exists() && !p.is_dir()) {
         return Err(CliError::other(format!(
-            "{}: is a file where a directory for the results should be; choose another with -o",
+            "{}: is a file, but a directory for the results is needed; choose another with -o",
             file.display()
         )));
     }
     if let Some(path) = files::foreign(dir) {
         return Err(CliError::other(format!(
-            "{}: is in the way and not of `{MADE_BY}`; move it or choose another directory with -o",
+            "{}: exists and was not written by `{MADE_BY}`; move it or choose another directory with -o",
             path.display()
         )));
     }
@@ -277,7 +276,7 @@ fn prepare(dir: &Path) -> Result<(), CliError> {
     })
 }
 
-/// Prints the result, beside the events if standard output is theirs.
+/// Prints the tables; to standard error if standard output has the events.
 fn show_tables(report: &ScaleReport, mode: ProgressMode) -> Result<(), CliError> {
     let text = table::text(report);
     if mode == ProgressMode::Json {
@@ -288,7 +287,7 @@ fn show_tables(report: &ScaleReport, mode: ProgressMode) -> Result<(), CliError>
     Ok(())
 }
 
-/// Tells one cell after the other.
+/// Reports each finished cell.
 struct Progress {
     mode: ProgressMode,
     total: usize,
@@ -312,7 +311,7 @@ impl Progress {
             event,
             json!({"cell": cell, "done": done, "total": self.total}),
         );
-        let told = match &cell.outcome {
+        let summary = match &cell.outcome {
             CellOutcome::Done(measured) => table::line(measured),
             CellOutcome::Failed { reason } => {
                 message!("error: {name}: {reason}");
@@ -321,16 +320,16 @@ impl Progress {
         };
         match self.mode {
             ProgressMode::Auto | ProgressMode::Plain => message!(
-                "[{done}/{}] {name}: {told}, {} left",
+                "[{done}/{}] {name}: {summary}, {} left",
                 self.total,
                 self.remaining(done)
             ),
-            ProgressMode::Openjd => openjd(done, self.total, &format!("{name}: {told}")),
+            ProgressMode::Openjd => openjd(done, self.total, &format!("{name}: {summary}")),
             ProgressMode::Json | ProgressMode::None => {}
         }
     }
 
-    /// Cells that are still to come are larger, but take their time at least.
+    /// Estimate from the mean so far; a cell takes at least its time budget.
     fn remaining(&self, done: usize) -> String {
         let mean = self.start.elapsed().as_secs_f64() / done.max(1) as f64;
         let each = match self.budget {

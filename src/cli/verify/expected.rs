@@ -2,7 +2,7 @@
 
 use spherule_jobs::Plan;
 
-use crate::cli::job::KIND;
+use crate::job::KIND;
 use crate::output::ImageShape;
 use crate::render::Channels;
 
@@ -32,8 +32,8 @@ impl ExpectedOutput {
     }
 
     fn of_settings(settings: &[(String, String)]) -> Result<Self, InvalidSetting> {
-        let find = |wanted: &str| {
-            let found = settings.iter().find(|(key, _)| key == wanted);
+        let find = |name: &str| {
+            let found = settings.iter().find(|(key, _)| key == name);
             found.map(|(_, value)| value.as_str())
         };
         if find(KIND).is_some() {
@@ -74,14 +74,14 @@ mod tests {
     #[test]
     fn outputs_of_a_render() {
         let mut settings = Manifest::new("data").settings();
-        let wanted = ImageShape {
+        let shape = ImageShape {
             width: 1920,
             height: 1080,
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
         };
         assert_eq!(
             ExpectedOutput::of_settings(&settings),
-            Ok(ExpectedOutput::Images(wanted))
+            Ok(ExpectedOutput::Images(shape))
         );
         for (key, value) in [
             ("image.width", "-3"),

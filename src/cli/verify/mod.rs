@@ -8,12 +8,14 @@ use clap::Args;
 use rayon::prelude::*;
 use spherule_formats::FrameError;
 use spherule_formats::native::{Access, NativeFile};
-use spherule_jobs::{EntryStatus, FrameRange, Job, JobState, LedgerEntry, PLAN_FILE, PlannedFrame};
+use spherule_jobs::{
+    EntryStatus, FrameRange, Job, JobState, LedgerEntry, PLAN_FILE, Panic, PlannedFrame,
+    catch_panic,
+};
 
 use super::job::{job_directory, list, no_job, use_threads};
 use super::print::{self, Reader};
 use super::{CliError, Outcome};
-use crate::failure::{Panic, catch_panic};
 use crate::manifest::MAX_THREADS;
 use crate::output::{ImageFault, verify_exr, verify_preview};
 use expected::ExpectedOutput;
@@ -35,7 +37,7 @@ pub(super) struct VerifyArgs {
     /// those of another length are repeated in any case.
     #[arg(long)]
     requeue_bad: bool,
-    /// Threads to use [default: all]; at most 4 for each processor are used.
+    /// Threads to use [default: all]; at most 4 per processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
     threads: Option<u32>,
 }

@@ -62,8 +62,8 @@ impl FileVerdict {
 /// The frames by verdict.
 pub(super) fn summary(verdicts: &[(i64, Verdict)]) -> Vec<String> {
     let mut lines = Vec::new();
-    for (wanted, _, text) in VERDICTS {
-        let these = verdicts.iter().filter(|(_, verdict)| *verdict == wanted);
+    for (shown, _, text) in VERDICTS {
+        let these = verdicts.iter().filter(|(_, verdict)| *verdict == shown);
         let frames: Vec<i64> = these.map(|(frame, _)| *frame).collect();
         if !frames.is_empty() {
             lines.push(format!("{text:<18} {} ({})", frames.len(), list(&frames)));

@@ -69,7 +69,7 @@ fn it_is_a_schema_of_draft_2020_12() {
 }
 
 #[test]
-fn what_the_program_writes_is_valid() {
+fn written_manifests_are_valid() {
     let plain = Manifest::new("data");
     both_take(&plain.to_commented_toml());
     both_take(EVERYTHING);
@@ -176,13 +176,13 @@ fn comments_defaults_and_examples_are_those_of_init() {
         let property = schema.pointer(&at).expect(&at);
         assert_eq!(property["description"], entry.comment(), "{at}");
         let sample = json_of(entry.sample());
-        let wanted = match (&*entry.key, &entry.value) {
+        let expected = match (&*entry.key, &entry.value) {
             ("input.path", _) => (Value::Null, Value::Null),
             (_, Some(_)) => (sample, Value::Null),
             (_, None) => (Value::Null, json!([sample])),
         };
         let found = (&property["default"], &property["examples"]);
-        assert_eq!(found, (&wanted.0, &wanted.1), "{at}");
+        assert_eq!(found, (&expected.0, &expected.1), "{at}");
     }
     for (pointer, text) in TABLES {
         let about = &schema.pointer(pointer).expect(pointer)["description"];
@@ -216,7 +216,7 @@ fn defaults_of_items_are_the_readers() {
 }
 
 #[test]
-fn what_is_needed_is_needed_by_both() {
+fn required_keys_agree() {
     let path = "input.path = \"data\"\n";
     both_refuse("");
     both_refuse("[input]\nup = \"y\"");
@@ -249,7 +249,7 @@ fn what_is_needed_is_needed_by_both() {
 
 /// All combinations of keys that define the camera.
 #[test]
-fn keys_that_need_one_another() {
+fn key_dependencies_agree() {
     let modes = ["", "auto", "fixed", "turntable", "keys"];
     let has = [false, true];
     for mode in modes {

@@ -3,8 +3,9 @@
 use serde_json::{Value as Json, json};
 use spherule_formats::is_control;
 
+use super::field::Field;
 use super::key::Key;
-use super::reader::Field;
+use super::nearest::nearest;
 
 mod numbers;
 mod text;
@@ -66,6 +67,35 @@ pub(super) trait Value: Sized {
     /// All words that are values.
     fn words() -> Vec<&'static str> {
         Vec::new()
+    }
+}
+
+impl Field<'_> {
+    /// The value; reports a problem and returns None if it is invalid.
+    pub(super) fn value<T: Value>(&self, key: &Key) -> Option<T> {
+        let what = match T::parse(self, key) {
+            Ok(value) => return Some(value),
+            Err(Fault::Noted) => return None,
+            Err(Fault::Because(what)) => what,
+            Err(Fault::Unwanted) => {
+                let text = self.as_text().unwrap_or_default();
+                let hint = nearest(text, &T::words()).map(|n| format!("; did you mean {n}?"));
+                let (expected, hint) = (expected::<T>(key), hint.unwrap_or_default());
+                format!("expected {expected}, found {}{hint}", self.node.describe())
+            }
+        };
+        self.fail(&what);
+        None
+    }
+}
+
+/// Description of the expected value for messages.
+fn expected<T: Value>(key: &Key) -> String {
+    let kind = T::kind(key);
+    match key.word {
+        Some(word @ "all") => format!("\"{word}\" or {kind}"),
+        Some(word) => format!("{kind} or \"{word}\""),
+        None => kind,
     }
 }
 

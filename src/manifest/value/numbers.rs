@@ -6,8 +6,8 @@ use glam::{DVec3, Vec3};
 use serde_json::{Value as Json, json};
 
 use super::{Fault, FlagKind, Value, list};
+use crate::manifest::field::{Field, narrow};
 use crate::manifest::key::Key;
-use crate::manifest::reader::{Field, narrow};
 
 impl Value for u32 {
     const FLAG: FlagKind = FlagKind::Integer;

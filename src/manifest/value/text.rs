@@ -4,8 +4,8 @@ use serde_json::{Value as Json, json};
 use spherule_jobs::FrameRange;
 
 use super::{Fault, FlagKind, Value, list, quoted};
+use crate::manifest::field::Field;
 use crate::manifest::key::Key;
-use crate::manifest::reader::Field;
 use crate::metrics::Bytes;
 
 /// A name is text that is not blank.

@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_give_the_same_differences_as_the_whole_block() {
+    fn line_predictor_equals_block_predictor() {
         let bytes: Vec<u8> = (0..4000_u32)
             .map(|at| (at * at / 7).to_le_bytes()[0])
             .collect();

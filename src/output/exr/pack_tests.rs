@@ -143,15 +143,15 @@ fn check(film: &Film, compression: Compression) {
     if !matches!(compression, Compression::Zip | Compression::Zips) {
         assert!(file == reference, "{compression:?} {size:?}");
     }
-    let wanted: Vec<_> = planes_in_file(film.channels())
+    let expected: Vec<_> = planes_in_file(film.channels())
         .iter()
         .map(|plane| (plane.name.to_owned(), bits(&samples(film, plane.source))))
         .collect();
-    assert!(decoded(&file) == wanted, "{compression:?} {size:?}");
+    assert!(decoded(&file) == expected, "{compression:?} {size:?}");
 }
 
 #[test]
-fn any_film_reads_back_to_the_bit_and_equals_the_file_of_exr() {
+fn films_round_trip_and_match_the_exr_crate() {
     for (width, height) in [(1, 1), (17, 33), (1, 50), (50, 1), (40, 16), (31, 64)] {
         for compression in COMPRESSIONS {
             check(&wild_film(width, height, Channels::ALL), compression);
@@ -172,7 +172,7 @@ fn any_film_reads_back_to_the_bit_and_equals_the_file_of_exr() {
 }
 
 #[test]
-fn wide_rows_read_back() {
+fn wide_rows_round_trip() {
     check(&wild_film(3000, 17, Channels::ALL), Compression::Zip);
     check(&wild_film(40_000, 2, Channels::ALL), Compression::Zip);
 }
@@ -282,7 +282,7 @@ fn the_bytes_are_the_same_on_every_machine() {
 #[test]
 fn the_film_is_returned_without_waiting_for_a_busy_pool() {
     let film = wild_film(40, 200, Channels::ALL);
-    let wanted = encode_exr(&film, &ExrOptions::default()).unwrap().bytes;
+    let expected = encode_exr(&film, &ExrOptions::default()).unwrap().bytes;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2);
     let (file, returned) = pool.build().unwrap().install(|| {
         let (free, busy) = mpsc::channel::<()>();
@@ -297,7 +297,7 @@ fn the_film_is_returned_without_waiting_for_a_busy_pool() {
         drop(free);
         (file.into_inner(), returned)
     });
-    assert!(file == wanted);
+    assert!(file == expected);
     assert_eq!(returned.id, film.id);
 }
 

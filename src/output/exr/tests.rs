@@ -74,7 +74,7 @@ fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encodin
 }
 
 #[test]
-fn reads_back_with_types_and_values() {
+fn round_trips_with_types_and_values() {
     let film = film(37, 21, Channels::ALL);
     for compression in COMPRESSIONS {
         let options = ExrOptions {
@@ -85,11 +85,11 @@ fn reads_back_with_types_and_values() {
         assert_eq!(encoded.clamped, 0);
         let (channels, attributes, encoding) = decode(&encoded.bytes);
         let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
-        let wanted = [
+        let expected = [
             "A", "B", "G", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "R", "V.X", "V.Y", "V.Z", "Z",
             "albedo.B", "albedo.G", "albedo.R", "id.I",
         ];
-        assert_eq!(names, wanted);
+        assert_eq!(names, expected);
         for (name, samples) in &channels {
             check_channel(&film, name, samples);
         }
@@ -107,7 +107,7 @@ fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
         let plane = plane.as_ref().unwrap();
         FlatSamples::F32(plane.iter().map(|v| v[a]).collect())
     };
-    let wanted = match name {
+    let expected = match name {
         "R" => FlatSamples::F16(color(0)),
         "G" => FlatSamples::F16(color(1)),
         "B" => FlatSamples::F16(color(2)),
@@ -128,7 +128,7 @@ fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
         "albedo.B" => axis(&film.albedo, 2),
         _ => panic!("unexpected channel {name}"),
     };
-    assert_eq!(*samples, wanted, "{name}");
+    assert_eq!(*samples, expected, "{name}");
 }
 
 #[track_caller]
@@ -216,7 +216,7 @@ fn texts_may_be_empty_long_or_not_ascii() {
 }
 
 #[test]
-fn attributes_that_do_not_fit_are_refused() {
+fn oversized_attributes_are_rejected() {
     let film = film(1, 1, Channels::COLOR);
     let with = |name: &str, json: &str| ExrOptions {
         custom: Some(CustomAttribute {

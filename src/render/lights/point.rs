@@ -74,7 +74,7 @@ mod tests {
     use crate::math::{lane3, splat, splat3};
 
     #[test]
-    fn a_point_light_keeps_or_loses_strength() {
+    fn point_light_falloff() {
         let sample = |falloff, start| {
             let light = PointLight {
                 position: Vec3::new(1.0, 0.0, 4.0),

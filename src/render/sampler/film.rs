@@ -55,7 +55,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn pixels_take_whole_sets_and_many_of_them() {
+    fn pixels_use_complete_sample_sets() {
         for samples in [1, 3, 16, 4096] {
             let sampler = FilmSampler::new(samples);
             let mut sets = HashSet::new();

@@ -153,10 +153,10 @@ mod tests {
         for side in [2, 4, 8] {
             let cells = points(side * side, 3);
             let cell = |p: &Vec2| (stratum(p.x, side), stratum(p.y, side));
-            let mut seen: Vec<_> = cells.iter().map(cell).collect();
-            seen.sort_unstable();
-            seen.dedup();
-            assert_eq!(seen.len(), cells.len());
+            let mut occupied: Vec<_> = cells.iter().map(cell).collect();
+            occupied.sort_unstable();
+            occupied.dedup();
+            assert_eq!(occupied.len(), cells.len());
         }
     }
 

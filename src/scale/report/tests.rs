@@ -74,7 +74,7 @@ fn report() -> ScaleReport {
 }
 
 #[test]
-fn spread_is_the_samples() {
+fn spread_uses_the_sample_standard_deviation() {
     let spread = Spread::of(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]);
     // The sum of squared deviations is 32, of 8 samples.
     assert_eq!(spread.sd, Some((32.0_f64 / 7.0).sqrt()));
@@ -87,7 +87,7 @@ fn spread_is_the_samples() {
 }
 
 #[test]
-fn tables_are_laid_out_like_the_thesis_s() {
+fn tables_have_the_layout_of_the_thesis() {
     let text = table::text(&report());
     let lines: Vec<&str> = text.lines().collect();
     let after = |heading: &str| {
@@ -110,7 +110,7 @@ fn tables_are_laid_out_like_the_thesis_s() {
     assert_eq!(after("Build time")[1], "       1000   0.500");
     assert_eq!(after("Build time")[2], "   10000000   9.000");
     assert_eq!(after("Peak memory")[1], "       1000    120.0");
-    assert_eq!(after("Bytes a particle")[1], "       1000   12.60");
+    assert_eq!(after("Bytes per particle")[1], "       1000   12.60");
     assert!(text.contains("failed: 10000000 particles, lbvh in memory, both: out of memory"));
     assert!(text.contains("interrupted: 1 of 6 cells were not measured"));
 }
@@ -154,7 +154,7 @@ fn report_in_place() -> ScaleReport {
 }
 
 #[test]
-fn memory_by_part_tells_the_file_from_memory() {
+fn memory_by_part_separates_mapped_from_anonymous() {
     let report = report_in_place();
     let titles: Vec<String> = report.columns().into_iter().map(|c| c.title).collect();
     // Other structures cannot be traced in place.
@@ -173,7 +173,7 @@ fn memory_by_part_tells_the_file_from_memory() {
     );
     // That count has no measurements.
     assert!(row("kdtree")[2..].iter().all(|cell| cell == MISSING));
-    assert_eq!(row("the thesis, about")[5], "350");
+    assert_eq!(row("thesis (about)")[5], "350");
     assert!(rows.iter().all(|row| row.len() == parts::HEADS.len()));
     assert_eq!(
         parts::conversions(&report),
@@ -195,7 +195,7 @@ fn memory_by_part_tells_the_file_from_memory() {
 }
 
 #[test]
-fn a_figure_that_there_cannot_be_is_no_failure() {
+fn undefined_values_are_not_failures() {
     let mut report = report();
     report.settings.particles = vec![0];
     let CellOutcome::Done(measured) = &mut report.cells[0].outcome else {
@@ -205,19 +205,19 @@ fn a_figure_that_there_cannot_be_is_no_failure() {
     report.cells.truncate(1);
     report.cells[0].particles = 0;
     let text = table::text(&report);
-    let (_, bytes) = text.split_once("Bytes a particle").unwrap();
+    let (_, bytes) = text.split_once("Bytes per particle").unwrap();
     assert!(!bytes.contains("failed"), "{text}");
     // A row with failures only is marked as failed.
     report.cells[0].outcome = CellOutcome::Failed {
         reason: "it was late".to_owned(),
     };
     let text = table::text(&report);
-    let (_, bytes) = text.split_once("Bytes a particle").unwrap();
+    let (_, bytes) = text.split_once("Bytes per particle").unwrap();
     assert!(bytes.contains("failed"), "{text}");
 }
 
 #[test]
-fn json_comes_back() {
+fn json_round_trips() {
     let report = report_in_place();
     let json = serde_json::json!(report);
     assert_eq!(json["made_by"], MADE_BY);
@@ -229,7 +229,7 @@ fn json_comes_back() {
 }
 
 #[test]
-fn csv_has_a_row_a_cell_and_quotes() {
+fn csv_has_one_row_per_cell_and_quotes_text() {
     let text = csv::text(&report());
     let columns = csv::header().split(',').count();
     let rows: Vec<&str> = text.lines().collect();
@@ -244,7 +244,7 @@ fn csv_has_a_row_a_cell_and_quotes() {
 }
 
 #[test]
-fn the_page_has_everything_beside_the_thesis() {
+fn page_compares_all_measurements_with_the_thesis() {
     let html = page::html(&report());
     for id in [
         "plot-build",
@@ -277,7 +277,7 @@ fn the_page_has_everything_beside_the_thesis() {
 }
 
 #[test]
-fn our_own_files_are_told_from_others() {
+fn own_files_are_distinguished_from_others() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     assert_eq!(files::foreign(dir), None);

@@ -10,7 +10,7 @@ fn one_frame() -> Workshop {
 }
 
 #[test]
-fn typing_errors_get_the_nearest_word() {
+fn misspelled_values_have_suggestions() {
     let workshop = one_frame();
     refused(
         &workshop,
@@ -58,15 +58,18 @@ fn typing_errors_get_the_nearest_word() {
     not_rendered(
         &workshop,
         &["--look", "watr"],
-        &["unknown look `watr`", "did you mean water?"],
+        &[
+            "--look: expected one of water, found \"watr\"",
+            "did you mean water?",
+        ],
     );
     refused(&workshop, &["render"], &["<INPUT>"]);
 }
 
 #[test]
-fn surfaces_that_make_no_sense_are_refused() {
+fn contradictory_surface_options_are_rejected() {
     let workshop = one_frame();
-    for (options, wanted) in [
+    for (options, expected) in [
         (
             ["--exact-surface", "--surface=union"],
             "surface.exact: is for the smooth surface alone",
@@ -80,14 +83,14 @@ fn surfaces_that_make_no_sense_are_refused() {
             "--smoothing: surface.smoothing: expected a number from 0 to 1",
         ),
     ] {
-        not_rendered(&workshop, &options, &[wanted]);
+        not_rendered(&workshop, &options, &[expected]);
     }
 }
 
 #[test]
 fn numbers_have_ranges() {
     let workshop = one_frame();
-    for (options, wanted) in [
+    for (options, expected) in [
         (
             ["--width", "-5"],
             "--width: image.width: expected a whole number from 1 to 65536, found -5",
@@ -171,10 +174,10 @@ fn numbers_have_ranges() {
         ),
         (
             ["--width", "4k"],
-            "invalid value '4k' for '--width <WIDTH>': expected a number of pixels, such as --width 3840",
+            "invalid value '4k' for '--width <WIDTH>': expected a number of pixels, such as 3840",
         ),
         (["--samples", "many"], "expected a whole number, such as 16"),
-        (["--idle", "1h"], "expected seconds as a number"),
+        (["--idle", "1h"], "expected a number of seconds"),
         (
             ["--threads", "2000"],
             "--threads: job.threads: expected \"all\" or a whole number from 1 to 1024, found 2000",
@@ -183,12 +186,12 @@ fn numbers_have_ranges() {
         (["--threads", "many"], "--threads"),
         (["--up", "w"], "--up: input.up: expected one of x, y, z"),
     ] {
-        not_rendered(&workshop, &options, &[wanted]);
+        not_rendered(&workshop, &options, &[expected]);
     }
 }
 
 #[test]
-fn all_that_is_wrong_is_told_at_once() {
+fn all_invalid_options_are_reported_at_once() {
     let workshop = one_frame();
     not_rendered(
         &workshop,
@@ -209,15 +212,15 @@ fn all_that_is_wrong_is_told_at_once() {
 }
 
 #[test]
-fn cameras_that_see_nothing() {
+fn invalid_cameras() {
     let workshop = one_frame();
-    let camera = |eye: &str, look_at: &str, up: &str, wanted: &str| {
+    let camera = |eye: &str, look_at: &str, up: &str, expected: &str| {
         let set = [eye, look_at, up].map(|s| format!("camera.{s}"));
         let mut options = Vec::new();
         for set in &set {
             options.extend(["--set", set]);
         }
-        not_rendered(&workshop, &options, &[wanted]);
+        not_rendered(&workshop, &options, &[expected]);
     };
     camera(
         "eye=[1,2,3]",
@@ -252,7 +255,7 @@ fn cameras_that_see_nothing() {
 fn frame_ranges() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=3);
-    for (range, wanted) in [
+    for (range, expected) in [
         (
             "900",
             "input.frames: 900 contains none of the frames of the input: 1-3",
@@ -265,24 +268,24 @@ fn frame_ranges() {
         ("one", "`one`: character 1"),
         ("1-3x0", "`1-3x0`"),
     ] {
-        not_rendered(&workshop, &["--frames", range], &[wanted]);
+        not_rendered(&workshop, &["--frames", range], &[expected]);
     }
 }
 
 #[test]
-fn colours_by_what_is_not_there() {
+fn missing_colour_attribute() {
     let workshop = one_frame();
     not_rendered(
         &workshop,
         &["--color-by", "nosuch"],
         &[
-            "material.color.attribute: no attribute `nosuch` in any frame looked at; there are `density`, `id`, `velocity`",
+            "material.color.attribute: no attribute `nosuch` in the sampled frames; available: `density`, `id`, `velocity`",
         ],
     );
     not_rendered(
         &workshop,
         &["--set", "input.radius={ attribute = \"size\" }"],
-        &["input.radius: no attribute `size` in any frame looked at; there are `density`"],
+        &["input.radius: no attribute `size` in the sampled frames; available: `density`"],
     );
     let plain = "input.path = \"in\"\nmaterial.color = [1, 0, 0]\n";
     std::fs::write(workshop.join("plain.toml"), plain).expect("a file");
@@ -299,7 +302,7 @@ fn colours_by_what_is_not_there() {
 }
 
 #[test]
-fn a_map_goes_with_the_colour_that_is_there() {
+fn map_applies_to_the_existing_colour() {
     let workshop = one_frame();
     let kept = |key: &str| {
         let text = std::fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
@@ -310,7 +313,7 @@ fn a_map_goes_with_the_colour_that_is_there() {
     workshop
         .render(&["--map", "turbo"])
         .expect(0)
-        .tells("colour by `velocity`");
+        .prints("colour by `velocity`");
     assert!(kept("color = ").starts_with("color = { map = \"turbo\" }"));
     let plain = workshop.render_to("plain", &[]).expect(0);
     drop(plain);
@@ -348,14 +351,14 @@ fn a_map_goes_with_the_colour_that_is_there() {
     refused(
         &workshop,
         &bare,
-        &["material.color: no attribute `velocity` in any frame looked at"],
+        &["material.color: no attribute `velocity` in the sampled frames"],
     );
 }
 
 #[test]
 fn patterns_and_ranges_of_any_size() {
     let workshop = one_frame();
-    for (pattern, wanted) in [
+    for (pattern, expected) in [
         (
             "#".repeat(70_000),
             "more than 32 digits for the frame number",
@@ -367,7 +370,7 @@ fn patterns_and_ranges_of_any_size() {
         ),
     ] {
         let output = format!("out/f.{pattern}.exr");
-        refused(&workshop, &["render", "in", "-o", &output], &[wanted]);
+        refused(&workshop, &["render", "in", "-o", &output], &[expected]);
     }
     for pattern in [
         "#".repeat(70_000),
@@ -381,12 +384,12 @@ fn patterns_and_ranges_of_any_size() {
             &["no file name fits this pattern"],
         );
     }
-    for (range, wanted) in [
+    for (range, expected) in [
         ("1-99999999999999999999", "does not fit in 64 bits"),
         ("1-10x99999999999999999999", "does not fit in 64 bits"),
         ("0-9000000000000000000x7", "contains none of the frames"),
     ] {
-        not_rendered(&workshop, &["--frames", range], &[wanted]);
+        not_rendered(&workshop, &["--frames", range], &[expected]);
     }
 }
 
@@ -425,12 +428,12 @@ fn frame_numbers_at_both_ends() {
 }
 
 #[test]
-fn threads_are_as_many_as_are_of_use() {
+fn thread_count_is_limited() {
     let workshop = one_frame();
     workshop
         .render(&["--threads", "1000"])
         .expect(0)
-        .tells("note: --threads 1000: ");
+        .prints("note: --threads 1000: ");
     for command in [
         &["verify", "out"][..],
         &["convert", "in", "-o", "native"],
@@ -438,12 +441,12 @@ fn threads_are_as_many_as_are_of_use() {
     ] {
         let arguments = [command, &["--threads", "2000"]].concat();
         let ran = workshop.run(&arguments).expect(2);
-        ran.tells("2000 is not in 1..=1024");
+        ran.prints("2000 is not in 1..=1024");
     }
 }
 
 #[test]
-fn a_manifest_that_is_not_there_gets_the_help_of_a_directory() {
+fn missing_manifest_lists_the_directory() {
     let workshop = one_frame();
     std::fs::write(workshop.join("dam.toml"), "input.path = \"in\"\n").expect("a file");
     for arguments in [
@@ -463,14 +466,14 @@ fn a_manifest_that_is_not_there_gets_the_help_of_a_directory() {
 #[test]
 fn conversions_write_directories() {
     let workshop = one_frame();
-    for (output, wanted) in [
+    for (output, expected) in [
         (
             "x.vtk",
             "x.vtk: has the extension of another format: convert writes only native frames (.spf)",
         ),
         ("x.csv.gz", "give a directory, as in -o x"),
     ] {
-        refused(&workshop, &["convert", "in", "-o", output], &[wanted]);
+        refused(&workshop, &["convert", "in", "-o", output], &[expected]);
         assert!(!workshop.join(output).exists());
     }
     workshop.run(&["convert", "in", "-o", "v1.2"]).expect(0);

@@ -6,11 +6,11 @@ use super::refused;
 use crate::harness::{Workshop, dam_break};
 
 #[track_caller]
-fn wrong(text: &str, wanted: &[&str]) {
+fn wrong(text: &str, expected: &[&str]) {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     fs::write(workshop.join("my.toml"), text).expect("a file");
-    refused(&workshop, &["render", "my.toml"], wanted);
+    refused(&workshop, &["render", "my.toml"], expected);
     let left = fs::read_dir(workshop.path())
         .expect("the directory")
         .count();
@@ -61,7 +61,7 @@ fn wrong_types_have_line_and_column() {
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_keys_are_named() {
     wrong(
         "",
         &[
@@ -81,7 +81,7 @@ fn what_is_missing_is_named() {
 }
 
 #[test]
-fn what_is_no_toml_has_a_place() {
+fn toml_errors_have_a_location() {
     wrong("[input]\npath = [\n", &["my.toml: line 2, column "]);
     wrong(
         "[input]\npath = \"a\"\npath = \"b\"\n",
@@ -125,7 +125,7 @@ fn keys_of_the_camera_have_line_and_column() {
 }
 
 #[test]
-fn a_manifest_that_is_no_text_or_no_file() {
+fn manifest_that_is_not_text_or_not_a_file() {
     let workshop = Workshop::new();
     fs::write(workshop.join("bytes.toml"), [0xff, 0xfe, 0, 9]).expect("a file");
     refused(

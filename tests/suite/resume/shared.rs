@@ -28,9 +28,9 @@ fn workers_started_at_once_make_each_frame_once() {
     let workshop = with_whole();
     let team: Vec<_> = (0..4).map(|_| workshop.start(&arguments(&[]))).collect();
     for running in team {
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(0), "{told}");
-        assert!(told.contains("12 of 12 frames done"), "{told}");
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{messages}");
+        assert!(messages.contains("12 of 12 frames done"), "{messages}");
     }
     let out = workshop.join("out");
     no_leftovers(&out);
@@ -63,7 +63,7 @@ fn parts_are_disjoint_and_together_everything() {
     workshop
         .run(&arguments(&["--shard", "6/5"]))
         .expect(2)
-        .tells("from 1 to the number of parts");
+        .prints("from 1 to the number of parts");
 }
 
 #[test]
@@ -94,7 +94,7 @@ fn frames_of_an_unresponsive_worker_are_taken_over() {
     let ran = workshop
         .run(&arguments(&["--takeover-after", "1"]))
         .expect(0)
-        .tells("waiting for frame 2: process 7 on far is working on it");
+        .prints("waiting for frame 2: process 7 on far is working on it");
     assert_eq!(ran.rendered().last(), Some(&2));
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
     // Its temporary files are removed too
@@ -111,11 +111,11 @@ fn a_worker_that_was_declared_dead_stops_and_may_rejoin() {
     let mut running = workshop.start(&arguments);
     assert!(running.wait_for_line("] frame 1:"));
     fs::remove_dir_all(workshop.join("slow/job.work")).expect("a directory");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(75), "{told}");
+    let (messages, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{messages}");
     assert!(
-        told.contains("its frames were reassigned; the same command rejoins"),
-        "{told}"
+        messages.contains("its frames were reassigned; the same command rejoins"),
+        "{messages}"
     );
     assert!(!ledger(&workshop.join("slow")).lines.is_empty());
 }

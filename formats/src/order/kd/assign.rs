@@ -301,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bracket_without_its_median_is_given_up() {
+    fn bracket_without_the_median_is_discarded() {
         let points = points();
         let expected = cells(&assign(&points, CutPlan::from_sample(&points)));
         let mut plan = CutPlan::from_sample(&points);

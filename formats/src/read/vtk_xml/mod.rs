@@ -296,7 +296,7 @@ fn values(
     let (bytes, used) = payload(source, encoding, need).map_err(|why| match why {
         ArrayFault::Damaged(what) => fault(at, what),
         ArrayFault::TooLarge(error) => {
-            error.retold(|what| format!("array `{}`: {what}", short(&array.name)))
+            error.map_message(|what| format!("array `{}`: {what}", short(&array.name)))
         }
     })?;
     let is_appended = matches!(array.place, ArrayLocation::Appended(_));

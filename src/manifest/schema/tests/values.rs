@@ -181,7 +181,7 @@ fn is_whole_float(value: &toml::Value) -> bool {
 }
 
 #[test]
-fn both_take_and_refuse_the_same_values() {
+fn schema_and_reader_accept_the_same_values() {
     let (schema, validator) = (job_schema(), validator());
     let mut values: BTreeSet<String> = VALUES
         .iter()
@@ -199,9 +199,9 @@ fn both_take_and_refuse_the_same_values() {
             let valid = validator.is_valid(&serde_json::to_value(&table).unwrap());
             taken += usize::from(valid);
             if valid != read.is_ok() && !(valid && is_whole_float(&value)) {
-                let told =
+                let verdict =
                     read.map_or_else(|e| e.to_string(), |_| "the schema refuses it".to_owned());
-                differ.push(format!("{key} = {text}: {told}"));
+                differ.push(format!("{key} = {text}: {verdict}"));
             }
         }
         if taken == 0 {
@@ -213,7 +213,7 @@ fn both_take_and_refuse_the_same_values() {
 
 /// Checks that the list of differences is up to date.
 #[test]
-fn what_only_the_reader_knows() {
+fn checks_of_the_reader_alone() {
     for (key, value) in BEYOND {
         let table = with(key, &toml::Value::from(value));
         assert!(validator().is_valid(&serde_json::to_value(&table).unwrap()));

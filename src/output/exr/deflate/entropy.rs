@@ -137,10 +137,10 @@ mod tests {
     #[test]
     fn logarithms_are_accurate() {
         for count in (1..5000).chain([65_535, 65_536, 1 << 24, u32::MAX - 1]) {
-            let wanted = f64::from(count) * f64::from(count).log2();
+            let expected = f64::from(count) * f64::from(count).log2();
             let found = count_log_count(count) as f64 / f64::from(1 << FRACTION);
             assert!(
-                (found - wanted).abs() <= 0.0015 * f64::from(count),
+                (found - expected).abs() <= 0.0015 * f64::from(count),
                 "{count}"
             );
         }

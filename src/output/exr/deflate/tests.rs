@@ -67,7 +67,7 @@ fn length(data: &[u8], ends: &[usize]) -> usize {
 }
 
 #[test]
-fn runs_of_every_length_and_distance_read_back() {
+fn runs_of_every_length_and_distance_round_trip() {
     let mut data: Vec<u8> = noise(1).take(5).collect();
     for length in (0..40)
         .chain(250..300)
@@ -89,7 +89,7 @@ fn runs_of_every_length_and_distance_read_back() {
 }
 
 #[test]
-fn few_and_equal_bytes_read_back() {
+fn few_and_equal_bytes_round_trip() {
     for length in 0..20 {
         check(&vec![128; length], &[]);
         check(&vec![0; length], &[length / 2]);
@@ -126,7 +126,7 @@ fn noise_next_to_runs_is_stored_in_several_blocks() {
 
 /// Counts that are Fibonacci numbers give the deepest codes.
 #[test]
-fn the_longest_codes_read_back() {
+fn longest_codes_round_trip() {
     let mut data = Vec::new();
     let (mut count, mut next) = (1, 1);
     for byte in 0..26_u8 {
@@ -251,7 +251,7 @@ fn every_distance_has_its_symbol() {
 proptest! {
     /// Runs of any bytes and lengths with noise between them, divided anywhere into pieces.
     #[test]
-    fn any_data_reads_back(
+    fn any_data_round_trip(
         parts in prop::collection::vec((any::<[u8; 2]>(), 0..700_usize, 0..9_usize), 1..60),
         cuts in prop::collection::vec(any::<prop::sample::Index>(), 0..40),
     ) {

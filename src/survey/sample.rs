@@ -9,18 +9,18 @@ use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParseError, RawParticles};
 
 use super::packing::{self, Spacing};
-use super::robust::{NEIGHBOUR_QUERIES, middle};
+use super::robust::{NEIGHBOUR_QUERIES, median};
 use super::stream;
 use super::{FrameWeight, RadiusQuestion, id_of, velocity_of};
 
 /// Number of particles to sample in a native frame; smaller frames are read completely.
-const MOST: usize = 1 << 17;
+const MAX_SAMPLE: usize = 1 << 17;
 
 /// Particle count above which a binary file of another format is sampled and not read into memory.
 const LARGE: u64 = 1 << 20;
 
 /// A sample of a frame.
-pub(super) struct Look {
+pub(super) struct FrameSample {
     /// The particles, or an even selection of them.
     pub(super) particles: RawParticles,
     /// Particle count of the frame.
@@ -34,34 +34,34 @@ pub(super) struct Look {
     pub(super) weight: FrameWeight,
 }
 
-impl Look {
-    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if `asked`
+impl FrameSample {
+    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if `question`
     /// requires it.
-    pub(super) fn at(
+    pub(super) fn of(
         sequence: &Sequence,
         index: usize,
-        asked: RadiusQuestion,
+        question: RadiusQuestion,
     ) -> Result<Self, FrameError> {
         match sequence.native_file(index) {
             Some(path) => {
                 let file = NativeFile::open(path, Access::Map)?;
-                let look =
-                    Self::at_native(&file, asked.is_packed()).map_err(|e| e.in_file(path))?;
+                let sample =
+                    Self::of_native(&file, question.is_packed()).map_err(|e| e.in_file(path))?;
                 file.check()?;
-                Ok(look)
+                Ok(sample)
             }
-            None => match Self::at_large(sequence, index, asked)? {
-                Some(look) => Ok(look),
-                None => Self::at_files(sequence, index),
+            None => match Self::of_large(sequence, index, question)? {
+                Some(sample) => Ok(sample),
+                None => Self::of_files(sequence, index),
             },
         }
     }
 
     /// Samples a binary file of many particles; None for other files.
-    fn at_large(
+    fn of_large(
         sequence: &Sequence,
         index: usize,
-        asked: RadiusQuestion,
+        question: RadiusQuestion,
     ) -> Result<Option<Self>, FrameError> {
         let Some(path) = sequence.lone_file(index) else {
             return Ok(None);
@@ -70,11 +70,11 @@ impl Look {
             return Ok(None);
         };
         // Read a sample, and stream over all particles for spacing and extremes
-        let particles = stream::sample(&*source, path, MOST)?;
+        let particles = stream::sample(&*source, path, MAX_SAMPLE)?;
         let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
         let has_radii = source.attributes().iter().any(is_radius);
-        let spacing = match asked.is_auto() && !has_radii {
-            true => stream::spacing(&*source, &particles.positions, asked.is_packed())?,
+        let spacing = match question.is_auto() && !has_radii {
+            true => stream::spacing(&*source, &particles.positions, question.is_packed())?,
             false => None,
         };
         let extremes = stream::extremes(&*source)?;
@@ -108,7 +108,7 @@ impl Look {
         }))
     }
 
-    fn at_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
+    fn of_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
         let loaded = sequence.load_measured(index)?;
         let raw = &loaded.particles;
         let weight = FrameWeight {
@@ -134,20 +134,20 @@ impl Look {
         })
     }
 
-    fn at_native(file: &NativeFile, how_packed: bool) -> Result<Self, ParseError> {
+    fn of_native(file: &NativeFile, needs_packed: bool) -> Result<Self, ParseError> {
         let frame = file.frame_unchecked();
         let index = file.index();
         let too_many = |_| ParseError::unsupported("more particles than this machine can count");
         let count = usize::try_from(index.count).map_err(too_many)?;
-        let is_part = count > MOST;
+        let is_part = count > MAX_SAMPLE;
         if !is_part {
             // Small frames are verified completely: it takes little time, and damage might not show in percentiles.
             frame.verify()?;
         }
         frame.verify_nodes()?;
-        let particles = frame.sample(MOST)?;
+        let particles = frame.sample(MAX_SAMPLE)?;
         let spacing = match index.radius {
-            RadiusIndex::None if is_part => stored_spacing(&frame, how_packed)?,
+            RadiusIndex::None if is_part => stored_spacing(&frame, needs_packed)?,
             _ => None,
         };
         let origin = DVec3::from_array(index.origin);
@@ -166,13 +166,13 @@ impl Look {
 /// The spacing of neighbours in a native frame.
 fn stored_spacing(
     frame: &NativeFrame<'_>,
-    how_packed: bool,
+    needs_packed: bool,
 ) -> Result<Option<Spacing>, ParseError> {
-    let nearest = middle(frame.neighbour_distances(NEIGHBOUR_QUERIES)?);
+    let nearest = median(frame.neighbour_distances(NEIGHBOUR_QUERIES)?);
     let Some(touching) = nearest.map(|d| 0.5 * d) else {
         return Ok(None);
     };
-    let packed = match how_packed {
+    let packed = match needs_packed {
         true => {
             let counts = frame.neighbour_counts(NEIGHBOUR_QUERIES, packing::reach(touching))?;
             packing::packed_radius(touching, counts)

@@ -1,17 +1,20 @@
-//! Failures that are not errors of the data: panics.
+//! Panics as errors of a single frame.
 
 use std::panic::{self, AssertUnwindSafe};
 
-/// A panic in the work of one frame. It is a bug in spherule and fails this frame only.
+/// The work on a frame has panicked. This is a bug; it fails this frame only.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
-#[error("a bug in spherule, please report it: {message}")]
+#[error("internal error, please report it: {message}")]
 pub struct Panic {
     /// The message of the panic.
     pub message: String,
 }
 
-/// Runs the work of one frame, and returns a panic in it as an error.
-pub(crate) fn catch_panic<T, E: From<Panic>>(work: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
+/// Runs the work on a frame, and returns a panic in it as an error.
+///
+/// # Errors
+/// Those of `work`, and [`Panic`].
+pub fn catch_panic<T, E: From<Panic>>(work: impl FnOnce() -> Result<T, E>) -> Result<T, E> {
     panic::catch_unwind(AssertUnwindSafe(work)).unwrap_or_else(|payload| {
         let message = payload
             .downcast_ref::<String>()
