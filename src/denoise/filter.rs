@@ -81,6 +81,9 @@ impl<'a> TileFilter<'a> {
                 if y >= -dy - patch {
                     self.compare(place, number, y);
                 }
+            }
+            for number in 0..self.offsets.len() {
+                let (dy, _) = self.offsets[number];
                 if y - patch >= -dy && y - patch < height {
                     self.add(number, y - patch, height);
                 }
@@ -150,7 +153,7 @@ impl<'a> TileFilter<'a> {
             color: 1.0 / (k * side * side),
             own: self.settings.own,
             offset: [dx.unsigned_abs() as f32, dy as f32],
-            depth: 0.5 * DEPTH_TOLERANCE,
+            depth: DEPTH_TOLERANCE,
         }
     }
 

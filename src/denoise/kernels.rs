@@ -59,12 +59,6 @@ fn squared_distance(p: &Pixels, q: &Pixels, plane: usize, lane: usize) -> f32 {
     x * x + y * y + z * z
 }
 
-/// The sum of the values of `p` and `q` in `plane`, in `lane`.
-#[inline(always)]
-fn sum(p: &Pixels, q: &Pixels, plane: usize, lane: usize) -> f32 {
-    p[plane * STRIDE + lane] + q[plane * STRIDE + lane]
-}
-
 /// Compares the colours of `count` pixels `p` with `q` in both halves, relative to their noise. `sums` has a plane for
 /// each half, with the sums of the results over `N` neighbours along the row for `sum_count` pixels. The buffers hold
 /// the results.
@@ -138,6 +132,15 @@ pub(super) struct WeightScale {
     pub(super) depth: f32,
 }
 
+/// The difference of depth that the slopes of a pixel explain.
+#[inline(always)]
+fn tolerance(pixel: &Pixels, scale: &WeightScale, lane: usize) -> f32 {
+    let [columns, rows] = scale.offset;
+    pixel[SLOPE_X * STRIDE + lane] * columns
+        + pixel[SLOPE_Y * STRIDE + lane] * rows
+        + pixel[DEPTH * STRIDE + lane] * scale.depth
+}
+
 /// Computes the weights of `count` pairs of pixels `p`, `q`, and moves their colours towards each other: adds the
 /// weighted differences and the weights to the sums of both pixels. The even half has the weights of the odd one, and
 /// conversely. `distances` has the colour distances along the `N` rows of the patch: two planes for each.
@@ -151,12 +154,7 @@ fn pairs_body<const N: usize, const D: usize>(
     p_sums: &mut [f32],
     q_sums: &mut [f32],
 ) {
-    let WeightScale {
-        color,
-        own,
-        offset: [columns, rows],
-        depth,
-    } = *scale;
+    let WeightScale { color, own, .. } = *scale;
     for x in (0..count).step_by(LANES) {
         let (p, q): (&Pixels, &Pixels) = (window(p, x), window(q, x));
         let distances: &[f32; D] = window(distances, x);
@@ -167,9 +165,7 @@ fn pairs_body<const N: usize, const D: usize>(
             // Compare features
             let albedo = squared_distance(p, q, ALBEDO, l);
             let normal = squared_distance(p, q, NORMAL, l);
-            let tolerance = sum(p, q, SLOPE_X, l) * columns
-                + sum(p, q, SLOPE_Y, l) * rows
-                + sum(p, q, DEPTH, l) * depth;
+            let tolerance = smaller(tolerance(p, scale, l), tolerance(q, scale, l));
             let z = (p[DEPTH * STRIDE + l] - q[DEPTH * STRIDE + l]) / tolerance;
             let feature = larger(larger(albedo, normal), z * z);
             // Sum the colour distances over the patch

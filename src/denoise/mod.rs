@@ -1,4 +1,29 @@
-//! Removes noise from rendered pictures.
+//! Removes the noise of rendered pictures: dual-buffer non-local means with features.
+//!
+//! After F. Rousselle, C. Knaus and M. Zwicker, "Adaptive rendering with non-local means filtering" (2012), section
+//! 4, with the features of their "Robust denoising using feature and color information" (2013). A pixel `p` is
+//! replaced by a weighted mean of the pixels `q` of a search window. The samples are in two halves, even and odd, and
+//! the weights of one half come from the other one, so that they do not depend on the noise that they average:
+//!
+//! - Colours are divided by albedo, so that textures stay sharp.
+//! - The noise `v(p)` of a half is half the squared difference of the two halves, averaged over 3x3 pixels.
+//! - Two pixels of a half differ by `(|p - q|^2 - 2 min(v(p), v(q))) / (v(p) + v(q))`, two patches by the mean `d` over
+//!   their pixels, divided by `k^2`.
+//! - The feature distance `f` is the largest of the squared distances of albedo, normal and depth, each relative to its
+//!   tolerance. Depth may differ as its slopes explain, so a plane that the camera sees at an angle is one surface.
+//! - The weight is `(1 - x/8)^8`, close to `exp(-x)`, of the larger of `d` and `f`: the lesser of two weights.
+//!
+//! Two things differ from the paper. Its variance term is `v(p) + min(v(p), v(q))`; the one above is symmetric, so that
+//! a pair of pixels is compared once for both. It also blurs less: on path-traced pictures of a dam break the error
+//! fell by a few percent, on those of water by a fifth. And `d` is that of the other half, but at least
+//! [`DenoiseSettings::own`] times that of the half itself. Otherwise a bright sample that the other half does not
+//! have is spread over the window, as sparkles of water are.
+//!
+//! The result is the colour of the input plus the filtered change, so pixels without a similar neighbour keep their
+//! bits. Pixels with NaN or infinite values keep theirs, and no other pixel receives them.
+//!
+//! Tiles with their border are copied to planes that stay in the cache ([`tile`]), and are filtered row by row
+//! ([`filter`]). The result does not depend on threads, tiles or the instruction set.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,58 +37,204 @@ mod kernels;
 mod settings;
 mod tile;
 
-pub use settings::{DenoiseSettings, MAX_PATCH, MAX_SEARCH};
+#[cfg(test)]
+mod brute;
+#[cfg(test)]
+mod tests;
+
+pub use settings::{DenoiseSettings, MAX_SEARCH, PATCHES, TOLERANCES};
 
 use filter::TileFilter;
-use tile::Rectangle;
+use tile::{Rectangle, TileLayout};
 
+/// Rows of a tile. Its border is filtered again by its neighbours, so more rows are less work in total, but need more
+/// of the cache; 48 to 96 are equally fast.
+const TILE_ROWS: usize = 64;
+
+/// A picture and its features. All planes have `width * height` values, row by row.
 #[derive(Debug, Clone, Copy)]
 pub struct DenoiseInput<'a> {
+    /// Width in pixels.
     pub width: u32,
+    /// Height in pixels.
     pub height: u32,
+    /// Samples per pixel, at least 2.
     pub samples: u32,
+    /// Mean of all samples: linear RGB, and a fourth component that is ignored.
     pub color: &'a [[f32; 4]],
+    /// Mean of the samples 1, 3, 5 and so on: linear RGB.
     pub odd: &'a [Vec3],
+    /// Base colour, linear RGB.
     pub albedo: &'a [Vec3],
+    /// Unit normal, or zero.
     pub normal: &'a [Vec3],
+    /// Distance along the view axis; infinite without an intersection.
     pub depth: &'a [f32],
 }
 
-#[derive(Debug, Clone, PartialEq, Error)]
+/// Reasons why a picture cannot be filtered.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum DenoiseError {
-    #[error("{name} {value} {max}")]
-    Radius { name: &'static str, value: u32, max: u32 },
-    #[error("{name} {value}")]
-    Tolerance { name: &'static str, value: f32 },
-    #[error("one sample")]
+    /// There are no two halves.
+    #[error(
+        "a picture with 1 sample per pixel cannot be denoised, as noise is measured by the difference of two \
+         samples; use at least 2"
+    )]
     OneSample,
-    #[error("length")]
-    Length,
+    /// A plane does not match the size of the picture.
+    #[error("the plane {plane} has {len} pixels, the picture has {width}x{height}")]
+    Length {
+        /// The plane.
+        plane: &'static str,
+        /// Its length.
+        len: usize,
+        /// Width of the picture in pixels.
+        width: u32,
+        /// Height of the picture in pixels.
+        height: u32,
+    },
+    /// A radius is out of range.
+    #[error("{name} = {value} is out of range, it must lie in {} to {}", range[0], range[1])]
+    Radius {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: u32,
+        /// Its smallest and largest value.
+        range: [u32; 2],
+    },
+    /// A tolerance is out of range.
+    #[error("{name} = {value} is out of range, it must lie in {} to {}", range[0], range[1])]
+    Tolerance {
+        /// The setting.
+        name: &'static str,
+        /// Its value.
+        value: f32,
+        /// Its smallest and largest value.
+        range: [f32; 2],
+    },
 }
 
-#[derive(Debug, Clone, Copy)]
-pub struct Execution { pub simd: SimdLevel, pub tile: [usize; 2] }
-
-pub fn denoise(input: &DenoiseInput<'_>, settings: &DenoiseSettings) -> Result<Vec<Vec3>, DenoiseError> {
-    denoise_with(input, settings, &Execution { simd: SimdLevel::best(), tile: [240, 64] })
-}
-
-pub fn denoise_with(input: &DenoiseInput<'_>, settings: &DenoiseSettings, execution: &Execution) -> Result<Vec<Vec3>, DenoiseError> {
-    settings.validate()?;
-    let (width, height) = (input.width as usize, input.height as usize);
-    let simd = Supported::or_best(execution.simd);
-    let mut filtered = vec![Vec3::ZERO; width * height];
-    let columns = width.div_ceil(execution.tile[0]); let tw = width.div_ceil(columns);
-    let bands = height.div_ceil(execution.tile[1]); let th = height.div_ceil(bands);
-    let mut tiles = Vec::new();
-    for (band, rows) in filtered.chunks_mut(width * th).enumerate() {
-        let mut pieces: Vec<Vec<&mut [Vec3]>> = Vec::new();
-        pieces.resize_with(columns, Vec::new);
-        for row in rows.chunks_mut(width) { for (p, c) in pieces.iter_mut().zip(row.chunks_mut(tw)) { p.push(c); } }
-        for (column, rows) in pieces.into_iter().enumerate() { if rows.is_empty() { continue; }
-            let place = Rectangle { left: column * tw, top: band * th, width: rows[0].len(), height: rows.len() };
-            tiles.push((place, rows)); }
+impl DenoiseInput<'_> {
+    fn validate(&self) -> Result<(), DenoiseError> {
+        if self.samples < 2 {
+            return Err(DenoiseError::OneSample);
+        }
+        let (width, height) = (self.width, self.height);
+        let wanted = u64::from(width) * u64::from(height);
+        for (plane, len) in [
+            ("color", self.color.len()),
+            ("odd", self.odd.len()),
+            ("albedo", self.albedo.len()),
+            ("normal", self.normal.len()),
+            ("depth", self.depth.len()),
+        ] {
+            if len as u64 != wanted {
+                return Err(DenoiseError::Length {
+                    plane,
+                    len,
+                    width,
+                    height,
+                });
+            }
+        }
+        Ok(())
     }
-    tiles.into_par_iter().for_each_init(|| TileFilter::new(simd, input, settings, tw), |filter, (place, mut rows)| filter.filter(&place, &mut rows));
+}
+
+/// Returns the filtered linear RGB of a picture. Runs on the current rayon pool.
+///
+/// # Errors
+/// If a setting is out of range, if a plane has the wrong length, or if there is only one sample per pixel.
+pub fn denoise(
+    input: &DenoiseInput<'_>,
+    settings: &DenoiseSettings,
+) -> Result<Vec<Vec3>, DenoiseError> {
+    denoise_with(input, settings, &Execution::default())
+}
+
+/// Upper bound of the memory that filtering needs in addition to the input, bytes: the result, and the tiles of
+/// `threads` threads.
+pub fn predicted_bytes(width: u32, height: u32, settings: &DenoiseSettings, threads: u64) -> u64 {
+    let pixels = u64::from(width) * u64::from(height);
+    pixels * size_of::<Vec3>() as u64 + threads * TileFilter::bytes(settings, TILE_ROWS)
+}
+
+/// How a picture is filtered; the result does not depend on it.
+#[derive(Debug, Clone, Copy)]
+struct Execution {
+    simd: SimdLevel,
+    /// Largest width and height of a tile in pixels, at least 1.
+    tile: [usize; 2],
+}
+
+impl Default for Execution {
+    fn default() -> Self {
+        Self {
+            simd: SimdLevel::best(),
+            tile: [usize::MAX, TILE_ROWS],
+        }
+    }
+}
+
+/// See [`denoise`].
+fn denoise_with(
+    input: &DenoiseInput<'_>,
+    settings: &DenoiseSettings,
+    execution: &Execution,
+) -> Result<Vec<Vec3>, DenoiseError> {
+    settings.validate()?;
+    input.validate()?;
+    let mut filtered = vec![Vec3::ZERO; input.color.len()];
+    if filtered.is_empty() {
+        return Ok(filtered);
+    }
+    // Divide the picture into equal tiles
+    let (width, height) = (input.width as usize, input.height as usize);
+    let [max_width, max_height] = execution.tile;
+    let columns = equal_part(width, max_width.min(TileLayout::max_width(settings)));
+    let rows = equal_part(height, max_height);
+    let tiles = tiles(&mut filtered, width, columns, rows);
+    // Filter them in parallel
+    let simd = Supported::or_best(execution.simd);
+    let filter = || TileFilter::new(simd, input, settings, columns);
+    tiles
+        .into_par_iter()
+        .for_each_init(filter, |filter, (place, mut rows)| {
+            filter.filter(&place, &mut rows);
+        });
     Ok(filtered)
+}
+
+/// The smallest length of which the parts of `whole` have at most the number that parts of length `max` have.
+fn equal_part(whole: usize, max: usize) -> usize {
+    whole.div_ceil(whole.div_ceil(max))
+}
+
+/// Splits a plane into tiles of up to `columns` x `rows` pixels: the place of each, and its rows.
+fn tiles(
+    plane: &mut [Vec3],
+    width: usize,
+    columns: usize,
+    rows: usize,
+) -> Vec<(Rectangle, Vec<&mut [Vec3]>)> {
+    let mut all = Vec::new();
+    for (band, pixels) in plane.chunks_mut(width * rows).enumerate() {
+        let first = all.len();
+        let height = pixels.len() / width;
+        let place = |left: usize| Rectangle {
+            left,
+            top: band * rows,
+            width: columns.min(width - left),
+            height,
+        };
+        let lefts = (0..width).step_by(columns);
+        all.extend(lefts.map(|left| (place(left), Vec::with_capacity(height))));
+        for row in pixels.chunks_mut(width) {
+            for ((_, tile), piece) in all[first..].iter_mut().zip(row.chunks_mut(columns)) {
+                tile.push(piece);
+            }
+        }
+    }
+    all
 }

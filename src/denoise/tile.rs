@@ -25,9 +25,9 @@ const VARIANCE: usize = 13;
 /// Variance of one half, averaged over neighbours: the sum over its components. This plane and those after it are
 /// derived from those before it.
 pub(super) const NOISE: usize = 14;
-/// Half the tolerance of depth per column.
+/// Tolerance of depth per column.
 pub(super) const SLOPE_X: usize = 15;
-/// Half the tolerance of depth per row.
+/// Tolerance of depth per row.
 pub(super) const SLOPE_Y: usize = 16;
 const PLANES: usize = 17;
 /// Pixels from a plane of a row to the next: an odd number of cache lines, so that planes do not compete for the same
@@ -151,7 +151,7 @@ impl Tile {
         noise(line.simd, &variance, &colors, albedo, &mut self.buffer, noise_plane);
         // Compute slopes
         let [above, below] = [above, below].map(|row| &plane(row, DEPTH)[inner.clone()]);
-        let unit = 0.5 * line.settings.depth;
+        let unit = line.settings.depth;
         slopes(line.simd, unit, plane(row, DEPTH), above, below, slope_x, slope_y);
     }
 }
