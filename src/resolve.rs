@@ -56,7 +56,7 @@ pub enum ResolveError {
     /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
         "input.radius: the frames bring none, and particles that are few, in one place or far apart \
-         do not tell it; give a length with --radius"
+         do not tell it"
     )]
     NoRadius,
     /// The radius is too small: squares of lengths would underflow.
@@ -308,7 +308,9 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
     })
 }
 
+/// The source of the colours of particles; "auto" depends on the attributes that exist.
 fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
+    // Maps an attribute. The default range is that of the survey
     let mapped = |name: &str, map: Option<MapName>, range: Option<[f64; 2]>, required: bool| {
         let found = survey
             .color

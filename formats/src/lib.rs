@@ -1,5 +1,5 @@
-//! Bytes to particles and back: readers for what simulations write, the native frame file, and
-//! the sequence of files that makes an animation.
+//! Converts bytes to particles and back: readers for the formats of simulations, the native frame file, and the
+//! sequences of files that make animations.
 //!
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins

@@ -1,4 +1,4 @@
-//! Scalar types as files name and store them.
+//! Scalar types of numbers in files.
 
 use crate::{AttributeData, ParseError};
 
@@ -38,7 +38,7 @@ impl ScalarType {
         }
     }
 
-    /// Name in reports: `f32`, `u32`...
+    /// Name in reports, such as `f32` or `u32`.
     pub const fn name(self) -> &'static str {
         match self {
             Self::I8 => "i8",

@@ -1,8 +1,8 @@
-//! Files that appear at their name whole or not at all: written under a temporary name in the
-//! same directory, synced, renamed, and the directory synced too.
+//! Files that appear under their name complete or not at all. They are written under a temporary name in the
+//! same directory, synced and renamed, and the directory is synced.
 //!
-//! A temporary is called `.NAME.OWNER.N.part`, so that what a killed run left behind can be told from what
-//! a living one is writing, also across machines that share the file system.
+//! Temporary files are called `.NAME.OWNER.N.part`. The owner distinguishes files of killed processes from those
+//! that are being written, also across machines that share the file system.
 
 use std::ffi::OsString;
 use std::fs::{self, File, OpenOptions};
@@ -210,7 +210,7 @@ pub fn discard_parts(dst: &Path, owner: &str) -> io::Result<()> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::work::sweep_parts;
+    use crate::workers::remove_stale_parts;
 
     fn names(dir: &Path) -> Vec<String> {
         let mut names: Vec<String> = fs::read_dir(dir)
@@ -294,8 +294,8 @@ mod tests {
         fs::write(dir.path().join(".a.exr.h-1-ff.0.part"), b"dead").unwrap();
         let mut living = Publisher::create(&dir.path().join("b.exr")).unwrap();
         living.write_all(b"x").unwrap();
-        let at_work = [owner(), "h-2-ff"].map(str::to_owned).into();
-        assert_eq!(sweep_parts(dir.path(), &at_work).unwrap(), 1);
+        let living_owners = [owner(), "h-2-ff"].map(str::to_owned).into();
+        assert_eq!(remove_stale_parts(dir.path(), &living_owners).unwrap(), 1);
         living.commit().unwrap();
         assert_eq!(names(dir.path()).len(), keep.len() + 1);
 

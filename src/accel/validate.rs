@@ -97,7 +97,7 @@ impl WideTree {
         }
         // Check that each child has a parent
         if let Some(lost) = reached.iter().position(|r| !r) {
-            return Err(format!("level {level}: nobody has child {lost}"));
+            return Err(format!("level {level}: child {lost} has no parent"));
         }
         Ok(own)
     }
@@ -134,7 +134,7 @@ impl WideTree {
     ) -> Result<Aabb, String> {
         let topology = view.linked();
         let NodeRef::Node(index) = Linked::decode(code) else {
-            return Err(format!("code {code} is no node"));
+            return Err(format!("code {code} does not name a node"));
         };
         if levels == 0 {
             return Err(format!("node {index}: deeper than {MAX_LEVELS} levels"));
@@ -167,7 +167,7 @@ impl WideTree {
     fn validate_particles(&self, spheres: &Spheres) -> Result<(), String> {
         if self.indices.is_empty() {
             return if self.has_copies {
-                Err("copies that cannot be told apart".to_owned())
+                Err("identical copies".to_owned())
             } else {
                 Ok(())
             };
@@ -226,8 +226,8 @@ impl Reached {
         let lost = |marks: &[bool]| marks.iter().position(|mark| !mark);
         match (lost(&self.nodes), lost(&self.blocks)) {
             (None, None) => Ok(()),
-            (Some(node), _) => Err(format!("nobody has node {node}")),
-            (_, Some(block)) => Err(format!("nobody has block {block}")),
+            (Some(node), _) => Err(format!("node {node} has no parent")),
+            (_, Some(block)) => Err(format!("block {block} is in no leaf")),
         }
     }
 }

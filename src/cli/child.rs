@@ -1,7 +1,8 @@
-//! One task in a process of its own: this program again, under a hidden command.
+//! Runs one task in a child process: this program with a hidden command.
 //!
-//! The task is one line on the child's standard input, which stays open: a child whose input ends has
-//! lost its parent and ends itself. What came of it is one line on its standard output. The child has its own process group, so that Ctrl-C reaches the parent alone.
+//! The task is one line on the child's standard input, which stays open. If it is closed, the parent has ended and
+//! the child exits. The result is one line on its standard output. The child has its own process group, so that
+//! Ctrl-C reaches only the parent.
 
 use std::io::{self, Read, Write};
 use std::path::PathBuf;
@@ -15,64 +16,81 @@ use spherule_jobs::discard_own_parts;
 
 use super::{CliError, INTERRUPTED};
 
-/// Between two looks at the child; short against what it does.
-const INTERVAL: Duration = Duration::from_millis(2);
-/// Characters of a reason; what a crash prints may be long.
-const REASON: usize = 400;
+/// Time between checks of the child; short compared with a task.
+const POLL_INTERVAL: Duration = Duration::from_millis(2);
+/// Longest reason, characters. A crash may print a lot.
+const MAX_REASON: usize = 400;
 
-/// How a child ended.
-pub(super) enum Ended<T> {
-    /// With a result, failures included.
-    Told(T),
-    /// Without one: why.
-    Died(String),
-    /// We have ended it because we were asked to.
+/// The result of a child process.
+pub(super) enum ChildResult<T> {
+    /// It printed a result, which may be a failure.
+    Completed(T),
+    /// It ended without a result: why.
+    Crashed(Crash),
+    /// It was killed because of an interrupt.
     Interrupted,
 }
 
-/// Has `task` done by the hidden command `command`, unless `stop` says to end it.
+/// Why a child process has no result.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum Crash {
+    /// The task cannot be serialised.
+    #[error("cannot serialise the task: {0}")]
+    Serialize(#[from] serde_json::Error),
+    /// The process cannot be started.
+    #[error("cannot start a process: {0}")]
+    Start(#[source] io::Error),
+    /// The state of the process is unknown.
+    #[error("lost the process: {0}")]
+    Lost(#[source] io::Error),
+    /// The process ended without a result: how, and what it printed.
+    #[error("the process died: {0}")]
+    Died(String),
+}
+
+/// Runs `task` in a child process with the hidden command `command`. Kills the child if `stop` returns true.
 pub(super) fn run<T: DeserializeOwned>(
     command: &str,
     task: &impl Serialize,
     stop: impl Fn() -> bool,
-) -> Ended<T> {
+) -> ChildResult<T> {
     if stop() {
-        return Ended::Interrupted;
+        return ChildResult::Interrupted;
     }
     let line = match serde_json::to_string(task) {
         Ok(line) => line,
-        Err(e) => return Ended::Died(format!("cannot be told to a process: {e}")),
+        Err(e) => return ChildResult::Crashed(e.into()),
     };
     let mut child = match spawn(command) {
         Ok(child) => child,
-        Err(e) => return Ended::Died(format!("cannot start a process: {e}")),
+        Err(e) => return ChildResult::Crashed(Crash::Start(e)),
     };
     let output = reader(child.stdout.take());
     let errors = reader(child.stderr.take());
     let mut input = child.stdin.take();
     if let Some(input) = &mut input {
-        // A child that is dead already tells by its status why.
+        // If the child is dead already, its status says why
         let _ = writeln!(input, "{line}");
     }
     let status = loop {
         match child.try_wait() {
             Ok(Some(status)) => break status,
             Ok(None) => {}
-            Err(e) => return Ended::Died(format!("lost its process: {e}")),
+            Err(e) => return ChildResult::Crashed(Crash::Lost(e)),
         }
         if stop() {
             let _ = child.kill();
             let _ = child.wait();
-            return Ended::Interrupted;
+            return ChildResult::Interrupted;
         }
-        thread::sleep(INTERVAL);
+        thread::sleep(POLL_INTERVAL);
     };
     drop(input);
     let text = |reader: JoinHandle<String>| reader.join().unwrap_or_default();
     let (output, errors) = (text(output), text(errors));
     match serde_json::from_str(&output) {
-        Ok(told) if status.success() => Ended::Told(told),
-        _ => Ended::Died(reason(status, &errors)),
+        Ok(result) if status.success() => ChildResult::Completed(result),
+        _ => ChildResult::Crashed(Crash::Died(reason(status, &errors))),
     }
 }
 
@@ -88,12 +106,12 @@ fn spawn(name: &str) -> io::Result<Child> {
     command.spawn()
 }
 
-/// The child's side: the task, after which the process ends with its parent; `whose` is the command that
-/// gives such tasks.
+/// Called in the child: reads the task. From then on the process ends with its parent. `parent_command` is the
+/// command that creates such tasks.
 ///
 /// # Errors
-/// Standard input is no task.
-pub(super) fn task<T: DeserializeOwned>(whose: &str) -> Result<T, CliError> {
+/// Standard input does not contain a task.
+pub(super) fn read_task<T: DeserializeOwned>(parent_command: &str) -> Result<T, CliError> {
     let mut line = String::new();
     let task = io::stdin()
         .read_line(&mut line)
@@ -101,22 +119,22 @@ pub(super) fn task<T: DeserializeOwned>(whose: &str) -> Result<T, CliError> {
         .and_then(|_| serde_json::from_str(&line).map_err(|e| e.to_string()))
         .map_err(|e| {
             CliError::other(format!(
-                "standard input: no request of `spherule {whose}`, whose own command this is: {e}"
+                "standard input: not a task of `spherule {parent_command}`, which uses this command internally: {e}"
             ))
         })?;
-    thread::spawn(end_with_parent);
+    thread::spawn(exit_with_parent);
     Ok(task)
 }
 
-/// Whoever wanted the result is gone once our input ends.
-fn end_with_parent() {
+/// Exits when standard input is closed: the parent has ended.
+fn exit_with_parent() {
     let mut rest = [0; 64];
     while io::stdin().read(&mut rest).is_ok_and(|n| n > 0) {}
     discard_own_parts();
     std::process::exit(i32::from(INTERRUPTED));
 }
 
-/// The file that this process runs, even if another has taken its name since.
+/// The executable of this process, even if the file was replaced meanwhile.
 fn own_program() -> io::Result<PathBuf> {
     let link = PathBuf::from("/proc/self/exe");
     if link.exists() {
@@ -126,7 +144,7 @@ fn own_program() -> io::Result<PathBuf> {
     }
 }
 
-/// Reads to the end, so that the child never waits for us.
+/// Reads a pipe to its end in a thread, so that the child never blocks.
 fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     thread::spawn(move || {
         let mut bytes = Vec::new();
@@ -137,29 +155,27 @@ fn reader(pipe: Option<impl Read + Send + 'static>) -> JoinHandle<String> {
     })
 }
 
-/// Why a child ended without a result.
+/// Why the child ended without a result.
 fn reason(status: ExitStatus, errors: &str) -> String {
-    let told: Vec<&str> = errors
+    let lines: Vec<&str> = errors
         .lines()
         .map(|line| line.strip_prefix("error: ").unwrap_or(line).trim())
         .filter(|line| !line.is_empty() && !line.starts_with("note: "))
         .collect();
-    let told: String = told.join("; ").chars().take(REASON).collect();
-    if told.contains("memory allocation of") {
-        return format!("out of memory: {told}");
+    let text: String = lines.join("; ").chars().take(MAX_REASON).collect();
+    if text.contains("memory allocation of") {
+        return format!("out of memory: {text}");
     }
     let how = match signal(status) {
-        Some(9) => "killed by the system, most likely for want of memory".to_owned(),
+        Some(9) => "killed by the system, probably because memory ran out".to_owned(),
         Some(signal) => format!("ended by signal {signal}"),
-        None if told.contains("panicked at") => {
-            "a fault in spherule itself, please report it".to_owned()
-        }
+        None if text.contains("panicked at") => "a bug in spherule, please report it".to_owned(),
         None => status.to_string(),
     };
-    if told.is_empty() {
+    if text.is_empty() {
         how
     } else {
-        format!("{how}: {told}")
+        format!("{how}: {text}")
     }
 }
 
@@ -179,7 +195,7 @@ mod tests {
     use std::os::unix::process::ExitStatusExt;
 
     #[test]
-    fn reasons_are_readable() {
+    fn reasons() {
         let by_signal = |n| ExitStatus::from_raw(n);
         for (status, errors, wanted) in [
             (
@@ -190,19 +206,19 @@ mod tests {
             (
                 by_signal(9),
                 "",
-                "killed by the system, most likely for want of memory",
+                "killed by the system, probably because memory ran out",
             ),
             (by_signal(15), "", "ended by signal 15"),
             (
                 ExitStatus::from_raw(101 << 8),
                 "\nthread 'main' panicked at src/x.rs:1:2:\nno such thing\nnote: run with\n",
-                "a fault in spherule itself, please report it: thread 'main' panicked at \
+                "a bug in spherule, please report it: thread 'main' panicked at \
                  src/x.rs:1:2:; no such thing",
             ),
             (
                 ExitStatus::from_raw(2 << 8),
-                "error: standard input: no request\n",
-                "exit status: 2: standard input: no request",
+                "error: standard input: not a task\n",
+                "exit status: 2: standard input: not a task",
             ),
         ] {
             assert_eq!(reason(status, errors), wanted);

@@ -13,13 +13,13 @@ use spherule_formats::native::{Bound, Encoding};
 use spherule_formats::write;
 use spherule_jobs::Interrupt;
 
-use super::numbers::{USUAL_BOUND, not_negative, positive};
+use super::numbers::{DEFAULT_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
 use crate::metrics::Bytes;
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping",
-    at_once: "stopped",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping",
+    stopped: "stopped",
 };
 
 const EXAMPLES: &str = "\
@@ -116,8 +116,8 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
             has_velocity: args.velocity,
         })),
     };
-    let signals = signals::listen(WORDS)?;
-    let until = Until(signals.at_work());
+    let signals = signals::listen(SIGNAL_MESSAGES)?;
+    let until = Until(signals.start_work());
     match write(format, &*source, common, &until) {
         Err(ConvertError::Interrupted) => return Ok(Outcome::Interrupted),
         result => result.map_err(|e| CliError::Other(e.to_string()))?,
@@ -128,7 +128,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
         output,
         ..
     } = common;
-    say!("{}: {particles} particles, seed {seed}", output.display());
+    message!("{}: {particles} particles, seed {seed}", output.display());
     Ok(Outcome::Done)
 }
 
@@ -182,8 +182,8 @@ fn write(
             let report = convert(source, path, &args.settings(source), until)?;
             let phases = report.seconds.iter();
             let seconds = phases.map(|(phase, s)| format!("{} {s:.2} s", phase.name()));
-            say!(
-                "{}, largest error {:.3e}, parts {}, memory {}, put aside {}: {}",
+            message!(
+                "{}, largest error {:.3e}, parts {}, memory {}, temporary files {}: {}",
                 report.index.encoding(),
                 report.index.max_error,
                 report.parts,
@@ -199,7 +199,7 @@ fn write(
 impl CommonArgs {
     fn settings(&self, source: &dyn ParticleSource) -> ConvertSettings {
         let is_plain = self.max_error.is_none() && self.encoding.is_none();
-        let usual = source.common_radius().map(|_| USUAL_BOUND);
+        let usual = source.common_radius().map(|_| DEFAULT_BOUND);
         ConvertSettings {
             encoding: self.encoding.or(is_plain.then_some(Encoding::F32)),
             bound: match self.max_error.or(usual) {
@@ -218,7 +218,7 @@ pub(super) fn count(text: &str) -> Result<usize, String> {
     if let Ok(count) = plain.parse() {
         return Ok(count);
     }
-    let wrong = || format!("`{text}` is no number of particles, as 100000 or 1e5");
+    let wrong = || format!("invalid particle count `{text}` (examples: 100000, 1e5)");
     let value: f64 = plain.parse().map_err(|_| wrong())?;
     // All integers to 2^53 are exact in f64, and no frame holds more.
     if value.fract() != 0.0 || !(0.0..=9e15).contains(&value) {

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::job::ManifestArgs;
+use super::manifest_args::ManifestArgs;
 use super::{CliError, Outcome, print};
 
 #[derive(Debug, Args)]

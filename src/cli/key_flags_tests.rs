@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::cli::plan::RunArgs;
+use crate::cli::render_job::RunArgs;
 use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is

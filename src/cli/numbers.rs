@@ -1,50 +1,52 @@
-//! Numbers on the command line that commands have in common.
+//! Parsers of numbers on the command line. They return text, as clap expects.
 
 use std::time::Duration;
 
-/// The bound that coded positions keep if none is given: a fraction of the radius.
-pub(super) const USUAL_BOUND: f64 = 0.02;
+/// Default error bound of encoded positions, as a fraction of the radius.
+pub(super) const DEFAULT_BOUND: f64 = 0.02;
 
-/// A side of an image. How many pixels there may be, the manifest says.
+/// A number of pixels. The manifest checks the range.
 pub(super) fn pixels(text: &str) -> Result<i64, String> {
     text.parse()
-        .map_err(|_| "wants a number of pixels, as in --width 3840 --height 2160".to_owned())
+        .map_err(|_| "expected a number of pixels, such as --width 3840 --height 2160".to_owned())
 }
 
-/// A whole number, whatever its range.
+/// A whole number in any range.
 pub(super) fn whole(text: &str) -> Result<i64, String> {
     text.parse()
-        .map_err(|_| "wants a whole number, as in 16".to_owned())
+        .map_err(|_| "expected a whole number, such as 16".to_owned())
 }
 
-/// A number with or without a fraction, whatever its range.
+/// A number in any range.
 pub(super) fn number(text: &str) -> Result<f64, String> {
     text.parse()
-        .map_err(|_| "wants a number, as in 0.5".to_owned())
+        .map_err(|_| "expected a number, such as 0.5".to_owned())
 }
 
-/// A number of seconds, whatever its range.
+/// A number of seconds in any range.
 pub(super) fn seconds(text: &str) -> Result<f64, String> {
     text.parse()
-        .map_err(|_| "wants seconds as a number, as in 90 for a minute and a half".to_owned())
+        .map_err(|_| "expected seconds as a number, such as 90 for a minute and a half".to_owned())
 }
 
-/// A side of an image, from 1 to `most` pixels.
-pub(super) fn pixels_to(most: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync {
+/// A number of pixels from 1 to `max`.
+pub(super) fn pixels_to(max: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync {
     move |text| {
         let count = pixels(text)?;
-        let fitting = u32::try_from(count).ok().filter(|c| (1..=most).contains(c));
-        fitting.ok_or_else(|| format!("{count} is not in 1..={most}"))
+        let fitting = u32::try_from(count).ok().filter(|c| (1..=max).contains(c));
+        fitting.ok_or_else(|| format!("{count} is not in 1..={max}"))
     }
 }
 
-/// A largest error: 0 or more.
+/// An error bound: 0 or more.
 pub(super) fn not_negative(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f64 = text
+        .parse()
+        .map_err(|_| format!("`{text}` is not a number"))?;
     if value >= 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(format!("`{text}` is no error; 0.02 is one"))
+        Err(format!("`{text}` is not an error bound (example: 0.02)"))
     }
 }
 
@@ -52,15 +54,17 @@ pub(super) fn not_negative(text: &str) -> Result<f64, String> {
 pub(super) fn duration(text: &str) -> Result<Duration, String> {
     let time = text.parse().ok();
     let time = time.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    time.ok_or_else(|| format!("`{text}` is not a time in seconds; 30 is one"))
+    time.ok_or_else(|| format!("`{text}` is not a time in seconds (example: 30)"))
 }
 
 /// A radius: above 0.
 pub(super) fn positive(text: &str) -> Result<f32, String> {
-    let value: f32 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
+    let value: f32 = text
+        .parse()
+        .map_err(|_| format!("`{text}` is not a number"))?;
     if value > 0.0 && value.is_finite() {
         Ok(value)
     } else {
-        Err(format!("`{text}` is no radius"))
+        Err(format!("`{text}` is not a radius; it must be above 0"))
     }
 }

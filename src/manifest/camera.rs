@@ -25,16 +25,16 @@ named! {
 }
 
 section! {
-    /// Where the image is taken from
+    /// Position and motion of the camera
     Camera {
         /// Placement: auto | fixed | turntable | keys
         ///
-        /// Without a mode, the camera is fixed if there is an eye, goes through keys if there are keys, and is
+        /// Without a mode, the camera is fixed if there is an eye, moves through the keys if there are keys, and is
         /// placed automatically otherwise.
         mode: CameraMode = CameraMode::Auto;
         /// fixed: position of the camera
         eye: Option<DVec3> = None, example("[0.0, 0.0, 0.0]");
-        /// fixed: the point in the middle of the image
+        /// fixed: the point in the centre of the image
         look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("input.up");
@@ -62,7 +62,7 @@ section! {
         frame: i64 = 0, required(KEY_NEEDS), example("1");
         /// Position of the camera
         eye: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[0.0, 0.0, 0.0]");
-        /// The point in the middle of the image
+        /// The point in the centre of the image
         look_at: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("camera.up");
@@ -101,6 +101,7 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        // Only the fixed mode has the keys `eye` and `look_at`, and requires both
         let own = match self.mode {
             CameraMode::Auto => Some("the automatic camera finds its own; say mode = \"fixed\""),
             CameraMode::Turntable => {
@@ -115,11 +116,12 @@ impl Camera {
                     section.wrong(key, &format!("is given, but {own}"));
                 }
                 None if section.lacks(key) => {
-                    section.missing(key, "a fixed camera needs it, as [5.0, 5.0, 0.0]");
+                    section.missing(key, "a fixed camera needs it, such as [5.0, 5.0, 0.0]");
                 }
                 _ => {}
             }
         }
+        // Check that the view is valid
         if self.mode == CameraMode::Fixed
             && let (Some(eye), Some(look_at)) = (self.eye, self.look_at)
         {

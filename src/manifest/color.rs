@@ -88,7 +88,7 @@ impl Value for MapName {
 /// The ends of a colour map.
 impl Value for [f64; 2] {
     fn kind(_: &Key) -> String {
-        "two rising numbers, as [0.0, 4.0]".to_owned()
+        "two rising numbers, such as [0.0, 4.0]".to_owned()
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
@@ -107,7 +107,7 @@ impl Value for [f64; 2] {
 
 impl Value for ColorSetting {
     fn kind(_: &Key) -> String {
-        "three numbers from 0, as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\""
+        "three numbers from 0, such as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\""
             .to_owned()
     }
 
@@ -123,7 +123,7 @@ impl Value for ColorSetting {
         let (mut attribute, mut map, mut range) = (String::new(), None, None);
         let mut name = Key::new("attribute", &[]);
         if !is_auto {
-            name = name.required("the name of an attribute, as \"velocity\"");
+            name = name.required("the name of an attribute, such as \"velocity\"");
         }
         section.read(&name, &mut attribute);
         section.read(&Key::new("map", &[]), &mut map);
@@ -180,7 +180,7 @@ impl Value for ColorSetting {
 /// The up direction is set by [`Background::with_up`].
 impl Value for Background {
     fn kind(_: &Key) -> String {
-        "three numbers from 0, as [0.1, 0.1, 0.1], { bottom = [...], top = [...] },".to_owned()
+        "three numbers from 0, such as [0.1, 0.1, 0.1], { bottom = [...], top = [...] },".to_owned()
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
@@ -189,7 +189,7 @@ impl Value for Background {
         };
         let (mut bottom, mut top) = (Vec3::ZERO, Vec3::ZERO);
         for (name, color) in [("bottom", &mut bottom), ("top", &mut top)] {
-            let key = Key::new(name, &[]).required("three numbers from 0, as [0.1, 0.1, 0.1]");
+            let key = Key::new(name, &[]).required("three numbers from 0, such as [0.1, 0.1, 0.1]");
             section.read(&key, color);
         }
         section.finish();

@@ -9,7 +9,7 @@ use super::reader::Section;
 use super::value::{Slot, Value};
 
 /// Declares a table of the manifest: a struct, its defaults and its keys. The doc comment of a field is the text that
-/// users read; its first paragraph is the comment in the file. A field after `@` has keys of its own.
+/// users read; its first paragraph is the comment in the file. A field after `@` is itself a table with keys.
 macro_rules! section {
     ($(#[doc = $about:literal])+ $name:ident {
         $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr
@@ -77,11 +77,11 @@ impl Affects {
     #[cfg(test)]
     pub(super) const fn text(self) -> &'static str {
         match self {
-            Self::Images => "yes",
-            Self::Nothing => "no",
-            Self::SmoothSurfaces => "smooth surfaces only",
-            Self::Bodies => "unions and smooth surfaces only",
-            Self::BranchingSpheres => "spheres that reflect and transmit only",
+            Self::Images => "Changes images.",
+            Self::Nothing => "Does not change images.",
+            Self::SmoothSurfaces => "Changes images of smooth surfaces.",
+            Self::Bodies => "Changes images of unions and smooth surfaces.",
+            Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
         }
     }
 }
@@ -254,7 +254,7 @@ impl Key {
     }
 
     /// Description of the expected value for messages.
-    pub(super) fn wants<T: Value>(&self) -> String {
+    pub(super) fn expected<T: Value>(&self) -> String {
         let kind = T::kind(self);
         match self.word {
             Some(word @ "all") => format!("\"{word}\" or {kind}"),

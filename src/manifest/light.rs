@@ -8,8 +8,9 @@ use crate::scene::Falloff;
 
 named!(Falloff: None = "none", InverseSquare = "inverse-square");
 
-pub(super) const ABOUT: &[&str] =
-    &["Light sources; without any, a key light and a soft fill are placed by the camera"];
+pub(super) const ABOUT: &[&str] = &[
+    "Light sources; without any, a key light and a soft fill light are placed relative to the camera",
+];
 
 /// The key `type`.
 #[derive(Clone, Copy, PartialEq)]
@@ -99,14 +100,14 @@ impl Light {
         match &mut self.kind {
             LightKind::Point { position, falloff } => keys!(keys:
                 /// Position of the light
-                position => *position, required("a point light needs it, as [0.0, 0.0, 10.0]");
+                position => *position, required("a point light needs it, such as [0.0, 0.0, 10.0]");
                 /// Falloff with distance: none | inverse-square
                 falloff => *falloff;
             ),
             LightKind::Directional { direction } => keys!(keys:
                 /// Direction in which the light travels
                 direction => *direction, direction(),
-                    required("a directional light needs the direction in which it travels, as [0.0, 0.0, -1.0]");
+                    required("a directional light needs the direction in which it travels, such as [0.0, 0.0, -1.0]");
             ),
         }
         keys!(keys:

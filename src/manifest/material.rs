@@ -9,7 +9,7 @@ use crate::scene::{self, Fresnel};
 
 named!(Fresnel: Schlick = "schlick", Exact = "exact");
 
-pub(super) const ABOUT: &[&str] = &["What particles are made of"];
+pub(super) const ABOUT: &[&str] = &["Material of the particles"];
 
 /// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,15 +55,15 @@ impl Material {
             shininess => constants.shininess, above(0);
             /// Index of refraction; water is 1.33
             ior => constants.ior, above(0);
-            /// Weight of reflected rays, 0 to 1, times the Fresnel reflectance
+            /// Weight of reflected rays, 0 to 1; a factor on the Fresnel reflectance
             reflection => constants.reflection, from(0), to(1);
-            /// Weight of refracted rays, 0 (opaque) to 1, times the Fresnel transmittance
+            /// Weight of refracted rays, 0 (opaque) to 1; a factor on the Fresnel transmittance
             transmission => constants.transmission, from(0), to(1);
-            /// Fresnel equations: auto | schlick | exact; auto is schlick for spheres, exact for one body
+            /// Fresnel equations: auto | schlick | exact; auto is schlick for spheres, exact for union and smooth
             fresnel => self.fresnel, or("auto");
-            /// Linear RGB of white light after absorption_length inside; [1, 1, 1] is clear
+            /// Colour of white light after absorption_length inside, linear RGB; [1, 1, 1] is clear
             absorption => self.absorption, to(1);
-            /// Length for which absorption holds, or auto
+            /// Distance after which white light has the colour absorption, or auto
             absorption_length => self.absorption_length, or("auto"), unit("a length"), above(0), single();
         );
     }

@@ -14,8 +14,9 @@ use crate::surface::{SurfaceKind, SurfaceSettings};
 
 use key::{Affects, Keys};
 use list::Entries;
-use reader::{Problem, Problems, Section};
-use tree::{Node, Place};
+use problem::{Place, Problem, Problems};
+use reader::Section;
+use tree::Node;
 
 mod camera;
 mod color;
@@ -33,6 +34,7 @@ mod pattern;
 #[cfg(test)]
 mod places_tests;
 mod preset;
+mod problem;
 mod reader;
 mod rebase;
 mod render;
@@ -61,7 +63,7 @@ pub use preset::Look;
 pub(crate) use reader::nearest;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
-pub use rebase::{named_place, real_dir};
+pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
 pub use tree::Override;
@@ -261,7 +263,7 @@ impl Manifest {
         };
         Err(ManifestError {
             lines: vec![format!(
-                "output.path: {} for {count}: {NEEDS_NUMBER}, or choose one frame with --frames",
+                "output.path: {} for {count}: {NEEDS_NUMBER}, or select one frame (input.frames)",
                 self.output.path
             )],
         })
@@ -313,17 +315,16 @@ impl Manifest {
 }
 
 /// Description of a manifest.
-const ABOUT: &str =
-    "A spherule job. Paths are relative to this file; lengths are those of the simulation.";
+const ABOUT: &str = "A spherule job. Paths are relative to this file; lengths are in the unit of the particle files.";
 
 const NEEDS_NUMBER: &str =
-    "several frames would get the same name; put #### into it, as in frame.####.exr";
+    "several frames would get the same name; put #### into the name (example: frame.####.exr)";
 
 const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
                        first and after the last.";
 
-const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill are placed by the camera. A directional light has \
-                           a direction instead of position and falloff.";
+const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
+                           directional light has a direction instead of position and falloff.";
 
 /// All keys that are not in lists.
 fn known_keys() -> Vec<String> {

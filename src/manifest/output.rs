@@ -34,7 +34,7 @@ named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz 
 const DEFAULT_PATH: &str = "out/frame.####.exr";
 
 section! {
-    /// Which images are written, and what is in them
+    /// Images to write, and their channels
     Output {
         /// Images to write; #### or %04d is the frame number, with at least that many digits
         path: OutputPattern = OutputPattern::parse(DEFAULT_PATH).expect("a good pattern"),
@@ -44,11 +44,11 @@ section! {
             example("[\"RGBA\", \"Z\"]"), flag("channels", "LIST", "Output");
         /// Lossless compression of the EXR: none | rle | zip | zips | piz
         compression: Compression = Compression::Zip;
-        /// A PNG beside each image
+        /// Write a PNG next to each image
         preview: bool = true;
-        /// Exposure of the PNG in stops
+        /// Exposure of the PNG, stops
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
-        /// No background in the EXR, for compositing; previews show it
+        /// Leave the background out of the EXR, for compositing; previews show it
         transparent: bool = false;
         /// Frames per second, stored in the images
         fps: Option<f64> = None, above(0), example("24.0"), unset("not stored");

@@ -30,7 +30,7 @@ impl OutputPattern {
             .extension()
             .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
         if !is_exr {
-            return Err("must end in .exr, as in out/frame.####.exr".to_owned());
+            return Err("must end in .exr (example: out/frame.####.exr)".to_owned());
         }
         // Find the number in the file name
         let name_at = text.rfind(std::path::is_separator).map_or(0, |i| i + 1);
@@ -49,7 +49,7 @@ impl OutputPattern {
         // Reject a second number
         let after = &name[end..];
         if find_number(after)?.is_some() {
-            return Err("has room for two numbers; one is wanted, as in frame.####.exr".into());
+            return Err("has places for two numbers; use one (example: frame.####.exr)".into());
         }
         Ok(Self {
             text: text.to_owned(),
@@ -118,7 +118,7 @@ fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
         let digits = rest.bytes().take_while(|b| *b == b'#').count();
         return Ok(Some((start, start + digits, at_most(digits)?)));
     }
-    let unknown = || format!("`{rest}` is no frame number; use #### or %04d");
+    let unknown = || format!("invalid frame number `{rest}`; use #### or %04d");
     let width = rest[1..].find('d').ok_or_else(unknown)?;
     let digits = match &rest[1..=width] {
         "" => 1,

@@ -1,17 +1,17 @@
-//! That whatever is wrong with a manifest is told with line, column and the nearest known key.
+//! Messages about invalid manifests: each names line, column and the nearest known key.
 
 use std::path::Path;
 
 use super::*;
 
-/// `text` must give exactly one message, which is `wanted` after the file's name.
+/// Checks that `text` gives exactly one message: the file's name, followed by `wanted`.
 #[track_caller]
 fn told(text: &str, wanted: &str) {
     let error = Manifest::parse(text, Path::new("job.toml")).unwrap_err();
     assert_eq!(error.messages(), [format!("job.toml: {wanted}")]);
 }
 
-/// The same for what follows a good beginning of two lines.
+/// Same as [`told`], with two valid lines in front of `text`.
 #[track_caller]
 fn told_below(text: &str, wanted: &str) {
     told(&format!("[input]\npath = \"ä\"\n{text}"), wanted);
@@ -147,11 +147,11 @@ fn keys_in_inline_tables() {
 fn values_in_every_kind_of_table() {
     told_below(
         "[job]\nsettle = \"soon\"",
-        "line 4, column 10: job.settle: wants seconds from 0 to 1e9, not the text \"soon\"",
+        "line 4, column 10: job.settle: expected seconds from 0 to 1e9, found the text \"soon\"",
     );
     told_below(
         "[[light]]\ntype = \"spot\"",
-        "line 4, column 8: light.0.type: wants one of point, directional, not the text \"spot\"",
+        "line 4, column 8: light.0.type: expected one of point, directional, found the text \"spot\"",
     );
     told(
         "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",

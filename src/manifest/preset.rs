@@ -45,17 +45,17 @@ impl Look {
             let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
             let hint = nearest(name, &known).map(|n| format!("; did you mean {n}?"));
             format!(
-                "--look {name}: there is no such look, known are: {}{}",
+                "unknown look `{name}`; available: {}{}",
                 known.join(", "),
                 hint.unwrap_or_default()
             )
         })
     }
 
-    /// Its defaults.
-    pub fn settings(self) -> Vec<Override> {
-        let (text, shown) = match self {
-            Self::Water => (WATER, "--look water"),
+    /// Its defaults. `shown` is the name of their origin in messages: the option that selected the look.
+    pub fn settings(self, shown: &str) -> Vec<Override> {
+        let text = match self {
+            Self::Water => WATER,
         };
         let sections: toml::Table = text.parse().expect("a look of our own is TOML");
         let key = |(section, keys): (String, Value)| match keys {
@@ -86,7 +86,11 @@ mod tests {
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
         let sets = sets.iter().map(|set| Override::parse(set).unwrap());
-        let all = Look::Water.settings().into_iter().chain(sets).collect();
+        let all = Look::Water
+            .settings("--look water")
+            .into_iter()
+            .chain(sets)
+            .collect();
         Manifest::parse_with(text, Path::new("job.toml"), all).unwrap()
     }
 
@@ -96,7 +100,8 @@ mod tests {
             assert_eq!(Look::named(name).unwrap(), *look);
             let text = "input.path = \"data\"";
             let manifest =
-                Manifest::parse_with(text, Path::new("job.toml"), look.settings()).unwrap();
+                Manifest::parse_with(text, Path::new("job.toml"), look.settings("--look water"))
+                    .unwrap();
             let shown = manifest.to_commented_toml();
             assert_eq!(Manifest::parse(&shown, Path::new("x")).unwrap(), manifest);
         }
@@ -125,9 +130,13 @@ mod tests {
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
         assert!(mixed.render.ground);
-        // What is wrong there is told once, by its own place.
+        // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
-        let error = Manifest::parse_with(wrong, Path::new("job.toml"), Look::Water.settings());
+        let error = Manifest::parse_with(
+            wrong,
+            Path::new("job.toml"),
+            Look::Water.settings("--look water"),
+        );
         let error = error.unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
         assert!(error.to_string().contains("line 2"), "{error}");
@@ -137,7 +146,7 @@ mod tests {
     fn an_unknown_look_names_the_known() {
         let error = Look::named("watre").unwrap_err();
         assert!(
-            error.contains("known are: water; did you mean water?"),
+            error.contains("available: water; did you mean water?"),
             "{error}"
         );
         assert!(!Look::named("lava").unwrap_err().contains("did you mean"));

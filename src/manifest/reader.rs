@@ -1,41 +1,10 @@
 //! Reads typed values from a [`Node`] tree and collects all problems with location and key, so that one run is enough
 //! to fix a manifest.
 
-use std::cell::RefCell;
-
 use super::key::Key;
-use super::tree::{Kind, Node, Place};
+use super::problem::{Place, Problems};
+use super::tree::{Kind, Node};
 use super::value::{Fault, Slot, Value};
-
-/// An error in a manifest, or a warning.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Problem {
-    pub(super) place: Place,
-    /// The dotted key; empty for the file as a whole.
-    pub(super) key: String,
-    pub(super) what: String,
-}
-
-/// All problems found so far.
-#[derive(Debug, Default)]
-pub(super) struct Problems {
-    pub(super) errors: RefCell<Vec<Problem>>,
-    pub(super) warnings: RefCell<Vec<Problem>>,
-}
-
-impl Problems {
-    fn note(&self, place: &Place, key: &str, what: &str) {
-        push(&self.errors, place, key, what);
-    }
-}
-
-fn push(list: &RefCell<Vec<Problem>>, place: &Place, key: &str, what: &str) {
-    list.borrow_mut().push(Problem {
-        place: place.clone(),
-        key: key.to_owned(),
-        what: what.to_owned(),
-    });
-}
 
 /// A table that is being read. Keys that have not been read before [`Section::finish`] are unknown.
 pub(super) struct Section<'a> {
@@ -110,12 +79,7 @@ impl<'a> Section<'a> {
         let old = key.renamed.filter(|[old, _]| field.as_text() == Some(old));
         let renamed = old.map(|[old, new]| {
             let what = format!("\"{old}\" is now called \"{new}\"; the old name still works");
-            push(
-                &self.problems.warnings,
-                &field.node.place,
-                &field.key,
-                &what,
-            );
+            self.problems.warn(&field.node.place, &field.key, &what);
             Node {
                 kind: Kind::Text(new.to_owned()),
                 place: field.node.place.clone(),
@@ -141,7 +105,7 @@ impl<'a> Section<'a> {
         };
         let items = field.items().unwrap_or_else(|| {
             field.fail(&format!(
-                "wants a list of tables, as [[{}]] begins, not {}",
+                "expected a list of tables, such as [[{}]] begins, found {}",
                 field.key,
                 field.node.describe()
             ));
@@ -230,8 +194,8 @@ impl<'a> Field<'a> {
             Err(Fault::Unwanted) => {
                 let text = self.as_text().unwrap_or_default();
                 let hint = nearest(text, &T::words()).map(|n| format!("; did you mean {n}?"));
-                let (wants, hint) = (key.wants::<T>(), hint.unwrap_or_default());
-                format!("wants {wants}, not {}{hint}", self.node.describe())
+                let (expected, hint) = (key.expected::<T>(), hint.unwrap_or_default());
+                format!("expected {expected}, found {}{hint}", self.node.describe())
             }
         };
         self.fail(&what);
@@ -303,7 +267,7 @@ impl<'a> Field<'a> {
     fn section(&self) -> Option<Section<'a>> {
         let table = self.as_table();
         if table.is_none() {
-            self.fail(&format!("wants a table, not {}", self.node.describe()));
+            self.fail(&format!("expected a table, found {}", self.node.describe()));
         }
         table
     }

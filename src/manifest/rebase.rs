@@ -4,26 +4,53 @@ use std::path::{Component, Path, PathBuf};
 
 use super::{Manifest, OutputPattern};
 
+/// Why the paths of a manifest cannot be made relative to another directory.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RebaseError {
+    /// A directory is not absolute.
+    #[error("{}: an absolute directory is needed", dir.display())]
+    NotAbsolute {
+        /// The directory.
+        dir: PathBuf,
+    },
+    /// A path is not UTF-8, as a manifest is.
+    #[error("{}: the path is not UTF-8", path.display())]
+    NotUtf8 {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The output is not a pattern for images, because of the name of its directory.
+    #[error("{path}: {reason}")]
+    Output {
+        /// The output.
+        path: String,
+        /// Why.
+        reason: String,
+    },
+}
+
 impl Manifest {
     /// Converts relative paths from the base `from` to the base `to`; both must be absolute. Absolute paths do not
     /// change. Symbolic links on disk are followed.
     ///
     /// # Errors
     /// A directory that would appear in a path is not UTF-8, or `from` or `to` is not absolute.
-    pub fn rebase(&mut self, from: &Path, to: &Path) -> Result<(), String> {
+    pub fn rebase(&mut self, from: &Path, to: &Path) -> Result<(), RebaseError> {
         for dir in [from, to] {
             if !dir.is_absolute() {
-                return Err(format!(
-                    "{}: an absolute directory is needed",
-                    dir.display()
-                ));
+                return Err(RebaseError::NotAbsolute {
+                    dir: dir.to_owned(),
+                });
             }
         }
         for path in self.input.path.iter_mut() {
             *path = rebased(path, from, to)?;
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
-        self.output.path = OutputPattern::parse(&output)?;
+        self.output.path = OutputPattern::parse(&output).map_err(|reason| RebaseError::Output {
+            path: output,
+            reason,
+        })?;
         if let Some(path) = &mut self.job.stop_file {
             *path = rebased(path, from, to)?;
         }
@@ -31,7 +58,7 @@ impl Manifest {
     }
 }
 
-fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
+fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, RebaseError> {
     if Path::new(path).is_absolute() {
         return Ok(path.to_owned());
     }
@@ -46,7 +73,7 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
 }
 
 /// `target` relative to `base`, both absolute and without `..`.
-fn relative(target: &Path, base: &Path) -> Result<String, String> {
+fn relative(target: &Path, base: &Path) -> Result<String, RebaseError> {
     let shared = target
         .components()
         .zip(base.components())
@@ -62,7 +89,7 @@ fn relative(target: &Path, base: &Path) -> Result<String, String> {
     match relative.to_str() {
         Some("") => Ok(".".to_owned()),
         Some(text) => Ok(text.to_owned()),
-        None => Err(format!("{}: the path is not UTF-8", relative.display())),
+        None => Err(RebaseError::NotUtf8 { path: relative }),
     }
 }
 

@@ -32,27 +32,28 @@ named! {
 }
 
 section! {
-    /// How the image is traced
+    /// Settings of the renderer
     Render {
         /// Acceleration structure: auto, lbvh, kdtree, bvh or sbvh
         ///
-        /// lbvh is the fastest to build, kdtree the fastest to trace. The image is the same; auto goes by the number
-        /// of rays for each particle.
+        /// lbvh is the fastest to build, kdtree the fastest to trace. The image is the same. auto chooses one of these
+        /// two by the number of rays per particle.
         accelerator: Option<Structure> = None, or("auto"), affects(Affects::Nothing),
             flag("accelerator", "NAME", "Job");
         /// Build quality of bvh: fast | medium | high
         bvh_preset: BvhPreset = BvhPreset::default(), affects(Affects::Nothing);
-        /// Primitives of bvh: blocks, or particles (200 bytes each while building)
+        /// Primitives of bvh: blocks, or particles (200 bytes per particle while building)
         bvh_leaves: BvhLeaves = BvhLeaves::default(), affects(Affects::Nothing);
-        /// sbvh tries spatial splits where boxes overlap by more than this part of the scene's area
+        /// sbvh tries spatial splits where boxes overlap by more than this fraction of the scene's surface area
         sbvh_alpha: f32 = SbvhSettings::DEFAULT.alpha, affects(Affects::Nothing),
             from(*SbvhSettings::ALPHAS.start()), to(*SbvhSettings::ALPHAS.end());
-        /// References that the spatial splits of sbvh may add, per particle; 0 allows no spatial splits
+        /// Maximum number of references per particle that the spatial splits of sbvh add; 0 turns them off
         sbvh_budget: f32 = SbvhSettings::DEFAULT.budget, affects(Affects::Nothing),
             zero("no spatial splits"), from(*SbvhSettings::BUDGETS.start()), to(*SbvhSettings::BUDGETS.end());
-        /// Reflections and refractions followed; 1 is direct light only
+        /// Maximum depth of reflections and refractions; 1 is direct light only
         max_depth: u32 = 3, from(1), to(MAX_DEPTH), flag("max-depth", "MAX_DEPTH", "Look");
-        /// Transmissive spheres: path weight below which one of two branches is followed; 0 follows both
+        /// Transmissive spheres: path weight below which only one of the two branches is followed; 0 always follows
+        /// both
         min_weight: f32 = DEFAULT_MIN_WEIGHT, affects(Affects::BranchingSpheres), or_zero(),
             from(*MIN_WEIGHTS.start()), to(*MIN_WEIGHTS.end());
         /// Background: auto, linear RGB, or { bottom = [...], top = [...] }
@@ -65,10 +66,10 @@ section! {
         ground_color: Vec3 = ground::DEFAULT_COLOR;
         /// Pattern of the ground: plain | checker (every other square is darker)
         ground_pattern: GroundPattern = GroundPattern::Plain;
-        /// Edge length of the pattern's squares, or auto
+        /// Edge length of the squares of the pattern, or auto
         ground_tile: Option<f64> = None, or("auto"), unit("a length"), above(0), single();
-        /// Most memory to use: 4GiB, 512MiB; frames that need more fail
-        memory_limit: Option<Bytes> = None, example("\"4GiB\""), unset("what is free"), affects(Affects::Nothing),
+        /// Maximum memory to use: 4GiB, 512MiB; frames that need more fail
+        memory_limit: Option<Bytes> = None, example("\"4GiB\""), unset("the free memory"), affects(Affects::Nothing),
             flag("memory-limit", "SIZE", "Job");
     }
 }

@@ -99,7 +99,7 @@ mod tests {
         Manifest::parse(&text, Path::new("job.toml")).unwrap()
     }
 
-    /// The settings of `manifest` as another version wrote them: `key` with another value, or without it.
+    /// The settings of `manifest` as another version may have written them: `key` has another value, or is missing.
     fn rewritten(manifest: &Manifest, key: &str, value: Option<&str>) -> Vec<(String, String)> {
         let mut settings = manifest.settings();
         settings.retain(|(k, _)| k != key);
@@ -170,7 +170,7 @@ mod tests {
         for (now, planned, has_rgb, is_same) in [
             (&plain, &viridis, false, true),
             (&viridis, &plain, false, true),
-            // These particles bring colours: without a map they are taken as they are.
+            // The particles contain colours, which are used unchanged if there is no map.
             (&plain, &viridis, true, false),
             (&viridis, &plain, true, false),
             (&viridis, &viridis, true, true),

@@ -5,7 +5,7 @@ use super::*;
 use crate::output::Compression;
 use crate::scene::{Background, Falloff};
 
-/// The example of the design, as users find it in the documentation.
+/// The example in the design, which is also in the user documentation.
 const EXAMPLE: &str = r#"
 [input]
 path = "ParticleData_Fluid_#.vtk"   # a directory, a pattern, or a list of files
@@ -67,7 +67,7 @@ fn with_sets(sets: &[&str]) -> Result<Manifest, ManifestError> {
     Manifest::parse_with(EXAMPLE, path(), sets)
 }
 
-/// `section` added to a good manifest must be refused with exactly one message, which has all of
+/// Checks that a valid manifest with `section` appended is rejected with exactly one message, which contains all
 /// `parts`.
 #[track_caller]
 fn refused(section: &str, parts: &[&str]) {
@@ -148,16 +148,16 @@ fn wrong_types_say_what_is_wanted() {
     refused(
         "[image]\nwidth = \"wide\"",
         &[
-            "line 3, column 9: image.width: wants a whole number from 1 to 65536, not the text \"wide\"",
+            "line 3, column 9: image.width: expected a whole number from 1 to 65536, found the text \"wide\"",
         ],
     );
-    refused("[image]\nwidth = 0", &["image.width", "not 0"]);
+    refused("[image]\nwidth = 0", &["image.width", "found 0"]);
     refused("[image]\nsamples = 0", &["image.samples", "from 1"]);
-    refused("[image]\nheight = -5", &["image.height", "not -5"]);
+    refused("[image]\nheight = -5", &["image.height", "found -5"]);
     refused("[image]\nheight = 10.5", &["image.height", "whole"]);
     refused(
         "[render]\nground = 1",
-        &["render.ground: wants true or false, not 1"],
+        &["render.ground: expected true or false, found 1"],
     );
     refused(
         "[render]\nbackground = [1, 2]",
@@ -174,18 +174,18 @@ fn wrong_types_say_what_is_wanted() {
     );
     refused(
         "[render]\nbvh_leaves = 16",
-        &["render.bvh_leaves: wants one of blocks, particles"],
+        &["render.bvh_leaves: expected one of blocks, particles"],
     );
     for wrong in ["-0.5", "nan", "8.01", "1e39", "inf", "\"much\"", "[1]"] {
         refused(
             &format!("[render]\nsbvh_budget = {wrong}"),
-            &["render.sbvh_budget: wants a number from 0 (no spatial splits) to 8, not"],
+            &["render.sbvh_budget: expected a number from 0 (no spatial splits) to 8, found"],
         );
     }
     for wrong in ["-1e-5", "1.5", "nan"] {
         refused(
             &format!("[render]\nsbvh_alpha = {wrong}"),
-            &["render.sbvh_alpha: wants a number from 0 to 1, not"],
+            &["render.sbvh_alpha: expected a number from 0 to 1, found"],
         );
     }
     for right in ["0", "0.5", "8"] {
@@ -237,7 +237,7 @@ fn wrong_types_say_what_is_wanted() {
     );
     refused(
         "[light]\ntype = \"point\"",
-        &["light: wants a list of tables, as [[light]]"],
+        &["light: expected a list of tables, such as [[light]]"],
     );
     refused("[[light]]\n", &["light.0.type: is missing"]);
     refused(
@@ -254,9 +254,9 @@ fn wrong_types_say_what_is_wanted() {
     refused("[output]\nfps = 0", &["output.fps"]);
     refused(
         "[output]\ncompression = 3",
-        &["one of none, rle, zip, zips, piz, not 3"],
+        &["one of none, rle, zip, zips, piz, found 3"],
     );
-    refused("render = 3", &["render: wants a table, not 3"]);
+    refused("render = 3", &["render: expected a table, found 3"]);
 }
 
 #[test]
@@ -273,7 +273,7 @@ fn keys_of_the_camera_are_checked() {
         ),
         (
             "look_at = [0,1]",
-            "line 5, column 11: camera.key.0.look_at: wants three numbers",
+            "line 5, column 11: camera.key.0.look_at: expected three numbers",
         ),
         (
             "look_at = [0,0,1]\nup = [0,0,-2]",
@@ -281,7 +281,7 @@ fn keys_of_the_camera_are_checked() {
         ),
         (
             "look_at = [0,0,1]\nup = [0,0,0]",
-            "line 6, column 6: camera.key.0.up: wants three numbers that are not all 0",
+            "line 6, column 6: camera.key.0.up: expected three numbers that are not all 0",
         ),
         (
             "look_at = [0,0,1]\n[camera]\nup = [0,0,3]",
@@ -289,7 +289,7 @@ fn keys_of_the_camera_are_checked() {
         ),
         (
             "look_at = [0,1,1]\nfov = 180",
-            "line 6, column 7: camera.key.0.fov: wants degrees",
+            "line 6, column 7: camera.key.0.fov: expected degrees",
         ),
         (
             "look_at = [0,1,1]\nupp = [0,0,1]",
@@ -341,12 +341,12 @@ fn input_is_checked() {
         assert_eq!(error.messages().len(), 1, "{error}");
         assert!(error.to_string().contains(part), "{error}");
     };
-    refused("[input]\npath = \"\"", "input.path: wants a name");
-    refused("[input]\npath = []", "input.path: wants a directory");
+    refused("[input]\npath = \"\"", "input.path: expected a name");
+    refused("[input]\npath = []", "input.path: expected a directory");
     refused("[input]\npath = [\"a\", 3]", "input.path.1");
     refused(
         "[input]\npath = \"a\"\nradius = 0",
-        "input.radius: wants a length above 0",
+        "input.radius: expected a length above 0",
     );
     refused(
         "[input]\npath = \"a\"\nradius = { scale = 2 }",
@@ -357,7 +357,7 @@ fn input_is_checked() {
     assert_eq!(*manifest.input.path, ["a", "b"]);
     assert_eq!(manifest.input.frames, Some("7".parse().unwrap()));
     assert_eq!(manifest.input.radius, RadiusSetting::Length(2.0));
-    // Which of the frames 1-3 there are is known only with the sequence.
+    // Which of the frames 1-3 exist is unknown without the sequence.
     for range in ["3", "1-3"] {
         let text =
             format!("input = {{ path = \"a\", frames = \"{range}\" }}\noutput.path = \"a.exr\"");
@@ -471,7 +471,7 @@ fn sets_that_will_not_do() {
     );
     wrong(
         "image.width=wide",
-        "--set image.width=wide: image.width: wants",
+        "--set image.width=wide: image.width: expected",
     );
     wrong(
         "image.width.x=1",
@@ -480,8 +480,8 @@ fn sets_that_will_not_do() {
     wrong("light.1.intensity=1", "light.1: the list has no such item");
     for (set, part) in [
         ("a", "no `=`"),
-        ("a..b=1", "dotted key"),
-        ("=1", "dotted key"),
+        ("a..b=1", "invalid key"),
+        ("=1", "invalid key"),
         ("a=[1", "--set a=[1: "),
     ] {
         let error = Override::parse(set).unwrap_err();
@@ -557,7 +557,7 @@ fn commented_file_reads_back_and_shows_every_key() {
         assert!(text.contains(&format!("{name} = ")), "{key}\n{text}");
     }
     assert_eq!(parse(&parse(EXAMPLE).to_commented_toml()), parse(EXAMPLE));
-    // What is shown as a comment must be right too.
+    // Check that the keys in comments are valid too
     let uncommented: String = text
         .lines()
         .map(|l| {

@@ -6,18 +6,7 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Problem;
-
-/// Origin of a value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Place {
-    /// Byte in the file.
-    Byte(usize),
-    /// The option as the user typed it.
-    Option(String),
-    /// The value is missing.
-    Nowhere,
-}
+use super::problem::{Place, Problem};
 
 #[derive(Debug, Clone)]
 pub(super) struct Node {
@@ -55,7 +44,7 @@ impl Override {
     pub fn parse(assignment: &str) -> Result<Self, String> {
         let shown = format!("--set {assignment}");
         let Some((key, value)) = assignment.split_once('=') else {
-            return Err(format!("{shown}: no `=`, as in render.max_depth=5"));
+            return Err(format!("{shown}: no `=` (example: render.max_depth=5)"));
         };
         let keys = split_key(key).map_err(|e| format!("{shown}: {e}"))?;
         let place = Place::Option(shown.clone());
@@ -107,7 +96,7 @@ impl Override {
 fn split_key(key: &str) -> Result<Vec<String>, String> {
     let keys: Vec<String> = key.split('.').map(|k| k.trim().to_owned()).collect();
     if keys.iter().any(String::is_empty) {
-        return Err(format!("`{key}` is no dotted key, as render.max_depth is"));
+        return Err(format!("invalid key `{key}` (example: render.max_depth)"));
     }
     Ok(keys)
 }

@@ -31,7 +31,7 @@ impl FromStr for Bytes {
     /// `4GiB`, `1.5G`, `512MiB`, `4GB`, `4294967296`: a number without a unit is in bytes.
     fn from_str(text: &str) -> Result<Self, String> {
         let wrong =
-            || format!("{text:?} is no size; write it as 4GiB, 512MiB or a number of bytes");
+            || format!("invalid size {text:?} (examples: 4GiB, 512MiB, or a number of bytes)");
         let trimmed = text.trim();
         let digits = trimmed.find(|c: char| !c.is_ascii_digit() && c != '.');
         let (number, unit) = trimmed.split_at(digits.unwrap_or(trimmed.len()));

@@ -124,7 +124,7 @@ mod tests {
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (92, 8, 100));
         peaks.take_in(use_of(100, 40, 10));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (90, 10, 100));
-        // Files let go by then: what was seen holds.
+        // The maps were closed before the second sample; the peak remains.
         peaks.take_in(use_of(140, 95, 60));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (95, 60, 140));
     }
@@ -133,7 +133,7 @@ mod tests {
     fn pages_of_mapped_frames_are_no_anonymous_memory() {
         let mut peaks = MemoryPeaks::default();
         peaks.looks_only();
-        // The map was larger between two looks.
+        // The map was larger between two samples.
         for (peak, anonymous, file) in [(1000, 50, 600), (1000, 40, 20)] {
             peaks.take_in(MemoryUse {
                 peak,

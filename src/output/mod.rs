@@ -1,5 +1,6 @@
-//! Films to bytes: OpenEXR for work, PNG to look at. Encodes into memory; putting a file in place
-//! whole is the caller's. And back: whether such a file is sound.
+//! Encodes films as OpenEXR images and PNG previews, and verifies such files.
+//!
+//! This module opens no files: callers pass readers and writers, and publish complete files.
 
 mod exr;
 mod preview;

@@ -1,4 +1,4 @@
-//! A PNG to look at: the film over an opaque background, through the view transform.
+//! PNG previews: the film over an opaque background, after the view transform.
 
 use glam::Vec3;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
@@ -11,13 +11,12 @@ use crate::math::Supported;
 use crate::math::functions::exp2;
 use crate::render::Film;
 
-/// How to show a film.
+/// Settings of a preview.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PreviewOptions {
-    /// Brightens by this many stops (factors of two).
+    /// Exposure in stops: each stop doubles the brightness.
     pub exposure: f32,
-    /// What lies behind a film that was rendered with a transparent background (linear RGB). A film
-    /// that has its background in its colours shows that: leave this `None`.
+    /// Linear RGB behind a film with a transparent background. `None` for a film whose colours include the background.
     pub backdrop: Option<Vec3>,
 }
 
@@ -34,12 +33,12 @@ pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, 
     for (y, (row, bytes)) in (0..film.height).zip(rows) {
         let pixels = linear.as_chunks_mut().0.iter_mut();
         for (pixel, &[r, g, b, a]) in pixels.zip(row) {
-            let behind = options.backdrop.unwrap_or_default() * (1.0 - a);
-            *pixel = view_transform((Vec3::new(r, g, b) + behind) * gain).to_array();
+            let background = options.backdrop.unwrap_or_default() * (1.0 - a);
+            *pixel = view_transform((Vec3::new(r, g, b) + background) * gain).to_array();
         }
         let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
         for (pixel, x) in pixels.zip(0..film.width) {
-            // One threshold for all components: grey stays grey.
+            // One threshold for all components, so that grey stays grey
             *pixel = [dither_threshold(x, y); 3];
         }
         bytes_from_linear(Supported::default(), &linear, &thresholds, bytes);
@@ -69,7 +68,7 @@ mod tests {
         film
     }
 
-    /// The mean of each component of a film of one `color`, in bytes.
+    /// Mean of each 8-bit component in the preview of a film of one `color`.
     fn mean(color: [f32; 4], options: &PreviewOptions) -> Vec3 {
         let image = decode(&encode_preview(&film(color), options).unwrap());
         let count = f32::from(u8::try_from(image.pixels().len()).unwrap());
@@ -105,7 +104,7 @@ mod tests {
 
     #[test]
     fn a_faint_gradient_has_no_bands() {
-        // Three bytes from left to right: in bands each would be hundreds of pixels wide.
+        // The gradient spans about three 8-bit values. Without dithering, each band would be hundreds of pixels wide.
         let mut film = Film::new(600, 16, Channels::COLOR);
         for (index, color) in film.color.iter_mut().enumerate() {
             let across = (index % 600) as f32 / 600.0;

@@ -1,9 +1,9 @@
-//! Whether images are what they were written as: every block of every channel decoded, with the size and
-//! the channels they must have. Block by block and row by row: an image is never in memory as a whole.
+//! Verifies image files: decodes every block of every channel, and compares size and channels with those of the job.
+//! Works block by block and row by row, so that an image is never in memory as a whole.
 //!
-//! Damage inside a block is found where its compression has a checksum (`zip` and `zips`, by Adler-32; all
-//! previews) or cannot be undone. A block without compression, as all are in files without, may hold any
-//! numbers.
+//! Damage inside a block is found if the compression has a checksum (Adler-32 in `zip` and `zips`; all previews have
+//! checksums), or if the block cannot be decompressed. Uncompressed blocks may contain any numbers, so damage in them
+//! is not found.
 
 use std::io::{BufRead, Read, Seek};
 
@@ -15,37 +15,37 @@ use thiserror::Error;
 use super::exr::planes::planes;
 use crate::render::Channels;
 
-/// What an image of a job must be.
+/// The expected size and channels of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageShape {
-    /// Pixels across.
+    /// Width in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height in pixels.
     pub height: u32,
-    /// What is in it.
+    /// The channels.
     pub channels: Channels,
 }
 
 /// What is wrong with an image.
 #[derive(Debug, Error)]
 pub enum ImageFault {
-    /// It is another picture.
+    /// It has another size.
     #[error("is {}x{}, {}x{} is wanted", found.0, found.1, wanted.0, wanted.1)]
     Size {
-        /// Width and height of the file.
+        /// Width and height of the image, pixels.
         found: (usize, usize),
-        /// Width and height it must have.
+        /// Expected width and height, pixels.
         wanted: (u32, u32),
     },
-    /// It holds other channels, or of another type.
+    /// It has other channels, or channels of another type.
     #[error("has the channels {found}, {wanted} are wanted")]
     Channels {
-        /// Those of the file.
+        /// The channels of the file, with their types.
         found: String,
-        /// Those it must have.
+        /// The expected channels, with their types.
         wanted: String,
     },
-    /// The file breaks its format, or cannot be read.
+    /// The file violates its format, or cannot be read.
     #[error("{0}")]
     Damaged(String),
 }
@@ -62,10 +62,10 @@ impl From<png::DecodingError> for ImageFault {
     }
 }
 
-/// Decodes the OpenEXR file `file`.
+/// Decodes the OpenEXR file `file` and compares it with `wanted`.
 ///
 /// # Errors
-/// The first fault.
+/// The first fault found.
 pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), ImageFault> {
     let reader = exr::block::read(file, true)?;
     let meta = reader.meta_data().clone();
@@ -73,10 +73,10 @@ pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), Ima
         let count = meta.headers.len();
         return Err(ImageFault::Damaged(format!("has {count} parts, not one")));
     };
-    // Before anything as large as the header says is made.
+    // Check the size before memory is allocated for the size in the header
     check_header(header, wanted)?;
+    // Decode the blocks at the offsets in the file, like viewers do
     let mut rows = 0;
-    // By the offsets in the file, as viewers do.
     for chunk in reader.filter_chunks(true, |_, _, _| true)? {
         let block = UncompressedBlock::decompress_chunk(chunk?, &meta, true)?;
         let (at, size) = (block.index.pixel_position, block.index.pixel_size);
@@ -107,9 +107,9 @@ fn check_header(header: &Header, wanted: &ImageShape) -> Result<(), ImageFault> 
     let planes: Vec<_> = planes
         .map(|plane| (plane.name.to_owned(), plane.sample_type()))
         .collect();
-    let is_whole = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
-    let are_whole = header.channels.list.iter().all(is_whole);
-    if are_whole && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {
+    let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
+    let is_complete = header.channels.list.iter().all(has_all_pixels);
+    if is_complete && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {
         return Ok(());
     }
     Err(ImageFault::Channels {
@@ -127,19 +127,24 @@ fn check_size(found: (usize, usize), wanted: &ImageShape) -> Result<(), ImageFau
     }
 }
 
+/// Names and types of channels for messages.
 fn listed(planes: &[(String, SampleType)]) -> String {
-    let told = |(name, kind): &(String, SampleType)| match kind {
+    let description = |(name, kind): &(String, SampleType)| match kind {
         SampleType::F16 => format!("{name} (half)"),
         SampleType::F32 => format!("{name} (float)"),
         SampleType::U32 => format!("{name} (uint)"),
     };
-    planes.iter().map(told).collect::<Vec<_>>().join(", ")
+    planes
+        .iter()
+        .map(description)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
-/// Decodes the PNG file `file`.
+/// Decodes the PNG file `file` and compares its size with `wanted`.
 ///
 /// # Errors
-/// The first fault.
+/// The first fault found.
 pub fn verify_preview(file: impl BufRead + Seek, wanted: &ImageShape) -> Result<(), ImageFault> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_checksums(false);

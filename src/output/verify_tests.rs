@@ -6,7 +6,8 @@ use super::*;
 use crate::output::{Compression, ExrOptions, PreviewOptions, encode_exr, encode_preview};
 use crate::render::Film;
 
-/// Not even, and with few values, so that compression has something to do and every block is stored compressed.
+/// An irregular film with few different values, so that every block is smaller when compressed and is stored
+/// compressed.
 fn film(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
     for (at, color) in film.color.iter_mut().enumerate() {
@@ -36,8 +37,8 @@ fn verify(bytes: &[u8], wanted: &ImageShape) -> Result<(), String> {
     verify_exr(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
 }
 
-/// Every choice of channels.
-fn choices() -> impl Iterator<Item = Channels> {
+/// All combinations of channels.
+fn channel_sets() -> impl Iterator<Item = Channels> {
     (0..64_u32).map(|bits| Channels {
         depth: bits & 1 != 0,
         normal: bits & 2 != 0,
@@ -49,8 +50,8 @@ fn choices() -> impl Iterator<Item = Channels> {
 }
 
 #[test]
-fn what_is_written_is_sound() {
-    for channels in choices() {
+fn written_files_are_sound() {
+    for channels in channel_sets() {
         let bytes = exr(&film(40, 37, channels), Compression::Zip);
         assert_eq!(verify(&bytes, &shape(channels)), Ok(()), "{channels:?}");
     }
@@ -67,7 +68,7 @@ fn what_is_written_is_sound() {
 }
 
 #[test]
-fn another_picture_is_a_fault() {
+fn another_size_or_other_channels_are_a_fault() {
     let bytes = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
     let mut wanted = shape(Channels::COLOR);
     wanted.height = 38;
@@ -88,7 +89,7 @@ fn another_picture_is_a_fault() {
     assert!(verify(&more, &shape(Channels::COLOR)).is_err());
 }
 
-/// All samples, block by block.
+/// All samples of a file, block by block.
 fn samples(bytes: &[u8]) -> Vec<u8> {
     let reader = exr::block::read(Cursor::new(bytes), true).unwrap();
     let meta = reader.meta_data().clone();
@@ -102,12 +103,12 @@ fn samples(bytes: &[u8]) -> Vec<u8> {
         .collect()
 }
 
-/// Where the table of offsets begins: blocks follow it to the end of the file.
+/// Start of the table of block offsets. The blocks follow it, up to the end of the file.
 fn end_of_header(bytes: &[u8]) -> usize {
     let reader = exr::block::read(Cursor::new(bytes), true).unwrap();
     let chunks = reader.all_chunks(true).unwrap().map(Result::unwrap);
     let lengths = chunks.map(|chunk| match chunk.compressed_block {
-        // With its offset, its row and its length.
+        // Plus the entry in the table (8 bytes), the row (4) and the length (4)
         CompressedBlock::ScanLine(block) => block.compressed_pixels_le.len() + 8 + 4 + 4,
         other => panic!("{other:?}"),
     });
@@ -124,23 +125,23 @@ fn flipped_bits_that_change_a_pixel_are_found() {
         for bit in 0..8 {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << bit;
-            // The last byte of a block has bits that mean nothing.
+            // The last byte of a block has unused bits, so some flips change no sample
             let is_sound = verify(&damaged, &shape(Channels::ALL)).is_ok();
             missed += usize::from(is_sound && samples(&damaged) != good);
         }
     }
-    // Adler-32 is weak where there are few values: some ways of moving bytes about pass it.
+    // Adler-32 is weak for data with few different values: some permutations of bytes have the same checksum
     let all = 8 * (bytes.len() - start);
     assert!(missed * 100 < all, "{missed} of {all}");
 }
 
 #[test]
-fn a_file_cut_short_is_found_and_costs_no_memory() {
+fn truncated_files_are_found_and_absurd_sizes_allocate_nothing() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Piz);
     for length in 0..bytes.len() {
         assert!(verify(&bytes[..length], &shape(Channels::ALL)).is_err());
     }
-    // A picture of absurd size is refused before anything is made for it.
+    // An absurd size in the header is rejected before memory is allocated
     let mut huge = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
     let window = b"dataWindow\0box2i\0";
     let at = huge

@@ -1,7 +1,7 @@
 //! Third stage: encodes images, publishes them under their final names, and records them.
 
 use std::io::{self, Seek, Write};
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::mpsc::{Receiver, Sender, SyncSender};
 use std::time::Instant;
 
@@ -9,39 +9,21 @@ use serde_json::json;
 use spherule_formats::sequence::Sequence;
 use spherule_jobs::{Job, JobError, Publisher, publish};
 
+use super::error::{ImageError, WriteError};
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::{ClaimedFrame, Event, Stage, StageResult, Watch};
+use super::{ClaimedFrame, Event, ImageTask, OnEvent, Stage, StageResult};
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::mishap::is_place_at_fault;
-use crate::output::{
-    CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
-};
+use crate::output::{CustomAttribute, ExrOptions, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
 
-/// Reasons why an image could not be written.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum WriteError {
-    /// Encoding failed.
-    #[error(transparent)]
-    Encode(#[from] OutputError),
-    /// Writing failed.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The image.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: io::Error,
-    },
-}
-
-/// Channels to notify when an image has been written. Their receivers may have ended.
-pub(super) struct WriteSignals {
-    /// To the reader, if it waits for that before it reads the next frame.
+/// Channels to earlier stages, for use after an image is written. The receivers may have ended.
+pub(super) struct AfterWrite {
+    /// To the reader, without overlap: read the next frame.
     pub(super) is_written: Option<SyncSender<()>>,
-    /// To the tracer, for the planes to be reused.
+    /// To the tracer: reuse the planes.
     pub(super) films: Option<Sender<Film>>,
 }
 
@@ -49,20 +31,19 @@ pub(super) fn write_stage(
     setup: &Setup,
     sequence: &Sequence,
     traced: Receiver<ClaimedFrame<TracedFrame>>,
-    next: &WriteSignals,
+    next: &AfterWrite,
     job: &mut Job,
-    watch: Watch,
+    on_event: OnEvent,
 ) -> Result<(), JobError> {
     let mut peaks = MemoryPeaks::default();
     let mut image_before = Instant::now();
     for ClaimedFrame { claim, result } in traced {
         match result {
             StageResult::Frame(frame) => {
-                watch(Event::Entered(frame.task.frame, Stage::Write));
-                // Stop if another worker has taken over
+                on_event(Event::StageEntered(frame.task.frame, Stage::Write));
                 if !claim.is_valid() {
                     let dir = job.state().dir().to_owned();
-                    return Err(JobError::TakenForDead { dir });
+                    return Err(JobError::DeclaredDead { dir });
                 }
                 // Encode and publish the image
                 let task = frame.task.clone();
@@ -82,26 +63,17 @@ pub(super) fn write_stage(
                             .cloned()
                             .collect();
                         job.record_done(task.frame, &outputs, json!(report))?;
-                        watch(Event::Done(&task, &report));
+                        on_event(Event::Done(&task, &report));
                     }
-                    // The disk is at fault, not the frame, which remains to be done.
-                    Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
-                        return Err(JobError::writing(&path, source));
-                    }
-                    Err(error) => {
-                        let reason = error.to_string();
-                        watch(Event::Failed(task.frame, &reason));
-                        job.record_failed(task.frame, &reason, json!(null))?;
-                    }
+                    Err(error) => fail(&task, error.into(), job, on_event)?,
                 }
             }
-            StageResult::Failed(task, reason) => {
-                watch(Event::Failed(task.frame, &reason));
-                job.record_failed(task.frame, &reason, json!(null))?;
+            StageResult::Failed(failed) => {
+                let (task, error) = *failed;
+                fail(&task, error, job, on_event)?;
             }
         }
-        // Release the frame, and let the next one be read
-        claim.end();
+        claim.complete();
         if let Some(is_written) = &next.is_written {
             let _ = is_written.send(());
         }
@@ -109,7 +81,22 @@ pub(super) fn write_stage(
     Ok(())
 }
 
-/// Encodes and publishes the images of `frame`. Returns the completed report, and the planes for reuse.
+/// Records that `task` failed, or stops the run if further images would fail too.
+fn fail(
+    task: &ImageTask,
+    error: ImageError,
+    job: &mut Job,
+    on_event: OnEvent,
+) -> Result<(), JobError> {
+    let failure = error.into_failure(task.frame);
+    if failure.kind.stops_run() {
+        return Err(JobError::Stopped(failure));
+    }
+    on_event(Event::Failed(&failure));
+    job.record_failed(&failure)
+}
+
+/// Encodes and publishes the images of `frame`. Returns the complete report and the planes, which can be reused.
 pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
@@ -122,7 +109,7 @@ pub(super) fn write_frame(
         let path = path.to_owned();
         move |source| WriteError::Io { path, source }
     };
-    // Publish the preview first: a ledger line vouches for both, and the EXR is the file that users wait for
+    // The preview first: users wait for the EXR, and the ledger entry covers both
     if let Some(path) = &task.preview {
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
         publish(path, &png).map_err(at(path))?;
@@ -159,14 +146,14 @@ pub(super) fn write_frame(
     Ok((report, film))
 }
 
-/// Samples the memory in use when the first bytes are written: all memory of encoding is allocated then.
+/// Samples memory use during the first writes, when all buffers of the encoder exist.
 struct MemorySampler<'a, W> {
     out: &'a mut W,
     peaks: &'a mut MemoryPeaks,
     samples: u32,
 }
 
-/// Number of writes to sample: the header is written before blocks are compressed.
+/// Number of writes with a sample. The header is written before blocks are compressed.
 const MAX_SAMPLES: u32 = 16;
 
 impl<W: Write> Write for MemorySampler<'_, W> {
@@ -189,15 +176,7 @@ impl<W: Seek> Seek for MemorySampler<'_, W> {
     }
 }
 
-/// The EXR of `frame` in memory.
-///
-/// # Errors
-/// If the image cannot be encoded.
-pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, OutputError> {
-    encode_exr(&frame.film, &exr_options(setup, frame))
-}
-
-/// Options for the EXR of `frame`, with an attribute of metadata for compositing.
+/// Options of the EXR of `frame`, including an attribute with data for compositing.
 fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,

@@ -2,8 +2,8 @@
 
 use std::time::{Duration, Instant};
 
-use spherule_formats::ParticleFrame;
 use spherule_formats::sequence::Sequence;
+use spherule_formats::{FrameError, ParticleFrame};
 
 use super::ImageTask;
 use super::decoded::DecodedFrame;
@@ -12,7 +12,6 @@ use super::load_error::LoadError;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
-use crate::mishap::may_be_unfinished;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -130,7 +129,9 @@ impl LoadedFrame {
 /// Marks errors of the last frame of a sequence, which may still be growing.
 fn newest(error: LoadError, sequence: &Sequence, task: &ImageTask) -> LoadError {
     match error {
-        LoadError::Frame(error) if may_be_unfinished(sequence, task.index, &error) => {
+        LoadError::Frame(error @ FrameError::Malformed { .. })
+            if task.index + 1 == sequence.frames().len() =>
+        {
             LoadError::Newest(error)
         }
         other => other,

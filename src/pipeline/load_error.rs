@@ -8,8 +8,10 @@ pub enum LoadError {
     /// Its files cannot be read.
     #[error(transparent)]
     Frame(FrameError),
-    /// The same for the last frame of the sequence, which a simulation may still be writing.
-    #[error("{0}; it is the newest frame, perhaps still being written: render again later")]
+    /// The same for the last frame of the sequence, which a simulation may be at.
+    #[error(
+        "{0}; this is the newest frame: if the simulation is still writing it, render again later"
+    )]
     Newest(FrameError),
     /// It does not fit into memory.
     #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]

@@ -2,7 +2,7 @@
 //!
 //! One frame is in flight per stage, handed over without a queue, so memory is constant however long the sequence is.
 //! Reading waits until the tree of the previous frame is built: building takes little time, and releases the
-//! positions of that frame. Reading has threads of its own, so that it never waits for tracing. The planes of a
+//! positions of that frame. Reading uses separate threads, so it never waits for tracing. The planes of a
 //! written image are returned to the tracer. The last stage records every frame in the ledger of the job, after its
 //! image. [`Setup`] defines the pictures in advance.
 
@@ -14,13 +14,15 @@ use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
 use std::thread;
 
 use spherule_formats::sequence::Sequence;
-use spherule_jobs::{Claim, Interrupt, Job, JobError, Queue, QueueNews};
+use spherule_jobs::{Claim, FrameFailure, FrameQueue, Interrupt, Job, JobError, QueueEvent};
 
 mod decoded;
 mod encode;
+mod error;
 mod in_place;
 mod load;
 mod load_error;
+mod memory_limit;
 mod predict;
 mod probe;
 mod rays;
@@ -33,26 +35,27 @@ mod surface;
 mod trace;
 
 pub use decoded::{DecodedFrame, DecodedShading};
-pub use encode::encode_frame;
+pub use error::{ImageError, WriteError};
 pub use in_place::{StoredFrame, StoredShading};
 pub use load::{LoadedFrame, LoadedParticles, load_frame};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
+pub use memory_limit::{MemoryLimitError, MemoryRemedy};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
-pub use probe::{Probe, probe};
+pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
 pub use schedule::{Overlap, Schedule};
 pub use setup::{ColorRule, Picture, RadiusRule, RunSettings, Setup};
-pub use single::{PictureKind, SingleFault, make_image, make_picture};
+pub use single::{PictureKind, make_image, make_picture};
 pub use trace::{CpuRenderer, renderer_of};
 
 use read_threads::ReadThreads;
 
-use crate::mishap::guarded;
+use crate::failure::catch_panic;
 use crate::render::{Film, Stop};
 use crate::report::FrameReport;
 
-/// One image to be made.
+/// One image to render.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageTask {
     /// Frame number.
@@ -63,11 +66,11 @@ pub struct ImageTask {
     pub image: PathBuf,
     /// Path of the optional PNG.
     pub preview: Option<PathBuf>,
-    /// Reason why it cannot be made, if that is known in advance.
-    pub refused: Option<String>,
+    /// Why it cannot be rendered, if that is known in advance.
+    pub refused: Option<MemoryLimitError>,
 }
 
-/// Stage of a frame.
+/// A stage of the pipeline.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
     /// Its files are being read.
@@ -78,43 +81,42 @@ pub enum Stage {
     Write,
 }
 
-/// Events of a run.
+/// Progress of a run.
 #[derive(Debug)]
 pub enum Event<'a> {
     /// A frame has entered a stage.
-    Entered(i64, Stage),
-    /// The image of a frame is complete and recorded.
+    StageEntered(i64, Stage),
+    /// A frame's image exists and is recorded.
     Done(&'a ImageTask, &'a FrameReport),
-    /// A frame failed. It is recorded with this reason, and the run continues.
-    Failed(i64, &'a str),
-    /// Other workers are working on frames of the run.
-    Others(QueueNews<'a>),
+    /// A frame failed, and the failure was recorded. The other frames continue.
+    Failed(&'a FrameFailure),
+    /// Another worker has finished a frame or holds one.
+    OtherWorker(QueueEvent<'a>),
     /// A note for the user.
     Note(&'a str),
 }
 
-/// An event handler.
-pub type Watch<'a> = &'a (dyn Fn(Event) + Sync);
+/// Receives events, from several threads.
+pub type OnEvent<'a> = &'a (dyn Fn(Event) + Sync);
 
-/// A frame between two stages, or the reason of its failure.
+/// A frame between two stages, or the reason why it failed.
 enum StageResult<T> {
     Frame(T),
-    Failed(ImageTask, String),
+    Failed(Box<(ImageTask, ImageError)>),
 }
 
-/// A frame between two stages that this worker has claimed.
+/// A frame between two stages, with the claim of this worker.
 struct ClaimedFrame<T> {
     claim: Claim,
     result: StageResult<T>,
 }
 
-/// Renders those of `tasks` that no other worker has claimed, in order, and records each in `job`. Returns when all
-/// of them are finished, by any worker. If `interrupt` is raised, finishes only the current frame; if it requests an
-/// immediate stop, drops that frame too. Without `overlap` a frame is read only after the previous one has been
-/// written and released.
+/// Renders those of `tasks` that no other worker holds, in order, and records each in `job`. Returns when all are
+/// finished, by any worker. Once `interrupt` is raised, returns after the frames in progress, or drops them if the
+/// interrupt says to stop now. Without `overlap`, a frame is read only when the memory of the one before is free.
 ///
 /// # Errors
-/// The ledger cannot be written, or the disk is full: further frames could not be recorded.
+/// The ledger or the output cannot be written, for example because the disk is full.
 pub fn run(
     setup: &Setup,
     sequence: &Sequence,
@@ -122,62 +124,59 @@ pub fn run(
     overlap: Overlap,
     job: &mut Job,
     interrupt: &Interrupt,
-    watch: Watch,
+    on_event: OnEvent,
 ) -> Result<(), JobError> {
-    let is_over = AtomicBool::new(false);
+    let has_failed = AtomicBool::new(false);
     let threads = ReadThreads::new();
     let mut read = Ok(());
     // Connect the stages; with capacity 0 a stage holds its result until the next stage is free
     let (to_trace, loaded) = sync_channel(0);
     let (to_write, traced) = sync_channel(0);
-    let (memory_freed, has_memory) = sync_channel(1);
+    let (continue_reading, may_continue) = sync_channel(1);
     let (films, spare) = channel();
-    // Select the stage that lets the next frame be read, because it frees the memory; without overlap no film is kept
+    // The next frame is read when the tree is built, or without overlap when the image is written
     let (is_built, is_written, films) = match overlap {
-        Overlap::Stages => (Some(memory_freed), None, Some(films)),
-        Overlap::None => (None, Some(memory_freed), None),
+        Overlap::Stages => (Some(continue_reading), None, Some(films)),
+        Overlap::None => (None, Some(continue_reading), None),
     };
-    // Start the reader
-    let (reader_started, reader_running) = sync_channel(0);
+    let (starts, has_started) = sync_channel(0);
     let frames = tasks.iter().map(|task| task.frame);
-    let queue = Queue::new(job.claims(), frames, interrupt);
+    let queue = FrameQueue::new(job.claims(), frames, interrupt);
     let reader = ReadStage {
         setup,
         sequence,
         tasks,
         threads: &threads,
-        next: TraceHandover {
+        next: ToTrace {
             to_trace,
-            has_memory,
+            may_continue,
         },
-        watch,
+        on_event,
     };
     let outcome = &mut read;
     let written = threads.scope(|first| {
         first.spawn(move |_| {
-            let _ = reader_started.send(());
+            let _ = starts.send(());
             *outcome = reader.run(queue);
         });
-        // Wait until the reader runs, so that its first thread reuses the memory that the survey of the frames has
-        // freed.
-        let _ = reader_running.recv();
+        // The first new thread reuses the memory that the survey has freed
+        let _ = has_started.recv();
         thread::scope(|scope| {
-            // Start the writer, and trace on this thread
-            let writer_ended = &is_over;
-            let next = encode::WriteSignals { is_written, films };
+            let writer_failed = &has_failed;
+            let next = encode::AfterWrite { is_written, films };
             let writer = scope.spawn(move || {
-                let ended = encode::write_stage(setup, sequence, traced, &next, job, watch);
-                writer_ended.store(ended.is_err(), Ordering::Relaxed);
-                ended
+                let result = encode::write_stage(setup, sequence, traced, &next, job, on_event);
+                writer_failed.store(result.is_err(), Ordering::Relaxed);
+                result
             });
             let stage = TraceStage {
                 setup,
                 stop: DropFrame {
-                    is_over: &is_over,
+                    has_failed: &has_failed,
                     interrupt,
                 },
                 interrupt,
-                watch,
+                on_event,
             };
             stage.run(loaded, spare, is_built, to_write);
             join_result(writer.join())
@@ -187,7 +186,7 @@ pub fn run(
 }
 
 fn join_result<T>(result: thread::Result<T>) -> T {
-    result.unwrap_or_else(|fault| panic::resume_unwind(fault))
+    result.unwrap_or_else(|payload| panic::resume_unwind(payload))
 }
 
 /// The first stage, see [`run`].
@@ -196,30 +195,28 @@ struct ReadStage<'a> {
     sequence: &'a Sequence,
     tasks: &'a [ImageTask],
     threads: &'a ReadThreads,
-    next: TraceHandover,
-    watch: Watch<'a>,
+    next: ToTrace,
+    on_event: OnEvent<'a>,
 }
 
 impl ReadStage<'_> {
-    /// The neighbouring stages end when this one does, because it owns its ends of all channels.
-    fn run(&self, mut queue: Queue) -> Result<(), JobError> {
-        let mut reported = ReportedNotes::default();
-        let mut on_news = |news: QueueNews| (self.watch)(Event::Others(news));
-        while let Some((index, claim)) = queue.take(&mut on_news)? {
-            // Read the frame, unless it is known to fail
+    /// Runs on the thread of the first stage.
+    fn run(&self, mut queue: FrameQueue) -> Result<(), JobError> {
+        let mut notes = ReportedNotes::default();
+        let mut on_queue_event = |event: QueueEvent| (self.on_event)(Event::OtherWorker(event));
+        while let Some((index, claim)) = queue.next(&mut on_queue_event)? {
             let task = &self.tasks[index];
-            (self.watch)(Event::Entered(task.frame, Stage::Read));
+            (self.on_event)(Event::StageEntered(task.frame, Stage::Read));
             let loaded = match &task.refused {
-                Some(reason) => Err(reason.clone()),
-                None => guarded(|| self.load(task)),
+                Some(error) => Err(error.clone().into()),
+                None => catch_panic(|| self.load(task)),
             };
-            // Report its notes, and pass it on
             let result = match loaded {
                 Ok(mut frame) => {
-                    reported.report_new(std::mem::take(&mut frame.notes), self.watch);
+                    notes.report(std::mem::take(&mut frame.notes), self.on_event);
                     StageResult::Frame(frame)
                 }
-                Err(reason) => StageResult::Failed(task.clone(), reason),
+                Err(error) => StageResult::Failed(Box::new((task.clone(), error))),
             };
             if !self.next.send(ClaimedFrame { claim, result }) {
                 break;
@@ -228,40 +225,39 @@ impl ReadStage<'_> {
         Ok(())
     }
 
-    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, String> {
+    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, ImageError> {
         let size = FrameSize::of(self.sequence, task.index, self.setup.run.weight.as_ref());
         let load = || load_frame(self.setup, self.sequence, task);
-        let loaded = self.threads.read(size.read_bytes(), load);
-        loaded.map_err(|e| e.to_string())
+        Ok(self.threads.read(size.read_bytes(), load)?)
     }
 }
 
-/// Notes that a stage has reported already: a note that applies to every frame is reported once.
+/// The notes that a stage has reported. A note that all frames share is reported once.
 #[derive(Default)]
 struct ReportedNotes(HashSet<String>);
 
 impl ReportedNotes {
-    fn report_new(&mut self, notes: Vec<String>, watch: Watch) {
+    fn report(&mut self, notes: Vec<String>, on_event: OnEvent) {
         for note in notes {
             if !self.0.contains(&note) {
-                watch(Event::Note(&note));
+                on_event(Event::Note(&note));
                 self.0.insert(note);
             }
         }
     }
 }
 
-/// Connection from reading to tracing.
-struct TraceHandover {
+/// The channels from reading to tracing.
+struct ToTrace {
     to_trace: SyncSender<ClaimedFrame<LoadedFrame>>,
-    /// Receives a message when there is memory for another frame.
-    has_memory: Receiver<()>,
+    /// Signals that there is memory for another frame.
+    may_continue: Receiver<()>,
 }
 
-impl TraceHandover {
-    /// Passes a frame on, and waits until there is memory for another one; false if a later stage has ended.
+impl ToTrace {
+    /// Sends the frame and waits until there is memory for another. Returns false once a later stage has ended.
     fn send(&self, frame: ClaimedFrame<LoadedFrame>) -> bool {
-        self.to_trace.send(frame).is_ok() && self.has_memory.recv().is_ok()
+        self.to_trace.send(frame).is_ok() && self.may_continue.recv().is_ok()
     }
 }
 
@@ -271,15 +267,15 @@ fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
     rayon::scope(|_| work())
 }
 
-/// Stops the frame that is being traced if further frames cannot be recorded, or if an immediate stop is requested.
+/// Stops tracing when frames can no longer be recorded, or when the interrupt says to stop now.
 struct DropFrame<'a> {
-    is_over: &'a AtomicBool,
+    has_failed: &'a AtomicBool,
     interrupt: &'a Interrupt,
 }
 
 impl Stop for DropFrame<'_> {
     fn is_raised(&self) -> bool {
-        self.is_over.load(Ordering::Relaxed) || self.interrupt.stop_now()
+        self.has_failed.load(Ordering::Relaxed) || self.interrupt.stop_now()
     }
 }
 
@@ -287,11 +283,11 @@ struct TraceStage<'a> {
     setup: &'a Setup,
     stop: DropFrame<'a>,
     interrupt: &'a Interrupt,
-    watch: Watch<'a>,
+    on_event: OnEvent<'a>,
 }
 
 impl TraceStage<'_> {
-    /// Its neighbours end when it does: it owns its ends of all channels.
+    /// The neighbouring stages end when this one does, because it owns its ends of all channels.
     fn run(
         &self,
         loaded: Receiver<ClaimedFrame<LoadedFrame>>,
@@ -300,42 +296,44 @@ impl TraceStage<'_> {
         next: SyncSender<ClaimedFrame<TracedFrame>>,
     ) {
         let mut tracer = renderer_of(self.setup.picture.renderer);
-        let mut reported = ReportedNotes::default();
+        let mut notes = ReportedNotes::default();
         for ClaimedFrame { claim, result } in loaded {
-            // A frame that has only been read when the interrupt comes is dropped.
+            // Drop a frame that was read but not started when the interrupt was raised
             if self.interrupt.is_raised() {
                 return;
             }
-            // Build the tree, and let the next frame be read
             let (task, built) = match result {
                 StageResult::Frame(frame) => {
                     let task = frame.task.clone();
-                    (self.watch)(Event::Entered(task.frame, Stage::Trace));
+                    (self.on_event)(Event::StageEntered(task.frame, Stage::Trace));
                     let build = || tracer.prepare(self.setup, frame);
-                    (task, guarded(|| in_pool(build).map_err(|e| e.to_string())))
+                    (task, catch_panic(|| Ok(in_pool(build)?)))
                 }
-                StageResult::Failed(task, reason) => (task, Err(reason)),
+                StageResult::Failed(failed) => {
+                    let (task, error) = *failed;
+                    (task, Err(error))
+                }
             };
             if let Some(is_built) = &is_built {
-                // The reader may have ended.
+                // The reader may have ended
                 let _ = is_built.send(());
             }
             // Trace the image, in the planes of an earlier one
             let traced = built.and_then(|mut frame| {
-                reported.report_new(std::mem::take(&mut frame.notes), self.watch);
+                notes.report(std::mem::take(&mut frame.notes), self.on_event);
                 if let Ok(film) = spare.try_recv() {
                     tracer.recycle(film);
                 }
                 let trace = || tracer.render(self.setup, frame, &self.stop);
-                guarded(|| in_pool(trace).map_err(|e| e.to_string()))
+                catch_panic(|| Ok(in_pool(trace)?))
             });
             let result = match traced {
                 Ok(traced) => StageResult::Frame(traced),
                 Err(_) if self.stop.is_raised() => return,
-                Err(reason) => {
-                    // The failure may have left its buffers in an invalid state.
+                Err(error) => {
+                    // The failure may have left the buffers in an inconsistent state
                     tracer = renderer_of(self.setup.picture.renderer);
-                    StageResult::Failed(task, reason)
+                    StageResult::Failed(Box::new((task, error)))
                 }
             };
             if is_built.is_none() {

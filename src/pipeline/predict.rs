@@ -157,7 +157,7 @@ impl fmt::Display for MemoryNeed {
 /// Predicts the memory of the frames of a job.
 #[derive(Debug, Clone, Copy)]
 pub struct MemoryModel<'a> {
-    setup: &'a Setup,
+    pub(super) setup: &'a Setup,
     own_radii: bool,
     has_ids: bool,
     has_velocities: bool,

@@ -74,16 +74,16 @@ fn limits_leave_out_what_does_not_fit_alone() {
     let model = MemoryModel::new(&setup);
     let frames = [plain(1000), plain(20_000_000), plain(1000)];
     let small = model.peak(&[frames[0], frames[2]]).total();
-    let schedule = model.schedule(&frames, Some(small), None);
+    let schedule = model.schedule(&frames, Some(Bytes(small)), None);
     let left_out: Vec<usize> = schedule.too_large.iter().map(|(place, _)| *place).collect();
     assert_eq!(left_out, [1]);
     assert_eq!(schedule.overlap, Overlap::Stages);
     assert_eq!(schedule.need.total(), small);
 
     let alone = model.alone(&frames[1]).total();
-    let schedule = model.schedule(&frames, Some(alone), None);
+    let schedule = model.schedule(&frames, Some(Bytes(alone)), None);
     assert!(schedule.too_large.is_empty());
-    let schedule = model.schedule(&[frames[1]; 2], Some(alone), None);
+    let schedule = model.schedule(&[frames[1]; 2], Some(Bytes(alone)), None);
     assert_eq!(schedule.overlap, Overlap::None);
     assert_eq!(schedule.need.total(), alone);
     // With less free memory, no frame is rejected here; they only do not overlap.

@@ -45,7 +45,7 @@ pub enum ColorRule {
         name: String,
         /// The map with the range of the whole sequence.
         map: ColorMap,
-        /// Whether it was asked for by name, so that a frame without it is an error. Otherwise such
+        /// Whether the user named it, so that a frame without it is an error. Otherwise such
         /// a frame has the default colour.
         required: bool,
     },
@@ -206,7 +206,8 @@ impl Setup {
     fn structure_for(&self, particles: usize) -> Structure {
         self.run.accelerator.unwrap_or_else(|| {
             let threads = rayon::current_num_threads();
-            choose(particles, expected_rays(self), threads)
+            let rays = expected_rays(&self.picture.render, &self.picture.scene);
+            choose(particles, rays, threads)
         })
     }
 }

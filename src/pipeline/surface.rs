@@ -204,7 +204,7 @@ fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
         .any(|radius| (radius - median).abs() > RADIUS_TOLERANCE * median)
     {
         notes.push(format!(
-            "radii differ; a smooth surface has one for all, here their median {median} (--radius gives another)"
+            "radii differ; a smooth surface has one for all, here their median {median} (input.radius sets another)"
         ));
     }
     median

@@ -14,7 +14,7 @@ use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use crate::ray::Ray;
 use crate::scene::{
     Background, Camera, CameraView,
-    material::{reflect, refract},
+    material::{reflect, refract, schlick},
 };
 use crate::surface::{Shape, spheres::SphereSurface};
 
@@ -92,9 +92,7 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
     let Some(onward) = refract(ray.direction, normal, ratio) else {
         return AMBIENT + mirrored;
     };
-    let r = scene
-        .material
-        .fresnel_reflectance(-ray.direction.dot(normal), ratio);
+    let r = schlick(scene.material.r0(), -ray.direction.dot(normal));
     AMBIENT + r * mirrored + (1.0 - r) * below(hit.anchor - step, onward)
 }
 

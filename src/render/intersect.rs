@@ -65,6 +65,7 @@ impl RenderContext<'_> {
         if lanes == 0 {
             return;
         }
+        // Weight the background by the part of the light that the surface does not cover
         let background_part = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => 1.0,
             _ => 1.0 - hits.opacity[lane],

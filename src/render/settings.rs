@@ -108,7 +108,7 @@ pub enum RenderError {
     #[error("rendering was interrupted")]
     Interrupted,
     /// A setting is out of range.
-    #[error("{name} = {value} is out of range, it must lie in 1 to {max}")]
+    #[error("{name} = {value} is out of range; it must be from 1 to {max}")]
     OutOfRange {
         /// The setting.
         name: &'static str,
@@ -118,7 +118,7 @@ pub enum RenderError {
         max: u32,
     },
     /// `min_weight` is out of range.
-    #[error("min_weight = {0} is out of range, it must be 0 or lie in {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
+    #[error("min_weight = {0} is out of range; it must be 0, or from {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
     MinWeight(f32),
     /// Both branches would be traced for too many levels.
     #[error(

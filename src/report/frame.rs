@@ -295,7 +295,7 @@ mod tests {
         assert_eq!((bytes.file.positions, bytes.file.structure), (400, 50));
         assert_eq!((bytes.held(), bytes.anonymous()), (1260, 810));
         assert_eq!((bytes.scratch, bytes.build_peak), (10, 470));
-        // A built tree after one in place.
+        // A built tree, after a tree in place.
         report.set_build(&built(0));
         assert_eq!(report.bytes.file, FileBytes::default());
         assert_eq!(report.bytes.anonymous(), 1260);

@@ -254,7 +254,7 @@ mod tests {
         page.end_fold();
         let html = page.html();
         assert!(!html.contains("<script") && !html.contains('\u{202e}') && !html.contains('\u{0}'));
-        // Nowhere does it close an attribute.
+        // The text does not end an attribute anywhere.
         assert!(!html.contains("script>\"") && !html.contains("alert('"));
         assert_eq!(html.matches("&lt;script&gt;").count(), 15);
     }

@@ -76,7 +76,7 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     assert_ne!(scenes[1].camera, setup.picture.scene.camera);
     assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());
     assert_eq!(scenes[0].lights, scenes[1].lights);
-    // The default lights come from where frame 0 is seen from.
+    // The default lights depend on the camera of frame 0.
     let crate::scene::LightKind::Directional { to_light } = scenes[0].lights[0].kind else {
         panic!("the key light is directional");
     };
@@ -119,7 +119,7 @@ fn a_key_without_a_picture_is_named() {
 
 #[test]
 fn a_frame_without_a_picture_is_named() {
-    // Through what is looked at, and over its head.
+    // Paths through the point that the camera looks at, and vertically above it.
     for (eyes, what) in [
         (
             [[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0]],

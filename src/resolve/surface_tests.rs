@@ -83,7 +83,7 @@ fn one_body_has_exact_fresnel_and_absorption() {
     assert_eq!(of(""), Material::DEFAULT);
     let smooth = "render.surface = \"smooth\"\nmaterial.absorption = [0.5, 1, 1]\n";
     assert_eq!(of(smooth).fresnel, Fresnel::Exact);
-    // A quarter of the diagonal of 7.
+    // A quarter of the diagonal, which is 7.
     let loss = of(smooth).extinction;
     assert!((loss.x - 2.0_f32.ln() / 1.75).abs() < 1e-5);
     assert_eq!([loss.y, loss.z], [0.0; 2]);

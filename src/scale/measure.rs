@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::motion::spread_place;
 use super::peaks::Peaks;
-use super::{Budget, CellRequest};
+use super::{Budget, CellError, CellRequest};
 use crate::accel::BuildReport;
 use crate::accel::view::TreeView;
 use crate::render::{ParticleShading, RayCounts, RenderSettings, render};
@@ -79,8 +79,8 @@ impl Builds {
     /// The first error of `build`.
     pub(super) fn repeat(
         budget: Budget,
-        mut build: impl FnMut() -> Result<BuildReport, String>,
-    ) -> Result<Self, String> {
+        mut build: impl FnMut() -> Result<BuildReport, CellError>,
+    ) -> Result<Self, CellError> {
         let allowed = match budget {
             Budget::Seconds(seconds) => BUILD_PART * seconds,
             Budget::Images(_) => BUILD_SECONDS,
@@ -113,7 +113,7 @@ pub(super) fn trace(
     tree: TreeView<'_>,
     request: &CellRequest,
     peaks: &Peaks,
-) -> Result<Images, String> {
+) -> Result<Images, CellError> {
     let settings = render_settings(request);
     let aspect = f64::from(request.width) / f64::from(request.height);
     let surface = SphereSurface::new(tree);
@@ -125,19 +125,17 @@ pub(super) fn trace(
     };
     let mut spent = 0.0;
     for index in 0.. {
+        // Stop if the budget is spent, otherwise choose a position on the path
         let place = match request.budget {
             Budget::Images(count) if index == count => break,
             Budget::Images(count) => f64::from(index) / f64::from(count),
             Budget::Seconds(allowed) if spent >= allowed && index >= LEAST_IMAGES => break,
             Budget::Seconds(_) => spread_place(index),
         };
-        let scene = request
-            .stage
-            .scene(request.motion, place, aspect)
-            .map_err(|e| format!("camera: {e}"))?;
+        let scene = request.stage.scene(request.motion, place, aspect)?;
+        // Trace one image, and measure its time without preparation or release
         let start = Instant::now();
-        let (film, rays) =
-            render(&[&surface], &scene, &shading, &settings, &never).map_err(|e| e.to_string())?;
+        let (film, rays) = render(&[&surface], &scene, &shading, &settings, &never)?;
         let seconds = start.elapsed().as_secs_f64();
         peaks.look();
         drop(film);

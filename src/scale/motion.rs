@@ -119,7 +119,7 @@ mod tests {
     #[test]
     fn both_is_the_one_after_the_other() {
         let view = Motion::Both.view_at(0.5, &START, CENTER);
-        // The eye has gone half of (5, 5, 0), then half a turn about the middle.
+        // The camera has moved by half of (5, 5, 0), then half a turn around the centre.
         close(view.eye, 2.0 * CENTER - DVec3::new(2.5, 2.5, 0.0));
     }
 

@@ -5,7 +5,7 @@ use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_formats::{ParticleFrame, Radius, is_radius};
 
-use super::{CellRequest, FrameSource, Source, Stage};
+use super::{CellError, CellRequest, FrameSource, Source, Stage};
 use crate::accel::{SphereRadius, Spheres};
 use crate::metrics::memory;
 use crate::reading::read_budget;
@@ -34,17 +34,16 @@ impl Particles {
     ///
     /// # Errors
     /// They do not fit into memory, or the frame cannot be read.
-    pub fn of(request: &CellRequest) -> Result<Self, String> {
+    pub fn of(request: &CellRequest) -> Result<Self, CellError> {
         let need = LEAST_BYTES.saturating_mul(request.particles as u64);
         if let Some(free) = memory::available()
             && need > free
         {
-            return Err(format!(
-                "out of memory: {} particles need at least {} MiB, {} MiB are free",
-                request.particles,
-                need >> 20,
-                free >> 20
-            ));
+            return Err(CellError::TooManyParticles {
+                particles: request.particles,
+                need: need >> 20,
+                free: free >> 20,
+            });
         }
         match &request.source {
             Source::Box => Ok(Self::in_box(request.particles, request.seed)),
@@ -62,19 +61,19 @@ impl Particles {
         }
     }
 
-    fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, String> {
+    fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, CellError> {
         // Find and read the frame
         let input = SequenceInput::from_path(&source.path);
-        let sequence =
-            Sequence::open_within(&input, read_budget(None, None)).map_err(|e| e.to_string())?;
+        let sequence = Sequence::open_within(&input, read_budget(None, None))?;
         let index = sequence
             .frames()
             .iter()
             .position(|f| f.number == source.frame)
-            .ok_or_else(|| format!("{}: no frame {}", source.path.display(), source.frame))?;
-        let frame = sequence
-            .load(index, source.origin)
-            .map_err(|e| e.to_string())?;
+            .ok_or_else(|| CellError::MissingFrame {
+                path: source.path.clone(),
+                frame: source.frame,
+            })?;
+        let frame = sequence.load(index, source.origin)?;
         let ParticleFrame {
             positions, radius, ..
         } = frame;
@@ -168,19 +167,20 @@ impl FrameSurvey {
         path: &std::path::Path,
         index: usize,
         aspect: f64,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, CellError> {
         let question = Question {
             color: ColorQuestion::None,
             radius: RadiusQuestion::Auto,
         };
-        let survey = Survey::of_frames(sequence, [index], question).map_err(|e| e.to_string())?;
+        let survey = Survey::of_frames(sequence, [index], question)?;
         let frame = sequence.frames()[index].number;
         if survey.most_particles == 0 {
-            return Err(format!(
-                "{}: frame {frame} has no particles, there is nothing to measure",
-                path.display()
-            ));
+            return Err(CellError::NoParticles {
+                path: path.to_owned(),
+                frame,
+            });
         }
+        // Frame the spheres, which extend beyond their centres
         let reach = f64::from(survey.radius.unwrap_or(0.0).max(survey.reach));
         let bounds = Bounds {
             min: survey.min - reach,
@@ -230,7 +230,7 @@ mod tests {
         };
         assert_eq!(chosen(1), chosen(1));
         assert_ne!(chosen(1), chosen(2));
-        // A tenth of the first half: 5000, standard deviation about 47.
+        // Expected in the first half: 5000, with a standard deviation of about 47.
         let first_half = chosen(1).iter().filter(|i| **i < 50_000).count();
         assert!((4700..5300).contains(&first_half), "{first_half}");
     }

@@ -72,7 +72,7 @@ pub enum CameraError {
     #[error("a coordinate is not a finite number")]
     NotFinite,
     /// A coordinate exceeds the range of f32.
-    #[error("eye or look_at is too far away for single precision, whose numbers end at 3e38")]
+    #[error("eye or look_at is too far away for single precision (limit 3e38)")]
     TooFar,
     /// `eye` and `look_at` are the same point.
     #[error("eye and look_at are the same point; move one of them")]
@@ -81,7 +81,7 @@ pub enum CameraError {
     #[error("up is zero or points along the view; choose another camera.up")]
     NoUp,
     /// Field of view outside 0 to 180 degrees.
-    #[error("fov must lie above 0 and below 180 degrees")]
+    #[error("fov must be above 0 and below 180 degrees")]
     FieldOfView,
     /// The aspect ratio is zero, negative or not finite.
     #[error("image width over height must be above 0")]
@@ -179,11 +179,6 @@ impl Camera {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
         let direction = self.forward + d.x * self.right + d.y * self.up;
         Ray::new(self.eye, direction.normalize())
-    }
-
-    /// Distance along the view axis of the point at `t` on a ray of this camera.
-    pub fn depth(&self, ray: &Ray, t: f32) -> f32 {
-        t * ray.direction.dot(self.forward)
     }
 
     /// The view axis.

@@ -39,14 +39,6 @@ fn centre_and_corners() {
 }
 
 #[test]
-fn depth_is_along_the_axis() {
-    let camera = Camera::new(&thesis_view(), 1.0, DVec3::ZERO).unwrap();
-    let ray = camera.ray(Vec2::new(0.0, 0.0));
-    let t = 3.0_f32.sqrt() * 5.0;
-    assert!((camera.depth(&ray, t) - 5.0).abs() < 1e-5);
-}
-
-#[test]
 fn far_from_zero_keeps_precision_and_the_matrix_is_in_world_units() {
     let far = DVec3::new(1e6, -2e6, 3e6);
     let view = CameraView {

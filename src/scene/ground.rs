@@ -6,7 +6,6 @@
 use glam::Vec3;
 
 use super::Bounds;
-use crate::ray::Ray;
 
 /// Default colour of the ground (linear RGB): a dark grey that shows shadows and does not distract from the particles.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
@@ -110,31 +109,6 @@ impl Ground {
         self.center += by * self.up;
         self.height += by;
     }
-
-    /// Distance at which `ray` hits the plane from above, if it is in the range of the ray.
-    pub fn hit(&self, ray: &Ray) -> Option<f32> {
-        let slope = ray.direction.dot(self.up);
-        if slope >= 0.0 {
-            return None;
-        }
-        let t = (self.height - ray.origin.dot(self.up)) / slope;
-        (t >= ray.t_min && t < ray.t_max && t.is_finite()).then_some(t)
-    }
-
-    /// Opacity of the ground at `point`: 1 near the centre, 0 far away, with a smooth transition.
-    pub fn opacity(&self, point: Vec3) -> f32 {
-        let distance = point.distance(self.center);
-        let span = (self.fade_end - self.fade_start).max(f32::MIN_POSITIVE);
-        let x = ((self.fade_end - distance) / span).clamp(0.0, 1.0);
-        x * x * (3.0 - 2.0 * x)
-    }
-
-    /// Length to step off the plane at `point` so that the next ray does not hit it again: a few ulps of the numbers
-    /// that determine the point.
-    pub fn offset(&self, point: Vec3, t: f32) -> f32 {
-        let scale = point.abs().max_element().max(t).max(self.height.abs());
-        (8.0 * f32::EPSILON * scale).max(f32::MIN_POSITIVE)
-    }
 }
 
 /// The largest integer not above `value`; saturates. It avoids the function call that `floor` needs on machines
@@ -170,17 +144,6 @@ mod tests {
     }
 
     #[test]
-    fn is_met_from_above_only_and_within_range() {
-        let floor = floor();
-        let down = Ray::new(Vec3::new(3.0, 4.0, 11.0), Vec3::NEG_Z);
-        assert_eq!(floor.hit(&down), Some(10.0));
-        assert_eq!(floor.hit(&Ray { t_max: 9.9, ..down }), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::NEG_Z)), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::splat(5.0), Vec3::X)), None);
-    }
-
-    #[test]
     fn squares_alternate_around_the_middle() {
         for up in [
             Vec3::X,
@@ -200,15 +163,5 @@ mod tests {
             assert_eq!(at(0.6, 0.7), light);
             assert!(across.dot(along).abs() < 1e-6 && across.dot(up).abs() < 1e-6);
         }
-    }
-
-    #[test]
-    fn fades_smoothly() {
-        let floor = floor();
-        assert_eq!(floor.opacity(floor.center), 1.0);
-        let far = floor.center + Vec3::X * (floor.fade_end * 1.01);
-        assert_eq!(floor.opacity(far), 0.0);
-        let middle = 0.5 * (floor.fade_start + floor.fade_end);
-        assert!((floor.opacity(floor.center + Vec3::Y * middle) - 0.5).abs() < 1e-4);
     }
 }

@@ -108,15 +108,6 @@ impl Material {
         let root = (1.0 - self.ior) / (1.0 + self.ior);
         root * root
     }
-
-    /// The Fresnel reflectance at the absolute `cosine` between ray and normal. `ratio` is the index of refraction on
-    /// the side of the ray over that on the other side. 1 under total internal reflection.
-    pub fn fresnel_reflectance(&self, cosine: f32, ratio: f32) -> f32 {
-        match self.fresnel {
-            Fresnel::Schlick => schlick(self.r0(), cosine),
-            Fresnel::Exact => dielectric(cosine, ratio),
-        }
-    }
 }
 
 /// The extinction coefficient of a medium that attenuates white light to `color` over `length`. Black is treated as

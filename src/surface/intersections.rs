@@ -152,7 +152,8 @@ impl Intersections {
     }
 
     /// The intersections of the first `count` rays.
-    pub fn all(&self, count: usize) -> Vec<Option<Intersection>> {
+    #[cfg(test)]
+    pub(crate) fn all(&self, count: usize) -> Vec<Option<Intersection>> {
         let found = |lane| (self.mask >> lane & 1 == 1).then(|| self.get(lane));
         (0..count).map(found).collect()
     }

@@ -35,8 +35,8 @@ pub(super) struct Look {
 }
 
 impl Look {
-    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if it is
-    /// `asked` for.
+    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if `asked`
+    /// requires it.
     pub(super) fn at(
         sequence: &Sequence,
         index: usize,

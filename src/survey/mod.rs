@@ -12,7 +12,7 @@ use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin, names};
 
-use crate::scene::{Bounds, RgbEncoding, is_rgb};
+use crate::scene::{RgbEncoding, is_rgb};
 
 mod look;
 mod packing;
@@ -247,6 +247,7 @@ impl Survey {
                 }
             }
         }
+        // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
             _ => Ok(totals.finish(if sequence.is_y_up() {
@@ -254,14 +255,6 @@ impl Survey {
             } else {
                 DVec3::Z
             })),
-        }
-    }
-
-    /// The box in the form that scenes use.
-    pub fn bounds(&self) -> Bounds {
-        Bounds {
-            min: self.min,
-            max: self.max,
         }
     }
 }

@@ -75,7 +75,7 @@ mod tests {
         along().flat_map(plane).collect()
     }
 
-    /// A block of water of particles of radius 0.1.
+    /// A block of water, with particles of radius 0.1.
     fn block(count: u16) -> Vec<Vec3> {
         let source = BlockSource::new(BlockSettings {
             count: u64::from(count),
@@ -114,7 +114,7 @@ mod tests {
     fn a_large_native_frame_tells_what_all_its_particles_tell() {
         let all = block(u16::MAX);
         let whole = packed(&all).expect("a radius");
-        // Three blocks far from one another: more than are looked at one by one.
+        // Three distant blocks, with more particles than the limit for inspecting each.
         let far = (0..3_u8).map(|i| 1e3 * f32::from(i) * Vec3::X);
         let all = far
             .flat_map(|offset| all.iter().map(move |p| *p + offset))

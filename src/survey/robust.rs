@@ -141,7 +141,7 @@ pub(super) fn middle(mut values: Vec<f32>) -> Option<f32> {
 mod tests {
     use super::*;
 
-    /// `side` by `side` particles in the unit square of a plane, and one more.
+    /// Bounds of `side` by `side` particles in the unit square of a plane, and one other particle.
     fn plane_and(side: u8, other: DVec3) -> (DVec3, DVec3) {
         let step = |i: u8| f64::from(i) / f64::from(side - 1);
         let mut all: Vec<DVec3> = (0..side)
@@ -166,7 +166,7 @@ mod tests {
     #[test]
     fn one_of_few_that_lies_near_is_kept() {
         assert_eq!(plane_and(5, DVec3::new(0.5, 0.5, 0.9)).1.z, 0.9);
-        // Of less than sixteen none is left out.
+        // Of fewer than sixteen particles, none is omitted.
         assert_eq!(plane_and(3, DVec3::new(0.5, 0.5, 1e4)).1.z, 1e4);
     }
 }

@@ -209,7 +209,7 @@ mod tests {
         near(streamed.touching, whole);
         let packed = estimate_packed(&single, whole).expect("some");
         near(streamed.packed.expect("asked for"), packed);
-        // Of particles at random the nearest neighbour is near: this tells one from the other.
+        // Nearest neighbours of randomly placed particles are close, so the two estimates differ.
         assert!(packed > 1.5 * whole, "{packed} {whole}");
         let asked_less = spacing(&source, &some.positions, false).expect("there");
         assert_eq!(

@@ -51,7 +51,7 @@ fn colours_of_the_particles_are_used() {
     // Whoever names a map or a range means the length.
     for options in [&["--map", "greys"][..], &["--range", "0", "1"]] {
         let by = [&["--color-by", "cd"][..], options].concat();
-        render(&shop, "in", &by).tells("colour by `cd`, seen from");
+        render(&shop, "in", &by).tells("colour by `cd`, range");
     }
     // Bytes are sRGB: 188 of 255 is half the light.
     table(&shop, "red,green,blue", "188,0,255");
@@ -79,7 +79,7 @@ fn bytes_of_vtk_and_ply_are_colours() {
 fn speed_goes_before_colours_unless_they_are_named() {
     let shop = Workshop::new();
     table(&shop, "vx,vy,vz,rgb_x,rgb_y,rgb_z", "1,2,3,0.25,0.5,0.75");
-    render(&shop, "in", &[]).tells("colour by `velocity`, seen from");
+    render(&shop, "in", &[]).tells("colour by `velocity`, range");
     render(&shop, "in", &["--color-by", "RGB"]).tells("colour by the RGB attribute `RGB`");
     assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
     render(&shop, "in", &["--set", "material.color=[0.1,0.2,0.3]"]);

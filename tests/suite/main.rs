@@ -2,6 +2,7 @@
 
 mod harness;
 mod picture;
+mod simd;
 
 mod architecture;
 mod arithmetic;

@@ -111,7 +111,7 @@ fn native_frames_are_traced_where_they_lie() {
     let representations = ["--representations", "memory,f32,q16,q10"];
     let structures = ["--structures", "lbvh,kdtree"];
     let ran = run(&workshop, &[counts, representations, structures].concat()).expect(0);
-    let ran = ran.tells("native frames (f32, q16, q10) are traced where they lie");
+    let ran = ran.tells("native frames (f32, q16, q10) are traced in place");
     for wanted in ["kdtree, q10 file", "Memory by part", "Native frames, made"] {
         assert!(ran.text().contains(wanted), "{}", ran.text());
     }
@@ -186,7 +186,7 @@ fn representations_need_a_structure() {
             "--representations",
             "memory,q10",
         ],
-        "--representations q10: native frames lie in k-d order and are traced where they lie: add \
+        "--representations q10: native frames are in k-d order and are traced in place: add \
          kdtree to --structures",
     );
 }
@@ -273,13 +273,9 @@ fn one_particle_and_all_in_one_place() {
 fn options_have_ranges() {
     let workshop = Workshop::new();
     for (option, value, wanted) in [
-        ("--particles", "-5", "`-5` is no number of particles"),
-        (
-            "--particles",
-            "1e3,many",
-            "`many` is no number of particles",
-        ),
-        ("--particles", "", "is no number of particles"),
+        ("--particles", "-5", "invalid particle count `-5`"),
+        ("--particles", "1e3,many", "invalid particle count `many`"),
+        ("--particles", "", "invalid particle count"),
         (
             "--particles",
             "1e10",
@@ -289,12 +285,12 @@ fn options_have_ranges() {
         (
             "--motions",
             "rotate",
-            "wants one of rotation, translation, both",
+            "expected one of rotation, translation, both",
         ),
         (
             "--representations",
             "f16",
-            "wants one of memory, f32, q16, q10",
+            "expected one of memory, f32, q16, q10",
         ),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
@@ -319,7 +315,7 @@ fn options_have_ranges() {
     }
     for seconds in ["0", "-1", "nan", "inf"] {
         let ran = workshop.run(&["scale", "--seconds", seconds]).expect(2);
-        ran.tells("wants seconds above 0");
+        ran.tells("expected seconds above 0");
     }
     refused(&workshop, &["--seconds", "1"], "cannot be used with");
     assert!(files(workshop.path()).is_empty());

@@ -68,5 +68,5 @@ fn how_the_work_is_gone_about_is_kept_and_may_change() {
     workshop
         .render(&["--threads", "-3"])
         .expect(2)
-        .tells("--threads: job.threads: wants \"all\" or a whole number from 1");
+        .tells("--threads: job.threads: expected \"all\" or a whole number from 1");
 }

@@ -83,7 +83,7 @@ fn who_is_at_work_and_who_has_died() {
     assert_eq!(told["running"], serde_json::json!([]));
     let text = workshop.run(&["status", "out"]).expect(75).text();
     assert!(
-        text.contains("has died: whoever works next takes over"),
+        text.contains("has died; the next worker takes over"),
         "{text}"
     );
 }

@@ -1,4 +1,4 @@
-//! The frame that comes of a conversion, begun when the first part is in order.
+//! The output frame of a conversion, started when the first part is in order.
 
 use super::columns::StoredColumns;
 use super::order::{OrderedPart, PartData};
@@ -9,14 +9,14 @@ use crate::native::{
     FrameIndex, FrameSpec, FrameWriter, RadiusSpec, radius_range, smallest_encoding,
 };
 
-/// Writes ordered parts to the frame.
+/// Writes ordered parts to the output frame.
 pub(super) struct FrameOutput<'a> {
     pub(super) asked: ConvertRequest<'a>,
     pub(super) columns: &'a StoredColumns,
     pub(super) survey: &'a Survey,
-    /// Largest error of each attribute; known before the first part comes.
+    /// Largest error of each attribute, known before the first part is written.
     pub(super) errors: Vec<f64>,
-    /// Radius of all particles that have radii of their own, if these are alike.
+    /// The radius of all particles, if they have radii of their own that are all equal.
     common: Option<f32>,
     run_len: usize,
     pushed: u64,
@@ -68,7 +68,7 @@ impl<'a> FrameOutput<'a> {
         Ok(())
     }
 
-    /// Completes the frame, if the source is what it was all the time.
+    /// Completes the frame, if the source did not change meanwhile.
     pub(super) fn finish(mut self) -> Result<FrameIndex, ConvertError> {
         let writer = match self.writer.take() {
             Some(writer) => writer,
@@ -81,7 +81,7 @@ impl<'a> FrameOutput<'a> {
         Ok(finished.map_err(|e| FrameError::io(self.asked.path, e))?)
     }
 
-    /// Begins the frame, whose first particles are `ordered`.
+    /// Starts the frame; `ordered` are its first particles.
     fn begin(&self, ordered: &OrderedPart) -> Result<FrameWriter, ConvertError> {
         let ConvertRequest {
             source,
@@ -89,6 +89,7 @@ impl<'a> FrameOutput<'a> {
             path,
             ..
         } = self.asked;
+        // Find the common radius
         let own = self.survey.radii.filter(|_| self.columns.radius.is_some());
         let common = match settings.radius {
             RadiusRule::All(radius) => Some(radius),
@@ -96,10 +97,12 @@ impl<'a> FrameOutput<'a> {
                 self.common.or(source.common_radius()).or(otherwise)
             }
         };
+        // Choose the encoding
         let smallest = own.map(|[low, _]| low).or(common);
         let encoding = settings
             .encoding
             .unwrap_or_else(|| smallest_encoding(&ordered.positions, settings.bound, smallest));
+        // Describe the frame
         let attributes = self.columns.attributes.iter().zip(&self.errors);
         let spec = FrameSpec {
             is_y_up: self.asked.settings.is_y_up,

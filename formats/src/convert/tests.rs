@@ -1,4 +1,4 @@
-//! Every converted frame is compared with its source, particle by particle, whatever the memory was.
+//! Compares every converted frame with its source, particle by particle, for different memory limits.
 
 use std::collections::HashMap;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::native::tests::clustered;
 use crate::native::{Access, Bound, Encoding, FrameIndex, NativeFile, StoredType};
 use crate::{Attribute, AttributeData, FrameError, Positions, RawParticles};
 
-/// Room for parts of `part_len` particles, `chunks` of 256 records in memory.
+/// Limits for parts of `part_len` particles and `chunks` chunks of 256 records in memory.
 fn tight(part_len: usize, chunks: usize) -> Limits {
     Limits {
         is_whole: false,
@@ -30,7 +30,7 @@ fn tight(part_len: usize, chunks: usize) -> Limits {
     }
 }
 
-/// Everything at once.
+/// Limits that order all particles at once.
 fn whole() -> Limits {
     Limits {
         is_whole: true,
@@ -106,9 +106,11 @@ fn converted(raw: &RawParticles, settings: &ConvertSettings, limits: Limits) -> 
     report
 }
 
-/// Every finite particle of `raw` is in the frame once, as near as the frame says, with its own values.
+/// Every finite particle of `raw` is in the frame exactly once, within the error that the frame states, with
+/// its own values.
 #[track_caller]
 fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &FrameIndex) {
+    // Open the frame
     let file = NativeFile::open(path, Access::Map).expect("whole");
     assert_eq!(file.index(), index);
     let frame = file.frame().expect("unchanged");
@@ -116,19 +118,22 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
     let leaves = frame.leaves().expect("in place");
     let id = frame.attribute("id").expect("kept");
     let kept = |i: usize| crate::is_near(&(raw.positions.get(i) - settings.origin).as_vec3());
+    // Mark the particles that the conversion drops
     let mut seen: Vec<bool> = (0..raw.positions.len()).map(|i| !kept(i)).collect();
     let dropped = seen.iter().filter(|s| **s).count();
     let mut largest = 0.0_f64;
     let mut last_at = HashMap::new();
+    // Compare each stored particle with its source
     for slot in 0..usize::try_from(index.count).expect("few") {
         let place = id.low_bits(slot).expect("an id") as usize;
         assert!(!std::mem::replace(&mut seen[place], true), "{place} twice");
-        // Of coincident particles the first in the source is the first here.
+        // Among coincident particles, the first in the source is the first here.
         let point = (raw.positions.get(place) - settings.origin).as_vec3() + Vec3::ZERO;
         let before = last_at.insert(point.to_array().map(f32::to_bits), place);
         assert!(before < Some(place), "{before:?} after {place}");
         let found = leaves.center(slot).as_dvec3() + settings.origin;
         largest = largest.max(found.distance(raw.positions.get(place)));
+        // Compare the attributes
         for attribute in &raw.attributes {
             let Some(view) = frame.attribute(&attribute.name) else {
                 continue;
@@ -146,6 +151,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
                 assert!(difference <= error, "{} {given}", attribute.name);
             }
         }
+        // Check the box of the leaf
         let node = &leaves.nodes[slot / 128];
         let own = leaves.radii.load(slot / 16).map(|r| r.0[slot % 16]);
         if own.is_none() {
@@ -157,6 +163,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
             assert!(node.child_holds(slot / 16 % 8, &point));
         }
     }
+    // Check the counts and the stated errors
     assert!(seen.into_iter().all(|s| s));
     assert_eq!(index.dropped, dropped as u64);
     assert!(largest <= index.max_error, "{largest} {}", index.max_error);
@@ -227,7 +234,7 @@ fn particles_in_one_place_are_cut_anywhere() {
     }
 }
 
-/// Few places for many particles, so that each is shared over blocks and parts; zeros of both signs.
+/// Few positions for many particles, so that blocks and parts share each position; zeros of both signs.
 #[test]
 fn coincident_particles_keep_the_order_of_the_source() {
     for places in [40, 700, 9000] {
@@ -259,14 +266,14 @@ fn what_is_not_finite_is_left_out() {
             8 => position.z = f32::NEG_INFINITY,
             9 => position.y = -1.01 * crate::FARTHEST,
             10 => position.x = crate::FARTHEST,
-            // Whole stretches of it.
+            // Whole ranges of the source.
             _ if (6000..6900).contains(&i) => position.y = f32::INFINITY,
             _ => {}
         }
     }
     for limits in [whole(), tight(4096, 0)] {
         let report = converted(&raw(all.clone()), &settings(), limits);
-        // One of the stretch is just near enough.
+        // One particle of the range is just near enough.
         assert_eq!(report.index.dropped, 899 + 3 * 19);
     }
     let none = vec![Vec3::NAN; 5000];
@@ -321,7 +328,7 @@ fn attributes_are_stored_as_chosen() {
     refused(&raw, &unknown, "velocity, place");
 }
 
-/// Nothing comes of it but a message with `text`.
+/// The conversion fails with a message that contains `text`, and leaves no file.
 #[track_caller]
 fn refused(raw: &RawParticles, settings: &ConvertSettings, text: &str) {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -443,7 +450,7 @@ fn frames_are_converted_again() {
     assert!(fs::read(&second).expect("readable") == fs::read(&third).expect("readable"));
 }
 
-/// Ends the conversion after so many calls.
+/// Cancels the conversion after this many calls.
 struct Ends(AtomicU64);
 
 impl Progress for Ends {
@@ -502,11 +509,11 @@ fn no_room_to_put_aside_is_told() {
     assert!(matches!(error, ConvertError::Frame(FrameError::Io { .. })));
     assert!(error.to_string().contains("none"), "{error}");
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 0);
-    // Where nothing has to be put aside, no file is asked for.
+    // If nothing is spilled, no scratch file is created.
     convert_to(&path, &source, &settings, tight(4096, 10_000)).expect("converted");
 }
 
-/// A source that is another one when it is read again.
+/// A source that returns different particles when it is read again.
 struct Changing(RawParticles, AtomicU64);
 
 impl ParticleSource for Changing {
@@ -574,7 +581,7 @@ fn budgets_are_shared_out_within_the_memory() {
     }
     let small = Limits::of(&ConvertSettings::default(), 10_000_000, 12, 12);
     assert!(small.is_whole);
-    // The show case keeps everything in memory.
+    // The showcase keeps all particles in memory.
     let settings = ConvertSettings {
         memory: 12 * gib,
         ..ConvertSettings::default()

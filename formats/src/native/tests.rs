@@ -1,4 +1,4 @@
-//! There and back, and every way to damage a file.
+//! Round trips, and every kind of damage to a file.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use super::layout::{RadiiIndex, RadiusIndex};
 use super::*;
 use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Positions, Radius, RawParticles};
 
-/// Under an interpreter not every byte can be tried.
+/// Miri is too slow to try every byte.
 const STRIDE: usize = if cfg!(miri) { 37 } else { 1 };
 
 fn frame(count: u8, origin: DVec3) -> ParticleFrame {
@@ -61,7 +61,7 @@ fn read_back(bytes: &[u8]) -> Result<RawParticles, ParseError> {
     FORMAT.read(bytes, &steps[0])
 }
 
-/// Positions and velocities of the particles by their ids, which count down from the largest.
+/// Positions and velocities of the particles in the order of their ids, which count down from the largest.
 fn by_id(raw: &RawParticles, count: usize) -> Vec<(DVec3, [f64; 3])> {
     let named = |name: &str| {
         let found = raw.attributes.iter().find(|a| a.name == name);
@@ -122,7 +122,7 @@ fn radii_come_back() {
     let Some(Radius::PerParticle(found)) = &again.radius else {
         panic!("radii of their own")
     };
-    // x is the number of the particle.
+    // x is the index of the particle.
     for (position, radius) in again.positions.iter().zip(found) {
         assert_eq!(*radius, position.x + 1.0);
     }
@@ -205,13 +205,13 @@ fn every_flipped_byte_is_an_error_or_padding() {
         match read_back(&damaged) {
             Err(ParseError::Malformed { .. }) => {}
             Err(other) => panic!("byte {at}: {other}"),
-            // Zeros between sections mean nothing.
+            // Damaged zeros between sections have no effect.
             Ok(raw) => assert!(at >= layout::HEADER_LEN && raw == expected, "byte {at}"),
         }
     }
 }
 
-/// An index that lies, under valid checksums.
+/// A false index with correct checksums.
 #[track_caller]
 fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
     static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| bytes(&frame(17, DVec3::ZERO)));
@@ -220,7 +220,7 @@ fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
     forge(&WHOLE, &index).expect_err("a lie")
 }
 
-/// `whole` with another index under valid checksums, read.
+/// Reads `whole` with another index and correct checksums.
 fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
     let index = rkyv::to_bytes::<rkyv::rancor::Error>(index).expect("memory");
     let offset = 24..32;
@@ -281,7 +281,7 @@ fn frames_that_do_not_fit_together_are_not_written() {
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 0);
 }
 
-/// Particles in a few clusters, some of them flat, and far outliers.
+/// Particles in a few clusters, some of them flat, and distant outliers.
 pub(crate) fn clustered(count: u32) -> Vec<Vec3> {
     let unit = |i: u32, k: u32| {
         let hash = (i * 3 + k).wrapping_mul(0x9e37_79b9).rotate_left(13);
@@ -299,12 +299,13 @@ pub(crate) fn clustered(count: u32) -> Vec<Vec3> {
     (0..count).map(place).collect()
 }
 
-/// Stores `positions` with ids and reads them back; they must be as near as the file says.
+/// Stores `positions` with ids and reads them back. Checks that they are within the error that the file states.
 fn stored_within(
     positions: Vec<Vec3>,
     radius: Option<Radius>,
     settings: StoreSettings,
 ) -> FrameIndex {
+    // Store the frame
     let ids = (0..positions.len() as u64).collect();
     let frame = ParticleFrame {
         attributes: vec![Attribute {
@@ -322,6 +323,7 @@ fn stored_within(
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let index = store(&path, &frame, None, &settings).expect("writable");
+    // Read it back
     let access = if cfg!(miri) {
         Access::Read
     } else {
@@ -336,6 +338,7 @@ fn stored_within(
     let AttributeData::U64(ids) = &raw.attributes[0].data else {
         panic!("ids changed their type")
     };
+    // Compare each particle with the given one
     let mut seen = vec![false; frame.len()];
     let mut largest = 0.0_f64;
     for (slot, id) in ids.iter().enumerate() {
@@ -344,6 +347,7 @@ fn stored_within(
         let found = raw.positions.get(slot);
         assert_eq!(found, leaves.center(slot).as_dvec3());
         largest = largest.max(found.distance(frame.positions[id].as_dvec3()));
+        // Check the box of the leaf
         let (node, block) = (slot / 128, slot / 16);
         let center = leaves.center(slot);
         let own = leaves.radii.load(block).map_or(0.0, |r| r.0[slot % 16]);
@@ -358,6 +362,7 @@ fn stored_within(
             sphere
         };
         assert!(leaves.nodes[node].child_holds(block % 8, &sphere), "{slot}");
+        // Check the radius
         if let Some(Radius::PerParticle(radii)) = &frame.radius {
             let RadiusIndex::PerParticle(coded) = index.radius else {
                 panic!("radii of their own")
@@ -479,7 +484,7 @@ fn a_file_does_not_depend_on_threads() {
     assert!(bytes(1) == bytes(3));
 }
 
-/// A file cut while it is mapped: what is gone reads as zeros, and is found out.
+/// A file that is truncated while it is mapped: missing bytes read as zeros, and the check detects it.
 #[cfg(all(target_os = "linux", not(miri)))]
 #[test]
 fn pages_that_are_gone_are_zeros_and_told() {

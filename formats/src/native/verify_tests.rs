@@ -1,4 +1,4 @@
-//! Frames with good checksums whose numbers are those of no frame.
+//! Frames with correct checksums whose numbers cannot belong to a frame.
 
 use glam::{DVec3, Vec3};
 
@@ -7,8 +7,9 @@ use super::super::*;
 use super::*;
 use crate::{Attribute, AttributeData, ParticleFrame, Radius};
 
-/// 300 particles of two sizes of block, so that tight bounds keep some as they are.
+/// 300 particles in blocks of two different sizes, so that tight bounds store some blocks as f32.
 fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
+    // Make positions, a few of them far away
     let positions: Vec<Vec3> = (0..300_u16)
         .map(|i| {
             let far = if i % 50 == 0 { 40.0 } else { 1.0 };
@@ -38,6 +39,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
         dropped: 0,
         file_index: None,
     };
+    // Store the frame and read its bytes
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let settings = StoreSettings {
@@ -49,11 +51,12 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     std::fs::read(path).expect("readable")
 }
 
-/// `bytes` after `harm`, under checksums that fit.
+/// `bytes` after `harm` changed them, with correct checksums.
 fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let mut index = layout::parse(&bytes).expect("whole");
     harm(&mut index, &mut bytes);
+    // Update the checksums of the sections
     let sum = |section: &mut Section| {
         let found = section_of(&bytes, section).expect("inside");
         section.xxh3 = xxh3_64(found);
@@ -67,6 +70,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     for attribute in &mut index.attributes {
         sum(&mut attribute.section);
     }
+    // Replace the index and the header
     let packed = rkyv::to_bytes::<rkyv::rancor::Error>(&index).expect("memory");
     let offset = u64::from_le_bytes(bytes[24..32].try_into().expect("8 bytes"));
     bytes.truncate(usize::try_from(offset).expect("small"));
@@ -76,7 +80,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     bytes
 }
 
-/// Harm is told with these words and this place.
+/// Checks that the fault that `harm` makes is reported with this message at this place.
 #[track_caller]
 fn told(
     bytes: &[u8],
@@ -151,7 +155,7 @@ fn nodes_that_lead_astray() {
         b[at(&i.nodes, 64 + 12)] = 255;
     });
     told(&bytes, "child 3 of node 1 has no box", second, |i, b| {
-        // Lower above upper plane on the last axis.
+        // The lower plane is above the upper plane on the last axis.
         let planes = at(&i.nodes, 64 + 16 + 2 * 16);
         b[planes + 3] = 200;
         b[planes + 8 + 3] = 100;
@@ -160,6 +164,7 @@ fn nodes_that_lead_astray() {
 
 #[test]
 fn positions_that_cannot_be() {
+    // Positions that are not finite, or outside the box of the node
     let bytes = stored(Encoding::F32, false);
     let third = |i: &FrameIndex| i.positions.offset + 2 * 192;
     let set = |value: f32| {
@@ -185,6 +190,7 @@ fn positions_that_cannot_be() {
         third,
         set(1e6),
     );
+    // Positions outside the bounds of the frame
     let first = |i: &FrameIndex| i.positions.offset;
     told(
         &bytes,
@@ -194,7 +200,7 @@ fn positions_that_cannot_be() {
             i.max = i.min;
         },
     );
-    // 300 particles: the last block has 12 and four copies of the last.
+    // Of the 300 particles, 12 are in the last block, followed by four copies of the last one.
     let last = |i: &FrameIndex| i.positions.offset + 18 * 192;
     told(
         &bytes,

@@ -61,15 +61,21 @@ pub(super) fn fitting(pattern: &Pattern, text: &Path) -> Result<Vec<FileName>, S
     Ok(names)
 }
 
-/// A remedy for a file that is not there: names in its directory that come close.
-pub(super) fn hint_for(path: &Path) -> String {
-    let directory = match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    match list(directory) {
-        Ok(files) if !files.is_empty() => format!("; {}", closest(path, directory, &files)),
-        _ => String::new(),
+impl SequenceError {
+    /// The file `path` does not exist. The error names similar files in its directory.
+    pub fn missing(path: &Path) -> Self {
+        let directory = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        let hint = match list(directory) {
+            Ok(files) if !files.is_empty() => format!("; {}", closest(path, directory, &files)),
+            _ => String::new(),
+        };
+        Self::Missing {
+            path: path.to_owned(),
+            hint,
+        }
     }
 }
 

@@ -1,7 +1,7 @@
-//! Files that appear whole or not at all.
+//! Files that appear complete or not at all.
 //!
-//! A temporary is called `.NAME.OWNER.N.part`: by its owner, whoever resumes work in a directory knows what a
-//! killed process left there.
+//! Temporary files are called `.NAME.OWNER.N.part`. The owner in the name shows a process that resumes work in
+//! the directory which files a killed process left there.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, BufWriter, Write};
@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 use std::sync::atomic::{AtomicU32, Ordering};
 
-/// A file under a temporary name beside its own. Dropped before it is published, it is removed.
+/// A file under a temporary name in the directory of its final name. Dropping it before it is published removes it.
 #[derive(Debug)]
 pub(crate) struct Unpublished {
     path: PathBuf,
@@ -19,7 +19,7 @@ pub(crate) struct Unpublished {
 }
 
 impl Unpublished {
-    /// Begins the file that will be `path`.
+    /// Creates the temporary file for `path`.
     ///
     /// # Errors
     /// [`io::Error`] of creating the file.
@@ -38,7 +38,7 @@ impl Unpublished {
         })
     }
 
-    /// Writes `bytes` from byte `at` of the file on.
+    /// Writes `bytes` at byte offset `at`.
     ///
     /// # Errors
     /// [`io::Error`] of writing.
@@ -47,7 +47,7 @@ impl Unpublished {
         std::os::unix::fs::FileExt::write_all_at(&self.file, bytes, at)
     }
 
-    /// Writes `bytes` from byte `at` of the file on.
+    /// Writes `bytes` at byte offset `at`.
     ///
     /// # Errors
     /// [`io::Error`] of writing.
@@ -59,10 +59,10 @@ impl Unpublished {
         file.write_all(bytes)
     }
 
-    /// Syncs the file and gives it its name.
+    /// Syncs the file and renames it to its final name.
     ///
     /// # Errors
-    /// [`io::Error`] of syncing or renaming; the temporary file is removed then.
+    /// [`io::Error`] of syncing or renaming; in that case the temporary file is removed.
     pub(crate) fn publish(mut self) -> io::Result<()> {
         self.file.sync_all()?;
         fs::rename(&self.part, &self.path)?;
@@ -74,16 +74,16 @@ impl Unpublished {
 impl Drop for Unpublished {
     fn drop(&mut self) {
         if !self.is_published {
-            // The error that prevented publishing is reported.
+            // The error that prevented publishing is the one to report.
             let _ = fs::remove_file(&self.part);
         }
     }
 }
 
-/// Fills a file under a temporary name beside `path`, syncs it and renames it to `path`.
+/// Writes a temporary file in the directory of `path` with `fill`, syncs it and renames it to `path`.
 ///
 /// # Errors
-/// [`io::Error`] of creating, writing, syncing or renaming; the temporary file is removed then.
+/// [`io::Error`] of creating, writing, syncing or renaming; in that case the temporary file is removed.
 pub(crate) fn publish<E: From<io::Error>>(
     path: &Path,
     fill: impl FnOnce(&mut BufWriter<&File>) -> Result<(), E>,
@@ -98,14 +98,14 @@ pub(crate) fn publish<E: From<io::Error>>(
 
 static OWNER: OnceLock<String> = OnceLock::new();
 
-/// Names the owner of this process's temporary files, without dots; else it is the process's number. To be
-/// called once, before the first file.
+/// Sets the owner in the names of this process's temporary files, which must not contain dots; the default is
+/// the process id. Call it once, before the first file is created.
 pub fn own_temporaries(owner: &str) {
     let _ = OWNER.set(owner.to_owned());
 }
 
-/// Hidden and ending in `.part`, so that no listing takes it for a frame; distinct for each
-/// living process and call.
+/// The name is hidden and ends in `.part`, so that no listing mistakes the file for a frame. It is distinct for
+/// each live process and each call.
 fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     static COUNT: AtomicU32 = AtomicU32::new(0);
     let name = path
@@ -119,7 +119,7 @@ fn temporary_name(path: &Path) -> io::Result<PathBuf> {
     Ok(path.with_file_name(part))
 }
 
-/// Makes the rename itself last through a power loss, where directories can be opened.
+/// Makes the rename durable across a power loss, on systems where directories can be opened.
 fn sync_directory(path: &Path) -> io::Result<()> {
     if cfg!(not(unix)) {
         return Ok(());

@@ -10,7 +10,7 @@ use super::stream::{publish_stream, write_positions};
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Progress};
 
-/// Writes `positions` to `path`, whole or not at all.
+/// Writes `positions` to `path`. The file appears complete or not at all.
 ///
 /// # Errors
 /// [`FrameError::Io`].
@@ -18,11 +18,11 @@ pub fn write(path: &Path, positions: &[Vec3]) -> Result<(), FrameError> {
     publish(path, |file| fill(file, positions)).map_err(|e| FrameError::io(path, e))
 }
 
-/// Writes the positions of `source` to `path` in its order, rounded to f32, whole or not at all; attributes have
-/// no equivalent in the format.
+/// Writes the positions of `source` to `path` in source order, rounded to f32. The file appears complete or not
+/// at all. The format has no equivalent for attributes.
 ///
 /// # Errors
-/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` wants that.
+/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` cancels.
 pub fn stream(
     path: &Path,
     source: &dyn ParticleSource,
@@ -46,7 +46,7 @@ fn fill(file: &mut impl Write, positions: &[Vec3]) -> io::Result<()> {
 
 fn fill_header(file: &mut impl Write, count: u64) -> io::Result<()> {
     let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 3), }}");
-    // Magic, version and length take 10 bytes; data begin at a multiple of 64, after a newline.
+    // Magic, version and length take 10 bytes. The data begins at a multiple of 64, after a newline.
     let header_len = (10 + dict.len() + 1).next_multiple_of(64) - 10;
     let length = u16::try_from(header_len).map_err(io::Error::other)?;
     file.write_all(b"\x93NUMPY\x01\x00")?;

@@ -1,4 +1,4 @@
-//! Damage to native frames, place by place: it is a named error, or it changes nothing.
+//! Damages native frames at every place: reading gives an error that names the file, or the damage has no effect.
 
 use std::fs;
 use std::hint::black_box;
@@ -13,15 +13,15 @@ mod shrinking;
 
 use frames::{Numbers, Stored};
 
-/// What is done to a byte: each bit alone, a few together, all.
+/// Changes to a byte: each bit alone, several bits, all bits.
 const FLIPS: [u8; 11] = [1, 2, 4, 8, 16, 32, 64, 128, 0x81, 0x3c, 0xff];
 
-/// Reads a whole file from memory, every section verified.
+/// Reads a whole file from memory and verifies every section.
 fn read(bytes: Vec<u8>) -> Result<RawParticles, FrameError> {
     FrameFile::from_bytes(Path::new("a.spf"), bytes)?.read(0)
 }
 
-/// The error names the file, a place in it, and what to do.
+/// Checks that the error names the file, a place in it, and a remedy.
 #[track_caller]
 fn check_error(error: &FrameError, len: usize) {
     let FrameError::Malformed { path, at, what } = error else {
@@ -33,7 +33,7 @@ fn check_error(error: &FrameError, len: usize) {
     assert!(remedies.iter().any(|r| what.contains(r)), "{error}");
 }
 
-/// Looks at everything that a view can show, none of it verified.
+/// Accesses everything in a view without verification.
 fn touch(frame: NativeFrame<'_>) {
     let _ = black_box((frame.verify(), frame.verify_nodes()));
     let leaves = frame.leaves().expect("lengths were checked");
@@ -67,7 +67,7 @@ fn every_byte_of_header_and_index_is_covered() {
     }
 }
 
-/// Reads `damaged`, which differs from `stored` at `places` of its sections.
+/// Reads `damaged`, which differs from `stored` at `places` in its sections.
 #[track_caller]
 fn named_or_same(stored: &Stored, damaged: &[u8], places: &[usize]) {
     let whole = FORMAT

@@ -1,9 +1,9 @@
-//! Files that are cut short while they are mapped: pages that are gone are zeros, and it is found out.
+//! Files that are truncated while they are mapped: missing pages read as zeros, and the check detects it.
 #![cfg(all(target_os = "linux", not(miri)))]
 
 use super::*;
 
-/// Cuts a mapped file down to each length and looks at all of it.
+/// Truncates a mapped file to each length and accesses all of it.
 #[test]
 fn everything_can_be_touched_after_a_cut() {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -25,7 +25,7 @@ fn everything_can_be_touched_after_a_cut() {
     }
 }
 
-/// A file that is put back to its length has lost its bytes all the same.
+/// A file that is restored to its length has still lost its bytes.
 #[test]
 fn what_was_lost_stays_lost() {
     let dir = tempfile::tempdir().expect("a temporary directory");

@@ -39,10 +39,6 @@ fn packet_of(rays: impl IntoIterator<Item = Ray>) -> RayPacket {
     packet
 }
 
-fn levels() -> impl Iterator<Item = SimdLevel> {
-    SimdLevel::ALL.into_iter().filter(|l| l.is_supported())
-}
-
 /// All lanes, poisoned or not, find what they find alone.
 #[test]
 fn poisoned_rays_do_not_change_their_neighbours() {
@@ -51,7 +47,7 @@ fn poisoned_rays_do_not_change_their_neighbours() {
         for structure in structures {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &BuildSettings::new(structure));
-            for level in levels() {
+            for level in tested_levels() {
                 builder.tree_mut().set_simd(level);
                 let view = builder.tree().view();
                 let mut random = Random(23);
@@ -106,7 +102,7 @@ fn points_are_found_as_by_single_rays() {
             for settings in all_settings() {
                 let mut builder = TreeBuilder::new();
                 builder.build(&scene.spheres(), &settings);
-                for level in levels() {
+                for level in tested_levels() {
                     builder.tree_mut().set_simd(level);
                     let mut random = Random(3);
                     for _ in 0..10 {
@@ -133,7 +129,7 @@ fn incoherent_packets_match_brute_force() {
         for settings in all_settings() {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &settings);
-            for level in levels() {
+            for level in tested_levels() {
                 builder.tree_mut().set_simd(level);
                 let view = builder.tree().view();
                 let mut judged = 0;

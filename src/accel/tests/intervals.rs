@@ -144,7 +144,7 @@ fn unions_match_intervals_merged_in_f64() {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &settings);
             let mut judged = 0;
-            for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+            for level in tested_levels() {
                 builder.tree_mut().set_simd(level);
                 let view = builder.tree().view();
                 judged += rays.iter().filter(|ray| judge(&scene, &view, ray)).count();
@@ -174,8 +174,7 @@ fn structures_and_kernels_agree_on_unions_to_the_bit() {
             });
             found.collect::<Vec<_>>()
         };
-        let fused = [SimdLevel::Neon, SimdLevel::Avx2, SimdLevel::Avx512];
-        let fused: Vec<_> = fused.into_iter().filter(|l| l.is_supported()).collect();
+        let fused = tested_fused_levels();
         for levels in [&[SimdLevel::Portable][..], &fused] {
             let mut first = None;
             for settings in all_settings() {

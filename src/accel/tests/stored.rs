@@ -75,7 +75,7 @@ fn check_stored(owned: &OwnedLeaves, name: &'static str, radius: Option<f32>) ->
         let report = tree.build(&leaves, settings).expect(name);
         assert_eq!(report.particles, owned.count);
         assert!(report.sah_cost >= 1.0 && report.file_bytes <= report.peak_bytes);
-        for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+        for level in tested_levels() {
             tree.set_simd(level);
             let view = tree.view(&leaves);
             for ray in rays(&scene, ray_count, 11) {
@@ -159,7 +159,7 @@ fn spheres_of_slots_are_those_stored() {
             let stored = owned.scene("stored", None);
             let mut tree = StoredTree::new();
             tree.build(&owned.leaves(), settings(None)).expect("sound");
-            for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+            for level in tested_levels() {
                 tree.set_simd(level);
                 let loaded = tree.view(&owned.leaves()).run(LoadAll(65));
                 for (index, block) in loaded.iter().enumerate() {
@@ -281,11 +281,11 @@ fn every_fault_has_its_name() {
     );
     assert_eq!(
         fault_of(&|owned| owned.nodes[8].child_mask = 3),
-        "node 8 does not have the blocks that lie below it"
+        "node 8 does not have the blocks below it"
     );
     assert_eq!(
         fault_of(&|owned| owned.nodes[7] = bytemuck::Zeroable::zeroed()),
-        "node 7 does not have the blocks that lie below it"
+        "node 7 does not have the blocks below it"
     );
     for (origin, exponent) in [(f32::INFINITY, 100), (1e38, 100), (0.0, 255), (0.0, 254)] {
         let fault = fault_of(&|owned| {
@@ -324,7 +324,7 @@ fn trace_anything(owned: &OwnedLeaves, radius: Option<f32>) {
     }
     let aims = Scene::common("aims", random_points(50, 4), 0.3);
     let mut crossings = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+    for level in tested_levels() {
         tree.set_simd(level);
         let view = tree.view(&leaves);
         for ray in rays(&aims, 30, 2) {

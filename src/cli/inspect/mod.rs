@@ -80,7 +80,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
                     let shown = file.display().to_string();
                     print::json(&json!({"file": shown, "error": error}))
                 } else {
-                    say!("error: {error}");
+                    message!("error: {error}");
                     Ok(Reader::Listening)
                 }
             }
@@ -117,7 +117,7 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
                 Ok(sequence) => {
                     if let Some(parts) = parts_text(&sequence) {
-                        say!("{}: {parts}", argument.display());
+                        message!("{}: {parts}", argument.display());
                     }
                     for frame in sequence.frames() {
                         // A file with many steps is in many frames.

@@ -1,28 +1,28 @@
-//! `--follow`: frames are rendered as a running simulation writes them.
+//! `--follow`: renders frames while a simulation writes them.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 use std::thread;
 use std::time::{Duration, Instant};
 
 use spherule_formats::{Sequence, SequenceError};
 use spherule_jobs::Interrupt;
 
-use super::arrivals::Arrivals;
+use super::complete_frames::CompleteFrames;
 use super::run::Run;
-use crate::cli::job::Asked;
-use crate::cli::signals::Listener;
-use crate::cli::work::WorkArgs;
+use crate::cli::job::JobArgs;
+use crate::cli::manifest_args::RequestedManifest;
+use crate::cli::signals::SignalListener;
 use crate::cli::{CliError, Outcome};
 use crate::manifest::real_dir;
 
-/// Shortest time between looks at the directory.
-const LOOK: Duration = Duration::from_millis(200);
+/// Shortest time between scans of the directory.
+const MIN_SCAN_INTERVAL: Duration = Duration::from_millis(200);
 
-/// Looking takes this part of the time at most, however many files there are.
-const SHARE: u32 = 10;
+/// Scans use at most one part in this many of the time, however many files there are.
+const SCAN_SHARE: u32 = 10;
 
-/// Why there will be no more frames.
-enum End {
+/// Why following ends.
+enum FollowEnd {
     Idle,
     StopFile,
     Interrupted,
@@ -30,71 +30,75 @@ enum End {
 
 /// Waits for frames.
 struct Follower<'a> {
-    asked: Asked,
-    arrivals: Arrivals,
+    requested: RequestedManifest,
+    complete: CompleteFrames,
     stop_file: PathBuf,
     idle: Duration,
     interrupt: &'a Interrupt,
-    /// When anything last happened, frames of our own included.
-    busy: Instant,
+    /// When the last frame was rendered.
+    last_render: Instant,
     is_waiting: bool,
 }
 
-pub(super) fn run(args: &WorkArgs, asked: Asked, signals: &Listener) -> Result<Outcome, CliError> {
+pub(super) fn run(
+    args: &JobArgs,
+    requested: RequestedManifest,
+    signals: &SignalListener,
+) -> Result<Outcome, CliError> {
     if let Some(shard) = args.shard {
         return Err(CliError::other(format!(
-            "--shard {shard} does not go with following: the place of a frame among all is not known before the \
-             last has come; workers share the frames without it"
+            "--shard {shard} does not combine with --follow: the shard of a frame is unknown until the last frame \
+             exists; several workers share the frames without it"
         )));
     }
-    let work = &asked.manifest.job;
-    let base = asked.absolute_base()?;
-    let stop_file = match &work.stop_file {
+    let settings = &requested.manifest.job;
+    let base = requested.absolute_base()?;
+    let stop_file = match &settings.stop_file {
         Some(path) => base.join(path),
-        None => work.stop_file_in(&real_dir(&base.join(asked.manifest.output.path.dir()))),
+        None => settings.stop_file_in(&real_dir(&base.join(requested.manifest.output.path.dir()))),
     };
     let mut follower = Follower {
-        arrivals: Arrivals::new(work.settle),
+        complete: CompleteFrames::new(settings.settle),
         stop_file,
-        idle: work.idle,
-        interrupt: signals.at_work_within(work.grace),
-        busy: Instant::now(),
+        idle: settings.idle,
+        interrupt: signals.start_work_with_grace(settings.grace),
+        last_render: Instant::now(),
         is_waiting: false,
-        asked: asked.clone(),
+        requested: requested.clone(),
     };
     let (sequence, _) = match follower.next()? {
         Ok(found) => found,
-        Err(End::Interrupted) => return Ok(Outcome::Interrupted),
+        Err(FollowEnd::Interrupted) => return Ok(Outcome::Interrupted),
         Err(end) => {
             return Err(CliError::other(format!(
-                "no complete frame has come: {}",
-                follower.told(&end)
+                "found no complete frame: {}",
+                follower.description(&end)
             )));
         }
     };
-    let mut run = Run::begin(args, asked, sequence)?;
-    run.tell_kept();
+    let mut run = Run::start(args, requested, sequence)?;
+    run.report_kept();
     Ok(match follower.follow(&mut run) {
         Ok(end) => {
-            say!("{}", follower.told(&end));
+            message!("{}", follower.description(&end));
             let outcome = run.end(Ok(()), follower.interrupt);
             match (end, outcome) {
-                (End::Interrupted, Outcome::Done) => Outcome::Interrupted,
+                (FollowEnd::Interrupted, Outcome::Done) => Outcome::Interrupted,
                 (_, outcome) => outcome,
             }
         }
-        // Frames have been made by now, so there is a report.
+        // Frames were rendered, so write the reports
         Err(error) => run.end(Err(error), follower.interrupt),
     })
 }
 
 impl Follower<'_> {
-    /// Makes frames as they come, until there will be no more.
-    fn follow(&mut self, run: &mut Run) -> Result<End, CliError> {
+    /// Renders frames as they arrive, until following ends.
+    fn follow(&mut self, run: &mut Run) -> Result<FollowEnd, CliError> {
         loop {
-            run.make_pending(self.interrupt)?;
+            run.render_pending(self.interrupt)?;
             run.job.sync()?;
-            self.busy = Instant::now();
+            self.last_render = Instant::now();
             match self.next()? {
                 Ok((sequence, new)) => run.extend(sequence, &new)?,
                 Err(end) => return Ok(end),
@@ -102,43 +106,43 @@ impl Follower<'_> {
         }
     }
 
-    /// Waits for complete frames: the sequence of all complete ones, and the numbers of the new ones.
-    fn next(&mut self) -> Result<Result<(Sequence, Vec<i64>), End>, CliError> {
+    /// Waits for complete frames. Returns the sequence of all complete frames and the numbers of the new ones.
+    fn next(&mut self) -> Result<Result<(Sequence, Vec<i64>), FollowEnd>, CliError> {
         loop {
             if self.interrupt.is_raised() {
-                return Ok(Err(End::Interrupted));
+                return Ok(Err(FollowEnd::Interrupted));
             }
             let is_stopped = self.stop_file.exists();
             let start = Instant::now();
-            let sequence = self.look()?;
+            let sequence = self.scan()?;
             if let Some(mut sequence) = sequence {
                 let now = Instant::now();
-                self.arrivals.look(&sequence, now);
-                let new = self.wanted(&sequence, now);
+                self.complete.update(&sequence, now);
+                let new = self.new_frames(&sequence, now);
                 if !new.is_empty() {
-                    let arrivals = &self.arrivals;
-                    sequence.keep_frames(|frame| arrivals.is_complete(frame.number, now));
+                    let complete = &self.complete;
+                    sequence.keep_frames(|frame| complete.is_complete(frame.number, now));
                     self.is_waiting = false;
                     return Ok(Ok((sequence, new)));
                 }
             }
-            if is_stopped && self.arrivals.all_complete(Instant::now()) {
-                return Ok(Err(End::StopFile));
+            if is_stopped && self.complete.all_complete(Instant::now()) {
+                return Ok(Err(FollowEnd::StopFile));
             }
-            if self.busy.max(self.arrivals.changed).elapsed() >= self.idle {
-                return Ok(Err(End::Idle));
+            if self.last_render.max(self.complete.last_change).elapsed() >= self.idle {
+                return Ok(Err(FollowEnd::Idle));
             }
             self.pause(start.elapsed());
         }
     }
 
-    /// The sequence as it is now; None if there is nothing yet.
-    fn look(&mut self) -> Result<Option<Sequence>, CliError> {
-        match self.asked.sequence() {
+    /// The current sequence; None if no file exists yet.
+    fn scan(&mut self) -> Result<Option<Sequence>, CliError> {
+        match self.requested.sequence() {
             Ok(sequence) => Ok(Some(sequence)),
-            Err(CliError::Sequence(error)) if is_nothing_yet(&error) => {
+            Err(CliError::Sequence(error)) if is_not_written_yet(&error) => {
                 if !std::mem::replace(&mut self.is_waiting, true) {
-                    say!("waiting: {error}");
+                    message!("waiting: {error}");
                 }
                 Ok(None)
             }
@@ -146,42 +150,40 @@ impl Follower<'_> {
         }
     }
 
-    /// New complete frames that were asked for.
-    fn wanted(&mut self, sequence: &Sequence, now: Instant) -> Vec<i64> {
-        let mut new = self.arrivals.take(now);
-        if let Some(range) = &self.asked.manifest.input.frames {
+    /// The new complete frames among those that are selected.
+    fn new_frames(&mut self, sequence: &Sequence, now: Instant) -> Vec<i64> {
+        let mut new = self.complete.take_new(now);
+        if let Some(range) = &self.requested.manifest.input.frames {
             new.retain(|frame| range.contains(*frame));
         }
-        // Files may go, too.
+        // Files may also have been removed
         let frames = sequence.frames();
         new.retain(|n| frames.binary_search_by_key(n, |f| f.number).is_ok());
         new
     }
 
-    /// Waits as long as the last look justifies, or for a signal.
-    fn pause(&self, looked: Duration) {
-        let end = Instant::now() + LOOK.max(looked * SHARE);
+    /// Waits in proportion to the time of the last scan, or until a signal.
+    fn pause(&self, scan_time: Duration) {
+        let end = Instant::now() + MIN_SCAN_INTERVAL.max(scan_time * SCAN_SHARE);
         while Instant::now() < end && !self.interrupt.is_raised() {
             thread::sleep(Duration::from_millis(20));
         }
     }
 
-    /// Why it ends, for people.
-    fn told(&self, end: &End) -> String {
+    /// Why following ends, as a message.
+    fn description(&self, end: &FollowEnd) -> String {
         match end {
-            End::Idle => format!("nothing new for {} s (--idle)", self.idle.as_secs_f64()),
-            End::StopFile => format!("following ends: {} is there", shown(&self.stop_file)),
-            End::Interrupted => "following was interrupted; the same command goes on".to_owned(),
+            FollowEnd::Idle => format!("no new frames for {} s (--idle)", self.idle.as_secs_f64()),
+            FollowEnd::StopFile => format!("following ends: {} exists", self.stop_file.display()),
+            FollowEnd::Interrupted => {
+                "following was interrupted; the same command continues".to_owned()
+            }
         }
     }
 }
 
-fn shown(path: &Path) -> String {
-    path.display().to_string()
-}
-
-/// What a simulation that has hardly begun looks like.
-fn is_nothing_yet(error: &SequenceError) -> bool {
+/// Whether the error is expected before a simulation has written its first frame.
+fn is_not_written_yet(error: &SequenceError) -> bool {
     matches!(
         error,
         SequenceError::Missing { .. }

@@ -1,8 +1,8 @@
-//! `--isolate`: each frame in a process of its own, so that a crash, or the system's killing what takes too
-//! much memory, costs one frame.
+//! `--isolate`: renders each frame in a process of its own. A crash, or a kill because memory ran out, then costs
+//! one frame.
 //!
-//! The process is this program again under a hidden command. It makes the image; claims, ledger and
-//! reports are its parent's, and so are its temporary files, should it die.
+//! The process is this program with a hidden command. It writes the image. The parent does everything else: claims,
+//! ledger, reports, and removing the temporary files of a process that died.
 
 use std::io;
 use std::path::PathBuf;
@@ -11,160 +11,185 @@ use std::time::Instant;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use spherule_jobs::{
-    Interrupt, Job, JobError, Queue, QueueNews, discard_parts, owner, work_on_behalf_of,
+    FailureKind, FrameFailure, FrameQueue, Interrupt, Job, JobError, QueueEvent, discard_parts,
+    owner, set_owner,
 };
 
-use crate::cli::child::{self, Ended};
-use crate::cli::job::Asked;
-use crate::cli::plan::Plan;
-use crate::cli::work::use_threads;
+use crate::cli::child::{self, ChildResult};
+use crate::cli::job::use_threads;
+use crate::cli::manifest_args::RequestedManifest;
+use crate::cli::render_job::RenderJob;
 use crate::cli::{CliError, Outcome, print};
 use crate::manifest::Manifest;
-use crate::pipeline::{Event, ImageTask, SingleFault, Stage, Watch, make_image};
+use crate::pipeline::{Event, ImageError, ImageTask, OnEvent, Stage, WriteError, make_image};
+use crate::render::RenderError;
 use crate::report::FrameReport;
 
-/// The command of the process, which users are not told of.
+/// The hidden command of the process.
 pub(in crate::cli) const COMMAND: &str = "render-frame";
 
-/// What a process is to do.
+/// The task of a process.
 #[derive(Debug, Serialize, Deserialize)]
-struct FrameRequest {
-    /// Whose its temporary files are.
+struct IsolatedTask {
+    /// The owner of its temporary files.
     owner: String,
-    /// Where the images go, and paths in the manifest begin.
+    /// The directory of the images, which paths in the manifest are relative to.
     dir: PathBuf,
     /// The manifest, as TOML.
     manifest: String,
-    /// What "auto" turned into.
+    /// The resolved automatic settings.
     resolved: Value,
     frame: i64,
-    /// Most anonymous memory, bytes.
+    /// Limit of anonymous memory, bytes.
     ceiling: Option<u64>,
 }
 
-/// What came of it.
+/// The result of a process.
 #[derive(Debug, Serialize, Deserialize)]
-enum Told {
+enum IsolatedResult {
     Done {
         report: Box<FrameReport>,
         notes: Vec<String>,
     },
-    Failed(String),
-    /// The frame is not in the sequence any more.
-    Gone,
-    /// The file, and the number of the system's error.
-    Place(PathBuf, Option<i32>),
+    /// The frame failed.
+    Failed { kind: FailureKind, reason: String },
+    /// The frame is no longer in the sequence.
+    Missing,
+    /// A file cannot be written: the file and the error number of the system.
+    Unwritable(PathBuf, Option<i32>),
 }
 
-/// Frames to be made.
-pub(super) struct Work<'a> {
-    pub(super) plan: &'a Plan,
+/// Renders frames in child processes.
+pub(super) struct IsolatedRender<'a> {
+    pub(super) render_job: &'a RenderJob,
     pub(super) tasks: &'a [ImageTask],
 }
 
-impl Work<'_> {
-    /// Makes those of the tasks that no other worker does, one after the other, and records each in `job`.
+impl IsolatedRender<'_> {
+    /// Renders the tasks that no other worker holds, one after the other, and records them in `job`.
     pub(super) fn run(
         &self,
         job: &mut Job,
         interrupt: &Interrupt,
-        watch: Watch,
+        on_event: OnEvent,
     ) -> Result<(), JobError> {
         let frames = self.tasks.iter().map(|task| task.frame);
-        let mut queue = Queue::new(job.claims(), frames, interrupt);
-        let mut heard = |news: QueueNews| watch(Event::Others(news));
-        while let Some((place, claim)) = queue.take(&mut heard)? {
-            let task = &self.tasks[place];
-            watch(Event::Entered(task.frame, Stage::Trace));
-            if !self.make(task, job, interrupt, watch)? {
-                return Ok(());
+        let mut queue = FrameQueue::new(job.claims(), frames, interrupt);
+        let mut on_queue_event = |event: QueueEvent| on_event(Event::OtherWorker(event));
+        let attempts = self.render_job.manifest.job.retries + 1;
+        while let Some((index, claim)) = queue.next(&mut on_queue_event)? {
+            let task = &self.tasks[index];
+            on_event(Event::StageEntered(task.frame, Stage::Trace));
+            for attempt in 1..=attempts {
+                match self.render(task, job, interrupt, on_event) {
+                    Ok(report) => {
+                        job.record_done(task.frame, &outputs(task), json!(report))?;
+                        on_event(Event::Done(task, &report));
+                        break;
+                    }
+                    Err(failure) if failure.kind == FailureKind::Interrupted => return Ok(()),
+                    Err(failure) if failure.kind.stops_run() => {
+                        return Err(JobError::Stopped(failure));
+                    }
+                    Err(failure) => {
+                        job.record_failed(&failure)?;
+                        if failure.kind.is_retryable() && attempt < attempts {
+                            let note = format!(
+                                "frame {}: attempt {attempt} of {attempts} failed: {failure}",
+                                task.frame
+                            );
+                            on_event(Event::Note(&note));
+                        } else {
+                            on_event(Event::Failed(&failure));
+                            break;
+                        }
+                    }
+                }
             }
-            claim.end();
+            claim.complete();
         }
         Ok(())
     }
 
-    /// Tries to make one frame as often as asked for; false if it was given up for an interrupt.
-    fn make(
+    /// Renders one frame in a child process.
+    fn render(
         &self,
         task: &ImageTask,
-        job: &mut Job,
+        job: &Job,
         interrupt: &Interrupt,
-        watch: Watch,
-    ) -> Result<bool, JobError> {
-        if let Some(reason) = &task.refused {
-            fail(job, watch, task, reason)?;
-            return Ok(true);
+        on_event: OnEvent,
+    ) -> Result<FrameReport, FrameFailure> {
+        let frame = task.frame;
+        if let Some(error) = &task.refused {
+            return Err(ImageError::from(error.clone()).into_failure(frame));
         }
-        let tries = self.plan.manifest.job.retries + 1;
-        let request = self.request(task, job.resolved());
-        for attempt in 1..=tries {
-            let start = Instant::now();
-            match child::run(COMMAND, &request, || interrupt.stop_now()) {
-                Ended::Interrupted => {
-                    discard(task);
-                    return Ok(false);
-                }
-                Ended::Told(Told::Done { mut report, notes }) => {
-                    for note in &notes {
-                        watch(Event::Note(note));
-                    }
-                    report.seconds.wall = start.elapsed().as_secs_f64();
-                    job.record_done(task.frame, &outputs(task), json!(report))?;
-                    watch(Event::Done(task, &report));
-                    return Ok(true);
-                }
-                Ended::Told(Told::Gone) => {
-                    fail(job, watch, task, &gone(job, task.frame))?;
-                    return Ok(true);
-                }
-                Ended::Told(Told::Failed(reason)) => {
-                    fail(job, watch, task, &reason)?;
-                    return Ok(true);
-                }
-                Ended::Told(Told::Place(path, number)) => {
-                    let unknown = || io::Error::other("the file cannot be written");
-                    let source = number.map_or_else(unknown, io::Error::from_raw_os_error);
-                    return Err(JobError::writing(&path, source));
-                }
-                Ended::Died(reason) => {
-                    discard(task);
-                    let reason = format!("its process died (try {attempt} of {tries}): {reason}");
-                    if attempt == tries {
-                        fail(job, watch, task, &reason)?;
-                    } else {
-                        watch(Event::Note(&format!("frame {}: {reason}", task.frame)));
-                        job.record_failed(task.frame, &reason, json!(null))?;
-                    }
-                }
+        let start = Instant::now();
+        let child_task = self.isolated_task(task, job.resolved());
+        let result = match child::run(COMMAND, &child_task, || interrupt.stop_now()) {
+            ChildResult::Completed(result) => result,
+            ChildResult::Crashed(crash) => {
+                discard(task);
+                return Err(FrameFailure::new(FailureKind::Crash, frame, crash));
+            }
+            ChildResult::Interrupted => {
+                discard(task);
+                return Err(FrameFailure::new(
+                    FailureKind::Interrupted,
+                    frame,
+                    RenderError::Interrupted,
+                ));
+            }
+        };
+        match result {
+            IsolatedResult::Done { mut report, notes } => {
+                notes.iter().for_each(|note| on_event(Event::Note(note)));
+                report.seconds.wall = start.elapsed().as_secs_f64();
+                Ok(*report)
+            }
+            IsolatedResult::Failed { kind, reason } => Err(FrameFailure::new(kind, frame, reason)),
+            IsolatedResult::Missing => {
+                let error = MissingFrame::new(job, frame);
+                Err(FrameFailure::new(FailureKind::Frame, frame, error))
+            }
+            IsolatedResult::Unwritable(path, number) => {
+                let unknown = || io::Error::other("the file cannot be written");
+                let source = number.map_or_else(unknown, io::Error::from_raw_os_error);
+                Err(FrameFailure::writing(frame, &path, source))
             }
         }
-        Ok(true)
     }
 
-    fn request(&self, task: &ImageTask, resolved: &Value) -> FrameRequest {
-        FrameRequest {
+    fn isolated_task(&self, task: &ImageTask, resolved: &Value) -> IsolatedTask {
+        IsolatedTask {
             owner: owner().to_owned(),
-            dir: self.plan.dir.clone(),
-            manifest: self.plan.manifest.to_commented_toml(),
+            dir: self.render_job.dir.clone(),
+            manifest: self.render_job.manifest.to_commented_toml(),
             resolved: resolved.clone(),
             frame: task.frame,
-            ceiling: self.plan.manifest.job.memory_ceiling.map(|limit| limit.0),
+            ceiling: self
+                .render_job
+                .manifest
+                .job
+                .memory_ceiling
+                .map(|limit| limit.0),
         }
     }
 }
 
-fn fail(job: &mut Job, watch: Watch, task: &ImageTask, reason: &str) -> Result<(), JobError> {
-    watch(Event::Failed(task.frame, reason));
-    job.record_failed(task.frame, reason, json!(null))
+/// The files of a frame were removed after the job was planned.
+#[derive(Debug, thiserror::Error)]
+#[error("{}: removed since the job was planned", paths.join(", "))]
+struct MissingFrame {
+    paths: Vec<String>,
 }
 
-/// That the files of `frame` are not there any more.
-fn gone(job: &Job, frame: i64) -> String {
-    let planned = job.state().plan().frame(frame);
-    let inputs = planned.map_or(&[][..], |planned| &planned.inputs);
-    let paths: Vec<&str> = inputs.iter().map(|input| input.path.as_str()).collect();
-    format!("{}: is gone since the job was planned", paths.join(", "))
+impl MissingFrame {
+    fn new(job: &Job, frame: i64) -> Self {
+        let planned = job.state().plan().frame(frame);
+        let inputs = planned.map_or(&[][..], |planned| &planned.inputs);
+        let paths = inputs.iter().map(|input| input.path.clone()).collect();
+        Self { paths }
+    }
 }
 
 fn outputs(task: &ImageTask) -> Vec<PathBuf> {
@@ -172,55 +197,63 @@ fn outputs(task: &ImageTask) -> Vec<PathBuf> {
     image.chain(&task.preview).cloned().collect()
 }
 
-/// Clears away what a process that has died was writing. What stays is found by the next run.
+/// Removes the temporary files of a process that died. The next run finds those that remain.
 fn discard(task: &ImageTask) {
     for path in outputs(task) {
         let _ = discard_parts(&path, owner());
     }
 }
 
-/// The child's side.
+/// The main function of the child process.
 pub(in crate::cli) fn run_child() -> Result<Outcome, CliError> {
-    let request: FrameRequest = child::task("render --isolate")?;
-    work_on_behalf_of(&request.owner);
+    let request: IsolatedTask = child::read_task("render --isolate")?;
+    set_owner(&request.owner);
     if let Some(ceiling) = request.ceiling {
         limit_memory(ceiling)?;
     }
-    let told = told(request)?;
-    let text = serde_json::to_string(&told).map_err(|e| CliError::Other(e.to_string()))?;
+    let result = render(request)?;
+    let text = serde_json::to_string(&result).map_err(|e| CliError::Other(e.to_string()))?;
     print::file(&(text + "\n"))?;
     Ok(Outcome::Done)
 }
 
-fn told(request: FrameRequest) -> Result<Told, CliError> {
+fn render(request: IsolatedTask) -> Result<IsolatedResult, CliError> {
     let manifest = Manifest::parse(&request.manifest, &request.dir.join("job.toml"))?;
     use_threads(manifest.job.threads)?;
-    let asked = Asked {
+    let requested = RequestedManifest {
         manifest,
         base: request.dir,
         file: None,
         unchanged: None,
     };
-    let sequence = asked.sequence()?;
-    let plan = Plan::new(asked, &sequence, None)?;
-    let (_, setup) = plan.settle(&request.resolved, &sequence)?;
-    let tasks = plan.tasks(&sequence, &[request.frame]);
+    let sequence = requested.sequence()?;
+    let render_job = RenderJob::new(requested, &sequence, None)?;
+    let (_, setup) = render_job.stored_setup(&request.resolved, &sequence)?;
+    let tasks = render_job.tasks(&sequence, &[request.frame]);
     let Some(task) = tasks.first() else {
-        return Ok(Told::Gone);
+        return Ok(IsolatedResult::Missing);
     };
     let mut notes = Vec::new();
-    let made = make_image(&setup, &sequence, task, |note| notes.push(note.to_owned()));
-    Ok(match made {
-        Ok(report) => Told::Done {
+    let rendered = make_image(&setup, &sequence, task, |note| notes.push(note.to_owned()));
+    Ok(match rendered {
+        Ok(report) => IsolatedResult::Done {
             report: Box::new(report),
             notes,
         },
-        Err(SingleFault::Frame(reason)) => Told::Failed(reason),
-        Err(SingleFault::Place(path, error)) => Told::Place(path, error.raw_os_error()),
+        Err(ImageError::Write(WriteError::Io { path, source })) => {
+            IsolatedResult::Unwritable(path, source.raw_os_error())
+        }
+        Err(error) => {
+            let failure = error.into_failure(request.frame);
+            IsolatedResult::Failed {
+                kind: failure.kind,
+                reason: failure.to_string(),
+            }
+        }
     })
 }
 
-/// No more than `bytes` of this process's own memory: what asks for more fails.
+/// Limits the anonymous memory of this process to `bytes`. Further allocations fail.
 #[cfg(unix)]
 fn limit_memory(bytes: u64) -> Result<(), CliError> {
     use rustix::process::{Resource, Rlimit, getrlimit, setrlimit};

@@ -1,4 +1,4 @@
-//! A render from the opened job to the last word.
+//! One run of a render job, from opening the job to the reports.
 
 use std::time::Instant;
 
@@ -6,66 +6,66 @@ use spherule_formats::Sequence;
 use spherule_jobs::{InputChange, Interrupt, Job};
 
 use super::isolate;
-use super::show::{show, tell};
-use crate::cli::job::Asked;
-use crate::cli::plan::{Plan, one_fits};
+use super::summary::{print_summary, show_event};
+use crate::cli::job::{FinishedRun, JobArgs, report_kept};
+use crate::cli::manifest_args::RequestedManifest;
 use crate::cli::progress::Progress;
-use crate::cli::work::{Finished, WorkArgs, tell_kept};
+use crate::cli::render_job::{RenderJob, require_one_fits};
 use crate::cli::{CliError, Outcome};
 use crate::pipeline::{self, Event, ImageTask, Overlap, Schedule, Setup};
 use crate::report;
 
 /// See the module.
 pub(super) struct Run {
-    pub(super) plan: Plan,
+    pub(super) render_job: RenderJob,
     sequence: Sequence,
     pub(super) job: Job,
     setup: Setup,
-    /// What is to be done next.
+    /// The pending frames.
     tasks: Vec<ImageTask>,
     schedule: Schedule,
     progress: Progress,
     start: Instant,
-    /// Frames that this run was to make.
-    asked: usize,
+    /// Number of frames that were pending in this run.
+    task_count: usize,
 }
 
 impl Run {
-    /// Opens the job over `sequence`, and tells what was decided.
-    pub(super) fn begin(
-        args: &WorkArgs,
-        asked: Asked,
+    /// Opens the job of `sequence`, and prints a summary of the resolved settings.
+    pub(super) fn start(
+        args: &JobArgs,
+        requested: RequestedManifest,
         sequence: Sequence,
     ) -> Result<Self, CliError> {
         let mode = args.mode();
-        let plan = Plan::new(asked, &sequence, args.shard)?;
-        plan.guard_directory(mode)?;
-        plan.guard_manifest()?;
-        let job = plan.open(&sequence, mode)?;
+        let render_job = RenderJob::new(requested, &sequence, args.shard)?;
+        render_job.guard_directory(mode)?;
+        render_job.guard_manifest()?;
+        let job = render_job.open(&sequence, mode)?;
         for change in job.requeued() {
-            note!("{}", again(change));
+            note!("{}", repeat_note(change));
         }
-        let (survey, setup) = plan.settle(job.resolved(), &sequence)?;
-        let mut tasks = plan.tasks(&sequence, &job.pending());
-        let schedule = plan.fit(&sequence, &setup, &mut tasks);
-        one_fits(&tasks)?;
-        plan.write_manifest(args.force || args.keep_done)?;
-        tell(&sequence, &survey, &setup);
+        let (survey, setup) = render_job.stored_setup(job.resolved(), &sequence)?;
+        let mut tasks = render_job.tasks(&sequence, &job.pending());
+        let schedule = render_job.fit(&sequence, &setup, &mut tasks);
+        require_one_fits(&tasks)?;
+        render_job.write_manifest(args.force || args.keep_done)?;
+        print_summary(&sequence, &survey, &setup);
         if schedule.overlap == Overlap::None && tasks.len() > 1 {
-            note!("one frame at a time, to take less memory");
+            note!("one frame at a time, to reduce memory");
         }
         let progress = Progress::new(
-            plan.manifest.job.progress,
+            render_job.manifest.job.progress,
             "render",
             tasks.len(),
-            &plan.shown_output,
+            &render_job.shown_output,
         );
         Ok(Self {
-            plan,
+            render_job,
             sequence,
             job,
             setup,
-            asked: tasks.len(),
+            task_count: tasks.len(),
             tasks,
             schedule,
             progress,
@@ -73,38 +73,39 @@ impl Run {
         })
     }
 
-    /// Tells how many frames are done already.
-    pub(super) fn tell_kept(&self) {
-        tell_kept(&self.job, self.tasks.len());
+    /// Reports how many frames are done already.
+    pub(super) fn report_kept(&self) {
+        report_kept(&self.job, self.tasks.len());
     }
 
-    /// Takes in the frames `new` of a `sequence` that has grown; they are to be done next. Those that were
-    /// finished and have changed since are done again.
+    /// Adds the frames `new` of a grown `sequence` to the run. Finished frames whose inputs have changed are repeated.
     pub(super) fn extend(&mut self, sequence: Sequence, new: &[i64]) -> Result<(), CliError> {
-        let request = self.plan.request_for(&sequence, new)?;
+        let request = self.render_job.request_for(&sequence, new)?;
         for change in self.job.extend(&request)? {
-            self.progress.note(&again(&change));
+            self.progress.note(&repeat_note(&change));
         }
         let mut pending = self.job.pending();
         pending.retain(|frame| new.contains(frame));
         self.sequence = sequence;
-        self.tasks = self.plan.tasks(&self.sequence, &pending);
-        self.schedule = self.plan.fit(&self.sequence, &self.setup, &mut self.tasks);
-        self.progress.more(self.tasks.len());
-        self.asked += self.tasks.len();
+        self.tasks = self.render_job.tasks(&self.sequence, &pending);
+        self.schedule = self
+            .render_job
+            .fit(&self.sequence, &self.setup, &mut self.tasks);
+        self.progress.add_frames(self.tasks.len());
+        self.task_count += self.tasks.len();
         Ok(())
     }
 
-    /// Makes what is to be done next.
-    pub(super) fn make_pending(&mut self, interrupt: &Interrupt) -> Result<(), CliError> {
+    /// Renders the pending frames.
+    pub(super) fn render_pending(&mut self, interrupt: &Interrupt) -> Result<(), CliError> {
         let progress = &self.progress;
-        let watch = |event: Event| show(progress, &event);
-        let made = if self.plan.manifest.job.isolate {
-            let work = isolate::Work {
-                plan: &self.plan,
+        let on_event = |event: Event| show_event(progress, &event);
+        let result = if self.render_job.manifest.job.isolate {
+            let work = isolate::IsolatedRender {
+                render_job: &self.render_job,
                 tasks: &self.tasks,
             };
-            work.run(&mut self.job, interrupt, &watch)
+            work.run(&mut self.job, interrupt, &on_event)
         } else {
             pipeline::run(
                 &self.setup,
@@ -113,38 +114,38 @@ impl Run {
                 self.schedule.overlap,
                 &mut self.job,
                 interrupt,
-                &watch,
+                &on_event,
             )
         };
         self.tasks.clear();
-        Ok(made?)
+        Ok(result?)
     }
 
-    /// Writes the reports and has the last word; `result` is what ended the run.
+    /// Writes and prints the reports. `result` is the error that ended the run, if any.
     pub(super) fn end(mut self, result: Result<(), CliError>, interrupt: &Interrupt) -> Outcome {
-        let ended = self.progress.finish();
-        // Others may have done some of the frames.
+        let frames = self.progress.finish();
+        // Other workers may have finished some of the frames
         let refreshed = self.job.refresh().map_err(CliError::from);
-        let report = report::job::JobReport::new(self.job.state(), &self.plan.manifest);
-        let dir = &self.plan.dir;
-        let reported = report.files().iter().try_for_each(|(name, text)| {
+        let report = report::job::JobReport::new(self.job.state(), &self.render_job.manifest);
+        let dir = &self.render_job.dir;
+        let written = report.files().iter().try_for_each(|(name, text)| {
             report::job::write(dir, name, text).map_err(CliError::io(&dir.join(name)))
         });
-        // What ended the run explains why there is no report either.
-        let result = result.and(refreshed).and(reported);
-        let finished = Finished {
+        // Report the first error: it explains a missing report too
+        let result = result.and(refreshed).and(written);
+        let finished = FinishedRun {
             job: &self.job,
-            tasks: self.asked,
-            ended,
+            tasks: self.task_count,
+            frames,
             start: self.start,
             interrupt,
-            output: &self.plan.shown_output,
+            output: &self.render_job.shown_output,
         };
-        finished.tell(result)
+        finished.report(result)
     }
 }
 
-/// That the file of a finished frame has changed, and what is done about it.
-fn again(change: &InputChange) -> String {
+/// The note for a finished frame whose input has changed.
+fn repeat_note(change: &InputChange) -> String {
     format!("{change} since it was rendered; it is rendered again")
 }

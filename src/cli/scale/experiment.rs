@@ -9,8 +9,8 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 use super::ScaleArgs;
 use crate::accel::Structure;
 use crate::cli::CliError;
+use crate::cli::job::useful_threads;
 use crate::cli::paths::absolute;
-use crate::cli::work::useful_threads;
 use crate::scale::report::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 
@@ -121,11 +121,11 @@ fn check_pairs(
     }
     if !structures.contains(&Structure::Kdtree) {
         return Err(CliError::other(format!(
-            "--representations {names}: native frames lie in k-d order and are traced where they lie: \
+            "--representations {names}: native frames are in k-d order and are traced in place: \
              add kdtree to --structures, or measure these structures in memory"
         )));
     }
-    note!("native frames ({names}) are traced where they lie, in k-d order: with kdtree alone");
+    note!("native frames ({names}) are traced in place, in k-d order: with kdtree only");
     Ok(())
 }
 
@@ -164,7 +164,7 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
         );
     }
     let aspect = f64::from(args.width) / f64::from(args.height);
-    FrameSurvey::of(&sequence, &path, index, aspect).map_err(CliError::Other)
+    FrameSurvey::of(&sequence, &path, index, aspect).map_err(|e| CliError::other(e.to_string()))
 }
 
 /// The `asked` counts that there are particles for; in place of those above, all `there` are, once.

@@ -9,7 +9,7 @@ use std::path::{Path, PathBuf};
 use spherule_jobs::Interrupt;
 
 use super::measure::COMMAND;
-use crate::cli::child::{self, Ended};
+use crate::cli::child::{self, ChildResult};
 use crate::scale::report::Conversion;
 use crate::scale::{CellRequest, Representation, Task};
 
@@ -42,7 +42,11 @@ impl Frames {
     }
 
     /// That of the cell of `request`, whose representation has one.
-    pub(super) fn of(&mut self, request: &CellRequest, interrupt: &Interrupt) -> Ended<&Made> {
+    pub(super) fn of(
+        &mut self,
+        request: &CellRequest,
+        interrupt: &Interrupt,
+    ) -> ChildResult<&Made> {
         let key = (request.particles, request.representation);
         let now = match self.now.take() {
             Some(now) if now.key == key => now,
@@ -50,33 +54,36 @@ impl Frames {
                 // First, so that there is never room for two needed.
                 remove(&self.dir);
                 match self.make(request, interrupt) {
-                    Ended::Told(made) => Now { key, made },
-                    Ended::Died(reason) => Now {
+                    ChildResult::Completed(made) => Now { key, made },
+                    ChildResult::Crashed(crash) => Now {
                         key,
-                        made: Err(reason),
+                        made: Err(crash.to_string()),
                     },
-                    Ended::Interrupted => return Ended::Interrupted,
+                    ChildResult::Interrupted => return ChildResult::Interrupted,
                 }
             }
         };
-        Ended::Told(&self.now.insert(now).made)
+        ChildResult::Completed(&self.now.insert(now).made)
     }
 
-    fn make(&self, request: &CellRequest, interrupt: &Interrupt) -> Ended<Made> {
+    fn make(&self, request: &CellRequest, interrupt: &Interrupt) -> ChildResult<Made> {
         if let Err(e) = fs::create_dir(&self.dir) {
             let dir = self.dir.display();
-            return Ended::Told(Err(format!("{dir}: {e}")));
+            return ChildResult::Completed(Err(format!("{dir}: {e}")));
         }
         let path = self.dir.join(FILE);
         let task = Task::Convert {
             request: request.clone(),
             path: path.clone(),
         };
-        let ended: Ended<Result<_, String>> = child::run(COMMAND, &task, || interrupt.is_raised());
+        let ended: ChildResult<Result<_, String>> =
+            child::run(COMMAND, &task, || interrupt.is_raised());
         match ended {
-            Ended::Told(made) => Ended::Told(made.map(|conversion| (path, conversion))),
-            Ended::Died(reason) => Ended::Told(Err(reason)),
-            Ended::Interrupted => Ended::Interrupted,
+            ChildResult::Completed(made) => {
+                ChildResult::Completed(made.map(|conversion| (path, conversion)))
+            }
+            ChildResult::Crashed(crash) => ChildResult::Completed(Err(crash.to_string())),
+            ChildResult::Interrupted => ChildResult::Interrupted,
         }
     }
 }

@@ -10,7 +10,7 @@ pub(in crate::cli) const COMMAND: &str = "scale-cell";
 
 /// Reads the task, does it, prints what came of it or why nothing did.
 pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
-    let task: Task = child::task("scale")?;
+    let task: Task = child::read_task("scale")?;
     rayon::ThreadPoolBuilder::new()
         .num_threads(task.threads())
         .build_global()
@@ -21,8 +21,9 @@ pub(in crate::cli) fn run() -> Result<Outcome, CliError> {
     Ok(Outcome::Done)
 }
 
+/// Runs the task. The parent reads the result as JSON: errors are text there.
 fn do_task(task: &Task) -> Result<Value, String> {
-    let told = match task {
+    let result = match task {
         Task::Convert { request, path } => {
             convert::convert(request, path).map(serde_json::to_value)
         }
@@ -30,5 +31,7 @@ fn do_task(task: &Task) -> Result<Value, String> {
             cell::measure(request, file.as_deref()).map(serde_json::to_value)
         }
     };
-    told?.map_err(|e| e.to_string())
+    result
+        .map_err(|e| e.to_string())?
+        .map_err(|e| e.to_string())
 }

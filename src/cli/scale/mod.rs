@@ -12,7 +12,7 @@ use super::numbers::pixels_to;
 use super::progress::{duration, openjd};
 use super::{CliError, Outcome, events, print, signals};
 use crate::accel::Structure;
-use crate::cli::child::{self, Ended};
+use crate::cli::child::{self, ChildResult};
 use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
@@ -110,15 +110,15 @@ pub(super) struct ScaleArgs {
     progress: ProgressMode,
 }
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping; what is measured is kept",
-    at_once: "stopped",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping; what is measured is kept",
+    stopped: "stopped",
 };
 
 pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
-    let signals = signals::listen(WORDS)?;
+    let signals = signals::listen(SIGNAL_MESSAGES)?;
     if args.progress == ProgressMode::Json {
-        events::begin();
+        events::start();
     }
     let experiment = Experiment::settle(args)?;
     prepare(&args.output)?;
@@ -130,13 +130,13 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         settings: experiment.settings,
         cells: Vec::with_capacity(cells.len()),
     };
-    say!("{}", table::subject(&report));
+    message!("{}", table::subject(&report));
     let output = args.output.display().to_string();
     events::send(
         "start",
         json!({"command": "scale", "total": cells.len(), "output": output}),
     );
-    let ended = measure_all(&cells, &mut report, args, signals.at_work());
+    let ended = measure_all(&cells, &mut report, args, signals.start_work());
     if report.cells.is_empty() {
         return Ok(Outcome::Interrupted);
     }
@@ -144,7 +144,7 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         .failed()
         .map(|(cell, _)| table::cell_name(cell))
         .collect();
-    events::at_end(json!({
+    events::add_to_end(json!({
         "done": report.cells.len() - failed.len(),
         "total": report.planned,
         "failed": failed,
@@ -152,12 +152,12 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     show_tables(&report, args.progress)?;
     if let Some((path, source)) = ended.unwritten {
         let error = CliError::Io { path, source };
-        say!("error: {error}");
-        events::at_end(json!({"errors": [error.to_string()]}));
+        message!("error: {error}");
+        events::add_to_end(json!({"errors": [error.to_string()]}));
         return Ok(Outcome::SomeFailed);
     }
     let [json, csv, html] = [JSON, CSV, HTML];
-    say!("{json}, {csv} and {html} are in {}", args.output.display());
+    message!("{json}, {csv} and {html} are in {}", args.output.display());
     Ok(if ended.interrupted {
         Outcome::Interrupted
     } else if report.failed().next().is_some() {
@@ -191,7 +191,7 @@ fn measure_all(
     let mut ended = EndOfRun::default();
     let mut frames = Frames::in_dir(&args.output);
     for request in cells {
-        let Ended::Told(outcome) = measure_one(request, &mut frames, interrupt) else {
+        let ChildResult::Completed(outcome) = measure_one(request, &mut frames, interrupt) else {
             ended.interrupted = true;
             break;
         };
@@ -209,16 +209,19 @@ fn measure_one(
     request: &CellRequest,
     frames: &mut Frames,
     interrupt: &Interrupt,
-) -> Ended<CellOutcome> {
+) -> ChildResult<CellOutcome> {
     let mut made = None;
     if request.representation.encoding().is_some() {
         match frames.of(request, interrupt) {
-            Ended::Interrupted => return Ended::Interrupted,
-            Ended::Died(reason) => return Ended::Told(CellOutcome::Failed { reason }),
-            Ended::Told(Ok(frame)) => made = Some(frame),
-            Ended::Told(Err(reason)) => {
+            ChildResult::Interrupted => return ChildResult::Interrupted,
+            ChildResult::Crashed(crash) => {
+                let reason = crash.to_string();
+                return ChildResult::Completed(CellOutcome::Failed { reason });
+            }
+            ChildResult::Completed(Ok(frame)) => made = Some(frame),
+            ChildResult::Completed(Err(reason)) => {
                 let reason = format!("no native frame: {reason}");
-                return Ended::Told(CellOutcome::Failed { reason });
+                return ChildResult::Completed(CellOutcome::Failed { reason });
             }
         }
     }
@@ -229,11 +232,11 @@ fn measure_one(
     let stop = || interrupt.is_raised();
     let measured: Result<CellMeasurement, String> = match child::run(measure::COMMAND, &task, stop)
     {
-        Ended::Interrupted => return Ended::Interrupted,
-        Ended::Told(measured) => measured,
-        Ended::Died(reason) => Err(reason),
+        ChildResult::Interrupted => return ChildResult::Interrupted,
+        ChildResult::Completed(measured) => measured,
+        ChildResult::Crashed(crash) => Err(crash.to_string()),
     };
-    Ended::Told(match measured {
+    ChildResult::Completed(match measured {
         Err(reason) => CellOutcome::Failed { reason },
         Ok(measured) => CellOutcome::Done(Box::new(CellMeasurement {
             conversion: made.map(|(_, conversion)| *conversion),
@@ -312,12 +315,12 @@ impl Progress {
         let told = match &cell.outcome {
             CellOutcome::Done(measured) => table::line(measured),
             CellOutcome::Failed { reason } => {
-                say!("error: {name}: {reason}");
+                message!("error: {name}: {reason}");
                 "failed".to_owned()
             }
         };
         match self.mode {
-            ProgressMode::Auto | ProgressMode::Plain => say!(
+            ProgressMode::Auto | ProgressMode::Plain => message!(
                 "[{done}/{}] {name}: {told}, {} left",
                 self.total,
                 self.remaining(done)

@@ -22,7 +22,7 @@ pub(super) fn seconds(text: &str) -> Result<f64, String> {
     let seconds = text.parse().ok();
     seconds
         .filter(|s| *s > 0.0 && *s <= MOST_SECONDS)
-        .ok_or_else(|| format!("wants seconds above 0 and up to {MOST_SECONDS}"))
+        .ok_or_else(|| format!("expected seconds above 0 and up to {MOST_SECONDS}"))
 }
 
 pub(super) fn structure(text: &str) -> Result<Structure, String> {
@@ -45,7 +45,7 @@ fn one_of<T: Copy>(all: &[T], name: fn(T) -> &'static str, text: &str) -> Result
             let known: Vec<&str> = all.iter().copied().map(name).collect();
             let hint = nearest(text, &known).map(|n| format!("; did you mean {n}?"));
             let hint = hint.unwrap_or_default();
-            format!("wants one of {}{hint}", known.join(", "))
+            format!("expected one of {}{hint}", known.join(", "))
         })
 }
 
@@ -60,7 +60,7 @@ mod tests {
         assert!(wrong.ends_with("; did you mean lbvh?"), "{wrong}");
         assert_eq!(
             motion("spiral").unwrap_err(),
-            "wants one of rotation, translation, both"
+            "expected one of rotation, translation, both"
         );
         assert!(representation("").is_err());
     }

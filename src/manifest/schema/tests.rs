@@ -1,4 +1,4 @@
-//! That schema and reader agree: on keys, defaults, words, and on which values will do.
+//! Schema and reader agree on keys, defaults, words and valid values.
 
 use std::collections::BTreeSet;
 
@@ -10,7 +10,7 @@ use crate::manifest::ManifestError;
 
 mod values;
 
-/// Something of everything, with what keys need of one another.
+/// A manifest with keys of all tables, which satisfies the dependencies between them.
 const EVERYTHING: &str = r#"
 input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
@@ -80,7 +80,7 @@ fn what_the_program_writes_is_valid() {
     both_take(&fixed.to_commented_toml());
 }
 
-/// Every table of the schema with a manifest that has it open at the end, so that a line goes into it.
+/// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
 const TABLES: [(&str, &str); 15] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
@@ -168,7 +168,7 @@ fn comments_defaults_and_examples_are_those_of_init() {
     }
 }
 
-/// A table in which only the named keys are missing reads as if they had their defaults.
+/// Missing keys have the same defaults in the schema and in the reader.
 #[test]
 fn defaults_of_items_are_the_readers() {
     let schema = job_schema();
@@ -225,7 +225,7 @@ fn what_is_needed_is_needed_by_both() {
     }
 }
 
-/// All ways to say where the camera is.
+/// All combinations of keys that define the camera.
 #[test]
 fn keys_that_need_one_another() {
     let modes = ["", "auto", "fixed", "turntable", "keys"];

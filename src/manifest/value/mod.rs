@@ -45,7 +45,7 @@ pub(super) trait Value: Sized {
     /// The kind of value of an option for it.
     const FLAG: FlagKind = FlagKind::Text(false);
 
-    /// Description with the range, as in "wants a number from 0 to 1".
+    /// Description with the range, as in "expected a number from 0 to 1".
     fn kind(key: &Key) -> String;
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault>;
@@ -118,9 +118,6 @@ macro_rules! named {
         }
 
         impl $name {
-            /// All values with their names.
-            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
-
             /// The name in a manifest.
             pub const fn name(self) -> &'static str {
                 match self {
@@ -171,7 +168,7 @@ impl<T: Named> Value for Vec<T> {
     const FLAG: FlagKind = FlagKind::List;
 
     fn kind(key: &Key) -> String {
-        format!("a list of {}, as {}", key.name, key.example)
+        format!("a list of {}, such as {}", key.name, key.example)
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {

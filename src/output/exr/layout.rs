@@ -1,4 +1,4 @@
-//! How an image is laid out in its file: its header, its planes, and its blocks of rows.
+//! The layout of an image in its file: header, planes, and blocks of rows.
 
 use exr::image::write::layers::WritableLayers;
 use exr::meta::header::Header;
@@ -11,20 +11,20 @@ use super::planes::{Plane, planes_in_file};
 use super::{Compression, ExrOptions, OutputError, attributes};
 use crate::render::{Channels, Film, FilmRows};
 
-/// Rows of a band where blocks have no more: those of the renderer's tiles.
+/// Minimum number of rows in a band: the height of the renderer's tiles.
 const BAND_ROWS: u32 = 16;
 
-/// What all blocks of a file have in common.
+/// The layout of an image file, which all of its blocks share.
 #[derive(Debug, Clone)]
 pub struct ExrLayout {
     pub(super) header: Header,
     pub(super) compression: Compression,
-    /// In the order of the file.
+    /// The planes in the order of the file.
     pub(super) planes: Vec<Plane>,
 }
 
 impl ExrLayout {
-    /// For images of `width` x `height` pixels with `channels`.
+    /// The layout of images of `width` x `height` pixels with `channels`.
     ///
     /// # Errors
     /// If an attribute cannot be stored.
@@ -35,7 +35,7 @@ impl ExrLayout {
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
         let planes = planes_in_file(channels);
-        // The header takes names and types alone, so the samples may stay away.
+        // Describe the channels; the header needs only names and types, so the samples may be empty
         let described = planes.iter().map(|plane| {
             let samples = match plane.sample_type() {
                 SampleType::F16 => FlatSamples::F16(Vec::new()),
@@ -44,6 +44,7 @@ impl ExrLayout {
             };
             AnyChannel::new(plane.name, samples)
         });
+        // Make the header
         let encoding = Encoding {
             compression: options.compression.codec(),
             blocks: Blocks::ScanLines,
@@ -61,7 +62,7 @@ impl ExrLayout {
         })
     }
 
-    /// For images like `film`.
+    /// The layout of images with the size and the channels of `film`.
     ///
     /// # Errors
     /// If an attribute cannot be stored.
@@ -69,25 +70,25 @@ impl ExrLayout {
         Self::new(film.width, film.height, film.channels(), options)
     }
 
-    /// Rows of a block: 1, 16 or 32. The last block of an image may have fewer.
+    /// Number of rows in a block: 1, 16 or 32. The last block of an image may have fewer.
     pub fn rows_per_block(&self) -> u32 {
         let rows = self.compression.codec().scan_lines_per_block();
         u32::try_from(rows).expect("blocks have at most 256 rows")
     }
 
-    /// Rows of a band: whole blocks, and enough of them to be worth a thread's while.
+    /// Number of rows in a band, the unit of work of a thread: one or more whole blocks.
     pub fn rows_per_band(&self) -> u32 {
         self.rows_per_block().max(BAND_ROWS)
     }
 
-    /// The blocks of `band`, which must begin where a block does and end where one does.
+    /// The blocks of `band`, which must begin and end at the border of a block.
     pub fn blocks<'a>(&self, band: FilmRows<'a>) -> impl Iterator<Item = FilmRows<'a>> + use<'a> {
         let rows = self.rows_per_block();
         let tops = (band.top..band.top + band.height).step_by(rows as usize);
         tops.map(move |top| band.part(top, rows))
     }
 
-    /// Bytes of all samples in `rows` rows.
+    /// Number of bytes of all samples in `rows` rows.
     pub(super) fn bytes(&self, rows: u32) -> usize {
         self.header.layer_size.x() * rows as usize * self.header.channels.bytes_per_pixel
     }

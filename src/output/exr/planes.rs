@@ -1,4 +1,4 @@
-//! Which planes a file has, and where in a film their samples are.
+//! The planes of a file, and the location of their samples in a film.
 
 use exr::meta::attribute::SampleType;
 
@@ -7,9 +7,9 @@ use crate::render::Channels;
 /// One channel of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::output) struct Plane {
-    /// Its name in the file.
+    /// Name in the file.
     pub(in crate::output) name: &'static str,
-    /// Where its samples come from.
+    /// Location of the samples in a film.
     pub(super) source: Source,
 }
 
@@ -25,16 +25,16 @@ pub(super) enum Source {
     Id,
 }
 
-/// Planes whose samples look alike to a compressor.
+/// Kinds of planes by the statistics of their samples, for compression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PlaneKind {
-    /// Halves that change from pixel to pixel.
+    /// Half-floats that change from pixel to pixel.
     Color,
-    /// Floats that do, and their exponents with them.
+    /// Floats that change from pixel to pixel, with changing exponents.
     Normal,
-    /// Floats whose exponents stay the same: where the place is that a pixel shows.
-    Place,
-    /// What all pixels of a particle share.
+    /// Floats that change from pixel to pixel, mostly with the same exponent: depths and positions.
+    Position,
+    /// Values that all pixels of a particle share.
     Particle,
 }
 
@@ -43,17 +43,17 @@ impl Plane {
         Self { name, source }
     }
 
-    /// What its samples are like.
+    /// Statistics of the samples.
     pub(super) const fn kind(&self) -> PlaneKind {
         match self.source {
             Source::Color(_) => PlaneKind::Color,
             Source::Normal(_) => PlaneKind::Normal,
-            Source::Depth | Source::Position(_) => PlaneKind::Place,
+            Source::Depth | Source::Position(_) => PlaneKind::Position,
             Source::Velocity(_) | Source::Albedo(_) | Source::Id => PlaneKind::Particle,
         }
     }
 
-    /// Colours are half: a display has no use for more. Data keep all of their bits.
+    /// Type of the samples. Colours are half-floats, which is sufficient for displays. Data keep all of their bits.
     pub(in crate::output) const fn sample_type(&self) -> SampleType {
         match self.source {
             Source::Color(_) => SampleType::F16,
@@ -63,13 +63,16 @@ impl Plane {
     }
 }
 
-/// The planes of a file with `channels`, in the order that a user would list them.
+/// The planes of a file with `channels`, in the order of the channel names in the manual.
 pub(in crate::output) fn planes(channels: Channels) -> Vec<Plane> {
     let color = vectors(["R", "G", "B", "A"], Source::Color);
     let mut all = color.to_vec();
     all.extend(channels.depth.then(|| Plane::new("Z", Source::Depth)));
-    let axes = |has: bool, names: [&'static str; 3], source| {
-        has.then(|| vectors(names, source)).into_iter().flatten()
+    let axes = |is_present: bool, names: [&'static str; 3], source| {
+        is_present
+            .then(|| vectors(names, source))
+            .into_iter()
+            .flatten()
     };
     let [n, p, v] = [
         ["N.X", "N.Y", "N.Z"],
@@ -89,7 +92,7 @@ fn vectors<const N: usize>(names: [&'static str; N], source: fn(usize) -> Source
     std::array::from_fn(|component| Plane::new(names[component], source(component)))
 }
 
-/// The same in the order of the file: by name, byte by byte.
+/// The planes of a file with `channels`, in the order of the file: by name, compared byte by byte.
 pub(super) fn planes_in_file(channels: Channels) -> Vec<Plane> {
     let mut all = planes(channels);
     all.sort_unstable_by_key(|plane| plane.name);

@@ -4,7 +4,7 @@ use glam::Vec3;
 use super::*;
 use crate::render::Channels;
 
-/// All there are.
+/// All compression methods.
 pub(super) const COMPRESSIONS: [Compression; 5] = [
     Compression::None,
     Compression::Rle,
@@ -13,7 +13,7 @@ pub(super) const COMPRESSIONS: [Compression; 5] = [
     Compression::Piz,
 ];
 
-/// A film whose every value tells where it belongs.
+/// A film whose values depend on pixel and channel, so that misplaced samples are found.
 fn film(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
     let value = |i: usize| i as f32 * 0.25;
@@ -57,7 +57,7 @@ fn options() -> ExrOptions {
     }
 }
 
-/// Channels as written, in file order, and the layer's attributes.
+/// The channels of a file in its order, the attributes of the layer, and the encoding.
 fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encoding) {
     let image = read()
         .no_deep_data()
@@ -146,7 +146,7 @@ fn check_attributes(attributes: &LayerAttributes) {
 }
 
 #[test]
-fn colour_alone_needs_no_options() {
+fn colours_without_options_are_encoded() {
     let encoded = encode_exr(&film(3, 2, Channels::COLOR), &ExrOptions::default()).unwrap();
     let (channels, attributes, _) = decode(&encoded.bytes);
     assert_eq!(channels.len(), 4);
@@ -154,7 +154,7 @@ fn colour_alone_needs_no_options() {
 }
 
 #[test]
-fn the_same_bytes_every_time_and_on_any_threads() {
+fn bytes_do_not_depend_on_threads() {
     let film = film(200, 300, Channels::ALL);
     for compression in COMPRESSIONS {
         let options = ExrOptions {
@@ -172,7 +172,7 @@ fn the_same_bytes_every_time_and_on_any_threads() {
 }
 
 #[test]
-fn what_half_cannot_hold_is_clamped_and_counted() {
+fn values_outside_the_range_of_half_floats_are_clamped_and_counted() {
     let mut film = film(2, 2, Channels::COLOR);
     film.color[0] = [65_504.0, 65_505.0, f32::INFINITY, 1.0];
     film.color[1] = [-1e9, f32::NAN, 0.0, 1.0];
@@ -191,7 +191,7 @@ fn what_half_cannot_hold_is_clamped_and_counted() {
 }
 
 #[test]
-fn texts_may_be_empty_long_or_in_any_script() {
+fn texts_may_be_empty_long_or_not_ascii() {
     for json in [
         String::new(),
         "\u{6c34}\u{e9}".to_owned(),

@@ -50,7 +50,7 @@ impl MultiJitter {
             // Jitter the point in its cell
             let column = self.column_order[index % columns] as f32;
             let row = self.row_order[index / columns] as f32;
-            // In x, every sample has a fine stratum of its own: the part of a column that belongs to its row.
+            // In x, every sample has a separate fine stratum: the part of a column that belongs to its row.
             let x = (column + (row + self.random.unit()) / rows as f32) / columns as f32;
             let y = (sample as f32 + self.random.unit()) / self.samples as f32;
             each(Vec2::new(x, y).min(Vec2::splat(1.0 - 0.5 * f32::EPSILON)));

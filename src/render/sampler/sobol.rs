@@ -26,7 +26,7 @@ impl PathSeed {
     /// The number of sample `sample` in dimension `dimension`, in 0..1 in steps of 2^-24.
     pub fn get_1d(self, dimension: u32, sample: u32) -> f32 {
         let [order, seed] = self.halves(dimension);
-        // Each dimension has an order of its own, otherwise a sample would be low or high in all dimensions.
+        // Each dimension has a different order; otherwise a sample would be low or high in all dimensions.
         let shuffled = scramble(sample, order);
         unit(scramble(shuffled.reverse_bits(), seed))
     }

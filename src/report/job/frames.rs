@@ -50,7 +50,7 @@ impl JobReport {
             table.bad_row([
                 frame.number.to_string(),
                 frame.image.clone().unwrap_or_default(),
-                shortened(frame.reason.as_deref().unwrap_or("not told"), MOST_TEXT),
+                shortened(frame.reason.as_deref().unwrap_or("not recorded"), MOST_TEXT),
             ]);
         }
         page.table(&table);
@@ -86,6 +86,7 @@ impl JobReport {
             page.text("No frame has been tried yet.");
             return;
         }
+        // Choose frames at equal distances, to limit the size of the page
         let mut table = Table::new("all-frames", &HEADS);
         let chosen = evenly(tried.len(), MOST_FRAMES);
         let all = chosen.len() == tried.len();

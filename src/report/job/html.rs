@@ -112,6 +112,7 @@ impl JobReport {
             return;
         };
         let build = &report.build;
+        // Properties of the tree and its memory
         page.section(
             "build",
             &format!("Tree of the slowest frame, {}", frame.number),
@@ -141,6 +142,7 @@ impl JobReport {
             ("Scratch while building", bytes(report.bytes.scratch)),
             ("Peak while building", bytes(report.bytes.build_peak)),
         ]);
+        // Times of the phases of the build
         let table = phases(report);
         if !table.is_empty() {
             page.table(&table);

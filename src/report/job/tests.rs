@@ -1,4 +1,4 @@
-//! Reports of awkward jobs.
+//! Reports of unusual jobs.
 
 use serde_json::json;
 
@@ -45,7 +45,7 @@ fn of(number: i64, status: Status, reason: Option<&str>, details: Value) -> JobF
         "seq": 1, "time_ms": 1, "frame": number, "status": status.name(), "reason": reason,
         "details": details,
     });
-    let entry: Entry = serde_json::from_value(entry).expect("an entry");
+    let entry: LedgerEntry = serde_json::from_value(entry).expect("an entry");
     JobFrame::of(
         number,
         Some(format!("f.{number}.exr")),

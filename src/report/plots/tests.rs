@@ -1,4 +1,4 @@
-//! Plots of awkward data, and what their text must hold.
+//! Plots of unusual data, and checks of their text.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn line(values: &[f64]) -> Series {
     Series::new("values", points.collect::<Vec<_>>())
 }
 
-/// All numbers in the attributes that place things.
+/// Checks that all numbers in attributes of positions and sizes are finite and inside the plot.
 #[track_caller]
 fn check_geometry(html: &str) {
     assert!(!html.contains("NaN") && !html.contains("inf"), "{html}");
@@ -39,7 +39,7 @@ fn check_geometry(html: &str) {
     }
 }
 
-/// Lines drawn for series and markers.
+/// Numbers of lines and of markers.
 fn drawn(html: &str) -> (usize, usize) {
     let svg = html.split("</svg>").next().expect("a first part");
     let series = svg.split("<g class=\"series").skip(1);
@@ -116,7 +116,7 @@ fn gaps_stay_gaps() {
     ])])
     .figure();
     check_geometry(&html);
-    // Two lines, and the lone point between the gaps as a marker.
+    // Two lines, and a marker for the isolated point between the gaps.
     assert_eq!(drawn(&html), (2, 5));
 }
 

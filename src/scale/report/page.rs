@@ -22,6 +22,7 @@ pub fn html(report: &ScaleReport) -> String {
          thesis's are of its process.",
     );
     page.plots(&plots(report));
+    // Frame rates, one table per motion
     for motion in &report.settings.motions {
         let heading = format!("Images per second: {motion}");
         page.section(&format!("rate-{motion}"), &heading);
@@ -31,6 +32,7 @@ pub fn html(report: &ScaleReport) -> String {
         );
         page.table(&rates(report, *motion));
     }
+    // Build time and memory, with the values of the thesis
     page.section("build", "Build time, s");
     page.text(
         "Median of the builds of a cell, and of its motions. The thesis says about 2.5 s for lbvh \
@@ -55,6 +57,7 @@ pub fn html(report: &ScaleReport) -> String {
         &thesis::PEAK_MIB,
     ));
     put_parts(&mut page, report);
+    // All measurements, folded
     page.section("cells", "All cells");
     page.fold("Every cell, with its rays and its memory by purpose");
     page.table(&cells(report));
@@ -237,6 +240,7 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
             &thesis::BYTES_PER_PARTICLE,
         ),
     ];
+    // Image times, one plot per motion
     for &motion in &report.settings.motions {
         let theirs: Vec<thesis::Figure> = thesis::RATES
             .iter()

@@ -12,12 +12,14 @@ use crate::scale::{Budget, Motion};
 /// All tables with their headings.
 pub fn text(report: &ScaleReport) -> String {
     let mut text = format!("{}\n{}\n", subject(report), conditions(report));
+    // Frame rates, one table per motion
     for motion in &report.settings.motions {
         let heading = format!("Images per second, {motion}: mean (standard deviation)");
         put(&mut text, report, &heading, |particles, column| {
             rate(report, particles, column, *motion)
         });
     }
+    // Build time and memory
     let heading = "Build time, s: median";
     put(&mut text, report, heading, |particles, column| {
         summed(
@@ -36,6 +38,7 @@ pub fn text(report: &ScaleReport) -> String {
         summed(report, particles, column, bytes(report, particles, column))
     });
     put_parts(&mut text, report);
+    // List failed and missing cells
     for (cell, reason) in report.failed() {
         let reason = escape_controls(reason);
         let _ = write!(text, "\nfailed: {}: {reason}", cell_name(cell));

@@ -1,4 +1,4 @@
-//! Reports made by hand, and what tables and files must say of them.
+//! Constructed reports, with the expected tables and files.
 
 use super::*;
 use crate::report::frame::{FileBytes, FrameBytes};
@@ -29,8 +29,7 @@ fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
     }
 }
 
-/// Two counts, one structure, all motions; the second count's last motion has failed and its first
-/// was not reached.
+/// Two counts, one structure, all motions. Of the second count, the last motion failed and the first is missing.
 fn report() -> ScaleReport {
     let cell = |particles, motion, outcome| CellReport {
         particles,
@@ -77,7 +76,7 @@ fn report() -> ScaleReport {
 #[test]
 fn spread_is_the_samples() {
     let spread = Spread::of(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]);
-    // Sum of squares 32 over 7.
+    // The sum of squared deviations is 32, of 8 samples.
     assert_eq!(spread.sd, Some((32.0_f64 / 7.0).sqrt()));
     assert_eq!((spread.mean, spread.min, spread.max), (5.0, 2.0, 9.0));
     assert_eq!(Spread::of(&[3.0]).sd, None);
@@ -107,7 +106,7 @@ fn tables_are_laid_out_like_the_thesis_s() {
     let both = after("Images per second, both");
     assert_eq!(both[1], "       1000   2000 (1.00)");
     assert_eq!(both[2], "   10000000        failed");
-    // The median over motions, of medians.
+    // The median over motions of their medians.
     assert_eq!(after("Build time")[1], "       1000   0.500");
     assert_eq!(after("Build time")[2], "   10000000   9.000");
     assert_eq!(after("Peak memory")[1], "       1000    120.0");
@@ -116,7 +115,7 @@ fn tables_are_laid_out_like_the_thesis_s() {
     assert!(text.contains("interrupted: 1 of 6 cells were not measured"));
 }
 
-/// As [`report`], with its last count in a q10 file too, whose cells have 4 bytes of positions there.
+/// Same as [`report`], and the last count also in a q10 file, with 4 bytes of positions per particle.
 fn report_in_place() -> ScaleReport {
     let mut report = report();
     report.settings.structures.push("kdtree".to_owned());
@@ -158,7 +157,7 @@ fn report_in_place() -> ScaleReport {
 fn memory_by_part_tells_the_file_from_memory() {
     let report = report_in_place();
     let titles: Vec<String> = report.columns().into_iter().map(|c| c.title).collect();
-    // No other structure is traced in place.
+    // Other structures cannot be traced in place.
     assert_eq!(titles, ["lbvh", "kdtree", "kdtree, q10 file"]);
     let rows = parts::rows(&report);
     let row = |title: &str| rows.iter().rfind(|row| row[1] == title).expect("a row");
@@ -172,7 +171,7 @@ fn memory_by_part_tells_the_file_from_memory() {
         rows[0][2..8],
         ["12.00", "0.00", "0.60", "12.60", "12.60", "0.00"]
     );
-    // Nothing was measured there.
+    // That count has no measurements.
     assert!(row("kdtree")[2..].iter().all(|cell| cell == MISSING));
     assert_eq!(row("the thesis, about")[5], "350");
     assert!(rows.iter().all(|row| row.len() == parts::HEADS.len()));
@@ -208,7 +207,7 @@ fn a_figure_that_there_cannot_be_is_no_failure() {
     let text = table::text(&report);
     let (_, bytes) = text.split_once("Bytes a particle").unwrap();
     assert!(!bytes.contains("failed"), "{text}");
-    // Nothing but failures is one.
+    // A row with failures only is marked as failed.
     report.cells[0].outcome = CellOutcome::Failed {
         reason: "it was late".to_owned(),
     };
@@ -234,7 +233,7 @@ fn csv_has_a_row_a_cell_and_quotes() {
     let text = csv::text(&report());
     let columns = csv::header().split(',').count();
     let rows: Vec<&str> = text.lines().collect();
-    // The last reason has a line break.
+    // The last reason contains a line break.
     assert_eq!(rows.len(), 1 + 5 + 1);
     for row in &rows[..5] {
         assert_eq!(row.split(',').count(), columns, "{row}");

@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::math::SimdLevel;
+use crate::accel::simd::tested_levels::tested_levels;
 use crate::surface::SurfaceKind;
 
 const RADIUS: f32 = 0.5;
@@ -291,7 +291,7 @@ fn little_and_strange_input_makes_a_surface_or_none() {
     };
     let default = settings(0.75, false);
     let (hit, report) = build(&[], &default);
-    assert_eq!((hit, report.bricks, report.is_empty), (None, 0, false));
+    assert_eq!((hit, report.bytes, report.is_empty), (None, 0, false));
     let (hit, _) = build(&[Vec3::ZERO], &default);
     // An isolated particle is a ball of about 1.3 radii, whatever the smoothing.
     assert!((hit.expect("a drop").t - (9.0 - 1.3 * RADIUS)).abs() < 0.15 * RADIUS);
@@ -454,7 +454,7 @@ fn packets(count: usize) -> Vec<(RayPacket, u32)> {
 fn packets_find_what_single_rays_find() {
     let (_, centers) = bodies().remove(3);
     let grid = grid(&centers, &settings(0.75, false));
-    for level in SimdLevel::ALL {
+    for level in tested_levels() {
         let surface = SmoothSurface {
             built: &grid.built,
             simd: Supported::or_best(level),

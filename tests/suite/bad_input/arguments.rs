@@ -38,7 +38,7 @@ fn typing_errors_get_the_nearest_word() {
         &workshop,
         &["--accelerator", "lbhv"],
         &[
-            "--accelerator: render.accelerator: wants one of ",
+            "--accelerator: render.accelerator: expected one of ",
             "did you mean lbvh?",
         ],
     );
@@ -51,14 +51,14 @@ fn typing_errors_get_the_nearest_word() {
         &workshop,
         &["--surface", "smoth"],
         &[
-            "--surface: render.surface: wants one of spheres, union, smooth",
+            "--surface: render.surface: expected one of spheres, union, smooth",
             "did you mean smooth?",
         ],
     );
     not_rendered(
         &workshop,
         &["--look", "watr"],
-        &["--look watr: there is no such look", "did you mean water?"],
+        &["unknown look `watr`", "did you mean water?"],
     );
     refused(&workshop, &["render"], &["<INPUT>"]);
 }
@@ -77,7 +77,7 @@ fn surfaces_that_make_no_sense_are_refused() {
         ),
         (
             ["--smoothing", "1.5"],
-            "--smoothing: surface.smoothing: wants a number from 0 to 1",
+            "--smoothing: surface.smoothing: expected a number from 0 to 1",
         ),
     ] {
         not_rendered(&workshop, &options, &[wanted]);
@@ -90,95 +90,98 @@ fn numbers_have_ranges() {
     for (options, wanted) in [
         (
             ["--width", "-5"],
-            "--width: image.width: wants a whole number from 1 to 65536, not -5",
+            "--width: image.width: expected a whole number from 1 to 65536, found -5",
         ),
         (
             ["--width", "0"],
-            "image.width: wants a whole number from 1 to 65536, not 0",
+            "image.width: expected a whole number from 1 to 65536, found 0",
         ),
-        (["--width", "65537"], "from 1 to 65536, not 65537"),
+        (["--width", "65537"], "from 1 to 65536, found 65537"),
         (
             ["--height", "-1"],
-            "--height: image.height: wants a whole number from 1 to 65536",
+            "--height: image.height: expected a whole number from 1 to 65536",
         ),
-        (["--height", "99999999999"], "not 99999999999"),
+        (["--height", "99999999999"], "found 99999999999"),
         (
             ["--samples", "0"],
-            "--samples: image.samples: wants a whole number from 1 to 4096, not 0",
+            "--samples: image.samples: expected a whole number from 1 to 4096, found 0",
         ),
         (
             ["--samples", "-4"],
-            "image.samples: wants a whole number from 1 to 4096, not -4",
+            "image.samples: expected a whole number from 1 to 4096, found -4",
         ),
         (
             ["--max-depth", "0"],
-            "render.max_depth: wants a whole number from 1 to 64, not 0",
+            "render.max_depth: expected a whole number from 1 to 64, found 0",
         ),
         (
             ["--max-depth", "-3"],
-            "render.max_depth: wants a whole number from 1 to 64, not -3",
+            "render.max_depth: expected a whole number from 1 to 64, found -3",
         ),
         (
             ["--radius", "0"],
-            "--radius: input.radius: wants a length above 0",
+            "--radius: input.radius: expected a length above 0",
         ),
-        (["--radius", "-0.1"], "input.radius: wants a length above 0"),
-        (["--radius", "nan"], "not NaN"),
-        (["--radius", "inf"], "not inf"),
-        (["--radius", "thick"], "not the text \"thick\""),
+        (
+            ["--radius", "-0.1"],
+            "input.radius: expected a length above 0",
+        ),
+        (["--radius", "nan"], "found NaN"),
+        (["--radius", "inf"], "found inf"),
+        (["--radius", "thick"], "found the text \"thick\""),
         (
             ["--set", "camera.fov=0"],
-            "--set camera.fov=0: camera.fov: wants degrees between 0 and 180, not 0",
+            "--set camera.fov=0: camera.fov: expected degrees between 0 and 180, found 0",
         ),
         (
             ["--set", "camera.fov=180"],
-            "camera.fov: wants degrees between 0 and 180, not 180",
+            "camera.fov: expected degrees between 0 and 180, found 180",
         ),
         (
             ["--set", "material.ior=nan"],
-            "--set material.ior=nan: material.ior: wants a number above 0, not NaN",
+            "--set material.ior=nan: material.ior: expected a number above 0, found NaN",
         ),
         (
             ["--set", "material.diffuse=inf"],
-            "material.diffuse: wants a number from 0, not inf",
+            "material.diffuse: expected a number from 0, found inf",
         ),
         (
             ["--set", "material.reflection=1.5"],
-            "material.reflection: wants a number from 0 to 1",
+            "material.reflection: expected a number from 0 to 1",
         ),
         (
             ["--set", "camera.eye=[nan,0,0]"],
-            "camera.eye: wants three numbers",
+            "camera.eye: expected three numbers",
         ),
         (
             ["--set", "camera.eye=[1,2]"],
-            "camera.eye: wants three numbers",
+            "camera.eye: expected three numbers",
         ),
         (
             ["--set", "camera.up=[0,0,0]"],
-            "camera.up: wants three numbers that are not all 0",
+            "camera.up: expected three numbers that are not all 0",
         ),
         (
             ["--set", "image.width"],
-            "--set image.width: no `=`, as in render.max_depth=5",
+            "--set image.width: no `=` (example: render.max_depth=5)",
         ),
         (
             ["--set", "image=7"],
-            "--set image=7: image: wants a table, not 7",
+            "--set image=7: image: expected a table, found 7",
         ),
         (
             ["--width", "4k"],
-            "invalid value '4k' for '--width <WIDTH>': wants a number of pixels, as in --width 3840",
+            "invalid value '4k' for '--width <WIDTH>': expected a number of pixels, such as --width 3840",
         ),
-        (["--samples", "many"], "wants a whole number, as in 16"),
-        (["--idle", "1h"], "wants seconds as a number"),
+        (["--samples", "many"], "expected a whole number, such as 16"),
+        (["--idle", "1h"], "expected seconds as a number"),
         (
             ["--threads", "2000"],
-            "--threads: job.threads: wants \"all\" or a whole number from 1 to 1024, not 2000",
+            "--threads: job.threads: expected \"all\" or a whole number from 1 to 1024, found 2000",
         ),
         (["--threads", "0"], "--threads"),
         (["--threads", "many"], "--threads"),
-        (["--up", "w"], "--up: input.up: wants one of x, y, z"),
+        (["--up", "w"], "--up: input.up: expected one of x, y, z"),
     ] {
         not_rendered(&workshop, &options, &[wanted]);
     }
@@ -252,7 +255,7 @@ fn frame_ranges() {
     for (range, wanted) in [
         (
             "900",
-            "input.frames: 900 has none of the frames that there are: 1-3",
+            "input.frames: 900 contains none of the frames of the input: 1-3",
         ),
         (
             "3-",
@@ -291,7 +294,7 @@ fn colours_by_what_is_not_there() {
     not_rendered(
         &workshop,
         &["--color-by", "velocity", "--range", "3", "3"],
-        &["material.color.range: wants two rising numbers"],
+        &["material.color.range: expected two rising numbers"],
     );
 }
 
@@ -381,7 +384,7 @@ fn patterns_and_ranges_of_any_size() {
     for (range, wanted) in [
         ("1-99999999999999999999", "does not fit in 64 bits"),
         ("1-10x99999999999999999999", "does not fit in 64 bits"),
-        ("0-9000000000000000000x7", "has none of the frames"),
+        ("0-9000000000000000000x7", "contains none of the frames"),
     ] {
         not_rendered(&workshop, &["--frames", range], &[wanted]);
     }
@@ -463,9 +466,9 @@ fn conversions_write_directories() {
     for (output, wanted) in [
         (
             "x.vtk",
-            "x.vtk: is a file's name: convert writes native frames (.spf) alone",
+            "x.vtk: has the extension of another format: convert writes only native frames (.spf)",
         ),
-        ("x.csv.gz", "name a directory, as in -o x"),
+        ("x.csv.gz", "give a directory, as in -o x"),
     ] {
         refused(&workshop, &["convert", "in", "-o", output], &[wanted]);
         assert!(!workshop.join(output).exists());

@@ -169,6 +169,6 @@ fn a_manifest_stands_alone() {
     refused(
         &workshop,
         &["render", "job.toml", "in"],
-        &["job.toml: a manifest stands alone; its input.path names the particles"],
+        &["job.toml: a manifest must be the only input; its input.path names the particles"],
     );
 }

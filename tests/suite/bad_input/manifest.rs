@@ -42,21 +42,21 @@ fn wrong_types_have_line_and_column() {
     wrong(
         "[input]\npath = \"in\"\n[image]\nwidth = \"wide\"\nheight = 1.5\n",
         &[
-            "error: my.toml: line 4, column 9: image.width: wants a whole number from 1 to 65536, not the text \"wide\"",
-            "error: my.toml: line 5, column 10: image.height: wants a whole number",
+            "error: my.toml: line 4, column 9: image.width: expected a whole number from 1 to 65536, found the text \"wide\"",
+            "error: my.toml: line 5, column 10: image.height: expected a whole number",
         ],
     );
     wrong(
         "[input]\npath = \"in\"\n[camera]\neye = 3\nlook_at = [0, 0, 0]\n",
-        &["my.toml: line 4, column 7: camera.eye: wants three numbers"],
+        &["my.toml: line 4, column 7: camera.eye: expected three numbers"],
     );
     wrong(
         "[input]\npath = 7\n",
-        &["my.toml: line 2, column 8: input.path: wants a name in quotes, not 7"],
+        &["my.toml: line 2, column 8: input.path: expected a name in quotes, found 7"],
     );
     wrong(
         "image = 3\n[input]\npath = \"in\"\n",
-        &["line 1, column 9: image: wants a table"],
+        &["line 1, column 9: image: expected a table"],
     );
 }
 
@@ -98,7 +98,7 @@ fn keys_of_the_camera_have_line_and_column() {
         &job(&[key, "look_at = [9, 0, 0]\nfov = 0\n"].concat()),
         &[
             "my.toml: line 6, column 1: camera.key.0.look_at: is where the eye is; they must differ",
-            "my.toml: line 7, column 7: camera.key.0.fov: wants degrees between 0 and 180, not 0",
+            "my.toml: line 7, column 7: camera.key.0.fov: expected degrees between 0 and 180, found 0",
         ],
     );
     wrong(

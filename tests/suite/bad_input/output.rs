@@ -35,7 +35,7 @@ fn names_that_will_not_do() {
         &workshop,
         "out/f.exr",
         &[
-            "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into it",
+            "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into the name",
         ],
     );
     // One of those chosen will do if only one is there.
@@ -51,19 +51,19 @@ fn names_that_will_not_do() {
         .tells("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
-    let ending = "--output: output.path: must end in .exr, as in out/frame.####.exr";
+    let ending = "--output: output.path: must end in .exr (example: out/frame.####.exr)";
     for pattern in ["out/f.####.png", "out/", "out", "", "out/f.####"] {
         not_there(&workshop, pattern, &[ending]);
     }
     not_there(
         &workshop,
         "out/%q.exr",
-        &["output.path: `%q.exr` is no frame number; use #### or %04d"],
+        &["output.path: invalid frame number `%q.exr`; use #### or %04d"],
     );
     not_there(
         &workshop,
         "out/##.##.exr",
-        &["output.path: has room for two numbers"],
+        &["output.path: has places for two numbers"],
     );
     not_there(
         &workshop,
@@ -107,10 +107,10 @@ fn one_frame_needs_no_number_in_its_name() {
     assert!(made == image("one/f.exr"));
     for frames in ["1-2", "all"] {
         let several = ["render", "in", "-o", "two/f.exr", "--frames", frames];
-        refused(&workshop, &several, &["put #### into it"]);
+        refused(&workshop, &several, &["put #### into the name"]);
     }
     let follow = ["render", "in", "-o", "two/f.exr", "--follow"];
-    refused(&workshop, &follow, &["put #### into it"]);
+    refused(&workshop, &follow, &["put #### into the name"]);
 }
 
 #[test]
@@ -124,7 +124,7 @@ fn one_converted_frame_has_the_name_it_was_given() {
     refused(
         &workshop,
         &one,
-        &["one.spf: is one name for 3 frames", "--frames"],
+        &["one.spf: one file name for 3 frames", "--frames"],
     );
 }
 
@@ -132,7 +132,7 @@ fn one_converted_frame_has_the_name_it_was_given() {
 fn a_file_in_the_place_of_the_directory() {
     let workshop = three_frames();
     fs::write(workshop.join("out"), "a file").expect("a file");
-    let wanted = "out: is a file where a directory for the images should be; choose another output";
+    let wanted = "out: is a file, but a directory for the images is needed; choose another output";
     not_there(&workshop, "out/f.####.exr", &[wanted]);
     not_there(&workshop, "out/deep/er/f.####.exr", &[wanted]);
     assert_eq!(fs::read(workshop.join("out")).expect("a file"), b"a file");
@@ -235,8 +235,8 @@ fn a_manifest_of_somebody_else_is_not_overwritten() {
     let ran = workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.toml: is in the way of this job's own manifest")
-        .tells("choose another output directory, or move it away");
+        .tells("out/job.toml: this job would write its manifest here")
+        .tells("choose another output directory, or move the file away");
     assert!(ran.rendered().is_empty());
     workshop.render(&["--force"]).expect(2);
     let left = files(&workshop.join("out"));

@@ -77,7 +77,7 @@ fn radii_that_vary_a_thousandfold() {
     smooth(&workshop, &[])
         .expect(0)
         .tells("radii differ; a smooth surface has one for all, here their median")
-        .tells("(--radius gives another)");
+        .tells("(input.radius sets another)");
     let options = [&["--surface", "union", "--force"][..], &BACKGROUND].concat();
     let ran = workshop.render(&options).expect(0);
     assert!(!ran.errors().contains("radii differ"), "{}", ran.errors());
@@ -90,6 +90,6 @@ fn surfaces_that_there_are_not() {
     dam_break(&workshop.join("in"), [1]);
     not_rendered(&workshop, &["--surface", "smoth"], &["smoth", "smooth"]);
     let voxel = [&SMOOTH[..], &["--set", "surface.voxel=0"]].concat();
-    let wanted = "surface.voxel: wants a number of particle radii from 0.25 to 4";
+    let wanted = "surface.voxel: expected a number of particle radii from 0.25 to 4";
     not_rendered(&workshop, &voxel, &[wanted]);
 }

@@ -98,10 +98,10 @@ fn what_cannot_be_meant_is_refused() {
             &["--no-attributes", "--attributes", "a:off"],
             "cannot be used with",
         ),
-        (&["--memory", "much"], "is no size"),
+        (&["--memory", "much"], "invalid size"),
         (
             &["--frames", "7-9"],
-            "--frames: 7-9 has none of the frames that there are: 1",
+            "--frames: 7-9 contains none of the frames of the input: 1",
         ),
         (&["--frames", "x"], "--frames"),
         (&["--force", "--keep-done"], "cannot be used with"),
@@ -118,7 +118,7 @@ fn a_directory_of_something_else_is_refused() {
     fs::write(shop.join("out"), "a file").expect("a file");
     convert(&shop, &[])
         .expect(2)
-        .tells("out: is a file where a directory for the frames should be");
+        .tells("out: is a file, but a directory for the frames is needed");
     fs::remove_file(shop.join("out")).expect("a file");
 
     // A job that renders, and the other way round.
@@ -126,12 +126,12 @@ fn a_directory_of_something_else_is_refused() {
     let before = files(&shop.join("out"));
     convert(&shop, &[])
         .expect(2)
-        .tells("out: holds a job of `render`, not of `convert`; choose another directory");
+        .tells("out: contains a job of `render`, not of `convert`; choose another directory");
     assert!(files(&shop.join("out")) == before);
     shop.run(&["convert", "in", "-o", "native"]).expect(0);
     shop.render_to("native", &[])
         .expect(2)
-        .tells("native: holds a job of `convert`, not of `render`");
+        .tells("native: contains a job of `convert`, not of `render`");
 
     // Frames are not converted onto themselves.
     let before = natives(&shop.join("native"));
@@ -139,7 +139,7 @@ fn a_directory_of_something_else_is_refused() {
     fs::remove_file(ledger_path(&shop.join("native"))).expect("the ledger");
     shop.run(&["convert", "native", "-o", "native"])
         .expect(2)
-        .tells("native/frame.0001.spf: would be overwritten by its own conversion");
+        .tells("native/frame.0001.spf: the conversion would overwrite its own input");
     assert!(natives(&shop.join("native")) == before);
 }
 

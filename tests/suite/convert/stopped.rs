@@ -126,9 +126,9 @@ fn a_second_term_stops_at_once() {
     let in_hand = (0..TRIES).any(|_| {
         let mut running = shop.start(&Q10);
         // Told last before the first frame is begun.
-        assert!(running.wait_for_line("half the usual distance"));
+        assert!(running.wait_for_line("half the typical distance"));
         running.signal("TERM");
-        let asked = running.wait_for_line("stopping after the frame in hand");
+        let asked = running.wait_for_line("stopping after the frames in progress");
         running.signal("TERM");
         let (told, status) = running.end();
         if status.code() == Some(0) {
@@ -137,10 +137,10 @@ fn a_second_term_stops_at_once() {
         }
         assert_eq!(status.code(), Some(75), "{told}");
         assert!(natives(&shop.join("out")).is_empty());
-        // Without a frame in hand, the first one has sufficed.
-        asked && told.contains("stopped; the same command goes on from here")
+        // Without a frame in progress the first signal is enough
+        asked && told.contains("stopped; the same command continues")
     });
-    assert!(in_hand, "there never was a frame in hand");
+    assert!(in_hand, "no frame was ever in progress");
     assert!(ledger(&shop.join("out")).lines.is_empty());
 }
 
@@ -148,9 +148,9 @@ fn a_second_term_stops_at_once() {
 fn a_second_process_takes_over_from_one_that_dies() {
     let shop = large_frame();
     let mut running = shop.start(&Q10);
-    assert!(running.wait_for_line("half the usual distance"));
+    assert!(running.wait_for_line("half the typical distance"));
     let mut second = shop.start(&Q10);
-    let waits = second.wait_for_line("which process");
+    let waits = second.wait_for_line("is working on it");
     running.kill();
     running.end();
     let (told, status) = second.end();

@@ -30,15 +30,15 @@ fn jobs_that_cannot_be_exported() {
     refused(
         &workshop,
         &with(&["--frames", "7-9"]),
-        "none of the frames that there are: 1-3",
+        "none of the frames of the input: 1-3",
     );
     refused(&workshop, &with(&["--frames", "1-"]), "--frames");
     refused(
         &workshop,
         &with(&["--mem", "16"]),
-        "write the unit, as in 4GiB",
+        "write the unit, such as 4GiB",
     );
-    refused(&workshop, &with(&["--mem", "lots"]), "is no size");
+    refused(&workshop, &with(&["--mem", "lots"]), "invalid size");
     refused(&workshop, &with(&["--chunk", "0"]), "--chunk");
     refused(&workshop, &with(&["--cpus", "0"]), "--cpus");
     let text = fs::read_to_string(&manifest).expect("a manifest");
@@ -56,7 +56,7 @@ fn what_engines_cannot_take() {
         let arguments = ["export", "slurm", "data/job.toml", "-o", "new.yaml"];
         only(&workshop, &[&arguments, options].concat(), wanted);
     };
-    slurm(&["--time", "2h"], "is no time limit");
+    slurm(&["--time", "2h"], "invalid time limit");
     slurm(
         &["--time", "2:00"],
         "a time limit of 00:02:00 leaves no time",
@@ -70,14 +70,14 @@ fn what_engines_cannot_take() {
     only(
         &workshop,
         &openjd,
-        "new.txt: engines know a template by its name",
+        "new.txt: engines recognise a template by its name",
     );
     job(&workshop, "100%", &[1]);
     let openjd = ["export", "openjd", "100%/job.toml"];
     only(&workshop, &openjd, "rename the directory");
     job(&workshop, "a{{b", &[1]);
     let openjd = ["export", "openjd", "a{{b/job.toml"];
-    only(&workshop, &openjd, "begins an expression");
+    only(&workshop, &openjd, "starts an expression");
 }
 
 #[test]

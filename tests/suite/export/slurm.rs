@@ -92,11 +92,11 @@ fn tasks_are_few_enough_for_an_array() {
         &["data/job.toml", "--max-tasks", "3", "--chunk", "2"],
     )
     .expect(0);
-    let ran = ran.tells("3 tasks of 5 frames, as 2 would make 7 tasks");
+    let ran = ran.tells("3 tasks of 5 frames, because 2 would give 7 tasks");
     assert_eq!(chunks(&ran.text()).concat(), FRAMES);
     assert!(
         ran.text()
-            .contains("# 5 frames a task, as 2 would make 7 tasks")
+            .contains("# 5 frames per task, because 2 would give 7 tasks")
     );
     // Nobody said how many.
     let ran = export(&workshop, &["data/job.toml"]).expect(0);

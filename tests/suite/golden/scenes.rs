@@ -6,6 +6,11 @@ use spherule::scene::{
     Background, Bounds, Camera, CameraView, ColorMap, Falloff, Fresnel, Ground, Light, Material,
     Scene,
 };
+use spherule::surface::{NormalKind, SurfaceKind, SurfaceSettings};
+
+mod bodies;
+
+pub(super) use bodies::{pca_normals, smooth, union};
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 54;
@@ -36,6 +41,18 @@ const MATT: Material = Material {
     extinction: Vec3::ZERO,
 };
 
+/// Each particle a ball of its own; a smooth surface has voxels of a particle radius. Spelled out, too.
+const SPHERES: SurfaceSettings = SurfaceSettings {
+    kind: SurfaceKind::Spheres,
+    normals: NormalKind::Sphere,
+    smoothing: 0.75,
+    exact: false,
+    voxel: 1.0,
+    smoothing_length: 2.0,
+    threshold: 0.6,
+    spray: false,
+};
+
 /// Owned colours.
 pub(super) enum Paint {
     Each(Vec<Vec3>),
@@ -59,6 +76,7 @@ pub(super) struct Shot {
     pub(super) colors: Paint,
     pub(super) ids: Option<Vec<u32>>,
     pub(super) velocities: Option<Vec<Vec3>>,
+    pub(super) surface: SurfaceSettings,
     pub(super) scene: Scene,
     pub(super) settings: RenderSettings,
 }
@@ -79,6 +97,7 @@ impl Shot {
             radii: vec![radius],
             ids: None,
             velocities: None,
+            surface: SPHERES,
             scene: Scene {
                 origin: DVec3::ZERO,
                 camera: Camera::new(&view, aspect, DVec3::ZERO).expect("a camera"),
@@ -95,6 +114,12 @@ impl Shot {
                 ..RenderSettings::new(WIDTH, HEIGHT)
             },
         }
+    }
+
+    /// Of another size and the same shape.
+    fn sized(mut self, width: u32) -> Self {
+        (self.settings.width, self.settings.height) = (width, width * HEIGHT / WIDTH);
+        self
     }
 
     /// With one colour each.

@@ -106,13 +106,13 @@ fn what_would_make_render_refuse_is_named() {
     fs::write(workshop.join("out"), "a file").expect("a file");
     check(&workshop, &[])
         .expect(2)
-        .tells("out: is a file where a directory for the images should be");
+        .tells("out: is a file, but a directory for the images is needed");
     fs::remove_file(workshop.join("out")).expect("the file");
     fs::create_dir(workshop.join("out")).expect("a directory");
     fs::write(workshop.join("out/job.toml"), "theirs = true\n").expect("a file");
     let ran = check(&workshop, &["--json"])
         .expect(2)
-        .tells("out/job.toml: is in the way of this job's own manifest");
+        .tells("out/job.toml: this job would write its manifest here");
     let told = answer(&ran);
     assert_eq!(told["problems"].as_array().map(Vec::len), Some(1));
     assert_eq!(files(&workshop.join("out")).len(), 1);

@@ -29,7 +29,7 @@ fn a_frame_larger_than_memory_is_made() {
     };
     // All of them at once need some 170 MB: so the limit is one.
     assert_ne!(make("2GiB").code(), Some(0));
-    make("64MiB").expect(0).tells("put aside");
+    make("64MiB").expect(0).tells("temporary files");
     let file = NativeFile::open(&workshop.join("a.spf"), Access::Map).expect("whole");
     let frame = file.frame().expect("unchanged");
     frame.verify().expect("undamaged");

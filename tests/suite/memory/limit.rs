@@ -52,10 +52,9 @@ fn sizes_that_are_none() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 10, false);
     for size in ["0", "", "-5", "much", "4 gallons", "1e3"] {
-        workshop
-            .render(&["--memory-limit", size])
-            .expect(2)
-            .tells("--memory-limit: render.memory_limit: wants a size above 0, as \"4GiB\"");
+        workshop.render(&["--memory-limit", size]).expect(2).tells(
+            "--memory-limit: render.memory_limit: expected a size above 0, such as \"4GiB\"",
+        );
     }
     for size in ["2GiB", "2G", "2048m", "2147483648"] {
         workshop.render(&["--memory-limit", size]).expect(0);
@@ -98,7 +97,7 @@ fn frames_go_one_at_a_time_where_that_fits() {
     run("free", &[]).expect(0);
     run("tight", &["--memory-limit", "65MiB"])
         .expect(0)
-        .tells("one frame at a time, to take less memory");
+        .tells("one frame at a time, to reduce memory");
     assert_eq!(
         images(&workshop.join("free")),
         images(&workshop.join("tight"))

@@ -218,7 +218,7 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
     own(&["--width", "90"]).expect(2);
     for option in ["--force", "--keep-done"] {
         let width = if option == "--force" { "80" } else { "90" };
-        let told = "out/job.toml: not written by spherule, or edited since, so it stays as it is";
+        let told = "out/job.toml: not written by spherule, or edited since, so it is not changed";
         own(&["--frames", "2", "--width", width, option])
             .expect(0)
             .tells(told);
@@ -226,7 +226,7 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
     }
     // Nor from elsewhere.
     let ran = workshop.render(&["--frames", "1", "--force"]).expect(0);
-    assert!(stays() && !ran.errors().contains("stays as it is"));
+    assert!(stays() && !ran.errors().contains("not changed"));
     workshop.render(&["--max-depth", "1", "--force"]).expect(0);
     workshop.render(&["--max-depth", "1"]).expect(0);
     assert!(stays());

@@ -40,7 +40,7 @@ fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
     fs::write(workshop.join("out/job.stop"), "").expect("a file");
     let (told, status) = running.end();
     assert_eq!(status.code(), Some(0), "{told}");
-    assert!(told.contains("job.stop is there"), "{told}");
+    assert!(told.contains("job.stop exists"), "{told}");
     assert!(
         !told.contains("error"),
         "a file was taken before it was complete: {told}"
@@ -70,7 +70,7 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     let ran = workshop
         .run(&arguments(&["--idle", "1"]))
         .expect(0)
-        .tells("nothing new for 1 s");
+        .tells("no new frames for 1 s");
     assert_eq!(ran.rendered(), [1, 2]);
     dam_break(&workshop.join("in"), 3..=3);
     let ran = workshop.run(&arguments(&["--idle", "1"])).expect(0);
@@ -78,7 +78,7 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     workshop
         .run(&arguments(&["--shard", "1/2"]))
         .expect(2)
-        .tells("--shard 1/2 does not go with following");
+        .tells("--shard 1/2 does not combine with --follow");
     // And what was never there is named.
     fs::remove_dir_all(workshop.join("in")).expect("a directory");
     let options = ["--idle", "0.5", "-o", "never/f.####.exr"];
@@ -87,7 +87,7 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
         .run(&never)
         .expect(2)
         .tells("waiting: in: no such file or directory")
-        .tells("no complete frame has come: nothing new for 0.5 s");
+        .tells("found no complete frame: no new frames for 0.5 s");
     assert!(!workshop.join("never").exists());
 }
 

@@ -20,8 +20,11 @@ fn interrupt(workshop: &Workshop, out: &str, signal: &str) -> bool {
         return false;
     }
     assert_eq!(status.code(), Some(75), "{told}");
-    assert!(told.contains("stopping after the frame in hand"), "{told}");
-    // The frame in hand was finished, and what is told is what is there.
+    assert!(
+        told.contains("stopping after the frames in progress"),
+        "{told}"
+    );
+    // The frame in progress was finished, and the messages match the files
     let done = ledger(&workshop.join(out)).lines.len();
     assert!((1..FRAMES).contains(&done), "{told}");
     assert!(
@@ -107,14 +110,14 @@ fn a_second_term_stops_at_once() {
         // Told last before the first frame is begun.
         assert!(running.wait_for_line("colour by"));
         running.signal("TERM");
-        let asked = running.wait_for_line("stopping after the frame in hand");
+        let asked = running.wait_for_line("stopping after the frames in progress");
         running.signal("TERM");
         let (told, status) = running.end();
         assert_eq!(status.code(), Some(75), "{told}");
-        // Without a frame in hand, the first one has sufficed.
-        asked && told.contains("stopped; the same command goes on from here")
+        // Without a frame in progress the first signal is enough
+        asked && told.contains("stopped; the same command continues")
     });
-    assert!(in_hand, "there never was a frame in hand");
+    assert!(in_hand, "no frame was ever in progress");
     assert!(images(&workshop.join("out")).is_empty());
     assert!(ledger(&workshop.join("out")).lines.is_empty());
 }
@@ -135,7 +138,7 @@ fn a_frame_that_outlasts_the_grace_period_is_dropped() {
             assert_eq!(status.code(), Some(75), "{told}");
             told.contains("the grace period of 0 s is over (--grace): stopping now")
         });
-        assert!(in_hand, "there never was a frame in hand");
+        assert!(in_hand, "no frame was ever in progress");
         let out = workshop.join(out);
         assert!(images(&out).is_empty() && ledger(&out).lines.is_empty());
         let parts = files(&out)
@@ -177,7 +180,7 @@ fn a_job_is_not_changed_under_those_at_work() {
         workshop
             .run(&[&arguments[..], options].concat())
             .expect(2)
-            .tells("is at work here; wait for it, or stop it first");
+            .tells("is working on this job; wait for it, or stop it first");
     }
     running.kill();
     assert_eq!(running.end().1.code(), None);

@@ -1,4 +1,4 @@
-//! SIGKILL at any moment loses at most the frames in hand, with one worker and with several.
+//! SIGKILL at any moment loses at most the frames in progress, with one worker and with several.
 
 use std::collections::BTreeMap;
 use std::fs;

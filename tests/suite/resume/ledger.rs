@@ -41,7 +41,7 @@ fn a_damaged_line_is_named_and_nothing_is_touched() {
         .expect(2)
         .tells("out/job.ledger.")
         .tells(".jsonl: line 2: not a ledger entry")
-        .tells("remove that line to do its frame again, or start over with --force");
+        .tells("remove that line to repeat its frame, or start over with --force");
     assert_eq!(ran.errors().matches("error:").count(), 1);
     assert_eq!(stamps(&workshop.join("out")), before);
 
@@ -63,7 +63,7 @@ fn a_damaged_or_missing_plan_is_no_fresh_start() {
     workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.plan.json: this is no readable plan")
+        .tells("out/job.plan.json: not a readable plan")
         .tells("--force");
     fs::remove_file(&plan).expect("a plan");
     workshop

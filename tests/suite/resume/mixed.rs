@@ -150,7 +150,7 @@ fn files_that_no_job_made_are_not_replaced() {
             render(&workshop, "in", options)
                 .expect(2)
                 .tells(&format!(
-                    "out/{name}: there already, and not made by this job; "
+                    "out/{name}: already exists and was not written by this job; "
                 ))
                 .tells("or replace it with --force");
         }
@@ -158,7 +158,7 @@ fn files_that_no_job_made_are_not_replaced() {
         workshop
             .run(&[&check[..], &SMALL].concat())
             .expect(2)
-            .tells(&format!("out/{name}: there already"));
+            .tells(&format!("out/{name}: already exists"));
         let left = files(&workshop.join("out"));
         assert_eq!(left.len(), 1, "{:?}", left.keys());
         assert_eq!(left[name], b"mine");
@@ -178,11 +178,11 @@ fn nor_are_files_in_the_way_of_frames_that_come_later() {
     // The previews are new to the job.
     render(&workshop, "in", &["--keep-done"])
         .expect(2)
-        .tells("out/f.0001.png: there already");
+        .tells("out/f.0001.png: already exists");
     dam_break(&workshop.join("in"), 3..=3);
     render(&workshop, "in", &["--set", "output.preview=false"])
         .expect(2)
-        .tells("out/f.0003.exr: there already");
+        .tells("out/f.0003.exr: already exists");
     fs::remove_file(workshop.join("out/f.0003.exr")).expect("a file");
     let ran = render(&workshop, "in", &["--set", "output.preview=false"]).expect(0);
     assert_eq!(ran.rendered(), [3]);
@@ -216,7 +216,7 @@ fn native_frames_that_no_job_made_are_not_replaced() {
     workshop
         .run(&["convert", "in", "-o", "out"])
         .expect(2)
-        .tells("out/frame.0002.spf: there already");
+        .tells("out/frame.0002.spf: already exists");
     assert_eq!(files(&workshop.join("out")).len(), 1);
     workshop
         .run(&["convert", "in", "-o", "out", "--force"])

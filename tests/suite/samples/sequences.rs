@@ -200,7 +200,7 @@ fn what_a_file_has_beside_its_particles_is_told() {
         .expect(0)
         .tells(cell)
         .tells(names)
-        .tells("colour by `element`, seen from 1 to 8");
+        .tells("colour by `element`, range 1 to 8");
 }
 
 #[test]

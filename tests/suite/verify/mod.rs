@@ -57,7 +57,7 @@ fn frames_that_are_not_made_yet_are_no_fault() {
     let ran = workshop.run(&["verify", "out"]).expect(0);
     assert_eq!(
         ran.text(),
-        "sound              1 (2)\nnot made yet       2 (1,3)\n"
+        "sound              1 (2)\npending            2 (1,3)\n"
     );
     let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
     let states: Vec<Value> = objects(&ran).iter().map(|o| o["status"].clone()).collect();
@@ -82,7 +82,7 @@ fn each_fault_is_named() {
         lines[0].starts_with("frame 1: f.0001.exr: damaged: cannot be decoded: "),
         "{text}"
     );
-    assert_eq!(lines[1], "frame 2: f.0002.png: missing: is not there");
+    assert_eq!(lines[1], "frame 2: f.0002.png: missing: does not exist");
     let longer = format!(
         "frame 3: f.0003.exr: length: has {} bytes, {written} were written",
         written + 1
@@ -101,7 +101,7 @@ fn each_fault_is_named() {
     assert_eq!(objects.len(), 1);
     assert_eq!(objects[0]["status"], "missing");
     assert_eq!(objects[0]["files"][0]["status"], "sound");
-    assert_eq!(objects[0]["files"][1]["reason"], "is not there");
+    assert_eq!(objects[0]["files"][1]["reason"], "does not exist");
 }
 
 #[test]
@@ -166,12 +166,12 @@ fn where_there_is_no_job() {
     refused(&["none.toml"], "none.toml: ");
     refused(
         &["out", "--frames", "9"],
-        "--frames: 9 has none of the job's frames: 1-3",
+        "--frames: 9 contains none of the job's frames: 1-3",
     );
     fs::write(workshop.join("bad.toml"), "[inptu]\n").expect("a file");
     refused(&["bad.toml"], "did you mean `input`?");
     fs::write(workshop.join("out/job.plan.json"), "{").expect("a file");
-    refused(&["out"], "job.plan.json: this is no readable plan");
+    refused(&["out"], "job.plan.json: not a readable plan");
 }
 
 #[test]
@@ -187,7 +187,7 @@ fn damaged_frames_are_made_anew_when_asked_for() {
     let damaged = images(&out);
     let ran = workshop.run(&["verify", "out", "--requeue-bad"]);
     ran.expect(1)
-        .tells("set back: 1,3; the next run of the job makes them anew");
+        .tells("requeued: 1,3; the next run of the job repeats them");
     assert_eq!(images(&out), damaged);
     let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
     let first = &objects(&ran)[0];

@@ -1,4 +1,4 @@
-//! A mapped source has the same particles as the reader.
+//! A mapped source has the same particles as the reader of its format.
 
 mod damage;
 mod made;
@@ -12,7 +12,7 @@ use super::*;
 use crate::attribute::with_values;
 use crate::{FrameFile, RawParticles};
 
-/// The files under a folder of the repository's `tests`.
+/// The files in a folder of the repository's `tests`.
 fn files_under(folder: &str) -> Vec<PathBuf> {
     let root = format!("{}/../tests/{folder}", env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![PathBuf::from(root)];
@@ -35,10 +35,11 @@ fn read_whole(path: &Path) -> Result<RawParticles, FrameError> {
     FrameFile::open(path)?.read(0)
 }
 
-/// Compares a source with what the reader found, in runs of `run` particles.
+/// Compares a source with the result of the reader, in runs of `run` particles.
 #[track_caller]
 fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
     let count = raw.positions.len();
+    // Compare the positions
     for first in (0..count).step_by(run) {
         let mut positions = vec![DVec3::NAN; run.min(count - first)];
         let asked = source.read_positions(first as u64, &mut positions);
@@ -49,6 +50,7 @@ fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
             assert_eq!(bits(*position), bits(expected), "{position} {expected}");
         }
     }
+    // Compare the attributes
     for (number, attribute) in raw.attributes.iter().enumerate() {
         let all: Vec<u8> = with_values!(&attribute.data, values => {
             values.iter().flat_map(|value| value.to_le_bytes()).collect()
@@ -63,7 +65,7 @@ fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
     }
 }
 
-/// Compares a source with its reader.
+/// Compares a source with the reader of its format.
 #[track_caller]
 fn same(source: &dyn ParticleSource, raw: &RawParticles) {
     assert_eq!(source.count(), raw.positions.len() as u64);

@@ -198,7 +198,7 @@ fn plain<'a>(
     let (length, data) = source.length_and_data(header)?;
     let stated = integers(&length, encoding).next().unwrap_or(0);
     if stated != need as u64 {
-        return Err(format!("{need} bytes needed, the header says {stated}"));
+        return Err(format!("{need} bytes needed, but the header has {stated}"));
     }
     match data {
         DataRun::New(source) => source.run(need),
@@ -226,7 +226,7 @@ fn compressed<'a>(
         // Some writers leave out the other two integers then.
         return match need {
             0 => Ok((Cow::Borrowed(&[]), rest)),
-            _ => Err(format!("{need} bytes needed, there are no blocks").into()),
+            _ => Err(format!("{need} bytes needed, but there are no blocks").into()),
         };
     }
     let header = usize::try_from(blocks)
@@ -259,7 +259,7 @@ fn inflate<'a>(
         .and_then(|full| full.checked_add(last));
     if total != Some(need as u64) || last > block_size || block_size == 0 {
         return Err(format!(
-            "{need} bytes needed, the header says {full_blocks} blocks of {block_size} and one of \
+            "{need} bytes needed, but the header has {full_blocks} blocks of {block_size} and one of \
              {last}"
         )
         .into());

@@ -5,7 +5,7 @@ use std::io::Read;
 use flate2::{Decompress, FlushDecompress, Status};
 use lzma_rust2::XzReader;
 
-use super::document::short;
+use super::short;
 use crate::ParseError;
 
 /// Bytes that an LZMA decoder takes beside its dictionary: probabilities and a buffer.
@@ -101,7 +101,7 @@ impl Compressor {
             Ok(())
         } else {
             Err(format!(
-                "it holds {written} bytes or more, its header says {wanted}"
+                "it holds {written} bytes or more, but its header has {wanted}"
             ))
         }
     }

@@ -12,6 +12,7 @@ use quick_xml::reader::Reader;
 
 use super::blocks::{ArrayEncoding, HeaderType};
 use super::compressor::Compressor;
+use super::short;
 use crate::{Endian, MemoryBudget, ParseError};
 
 /// The parsed XML.
@@ -330,12 +331,4 @@ fn required_count(start: &BytesStart<'_>, at: usize, name: &str) -> Result<usize
 
 fn bad_xml(at: usize, error: &dyn std::fmt::Display) -> ParseError {
     ParseError::malformed(at, format!("bad XML: {error}"))
-}
-
-/// A name from the file, short enough for a message.
-pub(super) fn short(name: &str) -> String {
-    name.chars()
-        .take(40)
-        .flat_map(char::escape_default)
-        .collect()
 }

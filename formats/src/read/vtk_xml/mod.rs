@@ -27,7 +27,7 @@ use crate::reader::{Confidence, FileExtent, Reader};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
 use blocks::{ArrayEncoding, ArrayFault, EncodedBytes, payload};
-use document::{ArrayLocation, DataArray, ParseEnd, XmlDocument, short};
+use document::{ArrayLocation, DataArray, ParseEnd, XmlDocument};
 
 /// XML VTK: `.vtu` and `.vtp`.
 pub const FORMAT: Format = Format::new(&XmlVtk);
@@ -323,4 +323,12 @@ fn value_count(
                 format!("{points} points of {components} components are too many"),
             )
         })
+}
+
+/// A name from the file, short enough for a message.
+fn short(name: &str) -> String {
+    name.chars()
+        .take(40)
+        .flat_map(char::escape_default)
+        .collect()
 }

@@ -1,4 +1,4 @@
-//! Files that are damaged, or change.
+//! Damaged files, and files that change while they are read.
 
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -23,7 +23,7 @@ fn damaged_files_get_the_error_of_their_reader() {
     assert!(told > 40, "{told}");
 }
 
-/// Whatever the bytes are: what streams is what is read.
+/// For any bytes, the streamed particles equal those of the reader.
 fn streams_as_read(name: &str, bytes: &[u8]) {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join(name);

@@ -1,8 +1,8 @@
-//! Files made here, with what the samples lack: axes of unlike types, two axes, integers, times, bits.
+//! Generated files with cases that the sample files lack: axes of different types, two axes, integers, times, bits.
 
 use super::*;
 
-/// Streams `bytes` as a file called `name`; whether it could.
+/// Streams `bytes` as a file named `name`; returns whether that was possible.
 #[track_caller]
 fn streams(name: &str, bytes: &[u8]) -> bool {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -16,7 +16,7 @@ fn streams(name: &str, bytes: &[u8]) -> bool {
     })
 }
 
-/// So many bytes that are no pattern.
+/// This many bytes without a pattern.
 fn noise(len: usize) -> Vec<u8> {
     let mut state = 1_u32;
     let mut next = || {

@@ -1,30 +1,37 @@
-//! What a job makes, by the settings in its plan.
+//! The expected outputs of a job, from the settings in its plan.
 
 use spherule_jobs::Plan;
 
-use crate::cli::work::KIND;
+use crate::cli::job::KIND;
 use crate::output::ImageShape;
 use crate::render::Channels;
 
-/// What the files of a job must be.
+/// The kind of files that a job writes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Made {
+pub(super) enum ExpectedOutput {
     /// Images, and previews of the same size.
     Images(ImageShape),
     /// Native frames.
     Frames,
 }
 
-impl Made {
-    /// By the settings of `plan`.
+/// A setting of the plan is missing or invalid.
+#[derive(Debug, PartialEq, Eq, thiserror::Error)]
+#[error("the plan's setting {key} is missing or invalid")]
+pub(super) struct InvalidSetting {
+    key: &'static str,
+}
+
+impl ExpectedOutput {
+    /// Reads the settings of `plan`.
     ///
     /// # Errors
-    /// They do not say it.
-    pub(super) fn of(plan: &Plan) -> Result<Self, String> {
+    /// A setting is missing or invalid.
+    pub(super) fn of(plan: &Plan) -> Result<Self, InvalidSetting> {
         Self::of_settings(plan.settings())
     }
 
-    fn of_settings(settings: &[(String, String)]) -> Result<Self, String> {
+    fn of_settings(settings: &[(String, String)]) -> Result<Self, InvalidSetting> {
         let find = |wanted: &str| {
             let found = settings.iter().find(|(key, _)| key == wanted);
             found.map(|(_, value)| value.as_str())
@@ -36,8 +43,8 @@ impl Made {
             let table = format!("value = {}", find(key)?).parse::<toml::Table>();
             table.ok()?.remove("value")
         };
-        let wrong = |key: &str| format!("the plan's setting {key} says nothing of use");
-        let side = |key: &str| {
+        let wrong = |key| InvalidSetting { key };
+        let side = |key: &'static str| {
             let side = value(key).and_then(|v| u32::try_from(v.as_integer()?).ok());
             side.ok_or_else(|| wrong(key))
         };
@@ -65,14 +72,17 @@ mod tests {
     }
 
     #[test]
-    fn what_a_render_makes() {
+    fn outputs_of_a_render() {
         let mut settings = Manifest::new("data").settings();
         let wanted = ImageShape {
             width: 1920,
             height: 1080,
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
         };
-        assert_eq!(Made::of_settings(&settings), Ok(Made::Images(wanted)));
+        assert_eq!(
+            ExpectedOutput::of_settings(&settings),
+            Ok(ExpectedOutput::Images(wanted))
+        );
         for (key, value) in [
             ("image.width", "-3"),
             ("image.height", "\"1080\""),
@@ -82,16 +92,19 @@ mod tests {
         ] {
             let mut wrong = settings.clone();
             set(&mut wrong, key, value);
-            let error = Made::of_settings(&wrong).unwrap_err();
-            assert!(error.contains(key), "{error}");
+            let error = ExpectedOutput::of_settings(&wrong).unwrap_err();
+            assert_eq!(error, InvalidSetting { key });
         }
         settings.retain(|(key, _)| key != "image.width");
-        assert!(Made::of_settings(&settings).is_err());
+        assert!(ExpectedOutput::of_settings(&settings).is_err());
     }
 
     #[test]
-    fn what_a_conversion_makes() {
+    fn outputs_of_a_conversion() {
         let settings = [(KIND.to_owned(), "convert".to_owned())];
-        assert_eq!(Made::of_settings(&settings), Ok(Made::Frames));
+        assert_eq!(
+            ExpectedOutput::of_settings(&settings),
+            Ok(ExpectedOutput::Frames)
+        );
     }
 }

@@ -1,4 +1,4 @@
-//! What a render tells of what it decides and does.
+//! Messages of a render: the resolved settings, and progress.
 
 use serde_json::json;
 use spherule_formats::Sequence;
@@ -9,10 +9,10 @@ use crate::report::FrameReport;
 use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
-/// Shows an event of the pipeline. Called from all its stages.
-pub(super) fn show(progress: &Progress, event: &Event) {
+/// Shows an event of the pipeline. Called from all stages.
+pub(super) fn show_event(progress: &Progress, event: &Event) {
     match event {
-        Event::Entered(frame, stage) => progress.entered(
+        Event::StageEntered(frame, stage) => progress.stage(
             *frame,
             match stage {
                 Stage::Read => "reading",
@@ -23,15 +23,15 @@ pub(super) fn show(progress: &Progress, event: &Event) {
         Event::Done(task, report) => {
             let image = task.image.display().to_string();
             let facts = json!({"image": image, "seconds": report.seconds});
-            progress.done(task.frame, &task.image, &told(report), facts);
+            progress.done(task.frame, &task.image, &frame_summary(report), facts);
         }
-        Event::Failed(frame, reason) => progress.failed(*frame, reason),
-        Event::Others(news) => progress.others(*news),
+        Event::Failed(failure) => progress.failed(failure),
+        Event::OtherWorker(event) => progress.other_worker(*event),
         Event::Note(note) => progress.note(note),
     }
 }
 
-fn told(report: &FrameReport) -> String {
+fn frame_summary(report: &FrameReport) -> String {
     let s = &report.seconds;
     let surface = match s.surface {
         none if none < 5e-4 => String::new(),
@@ -43,15 +43,15 @@ fn told(report: &FrameReport) -> String {
     )
 }
 
-/// What was decided for the user, so that nothing is a surprise.
-pub(in crate::cli) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) {
-    say!(
+/// Prints the resolved settings.
+pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+    message!(
         "{}, up to {}",
         counted(sequence.frames().len(), "frame"),
         counted(survey.most_particles, "particle")
     );
     if let Some(parts) = parts_text(sequence) {
-        say!("{parts}");
+        message!("{parts}");
     }
     for remark in sequence.remarks() {
         note!("{remark}");
@@ -59,42 +59,42 @@ pub(in crate::cli) fn tell(sequence: &Sequence, survey: &Survey, setup: &Setup) 
     if survey.most_particles == 0 {
         return;
     }
-    say!("{}", radius_text(setup, survey));
+    message!("{}", radius_text(setup, survey));
     if let pipeline::ColorRule::Attribute { name, .. } = &setup.picture.color
         && let Some(color) = &survey.color
     {
-        say!(
-            "colour by `{name}`, seen from {} to {}",
+        message!(
+            "colour by `{name}`, range {} to {}",
             short(color.low),
             short(color.high)
         );
     }
     if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.picture.color, &survey.rgb)
     {
-        say!(
+        message!(
             "colour by the RGB attribute `{name}` ({})",
             rgb.encoding.name()
         );
     }
     if survey.origin != glam::DVec3::ZERO {
-        say!("origin {}: the particles are far from zero", survey.origin);
+        message!("origin {}: the particles are far from zero", survey.origin);
     }
 }
 
-/// The parts of a step, where there are several: all, and which of them are used.
+/// The parts of a time step and the used ones, if there are several.
 pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
     let (all, kept) = (sequence.part_names(), sequence.kept_part_names());
     if all.len() < 2 {
         return None;
     }
     let used = match kept.len() == all.len() {
-        true => "; --parts keeps some of them".to_owned(),
+        true => "; --parts selects some of them".to_owned(),
         false => format!("; used: {}", kept.join(", ")),
     };
     Some(format!("each step has the parts {}{used}", all.join(", ")))
 }
 
-/// The radius in words.
+/// Describes the radius.
 pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
     match &setup.picture.radius {
         RadiusRule::Common(radius) => format!("radius {radius}"),
@@ -102,11 +102,11 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
         RadiusRule::FileOr(radius) => {
             let radius = short(f64::from(*radius));
             let why = match (setup.picture.surface.kind, survey.packed_radius) {
-                (SurfaceKind::Spheres, _) | (_, None) => "half the usual distance of neighbours",
+                (SurfaceKind::Spheres, _) | (_, None) => "half the typical distance of neighbours",
                 (SurfaceKind::Union, _) => {
-                    "by how densely particles lie, enlarged so that spheres overlap"
+                    "from the particle density, enlarged so that spheres overlap"
                 }
-                (SurfaceKind::Smooth, _) => "by how densely particles lie",
+                (SurfaceKind::Smooth, _) => "from the particle density",
             };
             format!("radius {radius}, {why} (--radius sets it)")
         }
@@ -114,7 +114,7 @@ pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
     }
 }
 
-/// Four digits, as a person reads a number.
+/// Rounds to four digits.
 fn short(value: f64) -> f64 {
     format!("{value:.3e}").parse().unwrap_or(value)
 }

@@ -1,79 +1,76 @@
-//! A job as it is asked for, before anything is written: what `render` and `check` share.
+//! A render job before anything is written: shared by `render`, `check`, `still` and `export`.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{FrameRequest, Job, JobRequest, Mode, publish, read_regular_text};
+use spherule_jobs::{FrameRequest, Job, JobRequest, ResumeMode, publish, read_regular_text};
 
 use super::CliError;
-use super::job::{Asked, ManifestArgs, apart};
+use super::job::{
+    JobArgs, frames_in, guard_directory, guard_kind, requests, saved_survey, selection,
+};
+use super::manifest_args::{ManifestArgs, RequestedManifest, in_thread};
 use super::paths::absolute;
 use super::schema::{is_schema, schema_text};
 use super::shard::Shard;
-use super::work::{
-    WorkArgs, chosen, guard_directory, guard_kind, requests, saved_survey, selection,
-};
-use crate::accel::Structure;
 use crate::manifest::{
     Manifest, OutputPattern, SCHEMA_FILE, is_marked, marked, named_place, read_manifest, real_dir,
 };
-use crate::metrics::Bytes;
 use crate::metrics::memory::available;
-use crate::pipeline::{FrameSize, ImageTask, MemoryModel, RadiusRule, Schedule, Setup};
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
 use crate::resolve::{self, check_views, question};
-use crate::surface::SurfaceKind;
 use crate::survey::Survey;
 
-/// The manifest that is written beside the images.
+/// The manifest that is written next to the images.
 const JOB_FILE: &str = "job.toml";
 
-/// What `render` and `check` are told alike.
+/// Arguments of `render` and `check`.
 #[derive(Debug, Args)]
 pub(super) struct RunArgs {
     #[command(flatten)]
     pub(super) manifest: ManifestArgs,
     #[command(flatten)]
-    pub(super) work: WorkArgs,
+    pub(super) job: JobArgs,
 }
 
-/// A job before anything is written.
-pub(super) struct Plan {
-    /// Where the images go: everything of the job lies there. Absolute.
+/// A render job before anything is written.
+pub(super) struct RenderJob {
+    /// Directory of the images and of all files of the job. Absolute.
     pub(super) dir: PathBuf,
-    /// With paths relative to `dir`.
+    /// The manifest, with paths relative to `dir`.
     pub(super) manifest: Manifest,
-    /// The manifest's own file, absolute.
+    /// The file of the manifest, absolute.
     file: Option<PathBuf>,
-    /// What that file says, seen from `dir` too; None if it cannot stand alone.
+    /// The manifest in that file, also relative to `dir`; None if it is not valid without options.
     unchanged: Option<Manifest>,
-    /// The images as the user named them.
+    /// The output path that the user gave.
     pub(super) shown_output: PathBuf,
-    /// The part of the frames that this run is to do.
+    /// The part of the frames that this run processes.
     shard: Option<Shard>,
 }
 
-impl Plan {
+impl RenderJob {
     pub(super) fn new(
-        asked: Asked,
+        requested: RequestedManifest,
         sequence: &Sequence,
         shard: Option<Shard>,
     ) -> Result<Self, CliError> {
-        let base = asked.absolute_base()?;
-        let mut manifest = asked.manifest;
+        let base = requested.absolute_base()?;
+        let mut manifest = requested.manifest;
         let range = manifest.input.frames.as_ref();
-        let chosen = chosen(sequence, range, "input.frames")?;
-        manifest.check_frame_count(chosen.len())?;
+        let frames = frames_in(sequence, range, "input.frames")?;
+        manifest.check_frame_count(frames.len())?;
         let shown_output = PathBuf::from(manifest.output.path.as_str());
         let dir = real_dir(&base.join(manifest.output.path.dir()));
         move_into(&mut manifest, &base, &dir)?;
-        let mut unchanged = asked.unchanged;
+        let mut unchanged = requested.unchanged;
         if let Some(manifest) = &mut unchanged {
             move_into(manifest, &base, &dir)?;
         }
-        let file = asked
+        let file = requested
             .file
             .as_deref()
             .map(absolute)
@@ -93,33 +90,33 @@ impl Plan {
         self.dir.join(JOB_FILE)
     }
 
-    /// Whether the manifest that was given is the one that would be written.
+    /// Whether the given manifest is the file that this job would write.
     fn is_own_manifest(&self) -> bool {
         self.file.as_deref() == Some(&self.job_file())
     }
 
-    /// The frames asked for, done or not.
+    /// The selected frames, done or not.
     pub(super) fn selected(&self, sequence: &Sequence) -> Vec<i64> {
         selection(sequence, self.manifest.input.frames.as_ref(), self.shard)
     }
 
-    /// Refuses a directory that cannot be, or that has a job of another kind.
-    pub(super) fn guard_directory(&self, mode: Mode) -> Result<(), CliError> {
+    /// Refuses an output directory that is a file, or that contains a job of another kind.
+    pub(super) fn guard_directory(&self, mode: ResumeMode) -> Result<(), CliError> {
         guard_directory(&self.dir, "images")?;
         guard_kind(&self.dir, None, mode)
     }
 
-    /// Refuses to begin a job beside a `job.toml` that a user wrote for something else: no option makes
-    /// that file's place free.
+    /// Refuses to start a job next to a `job.toml` that a user wrote for something else. No option overwrites such
+    /// a file.
     pub(super) fn guard_manifest(&self) -> Result<(), CliError> {
         let path = self.job_file();
         let is_free = || !path.exists() || read_manifest(&path).is_ok_and(|text| is_marked(&text));
-        if self.is_own_manifest() || is_free() || Job::has_begun(&self.dir)? {
+        if self.is_own_manifest() || is_free() || Job::exists(&self.dir)? {
             return Ok(());
         }
         Err(CliError::other(format!(
-            "{}: is in the way of this job's own manifest; render that file, choose another \
-             output directory, or move it away",
+            "{}: this job would write its manifest here; render that file, choose another \
+             output directory, or move the file away",
             path.display()
         )))
     }
@@ -136,11 +133,15 @@ impl Plan {
         self.manifest.output.preview.then(path)
     }
 
-    /// What is asked of the job.
+    /// The request for the job.
     ///
     /// # Errors
-    /// The plan of the job that is there cannot be read.
-    pub(super) fn request(&self, sequence: &Sequence, mode: Mode) -> Result<JobRequest, CliError> {
+    /// The plan of the existing job cannot be read.
+    pub(super) fn request(
+        &self,
+        sequence: &Sequence,
+        mode: ResumeMode,
+    ) -> Result<JobRequest, CliError> {
         let outputs = |frame| {
             let image = std::iter::once(self.image(frame));
             image.chain(self.preview(frame)).collect()
@@ -153,20 +154,20 @@ impl Plan {
                 .into(),
             selection: Some(self.selected(sequence)),
             mode: match mode {
-                // A simulation that still runs may have paused in the middle of a file.
-                Mode::Resume if self.manifest.job.follow => Mode::RequeueChanged,
+                // A running simulation may have paused in the middle of a file
+                ResumeMode::Resume if self.manifest.job.follow => ResumeMode::RequeueChanged,
                 mode => mode,
             },
-            patience: self.manifest.job.takeover_after,
+            takeover_after: self.manifest.job.takeover_after,
         })
     }
 
-    /// What the images depend on, in the words of the job that is gone on with, where that makes no difference.
-    fn settings(&self, mode: Mode) -> Result<Vec<(String, String)>, CliError> {
+    /// The settings of the images. Those with the same effect as in the existing plan are written as in the plan.
+    fn settings(&self, mode: ResumeMode) -> Result<Vec<(String, String)>, CliError> {
         let settings = self.manifest.settings();
         let planned = match mode {
-            Mode::Force => None,
-            _ => Job::peek(&self.dir)?,
+            ResumeMode::Force => None,
+            _ => Job::read_plan(&self.dir)?,
         };
         let Some(planned) = planned else {
             return Ok(settings);
@@ -175,15 +176,16 @@ impl Plan {
         let as_planned = self
             .manifest
             .settings_as_planned(planned.settings(), has_rgb);
-        // What is settled anew is settled by what is asked for now.
-        let is_settled_anew = mode == Mode::KeepDone && !planned.changes_to(&as_planned).is_empty();
-        Ok(match is_settled_anew {
+        // Settings that are resolved again must be the new ones
+        let resolves_again =
+            mode == ResumeMode::KeepDone && !planned.changes_to(&as_planned).is_empty();
+        Ok(match resolves_again {
             true => settings,
             false => as_planned,
         })
     }
 
-    /// The frames that the job has: all of the sequence, or the one that is asked for if there is but one name.
+    /// The frames of the job: all of the sequence, or the selected one if the output has no number.
     fn frames_of_job(&self, mut all: Vec<FrameRequest>) -> Vec<FrameRequest> {
         let range = self.manifest.input.frames.as_ref();
         if let Some(range) = range.filter(|_| !self.manifest.output.path.has_number()) {
@@ -192,7 +194,7 @@ impl Plan {
         all
     }
 
-    /// What is asked of a job that goes on with the frames `new`.
+    /// The request that adds the frames `new` to an open job.
     ///
     /// # Errors
     /// The plan cannot be read.
@@ -203,15 +205,15 @@ impl Plan {
     ) -> Result<JobRequest, CliError> {
         Ok(JobRequest {
             selection: Some(new.to_vec()),
-            ..self.request(sequence, Mode::Resume)?
+            ..self.request(sequence, ResumeMode::Resume)?
         })
     }
 
-    pub(super) fn open(&self, sequence: &Sequence, mode: Mode) -> Result<Job, CliError> {
+    pub(super) fn open(&self, sequence: &Sequence, mode: ResumeMode) -> Result<Job, CliError> {
         let request = self.request(sequence, mode)?;
-        // A new job is begun, and an old one forgotten, only for pictures that can be.
-        let surveyed = if mode == Mode::Force || Job::peek(&self.dir)?.is_none() {
-            Some(self.survey_to_begin(sequence)?)
+        // Start a new job, or discard an old one, only if its images are possible
+        let surveyed = if mode == ResumeMode::Force || Job::read_plan(&self.dir)?.is_none() {
+            Some(self.survey_for_start(sequence)?)
         } else {
             None
         };
@@ -220,32 +222,32 @@ impl Plan {
         })?)
     }
 
-    fn survey_to_begin(&self, sequence: &Sequence) -> Result<Value, CliError> {
+    fn survey_for_start(&self, sequence: &Sequence) -> Result<Value, CliError> {
         let (survey, setup) = self.survey(sequence)?;
         let mut tasks = self.tasks(sequence, &self.selected(sequence));
         self.fit(sequence, &setup, &mut tasks);
-        one_fits(&tasks)?;
+        require_one_fits(&tasks)?;
         to_value(&survey)
     }
 
-    /// Looks at the sequence: what "auto" means, and the pictures that come of it.
+    /// Surveys the sequence, and resolves the automatic settings with it.
     pub(super) fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), CliError> {
-        say!("looking at the sequence");
-        let survey = apart(|| Survey::of(sequence, question(&self.manifest)))?;
+        message!("surveying the sequence");
+        let survey = in_thread(|| Survey::of(sequence, question(&self.manifest)))?;
         let setup = self.setup(&survey, sequence)?;
         Ok((survey, setup))
     }
 
-    /// The pictures, if there is one from everywhere the camera goes.
+    /// The setup, if the view is valid along the whole camera path.
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, CliError> {
         let frames = sequence.frames().iter().map(|frame| frame.number);
         let setup = resolve::setup(&self.manifest, survey);
         let setup = setup.and_then(|setup| check_views(&setup, frames).map(|()| setup));
-        setup.map_err(|e| CliError::Other(e.to_string()))
+        Ok(setup?)
     }
 
-    /// The pictures, by what was found when the job began.
-    pub(super) fn settle(
+    /// The setup with the survey that is stored in the plan.
+    pub(super) fn stored_setup(
         &self,
         resolved: &Value,
         sequence: &Sequence,
@@ -255,7 +257,7 @@ impl Plan {
         Ok((survey, setup))
     }
 
-    /// How `tasks` go through memory. Those that do not fit into the limit are marked so.
+    /// Decides whether frames overlap in memory. Tasks that exceed the limit are marked as refused.
     pub(super) fn fit(
         &self,
         sequence: &Sequence,
@@ -267,34 +269,27 @@ impl Plan {
             .map(|task| FrameSize::of(sequence, task.index, setup.run.weight.as_ref()))
             .collect();
         let limit = self.manifest.render.memory_limit;
-        let model = MemoryModel::new(setup);
-        let schedule = model.schedule(&sizes, limit.map(|l| l.0), available());
-        if let Some(limit) = limit {
-            for (place, need) in &schedule.too_large {
-                tasks[*place].refused = Some(format!(
-                    "it needs about {} ({need}){}, render.memory_limit is {limit}: {}",
-                    Bytes(need.total()),
-                    surface_text(setup),
-                    remedy(setup, &sizes[*place], limit)
-                ));
-            }
+        let mut schedule = MemoryModel::new(setup).schedule(&sizes, limit, available());
+        for (index, error) in schedule.too_large.drain(..) {
+            tasks[index].refused = Some(error);
         }
         schedule
     }
 
-    /// Writes the manifest beside the images, unless it is what was given or stands there already.
-    /// If it is what was given, options become part of it where the job was `settled_anew` by them. A file
-    /// that a user wrote or edited stays as it is.
-    pub(super) fn write_manifest(&self, settled_anew: bool) -> Result<(), CliError> {
+    /// Writes the manifest next to the images, unless that file is the given manifest or is up to date. If it is the
+    /// given manifest, options are added to it only if `resolves_again` is set. A file that a user wrote or edited
+    /// is not changed.
+    pub(super) fn write_manifest(&self, resolves_again: bool) -> Result<(), CliError> {
         let path = self.job_file();
         let mut manifest = self.manifest.clone();
         if let Some(unchanged) = &self.unchanged {
-            // Which frames one of many workers does now, and how, is no property of the job.
+            // The frame selection and execution options of one worker are not properties of the job
             manifest.input.frames = unchanged.input.frames.clone();
             manifest.job = unchanged.job.clone();
             manifest.render.memory_limit = unchanged.render.memory_limit;
         }
-        if self.is_own_manifest() && (!settled_anew || self.unchanged.as_ref() == Some(&manifest)) {
+        if self.is_own_manifest() && (!resolves_again || self.unchanged.as_ref() == Some(&manifest))
+        {
             return Ok(());
         }
         if path.exists() {
@@ -302,8 +297,8 @@ impl Plan {
             if !is_marked(&text) {
                 if Manifest::parse(&text, &path).ok().as_ref() != Some(&manifest) {
                     note!(
-                        "{}: not written by spherule, or edited since, so it stays as it is; this job was made \
-                         with other settings than it has: give the same options again, or put them into it",
+                        "{}: not written by spherule, or edited since, so it is not changed; the settings of this job \
+                         differ from it: give the same options again, or add them to the file",
                         path.display()
                     );
                 }
@@ -315,14 +310,14 @@ impl Plan {
         Ok(())
     }
 
-    /// The manifest's first line refers to the schema, which is of use to editors alone.
+    /// Writes the schema that the first line of the manifest refers to. Only editors use it.
     fn write_schema(&self) {
         let path = self.dir.join(SCHEMA_FILE);
         if path.exists() && !is_schema(&path) {
             return;
         }
         if let Err(error) = write_if_changed(&path, &schema_text()) {
-            note!("{error}; editors do without it");
+            note!("{error}; editors will not have a schema");
         }
     }
 
@@ -353,8 +348,8 @@ fn to_value(survey: &Survey) -> Result<Value, CliError> {
     serde_json::to_value(survey).map_err(|e| CliError::Other(e.to_string()))
 }
 
-/// Refuses work of which nothing can be done.
-pub(super) fn one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
+/// Refuses a run in which no frame fits into memory.
+pub(super) fn require_one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
     let refused = tasks.iter().map(|t| Some((t.frame, t.refused.as_ref()?)));
     match refused.collect::<Option<Vec<_>>>().as_deref() {
         Some([(frame, reason), ..]) => Err(CliError::other(format!(
@@ -364,48 +359,10 @@ pub(super) fn one_fits(tasks: &[ImageTask]) -> Result<(), CliError> {
     }
 }
 
-/// What the grid of a smooth surface depends on, the usual reason for its size being a wrong radius.
-fn surface_text(setup: &Setup) -> String {
-    if setup.picture.surface.kind != SurfaceKind::Smooth {
-        return String::new();
-    }
-    let voxel = setup.picture.surface.voxel;
-    match setup.picture.radius {
-        RadiusRule::Common(radius) | RadiusRule::FileOr(radius) if radius > 0.0 => format!(
-            " for a smooth surface of particles of radius {radius} in voxels of {}",
-            voxel * radius
-        ),
-        _ => format!(
-            " for a smooth surface of particles of their own radius in voxels of {voxel} of it"
-        ),
-    }
-}
-
-/// What to do about a frame that needs more than `limit`.
-fn remedy(setup: &Setup, frame: &FrameSize, limit: Bytes) -> String {
-    let mut ways = Vec::new();
-    let others = Structure::ALL.into_iter().filter(|structure| {
-        let mut setup = setup.clone();
-        setup.run.accelerator = Some(*structure);
-        MemoryModel::new(&setup).alone(frame).total() <= limit.0
-    });
-    ways.extend(others.map(|other| format!("choose --accelerator {other}")));
-    let alone = MemoryModel::new(setup).alone(frame);
-    let empty = MemoryModel::new(setup).alone(&FrameSize::default());
-    if 4 * (empty.images + empty.encoding) > limit.0 {
-        ways.push("make the image smaller or ask for fewer channels".to_owned());
-    }
-    if setup.picture.surface.kind == SurfaceKind::Smooth && 4 * alone.surface > limit.0 {
-        ways.push("give larger voxels (surface.voxel)".to_owned());
-    }
-    ways.push("raise the limit".to_owned());
-    ways.join(", or ")
-}
-
-/// Makes paths relative to `dir`, where the images of `manifest` are to be.
+/// Makes the paths in `manifest` relative to `dir`, the directory of its images.
 fn move_into(manifest: &mut Manifest, base: &Path, dir: &Path) -> Result<(), CliError> {
-    manifest.rebase(base, dir).map_err(CliError::Other)?;
-    // However the directory was named: it may be moved with its manifest.
+    manifest.rebase(base, dir)?;
+    // Store only the file name, so that the directory can be moved with its manifest
     if real_dir(&dir.join(manifest.output.path.dir())) == dir {
         manifest.output.path =
             OutputPattern::parse(manifest.output.path.file_name()).map_err(CliError::Other)?;

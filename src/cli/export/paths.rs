@@ -1,15 +1,15 @@
-//! Paths as other hosts are to see them.
+//! Paths for use on other hosts.
 
 use std::path::{Path, PathBuf};
 
 use super::super::CliError;
-use crate::manifest::{named_place, real_dir, without_dots};
+use crate::manifest::{self, named_place, real_dir};
 
-/// The directory `path`, absolute, without `.` and `..`. Links stay: on a cluster a link's name often is what
-/// hosts have in common, and where it leads is not.
-pub(super) fn tidy(path: &Path) -> PathBuf {
-    let plain = without_dots(path);
-    // Unless `..` goes past a link.
+/// The directory `path`, absolute, without `.` and `..`. Links are kept: on a cluster, hosts often share the name of
+/// a link but not its target.
+pub(super) fn normalized(path: &Path) -> PathBuf {
+    let plain = manifest::without_dots(path);
+    // `..` after a link leads to another directory
     let real = real_dir(path);
     if real_dir(&plain) == real {
         plain
@@ -18,18 +18,18 @@ pub(super) fn tidy(path: &Path) -> PathBuf {
     }
 }
 
-/// The directory that all `files` are in, at whatever depth; None if they share but the root.
+/// The common ancestor directory of all `files`; None if it is the root.
 pub(super) fn common_dir(files: &[PathBuf]) -> Option<PathBuf> {
     let mut dirs = files.iter().filter_map(|file| file.parent());
-    let mut common = tidy(dirs.next()?);
+    let mut common = normalized(dirs.next()?);
     let mut last = None;
     for dir in dirs {
-        // Files mostly lie in one directory.
+        // Most files are in the same directory
         if last == Some(dir) {
             continue;
         }
         last = Some(dir);
-        let dir = tidy(dir);
+        let dir = normalized(dir);
         while !dir.starts_with(&common) {
             common.pop();
         }
@@ -37,24 +37,24 @@ pub(super) fn common_dir(files: &[PathBuf]) -> Option<PathBuf> {
     common.parent().is_some().then_some(common)
 }
 
-/// `path` as seen from `dir`, both absolute; None if it is not in there.
+/// `path` relative to `dir`, both absolute; None if it is not inside.
 pub(super) fn inside(path: &Path, dir: &Path) -> Option<PathBuf> {
-    let place = match path.strip_prefix(dir) {
-        Ok(place) => place.to_owned(),
-        // They may be named by different links.
+    let relative = match path.strip_prefix(dir) {
+        Ok(relative) => relative.to_owned(),
+        // The paths may contain different links
         Err(_) => named_place(path)
             .strip_prefix(real_dir(dir))
             .ok()?
             .to_owned(),
     };
-    Some(if place.as_os_str().is_empty() {
+    Some(if relative.as_os_str().is_empty() {
         ".".into()
     } else {
-        place
+        relative
     })
 }
 
-/// What a queue can call the job of a manifest: the file's name, or its directory's if it is just `job.toml`.
+/// The name of a job in a queue: that of the manifest, or of its directory if the manifest is `job.toml`.
 pub(super) fn job_name(manifest: &Path) -> String {
     let stem = manifest.file_stem().unwrap_or_default();
     let dir = manifest.parent().and_then(Path::file_name);
@@ -77,18 +77,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn dots_go_and_links_stay() {
+    fn dots_are_removed_and_links_kept() {
         let temporary = tempfile::tempdir().unwrap();
         let dir = temporary.path().canonicalize().unwrap();
         std::fs::create_dir_all(dir.join("real/deep")).unwrap();
         std::os::unix::fs::symlink(dir.join("real/deep"), dir.join("link")).unwrap();
-        assert_eq!(tidy(&dir.join("./link/x/../y")), dir.join("link/y"));
-        // Past the link, `..` is another directory than the name says.
-        assert_eq!(tidy(&dir.join("link/../y")), dir.join("real/y"));
+        assert_eq!(normalized(&dir.join("./link/x/../y")), dir.join("link/y"));
+        // After the link, `..` is another directory
+        assert_eq!(normalized(&dir.join("link/../y")), dir.join("real/y"));
     }
 
     #[test]
-    fn inputs_share_a_directory() {
+    fn common_directories() {
         let common = |files: &[&str]| {
             let files: Vec<PathBuf> = files.iter().map(PathBuf::from).collect();
             common_dir(&files)
@@ -103,7 +103,7 @@ mod tests {
     }
 
     #[test]
-    fn only_what_is_below_is_inside() {
+    fn relative_paths_inside_a_directory() {
         let seen = |path: &str, dir: &str| inside(Path::new(path), Path::new(dir));
         assert_eq!(seen("/a/b/c", "/a"), Some("b/c".into()));
         assert_eq!(seen("/a/b", "/a/b"), Some(".".into()));
@@ -119,7 +119,7 @@ mod tests {
     }
 
     #[test]
-    fn jobs_are_called_by_what_tells_them_apart() {
+    fn job_names() {
         assert_eq!(job_name(Path::new("/data/dam/job.toml")), "dam");
         assert_eq!(job_name(Path::new("/data/dam/night.toml")), "night");
         assert_eq!(job_name(Path::new("/job.toml")), "job");
