@@ -26,6 +26,7 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
+pub mod denoise;
 pub mod failure;
 pub mod manifest;
 pub mod math;

@@ -7,32 +7,58 @@
 
 use glam::Vec3;
 
-use super::{
-    DenoiseInput, DenoiseSettings,
-    gather::{Shares, finish},
-    kernels::{SUMS, WeightScale, distances_3, distances_5, pairs_3, pairs_5},
-    tile::{Rectangle, STRIDE, Tile, TileLayout},
-};
+use super::gather::{Shares, finish};
+use super::kernels::{PairScale, distances, pairs};
+use super::planes::{PLANES, STRIDE, SUMS};
+use super::settings::{PATCH_RADIUS, PATCH_SIDE};
+use super::tile::Tile;
+use super::tiling::{Rectangle, TileLayout};
+use super::{DenoiseInput, DenoiseSettings};
 use crate::math::Supported;
 
-/// Tolerance of depth on a plane that faces the camera, relative to the depth.
-const DEPTH_TOLERANCE: f32 = 3e-3;
+/// Values of a row of sums.
+const SUMS_LEN: usize = SUMS * STRIDE;
+/// Values of the colour distances in the rows of a patch, for both halves.
+const DISTANCES_LEN: usize = PATCH_SIDE * 2 * STRIDE;
 
 /// The filter for an image, and the memory of one thread.
 pub(super) struct TileFilter<'a> {
     simd: Supported,
     input: &'a DenoiseInput<'a>,
-    settings: &'a DenoiseSettings,
+    search: isize,
+    /// Factor of the sum of colour distances over a patch.
+    color_scale: f32,
     layout: TileLayout,
-    /// Rows and columns from a pixel to the other one of a pair.
-    offsets: Vec<(isize, isize)>,
+    offsets: Vec<Offset>,
     tile: Tile,
-    /// Sums of rows for the first and the second pixel of pairs.
+    /// Sums of rows for the first and the second pixel of pairs; the last row is for pixels beside the tile.
     sums: [Vec<f32>; 2],
-    /// For each offset, the colour distances in the last rows: a plane for each half.
+    /// For each offset, the colour distances in the last rows.
     distances: Vec<f32>,
     /// Distances of single pixels, for each half.
-    row: [Vec<f32>; 2],
+    pixels: Vec<f32>,
+}
+
+/// Rows and columns from a pixel to the other one of a pair.
+#[derive(Debug, Clone, Copy)]
+struct Offset {
+    dy: isize,
+    dx: isize,
+}
+
+impl Offset {
+    /// Those below and to the right of a pixel.
+    fn all(search: isize) -> Vec<Self> {
+        let rows = (0..=search).flat_map(|dy| (-search..=search).map(move |dx| (dy, dx)));
+        rows.filter(|offset| *offset > (0, 0))
+            .map(|(dy, dx)| Self { dy, dx })
+            .collect()
+    }
+
+    /// The first columns of pairs, of which at least one pixel is in the tile.
+    fn first_columns(self) -> [isize; 2] {
+        [(-self.dx).min(0), self.dx.min(0)]
+    }
 }
 
 impl<'a> TileFilter<'a> {
@@ -40,130 +66,108 @@ impl<'a> TileFilter<'a> {
     pub(super) fn new(
         simd: Supported,
         input: &'a DenoiseInput<'a>,
-        settings: &'a DenoiseSettings,
+        settings: &DenoiseSettings,
         width: usize,
     ) -> Self {
-        let search = settings.search as isize;
-        let offsets: Vec<_> = (0..=search)
-            .flat_map(|dy| (-search..=search).map(move |dx| (dy, dx)))
-            .filter(|offset| *offset > (0, 0))
-            .collect();
-        let rows = 2 * settings.patch as usize + 1;
+        let search = settings.search as usize;
+        let layout = TileLayout::new(search, width);
+        let offsets = Offset::all(search as isize);
         Self {
             simd,
             input,
-            settings,
-            layout: TileLayout::new(settings, width),
-            tile: Tile::default(),
+            search: search as isize,
+            color_scale: 1.0 / (settings.k * settings.k * (PATCH_SIDE * PATCH_SIDE) as f32),
+            layout,
+            tile: Tile::new(layout),
             sums: [Vec::new(), Vec::new()],
-            distances: vec![0.0; offsets.len() * rows * 2 * STRIDE],
-            row: [vec![0.0; STRIDE], vec![0.0; STRIDE]],
+            distances: vec![0.0; offsets.len() * DISTANCES_LEN],
+            pixels: vec![0.0; 2 * STRIDE],
             offsets,
         }
     }
 
+    /// Upper bound of the memory for tiles of up to `rows` rows, bytes.
+    pub(super) fn bytes(settings: &DenoiseSettings, rows: usize) -> u64 {
+        let search = settings.search as usize;
+        let offsets = 2 * search * (search + 1);
+        let tile = (rows + 2 * TileLayout::margin(search)) * PLANES * STRIDE + STRIDE;
+        let values = tile + 2 * (rows + 1) * SUMS_LEN + offsets * DISTANCES_LEN + 2 * STRIDE;
+        (values * size_of::<f32>() + offsets * size_of::<Offset>()) as u64
+    }
+
     /// Filters the pixels at `place` into `rows`.
     pub(super) fn filter(&mut self, place: &Rectangle, rows: &mut [&mut [Vec3]]) {
-        self.tile
-            .gather(self.simd, self.input, self.settings, &self.layout, place);
-        // Compare and accumulate
-        let search = self.settings.search as isize;
-        let patch = self.settings.patch as isize;
-        let height = place.height as isize;
-        let sum_rows = place.height + 1;
+        self.tile.gather(self.simd, self.input, place);
         for sums in &mut self.sums {
             sums.clear();
-            sums.resize(sum_rows * SUMS * STRIDE, 0.0);
+            sums.resize((place.height + 1) * SUMS_LEN, 0.0);
         }
-        for y in -search - patch..height + patch {
+        // Compare and accumulate
+        let patch = PATCH_RADIUS as isize;
+        let height = place.height as isize;
+        for y in -self.search - patch..height + patch {
             for number in 0..self.offsets.len() {
-                let (dy, _) = self.offsets[number];
-                if y >= -dy - patch {
+                if y + patch >= -self.offsets[number].dy {
                     self.compare(place, number, y);
                 }
             }
             for number in 0..self.offsets.len() {
-                let (dy, _) = self.offsets[number];
-                if y - patch >= -dy && y - patch < height {
-                    self.add(number, y - patch, height);
+                if y - patch >= -self.offsets[number].dy && y - patch < height {
+                    self.accumulate(number, y - patch, height);
                 }
             }
         }
-        // Finish
         for (y, row) in rows.iter_mut().enumerate() {
             self.finish(place, y, row);
         }
     }
 
-    /// The first column of the pairs at column offset `dx`.
-    fn first(dx: isize) -> isize {
-        (-dx).min(0)
-    }
-
     /// Computes the colour distances of row `y` at offset `number`.
     fn compare(&mut self, place: &Rectangle, number: usize, y: isize) {
-        let (dy, dx) = self.offsets[number];
-        let patch = self.settings.patch as isize;
-        let rows = 2 * self.settings.patch as usize + 1;
+        let offset = self.offsets[number];
+        let [p_first, q_first] = offset
+            .first_columns()
+            .map(|x| self.layout.column(x - PATCH_RADIUS as isize));
+        // The slot depends on the image and not on the tile, and so does the order of the sum over slots
+        let slot = (place.top as isize + y).rem_euclid(PATCH_SIDE as isize) as usize;
+        let sums = &mut self.distances[number * DISTANCES_LEN + slot * 2 * STRIDE..][..2 * STRIDE];
+        let p = &self.tile.row(y)[p_first..];
+        let q = &self.tile.row(y + offset.dy)[q_first..];
         let TileLayout {
             pairs, compared, ..
         } = self.layout;
-        // The slot depends on the image and not on the tile, and so does the order of the sum over slots
-        let slot = number * rows + (place.top as isize + y).rem_euclid(rows as isize) as usize;
-        let sums = &mut self.distances[slot * 2 * STRIDE..][..2 * STRIDE];
-        let first = Self::first(dx) - patch;
-        let p = &self.tile.row(y)[self.layout.column(first)..];
-        let q = &self.tile.row(y + dy)[self.layout.column(first + dx)..];
-        let [even, odd] = &mut self.row;
-        match rows {
-            3 => distances_3(self.simd, p, q, compared, pairs, even, odd, sums),
-            _ => distances_5(self.simd, p, q, compared, pairs, even, odd, sums),
-        }
+        distances(self.simd, p, q, compared, pairs, &mut self.pixels, sums);
     }
 
     /// Adds to the sums of the pairs in row `y` at offset `number`.
-    fn add(&mut self, number: usize, y: isize, height: isize) {
-        let (dy, dx) = self.offsets[number];
-        let first = Self::first(dx);
-        let (p_at, q_at) = (self.layout.column(first), self.layout.column(first + dx));
-        let p = &self.tile.row(y)[p_at..];
-        let q = &self.tile.row(y + dy)[q_at..];
-        let rows = 2 * self.settings.patch as usize + 1;
-        let len = rows * 2 * STRIDE;
-        let distances = &self.distances[number * len..][..len];
-        let scale = self.scale(dx, dy);
-        let [p_row, q_row] = [y, y + dy].map(|y| {
-            let row = if y < 0 || y >= height { height } else { y };
-            row as usize * SUMS * STRIDE
+    fn accumulate(&mut self, number: usize, y: isize, height: isize) {
+        let offset = self.offsets[number];
+        let [p_first, q_first] = offset.first_columns().map(|x| self.layout.column(x));
+        let p = &self.tile.row(y)[p_first..];
+        let q = &self.tile.row(y + offset.dy)[q_first..];
+        let distances = &self.distances[number * DISTANCES_LEN..][..DISTANCES_LEN];
+        let scale = PairScale {
+            color: self.color_scale,
+            columns: offset.dx.unsigned_abs() as f32,
+            rows: offset.dy as f32,
+        };
+        let [p_row, q_row] = [y, y + offset.dy].map(|y| {
+            let row = if (0..height).contains(&y) { y } else { height };
+            row as usize * SUMS_LEN
         });
         let [p_sums, q_sums] = &mut self.sums;
-        let p_sums = &mut p_sums[p_row + p_at..];
-        let q_sums = &mut q_sums[q_row + q_at..];
-        let (simd, count) = (self.simd, self.layout.pairs);
-        match rows {
-            3 => pairs_3(simd, p, q, count, &scale, distances, p_sums, q_sums),
-            _ => pairs_5(simd, p, q, count, &scale, distances, p_sums, q_sums),
-        }
-    }
-
-    fn scale(&self, dx: isize, dy: isize) -> WeightScale {
-        let k = self.settings.k * self.settings.k;
-        let side = 2.0 * self.settings.patch as f32 + 1.0;
-        WeightScale {
-            color: 1.0 / (k * side * side),
-            own: self.settings.own,
-            offset: [dx.unsigned_abs() as f32, dy as f32],
-            depth: DEPTH_TOLERANCE,
-        }
+        let p_sums = &mut p_sums[p_row + p_first..];
+        let q_sums = &mut q_sums[q_row + q_first..];
+        let count = self.layout.pairs;
+        pairs(self.simd, p, q, count, &scale, distances, p_sums, q_sums);
     }
 
     /// Writes row `y` of the tile at `place`.
     fn finish(&self, place: &Rectangle, y: usize, filtered: &mut [Vec3]) {
         let start = (place.top + y) * self.input.width as usize + place.left;
         let pixels = start..start + place.width;
-        let first = self.layout.column(0);
-        let row = y * SUMS * STRIDE + first;
-        let [p, q] = [0, 1].map(|i| &self.sums[i][row..]);
+        let first = y * SUMS_LEN + self.layout.column(0);
+        let [p, q] = [0, 1].map(|i| &self.sums[i][first..]);
         finish(
             self.simd,
             Shares::of(self.input.samples),

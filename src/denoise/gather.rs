@@ -1,7 +1,8 @@
 //! Planes of a row of a tile from those of the image: halves without albedo, noise, features in units of their
 //! tolerances, and slopes of depth. Compiled for each instruction set.
 
-use super::{kernels::WEIGHTS, tile::STRIDE};
+use super::planes::{EVEN, ODD, STRIDE, WEIGHTS};
+use super::settings::SLOPE_TOLERANCE;
 use crate::math::{lane_kernel, larger, smaller};
 
 /// Depth of pixels without an intersection: far from that of all others.
@@ -79,7 +80,11 @@ fn classify_body(
         let [r, g, b, _] = color[x];
         let color = magnitude(&[r, g, b]) + magnitude(&odd[x]);
         let feature = magnitude(&albedo[x]) + magnitude(&normal[x]);
-        usable[x] = if color + feature <= MAX_VALUE { 1.0 } else { 0.0 };
+        usable[x] = if color + feature <= MAX_VALUE {
+            1.0
+        } else {
+            0.0
+        };
         depth_plane[x] = if is_depth(depth[x]) { depth[x] } else { MISSED };
     }
 }
@@ -157,76 +162,65 @@ lane_kernel! {
     ) = feature_body;
 }
 
-/// The noise of a row of pixels: the mean variance of `N` x `N` neighbours, the first of which are in the first column
-/// and row of `variance`, and a small part of the colour. `colors` has the planes of both halves; an albedo of
-/// [`UNUSABLE`] marks unusable pixels.
+/// The noise of a row of pixels: the mean variance of 3x3 neighbours, and a small part of the colour. The first columns
+/// of `variance`, the rows above, at and below the pixels, are the left neighbours of the first pixel. `colors` has the
+/// planes of both halves; an albedo of [`UNUSABLE`] marks unusable pixels.
 #[inline(always)]
-fn noise_body<const N: usize>(
-    variance: &[&[f32]],
+fn noise_body(
+    variance: &[&[f32]; 3],
     colors: &[&[f32]; 6],
     albedo: &[f32],
     column_sums: &mut [f32],
     noise: &mut [f32],
 ) {
     let count = noise.len();
-    let width = count + N - 1;
-    // Sum along columns, then along rows
-    let rows: [&[f32]; N] = std::array::from_fn(
-        #[inline(always)]
-        |row| &variance[row][..width],
-    );
+    // Sum along columns
+    let width = count + 2;
+    let [above, at, below] = [
+        &variance[0][..width],
+        &variance[1][..width],
+        &variance[2][..width],
+    ];
     let column_sums = &mut column_sums[..width];
     for x in 0..width {
-        let mut sum = rows[0][x];
-        for row in &rows[1..] {
-            sum += row[x];
-        }
-        column_sums[x] = sum;
+        column_sums[x] = above[x] + at[x] + below[x];
     }
-    let shifted: [&[f32]; N] = std::array::from_fn(
-        #[inline(always)]
-        |i| &column_sums[i..][..count],
+    // Sum along rows
+    let (left, center, right) = (
+        &column_sums[..count],
+        &column_sums[1..][..count],
+        &column_sums[2..][..count],
     );
     let colors = colors.map(
         #[inline(always)]
         |plane| &plane[..count],
     );
     let albedo = &albedo[..count];
-    let (mean, relative) = (
-        1.0 / (N * N) as f32,
-        0.25 * RELATIVE_NOISE * RELATIVE_NOISE,
-    );
     for x in 0..count {
-        let mut sum = shifted[0][x];
-        for other in &shifted[1..] {
-            sum += other[x];
-        }
         let mut brightness = 0.0;
         for axis in 0..3 {
             let both = colors[axis][x] + colors[3 + axis][x];
             brightness += both * both;
         }
-        let estimate = sum * mean + brightness * relative + MIN_NOISE;
-        noise[x] = if albedo[x] < UNUSABLE {
-            smaller(estimate, UNUSABLE_NOISE)
-        } else {
-            UNUSABLE_NOISE
-        };
+        let mean = (left[x] + center[x] + right[x]) * (1.0 / 9.0);
+        let least = brightness * (0.25 * RELATIVE_NOISE * RELATIVE_NOISE) + MIN_NOISE;
+        let is_usable = albedo[x] < UNUSABLE;
+        let estimate = smaller(mean + least, UNUSABLE_NOISE);
+        noise[x] = if is_usable { estimate } else { UNUSABLE_NOISE };
     }
 }
 
 lane_kernel! {
     pub(super) fn noise(
-        variance: &[&[f32]], colors: &[&[f32]; 6], albedo: &[f32], column_sums: &mut [f32], noise: &mut [f32],
-    ) = noise_body::<{ super::tile::NOISE_SIDE }>;
+        variance: &[&[f32]; 3], colors: &[&[f32]; 6], albedo: &[f32], column_sums: &mut [f32], noise: &mut [f32],
+    ) = noise_body;
 }
 
-/// The slope of depth along columns and rows, times `unit`: on each axis the lesser of the differences with the two
-/// neighbours, so that edges are not slopes; 0 if both are missed. `depth` begins at the left neighbour of the first
-/// pixel, `above` and `below` at the pixel.
+/// The tolerance of depth per column and row, in proportion to the slope: on each axis the lesser of the differences
+/// with the two neighbours, so that edges are not slopes; 0 if both are missed. `depth` begins at the left neighbour of
+/// the first pixel, `above` and `below` at the pixel.
 #[inline(always)]
 fn slopes_body(
-    unit: f32,
     depth: &[f32],
     above: &[f32],
     below: &[f32],
@@ -238,8 +232,8 @@ fn slopes_body(
     let (above, below) = (&above[..count], &below[..count]);
     let slope_y = &mut slope_y[..count];
     for x in 0..count {
-        slope_x[x] = lesser_slope(left[x], center[x], right[x]) * unit;
-        slope_y[x] = lesser_slope(above[x], center[x], below[x]) * unit;
+        slope_x[x] = lesser_slope(left[x], center[x], right[x]) * SLOPE_TOLERANCE;
+        slope_y[x] = lesser_slope(above[x], center[x], below[x]) * SLOPE_TOLERANCE;
     }
 }
 
@@ -251,7 +245,7 @@ fn lesser_slope(before: f32, at: f32, after: f32) -> f32 {
 
 lane_kernel! {
     pub(super) fn slopes(
-        unit: f32, depth: &[f32], above: &[f32], below: &[f32], slope_x: &mut [f32], slope_y: &mut [f32],
+        depth: &[f32], above: &[f32], below: &[f32], slope_x: &mut [f32], slope_y: &mut [f32],
     ) = slopes_body;
 }
 
@@ -276,7 +270,7 @@ fn finish_body(
         let even = shares.even / (1.0 + sum(WEIGHTS, x));
         let odd = shares.odd / (1.0 + sum(WEIGHTS + 1, x));
         for axis in 0..3 {
-            let change = sum(axis, x) * even + sum(3 + axis, x) * odd;
+            let change = sum(EVEN + axis, x) * even + sum(ODD + axis, x) * odd;
             let value = color[x][axis];
             let changed = value + divisor(albedo[x][axis], depth[x]) * change;
             // Written such that NaN stays

@@ -1,44 +1,18 @@
 //! The inner loops over pairs of pixels, compiled for each instruction set.
-//!
-//! Rows store their planes one after another, [`STRIDE`] values each (see [`super::tile`]). A [`window`] has all
-//! planes at 16 consecutive pixels: one check of bounds, then constant distances.
 
-use super::tile::{ALBEDO, DEPTH, EVEN, NOISE, NORMAL, ODD, SLOPE_X, SLOPE_Y, STRIDE};
-use crate::math::{LANES, lane_kernel, larger, smaller};
+use super::planes::{
+    ALBEDO, DEPTH, EVEN, Halves, NOISE, NORMAL, ODD, Pixels, SLOPE_X, SLOPE_Y, STRIDE, Sums,
+    WEIGHTS, window, window_len, window_mut,
+};
+use super::settings::{DEPTH_TOLERANCE, OWN_PART, PATCH_SIDE};
+use crate::math::{LANES, Lanes, lane_kernel, larger, smaller};
 
 /// Upper bound of the squared difference of two pixels relative to their noise, so that a single pixel of a patch,
 /// infinite values included, counts like a strong edge. A patch in which all others agree is then still rejected.
 pub(super) const MAX_DISTANCE: f32 = 64.0;
 
-/// Values of [`window`] of a row with `planes` planes.
-const fn window_len(planes: usize) -> usize {
-    (planes - 1) * STRIDE + LANES
-}
-
-/// A window of the planes that describe pixels.
-type Pixels = [f32; window_len(SLOPE_Y + 1)];
-
-/// Planes of a row of sums: three components of weighted differences for each half, then the weights of each half.
-pub(super) const SUMS: usize = 8;
-/// The first plane with weights.
-pub(super) const WEIGHTS: usize = 6;
-
-/// A window of the planes of sums.
-type Sums = [f32; window_len(SUMS)];
-
-/// The values from `x` on.
-#[inline(always)]
-fn window<const N: usize>(row: &[f32], x: usize) -> &[f32; N] {
-    let window = row[x..].first_chunk();
-    window.expect("rows are long enough")
-}
-
-/// The values from `x` on.
-#[inline(always)]
-fn window_mut<const N: usize>(row: &mut [f32], x: usize) -> &mut [f32; N] {
-    let window = row[x..].first_chunk_mut();
-    window.expect("rows are long enough")
-}
+/// A window of the colour distances in the rows of a patch.
+type PatchRows = [f32; window_len(2 * PATCH_SIDE)];
 
 /// `(1 - x/8)^8`, which approximates `exp(-x)` and is 0 from 8 on. Only products are needed. NaN gives 0.
 #[inline(always)]
@@ -59,105 +33,85 @@ fn squared_distance(p: &Pixels, q: &Pixels, plane: usize, lane: usize) -> f32 {
     x * x + y * y + z * z
 }
 
-/// Compares the colours of `count` pixels `p` with `q` in both halves, relative to their noise. `sums` has a plane for
-/// each half, with the sums of the results over `N` neighbours along the row for `sum_count` pixels. The buffers hold
-/// the results.
+/// Compares the colours of `count` pixels `p` with `q` in both halves, relative to their noise: two planes, `pixels`.
+/// Their sums over the neighbours along the row of a patch go to the first `sum_count` pixels of the two planes `sums`.
 #[inline(always)]
-fn distances_body<const N: usize>(
+fn distances_body(
     p: &[f32],
     q: &[f32],
     count: usize,
     sum_count: usize,
-    even: &mut [f32],
-    odd: &mut [f32],
+    pixels: &mut [f32],
     sums: &mut [f32],
 ) {
     // Compare pixels
     for x in (0..count).step_by(LANES) {
         let (p, q): (&Pixels, &Pixels) = (window(p, x), window(q, x));
-        let even: &mut [f32; LANES] = window_mut(even, x);
-        let odd: &mut [f32; LANES] = window_mut(odd, x);
+        let pixels: &mut Halves = window_mut(pixels, x);
         for l in 0..LANES {
             let noise = [p[NOISE * STRIDE + l], q[NOISE * STRIDE + l]];
             let scale = 1.0 / (noise[0] + noise[1]);
             let expected = 2.0 * smaller(noise[0], noise[1]);
-            let [by_even, by_odd] = [squared_distance(p, q, EVEN, l), squared_distance(p, q, ODD, l)];
-            even[l] = smaller((by_even - expected) * scale, MAX_DISTANCE);
-            odd[l] = smaller((by_odd - expected) * scale, MAX_DISTANCE);
+            let even = squared_distance(p, q, EVEN, l);
+            let odd = squared_distance(p, q, ODD, l);
+            pixels[l] = smaller((even - expected) * scale, MAX_DISTANCE);
+            pixels[STRIDE + l] = smaller((odd - expected) * scale, MAX_DISTANCE);
         }
     }
     // Sum over neighbours
-    let (even_sums, odd_sums) = sums.split_at_mut(STRIDE);
-    for x in (0..sum_count).step_by(LANES) {
-        sum_neighbours::<N>(&even[x..], window_mut(even_sums, x));
-    }
-    for x in (0..sum_count).step_by(LANES) {
-        sum_neighbours::<N>(&odd[x..], window_mut(odd_sums, x));
-    }
-}
-
-#[inline(always)]
-fn sum_neighbours<const N: usize>(values: &[f32], sums: &mut [f32; LANES]) {
-    let values: &[f32; LANES + 4] = window(values, 0);
-    for l in 0..LANES {
-        let mut sum = values[l];
-        for i in 1..N {
-            sum += values[l + i];
+    for half in [0, STRIDE] {
+        for x in (half..half + sum_count).step_by(LANES) {
+            let pixels: &[f32; LANES + PATCH_SIDE - 1] = window(pixels, x);
+            let sums: &mut Lanes = window_mut(sums, x);
+            for l in 0..LANES {
+                sums[l] = pixels[l] + pixels[l + 1] + pixels[l + 2];
+            }
         }
-        sums[l] = sum;
     }
 }
 
 lane_kernel! {
-    pub(super) fn distances_3(
-        p: &[f32], q: &[f32], count: usize, sum_count: usize, even: &mut [f32], odd: &mut [f32], sums: &mut [f32],
-    ) = distances_body::<3>;
-}
-lane_kernel! {
-    pub(super) fn distances_5(
-        p: &[f32], q: &[f32], count: usize, sum_count: usize, even: &mut [f32], odd: &mut [f32], sums: &mut [f32],
-    ) = distances_body::<5>;
+    pub(super) fn distances(
+        p: &[f32], q: &[f32], count: usize, sum_count: usize, pixels: &mut [f32], sums: &mut [f32],
+    ) = distances_body;
 }
 
-/// What turns distances into weights.
+/// Where the second pixel of pairs is, and how colours are compared.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct WeightScale {
+pub(super) struct PairScale {
     /// Factor of the sum of colour distances over a patch.
     pub(super) color: f32,
-    /// Part of the distance in the half itself that counts, beside that of the other half.
-    pub(super) own: f32,
-    /// Distance of the pixels in columns and rows, not negative.
-    pub(super) offset: [f32; 2],
-    /// Tolerance of depth that is always allowed, relative to the depth.
-    pub(super) depth: f32,
+    /// Columns from one pixel to the other, not negative.
+    pub(super) columns: f32,
+    /// Rows from one pixel to the other, not negative.
+    pub(super) rows: f32,
 }
 
-/// The difference of depth that the slopes of a pixel explain.
+/// The tolerance of depth at a pixel.
 #[inline(always)]
-fn tolerance(pixel: &Pixels, scale: &WeightScale, lane: usize) -> f32 {
-    let [columns, rows] = scale.offset;
-    pixel[SLOPE_X * STRIDE + lane] * columns
-        + pixel[SLOPE_Y * STRIDE + lane] * rows
-        + pixel[DEPTH * STRIDE + lane] * scale.depth
+fn tolerance(pixel: &Pixels, scale: &PairScale, lane: usize) -> f32 {
+    pixel[SLOPE_X * STRIDE + lane] * scale.columns
+        + pixel[SLOPE_Y * STRIDE + lane] * scale.rows
+        + pixel[DEPTH * STRIDE + lane] * DEPTH_TOLERANCE
 }
 
 /// Computes the weights of `count` pairs of pixels `p`, `q`, and moves their colours towards each other: adds the
 /// weighted differences and the weights to the sums of both pixels. The even half has the weights of the odd one, and
-/// conversely. `distances` has the colour distances along the `N` rows of the patch: two planes for each.
+/// conversely. `distances` has the colour distances along the rows of the patch: two planes for each.
 #[inline(always)]
-fn pairs_body<const N: usize, const D: usize>(
+fn pairs_body(
     p: &[f32],
     q: &[f32],
     count: usize,
-    scale: &WeightScale,
+    scale: &PairScale,
     distances: &[f32],
     p_sums: &mut [f32],
     q_sums: &mut [f32],
 ) {
-    let WeightScale { color, own, .. } = *scale;
+    let scale = *scale;
     for x in (0..count).step_by(LANES) {
         let (p, q): (&Pixels, &Pixels) = (window(p, x), window(q, x));
-        let distances: &[f32; D] = window(distances, x);
+        let distances: &PatchRows = window(distances, x);
         let p_sums: &mut Sums = window_mut(p_sums, x);
         let q_sums: &mut Sums = window_mut(q_sums, x);
         let mut weights = [[0.0; LANES]; 2];
@@ -165,33 +119,30 @@ fn pairs_body<const N: usize, const D: usize>(
             // Compare features
             let albedo = squared_distance(p, q, ALBEDO, l);
             let normal = squared_distance(p, q, NORMAL, l);
-            let tolerance = smaller(tolerance(p, scale, l), tolerance(q, scale, l));
+            let tolerance = smaller(tolerance(p, &scale, l), tolerance(q, &scale, l));
             let z = (p[DEPTH * STRIDE + l] - q[DEPTH * STRIDE + l]) / tolerance;
             let feature = larger(larger(albedo, normal), z * z);
             // Sum the colour distances over the patch
             let (mut even, mut odd) = (distances[l], distances[STRIDE + l]);
-            for row in 1..N {
+            for row in 1..PATCH_SIDE {
                 even += distances[2 * row * STRIDE + l];
                 odd += distances[(2 * row + 1) * STRIDE + l];
             }
-            let (even, odd) = (even * color, odd * color);
-            weights[0][l] = weight_of(larger(larger(odd, even * own), feature));
-            weights[1][l] = weight_of(larger(larger(even, odd * own), feature));
+            let (even, odd) = (even * scale.color, odd * scale.color);
+            weights[0][l] = weight_of(larger(larger(odd, even * OWN_PART), feature));
+            weights[1][l] = weight_of(larger(larger(even, odd * OWN_PART), feature));
         }
-        let [even, odd] = &weights;
-        move_together(p, q, EVEN, even, p_sums, q_sums);
-        move_together(p, q, EVEN + 1, even, p_sums, q_sums);
-        move_together(p, q, EVEN + 2, even, p_sums, q_sums);
-        move_together(p, q, ODD, odd, p_sums, q_sums);
-        move_together(p, q, ODD + 1, odd, p_sums, q_sums);
-        move_together(p, q, ODD + 2, odd, p_sums, q_sums);
-        for l in 0..LANES {
-            p_sums[WEIGHTS * STRIDE + l] += even[l];
-            q_sums[WEIGHTS * STRIDE + l] += even[l];
-        }
-        for l in 0..LANES {
-            p_sums[(WEIGHTS + 1) * STRIDE + l] += odd[l];
-            q_sums[(WEIGHTS + 1) * STRIDE + l] += odd[l];
+        // Accumulate
+        for (half, weights) in weights.iter().enumerate() {
+            let first = if half == 0 { EVEN } else { ODD };
+            for plane in first..first + 3 {
+                move_together(p, q, plane, weights, p_sums, q_sums);
+            }
+            let at = (WEIGHTS + half) * STRIDE;
+            for l in 0..LANES {
+                p_sums[at + l] += weights[l];
+                q_sums[at + l] += weights[l];
+            }
         }
     }
 }
@@ -202,7 +153,7 @@ fn move_together(
     p: &Pixels,
     q: &Pixels,
     plane: usize,
-    weights: &[f32; LANES],
+    weights: &Lanes,
     p_sums: &mut Sums,
     q_sums: &mut Sums,
 ) {
@@ -215,14 +166,8 @@ fn move_together(
 }
 
 lane_kernel! {
-    pub(super) fn pairs_3(
-        p: &[f32], q: &[f32], count: usize, scale: &WeightScale, distances: &[f32], p_sums: &mut [f32],
+    pub(super) fn pairs(
+        p: &[f32], q: &[f32], count: usize, scale: &PairScale, distances: &[f32], p_sums: &mut [f32],
         q_sums: &mut [f32],
-    ) = pairs_body::<3, { window_len(6) }>;
-}
-lane_kernel! {
-    pub(super) fn pairs_5(
-        p: &[f32], q: &[f32], count: usize, scale: &WeightScale, distances: &[f32], p_sums: &mut [f32],
-        q_sums: &mut [f32],
-    ) = pairs_body::<5, { window_len(10) }>;
+    ) = pairs_body;
 }

@@ -34,18 +34,20 @@ use crate::math::{SimdLevel, Supported};
 mod filter;
 mod gather;
 mod kernels;
+mod planes;
 mod settings;
 mod tile;
+mod tiling;
 
 #[cfg(test)]
 mod brute;
 #[cfg(test)]
 mod tests;
 
-pub use settings::{DenoiseSettings, MAX_SEARCH, PATCHES, TOLERANCES};
+pub use settings::{COLOR_TOLERANCES, DenoiseSettings, SEARCH_RADII};
 
 use filter::TileFilter;
-use tile::{Rectangle, TileLayout};
+use tiling::{TileLayout, equal_part, tiles};
 
 /// Rows of a tile. Its border is filtered again by its neighbours, so more rows are less work in total, but need more
 /// of the cache; 48 to 96 are equally fast.
@@ -93,25 +95,17 @@ pub enum DenoiseError {
         /// Height of the picture in pixels.
         height: u32,
     },
-    /// A radius is out of range.
-    #[error("{name} = {value} is out of range, it must lie in {} to {}", range[0], range[1])]
-    Radius {
-        /// The setting.
-        name: &'static str,
-        /// Its value.
-        value: u32,
-        /// Its smallest and largest value.
-        range: [u32; 2],
+    /// A setting is out of range.
+    #[error("search radius {search} is out of range, it must lie in {} to {}", SEARCH_RADII.start(), SEARCH_RADII.end())]
+    SearchRadius {
+        /// The radius in pixels.
+        search: u32,
     },
-    /// A tolerance is out of range.
-    #[error("{name} = {value} is out of range, it must lie in {} to {}", range[0], range[1])]
-    Tolerance {
-        /// The setting.
-        name: &'static str,
-        /// Its value.
-        value: f32,
-        /// Its smallest and largest value.
-        range: [f32; 2],
+    /// A setting is out of range.
+    #[error("k = {k} is out of range, it must lie in {} to {}", COLOR_TOLERANCES.start(), COLOR_TOLERANCES.end())]
+    ColorTolerance {
+        /// The tolerance of colours.
+        k: f32,
     },
 }
 
@@ -192,7 +186,10 @@ fn denoise_with(
     // Divide the picture into equal tiles
     let (width, height) = (input.width as usize, input.height as usize);
     let [max_width, max_height] = execution.tile;
-    let columns = equal_part(width, max_width.min(TileLayout::max_width(settings)));
+    let columns = equal_part(
+        width,
+        max_width.min(TileLayout::max_width(settings.search as usize)),
+    );
     let rows = equal_part(height, max_height);
     let tiles = tiles(&mut filtered, width, columns, rows);
     // Filter them in parallel
@@ -204,37 +201,4 @@ fn denoise_with(
             filter.filter(&place, &mut rows);
         });
     Ok(filtered)
-}
-
-/// The smallest length of which the parts of `whole` have at most the number that parts of length `max` have.
-fn equal_part(whole: usize, max: usize) -> usize {
-    whole.div_ceil(whole.div_ceil(max))
-}
-
-/// Splits a plane into tiles of up to `columns` x `rows` pixels: the place of each, and its rows.
-fn tiles(
-    plane: &mut [Vec3],
-    width: usize,
-    columns: usize,
-    rows: usize,
-) -> Vec<(Rectangle, Vec<&mut [Vec3]>)> {
-    let mut all = Vec::new();
-    for (band, pixels) in plane.chunks_mut(width * rows).enumerate() {
-        let first = all.len();
-        let height = pixels.len() / width;
-        let place = |left: usize| Rectangle {
-            left,
-            top: band * rows,
-            width: columns.min(width - left),
-            height,
-        };
-        let lefts = (0..width).step_by(columns);
-        all.extend(lefts.map(|left| (place(left), Vec::with_capacity(height))));
-        for row in pixels.chunks_mut(width) {
-            for ((_, tile), piece) in all[first..].iter_mut().zip(row.chunks_mut(columns)) {
-                tile.push(piece);
-            }
-        }
-    }
-    all
 }

@@ -1,158 +1,89 @@
 //! The planes of a tile of the image and of the border around it that its pixels are compared with, in memory that
 //! stays in the cache.
 //!
-//! Coordinates are relative to the tile. A row stores its planes one after another. Pixels beside the image repeat
-//! those at its edge, so that patches are complete; their red albedo is [`OUTSIDE`], so that their weight is 0.
+//! Pixels beside the image repeat those at its edge, so that patches are complete; their red albedo is [`OUTSIDE`], so
+//! that their weight is 0.
 
-use super::{
-    DenoiseInput, DenoiseSettings,
-    gather::{MISSED, OUTSIDE, Shares, UNUSABLE, classify, feature, halves, noise, slopes},
-};
-use crate::math::{LANES, Supported};
+use std::ops::Range;
 
-/// Planes of a row: the even half without albedo, three components.
-pub(super) const EVEN: usize = 0;
-/// The odd half.
-pub(super) const ODD: usize = 3;
-/// Albedo in units of its tolerance, three components.
-pub(super) const ALBEDO: usize = 6;
-/// Normal in units of its tolerance, three components.
-pub(super) const NORMAL: usize = 9;
-/// Distance along the view axis, or [`MISSED`].
-pub(super) const DEPTH: usize = 12;
-/// Variance of a pixel by the difference of its halves.
-const VARIANCE: usize = 13;
-/// Variance of one half, averaged over neighbours: the sum over its components. This plane and those after it are
-/// derived from those before it.
-pub(super) const NOISE: usize = 14;
-/// Tolerance of depth per column.
-pub(super) const SLOPE_X: usize = 15;
-/// Tolerance of depth per row.
-pub(super) const SLOPE_Y: usize = 16;
-const PLANES: usize = 17;
-/// Pixels from a plane of a row to the next: an odd number of cache lines, so that planes do not compete for the same
-/// sets of the cache. A constant, so that kernels address all planes by one register.
-pub(super) const STRIDE: usize = 176;
+use super::DenoiseInput;
+use super::gather::{MISSED, OUTSIDE, Shares, UNUSABLE, classify, feature, halves, noise, slopes};
+use super::planes::{ALBEDO, DEPTH, EVEN, NOISE, PLANES, STRIDE, VARIANCE};
+use super::settings::{ALBEDO_TOLERANCE, NORMAL_TOLERANCE};
+use super::tiling::{NOISE_RADIUS, Rectangle, TileLayout};
+use crate::math::Supported;
 
-/// Neighbours on each side over which variances are averaged.
-pub(super) const NOISE_RADIUS: usize = 1;
-/// Pixels along a side of that square.
-pub(super) const NOISE_SIDE: usize = 2 * NOISE_RADIUS + 1;
+/// Values of a row of pixels.
+const ROW_LEN: usize = PLANES * STRIDE;
 
-/// A rectangle of the image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Rectangle {
-    pub(super) left: usize,
-    pub(super) top: usize,
-    pub(super) width: usize,
-    pub(super) height: usize,
-}
-
-/// Sizes that all tiles of an image have in common.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct TileLayout {
-    /// Pixels around a tile.
-    pub(super) margin: usize,
-    /// Number of pairs of pixels per row.
-    pub(super) pairs: usize,
-    /// Number of pixels per row that are compared: the patches of all pairs.
-    pub(super) compared: usize,
-}
-
-impl TileLayout {
-    /// For tiles of up to `width` columns.
-    pub(super) fn new(settings: &DenoiseSettings, width: usize) -> Self {
-        let (search, patch) = (settings.search as usize, settings.patch as usize);
-        let pairs = (width + search).next_multiple_of(LANES);
-        let compared = (width + search + 2 * patch).next_multiple_of(LANES);
-        let margin = search + patch + NOISE_RADIUS;
-        assert!(margin + pairs.max(compared - patch) < STRIDE);
-        Self {
-            margin,
-            pairs,
-            compared,
-        }
-    }
-
-    /// The index of column `x` in a plane.
-    pub(super) fn column(&self, x: isize) -> usize {
-        index(self.margin, x)
-    }
-}
-
-/// The index of `position` in an array that starts `margin` before position 0.
-fn index(margin: usize, position: isize) -> usize {
-    let index = margin.checked_add_signed(position);
-    index.expect("positions lie within the margin")
-}
-
-/// The planes of a tile.
-#[derive(Debug, Default)]
+/// The planes of a tile. Rows and columns are relative to the tile.
+#[derive(Debug)]
 pub(super) struct Tile {
     values: Vec<f32>,
-    margin: usize,
-    row_len: usize,
+    layout: TileLayout,
     /// One value for each pixel of a row.
     buffer: Vec<f32>,
 }
 
 impl Tile {
+    pub(super) fn new(layout: TileLayout) -> Self {
+        Self {
+            values: Vec::new(),
+            layout,
+            buffer: vec![0.0; STRIDE],
+        }
+    }
+
     /// Values of all planes of row `y`.
     pub(super) fn row(&self, y: isize) -> &[f32] {
-        &self.values[index(self.margin, y) * self.row_len..][..self.row_len]
+        &self.values[self.layout.row(y) * ROW_LEN..][..ROW_LEN]
     }
 
     /// Fills the planes for the tile at `place`.
-    pub(super) fn gather(
-        &mut self,
-        simd: Supported,
-        input: &DenoiseInput<'_>,
-        settings: &DenoiseSettings,
-        layout: &TileLayout,
-        place: &Rectangle,
-    ) {
-        // Make room
-        self.margin = layout.margin;
-        self.row_len = PLANES * STRIDE;
-        let rows = place.height + 2 * layout.margin;
-        self.values.resize(rows * self.row_len, 0.0);
-        self.buffer.resize(STRIDE, 0.0);
+    pub(super) fn gather(&mut self, simd: Supported, input: &DenoiseInput<'_>, place: &Rectangle) {
+        let margin = self.layout.margin;
+        let rows = place.height + 2 * margin;
+        self.values.resize(rows * ROW_LEN, 0.0);
         // Copy the rows of the image
         let line = Line {
             simd,
             input,
-            settings,
-            layout,
+            margin,
             left: place.left,
         };
-        for (number, row) in self.values.chunks_mut(self.row_len).enumerate() {
+        for (number, row) in self.values.chunks_mut(ROW_LEN).enumerate() {
             line.copy(place.top + number, row, &mut self.buffer);
         }
         // Derive noise and slopes from neighbouring rows
         for number in NOISE_RADIUS..rows - NOISE_RADIUS {
-            self.derive(&line, number);
+            self.derive(simd, number);
         }
     }
 
-    /// Computes noise and slopes in row `number`, except in the first and last column.
-    fn derive(&mut self, line: &Line<'_>, number: usize) {
+    /// Computes noise and slopes in row `number` of those in memory, except in the first and last column.
+    fn derive(&mut self, simd: Supported, number: usize) {
         const { assert!(NOISE_RADIUS == 1, "the rows above and below") };
-        let len = self.row_len;
-        let (before, rest) = self.values.split_at_mut(number * len);
-        let (row, after) = rest.split_at_mut(len);
+        let (before, rest) = self.values.split_at_mut(number * ROW_LEN);
+        let (row, below) = rest.split_at_mut(ROW_LEN);
         let (row, derived) = row.split_at_mut(NOISE * STRIDE);
-        let (above, below) = (&before[(number - 1) * len..], &after[..len]);
+        let above = &before[(number - 1) * ROW_LEN..];
         let inner = 1..STRIDE - 1;
+        let [noise_plane, slope_x, slope_y] = planes_mut(derived, inner.clone());
         // Average variances
         let colors: [&[f32]; 6] = std::array::from_fn(|c| &plane(row, EVEN + c)[inner.clone()]);
         let variance = [above, row, below].map(|row| plane(row, VARIANCE));
         let albedo = &plane(row, ALBEDO + 1)[inner.clone()];
-        let [noise_plane, slope_x, slope_y] = planes_mut(derived, inner.clone());
-        noise(line.simd, &variance, &colors, albedo, &mut self.buffer, noise_plane);
+        noise(
+            simd,
+            &variance,
+            &colors,
+            albedo,
+            &mut self.buffer,
+            noise_plane,
+        );
         // Compute slopes
         let [above, below] = [above, below].map(|row| &plane(row, DEPTH)[inner.clone()]);
-        let unit = line.settings.depth;
-        slopes(line.simd, unit, plane(row, DEPTH), above, below, slope_x, slope_y);
+        slopes(simd, plane(row, DEPTH), above, below, slope_x, slope_y);
     }
 }
 
@@ -162,10 +93,7 @@ fn plane(row: &[f32], plane: usize) -> &[f32] {
 }
 
 /// The pixels in `range` of each of the planes in `row`.
-fn planes_mut<const N: usize>(
-    row: &mut [f32],
-    range: std::ops::Range<usize>,
-) -> [&mut [f32]; N] {
+fn planes_mut<const N: usize>(row: &mut [f32], range: Range<usize>) -> [&mut [f32]; N] {
     let mut planes = row.chunks_mut(STRIDE);
     std::array::from_fn(|_| {
         let plane = planes.next().expect("the row has this many planes");
@@ -177,8 +105,8 @@ fn planes_mut<const N: usize>(
 struct Line<'a> {
     simd: Supported,
     input: &'a DenoiseInput<'a>,
-    settings: &'a DenoiseSettings,
-    layout: &'a TileLayout,
+    /// Pixels around the tile.
+    margin: usize,
     /// The first column of the tile in the image.
     left: usize,
 }
@@ -186,7 +114,7 @@ struct Line<'a> {
 impl Line<'_> {
     /// Copies the row `margin` above row `below` of the image to `row`.
     fn copy(&self, below: usize, row: &mut [f32], usable: &mut [f32]) {
-        let margin = self.layout.margin;
+        let margin = self.margin;
         let (width, height) = (self.input.width as usize, self.input.height as usize);
         let y = below.saturating_sub(margin).min(height - 1);
         let is_inside = y + margin == below;
@@ -215,9 +143,9 @@ impl Line<'_> {
     /// Copies `pixels` of the image to columns `to` of `row`.
     fn copy_pixels(
         &self,
-        pixels: std::ops::Range<usize>,
+        pixels: Range<usize>,
         row: &mut [f32],
-        to: std::ops::Range<usize>,
+        to: Range<usize>,
         usable: &mut [f32],
     ) {
         let (simd, input) = (self.simd, self.input);
@@ -236,12 +164,12 @@ impl Line<'_> {
                 simd, axis, shares, color, odd, albedo, depth, usable, even, odd_plane, variance,
             );
         }
-        let unit = 1.0 / self.settings.albedo;
         for (axis, plane) in [ar, ag, ab].into_iter().enumerate() {
+            let unit = 1.0 / ALBEDO_TOLERANCE;
             feature(simd, axis, unit, UNUSABLE, albedo, usable, plane);
         }
-        let unit = 1.0 / self.settings.normal;
         for (axis, plane) in [nx, ny, nz].into_iter().enumerate() {
+            let unit = 1.0 / NORMAL_TOLERANCE;
             feature(simd, axis, unit, 0.0, normal, usable, plane);
         }
     }
