@@ -9,7 +9,7 @@ use glam::Vec3;
 
 use super::gather::{Shares, finish};
 use super::kernels::{PairScale, distances, pairs};
-use super::planes::{PLANES, STRIDE, SUMS};
+use super::planes::{STRIDE, SUMS};
 use super::settings::{PATCH_RADIUS, PATCH_SIDE};
 use super::tile::Tile;
 use super::tiling::{Rectangle, TileLayout};
@@ -47,12 +47,18 @@ struct Offset {
 }
 
 impl Offset {
-    /// Those below and to the right of a pixel.
+    /// Those of the pixels after a pixel: to the right of it, and in the rows below.
     fn all(search: isize) -> Vec<Self> {
         let rows = (0..=search).flat_map(|dy| (-search..=search).map(move |dx| (dy, dx)));
-        rows.filter(|offset| *offset > (0, 0))
-            .map(|(dy, dx)| Self { dy, dx })
-            .collect()
+        let after = rows.filter(|offset| *offset > (0, 0));
+        let mut all = Vec::with_capacity(Self::count(search as usize));
+        all.extend(after.map(|(dy, dx)| Self { dy, dx }));
+        all
+    }
+
+    /// The number of all.
+    const fn count(search: usize) -> usize {
+        2 * search * (search + 1)
     }
 
     /// The first columns of pairs, of which at least one pixel is in the tile.
@@ -62,58 +68,58 @@ impl Offset {
 }
 
 impl<'a> TileFilter<'a> {
-    /// For tiles of up to `width` columns.
+    /// For tiles of up to `columns` x `rows` pixels.
     pub(super) fn new(
         simd: Supported,
         input: &'a DenoiseInput<'a>,
         settings: &DenoiseSettings,
-        width: usize,
+        [columns, rows]: [usize; 2],
     ) -> Self {
         let search = settings.search as usize;
-        let layout = TileLayout::new(search, width);
+        let layout = TileLayout::new(search, columns);
         let offsets = Offset::all(search as isize);
+        let sums = || vec![0.0; (rows + 1) * SUMS_LEN];
         Self {
             simd,
             input,
             search: search as isize,
             color_scale: 1.0 / (settings.k * settings.k * (PATCH_SIDE * PATCH_SIDE) as f32),
             layout,
-            tile: Tile::new(layout),
-            sums: [Vec::new(), Vec::new()],
+            tile: Tile::new(layout, rows),
+            sums: [sums(), sums()],
             distances: vec![0.0; offsets.len() * DISTANCES_LEN],
             pixels: vec![0.0; 2 * STRIDE],
             offsets,
         }
     }
 
-    /// Upper bound of the memory for tiles of up to `rows` rows, bytes.
-    pub(super) fn bytes(settings: &DenoiseSettings, rows: usize) -> u64 {
-        let search = settings.search as usize;
-        let offsets = 2 * search * (search + 1);
-        let tile = (rows + 2 * TileLayout::margin(search)) * PLANES * STRIDE + STRIDE;
-        let values = tile + 2 * (rows + 1) * SUMS_LEN + offsets * DISTANCES_LEN + 2 * STRIDE;
-        (values * size_of::<f32>() + offsets * size_of::<Offset>()) as u64
+    /// The memory that [`Self::new`] allocates for tiles of up to `rows` rows, bytes.
+    pub(super) fn bytes(search: usize, rows: usize) -> usize {
+        let offsets = Offset::count(search);
+        let sums = 2 * (rows + 1) * SUMS_LEN;
+        let values = Tile::len(search, rows) + sums + offsets * DISTANCES_LEN + 2 * STRIDE;
+        values * size_of::<f32>() + offsets * size_of::<Offset>()
     }
 
     /// Filters the pixels at `place` into `rows`.
     pub(super) fn filter(&mut self, place: &Rectangle, rows: &mut [&mut [Vec3]]) {
         self.tile.gather(self.simd, self.input, place);
         for sums in &mut self.sums {
-            sums.clear();
-            sums.resize((place.height + 1) * SUMS_LEN, 0.0);
+            sums.fill(0.0);
         }
         // Compare and accumulate
         let patch = PATCH_RADIUS as isize;
         let height = place.height as isize;
-        for y in -self.search - patch..height + patch {
+        for last in -self.search - patch..height + patch {
+            // The last row of a patch completes it
+            let middle = last - patch;
             for number in 0..self.offsets.len() {
-                if y + patch >= -self.offsets[number].dy {
-                    self.compare(place, number, y);
+                let first = -self.offsets[number].dy;
+                if last >= first - patch {
+                    self.compare(place, number, last);
                 }
-            }
-            for number in 0..self.offsets.len() {
-                if y - patch >= -self.offsets[number].dy && y - patch < height {
-                    self.accumulate(number, y - patch, height);
+                if middle >= first && middle < height {
+                    self.accumulate(number, middle, height);
                 }
             }
         }
@@ -178,5 +184,37 @@ impl<'a> TileFilter<'a> {
             q,
             bytemuck::cast_slice_mut(filtered),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_memory_of_a_thread_is_what_it_allocates() {
+        let input = DenoiseInput {
+            width: 0,
+            height: 0,
+            samples: 2,
+            color: &[],
+            odd: &[],
+            albedo: &[],
+            normal: &[],
+            depth: &[],
+        };
+        for (search, rows) in [(1, 1), (4, 64), (16, 64)] {
+            let settings = DenoiseSettings {
+                search: search as u32,
+                k: 1.0,
+            };
+            let filter = TileFilter::new(Supported::default(), &input, &settings, [16, rows]);
+            let [p, q] = &filter.sums;
+            let values = [p, q, &filter.distances, &filter.pixels].map(Vec::capacity);
+            let floats = values.iter().sum::<usize>() + filter.tile.capacity();
+            let offsets = filter.offsets.capacity() * size_of::<Offset>();
+            let held = floats * size_of::<f32>() + offsets;
+            assert_eq!(TileFilter::bytes(search, rows), held, "{search} {rows}");
+        }
     }
 }

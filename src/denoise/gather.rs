@@ -12,17 +12,17 @@ pub(super) const UNUSABLE: f32 = 1e18;
 /// Red albedo of a pixel beside the image, which gives its colour to no other either.
 pub(super) const OUTSIDE: f32 = 2e18;
 /// Depths of intersections; others count as missed.
-const DEPTHS: [f32; 2] = [1e-15, 1e15];
+pub(super) const DEPTHS: [f32; 2] = [1e-15, 1e15];
 /// Larger values count as infinite: their squares would overflow.
-const MAX_VALUE: f32 = 1e14;
+pub(super) const MAX_VALUE: f32 = 1e14;
 /// Colours are divided by albedo, but by no less than this.
-const MIN_ALBEDO: f32 = 0.02;
+pub(super) const MIN_ALBEDO: f32 = 0.02;
 /// Noise of an unusable pixel: large, so that patches that contain it are compared by their other pixels.
-const UNUSABLE_NOISE: f32 = 1e30;
+pub(super) const UNUSABLE_NOISE: f32 = 1e30;
 /// Noise that is always assumed, relative to the colour: it decides where there is none.
-const RELATIVE_NOISE: f32 = 1e-3;
+pub(super) const RELATIVE_NOISE: f32 = 1e-3;
 /// The square of noise that is always assumed, so that black pixels can be compared.
-const MIN_NOISE: f32 = 1e-12;
+pub(super) const MIN_NOISE: f32 = 1e-12;
 
 /// Parts of the samples that are even and odd.
 #[derive(Debug, Clone, Copy, PartialEq)]

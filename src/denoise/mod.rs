@@ -47,7 +47,7 @@ mod tests;
 pub use settings::{COLOR_TOLERANCES, DenoiseSettings, SEARCH_RADII};
 
 use filter::TileFilter;
-use tiling::{TileLayout, equal_part, tiles};
+use tiling::{TileLayout, equal_part, tiles, tiles_bytes};
 
 /// Rows of a tile. Its border is filtered again by its neighbours, so more rows are less work in total, but need more
 /// of the cache; 48 to 96 are equally fast.
@@ -150,8 +150,10 @@ pub fn denoise(
 /// Upper bound of the memory that filtering needs in addition to the input, bytes: the result, and the tiles of
 /// `threads` threads.
 pub fn predicted_bytes(width: u32, height: u32, settings: &DenoiseSettings, threads: u64) -> u64 {
-    let pixels = u64::from(width) * u64::from(height);
-    pixels * size_of::<Vec3>() as u64 + threads * TileFilter::bytes(settings, TILE_ROWS)
+    let search = settings.search.min(*SEARCH_RADII.end()) as usize;
+    let result = u64::from(width) * u64::from(height) * size_of::<Vec3>() as u64;
+    let tiles = tiles_bytes(width, height, TileLayout::max_width(search), TILE_ROWS);
+    result + tiles + threads * TileFilter::bytes(search, TILE_ROWS) as u64
 }
 
 /// How a picture is filtered; the result does not depend on it.
@@ -186,15 +188,13 @@ fn denoise_with(
     // Divide the picture into equal tiles
     let (width, height) = (input.width as usize, input.height as usize);
     let [max_width, max_height] = execution.tile;
-    let columns = equal_part(
-        width,
-        max_width.min(TileLayout::max_width(settings.search as usize)),
-    );
+    let max_width = max_width.min(TileLayout::max_width(settings.search as usize));
+    let columns = equal_part(width, max_width);
     let rows = equal_part(height, max_height);
     let tiles = tiles(&mut filtered, width, columns, rows);
     // Filter them in parallel
     let simd = Supported::or_best(execution.simd);
-    let filter = || TileFilter::new(simd, input, settings, columns);
+    let filter = || TileFilter::new(simd, input, settings, [columns, rows]);
     tiles
         .into_par_iter()
         .for_each_init(filter, |filter, (place, mut rows)| {

@@ -26,12 +26,23 @@ pub(super) struct Tile {
 }
 
 impl Tile {
-    pub(super) fn new(layout: TileLayout) -> Self {
+    /// For tiles of up to `rows` rows.
+    pub(super) fn new(layout: TileLayout, rows: usize) -> Self {
         Self {
-            values: Vec::new(),
+            values: vec![0.0; (rows + 2 * layout.margin) * ROW_LEN],
             layout,
             buffer: vec![0.0; STRIDE],
         }
+    }
+
+    /// Number of values that [`Self::new`] allocates.
+    pub(super) const fn len(search: usize, rows: usize) -> usize {
+        (rows + 2 * TileLayout::margin(search)) * ROW_LEN + STRIDE
+    }
+
+    #[cfg(test)]
+    pub(super) fn capacity(&self) -> usize {
+        self.values.capacity() + self.buffer.capacity()
     }
 
     /// Values of all planes of row `y`.
@@ -43,7 +54,6 @@ impl Tile {
     pub(super) fn gather(&mut self, simd: Supported, input: &DenoiseInput<'_>, place: &Rectangle) {
         let margin = self.layout.margin;
         let rows = place.height + 2 * margin;
-        self.values.resize(rows * ROW_LEN, 0.0);
         // Copy the rows of the image
         let line = Line {
             simd,
@@ -51,7 +61,7 @@ impl Tile {
             margin,
             left: place.left,
         };
-        for (number, row) in self.values.chunks_mut(ROW_LEN).enumerate() {
+        for (number, row) in self.values.chunks_mut(ROW_LEN).take(rows).enumerate() {
             line.copy(place.top + number, row, &mut self.buffer);
         }
         // Derive noise and slopes from neighbouring rows

@@ -72,14 +72,18 @@ pub(super) fn equal_part(whole: usize, max: usize) -> usize {
     whole.div_ceil(whole.div_ceil(max))
 }
 
-/// Splits a plane into tiles of up to `columns` x `rows` pixels: the place of each, and its rows.
+/// The place of a tile, and its rows.
+type TileRows<'a> = (Rectangle, Vec<&'a mut [Vec3]>);
+
+/// Splits a plane into tiles of up to `columns` x `rows` pixels.
 pub(super) fn tiles(
     plane: &mut [Vec3],
     width: usize,
     columns: usize,
     rows: usize,
-) -> Vec<(Rectangle, Vec<&mut [Vec3]>)> {
-    let mut all = Vec::new();
+) -> Vec<TileRows<'_>> {
+    let count = width.div_ceil(columns) * plane.len().div_ceil(width * rows);
+    let mut all = Vec::with_capacity(count);
     for (band, pixels) in plane.chunks_mut(width * rows).enumerate() {
         let first = all.len();
         let height = pixels.len() / width;
@@ -98,4 +102,63 @@ pub(super) fn tiles(
         }
     }
     all
+}
+
+/// Upper bound of the memory of [`tiles`] of an image, divided into equal parts of at most these lengths, bytes.
+pub(super) fn tiles_bytes(width: u32, height: u32, max_columns: usize, max_rows: usize) -> u64 {
+    let columns = u64::from(width).div_ceil(max_columns as u64);
+    let tiles = columns * u64::from(height).div_ceil(max_rows as u64);
+    let rows = columns * u64::from(height);
+    tiles * size_of::<TileRows<'_>>() as u64 + rows * size_of::<&[Vec3]>() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_a_plane_once() {
+        for (width, height, max_columns, max_rows) in [
+            (1, 1, 9, 9),
+            (7, 5, 3, 2),
+            (154, 64, 154, 64),
+            (155, 65, 154, 64),
+        ] {
+            let columns = equal_part(width, max_columns);
+            let rows = equal_part(height, max_rows);
+            let mut plane = vec![Vec3::ZERO; width * height];
+            let all = tiles(&mut plane, width, columns, rows);
+            let places = size_of_val(&all[..]);
+            let lines: usize = all.iter().map(|(_, rows)| size_of_val(&rows[..])).sum();
+            let predicted = tiles_bytes(width as u32, height as u32, max_columns, max_rows);
+            assert_eq!((places + lines) as u64, predicted, "{width}x{height}");
+            for (place, rows) in all {
+                assert_eq!(rows.len(), place.height);
+                for (y, row) in rows.into_iter().enumerate() {
+                    assert_eq!(row.len(), place.width);
+                    for (x, pixel) in row.iter_mut().enumerate() {
+                        *pixel += Vec3::new((place.left + x) as f32, (place.top + y) as f32, 1.0);
+                    }
+                }
+            }
+            for (i, pixel) in plane.iter().enumerate() {
+                let expected = Vec3::new((i % width) as f32, (i / width) as f32, 1.0);
+                assert_eq!(*pixel, expected, "{width}x{height}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_the_widest_tile_hold_all_that_is_compared() {
+        for search in 1..=16 {
+            let layout = TileLayout::new(search, TileLayout::max_width(search));
+            // Columns 0 and `STRIDE - 1` have no noise
+            let first = layout.column(-((search + PATCH_RADIUS) as isize));
+            assert_eq!(first, 1);
+            let end = layout.column(-(PATCH_RADIUS as isize)) + layout.compared;
+            assert!(end < STRIDE, "{search}: {end}");
+            assert!(layout.margin + layout.pairs <= STRIDE, "{search}");
+            assert!(layout.pairs + 2 * PATCH_RADIUS <= STRIDE, "{search}");
+        }
+    }
 }
