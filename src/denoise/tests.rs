@@ -344,7 +344,7 @@ fn a_bright_sample_does_not_spread() {
     let after = picture.denoised();
     for i in (0..before.len()).filter(|i| *i != center) {
         let change = (before[i] - after[i]).abs().max_element();
-        assert!(change < 0.1, "{i}: {change}");
+        assert!(change < 0.2, "{i}: {change}");
     }
 }
 
