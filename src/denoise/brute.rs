@@ -49,7 +49,8 @@ impl Picture<'_> {
 
     fn index(&self, [x, y]: Position) -> usize {
         let (width, height) = (i64::from(self.input.width), i64::from(self.input.height));
-        (y.clamp(0, height - 1) * width + x.clamp(0, width - 1)) as usize
+        let index = y.clamp(0, height - 1) * width + x.clamp(0, width - 1);
+        usize::try_from(index).expect("a small picture")
     }
 
     /// Whether all values of a pixel are finite.
@@ -69,15 +70,14 @@ impl Picture<'_> {
     /// The depth of an intersection inside the image.
     fn depth(&self, p: Position) -> Option<f64> {
         let depth = self.input.depth[self.index(p)];
-        let is_intersection = depth >= DEPTHS[0] && depth <= DEPTHS[1];
-        (self.is_inside(p) && is_intersection).then_some(f64::from(depth))
+        let is_valid = self.is_inside(p) && (DEPTHS[0]..=DEPTHS[1]).contains(&depth);
+        is_valid.then_some(f64::from(depth))
     }
 
     /// What colours are divided by.
     fn divisor(&self, p: Position) -> DVec3 {
         let i = self.index(p);
-        let depth = self.input.depth[i];
-        if depth >= DEPTHS[0] && depth <= DEPTHS[1] {
+        if (DEPTHS[0]..=DEPTHS[1]).contains(&self.input.depth[i]) {
             self.input.albedo[i]
                 .as_dvec3()
                 .max(DVec3::splat(MIN_ALBEDO.into()))

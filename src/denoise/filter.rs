@@ -204,17 +204,18 @@ mod tests {
             depth: &[],
         };
         for (search, rows) in [(1, 1), (4, 64), (16, 64)] {
-            let settings = DenoiseSettings {
-                search: search as u32,
-                k: 1.0,
-            };
+            let settings = DenoiseSettings { search, k: 1.0 };
             let filter = TileFilter::new(Supported::default(), &input, &settings, [16, rows]);
             let [p, q] = &filter.sums;
             let values = [p, q, &filter.distances, &filter.pixels].map(Vec::capacity);
             let floats = values.iter().sum::<usize>() + filter.tile.capacity();
             let offsets = filter.offsets.capacity() * size_of::<Offset>();
             let held = floats * size_of::<f32>() + offsets;
-            assert_eq!(TileFilter::bytes(search, rows), held, "{search} {rows}");
+            assert_eq!(
+                TileFilter::bytes(search as usize, rows),
+                held,
+                "{search} {rows}"
+            );
         }
     }
 }

@@ -44,6 +44,10 @@ impl Shares {
 
 /// Whether `depth` is that of an intersection.
 #[inline(always)]
+#[expect(
+    clippy::manual_range_contains,
+    reason = "both comparisons without a branch"
+)]
 fn is_depth(depth: f32) -> bool {
     (depth >= DEPTHS[0]) & (depth <= DEPTHS[1])
 }
@@ -99,6 +103,7 @@ lane_kernel! {
 /// Computes component `axis` of both halves of a row, divided by albedo, and adds the variance of a half by the
 /// difference of the two. All of it is 0 where a pixel is not usable.
 #[inline(always)]
+#[expect(clippy::too_many_arguments, reason = "see `math::lane_kernel`")]
 fn halves_body(
     axis: usize,
     shares: Shares,

@@ -22,9 +22,8 @@
 //! The result is the colour of the input plus the filtered change, so pixels without a similar neighbour keep their
 //! bits. Pixels with NaN or infinite values keep theirs, and no other pixel receives them.
 //!
-//! Tiles with their border are copied to planes that stay in the cache ([`tile`]), and are filtered row by row
-//! ([`filter`]). The result does not depend on threads, tiles or the instruction set. `docs/speed.md` has times and
-//! errors.
+//! Tiles with their border are copied to planes that stay in the cache, and are filtered row by row. The result does
+//! not depend on threads, tiles or the instruction set. `docs/speed.md` has times and errors.
 
 use glam::Vec3;
 use rayon::prelude::*;

@@ -88,8 +88,8 @@ impl Picture {
 
     fn input(&self) -> DenoiseInput<'_> {
         DenoiseInput {
-            width: self.width as u32,
-            height: self.height as u32,
+            width: u32::try_from(self.width).expect("a small picture"),
+            height: u32::try_from(self.height).expect("a small picture"),
             samples: self.samples,
             color: &self.color,
             odd: &self.odd,

@@ -118,19 +118,20 @@ mod tests {
 
     #[test]
     fn tiles_cover_a_plane_once() {
-        for (width, height, max_columns, max_rows) in [
-            (1, 1, 9, 9),
-            (7, 5, 3, 2),
-            (154, 64, 154, 64),
-            (155, 65, 154, 64),
+        for ([width, height], [max_columns, max_rows]) in [
+            ([1_u32, 1_u32], [9, 9]),
+            ([7, 5], [3, 2]),
+            ([154, 64], [154, 64]),
+            ([155, 65], [154, 64]),
         ] {
+            let predicted = tiles_bytes(width, height, max_columns, max_rows);
+            let (width, height) = (width as usize, height as usize);
             let columns = equal_part(width, max_columns);
             let rows = equal_part(height, max_rows);
             let mut plane = vec![Vec3::ZERO; width * height];
             let all = tiles(&mut plane, width, columns, rows);
             let places = size_of_val(&all[..]);
             let lines: usize = all.iter().map(|(_, rows)| size_of_val(&rows[..])).sum();
-            let predicted = tiles_bytes(width as u32, height as u32, max_columns, max_rows);
             assert_eq!((places + lines) as u64, predicted, "{width}x{height}");
             for (place, rows) in all {
                 assert_eq!(rows.len(), place.height);
