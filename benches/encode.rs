@@ -13,8 +13,6 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::thread;
-use std::time::Instant;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, Image,
@@ -24,6 +22,11 @@ use exr::prelude::{
 use glam::Vec3;
 use spherule::output::{ExrLayout, ExrOptions, PackBuffers, pack_block, write_blocks};
 use spherule::render::{Channels, Film};
+
+#[path = "support/cpu_time.rs"]
+mod cpu_time;
+
+use cpu_time::CpuTime;
 
 /// Turns of each; the best counts.
 const TURNS: usize = 7;
@@ -249,32 +252,5 @@ fn film(file: &Path) -> Film {
             FlatSamples::U32(ids) => Some(ids.clone()),
             _ => None,
         }),
-    }
-}
-
-/// What this thread has run so far; the time of day where the system does not tell.
-struct CpuTime {
-    nanoseconds: Option<u64>,
-    instant: Instant,
-}
-
-impl CpuTime {
-    fn now() -> Self {
-        // The kernel brings its books up to date when a thread gives way.
-        thread::yield_now();
-        let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-        Self {
-            nanoseconds: text.split_whitespace().next().and_then(|n| n.parse().ok()),
-            instant: Instant::now(),
-        }
-    }
-
-    /// Seconds since.
-    fn seconds(&self) -> f64 {
-        let now = Self::now();
-        match (self.nanoseconds, now.nanoseconds) {
-            (Some(before), Some(after)) => 1e-9 * (after - before) as f64,
-            _ => self.instant.elapsed().as_secs_f64(),
-        }
     }
 }

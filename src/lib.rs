@@ -26,6 +26,7 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
+pub mod denoise;
 pub mod hdr;
 pub mod job;
 pub mod manifest;
