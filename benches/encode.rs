@@ -205,6 +205,8 @@ fn with(film: &Film, channels: Channels) -> Film {
         velocity: plane(&film.velocity, channels.velocity),
         albedo: plane(&film.albedo, channels.albedo),
         id: film.id.clone().filter(|_| channels.id),
+        odd: None,
+        channels,
     }
 }
 
@@ -237,7 +239,7 @@ fn film(file: &Path) -> Film {
     };
     let color = ["R", "G", "B", "A"].map(|name| floats(name).expect("colours"));
     let side = |pixels: usize| u32::try_from(pixels).expect("a side");
-    Film {
+    let mut film = Film {
         width: side(layer.size.x()),
         height: side(layer.size.y()),
         color: (0..color[0].len())
@@ -252,5 +254,16 @@ fn film(file: &Path) -> Film {
             FlatSamples::U32(ids) => Some(ids.clone()),
             _ => None,
         }),
-    }
+        odd: None,
+        channels: Channels::COLOR,
+    };
+    film.channels = Channels {
+        depth: film.depth.is_some(),
+        normal: film.normal.is_some(),
+        position: film.position.is_some(),
+        velocity: film.velocity.is_some(),
+        albedo: film.albedo.is_some(),
+        id: film.id.is_some(),
+    };
+    film
 }

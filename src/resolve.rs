@@ -19,6 +19,7 @@ use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
+mod denoise;
 mod environment;
 mod ground;
 mod lights;
@@ -183,6 +184,8 @@ pub fn setup(
     render.min_weight = manifest.render.min_weight;
     render.channels = channels;
     render.transparent_background = output.transparent;
+    let denoise = denoise::settings(manifest, &scene.material)?;
+    render.has_features = denoise.is_some();
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
@@ -193,6 +196,7 @@ pub fn setup(
         scene,
         renderer: crate::render::RendererKind::default(),
         render,
+        denoise,
         surface,
         exr: ExrOptions {
             compression: output.compression,

@@ -63,6 +63,10 @@ section! {
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
+        /// Removes noise from R, G and B: auto | true | false; auto is true for integrator = "path"
+        ///
+        /// It takes at least 2 samples per pixel. Other channels do not change.
+        denoise: Option<bool> = None, or("auto"), flag("denoise", "", "Look");
         /// Maximum depth of reflections and refractions; 1 is direct light only
         max_depth: u32 = 3, from(1), to(MAX_DEPTH), flag("max-depth", "MAX_DEPTH", "Look");
         /// Transmissive spheres: path weight below which only one of the two branches is followed; 0 always follows

@@ -17,6 +17,7 @@ use spherule_formats::sequence::Sequence;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
+use crate::denoise;
 use crate::metrics::Bytes;
 use crate::output::PackBuffers;
 use crate::render::{Film, scratch_bytes};
@@ -356,8 +357,11 @@ impl<'a> MemoryModel<'a> {
         tree: u64,
     ) -> MemoryNeed {
         let render = &self.setup.picture.render;
-        let film = Film::bytes_for(render.width, render.height, render.channels);
+        let film = self.film();
         let threads = rayon::current_num_threads() as u64;
+        let denoising = self.setup.picture.denoise.map_or(0, |settings| {
+            denoise::predicted_bytes(render.width, render.height, &settings, threads)
+        });
         let film_before = if before > 0 { film } else { 0 };
         let film_kept = if before > 1 { film } else { 0 };
         let encoding_before = if before > 0 { self.encoding() } else { 0 };
@@ -396,7 +400,7 @@ impl<'a> MemoryModel<'a> {
             particles: self.shading(frame),
             tree,
             surface: surface.kept,
-            images: film + film_before + self.tracing_scratch() * threads,
+            images: film + film_before + denoising.max(self.tracing_scratch() * threads),
             encoding: encoding_before,
             ..idle
         };
@@ -406,6 +410,17 @@ impl<'a> MemoryModel<'a> {
             ..idle
         };
         first_read.larger(building).larger(tracing).larger(encoding)
+    }
+
+    /// Memory of the planes of an image.
+    fn film(&self) -> u64 {
+        let render = &self.setup.picture.render;
+        Film::bytes_for(
+            render.width,
+            render.height,
+            render.channels,
+            render.has_features,
+        )
     }
 
     /// Memory of a thread during tracing.
@@ -423,7 +438,7 @@ impl<'a> MemoryModel<'a> {
     fn encoding(&self) -> u64 {
         let render = &self.setup.picture.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
-        let film = Film::bytes_for(render.width, render.height, render.channels);
+        let film = self.film();
         // Bands have 32 rows at most, and 16 for compression methods with large blocks. Colours are in half precision.
         let band = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
         let threads = rayon::current_num_threads() as u64;

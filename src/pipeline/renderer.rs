@@ -10,6 +10,7 @@ use super::in_place::StoredFrame;
 use super::load::LoadedFrame;
 use super::setup::Setup;
 use crate::accel::stored::StoredFault;
+use crate::denoise::DenoiseError;
 use crate::metrics::MemoryUse;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;
@@ -33,6 +34,9 @@ pub enum TraceError {
     /// A native frame changed while it was traced, or cannot be used on this machine.
     #[error(transparent)]
     File(#[from] FrameError),
+    /// The image cannot be denoised.
+    #[error(transparent)]
+    Denoise(#[from] DenoiseError),
     /// The surface does not fit into memory.
     #[error(transparent)]
     Surface(#[from] SmoothError),

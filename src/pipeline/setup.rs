@@ -5,6 +5,7 @@ use spherule_formats::native::Access;
 
 use super::rays::expected_rays;
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
+use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::{RenderSettings, RendererKind};
 use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
@@ -98,6 +99,8 @@ pub struct Picture {
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
+    /// How noise is removed from the images, if it is. The settings for rendering then have features.
+    pub denoise: Option<DenoiseSettings>,
     /// The surface.
     pub surface: SurfaceSettings,
     /// Options of the EXR; the camera is added for each frame.

@@ -10,6 +10,7 @@ use super::setup::{ColorRule, Setup};
 use super::surface::{SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
+use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::metrics::MemoryUse;
 use crate::render::{Colors, Film, ParticleShading, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
@@ -99,6 +100,7 @@ impl FrameRenderer for CpuRenderer {
             ..
         } = frame;
         report.seconds.trace = seconds(start.elapsed());
+        report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
         Ok(TracedFrame {
             camera: setup.camera_at(task.frame)?,
@@ -176,6 +178,35 @@ impl CpuRenderer {
             }
         }
     }
+}
+
+/// Denoises `film` if the setup says so. Returns the time, seconds.
+fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
+    let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) = (
+        &setup.picture.denoise,
+        &film.odd,
+        &film.albedo,
+        &film.normal,
+        &film.depth,
+    ) else {
+        return Ok(0.0);
+    };
+    let start = Instant::now();
+    let input = DenoiseInput {
+        width: film.width,
+        height: film.height,
+        samples: setup.picture.render.samples,
+        color: &film.color,
+        odd,
+        albedo,
+        normal,
+        depth,
+    };
+    let filtered = denoise(&input, settings)?;
+    for (color, filtered) in film.color.iter_mut().zip(filtered) {
+        [color[0], color[1], color[2]] = filtered.to_array();
+    }
+    Ok(seconds(start.elapsed()))
 }
 
 fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> ParticleShading<'a> {

@@ -52,6 +52,17 @@ impl Channels {
         id: true,
     };
 
+    /// These and, if `has_features`, those that are features for denoising.
+    #[must_use]
+    const fn with_features(self, has_features: bool) -> Self {
+        Self {
+            depth: self.depth || has_features,
+            normal: self.normal || has_features,
+            albedo: self.albedo || has_features,
+            ..self
+        }
+    }
+
     /// Channels by their names in a manifest; `RGBA` is allowed, and always included.
     ///
     /// # Errors
@@ -102,6 +113,10 @@ pub struct Film {
     pub albedo: Option<Vec<Vec3>>,
     /// See [`DataSample::id`].
     pub id: Option<Vec<u32>>,
+    /// Mean of the samples 1, 3, 5 and so on of a film for [denoising](crate::denoise), linear RGB. Not a channel.
+    pub odd: Option<Vec<Vec3>>,
+    /// The channels; the film may have other planes as features for denoising.
+    pub channels: Channels,
 }
 
 impl Film {
@@ -119,46 +134,55 @@ impl Film {
             velocity: vectors(channels.velocity),
             albedo: vectors(channels.albedo),
             id: channels.id.then(|| vec![NO_ID; count]),
+            odd: None,
+            channels,
         }
     }
 
     /// A film of zeros. Its pages are allocated when they are first written.
-    fn zeroed(width: u32, height: u32, channels: Channels) -> Self {
+    fn zeroed(width: u32, height: u32, channels: Channels, has_features: bool) -> Self {
         let count = width as usize * height as usize;
+        let planes = channels.with_features(has_features);
         let vectors = |is_stored: bool| is_stored.then(|| zeroed_vec::<Vec3>(count));
         Self {
             width,
             height,
             color: zeroed_vec(count),
-            depth: channels.depth.then(|| zeroed_vec(count)),
-            normal: vectors(channels.normal),
-            position: vectors(channels.position),
-            velocity: vectors(channels.velocity),
-            albedo: vectors(channels.albedo),
-            id: channels.id.then(|| zeroed_vec(count)),
+            depth: planes.depth.then(|| zeroed_vec(count)),
+            normal: vectors(planes.normal),
+            position: vectors(planes.position),
+            velocity: vectors(planes.velocity),
+            albedo: vectors(planes.albedo),
+            id: planes.id.then(|| zeroed_vec(count)),
+            odd: vectors(has_features),
+            channels,
         }
     }
 
-    /// Makes this a film of that size with these planes. If it is one already, its memory and content stay; the
+    /// Makes this a film of that size with these channels, and with the features for denoising if `has_features`. If it is one already, its memory and content stay; the
     /// renderer sets every pixel. New planes are not written here, so that the page faults of their first use are
     /// shared by all tracing threads.
-    pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels) {
-        let is_fit = (self.width, self.height) == (width, height) && self.channels() == channels;
+    pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels, has_features: bool) {
+        let is_fit = (self.width, self.height) == (width, height)
+            && self.channels == channels
+            && self.odd.is_some() == has_features;
         if !is_fit {
             // Release the old planes before the new ones are allocated.
             *self = Self::default();
-            *self = Self::zeroed(width, height, channels);
+            *self = Self::zeroed(width, height, channels, has_features);
         }
     }
 
-    /// Memory of all planes of an image, bytes.
-    pub fn bytes_for(width: u32, height: u32, channels: Channels) -> u64 {
+    /// Memory of all planes of an image, bytes. `has_features`: it will be denoised.
+    pub fn bytes_for(width: u32, height: u32, channels: Channels, has_features: bool) -> u64 {
+        let channels = channels.with_features(has_features);
         let scalars = [channels.depth, channels.id];
         let vectors = [
             channels.normal,
             channels.position,
             channels.velocity,
             channels.albedo,
+            has_features,
         ];
         let count = |is_present: &[bool]| is_present.iter().filter(|w| **w).count() as u64;
         let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors);
@@ -174,6 +198,7 @@ impl Film {
         let mut velocity = chunks(&mut self.velocity, length);
         let mut albedo = chunks(&mut self.albedo, length);
         let mut id = chunks(&mut self.id, length);
+        let mut odd = chunks(&mut self.odd, length);
         // Combine the chunks of all planes into bands
         let top_rows = (0..self.height).step_by(rows as usize);
         let color = self.color.chunks_mut(length);
@@ -190,6 +215,7 @@ impl Film {
                 velocity: next(&mut velocity),
                 albedo: next(&mut albedo),
                 id: next(&mut id),
+                odd: next(&mut odd),
             })
             .collect()
     }
@@ -218,6 +244,7 @@ pub(super) struct Band<'a> {
     velocity: Option<&'a mut [Vec3]>,
     albedo: Option<&'a mut [Vec3]>,
     id: Option<&'a mut [u32]>,
+    odd: Option<&'a mut [Vec3]>,
 }
 
 impl Band<'_> {
@@ -231,6 +258,7 @@ impl Band<'_> {
         let mut velocity = planes(&mut self.velocity, width, columns);
         let mut albedo = planes(&mut self.albedo, width, columns);
         let mut id = planes(&mut self.id, width, columns);
+        let mut odd = planes(&mut self.odd, width, columns);
         // Combine the rows of all planes into tiles
         let tile = |left: u32| FilmTile {
             left,
@@ -244,6 +272,7 @@ impl Band<'_> {
             velocity: next(&mut velocity),
             albedo: next(&mut albedo),
             id: next(&mut id),
+            odd: next(&mut odd),
         };
         (0..self.width).step_by(columns).map(tile).collect()
     }
@@ -288,12 +317,23 @@ pub(super) struct FilmTile<'a> {
     velocity: Option<Rows<'a, Vec3>>,
     albedo: Option<Rows<'a, Vec3>>,
     id: Option<Rows<'a, u32>>,
+    odd: Option<Rows<'a, Vec3>>,
 }
 
 impl FilmTile<'_> {
     /// Stores the colour of the pixel in `column` and `row` of the tile.
     pub(super) fn set_color(&mut self, column: u32, row: u32, color: [f32; 4]) {
         self.color[row as usize][column as usize] = color;
+    }
+
+    /// Whether the film has the mean of odd samples.
+    pub(super) const fn has_odd(&self) -> bool {
+        self.odd.is_some()
+    }
+
+    /// Stores the mean of the odd samples of the pixel in `column` and `row` of the tile, linear RGB.
+    pub(super) fn set_odd(&mut self, column: u32, row: u32, mean: Vec3) {
+        set_pixel(&mut self.odd, (column as usize, row as usize), mean);
     }
 
     /// Stores the data of the pixel in `column` and `row` of the tile in all planes that exist.
@@ -330,7 +370,8 @@ mod tests {
         assert_eq!(film.depth.as_ref().unwrap().len(), 6);
         assert_eq!(film.id.as_ref().unwrap()[5], NO_ID);
         assert!(film.normal.is_none());
-        assert_eq!(Film::bytes_for(3, 2, channels), 6 * 24);
+        assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * 24);
+        assert_eq!(Film::bytes_for(3, 2, channels, true), 6 * (24 + 3 * 12));
         let error = Channels::from_names(["depth"]).unwrap_err();
         assert!(error.to_string().contains("\"depth\""));
     }

@@ -58,30 +58,24 @@ impl<'a> FilmRows<'a> {
 impl Film {
     /// All rows.
     pub fn rows(&self) -> FilmRows<'_> {
+        let channels = self.channels;
         FilmRows {
             top: 0,
             height: self.height,
             width: self.width,
             color: &self.color,
-            depth: self.depth.as_deref(),
-            normal: self.normal.as_deref(),
+            depth: self.depth.as_deref().filter(|_| channels.depth),
+            normal: self.normal.as_deref().filter(|_| channels.normal),
             position: self.position.as_deref(),
             velocity: self.velocity.as_deref(),
-            albedo: self.albedo.as_deref(),
+            albedo: self.albedo.as_deref().filter(|_| channels.albedo),
             id: self.id.as_deref(),
         }
     }
 
-    /// The planes in addition to colour.
+    /// The channels in addition to colour.
     pub const fn channels(&self) -> Channels {
-        Channels {
-            depth: self.depth.is_some(),
-            normal: self.normal.is_some(),
-            position: self.position.is_some(),
-            velocity: self.velocity.is_some(),
-            albedo: self.albedo.is_some(),
-            id: self.id.is_some(),
-        }
+        self.channels
     }
 }
 

@@ -144,7 +144,14 @@ pub fn render_into(
         settings.validate_branches(&scene.material)?;
     }
     // Prepare film, shapes and integrator
-    film.fit(settings.width, settings.height, settings.channels);
+    let RenderSettings {
+        width,
+        height,
+        channels,
+        has_features,
+        ..
+    } = *settings;
+    film.fit(width, height, channels, has_features);
     let plane = scene.ground.as_ref().map(Plane::new);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();

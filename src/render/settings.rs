@@ -66,6 +66,8 @@ pub struct RenderSettings {
     pub transparent_background: bool,
     /// Planes to fill.
     pub channels: Channels,
+    /// Also fills the planes that [denoising](crate::denoise) needs.
+    pub has_features: bool,
     /// If given, the image is a mosaic: its tiles of 16x16 pixels are tiles of an image with this width and height,
     /// evenly distributed over it. The cost per pixel of a mosaic is an estimate for the whole image.
     pub mosaic_of: Option<[u32; 2]>,
@@ -84,6 +86,7 @@ impl RenderSettings {
             min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,
             channels: Channels::COLOR,
+            has_features: false,
             mosaic_of: None,
         }
     }

@@ -41,6 +41,9 @@ pub struct StageSeconds {
     /// Building the surface, without the tree.
     pub surface: f64,
     pub trace: f64,
+    /// Removing noise; 0 in reports of older versions.
+    #[serde(default)]
+    pub denoise: f64,
     pub encode: f64,
     /// From the previous image, or the start of the run, to this image. The sum is the time that the user waits for
     /// the frames.
@@ -189,6 +192,7 @@ impl FrameReport {
         self.seconds.build += frame.seconds.build;
         self.seconds.surface += frame.seconds.surface;
         self.seconds.trace += frame.seconds.trace;
+        self.seconds.denoise += frame.seconds.denoise;
         self.seconds.encode += frame.seconds.encode;
         self.seconds.wall += frame.seconds.wall;
         add(&mut self.rays.primary, frame.rays.primary);

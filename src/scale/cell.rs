@@ -57,7 +57,7 @@ fn build_and_trace(request: &CellRequest) -> Result<Measured, CellError> {
 /// Rejects an image that cannot fit into memory, before the system kills the process.
 fn check_image(request: &CellRequest) -> Result<(), CellError> {
     let settings = render_settings(request);
-    let need = Film::bytes_for(settings.width, settings.height, settings.channels);
+    let need = Film::bytes_for(settings.width, settings.height, settings.channels, false);
     match memory::available() {
         Some(free) if need > free => Err(CellError::ImageTooLarge {
             width: settings.width,

@@ -12,6 +12,7 @@ mod colors;
 mod convert;
 mod corpus;
 mod damaged;
+mod denoise;
 mod export;
 mod golden;
 mod help;

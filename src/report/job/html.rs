@@ -76,6 +76,7 @@ impl JobReport {
             ("Build", duration(seconds.build)),
             ("Surface", duration(seconds.surface)),
             ("Trace", duration(seconds.trace)),
+            ("Denoise", duration(seconds.denoise)),
             ("Encode and write", duration(seconds.encode)),
             ("Rays", count(rays.total())),
             (

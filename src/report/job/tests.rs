@@ -15,6 +15,7 @@ fn done(number: i64, particles: u64) -> JobFrame {
             build: 0.375,
             surface: 0.125,
             trace: 1.0 + 0.25 * n,
+            denoise: 0.0,
             encode: 0.125,
             wall: 2.0,
         },
