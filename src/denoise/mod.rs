@@ -96,13 +96,21 @@ pub enum DenoiseError {
         height: u32,
     },
     /// A setting is out of range.
-    #[error("search radius {search} is out of range, it must lie in {} to {}", SEARCH_RADII.start(), SEARCH_RADII.end())]
+    #[error(
+        "search radius {search} is out of range, it must lie in {} to {}",
+        SEARCH_RADII.start(),
+        SEARCH_RADII.end()
+    )]
     SearchRadius {
         /// The radius in pixels.
         search: u32,
     },
     /// A setting is out of range.
-    #[error("k = {k} is out of range, it must lie in {} to {}", COLOR_TOLERANCES.start(), COLOR_TOLERANCES.end())]
+    #[error(
+        "k = {k} is out of range, it must lie in {} to {}",
+        COLOR_TOLERANCES.start(),
+        COLOR_TOLERANCES.end()
+    )]
     ColorTolerance {
         /// The tolerance of colours.
         k: f32,
