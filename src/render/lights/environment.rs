@@ -38,6 +38,26 @@ lane_kernel! {
     ) = sample_environment_body;
 }
 
+/// Samples a direction towards the environment for each lane, without its radiance. The numbers `u` are in 0..1.
+#[inline(always)]
+fn sample_directions_body(environment: &Environment, u: &[Lanes; 2], directions: &mut Lanes3) {
+    for l in 0..LANES {
+        set_lane3(
+            directions,
+            l,
+            environment.sample_direction([u[0][l], u[1][l]]),
+        );
+    }
+}
+
+lane_kernel! {
+    pub(in crate::render) fn sample_directions(
+        environment: &Environment,
+        u: &[Lanes; 2],
+        directions: &mut Lanes3,
+    ) = sample_directions_body;
+}
+
 /// Radiance of the environment along `direction` times `throughput`. `pdf` is the density with which each direction
 /// was sampled elsewhere: the balance heuristic weights it against the sampling of the environment. An infinite
 /// density has the full weight.

@@ -18,7 +18,7 @@ mod sun;
 mod tests;
 
 use directional::DirectionalLight;
-pub(super) use environment::{environment_along, sample_environment};
+pub(super) use environment::{environment_along, sample_directions, sample_environment};
 pub(super) use light::{Emission, Light, LightSamples};
 use panel::{Outline, PanelLight};
 use point::PointLight;

@@ -3,16 +3,23 @@
 //! known: where nothing is in the way, the background is exact, without noise. In transparent images, the lost fraction
 //! is coverage by black.
 //!
-//! The fraction from a single sample may exceed 1, but not its mean; `accumulate` bounds pixels. Light that particles
-//! reflect to the ground is left out. All other rays see a matte ground.
+//! The fraction from a single sample may exceed 1, but not its mean; `accumulate` bounds pixels. Transmissive particles
+//! attenuate light in a straight line. Light that particles reflect to the ground is left out. All other rays see a
+//! matte ground.
 
 use glam::Vec3;
 
-use super::{PathIntegrator, Surface};
+use super::{PathIntegrator, Surface, lanes_where};
 use crate::math::{Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
-use crate::render::{bsdf::surface_points, scratch::PacketScratch};
-use crate::scene::Scene;
+use crate::render::{
+    bsdf::surface_points,
+    dimensions::ENVIRONMENT,
+    lights::{environment_along, sample_directions},
+    sampler::get_2d_lanes,
+    scratch::PacketScratch,
+};
 use crate::scene::environment::LUMINANCE;
+use crate::scene::{Environment, Scene};
 
 /// A shadow catcher and its light.
 #[derive(Debug, Clone, Copy)]
@@ -88,13 +95,75 @@ impl PathIntegrator<'_> {
         let Some(environment) = self.environment else {
             return;
         };
-        self.reflect_environment(environment, surface, surface.lanes, packet);
-        self.add_lost(surface, packet, light);
-        let lanes = self.sample_bsdf(surface, packet);
-        self.aim_at_environment(environment, lanes, packet);
-        self.add_lost(surface, packet, light);
+        let (simd, path) = (self.context.simd, &surface.segments.path);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
+        sample_directions(simd, environment, &u, &mut packet.light.rays.direction);
+        self.lose_along(environment, surface, packet, light);
+        self.sample_bsdf(surface, packet);
+        packet.light.rays.direction = packet.points.reflected.direction;
+        self.lose_along(environment, surface, packet, light);
         // Infinite densities mark specular rays
         packet.points.reflected.pdf = splat(f32::INFINITY);
+    }
+
+    /// Adds the lost light of the environment along the directions of `packet.light`. On a white matte surface, the
+    /// BSDF is its own density, so both ways to sample a direction give its light the same weight.
+    fn lose_along(
+        &self,
+        environment: &Environment,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+        light: &mut CaughtLight,
+    ) {
+        // Find the directions that something is in the way of, before any radiance is looked up
+        self.eval(surface, packet);
+        let PacketScratch {
+            light: samples,
+            bsdf,
+            crossings,
+            counts,
+            surface: points,
+            ..
+        } = packet;
+        let lanes = surface.lanes & lanes_where(|l| bsdf.pdf[l] > 0.0);
+        let is_traced = |l: usize| lanes >> l & 1 == 1;
+        samples.lanes = lanes;
+        samples.radiance = splat3(Vec3::ONE);
+        samples.rays.origin = points.start;
+        samples.rays.t_min = splat(0.0);
+        samples.rays.t_max =
+            std::array::from_fn(|l| if is_traced(l) { f32::INFINITY } else { -1.0 });
+        if lanes == 0 {
+            return;
+        }
+        let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
+        let visible = context.trace_shadow_rays(segments, depth, samples, crossings, counts);
+        let transmittance = |l: usize| match visible >> l & 1 {
+            0 => Vec3::ZERO,
+            _ => lane3(&samples.radiance, l),
+        };
+        let blocked = lanes & lanes_where(|l| transmittance(l) != Vec3::ONE);
+        if blocked == 0 {
+            return;
+        }
+        // Add their light
+        let (direction, white) = (&samples.rays.direction, splat3(Vec3::ONE));
+        let mut arriving = [splat(0.0); 3];
+        let simd = context.simd;
+        environment_along(
+            simd,
+            environment,
+            direction,
+            &bsdf.pdf,
+            &white,
+            &mut arriving,
+        );
+        for lane in lanes_in(blocked) {
+            let lost = (Vec3::ONE - transmittance(lane)) * lane3(&arriving, lane);
+            let sum = lane3(&light.lost, lane) + lost;
+            set_lane3(&mut light.lost, lane, sum);
+        }
     }
 
     /// Adds the light of all light sources and its lost part.
@@ -116,8 +185,7 @@ impl PathIntegrator<'_> {
         }
     }
 
-    /// Traces the shadow rays of `packet.light`, and adds what does not arrive. Transmissive particles attenuate light
-    /// in a straight line.
+    /// Traces the shadow rays of `packet.light`, and adds what does not arrive.
     fn add_lost(&self, surface: &Surface<'_>, packet: &mut PacketScratch, light: &mut CaughtLight) {
         let PacketScratch {
             light: samples,

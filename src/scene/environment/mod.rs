@@ -21,7 +21,7 @@ mod studio;
 #[cfg(test)]
 mod tests;
 
-use distribution::Distribution;
+use distribution::{Cell, Distribution};
 pub use map::{MAX_MAP_PIXELS, MapError, RadianceMap};
 pub use sky::{sky, sky_direction};
 pub use studio::studio;
@@ -219,8 +219,25 @@ impl Environment {
     /// Samples a direction. The components of `u` are in 0..1.
     #[inline(always)]
     pub fn sample(&self, u: [f32; 2]) -> EnvironmentSample {
-        // Choose a texel, and a point in it that is uniform in solid angle
         let cell = self.distribution.sample(u);
+        let (direction, z) = self.direction_in(&cell);
+        let x = cell.column as f32 + cell.across;
+        EnvironmentSample {
+            direction,
+            radiance: self.bilinear(x, acos(z) * (FRAC_1_PI * ROWS as f32)),
+            pdf: self.texels[cell.row * COLUMNS + cell.column][3],
+        }
+    }
+
+    /// The direction of [`Self::sample`] alone, which takes less time.
+    #[inline(always)]
+    pub fn sample_direction(&self, u: [f32; 2]) -> Vec3 {
+        self.direction_in(&self.distribution.sample(u)).0
+    }
+
+    /// The direction of a point in a texel, uniform in solid angle, and its cosine with the zenith.
+    #[inline(always)]
+    fn direction_in(&self, cell: &Cell) -> (Vec3, f32) {
         let [top, bottom] = [self.cosines[cell.row], self.cosines[cell.row + 1]];
         let z = top + (bottom - top) * cell.down;
         let rest = (1.0 - z) * (1.0 + z);
@@ -229,11 +246,7 @@ impl Environment {
         let (sin, cos) = sin_cos(x * (2.0 * PI / COLUMNS as f32));
         let axes = &self.axes;
         let direction = level * cos * axes.right + level * sin * axes.back + z * axes.up;
-        EnvironmentSample {
-            direction,
-            radiance: self.bilinear(x, acos(z) * (FRAC_1_PI * ROWS as f32)),
-            pdf: self.texels[cell.row * COLUMNS + cell.column][3],
-        }
+        (direction, z)
     }
 
     /// Irradiance on a surface with unit `normal`, linear RGB.
