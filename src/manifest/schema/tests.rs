@@ -82,7 +82,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 21] = [
+const TABLES: [(&str, &str); 22] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -94,6 +94,10 @@ const TABLES: [(&str, &str); 21] = [
     ("/properties/render", "[render]\n"),
     ("/properties/surface", "[surface]\n"),
     ("/properties/material", "[material]\n"),
+    (
+        "/properties/environment/properties/sun",
+        "[environment.sun]\n",
+    ),
     (
         "/properties/light/items/oneOf/0",
         "[[light]]\ntype = \"point\"\n",
