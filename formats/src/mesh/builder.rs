@@ -1,6 +1,7 @@
 //! Builds a mesh from vertices and polygons: checks indices, splits polygons into triangles, keeps the budget.
 
 use bytemuck::allocation::try_cast_vec;
+use glam::DVec3;
 
 use crate::{MemoryBudget, ParseError, Positions};
 
@@ -142,6 +143,12 @@ impl MeshBuilder {
             }
         }
         Ok(())
+    }
+
+    /// The position of vertex `index`, which [`CornerRange::vertex`] returned.
+    pub(super) fn position(&self, index: u32) -> DVec3 {
+        let vertex = self.mesh.vertices.get(index as usize);
+        DVec3::from_array(*vertex.expect("indices are checked"))
     }
 
     /// Adds one vertex, which all polygons that follow may have as a corner, and returns its index.

@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use glam::DVec3;
+
 use super::builder::{CornerRange, MeshBuilder};
 use super::surface::{CellShape, SurfaceFaces, shape};
 use crate::{AttributeData, ParseError};
@@ -156,15 +158,21 @@ impl CellArray {
                 }
                 CellShape::Polygon => {
                     let order = &[0, 1, 2, 3][..corners];
-                    surface.add(builder, order.iter().map(corner), false)
+                    surface.add(builder, order.iter().map(corner), None)
                 }
                 CellShape::Face(order) if has_volumes => {
-                    surface.add(builder, order.iter().map(corner), false)
+                    surface.add(builder, order.iter().map(corner), None)
                 }
                 CellShape::Face(order) => builder.add_polygon(order.iter().map(corner)),
                 CellShape::Volume(faces) => {
+                    let mut center = DVec3::ZERO;
+                    for corner in self.corners(range.clone(), all) {
+                        center += builder.position(corner?) / corners as f64;
+                    }
                     let mut faces = faces.iter();
-                    faces.try_for_each(|face| surface.add(builder, face.iter().map(corner), true))
+                    faces.try_for_each(|face| {
+                        surface.add(builder, face.iter().map(corner), Some(center))
+                    })
                 }
             }
         })?;

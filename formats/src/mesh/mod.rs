@@ -9,8 +9,6 @@ pub(crate) mod cells;
 mod obj;
 mod stl;
 mod surface;
-#[cfg(test)]
-mod tests;
 
 use std::path::Path;
 

@@ -1,5 +1,7 @@
 //! The types of VTK's cells, and the surface of a mesh of volumes: the faces that belong to one volume only.
 
+use glam::DVec3;
+
 use super::builder::{MeshBuilder, reserve};
 use crate::ParseError;
 
@@ -14,7 +16,7 @@ pub(super) enum CellShape {
     Face(&'static [u8]),
     /// A strip of triangles.
     Strip,
-    /// Faces with their corners counter-clockwise, seen from outside.
+    /// The corners of each face, in the order around it.
     Volume(&'static [&'static [u8]]),
 }
 
@@ -101,32 +103,38 @@ pub(super) struct SurfaceFaces {
 }
 
 impl SurfaceFaces {
-    /// Adds a face of three or four `corners`. The memory counts as that of `builder`.
+    /// Adds a face of three or four `corners`. If it belongs to a volume, `center` is inside of that. The memory counts
+    /// as that of `builder`.
+    ///
+    /// # Errors
+    /// The first error of `corners`; [`ParseError::TooLarge`].
     pub(super) fn add(
         &mut self,
         builder: &MeshBuilder,
         corners: impl Iterator<Item = Result<u32, ParseError>>,
-        is_of_volume: bool,
+        center: Option<DVec3>,
     ) -> Result<(), ParseError> {
         let mut face = [NONE; 4];
+        let mut count = 0;
         for (to, corner) in face.iter_mut().zip(corners) {
             *to = corner?;
+            count += 1;
         }
         let held = self.faces.capacity() * size_of::<Face>();
-        reserve(
-            &mut self.faces,
-            builder.left().less(held as u64),
-            builder.left(),
-        )?;
+        let left = builder.left();
+        reserve(&mut self.faces, left.less(held as u64), left)?;
         let place = u32::try_from(self.faces.len())
             .map_err(|_| ParseError::unsupported("cells with more than 4294967295 faces"))?;
         let mut key = face;
         key.sort_unstable();
+        if center.is_some_and(|center| is_inside_out(builder, &face[..count], center)) {
+            face[..count].reverse();
+        }
         self.faces.push(Face {
             corners: face,
             key,
             place,
-            is_of_volume,
+            is_of_volume: center.is_some(),
         });
         Ok(())
     }
@@ -178,4 +186,18 @@ fn same_faces(faces: &[Face], start: usize) -> (usize, usize) {
         all += 1;
     }
     (of_volumes, start + all)
+}
+
+/// Whether the normal of `face` points towards `center`: programs disagree about the order of the corners of a volume.
+fn is_inside_out(builder: &MeshBuilder, face: &[u32], center: DVec3) -> bool {
+    let mut points = face.iter().map(|corner| builder.position(*corner));
+    let (Some(a), Some(b), Some(c)) = (points.next(), points.next(), points.next()) else {
+        return false;
+    };
+    // Of a quad, the diagonals.
+    let (normal, middle) = match points.next() {
+        Some(d) => ((c - a).cross(d - b), (a + b + c + d) / 4.0),
+        None => ((b - a).cross(c - a), (a + b + c) / 3.0),
+    };
+    normal.dot(middle - center) < 0.0
 }
