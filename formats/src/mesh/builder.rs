@@ -37,6 +37,11 @@ pub(crate) struct CornerRange {
 }
 
 impl CornerRange {
+    /// Vertices.
+    pub(super) const fn count(self) -> u32 {
+        self.count
+    }
+
     /// The vertex with `index`, counted from the first of the range; `None` stands for a number that is no index.
     /// `at` is the byte for the error.
     ///

@@ -79,7 +79,8 @@ impl CellArray {
                 CellExtents::Ends(ends) => (end, self.place(cell, unsigned(ends, cell))?),
             };
             if next < start || next > len {
-                let what = format!("cell {cell} has indices {start} to {next} of {len}");
+                let what =
+                    format!("cell {cell} has the indices {start} to {next}, there are {len}");
                 return Err(ParseError::malformed(self.at, what));
             }
             show(cell, start..next)?;
@@ -141,9 +142,8 @@ impl CellArray {
         self.each(|cell, range| {
             let corners = range.len();
             let shape = self.shape(cell, types)?;
-            if shape.corners().is_some_and(|needed| needed != corners) {
-                let what =
-                    format!("cell {cell} has {corners} vertices, which its type does not have");
+            if let Some(needed) = shape.corners().filter(|needed| *needed != corners) {
+                let what = format!("cell {cell} has {corners} vertices, its type has {needed}");
                 return Err(ParseError::malformed(self.at, what));
             }
             let corner = |index: &u8| {

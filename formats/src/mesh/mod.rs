@@ -1,8 +1,8 @@
 //! Reads triangle meshes: tanks and obstacles in a picture, not particles.
 //!
 //! The content decides which format a file is. STL and OBJ are read here; the other formats share their parsers with
-//! the particle readers (`read::ply`, `read::vtk`, `read::vtk_xml`). Like those, nothing here trusts a file: indices are
-//! checked, counts are compared with the bytes that are there, and memory is bounded by a [`MemoryBudget`].
+//! the particle readers (`read::ply`, `read::vtk`, `read::vtk_xml`). Like those, nothing here trusts a file: indices
+//! are checked, counts are compared with the bytes that are there, and memory is bounded by a [`MemoryBudget`].
 
 pub(crate) mod builder;
 pub(crate) mod cells;

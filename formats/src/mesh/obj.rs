@@ -76,11 +76,21 @@ fn corner(
     } else {
         before.saturating_add(index)
     };
-    let Ok(from_zero) = u64::try_from(from_zero) else {
-        let what = format!("refers to vertex {index}, but {before} vertices are before it");
-        return Err(statement.fault(&what));
-    };
-    all.vertex(statement.at, Some(from_zero))
+    let vertex = all.vertex(statement.at, u64::try_from(from_zero).ok());
+    vertex.map_err(|_| {
+        // With the index as the file has it.
+        let there = if index > 0 {
+            i64::from(all.count())
+        } else {
+            before
+        };
+        let of = if index > 0 {
+            "the file has"
+        } else {
+            "before it are"
+        };
+        statement.fault(&format!("refers to vertex {index}, {of} {there} vertices"))
+    })
 }
 
 /// A line, and those that follow if it ends with a backslash.

@@ -1,8 +1,8 @@
 //! Damaged meshes: each gives its named error, within little memory.
 //!
-//! `tests/damaged_meshes` holds the files and `table.tsv`, a line for each: the name, then text that the error must have,
-//! or `reads V vertices T triangles`. `SPHERULE_BLESS=1` writes the files anew from `make.rs`; the table is written by
-//! hand.
+//! `tests/damaged_meshes` holds the files and `table.tsv`, a line for each: the name, then text that the error must
+//! have, or `reads V vertices T triangles`. `SPHERULE_BLESS=1` writes the files anew from `make.rs`; the table is
+//! written by hand.
 
 use std::fs;
 use std::path::{Path, PathBuf};

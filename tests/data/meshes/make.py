@@ -1,11 +1,11 @@
 """Writes the sample meshes of this folder, and expected.tsv, with the libraries that users have.
 
-    pip install trimesh==5.2.0 pyvista==0.49.1 meshio==5.3.5 numpy==2.4.6 scipy networkx   (VTK 9.7.2 comes with pyvista)
+    pip install trimesh==5.2.0 pyvista==0.49.1 vtk==9.7.2 meshio==5.3.5 numpy==2.4.6 scipy networkx
     python make.py
 
-expected.tsv has a line for each file: the number of vertices and triangles, the lowest and highest coordinates, the area,
-and the volume (the integral of x, times the x of the normal, over the surface). trimesh computes area and volume from the shapes, not
-from the files; only the vertex and triangle counts depend on how a format stores them.
+expected.tsv has a line for each file: the number of vertices and triangles, the lowest and highest coordinates, the
+area, and the volume (the integral of x, times the x of the normal, over the surface). trimesh computes area and volume
+from the shapes, not from the files; only the vertex and triangle counts depend on how a format stores them.
 """
 
 from pathlib import Path
@@ -155,7 +155,7 @@ def volumes():
         meshio.write(HERE / name, meshio.Mesh(points, blocks), file_format=kind)
         row(name, points, faces)
 
-    # One of each: a hexahedron, on it a pyramid, beside it a wedge, on that a tetrahedron, and a voxel and a pixel apart.
+    # A hexahedron, on it a pyramid, beside it a wedge, on that a tetrahedron, and a voxel and a pixel apart.
     points = np.array(
         [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1], [0.5, 0.5, 2]]
         + [[2, 0.5, 0], [2, 0.5, 1], [1.2, 0.5, 2]]

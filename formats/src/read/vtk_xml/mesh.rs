@@ -3,7 +3,7 @@
 use super::appended::Appended;
 use super::document::{CellGroup, CellSection, Piece, XmlDocument, XmlPart};
 use super::merge::{filled, not_numeric, piece_positions};
-use super::{check_memory, check_shares, parse, scalar_type, values};
+use super::{check_memory, check_shares, most_bytes, parse, scalar_type, values};
 use crate::mesh::builder::{Mesh, MeshBuilder};
 use crate::mesh::cells::{CellArray, CellExtents, CellKind, unsigned};
 use crate::{AttributeData, MemoryBudget, ParseError};
@@ -24,6 +24,7 @@ pub(crate) fn read_mesh(bytes: &[u8], budget: MemoryBudget) -> Result<Mesh, Pars
                 document: &document,
                 piece,
                 appended,
+                most_numbers: most_bytes(&document, bytes.len()),
             };
             for group in &piece.cells {
                 groups.add(&mut builder, group)?;
@@ -38,6 +39,8 @@ struct CellReader<'d, 'a> {
     document: &'d XmlDocument<'a>,
     piece: &'d Piece<'a>,
     appended: Option<Appended<'d>>,
+    /// More numbers than any file of this length can hold: each has a byte at least.
+    most_numbers: usize,
 }
 
 impl CellReader<'_, '_> {
@@ -93,6 +96,13 @@ impl CellReader<'_, '_> {
             let what = format!("<{}> without an array {name}", group.section.element());
             return Err(ParseError::malformed(group.at, what));
         };
+        if count > self.most_numbers {
+            let what = format!(
+                "array `{}` has {count} numbers, more than the file can hold",
+                name
+            );
+            return Err(ParseError::malformed(array.at, what));
+        }
         // While they are decoded, there are the bytes as well.
         let size = scalar_type(&array.type_name).map_or(0, |scalar| 2 * scalar.size());
         builder.check(count.saturating_mul(size) as u64)?;

@@ -120,13 +120,18 @@ fn parse<T>(
     then(document, appended)
 }
 
+/// The most bytes that `len` bytes of the file can stand for.
+fn most_bytes(document: &XmlDocument<'_>, len: usize) -> usize {
+    match document.encoding.compressor {
+        Some(compressor) => compressor.most_output(len),
+        None => len,
+    }
+}
+
 /// Rejects particle counts that no file of this length can hold; pieces that share their bytes
 /// would get past the check of each array.
 fn check_total(document: &XmlDocument<'_>, file: usize) -> Result<(), ParseError> {
-    let most = match document.encoding.compressor {
-        Some(compressor) => compressor.most_output(file),
-        None => file,
-    };
+    let most = most_bytes(document, file);
     let total = document
         .pieces
         .iter()
@@ -136,7 +141,7 @@ fn check_total(document: &XmlDocument<'_>, file: usize) -> Result<(), ParseError
         Some(bytes) if bytes <= most => Ok(()),
         _ => Err(ParseError::malformed(
             0,
-            format!("the pieces state more particles than a file of {file} bytes can hold"),
+            format!("the pieces state more points than a file of {file} bytes can hold"),
         )),
     }
 }
@@ -151,10 +156,7 @@ fn check_shares(
         return Ok(());
     };
     let len = appended.blob.len();
-    let most = match document.encoding.compressor {
-        Some(compressor) => compressor.most_output(len),
-        None => len,
-    };
+    let most = most_bytes(document, len);
     let mut need = 0_usize;
     for (array, bytes) in array_sizes(document) {
         if !matches!(array.place, ArrayLocation::Appended(_)) {
