@@ -79,17 +79,14 @@ fn corner(
     let vertex = all.vertex(statement.at, u64::try_from(from_zero).ok());
     vertex.map_err(|_| {
         // With the index as the file has it.
-        let there = if index > 0 {
-            i64::from(all.count())
+        let (there, count) = if index > 0 {
+            ("in the file", i64::from(all.count()))
         } else {
-            before
+            ("before it", before)
         };
-        let of = if index > 0 {
-            "the file has"
-        } else {
-            "before it are"
-        };
-        statement.fault(&format!("refers to vertex {index}, {of} {there} vertices"))
+        statement.fault(&format!(
+            "refers to vertex {index}; vertices {there}: {count}"
+        ))
     })
 }
 

@@ -65,7 +65,7 @@ fn obj_indices_may_be_relative_and_have_other_indices() {
     assert_eq!(triangles(text), [[0, 1, 2], [0, 1, 3], [3, 2, 1]]);
     fails(
         "v 0 0 0\nf 1 -1 -2\n",
-        "byte 8: \"f 1 -1 -2\" refers to vertex -2, but 1 vertices are before it",
+        "byte 8: \"f 1 -1 -2\" refers to vertex -2; vertices before it: 1",
     );
 }
 

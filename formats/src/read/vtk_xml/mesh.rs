@@ -50,11 +50,10 @@ impl CellReader<'_, '_> {
         let Some(last) = count.checked_sub(1) else {
             return Ok(());
         };
-        let mut held = 0;
+        // They count to the end: many arrays that share few compressed bytes could take long otherwise.
         let mut array = |name: &str, count: usize| {
             let data = self.array(builder, group, name, count)?;
             builder.hold(data.byte_len());
-            held += data.byte_len();
             Ok::<AttributeData, ParseError>(data)
         };
         let ends = array("offsets", count)?;
@@ -78,9 +77,7 @@ impl CellReader<'_, '_> {
             connectivity,
             extents: CellExtents::Ends(ends),
         };
-        cells.add_to(builder, &kind)?;
-        builder.release(held);
-        Ok(())
+        cells.add_to(builder, &kind)
     }
 
     /// The `count` numbers of the array `name` of `group`.
@@ -97,10 +94,7 @@ impl CellReader<'_, '_> {
             return Err(ParseError::malformed(group.at, what));
         };
         if count > self.most_numbers {
-            let what = format!(
-                "array `{}` has {count} numbers, more than the file can hold",
-                name
-            );
+            let what = format!("array `{name}` has {count} numbers, more than the file can hold");
             return Err(ParseError::malformed(array.at, what));
         }
         // While they are decoded, there are the bytes as well.
