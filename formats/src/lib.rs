@@ -27,6 +27,7 @@ pub mod blocks;
 pub mod convert;
 pub mod detect;
 pub mod generate;
+pub mod mesh;
 pub mod names;
 pub mod native;
 pub mod open;

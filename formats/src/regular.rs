@@ -18,7 +18,7 @@ pub(crate) fn regular_len(path: &Path) -> Result<u64, FrameError> {
         return Ok(meta.len());
     }
     let what = if meta.is_dir() {
-        "a directory, where a particle file was expected"
+        "a directory, where a file was expected"
     } else {
         "not a regular file; copy it to one first"
     };

@@ -179,7 +179,7 @@ mod tests {
         );
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
-        refused("a.vti", odd, r"type a\n\u{1b}[2J holds");
+        refused("a.vti", odd, r"type a\n\u{1b}[2J is not read");
         refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
         refused(
             "a.csv",

@@ -22,10 +22,12 @@ use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 mod head;
 mod mapped;
 mod streamed;
+mod whole;
 
 pub use crate::gzip::unpacked_len;
 pub(crate) use head::head;
 pub use head::{detect_file, is_native, remarks};
+pub(crate) use whole::read_whole;
 
 use mapped::SteppedFile;
 use streamed::{StreamedFile, decompressor};

@@ -20,7 +20,7 @@ mod remarks;
 pub(crate) mod sniff;
 mod source;
 mod table;
-mod text;
+pub(crate) mod text;
 #[cfg(test)]
 mod text_samples;
 pub mod vtk;

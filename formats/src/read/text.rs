@@ -11,11 +11,11 @@ use memchr::memchr;
 
 /// One line without its line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Line<'a> {
+pub(crate) struct Line<'a> {
     /// Offset of the first byte from the start of the file.
-    pub(super) at: usize,
+    pub(crate) at: usize,
     /// The bytes, without `\n` or `\r\n`.
-    pub(super) text: &'a [u8],
+    pub(crate) text: &'a [u8],
 }
 
 impl Line<'_> {
@@ -27,7 +27,7 @@ impl Line<'_> {
 
 /// Walks over the lines of a part of a file.
 #[derive(Debug, Clone)]
-pub(super) struct Lines<'a> {
+pub(crate) struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
     end: usize,
@@ -35,7 +35,7 @@ pub(super) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// The lines in `span` of the file `bytes`; a span beyond the file is cut.
-    pub(super) fn new(bytes: &'a [u8], span: Range<usize>) -> Self {
+    pub(crate) fn new(bytes: &'a [u8], span: Range<usize>) -> Self {
         let end = span.end.min(bytes.len());
         let at = span.start.min(end);
         Self { bytes, at, end }
@@ -82,7 +82,7 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 /// The parts of `text` between blanks and tabs.
-pub(super) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
 }
@@ -102,7 +102,7 @@ pub(super) fn same_length(bytes: &[u8]) -> Cow<'_, str> {
 }
 
 /// Bytes of a file as a message can show them: quoted, lossy, at most 24 characters.
-pub(super) fn shown(bytes: &[u8]) -> String {
+pub(crate) fn shown(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes.get(..96).unwrap_or(bytes));
     let text = text.trim();
     match text.char_indices().nth(24) {
@@ -112,7 +112,7 @@ pub(super) fn shown(bytes: &[u8]) -> String {
 }
 
 /// `token` as a decimal integer with an optional sign. `-0` is none: only a float has it.
-pub(super) fn integer(token: &[u8]) -> Option<i64> {
+pub(crate) fn integer(token: &[u8]) -> Option<i64> {
     let (negative, digits) = match token {
         [b'-', digits @ ..] => (true, digits),
         [b'+', digits @ ..] => (false, digits),
@@ -143,7 +143,7 @@ pub(super) fn integer(token: &[u8]) -> Option<i64> {
 ///
 /// `fast_float2` takes nearly all of them: 13 ns for a number of a LAMMPS dump, where `str::parse`
 /// needs 18 ns and UTF-8 (one core of the development machine).
-pub(super) fn number(token: &[u8]) -> Option<f64> {
+pub(crate) fn number(token: &[u8]) -> Option<f64> {
     match fast_float2::parse(token) {
         Ok(value) => Some(value),
         Err(_) => unusual_number(token),
