@@ -222,6 +222,11 @@ fn samples_follow_their_density() {
             let simd = Supported::default();
             // Count samples
             let samples = point.samples(simd, &*bsdf, &random(100_000));
+            #[expect(
+                clippy::cast_possible_truncation,
+                clippy::cast_sign_loss,
+                reason = "cells"
+            )]
             let cell = |v: Vec3| {
                 let row = ((v.z * ROWS as f32) as usize).min(ROWS - 1);
                 let turn = v.y.atan2(v.x) / std::f32::consts::TAU + 1.0;

@@ -3,11 +3,6 @@
 //! Light that is reflected several times between microfacets is added, so that rough metals do not lose it (Kulla and
 //! Conty, "Revisiting Physically Based Shading at Imageworks", 2017).
 
-#![expect(
-    clippy::needless_range_loop,
-    reason = "loops over lanes, several arrays at a time"
-)]
-
 use std::f32::consts::FRAC_1_PI;
 
 use super::local::{LocalBsdf, lane_bsdf};
