@@ -1,12 +1,12 @@
 //! A value of a manifest before it is parsed.
 
 use super::problem::Problems;
-use super::tree::{Kind, Node};
+use super::tree::{Kind, TomlNode};
 
 /// A value that is present.
 pub(super) struct Field<'a> {
     pub(super) key: String,
-    pub(super) node: &'a Node,
+    pub(super) node: &'a TomlNode,
     pub(super) problems: &'a Problems,
 }
 

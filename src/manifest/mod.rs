@@ -18,7 +18,7 @@ use keys::Keys;
 use list::Entries;
 use problem::{Place, Problem, Problems};
 use reader::Section;
-use tree::Node;
+use tree::TomlNode;
 
 mod camera;
 mod color;
@@ -175,7 +175,7 @@ impl Manifest {
         overrides: Vec<Override>,
     ) -> Result<(Self, Vec<String>), ManifestError> {
         let problems = Problems::default();
-        let mut tree = Node::parse(text).map_err(|(place, what)| {
+        let mut tree = TomlNode::parse(text).map_err(|(place, what)| {
             let key = String::new();
             ManifestError::new(vec![Problem { place, key, what }], text, path)
         })?;

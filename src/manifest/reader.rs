@@ -1,17 +1,17 @@
-//! Reads typed values from a [`Node`] tree and collects all problems with location and key, so that one run is enough
+//! Reads typed values from a [`TomlNode`] tree and collects all problems with location and key, so that one run is enough
 //! to fix a manifest.
 
 use super::field::Field;
 use super::key::Key;
 use super::nearest::nearest;
 use super::problem::{Place, Problems};
-use super::tree::{Kind, Node};
+use super::tree::{Kind, TomlNode};
 use super::value::Slot;
 
 /// A table that is being read. Keys that have not been read before [`Section::finish`] are unknown.
 pub(super) struct Section<'a> {
     path: String,
-    node: Option<&'a Node>,
+    node: Option<&'a TomlNode>,
     known: Vec<&'static str>,
     problems: &'a Problems,
     /// Number of errors before the first key was read.
@@ -20,11 +20,11 @@ pub(super) struct Section<'a> {
 }
 
 impl<'a> Section<'a> {
-    pub(super) fn root(node: &'a Node, problems: &'a Problems) -> Self {
+    pub(super) fn root(node: &'a TomlNode, problems: &'a Problems) -> Self {
         Self::new(String::new(), Some(node), problems)
     }
 
-    fn new(path: String, node: Option<&'a Node>, problems: &'a Problems) -> Self {
+    fn new(path: String, node: Option<&'a TomlNode>, problems: &'a Problems) -> Self {
         Self {
             path,
             node,
@@ -75,7 +75,7 @@ impl<'a> Section<'a> {
         let renamed = old.map(|[old, new]| {
             let what = format!("\"{old}\" is now called \"{new}\"; the old name still works");
             self.problems.warn(&field.node.place, &field.key, &what);
-            Node {
+            TomlNode {
                 kind: Kind::Text(new.to_owned()),
                 place: field.node.place.clone(),
             }

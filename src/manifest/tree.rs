@@ -9,7 +9,7 @@ use toml::de::{DeTable, DeValue};
 use super::problem::{Place, Problem};
 
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub(super) struct TomlNode {
     pub(super) kind: Kind,
     pub(super) place: Place,
 }
@@ -20,9 +20,9 @@ pub(super) enum Kind {
     Integer(i64),
     Float(f64),
     Bool(bool),
-    Array(Vec<Node>),
+    Array(Vec<TomlNode>),
     /// Values by key, with the location of each key.
-    Table(BTreeMap<String, (Place, Node)>),
+    Table(BTreeMap<String, (Place, TomlNode)>),
     /// Dates, and integers beyond 64 bits.
     Other,
 }
@@ -31,7 +31,7 @@ pub(super) enum Kind {
 #[derive(Debug, Clone)]
 pub struct Override {
     keys: Vec<String>,
-    node: Node,
+    node: TomlNode,
     is_under: bool,
 }
 
@@ -73,7 +73,7 @@ impl Override {
         let place = Place::Option(shown.clone());
         let value = value.trim();
         let kind = match DeValue::parse(value) {
-            Ok(parsed) => match Node::from_toml(parsed, &|_| place.clone()).kind {
+            Ok(parsed) => match TomlNode::from_toml(parsed, &|_| place.clone()).kind {
                 Kind::Other => Kind::Text(value.to_owned()),
                 kind => kind,
             },
@@ -84,7 +84,7 @@ impl Override {
         };
         Ok(Self {
             keys,
-            node: Node { kind, place },
+            node: TomlNode { kind, place },
             is_under: false,
         })
     }
@@ -104,7 +104,7 @@ impl Override {
                 shown: shown.to_owned(),
                 fault,
             })?,
-            node: Node::from_value(value.into(), &place),
+            node: TomlNode::from_value(value.into(), &place),
             is_under: false,
         })
     }
@@ -131,7 +131,7 @@ fn split_key(key: &str) -> Result<Vec<String>, OverrideFault> {
     Ok(keys)
 }
 
-impl Node {
+impl TomlNode {
     /// Whether `table` is a table with `key`.
     pub(super) fn contains(&self, table: &str, key: &str) -> bool {
         let Kind::Table(tables) = &self.kind else {
@@ -277,7 +277,7 @@ impl Kind {
                 .into_iter()
                 .map(|(key, value)| {
                     let at = place(key.span().start);
-                    let node = Node::from_toml(value, place);
+                    let node = TomlNode::from_toml(value, place);
                     (key.into_inner().into_owned(), (at, node))
                 })
                 .collect(),

@@ -4,7 +4,7 @@
 //! Source: "Template Schemas 2023-09" of the Open Job Description specifications.
 
 use super::quote::one_line;
-use super::tree::{Field, Node, field};
+use super::tree::{Field, YamlNode, field};
 use super::{Chunks, ExportError};
 use crate::range::FrameRange;
 
@@ -115,7 +115,7 @@ impl JobTemplate<'_> {
         })
     }
 
-    fn tree(&self) -> Result<Node, ExportError> {
+    fn tree(&self) -> Result<YamlNode, ExportError> {
         let name = literal("name", self.name)?;
         let name: String = name.chars().take(MAX_NAME).collect();
         let description = one_line("description", &self.description)?;
@@ -127,18 +127,24 @@ impl JobTemplate<'_> {
         let requirements = self.host.to_field();
         let script = [field("script", self.script()?)];
         let step = step.into_iter().chain(requirements).chain(script);
-        Ok(Node::Map(vec![
+        Ok(YamlNode::Map(vec![
             field("specificationVersion", "jobtemplate-2023-09")
                 .with_comment("Paths are relative to the directory of this file."),
-            field("extensions", Node::FlowList(vec!["TASK_CHUNKING".into()])),
+            field(
+                "extensions",
+                YamlNode::FlowList(vec!["TASK_CHUNKING".into()]),
+            ),
             field("name", name),
             field("description", description),
             field("parameterDefinitions", self.parameters()?),
-            field("steps", Node::BlockList(vec![Node::Map(step.collect())])),
+            field(
+                "steps",
+                YamlNode::BlockList(vec![YamlNode::Map(step.collect())]),
+            ),
         ]))
     }
 
-    fn parameters(&self) -> Result<Node, ExportError> {
+    fn parameters(&self) -> Result<YamlNode, ExportError> {
         let (name, path) = self.program;
         let mut all = Vec::new();
         for path in &self.paths {
@@ -169,33 +175,35 @@ impl JobTemplate<'_> {
             ),
             field("default", value("program", path)?),
         ]);
-        Ok(Node::BlockList(all.into_iter().map(Node::Map).collect()))
+        Ok(YamlNode::BlockList(
+            all.into_iter().map(YamlNode::Map).collect(),
+        ))
     }
 
-    fn script(&self) -> Result<Node, ExportError> {
+    fn script(&self) -> Result<YamlNode, ExportError> {
         let mut arguments = Vec::new();
         for argument in &self.arguments {
-            arguments.push(Node::from(one_line("argument", argument)?));
+            arguments.push(YamlNode::from(one_line("argument", argument)?));
         }
         let on_run = vec![
             field("command", parameter(self.program.0)),
-            field("args", Node::FlowList(arguments)),
+            field("args", YamlNode::FlowList(arguments)),
             field("timeout", MAX_TASK_SECONDS).with_comment("Seconds."),
             field(
                 "cancelation",
-                Node::Map(vec![
+                YamlNode::Map(vec![
                     field("mode", "NOTIFY_THEN_TERMINATE"),
                     field("notifyPeriodInSeconds", NOTIFY_SECONDS),
                 ]),
             )
             .with_comment("On a request to stop, the program finishes the frame in progress."),
         ];
-        let actions = Node::Map(vec![field("onRun", Node::Map(on_run))]);
-        Ok(Node::Map(vec![field("actions", actions)]))
+        let actions = YamlNode::Map(vec![field("onRun", YamlNode::Map(on_run))]);
+        Ok(YamlNode::Map(vec![field("actions", actions)]))
     }
 }
 
-fn parameter_space() -> Node {
+fn parameter_space() -> YamlNode {
     let chunks = vec![
         field("defaultTaskCount", parameter("ChunkSize")),
         field("rangeConstraint", "NONCONTIGUOUS")
@@ -205,10 +213,10 @@ fn parameter_space() -> Node {
         field("name", "Frame"),
         field("type", "CHUNK[INT]"),
         field("range", parameter("Frames")),
-        field("chunks", Node::Map(chunks)),
+        field("chunks", YamlNode::Map(chunks)),
     ];
-    let all = Node::BlockList(vec![Node::Map(frame)]);
-    Node::Map(vec![field("taskParameterDefinitions", all)])
+    let all = YamlNode::BlockList(vec![YamlNode::Map(frame)]);
+    YamlNode::Map(vec![field("taskParameterDefinitions", all)])
 }
 
 impl PathParameter {
@@ -241,21 +249,21 @@ impl HostRequirements {
             .memory
             .map(|bytes| ("amount.worker.memory", bytes.div_ceil(1 << 20).max(1)));
         for (name, min) in cpus.into_iter().chain(memory) {
-            amounts.push(Node::Map(vec![field("name", name), field("min", min)]));
+            amounts.push(YamlNode::Map(vec![field("name", name), field("min", min)]));
         }
         let system = |name: &str| {
-            Node::Map(vec![
+            YamlNode::Map(vec![
                 field("name", "attr.worker.os.family"),
-                field("anyOf", Node::FlowList(vec![name.into()])),
+                field("anyOf", YamlNode::FlowList(vec![name.into()])),
             ])
         };
-        let attributes: Vec<Node> = self.system.map(system).into_iter().collect();
+        let attributes: Vec<YamlNode> = self.system.map(system).into_iter().collect();
         let all: Vec<Field> = [("amounts", amounts), ("attributes", attributes)]
             .into_iter()
             .filter(|(_, items)| !items.is_empty())
-            .map(|(key, items)| field(key, Node::BlockList(items)))
+            .map(|(key, items)| field(key, YamlNode::BlockList(items)))
             .collect();
-        (!all.is_empty()).then(|| field("hostRequirements", Node::Map(all)))
+        (!all.is_empty()).then(|| field("hostRequirements", YamlNode::Map(all)))
     }
 }
 

@@ -4,13 +4,13 @@ use serde::{Serialize, Serializer, ser::SerializeMap};
 
 /// A value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Node {
+pub(super) enum YamlNode {
     Text(String),
     Number(u64),
     /// A list on one line.
-    FlowList(Vec<Node>),
+    FlowList(Vec<YamlNode>),
     /// A list with one item per line.
-    BlockList(Vec<Node>),
+    BlockList(Vec<YamlNode>),
     Map(Vec<Field>),
 }
 
@@ -18,13 +18,13 @@ pub(super) enum Node {
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) struct Field {
     pub(super) key: &'static str,
-    pub(super) value: Node,
+    pub(super) value: YamlNode,
     /// A comment line above the key; YAML only.
     pub(super) comment: Option<&'static str>,
 }
 
 /// `key: value`.
-pub(super) fn field(key: &'static str, value: impl Into<Node>) -> Field {
+pub(super) fn field(key: &'static str, value: impl Into<YamlNode>) -> Field {
     Field {
         key,
         value: value.into(),
@@ -40,25 +40,25 @@ impl Field {
     }
 }
 
-impl From<&str> for Node {
+impl From<&str> for YamlNode {
     fn from(text: &str) -> Self {
         Self::Text(text.to_owned())
     }
 }
 
-impl From<String> for Node {
+impl From<String> for YamlNode {
     fn from(text: String) -> Self {
         Self::Text(text)
     }
 }
 
-impl From<u64> for Node {
+impl From<u64> for YamlNode {
     fn from(number: u64) -> Self {
         Self::Number(number)
     }
 }
 
-impl Node {
+impl YamlNode {
     /// The tree as YAML.
     pub(super) fn to_yaml(&self) -> String {
         let mut out = String::new();
@@ -133,7 +133,7 @@ fn yaml_text(text: &str) -> String {
     serde_json::Value::from(text).to_string()
 }
 
-impl Serialize for Node {
+impl Serialize for YamlNode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Text(text) => serializer.serialize_str(text),
@@ -156,15 +156,16 @@ mod tests {
 
     #[test]
     fn yaml_and_json() {
-        let list = |words: &[&str]| Node::FlowList(words.iter().map(|w| Node::from(*w)).collect());
-        let tree = Node::Map(vec![
+        let list =
+            |words: &[&str]| YamlNode::FlowList(words.iter().map(|w| YamlNode::from(*w)).collect());
+        let tree = YamlNode::Map(vec![
             field("name", "dam-break"),
             field("range", "1-5").with_comment("What to do."),
             field(
                 "items",
-                Node::BlockList(vec![
-                    Node::Map(vec![field("a", "CHUNK[INT]"), field("b", 7_u64)]),
-                    Node::Map(vec![field("c", Node::Map(vec![field("d", "No")]))]),
+                YamlNode::BlockList(vec![
+                    YamlNode::Map(vec![field("a", "CHUNK[INT]"), field("b", 7_u64)]),
+                    YamlNode::Map(vec![field("c", YamlNode::Map(vec![field("d", "No")]))]),
                 ]),
             ),
             field("args", list(&["render", "{{x}}", "it's \"so\""])),

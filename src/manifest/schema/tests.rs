@@ -95,10 +95,6 @@ const TABLES: [(&str, &str); 22] = [
     ("/properties/surface", "[surface]\n"),
     ("/properties/material", "[material]\n"),
     (
-        "/properties/environment/properties/sun",
-        "[environment.sun]\n",
-    ),
-    (
         "/properties/light/items/oneOf/0",
         "[[light]]\ntype = \"point\"\n",
     ),
@@ -140,6 +136,10 @@ const TABLES: [(&str, &str); 22] = [
     (
         "/properties/render/properties/ground/anyOf/2",
         "[render.ground]\n",
+    ),
+    (
+        "/properties/environment/properties/sun",
+        "[environment.sun]\n",
     ),
 ];
 

@@ -10,7 +10,7 @@ use super::blur::{Around, Blur, BrickField, Part, taps};
 use super::brick::{Brick, BrickKind, CODES, SAMPLES};
 use super::layout::Layout;
 use super::raw::{Codes, Gather, RawBrick};
-use super::tree::{Block, BrickTree, Node};
+use super::tree::{Block, BrickNode, BrickTree};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
 use crate::metrics::Bytes;
 use crate::surface::SurfaceSettings;
@@ -359,7 +359,7 @@ impl ArrayTask for MakeBlock<'_> {
                 BrickKind::Outside => {}
             }
         }
-        let node = Node {
+        let node = BrickNode {
             children,
             inside,
             first: 0,

@@ -59,7 +59,7 @@ fn misspelled_values_have_suggestions() {
         &workshop,
         &["--look", "watr"],
         &[
-            "--look: expected one of water, found \"watr\"",
+            "--look: expected one of water, studio, paper, found \"watr\"",
             "did you mean water?",
         ],
     );
