@@ -67,6 +67,7 @@ pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
 pub use material::{Material, MaterialKind};
+#[cfg(feature = "cli")]
 pub(crate) use nearest::nearest;
 pub use output::{Channel, Output};
 pub use pattern::OutputPattern;
