@@ -7,38 +7,43 @@
 //! attenuate light in a straight line. Light that particles reflect to the ground is left out. All other rays see a
 //! matte ground.
 
+use std::f32::consts::FRAC_1_PI;
+
 use glam::Vec3;
 
 use super::{PathIntegrator, Surface, lanes_where};
 use crate::math::{Lanes3, lane3, lanes_in, set_lane3, splat, splat3};
+use crate::ray::RayPacket;
 use crate::render::{
-    bsdf::surface_points,
-    dimensions::ENVIRONMENT,
-    lights::{environment_along, sample_directions},
-    sampler::get_2d_lanes,
-    scratch::PacketScratch,
+    bsdf::surface_points, dimensions::ENVIRONMENT, lights::sample_directions,
+    sampler::get_2d_lanes, scratch::PacketScratch,
 };
 use crate::scene::environment::LUMINANCE;
 use crate::scene::{Environment, Scene};
 
 /// A shadow catcher and its light.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct Catcher {
     /// Strength of the shadows, 0 to 1.
     strength: f32,
+    /// The environment times the cosine with the ground: sampling it needs no BSDF, and a sample that is blocked loses
+    /// about the same light whatever its direction.
+    environment: Option<Environment>,
     /// Radiance that a white ground reflects of the environment if nothing is in the way.
-    environment: Vec3,
+    whole: Vec3,
 }
 
 impl Catcher {
     /// The shadow catcher of `scene`, if there is one.
     pub(super) fn of(scene: &Scene) -> Option<Self> {
         let ground = scene.ground.as_ref()?;
-        let environment = scene.environment.as_deref();
+        let strength = ground.shadow_catcher?;
+        let environment = scene.environment.as_deref().filter(|e| !e.is_black());
         let irradiance = environment.map_or(Vec3::ZERO, |e| e.irradiance(ground.up));
         Some(Self {
-            strength: ground.shadow_catcher?,
-            environment: irradiance * std::f32::consts::FRAC_1_PI,
+            strength,
+            environment: environment.map(|e| e.times_cosine(ground.up)),
+            whole: irradiance * FRAC_1_PI,
         })
     }
 }
@@ -65,10 +70,12 @@ impl PathIntegrator<'_> {
         let points = &mut packet.surface;
         surface_points(simd, rays, &packet.hits, &packet.base, points);
         let mut light = CaughtLight {
-            whole: splat3(catcher.environment),
+            whole: splat3(catcher.whole),
             lost: [splat(0.0); 3],
         };
-        self.lose_environment(surface, packet, &mut light);
+        if let Some(environment) = &catcher.environment {
+            self.lose_environment(environment, surface, packet, &mut light);
+        }
         self.lose_lights(surface, packet, &mut light);
         // Darken the background by the lost fraction
         let is_transparent = self.context.settings.transparent_background;
@@ -85,48 +92,30 @@ impl PathIntegrator<'_> {
         packet.hits.mask &= !surface.lanes;
     }
 
-    /// Adds the lost light of the environment, from one direction that it samples and one that the BSDF samples.
+    /// Adds the lost light of the `environment` of a catcher.
     fn lose_environment(
-        &self,
-        surface: &Surface<'_>,
-        packet: &mut PacketScratch,
-        light: &mut CaughtLight,
-    ) {
-        let Some(environment) = self.environment else {
-            return;
-        };
-        let (simd, path) = (self.context.simd, &surface.segments.path);
-        let mut u = [splat(0.0); 2];
-        get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
-        sample_directions(simd, environment, &u, &mut packet.light.rays.direction);
-        self.lose_along(environment, surface, packet, light);
-        self.sample_bsdf(surface, packet);
-        packet.light.rays.direction = packet.points.reflected.direction;
-        self.lose_along(environment, surface, packet, light);
-        // Infinite densities mark specular rays
-        packet.points.reflected.pdf = splat(f32::INFINITY);
-    }
-
-    /// Adds the lost light of the environment along the directions of `packet.light`. On a white matte surface, the
-    /// BSDF is its own density, so both ways to sample a direction give its light the same weight.
-    fn lose_along(
         &self,
         environment: &Environment,
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
         light: &mut CaughtLight,
     ) {
-        // Find the directions that something is in the way of, before any radiance is looked up
-        self.eval(surface, packet);
+        // Sample directions
+        let (simd, path) = (self.context.simd, &surface.segments.path);
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(simd, path, ENVIRONMENT, &surface.sample, &mut u);
         let PacketScratch {
             light: samples,
-            bsdf,
             crossings,
             counts,
             surface: points,
             ..
         } = packet;
-        let lanes = surface.lanes & lanes_where(|l| bsdf.pdf[l] > 0.0);
+        sample_directions(simd, environment, &u, &mut samples.rays.direction);
+        // Find out whether something is in their way
+        let direction = |rays: &RayPacket, l: usize| lane3(&rays.direction, l);
+        let is_above = |l| direction(&samples.rays, l).dot(lane3(&points.normal, l)) > 0.0;
+        let lanes = surface.lanes & lanes_where(is_above);
         let is_traced = |l: usize| lanes >> l & 1 == 1;
         samples.lanes = lanes;
         samples.radiance = splat3(Vec3::ONE);
@@ -148,19 +137,9 @@ impl PathIntegrator<'_> {
             return;
         }
         // Add their light
-        let (direction, white) = (&samples.rays.direction, splat3(Vec3::ONE));
-        let mut arriving = [splat(0.0); 3];
-        let simd = context.simd;
-        environment_along(
-            simd,
-            environment,
-            direction,
-            &bsdf.pdf,
-            &white,
-            &mut arriving,
-        );
         for lane in lanes_in(blocked) {
-            let lost = (Vec3::ONE - transmittance(lane)) * lane3(&arriving, lane);
+            let (arriving, pdf) = environment.radiance_and_pdf(direction(&samples.rays, lane));
+            let lost = (Vec3::ONE - transmittance(lane)) * arriving * (FRAC_1_PI / pdf);
             let sum = lane3(&light.lost, lane) + lost;
             set_lane3(&mut light.lost, lane, sum);
         }

@@ -77,6 +77,15 @@ impl EnvironmentAxes {
 }
 
 impl EnvironmentAxes {
+    /// The components of `world` along these axes.
+    fn own(&self, world: Vec3) -> Vec3 {
+        Vec3::new(
+            world.dot(self.right),
+            world.dot(self.back),
+            world.dot(self.up),
+        )
+    }
+
     /// The world direction with the components `own` along these axes, normalised.
     pub fn to_world(&self, own: Vec3) -> Vec3 {
         (own.x * self.right + own.y * self.back + own.z * self.up).normalize()
@@ -251,12 +260,7 @@ impl Environment {
 
     /// Irradiance on a surface with unit `normal`, linear RGB.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
-        let axes = &self.axes;
-        let own = Vec3::new(
-            normal.dot(axes.right),
-            normal.dot(axes.back),
-            normal.dot(axes.up),
-        );
+        let own = self.axes.own(normal);
         let mut sum = DVec3::ZERO;
         for (row, texels) in self.texels.chunks(COLUMNS).enumerate() {
             let height = edge_cosine(row) - edge_cosine(row + 1);
@@ -270,6 +274,18 @@ impl Environment {
             sum += height * of_row;
         }
         (sum * (2.0 * std::f64::consts::PI / COLUMNS as f64)).as_vec3()
+    }
+
+    /// This environment times the cosine between its directions and a unit `normal`, 0 behind it: sampling it samples
+    /// irradiance.
+    #[must_use]
+    pub fn times_cosine(&self, normal: Vec3) -> Self {
+        let own = self.axes.own(normal);
+        let texels = self.texels.iter().enumerate().map(|(texel, [r, g, b, _])| {
+            let direction = own_direction(texel % COLUMNS, texel / COLUMNS, 0.5, 0.5);
+            direction.dot(own).max(0.0) * Vec3::new(*r, *g, *b)
+        });
+        Self::from_texels(self.axes, texels.collect())
     }
 
     /// The position of `direction` in the table, in columns and rows.
