@@ -178,7 +178,8 @@ shots! {
     transparent_background
     union
     smooth
-    pca_normals;
+    pca_normals
+    studio;
     rendered:
     spray
     water;

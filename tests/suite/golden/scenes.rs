@@ -9,8 +9,10 @@ use spherule::scene::{
 use spherule::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 
 mod bodies;
+mod studio;
 
 pub(super) use bodies::{pca_normals, smooth, union};
+pub(super) use studio::studio;
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 54;
