@@ -1,6 +1,7 @@
 //! A render job before anything is written: manifest, directory, frames, and the setup of its images.
 
 use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
 
 use serde_json::Value;
 use spherule_formats::Sequence;
@@ -28,6 +29,8 @@ pub struct RenderJob {
     /// The output path of the given manifest.
     shown_output: PathBuf,
     shard: Option<Shard>,
+    /// See [`RenderJob::environment_image`].
+    environment_image: OnceLock<Option<RadianceMap>>,
 }
 
 impl RenderJob {
@@ -49,6 +52,7 @@ impl RenderJob {
             manifest_file,
             shown_output,
             shard,
+            environment_image: OnceLock::new(),
         })
     }
 
@@ -249,7 +253,7 @@ impl RenderJob {
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {
         let frames = sequence.frames().iter().map(|frame| frame.number);
         let map = self.environment_image()?;
-        let setup = resolve::setup(&self.manifest, survey, map.as_ref())?;
+        let setup = resolve::setup(&self.manifest, survey, map)?;
         check_views(&setup, frames)?;
         Ok(setup)
     }
@@ -260,9 +264,15 @@ impl RenderJob {
         needs_environment_image(&self.manifest).then(|| self.dir().join(path))
     }
 
-    fn environment_image(&self) -> Result<Option<RadianceMap>, RunError> {
+    /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.
+    fn environment_image(&self) -> Result<Option<&RadianceMap>, RunError> {
+        if let Some(map) = self.environment_image.get() {
+            return Ok(map.as_ref());
+        }
         let path = self.environment_path();
-        Ok(path.map(|path| read_radiance_map(&path)).transpose()?)
+        let map = path.map(|path| read_radiance_map(&path)).transpose()?;
+        let reduced = map.map(|map| map.reduced());
+        Ok(self.environment_image.get_or_init(|| reduced).as_ref())
     }
 
     /// Notes for the user on the image of the environment.
@@ -270,7 +280,7 @@ impl RenderJob {
     /// # Errors
     /// The image cannot be read.
     pub fn environment_notes(&self) -> Result<Vec<String>, RunError> {
-        let negative = self.environment_image()?.map_or(0, |map| map.negative());
+        let negative = self.environment_image()?.map_or(0, RadianceMap::negative);
         let note = |path: PathBuf| {
             let path = path.display();
             format!("{path}: {negative} pixels are negative, which counts as 0")

@@ -3,6 +3,8 @@
 use glam::{DVec3, Vec3};
 use thiserror::Error;
 
+use super::{COLUMNS, ROWS};
+
 /// Maximum number of pixels of a map. The environment has far fewer directions, so more pixels would only need memory.
 pub const MAX_MAP_PIXELS: u64 = 8192 * 4096;
 
@@ -104,6 +106,18 @@ impl RadianceMap {
     /// Number of pixels with a negative component, which counts as 0.
     pub fn negative(&self) -> usize {
         self.negative
+    }
+
+    /// The map in the resolution of environments, for [`Environment::from_map`](super::Environment::from_map): a fraction
+    /// of the memory, and the same environment.
+    #[must_use]
+    pub fn reduced(&self) -> Self {
+        Self {
+            width: COLUMNS,
+            height: ROWS,
+            pixels: self.resized(COLUMNS, ROWS),
+            negative: self.negative,
+        }
     }
 
     /// The map with another number of pixels: the mean over the solid angle of each new pixel.
