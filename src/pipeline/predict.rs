@@ -366,8 +366,11 @@ impl<'a> MemoryModel<'a> {
         let film_kept = if before > 1 { film } else { 0 };
         let encoding_before = if before > 0 { self.encoding() } else { 0 };
         let shared = if frame.is_shared { frame.content } else { 0 };
-        let environment = self.setup.picture.scene.environment.as_deref();
-        let environment = environment.map_or(0, Environment::byte_len);
+        let scene = &self.setup.picture.scene;
+        // A shadow catcher has a table of its own
+        let tables = 1 + u64::from(scene.ground.is_some_and(|g| g.shadow_catcher.is_some()));
+        let environment = scene.environment.as_deref();
+        let environment = tables * environment.map_or(0, Environment::byte_len);
         // Count the threads, including those for reading
         let has_read_pool = [Some(frame), after]
             .into_iter()

@@ -39,10 +39,11 @@ impl Catcher {
         let ground = scene.ground.as_ref()?;
         let strength = ground.shadow_catcher?;
         let environment = scene.environment.as_deref().filter(|e| !e.is_black());
-        let irradiance = environment.map_or(Vec3::ZERO, |e| e.irradiance(ground.up));
+        let environment = environment.map(|e| e.times_cosine(ground.up));
+        let irradiance = environment.as_ref().map_or(Vec3::ZERO, Environment::flux);
         Some(Self {
             strength,
-            environment: environment.map(|e| e.times_cosine(ground.up)),
+            environment,
             whole: irradiance * FRAC_1_PI,
         })
     }

@@ -260,32 +260,37 @@ impl Environment {
 
     /// Irradiance on a surface with unit `normal`, linear RGB.
     pub fn irradiance(&self, normal: Vec3) -> Vec3 {
-        let own = self.axes.own(normal);
-        let mut sum = DVec3::ZERO;
-        for (row, texels) in self.texels.chunks(COLUMNS).enumerate() {
-            let height = edge_cosine(row) - edge_cosine(row + 1);
-            let mut of_row = DVec3::ZERO;
-            for (column, [r, g, b, _]) in texels.iter().enumerate() {
-                let cosine = own_direction(column, row, 0.5, 0.5).dot(own);
-                if cosine > 0.0 {
-                    of_row += (cosine * Vec3::new(*r, *g, *b)).as_dvec3();
-                }
-            }
-            sum += height * of_row;
-        }
-        (sum * (2.0 * std::f64::consts::PI / COLUMNS as f64)).as_vec3()
+        integral(&self.lit_texels(normal), |texel| *texel)
+    }
+
+    /// The integral of the radiance over all directions, linear RGB.
+    pub fn flux(&self) -> Vec3 {
+        integral(&self.texels, |[r, g, b, _]| Vec3::new(*r, *g, *b))
     }
 
     /// This environment times the cosine between its directions and a unit `normal`, 0 behind it: sampling it samples
     /// irradiance.
     #[must_use]
     pub fn times_cosine(&self, normal: Vec3) -> Self {
+        Self::from_texels(self.axes, self.lit_texels(normal))
+    }
+
+    /// The radiance of each texel times the cosine between its centre and a unit `normal`, 0 behind it.
+    fn lit_texels(&self, normal: Vec3) -> Vec<Vec3> {
         let own = self.axes.own(normal);
-        let texels = self.texels.iter().enumerate().map(|(texel, [r, g, b, _])| {
-            let direction = own_direction(texel % COLUMNS, texel / COLUMNS, 0.5, 0.5);
-            direction.dot(own).max(0.0) * Vec3::new(*r, *g, *b)
+        let longitudes: Vec<[f64; 2]> = (0..COLUMNS).map(|x| longitude(x, 0.5)).collect();
+        let rows = self.texels.chunks(COLUMNS).enumerate();
+        let lit = rows.flat_map(|(row, texels)| {
+            let polar = polar(row, 0.5);
+            texels
+                .iter()
+                .zip(&longitudes)
+                .map(move |([r, g, b, _], longitude)| {
+                    let cosine = direction_at(polar, *longitude).dot(own);
+                    cosine.max(0.0) * Vec3::new(*r, *g, *b)
+                })
         });
-        Self::from_texels(self.axes, texels.collect())
+        lit.collect()
     }
 
     /// The position of `direction` in the table, in columns and rows.
@@ -335,17 +340,37 @@ fn index(position: f32, count: usize) -> usize {
     if cell < count { cell } else { count - 1 }
 }
 
+/// The integral of the `value` of texels over the sphere.
+fn integral<T>(texels: &[T], value: impl Fn(&T) -> Vec3) -> Vec3 {
+    let mut sum = DVec3::ZERO;
+    for (row, texels) in texels.chunks(COLUMNS).enumerate() {
+        let height = edge_cosine(row) - edge_cosine(row + 1);
+        let of_row: DVec3 = texels.iter().map(|texel| value(texel).as_dvec3()).sum();
+        sum += height * of_row;
+    }
+    (sum * (2.0 * std::f64::consts::PI / COLUMNS as f64)).as_vec3()
+}
+
 /// The direction of a point of a texel, in the axes of the environment.
 fn own_direction(column: usize, row: usize, across: f64, down: f64) -> Vec3 {
+    direction_at(polar(row, down), longitude(column, across))
+}
+
+/// Sine and cosine of the polar angle at a height in `row`.
+fn polar(row: usize, down: f64) -> [f64; 2] {
     let polar = (row as f64 + down) * std::f64::consts::PI / ROWS as f64;
+    [libm::sin(polar), libm::cos(polar)]
+}
+
+/// Sine and cosine of the longitude at a position in `column`.
+fn longitude(column: usize, across: f64) -> [f64; 2] {
     let longitude = (column as f64 + across) * 2.0 * std::f64::consts::PI / COLUMNS as f64;
-    let level = libm::sin(polar);
-    DVec3::new(
-        level * libm::cos(longitude),
-        level * libm::sin(longitude),
-        libm::cos(polar),
-    )
-    .as_vec3()
+    [libm::sin(longitude), libm::cos(longitude)]
+}
+
+/// The direction of a polar angle and a longitude, given by their sines and cosines.
+fn direction_at([level, z]: [f64; 2], [sin, cos]: [f64; 2]) -> Vec3 {
+    DVec3::new(level * cos, level * sin, z).as_vec3()
 }
 
 /// Cosine of the polar angle at the upper edge of `row`.

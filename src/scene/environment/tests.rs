@@ -268,3 +268,15 @@ fn extreme_values_stay_finite() {
     }
     assert!(environment.byte_len() < 4 << 20);
 }
+
+#[test]
+fn reduced_maps_give_the_same_environment() {
+    for (width, height) in [(2, 1), (700, 350), (1024, 512), (1500, 751)] {
+        let pixel = |i: usize| Vec3::new((i % 7) as f32, (i % 11) as f32 * 0.5, (i % 1000) as f32);
+        let pixels = (0..width * height).map(pixel).collect();
+        let map = RadianceMap::new(width, height, pixels).unwrap();
+        let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 20.0);
+        let of = |map: &RadianceMap| Environment::from_map(axes, map, Vec3::ONE);
+        assert!(of(&map) == of(&map.reduced()), "{width}x{height}");
+    }
+}
