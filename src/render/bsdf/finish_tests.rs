@@ -282,6 +282,23 @@ fn samples_follow_their_density() {
     }
 }
 
+/// A shading normal may be turned so far that directions around it lead below the geometric surface.
+#[test]
+fn nothing_is_reflected_below_the_surface() {
+    let normal = Vec3::new(0.8, 0.0, 0.6);
+    let below = Vec3::new(0.9, 0.0, -0.2).normalize();
+    for finish in FINISHES {
+        let bsdf = bsdf_of(finish);
+        let mut point = Point::new(normal, Vec3::splat(0.5));
+        point.points.normal = splat3(normal);
+        assert_eq!(point.value(&*bsdf, below), Vec3::ZERO, "{finish:?}");
+        for (into, weight, pdf) in point.samples(Supported::default(), &*bsdf, &grid(64)) {
+            let is_above = into.z > 0.0;
+            assert!(is_above || (pdf, weight) == (0.0, Vec3::ZERO), "{finish:?}");
+        }
+    }
+}
+
 #[test]
 fn instruction_sets_give_the_same_bits() {
     for finish in FINISHES {
