@@ -61,7 +61,7 @@ impl Offset {
         2 * search * (search + 1)
     }
 
-    /// The first columns of pairs, of which at least one pixel is in the tile.
+    /// The first column of the pairs that have at least one pixel in the tile, for each of the two pixels.
     fn first_columns(self) -> [isize; 2] {
         [(-self.dx).min(0), self.dx.min(0)]
     }

@@ -1,6 +1,6 @@
 use super::*;
 
-/// A picture of which tests change some planes.
+/// A picture. Tests change some of its planes.
 #[derive(Debug, Clone)]
 struct Picture {
     width: usize,

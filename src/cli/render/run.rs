@@ -30,7 +30,7 @@ impl Run {
     ) -> Result<Self, CliError> {
         let mode = args.mode();
         let job = RenderJob::new(requested, &sequence, args.shard)?;
-        // Refuse before the survey, which may take long
+        // Refuse before the survey is announced; `RenderRun::open` checks again, for callers of the library
         job.check_output_dir(mode)?;
         job.check_manifest_file()?;
         if job.needs_survey(mode)? {

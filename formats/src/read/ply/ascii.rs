@@ -168,7 +168,7 @@ pub(super) fn too_long(at: usize, element: &Element) -> ParseError {
     )
 }
 
-/// The error for a word that is no number of the type of `property`.
+/// The error for a word that is not a number of the type of `property`.
 pub(super) fn bad_word(at: usize, word: &[u8], property: &Property) -> ParseError {
     ParseError::malformed(
         at,
