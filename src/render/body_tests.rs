@@ -39,15 +39,9 @@ fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
         fov: 20.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
-        ambient_light: Vec3::ONE,
         material,
         background: Background::Constant(Vec3::ONE),
-        ground: None,
-        environment: None,
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 

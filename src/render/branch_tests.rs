@@ -43,9 +43,6 @@ fn glass_scene() -> Scene {
         fov: 20.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
         ambient_light: Vec3::splat(AMBIENT),
         material: Material {
             ambient: 1.0,
@@ -58,9 +55,7 @@ fn glass_scene() -> Scene {
             top: Vec3::ONE,
             up: Vec3::new(0.6, 0.0, 0.8),
         },
-        ground: None,
-        environment: None,
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 

@@ -8,8 +8,7 @@ use glam::{DVec3, Vec3};
 use super::{brute::Balls, *};
 use crate::scene::environment::studio;
 use crate::scene::{
-    Background, Camera, CameraView, Environment, EnvironmentAxes, Ground, Light, LightKind,
-    Material, Scene,
+    Background, Camera, CameraView, Environment, EnvironmentAxes, Ground, Light, LightKind, Scene,
 };
 
 /// A floor at height 0, seen at an angle.
@@ -21,11 +20,6 @@ fn scene(environment: Environment) -> Scene {
         fov: 40.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
-        ambient_light: Vec3::ONE,
-        material: Material::DEFAULT,
         background: Background::Constant(Vec3::ONE),
         ground: Some(Ground {
             up: Vec3::Z,
@@ -38,7 +32,7 @@ fn scene(environment: Environment) -> Scene {
             shadow_catcher: None,
         }),
         environment: Some(Arc::new(environment)),
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 

@@ -7,7 +7,7 @@ use glam::{DVec3, Vec3};
 use super::super::brute::Balls;
 use super::super::{ParticleShading, RenderSettings, render_into};
 use super::{Channels, Film};
-use crate::scene::{Background, Bounds, Camera, Framing, Ground, Material, Scene, default_lights};
+use crate::scene::{Background, Bounds, Camera, Framing, Ground, Scene, default_lights};
 
 /// Bits that no renderer makes: of a float, a NaN with a payload.
 const POISON: u32 = 0x7fad_beef;
@@ -56,15 +56,10 @@ fn scene(has_ground: bool) -> Scene {
     };
     let view = Camera::framing(&bounds, &Framing::three_quarter(DVec3::Z, 1.5));
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.5, DVec3::ZERO).unwrap(),
         lights: default_lights(&bounds, DVec3::Z, &view),
-        ambient_light: Vec3::ONE,
-        material: Material::DEFAULT,
         background: Background::default_for(Vec3::Z),
         ground: has_ground.then(|| Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
-        environment: None,
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.5, DVec3::ZERO).unwrap())
     }
 }
 

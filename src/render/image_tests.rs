@@ -38,18 +38,14 @@ fn heap_scene(transmission: f32) -> Scene {
     let framing = Framing::three_quarter(DVec3::Z, 1.5);
     let view = Camera::framing(&bounds, &framing);
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.5, DVec3::ZERO).unwrap(),
         lights: default_lights(&bounds, DVec3::Z, &view),
-        ambient_light: Vec3::ONE,
         material: Material {
             transmission,
             ..Material::DEFAULT
         },
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
-        environment: None,
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.5, DVec3::ZERO).unwrap())
     }
 }
 

@@ -28,15 +28,9 @@ fn scene(environment: Environment) -> Scene {
         fov: 12.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
-        ambient_light: Vec3::ONE,
-        material: Material::DEFAULT,
         background: Background::Constant(Vec3::new(0.1, 0.2, 0.3)),
-        ground: None,
         environment: Some(Arc::new(environment)),
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 

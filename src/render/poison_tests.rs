@@ -39,13 +39,10 @@ fn scene(transmission: f32) -> Scene {
     let falloff = Falloff::InverseSquare;
     let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
         lights: vec![
             Light::directional(Vec3::new(1.0, 0.5, -1.0), Vec3::ONE).unwrap(),
             Light::point_with(lamp, DVec3::ZERO, Vec3::splat(20.0), falloff),
         ],
-        ambient_light: Vec3::ONE,
         material: Material {
             transmission,
             fresnel: Fresnel::Exact,
@@ -55,7 +52,7 @@ fn scene(transmission: f32) -> Scene {
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
         environment: Some(Arc::new(studio(axes, Vec3::ONE))),
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 

@@ -23,15 +23,10 @@ fn scene(material: Material) -> Scene {
         fov: 20.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
         ambient_light: Vec3::ZERO,
         material,
         background: Background::Constant(Vec3::ONE),
-        ground: None,
-        environment: None,
-        is_environment_visible: false,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 

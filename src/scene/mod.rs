@@ -88,6 +88,23 @@ pub struct Scene {
     pub is_environment_visible: bool,
 }
 
+impl Scene {
+    /// Nothing but the default material and white ambient light, in front of black, at the origin of the world.
+    pub const fn new(camera: Camera) -> Self {
+        Self {
+            origin: DVec3::ZERO,
+            camera,
+            lights: Vec::new(),
+            ambient_light: Vec3::ONE,
+            material: Material::DEFAULT,
+            background: Background::Constant(Vec3::ZERO),
+            ground: None,
+            environment: None,
+            is_environment_visible: false,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

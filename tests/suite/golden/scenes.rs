@@ -102,15 +102,10 @@ impl Shot {
             velocities: None,
             surface: SPHERES,
             scene: Scene {
-                origin: DVec3::ZERO,
-                camera: Camera::new(&view, aspect, DVec3::ZERO).expect("a camera"),
                 lights: vec![sun(Vec3::new(0.4, 0.7, -1.0), 0.9)],
-                ambient_light: Vec3::ONE,
                 material: MATT,
                 background: Background::Constant(Vec3::new(0.02, 0.03, 0.05)),
-                ground: None,
-                environment: None,
-                is_environment_visible: false,
+                ..Scene::new(Camera::new(&view, aspect, DVec3::ZERO).expect("a camera"))
             },
             settings: RenderSettings {
                 samples: 4,
