@@ -26,6 +26,7 @@ mod lights;
 mod surface;
 
 pub use camera::check_views;
+use ground::Floor;
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -149,14 +150,21 @@ pub fn setup(
     let camera = camera::at_start(&path, aspect, survey.origin)?;
     // Set up lights and ground
     let environment = environment::environment(manifest, map, &path.start(), up)?;
-    let mut lights = match (manifest.lights.is_empty(), manifest.render.integrator) {
+    let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
         (false, _) => lights::lights(manifest, survey.origin, up)?,
         (true, IntegratorKind::Whitted) => default_lights(&bounds, up, &path.start()),
         // The environment is the light
         (true, IntegratorKind::Path) => Vec::new(),
     };
     lights.extend(environment::sun(manifest, &path.start(), up));
-    let ground = ground::ground(manifest, &bounds, reach.x, up, survey.origin)?;
+    let floor = Floor {
+        bounds: &bounds,
+        reach: reach.x,
+        up,
+        origin: survey.origin,
+        has_layer: survey.rests_on_floor(up),
+    };
+    let ground = ground::ground(manifest, &floor)?;
     let scene = Scene {
         origin: survey.origin,
         camera,
@@ -178,7 +186,7 @@ pub fn setup(
     })?;
     let mut render = RenderSettings::new(image.width, image.height);
     render.samples = image.samples;
-    render.integrator = manifest.render.integrator;
+    render.integrator = manifest.integrator();
     render.bounces = manifest.render.bounces;
     render.max_depth = manifest.render.max_depth;
     render.min_weight = manifest.render.min_weight;
@@ -376,8 +384,11 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
 }
 
 fn background(manifest: &Manifest, up: Vec3) -> Background {
-    let background = manifest.render.background;
-    background.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
+    match (manifest.render.background, manifest.integrator()) {
+        (Some(background), _) => background.with_up(up),
+        (None, IntegratorKind::Path) => Background::Studio { up },
+        (None, IntegratorKind::Whitted) => Background::default_for(up),
+    }
 }
 
 /// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.

@@ -44,7 +44,12 @@ pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     for note in sequence.notes() {
         note!("{note}");
     }
-    let render_job = RenderJob::new(requested, &sequence, args.run.job.shard)?;
+    let mode = args.run.job.mode();
+    let mut render_job = RenderJob::new(requested, &sequence, args.run.job.shard)?;
+    // The check reports a directory that cannot be used
+    if render_job.check_output_dir(mode).is_ok() {
+        render_job = render_job.resuming(mode)?;
+    }
     let mut check = Check::new(&render_job, &sequence);
     check.run(&args.run);
     if args.json {

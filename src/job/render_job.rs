@@ -56,6 +56,17 @@ impl RenderJob {
         })
     }
 
+    /// The job with the defaults of the version that began it, if a run in `mode` resumes one.
+    ///
+    /// # Errors
+    /// The plan of the existing job cannot be read.
+    pub fn resuming(mut self, mode: ResumeMode) -> Result<Self, RunError> {
+        if let Some(planned) = self.existing_plan(mode)? {
+            self.manifest.adopt_old_defaults(planned.settings());
+        }
+        Ok(self)
+    }
+
     /// The manifest, with paths relative to [`RenderJob::dir`].
     pub const fn manifest(&self) -> &Manifest {
         &self.manifest

@@ -43,6 +43,7 @@ impl RenderRun {
     ) -> Result<Self, RunError> {
         render_job.check_output_dir(mode)?;
         render_job.check_manifest_file()?;
+        let render_job = render_job.resuming(mode)?;
         let job = render_job.open(&sequence, mode)?;
         let mut notes: Vec<String> = job.requeued().iter().map(repeat_note).collect();
         let (survey, setup) = render_job.stored_setup(job.resolved(), &sequence)?;

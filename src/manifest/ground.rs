@@ -92,17 +92,18 @@ mod tests {
         let kind = |setting: &str| {
             let text = format!("input.path = \"a\"\n{setting}");
             let manifest = Manifest::parse(&text, Path::new("job.toml"));
-            manifest.map(|manifest| manifest.render.ground.0)
+            manifest.map(|manifest| manifest.render.ground.map(|ground| ground.0))
         };
         for (setting, wanted) in [
-            ("", GroundKind::None),
-            ("render.ground = false", GroundKind::None),
-            ("render.ground = true", GroundKind::Plain),
-            ("render.ground = \"none\"", GroundKind::None),
-            ("render.ground = \"checker\"", GroundKind::Checker),
+            ("", None),
+            ("render.ground = \"auto\"", None),
+            ("render.ground = false", Some(GroundKind::None)),
+            ("render.ground = true", Some(GroundKind::Plain)),
+            ("render.ground = \"none\"", Some(GroundKind::None)),
+            ("render.ground = \"checker\"", Some(GroundKind::Checker)),
             (
                 "[render.ground]\ntype = \"shadow_catcher\"",
-                GroundKind::ShadowCatcher,
+                Some(GroundKind::ShadowCatcher),
             ),
         ] {
             assert_eq!(kind(setting), Ok(wanted), "{setting}");

@@ -191,11 +191,9 @@ impl Manifest {
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
-        if !tree.contains("render", "integrator") {
-            let is_of_thesis =
-                (material::THESIS_TERMS.iter()).any(|term| tree.contains("material", term));
-            manifest.render.integrator =
-                usual_integrator(is_of_thesis, Render::default().integrator);
+        let has_term = |term: &&str| tree.contains("material", term);
+        if !tree.contains("render", "integrator") && material::THESIS_TERMS.iter().any(has_term) {
+            manifest.render.integrator = Some(IntegratorKind::Whitted);
         }
         manifest.check(&mut root);
         root.finish();
@@ -255,6 +253,11 @@ impl Manifest {
         }
     }
 
+    /// The integrator of the images.
+    pub fn integrator(&self) -> IntegratorKind {
+        self.render.integrator.unwrap_or(IntegratorKind::Path)
+    }
+
     /// Whether rays at spheres split into reflected and refracted ones; `render.min_weight` has no effect otherwise.
     fn branches_at_spheres(&self) -> bool {
         self.surface.kind == SurfaceKind::Spheres
@@ -269,7 +272,7 @@ impl Manifest {
             Affects::SmoothSurfaces => self.surface.kind == SurfaceKind::Smooth,
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
             Affects::BranchingSpheres => self.branches_at_spheres(),
-            Affects::PathTracing => self.render.integrator == IntegratorKind::Path,
+            Affects::PathTracing => self.integrator() == IntegratorKind::Path,
         }
     }
 
@@ -337,14 +340,6 @@ impl Manifest {
         manifest.camera.keys = vec![CameraKey::default()];
         manifest.lights = Light::examples();
         manifest
-    }
-}
-
-/// The integrator of a manifest that names none: `usual`, unless the manifest names terms of the thesis's model.
-fn usual_integrator(is_of_thesis: bool, usual: IntegratorKind) -> IntegratorKind {
-    match is_of_thesis {
-        true => IntegratorKind::Whitted,
-        false => usual,
     }
 }
 

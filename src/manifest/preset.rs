@@ -15,11 +15,14 @@ pub enum Look {
     Studio,
     /// The same in front of white, for print.
     Paper,
+    /// The model of the thesis: lights without extent, ambient light and highlights.
+    Whitted,
 }
 
 /// Water: one body with a smooth surface. It has no diffuse reflection, so its colour comes from absorption, and its
 /// reflections from the sky. Tuned by eye on dam breaks.
 const WATER: &str = r#"
+render.integrator = "whitted"
 render.surface = "smooth"
 render.max_depth = 8
 render.background = { bottom = [0.75, 0.80, 0.86], top = [0.30, 0.52, 0.92] }
@@ -51,12 +54,19 @@ render.ground = "shadow_catcher"
 render.background = [1.0, 1.0, 1.0]
 "#;
 
+/// The thesis's equation 4.1, without a ground.
+const WHITTED: &str = r#"
+render.integrator = "whitted"
+render.ground = false
+"#;
+
 impl Look {
     /// All looks with their names.
     pub const ALL: &[(Self, &'static str)] = &[
         (Self::Water, "water"),
         (Self::Studio, "studio"),
         (Self::Paper, "paper"),
+        (Self::Whitted, "whitted"),
     ];
 
     /// The look with a name.
@@ -77,6 +87,7 @@ impl Look {
             Self::Water => WATER,
             Self::Studio => STUDIO,
             Self::Paper => PAPER,
+            Self::Whitted => WHITTED,
         };
         let sections: toml::Table = text.parse().expect("built-in looks are valid TOML");
         let key = |(section, keys): (String, Value)| match keys {
@@ -101,7 +112,7 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::manifest::{GroundKind, GroundPattern, Manifest};
+    use crate::manifest::{GroundKind, GroundPattern, GroundSetting, Manifest};
     use crate::render::IntegratorKind;
     use crate::scene::Background;
     use crate::surface::SurfaceKind;
@@ -136,7 +147,10 @@ mod tests {
         assert_eq!(plain.render.max_depth, 8);
         assert_eq!(plain.render.ground_pattern, GroundPattern::Checker);
         assert_eq!(plain.material.constants.transmission, 1.0);
-        assert!(plain.render.ground.0 == GroundKind::Plain && plain.material.absorption[0] < 1.0);
+        assert!(
+            plain.render.ground == Some(GroundSetting(GroundKind::Plain))
+                && plain.material.absorption[0] < 1.0
+        );
     }
 
     #[test]
@@ -150,8 +164,8 @@ mod tests {
             (Look::Paper, Background::Constant(Vec3::ONE)),
         ] {
             let plain = look(name, "").render;
-            assert_eq!(plain.integrator, IntegratorKind::Path);
-            assert_eq!(plain.ground.0, GroundKind::ShadowCatcher);
+            assert_eq!(plain.integrator, Some(IntegratorKind::Path));
+            assert_eq!(plain.ground, Some(GroundSetting(GroundKind::ShadowCatcher)));
             assert_eq!(plain.background, Some(background));
             // A source of light of the manifest's own
             look(name, "environment.image = \"hall.exr\"");
@@ -160,8 +174,8 @@ mod tests {
             Look::Studio,
             "render.integrator = \"whitted\"\nrender.ground = false",
         );
-        assert_eq!(own.render.integrator, IntegratorKind::Whitted);
-        assert_eq!(own.render.ground.0, GroundKind::None);
+        assert_eq!(own.integrator(), IntegratorKind::Whitted);
+        assert_eq!(own.render.ground, Some(GroundSetting(GroundKind::None)));
     }
 
     #[test]
@@ -176,7 +190,7 @@ mod tests {
         assert_eq!(mixed.material.absorption, Vec3::ONE);
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
-        assert_eq!(mixed.render.ground.0, GroundKind::Plain);
+        assert_eq!(mixed.render.ground, Some(GroundSetting(GroundKind::Plain)));
         // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
         let error = Manifest::parse_with(
@@ -194,7 +208,7 @@ mod tests {
         let error = Look::named("watre").unwrap_err();
         assert_eq!(
             error.to_string(),
-            "expected one of water, studio, paper, found \"watre\"; did you mean water?"
+            "expected one of water, studio, paper, whitted, found \"watre\"; did you mean water?"
         );
         assert_eq!(Look::named("lava").unwrap_err().similar, None);
     }

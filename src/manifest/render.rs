@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::ground::{GroundKind, GroundSetting};
+use super::ground::GroundSetting;
 use super::key::Affects;
 use super::keys::section;
 use super::value::{Named, named};
@@ -55,15 +55,17 @@ section! {
         /// Maximum number of references per particle that the spatial splits of sbvh add; 0 turns them off
         sbvh_budget: f32 = SbvhSettings::DEFAULT.budget, affects(Affects::Nothing),
             zero("no spatial splits"), from(*SbvhSettings::BUDGETS.start()), to(*SbvhSettings::BUDGETS.end());
-        /// Light transport: whitted | path (environment, interreflection)
+        /// Light transport: auto | path | whitted; auto is path
         ///
-        /// whitted is the model of the thesis: lights without extent, ambient light and highlights. path follows
-        /// diffusely reflected light as well, and is lit by the environment.
-        integrator: IntegratorKind = IntegratorKind::Whitted, flag("integrator", "NAME", "Look");
+        /// path is lit by the environment and by lights, and follows the light that surfaces reflect. whitted is the
+        /// model of the thesis: lights without extent, ambient light and highlights. A manifest that has one of the
+        /// thesis's terms in `[material]` (ambient, diffuse, specular, shininess, reflection, transmission) and no
+        /// integrator is rendered with whitted, as is a job of a version without path.
+        integrator: Option<IntegratorKind> = None, or("auto"), flag("integrator", "NAME", "Look");
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
-        /// Removes noise from R, G and B: auto | true | false; auto is true for integrator = "path"
+        /// Removes noise from R, G and B: auto | true | false; auto is true with path
         ///
         /// It takes at least 2 samples per pixel. Other channels do not change.
         denoise: Option<bool> = None, or("auto"), flag("denoise", "", "Look");
@@ -75,13 +77,16 @@ section! {
             from(*MIN_WEIGHTS.start()), to(*MIN_WEIGHTS.end());
         /// Background: auto, studio, linear RGB, or { bottom = [...], top = [...] }
         ///
-        /// studio is a grey gradient over the image with darker corners. It does not move with the camera.
+        /// studio is a grey gradient over the image with darker corners. It does not move with the camera. auto is
+        /// studio with path, and a darker gradient along the up axis with whitted.
         background: Option<Background> = None, or("auto");
-        /// Ground under the particles: false | true (plain) | checker | shadow_catcher
+        /// Ground under the particles: auto | false | true (plain) | checker | shadow_catcher
         ///
         /// A shadow catcher is invisible: it shows the background, darker where particles take light away. It needs
-        /// integrator = "path" and has no colour. `[render.ground]` with `type = "checker"` means the same.
-        ground: GroundSetting = GroundSetting(GroundKind::None), flag("ground", "KIND", "Look");
+        /// integrator = "path" and has no colour. auto is a shadow catcher with path if particles lie on the floor of
+        /// their domain at some time, otherwise false. `[render.ground]` with `type = "checker"` is the same as
+        /// ground = "checker".
+        ground: Option<GroundSetting> = None, or("auto"), flag("ground", "KIND", "Look");
         /// Height of the ground along input.up, or auto
         ground_height: Option<f64> = None, or("auto"), unit("a height");
         /// Colour of the ground, linear RGB

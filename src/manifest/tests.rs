@@ -89,6 +89,8 @@ fn example_manifest_is_valid() {
     expected.camera.eye = Some(DVec3::ZERO);
     expected.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
     expected.camera.up = Some(DVec3::Z);
+    expected.render.integrator = Some(IntegratorKind::Whitted);
+    expected.render.ground = Some(GroundSetting(GroundKind::None));
     expected.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
     expected.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
     expected.lights = vec![Light {
@@ -159,7 +161,7 @@ fn wrong_types_name_the_expected_type() {
     refused(
         "[render]\nground = 1",
         &[
-            "render.ground: expected true, false or one of none, plain, checker, shadow_catcher, found 1",
+            "render.ground: expected true, false or one of none, plain, checker, shadow_catcher or \"auto\", found 1",
         ],
     );
     refused(
@@ -645,21 +647,11 @@ fn number_of_reported_problems_is_limited() {
 
 #[test]
 fn terms_of_the_thesis_select_its_model() {
-    for (is_of_thesis, wanted) in [
-        (true, IntegratorKind::Whitted),
-        (false, IntegratorKind::Path),
-    ] {
-        let usual = usual_integrator(is_of_thesis, IntegratorKind::Path);
-        assert_eq!(usual, wanted);
-    }
-    let integrator = |text: &str| {
-        parse(&format!("input.path = \"a\"\n{text}"))
-            .render
-            .integrator
-    };
+    let integrator = |text: &str| parse(&format!("input.path = \"a\"\n{text}")).integrator();
     let whitted = IntegratorKind::Whitted;
     assert_eq!(integrator("material.shininess = 5"), whitted);
-    assert_eq!(integrator(""), whitted);
+    assert_eq!(integrator(""), IntegratorKind::Path);
+    assert_eq!(integrator("material.ior = 1.5"), IntegratorKind::Path);
     // The integrator that a manifest names is the one that it gets
     let both = "render.integrator = \"path\"\nmaterial.shininess = 5";
     assert_eq!(integrator(both), IntegratorKind::Path);

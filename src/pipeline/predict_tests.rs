@@ -18,6 +18,8 @@ fn plain(particles: u64) -> FrameSize {
 fn setup() -> Setup {
     let mut manifest = crate::manifest::Manifest::new("in");
     manifest.input.radius = crate::manifest::RadiusSetting::Length(0.1);
+    // Without tables of an environment
+    manifest.render.integrator = Some(crate::render::IntegratorKind::Whitted);
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("f_1.npy");
     spherule_formats::write::npy::write(&file, &[glam::Vec3::ZERO]).expect("a file");

@@ -1,6 +1,7 @@
 use super::*;
 use crate::manifest::{CameraKey as Key, RadiusSetting};
 use crate::pipeline::Setup;
+use crate::render::IntegratorKind;
 use crate::survey::Survey;
 
 pub(in crate::resolve) fn survey() -> Survey {
@@ -8,6 +9,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         origin: DVec3::ZERO,
         min: DVec3::splat(-1.0),
         max: DVec3::splat(1.0),
+        layers: None,
         radius: None,
         packed_radius: None,
         has_radii: false,
@@ -34,6 +36,7 @@ fn key(frame: i64, eye: [f64; 3]) -> Key {
 
 fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveError> {
     let mut manifest = Manifest::new("in");
+    manifest.render.integrator = Some(IntegratorKind::Whitted);
     manifest.input.radius = RadiusSetting::Length(0.1);
     (manifest.image.width, manifest.image.height) = (64, 36);
     manifest.output.transparent = true;

@@ -15,7 +15,7 @@ pub(super) fn settings(
     material: &Material,
 ) -> Result<Option<DenoiseSettings>, ResolveError> {
     let has_samples = manifest.image.samples >= 2;
-    let is_path = manifest.render.integrator == IntegratorKind::Path;
+    let is_path = manifest.integrator() == IntegratorKind::Path;
     if manifest.render.denoise == Some(true) && !has_samples {
         return Err(ResolveError::Unsupported {
             key: "render.denoise",

@@ -13,7 +13,7 @@ use crate::scene::{self, CameraView, Environment, EnvironmentAxes, Light, Radian
 
 /// Whether the environment is an image.
 pub(super) fn needs_image(manifest: &Manifest) -> bool {
-    manifest.render.integrator == IntegratorKind::Path
+    manifest.integrator() == IntegratorKind::Path
         && manifest.environment.kind == EnvironmentKind::Image
 }
 
@@ -24,7 +24,7 @@ pub(super) fn environment(
     view: &CameraView,
     up: DVec3,
 ) -> Result<Option<Arc<Environment>>, ResolveError> {
-    if manifest.render.integrator != IntegratorKind::Path {
+    if manifest.integrator() != IntegratorKind::Path {
         return Ok(None);
     }
     let settings = &manifest.environment;
@@ -57,7 +57,7 @@ const SUN: Vec3 = Vec3::new(1.8, 1.674, 1.476);
 pub(super) fn sun(manifest: &Manifest, view: &CameraView, up: DVec3) -> Option<Light> {
     let settings = &manifest.environment;
     let is_sky =
-        manifest.render.integrator == IntegratorKind::Path && settings.kind == EnvironmentKind::Sky;
+        manifest.integrator() == IntegratorKind::Path && settings.kind == EnvironmentKind::Sky;
     is_sky.then(|| {
         let axes = EnvironmentAxes::of_view(view.look_at - view.eye, up, settings.rotation);
         let sun = &settings.sun;

@@ -12,25 +12,40 @@ use crate::surface::SurfaceKind;
 /// through the particles, and none is only a few pixels wide.
 const TILE: f64 = 1.0 / 8.0;
 
-/// The ground of `render.ground`, if there is one. `bounds` contain the particles, which reach `reach` beyond their
-/// centres.
+/// Where the ground is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Floor<'a> {
+    /// Box of the particles.
+    pub(super) bounds: &'a Bounds,
+    /// Distance by which the particles reach beyond their centres.
+    pub(super) reach: f64,
+    pub(super) up: DVec3,
+    pub(super) origin: DVec3,
+    /// Whether particles lie on the lower side of the box at some time.
+    pub(super) has_layer: bool,
+}
+
+/// The ground of `render.ground`, if there is one.
 ///
 /// # Errors
 /// It is a shadow catcher, but the integrator cannot use one.
 pub(super) fn ground(
     manifest: &Manifest,
-    bounds: &Bounds,
-    reach: f64,
-    up: DVec3,
-    origin: DVec3,
+    floor: &Floor<'_>,
 ) -> Result<Option<Ground>, ResolveError> {
     let render = &manifest.render;
-    let kind = render.ground.0;
+    let integrator = manifest.integrator();
+    let kind = match render.ground {
+        Some(ground) => ground.0,
+        // Without a floor, a shadow would fall on nothing
+        None if integrator == IntegratorKind::Path && floor.has_layer => GroundKind::ShadowCatcher,
+        None => GroundKind::None,
+    };
     if kind == GroundKind::None {
         return Ok(None);
     }
     let is_catcher = kind == GroundKind::ShadowCatcher;
-    if is_catcher && render.integrator == IntegratorKind::Whitted {
+    if is_catcher && integrator == IntegratorKind::Whitted {
         return Err(ResolveError::Unsupported {
             key: "render.ground",
             what: "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a \
@@ -39,6 +54,9 @@ pub(super) fn ground(
         });
     }
     // Place it under the particles
+    let Floor {
+        bounds, up, origin, ..
+    } = *floor;
     let mut ground = Ground::under(bounds, up.as_vec3(), origin);
     if let Some(height) = render.ground_height {
         let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
@@ -48,7 +66,7 @@ pub(super) fn ground(
         // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
         // a thin layer of air, which reflects all light at grazing angles. Spheres that only touched a shadow catcher
         // would seem to float.
-        ground.raise(narrow(reach));
+        ground.raise(narrow(floor.reach));
     }
     if is_catcher {
         let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow);
@@ -82,10 +100,30 @@ mod tests {
         change: impl Fn(&mut Manifest),
     ) -> Result<Option<Ground>, ResolveError> {
         let mut manifest = Manifest::new("in");
-        manifest.render.ground = GroundSetting(kind);
-        manifest.render.integrator = IntegratorKind::Path;
+        manifest.render.ground = Some(GroundSetting(kind));
         change(&mut manifest);
-        ground(&manifest, &BOUNDS, 0.25, DVec3::Z, DVec3::ZERO)
+        ground(&manifest, &floor(true))
+    }
+
+    fn floor(has_layer: bool) -> Floor<'static> {
+        Floor {
+            bounds: &BOUNDS,
+            reach: 0.25,
+            up: DVec3::Z,
+            origin: DVec3::ZERO,
+            has_layer,
+        }
+    }
+
+    #[test]
+    fn auto_is_a_shadow_catcher_of_paths_under_particles_on_a_floor() {
+        let auto = Manifest::new("in");
+        let found = |manifest: &Manifest, has_layer| ground(manifest, &floor(has_layer)).unwrap();
+        assert!(found(&auto, true).is_some_and(|ground| ground.shadow_catcher.is_some()));
+        assert_eq!(found(&auto, false), None);
+        let mut whitted = auto;
+        whitted.render.integrator = Some(IntegratorKind::Whitted);
+        assert_eq!(found(&whitted, true), None);
     }
 
     #[test]
@@ -113,7 +151,7 @@ mod tests {
     #[test]
     fn whitted_has_no_shadow_catcher() {
         let whitted =
-            |manifest: &mut Manifest| manifest.render.integrator = IntegratorKind::Whitted;
+            |manifest: &mut Manifest| manifest.render.integrator = Some(IntegratorKind::Whitted);
         let error = of(GroundKind::ShadowCatcher, whitted)
             .unwrap_err()
             .to_string();

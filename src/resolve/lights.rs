@@ -21,7 +21,7 @@ pub(super) fn lights(
         let Some(found) = light_of(light, origin, up) else {
             continue;
         };
-        if found.kind.has_extent() && manifest.render.integrator == IntegratorKind::Whitted {
+        if found.kind.has_extent() && manifest.integrator() == IntegratorKind::Whitted {
             return Err(ResolveError::Unsupported {
                 key: "light.type",
                 what: format!(

@@ -21,7 +21,9 @@ mod stream;
 
 use packing::Spacing;
 use packing::narrow;
-use robust::{estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range};
+use robust::{
+    RobustBounds, estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range,
+};
 use sample::FrameSample;
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
@@ -36,6 +38,10 @@ pub struct Survey {
     pub min: DVec3,
     /// Upper corner of that box.
     pub max: DVec3,
+    /// The lowest layers of particles on each axis over the sequence, and the highest. Jobs of earlier versions lack
+    /// them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers: Option<(DVec3, DVec3)>,
     /// Radius for frames without radii: half the median distance of neighbours.
     pub radius: Option<f32>,
     /// The same for the particles of one body: half the edge of the cube that each particle occupies inside, slightly
@@ -169,7 +175,7 @@ pub enum ColorQuestion<'a> {
 
 /// Running totals over the frames.
 struct Totals {
-    bounds: Option<(DVec3, DVec3)>,
+    bounds: Option<RobustBounds>,
     radius: Option<(usize, Spacing)>,
     has_radii: bool,
     reach: f32,
@@ -205,7 +211,23 @@ impl Origins {
     }
 }
 
+/// Fraction of the extent along an axis within which the outermost layer of particles lies if they rest on a floor: a
+/// ball has much less of its volume there, a box or a heap more.
+const FLOOR: f64 = 0.02;
+
 impl Survey {
+    /// Whether particles lie on a floor at the lower end of the axis `up` at some time: the lowest layer is at the
+    /// lower end.
+    pub fn rests_on_floor(&self, up: DVec3) -> bool {
+        let Some(layers) = self.layers else {
+            return false;
+        };
+        let lowest = |(min, max): (DVec3, DVec3)| (up * min).min(up * max).element_sum();
+        let floor = lowest((self.min, self.max));
+        let extent = (up * (self.max - self.min)).abs().element_sum();
+        lowest(layers) <= floor + FLOOR * extent
+    }
+
     /// Surveys `sequence`. Frames that cannot be read are skipped here, and reported when they are rendered.
     ///
     /// # Errors
@@ -344,12 +366,11 @@ impl Totals {
         self.attributes
             .extend(raw.attributes.iter().map(|a| a.name.clone()));
         // Extend the bounds
-        if let Some((min, max)) = robust_bounds(&raw.positions, extremes) {
-            self.bounds = Some(match self.bounds {
-                Some((low, high)) => (low.min(min), high.max(max)),
-                None => (min, max),
-            });
-        }
+        let found = robust_bounds(&raw.positions, extremes);
+        self.bounds = match (self.bounds, found) {
+            (Some(before), Some(found)) => Some(before.and(found)),
+            (before, found) => before.or(found),
+        };
         // Find velocity and colours
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
@@ -361,9 +382,9 @@ impl Totals {
                 ColorQuestion::Attribute(name) => RgbAttribute::of(&raw.attributes, Some(name)),
             };
         }
-        let origin = self
-            .bounds
-            .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
+        let origin = self.bounds.map_or(DVec3::ZERO, |bounds| {
+            choose_origin(bounds.outer.0, bounds.outer.1)
+        });
         // Count particles, and remember the heaviest frame
         let sampled = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
@@ -436,9 +457,8 @@ impl Totals {
     }
 
     fn finish(self, up: DVec3) -> Survey {
-        let (min, max) = self
-            .bounds
-            .unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
+        let bounds = self.bounds.map(|bounds| bounds.outer);
+        let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
         // Speed has precedence over colours.
         let rgb = self.rgb.filter(|rgb| {
             let is_colored_by = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
@@ -463,6 +483,7 @@ impl Totals {
             origin,
             min,
             max,
+            layers: self.bounds.map(|bounds| bounds.layers),
             radius: self.radius.map(|(_, spacing)| spacing.touching),
             packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
             has_radii: self.has_radii,

@@ -15,6 +15,29 @@ pub(super) const NEIGHBOUR_QUERIES: usize = 512;
 /// Maximum number of distance computations of the estimate: half a second for a frame of 1e7.
 pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 
+/// Boxes of the particles of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RobustBounds {
+    /// Corners of the box of the particles without outliers.
+    pub(super) outer: (DVec3, DVec3),
+    /// On each axis, the values with 1 / [`LAYER`] of the particles below, and above.
+    pub(super) layers: (DVec3, DVec3),
+}
+
+impl RobustBounds {
+    /// The boxes of two frames.
+    pub(super) fn and(self, other: Self) -> Self {
+        let enclose = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+        Self {
+            outer: enclose(self.outer, other.outer),
+            layers: enclose(self.layers, other.layers),
+        }
+    }
+}
+
+/// A frame's lowest layer is one of this many parts of its particles.
+const LAYER: usize = 200;
+
 /// The box of the particles, limited on each axis to half the extent of the middle 98 % beyond them. None without
 /// finite particles. `extremes` is the box of all particles if `positions` are only a part of them.
 ///
@@ -24,7 +47,7 @@ pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 pub(super) fn robust_bounds(
     positions: &Positions,
     extremes: Option<(DVec3, DVec3)>,
-) -> Option<(DVec3, DVec3)> {
+) -> Option<RobustBounds> {
     let count = positions.len();
     let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
     let stride = count.div_ceil(SAMPLE).max(1);
@@ -40,13 +63,19 @@ pub(super) fn robust_bounds(
         0 => usize::from(sample.len() >= ESCAPE_MIN),
         percent => percent,
     };
-    // Find the middle of each axis
+    // Find the middle of each axis, and the outer layers
     let (mut first, mut last) = (min, max);
+    let mut layers = (min, max);
     for axis in 0..3 {
         sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
         let above = (sample.len() - outside).saturating_sub(1);
         if let (Some(low), Some(high)) = (sample.get(outside), sample.get(above)) {
             (first[axis], last[axis]) = (low[axis], high[axis]);
+        }
+        let layer = sample.len() / LAYER;
+        if let (Some(low), Some(high)) = (sample.get(layer), sample.iter().nth_back(layer)) {
+            layers.0[axis] = low[axis];
+            layers.1[axis] = high[axis];
         }
     }
     // Limit the box to a margin around it
@@ -56,7 +85,10 @@ pub(super) fn robust_bounds(
     } else {
         0.5 * extent
     };
-    Some((min.max(first - margin), max.min(last + margin)))
+    Some(RobustBounds {
+        outer: (min.max(first - margin), max.min(last + margin)),
+        layers,
+    })
 }
 
 /// The 99th percentile of `count` radii; 0 without finite ones.
@@ -148,7 +180,17 @@ mod tests {
             .flat_map(|i| (0..side).map(move |j| DVec3::new(step(i), step(j), 0.0)))
             .collect();
         all.push(other);
-        robust_bounds(&Positions::F64(all), None).unwrap()
+        robust_bounds(&Positions::F64(all), None).unwrap().outer
+    }
+
+    #[test]
+    fn layers_contain_half_a_percent() {
+        let line: Vec<DVec3> = (0..1000)
+            .map(|i| f64::from(i) * DVec3::new(1.0, -2.0, 0.0))
+            .collect();
+        let layers = robust_bounds(&Positions::F64(line), None).unwrap().layers;
+        assert_eq!(layers.0, DVec3::new(5.0, -1988.0, 0.0));
+        assert_eq!(layers.1, DVec3::new(994.0, -10.0, 0.0));
     }
 
     #[test]

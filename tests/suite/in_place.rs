@@ -229,7 +229,7 @@ fn memory_does_not_grow_with_the_particles() {
         .expect(0);
     let limited = |out: &str, how: &str| {
         let program = env!("CARGO_BIN_EXE_spherule");
-        let arguments = "--width 160 --height 90 --samples 1 --threads 2";
+        let arguments = "--width 160 --height 90 --samples 1 --threads 2 --look whitted";
         let command = format!(
             "ulimit -d {ALLOWED} && exec {program} render native -o {out}/f.#.exr {arguments} {how}"
         );

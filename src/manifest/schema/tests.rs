@@ -134,7 +134,7 @@ const TABLES: [(&str, &str); 22] = [
         "[render.background]\n",
     ),
     (
-        "/properties/render/properties/ground/anyOf/2",
+        "/properties/render/properties/ground/anyOf/3",
         "[render.ground]\n",
     ),
     (

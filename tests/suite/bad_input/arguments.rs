@@ -59,7 +59,7 @@ fn misspelled_values_have_suggestions() {
         &workshop,
         &["--look", "watr"],
         &[
-            "--look: expected one of water, studio, paper, found \"watr\"",
+            "--look: expected one of water, studio, paper, whitted, found \"watr\"",
             "did you mean water?",
         ],
     );

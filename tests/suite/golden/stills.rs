@@ -25,7 +25,7 @@ pub(super) struct Still {
 pub(super) fn spray() -> Still {
     Still {
         dam_break: None,
-        options: &["--surface", "smooth", "--spray"],
+        options: &["--look", "whitted", "--surface", "smooth", "--spray"],
         settings: &[
             "input.radius=0.025",
             "camera.eye=[0.2, 0.9, 3.0]",

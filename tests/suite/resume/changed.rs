@@ -112,9 +112,9 @@ fn changed_settings_are_refused_with_old_and_new_value() {
 fn force_starts_over() {
     let workshop = five_frames();
     workshop.render(&[]).expect(0);
-    workshop.render_to("fresh", &["--max-depth", "1"]).expect(0);
+    workshop.render_to("fresh", &["--bounces", "0"]).expect(0);
     let old = images(&workshop.join("out"));
-    let ran = workshop.render(&["--max-depth", "1", "--force"]).expect(0);
+    let ran = workshop.render(&["--bounces", "0", "--force"]).expect(0);
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
     let new = images(&workshop.join("out"));
     assert!(new != old && new == images(&workshop.join("fresh")));
@@ -122,9 +122,9 @@ fn force_starts_over() {
     workshop
         .render(&[])
         .expect(2)
-        .prints("render.max_depth: 1 -> 3");
+        .prints("render.bounces: 0 -> 6");
     workshop
-        .render(&["--max-depth", "1"])
+        .render(&["--bounces", "0"])
         .expect(0)
         .prints("5 of 5 frames are done already");
 }
