@@ -188,6 +188,7 @@ pub fn setup(
     render.samples = image.samples;
     render.integrator = manifest.integrator();
     render.bounces = manifest.render.bounces;
+    render.photons = manifest.render.caustics.photons;
     render.max_depth = manifest.render.max_depth;
     render.min_weight = manifest.render.min_weight;
     render.channels = channels;

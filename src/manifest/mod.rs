@@ -21,6 +21,7 @@ use reader::Section;
 use tree::TomlNode;
 
 mod camera;
+mod caustics;
 mod color;
 mod environment;
 mod field;

@@ -9,7 +9,7 @@ use super::nearest::nearest;
 /// A look, see the module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
-    /// Clear water on a checkerboard, under a sky.
+    /// Clear water on sand, under a clear sky.
     Water,
     /// Matte particles in a photo studio, with path tracing.
     Studio,
@@ -19,16 +19,19 @@ pub enum Look {
     Whitted,
 }
 
-/// Water: one body with a smooth surface. It has no diffuse reflection, so its colour comes from absorption, and its
-/// reflections from the sky. Tuned by eye on dam breaks.
+/// Water: one body with a smooth surface. Its colour comes from absorption, and its reflections from the sky; the sun
+/// makes caustics on the ground. The terms of the thesis's model and the background are for `integrator = "whitted"`.
+/// Tuned by eye on dam breaks.
 const WATER: &str = r#"
-render.integrator = "whitted"
+render.integrator = "path"
 render.surface = "smooth"
 render.max_depth = 8
 render.background = { bottom = [0.75, 0.80, 0.86], top = [0.30, 0.52, 0.92] }
 render.ground = true
-render.ground_color = [0.46, 0.44, 0.41]
-render.ground_pattern = "checker"
+render.ground_color = [0.36, 0.33, 0.28]
+render.ground_pattern = "sand"
+environment.type = "sky"
+environment.visible = true
 material.color = [0.6, 0.85, 0.9]
 material.ambient = 0.0
 material.diffuse = 0.0
@@ -145,7 +148,7 @@ mod tests {
         let plain = water("input.path = \"data\"", &[]);
         assert_eq!(plain.surface.kind, SurfaceKind::Smooth);
         assert_eq!(plain.render.max_depth, 8);
-        assert_eq!(plain.render.ground_pattern, GroundPattern::Checker);
+        assert_eq!(plain.render.ground_pattern, GroundPattern::Sand);
         assert_eq!(plain.material.constants.transmission, 1.0);
         assert!(
             plain.render.ground == Some(GroundSetting(GroundKind::Plain))

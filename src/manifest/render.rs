@@ -2,6 +2,7 @@
 
 use glam::Vec3;
 
+use super::caustics::Caustics;
 use super::ground::GroundSetting;
 use super::key::Affects;
 use super::keys::section;
@@ -33,6 +34,8 @@ named! {
         Plain = "plain",
         /// Squares, every other one darker.
         Checker = "checker",
+        /// Spots of many sizes.
+        Sand = "sand",
     }
 }
 
@@ -65,6 +68,12 @@ section! {
         /// Diffuse reflections that light may take before its last one; 0 is direct light only
         bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
             flag("bounces", "COUNT", "Look");
+        /// Light on the ground through transmissive particles: number of photons; 0 is none
+        ///
+        /// With photons, paths end at the ground, whose light is computed once for each image. It is that of the
+        /// environment and of suns and directional lights; of other lights there are no caustics. Without photons,
+        /// paths go on from the ground, and find a sun only where nothing refracts its light.
+        caustics: Caustics = Caustics::DEFAULT, affects(Affects::PathTracing);
         /// Removes noise from R, G and B: auto | true | false; auto is true with path
         ///
         /// It takes at least 2 samples per pixel. Other channels do not change.
@@ -91,11 +100,11 @@ section! {
         ground_height: Option<f64> = None, or("auto"), unit("a height");
         /// Colour of the ground, linear RGB
         ground_color: Vec3 = ground::DEFAULT_COLOR;
-        /// Pattern of the ground: plain | checker (every other square is darker)
+        /// Pattern of the ground: plain | checker (every other square is darker) | sand
         ground_pattern: GroundPattern = GroundPattern::Plain;
         /// Strength of the shadows on a shadow catcher; 1 is physical
         ground_shadow: f32 = 1.0, from(0), to(1), affects(Affects::PathTracing);
-        /// Edge length of the squares of the pattern, or auto
+        /// Edge length of the squares of the pattern, or of its largest spots, or auto
         ground_tile: Option<f64> = None, or("auto"), unit("a length"), above(0), single();
         /// Maximum memory to use: 4GiB, 512MiB; frames that need more fail
         memory_limit: Option<Bytes> = None, example("\"4GiB\""), unset("the free memory"), affects(Affects::Nothing),

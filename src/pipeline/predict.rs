@@ -20,7 +20,7 @@ use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predic
 use crate::denoise;
 use crate::metrics::Bytes;
 use crate::output::PackBuffers;
-use crate::render::{Film, scratch_bytes};
+use crate::render::{Film, floor_light_bytes, scratch_bytes};
 use crate::scene::Environment;
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
@@ -371,13 +371,14 @@ impl<'a> MemoryModel<'a> {
         let tables = 1 + u64::from(scene.ground.is_some_and(|g| g.shadow_catcher.is_some()));
         let environment = scene.environment.as_deref();
         let environment = tables * environment.map_or(0, Environment::byte_len);
+        let light = environment + floor_light_bytes(scene, render);
         // Count the threads, including those for reading
         let has_read_pool = [Some(frame), after]
             .into_iter()
             .flatten()
             .any(FrameSize::needs_many);
         let idle = MemoryNeed {
-            program: PROGRAM + environment + THREAD * threads * if has_read_pool { 2 } else { 1 },
+            program: PROGRAM + light + THREAD * threads * if has_read_pool { 2 } else { 1 },
             reading: shared.max(self.retained(frame)),
             ..MemoryNeed::default()
         };

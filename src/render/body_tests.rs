@@ -13,7 +13,7 @@ use super::{
 };
 use crate::ray::Ray;
 use crate::scene::{
-    Background, Camera, CameraView, Checker, Fresnel, Ground, Light, Material, ground,
+    Background, Camera, CameraView, Fresnel, Ground, Light, Material, ground,
     material::{dielectric, extinction},
 };
 use crate::surface::{Intersection, MaterialId, Side};
@@ -70,7 +70,8 @@ fn floor(height: f32) -> Ground {
         center: Vec3::Z * height,
         fade_start: 1e4,
         fade_end: 2e4,
-        checker: None,
+        pattern: ground::Pattern::Plain,
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
     }
 }
@@ -310,7 +311,8 @@ fn ground_is_refracted_through_a_slab() {
     let light = (1.0 - r) * 0.5 * ground::AMBIENT;
     for (tile, is_light) in [(0.54, true), (0.53, false)] {
         scene.ground = Some(Ground {
-            checker: Some(Checker { tile }),
+            pattern: ground::Pattern::Checker { tile },
+            particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
             shadow_catcher: None,
             // The corner of four squares; the camera looks along y.
             center: Vec3::new(-0.1, 0.0, 0.0),

@@ -96,14 +96,27 @@ fn trace_group<I: Integrator + ?Sized>(
     stop: &dyn Stop,
     scratch: &mut Scratch,
 ) -> Option<()> {
+    trace_batches(integrator, stop, scratch, &|packets, scratch| {
+        trace_camera_rays(integrator, packets, stop, scratch)
+    })
+}
+
+/// Traces all samples of a group, batch by batch. `start` traces the segments of depth 1 of the packets that it is
+/// given.
+pub(super) fn trace_batches<I: Integrator + ?Sized>(
+    integrator: &I,
+    stop: &dyn Stop,
+    scratch: &mut Scratch,
+    start: &dyn Fn(Range<usize>, &mut Scratch) -> Option<()>,
+) -> Option<()> {
     let context = integrator.context();
     let packets = scratch.group.film.len();
     // Trace batches with a bounded number of path segments
     let step = batch_len(context.max_segments, integrator.max_paths()) / LANES;
     for first in (0..packets).step_by(step) {
-        // Trace the camera rays of the batch
+        // Trace the first segments of the batch
         scratch.next.clear();
-        trace_camera_rays(integrator, first..packets.min(first + step), stop, scratch)?;
+        start(first..packets.min(first + step), scratch)?;
         // Trace depth by depth, until no rays are left
         for depth in 2..=integrator.max_depth() {
             std::mem::swap(&mut scratch.current, &mut scratch.next);

@@ -51,6 +51,8 @@ mod branch_tests;
 #[cfg(test)]
 mod catcher_tests;
 #[cfg(test)]
+mod floor_tests;
+#[cfg(test)]
 mod image_tests;
 #[cfg(test)]
 mod path_tests;
@@ -67,8 +69,9 @@ pub use film_rows::FilmRows;
 pub use ray_counts::RayCounts;
 pub use sampler::{FilmSampler, MultiJitter, PathSeed};
 pub use settings::{
-    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, IntegratorKind, MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH,
-    MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError, RenderSettings,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IntegratorKind, MAX_BOUNCES, MAX_DEPTH,
+    MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError,
+    RenderSettings,
 };
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
@@ -102,6 +105,11 @@ pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bo
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
     scratch::scratch_bytes(settings.samples, max_depth, max_paths)
+}
+
+/// Upper bound of the memory for the light on the ground around transmissive particles, in bytes.
+pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
+    path::floor::bytes(scene, settings)
 }
 
 /// Renders one image on the current rayon pool.
@@ -156,9 +164,15 @@ pub fn render_into(
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();
     let context = RenderContext::new(shapes, scene, source, settings);
+    let mut before = RayCounts::default();
     let integrator: Box<dyn Integrator> = match settings.integrator {
         IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
-        IntegratorKind::Path => Box::new(PathIntegrator::new(context)),
+        IntegratorKind::Path => {
+            let integrator = PathIntegrator::new(context).with_floor_light(stop);
+            let (integrator, traced) = integrator.ok_or(RenderError::Interrupted)?;
+            before = traced;
+            Box::new(integrator)
+        }
     };
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
@@ -169,7 +183,8 @@ pub fn render_into(
         counts.ok_or(RenderError::Interrupted)
     };
     // Render bands and their tiles in parallel, so that a slow corner of the image keeps all threads busy
-    film.bands_mut(tile::SIDE)
+    let counts = film
+        .bands_mut(tile::SIDE)
         .into_par_iter()
         .map(|mut band| {
             let tiles = band.tiles(tile::SIDE).into_par_iter();
@@ -177,7 +192,8 @@ pub fn render_into(
                 .map(|mut tile| render_tile(&mut tile))
                 .try_reduce(RayCounts::default, |a, b| Ok(a + b))
         })
-        .try_reduce(RayCounts::default, |a, b| Ok(a + b))
+        .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
+    Ok(before + counts)
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

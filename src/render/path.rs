@@ -30,8 +30,10 @@ use glam::Vec3;
 
 mod catcher;
 mod emission;
+pub(super) mod floor;
 
 use catcher::Catcher;
+use floor::FloorLight;
 
 /// Number of diffuse reflections from which on paths end at random.
 const ROULETTE_START: u32 = 2;
@@ -51,6 +53,8 @@ pub(super) struct PathIntegrator<'a> {
     /// Whether rays can hit a light.
     has_extents: bool,
     catcher: Option<Catcher>,
+    /// The light on the ground, if paths end there.
+    floor: Option<FloorLight>,
 }
 
 impl<'a> PathIntegrator<'a> {
@@ -64,6 +68,7 @@ impl<'a> PathIntegrator<'a> {
             interface,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
+            floor: None,
             has_extents: context.lights.iter().any(|light| light.has_extent()),
             context,
         }
@@ -99,13 +104,21 @@ impl Integrator for PathIntegrator<'_> {
         if packet.hits.mask == 0 {
             return;
         }
+        // End paths at a ground whose light is known
+        let ground = packet.hits.lanes_of(MaterialId::GROUND);
+        let mut ended = 0;
+        if let Some(floor) = self.floor.as_ref().filter(|_| ground != 0) {
+            self.shade_floor(floor, &self.surface(segments, depth, ground), packet);
+            ended = ground;
+        }
         // Reflect light at opaque surfaces
         let clear = match self.context.interior {
             Interior::Opaque => 0,
             Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
         };
         let max = self.context.settings.bounces;
-        let opaque = packet.hits.mask & !clear & lanes_where(|l| segments.bounces[l] <= max);
+        let opaque =
+            packet.hits.mask & !clear & !ended & lanes_where(|l| segments.bounces[l] <= max);
         if opaque != 0 {
             self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
         }
@@ -221,7 +234,7 @@ impl PathIntegrator<'_> {
         reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
     }
 
-    /// Traces the shadow rays of environment samples, and adds those that arrive.
+    /// Traces the shadow rays of light samples to which transmissive surfaces are opaque, and adds those that arrive.
     fn add_unoccluded(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
         let context = &self.context;
         let (samples, counts) = (&mut packet.light, &mut packet.counts);
@@ -245,31 +258,36 @@ impl PathIntegrator<'_> {
         for (index, light) in context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
             self.reflect_light(index, competes, surface, packet);
-            if packet.light.lanes == 0 {
-                continue;
-            }
-            // Trace the shadow rays
-            let PacketScratch {
-                light: samples,
-                crossings,
-                counts,
-                radiance,
-                ..
-            } = &mut *packet;
-            let visible = if light.casts_shadow() {
-                let (segments, depth) = (surface.segments, surface.depth);
-                context.trace_shadow_rays(segments, depth, samples, crossings, counts)
-            } else {
-                samples.lanes
-            };
-            add(
-                context.simd,
-                &samples.radiance,
-                &Vec3::ONE,
-                visible,
-                radiance,
-            );
+            self.add_attenuated(light.casts_shadow(), surface, packet);
         }
+    }
+
+    /// Traces the shadow rays of light samples if the light casts shadows, and adds what arrives.
+    fn add_attenuated(
+        &self,
+        casts_shadow: bool,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) {
+        let context = &self.context;
+        let PacketScratch {
+            light: samples,
+            crossings,
+            counts,
+            radiance,
+            ..
+        } = packet;
+        if samples.lanes == 0 {
+            return;
+        }
+        let visible = if casts_shadow {
+            let (segments, depth) = (surface.segments, surface.depth);
+            context.trace_shadow_rays(segments, depth, samples, crossings, counts)
+        } else {
+            samples.lanes
+        };
+        let simd = context.simd;
+        add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
     }
 
     /// Samples a light source, and the light from there that the surface reflects: `packet.light`. `competes`: rays
@@ -422,7 +440,7 @@ impl PathIntegrator<'_> {
         interface.shading_points(context.simd, rays, hits, inside, &mut packet.points);
         // At the last specular surface, rays see the environment
         let max = context.settings.max_depth;
-        let is_last = |l: usize| depth - segments.bounces[l] >= max;
+        let is_last = |l: usize| depth >= max + segments.bounces[l];
         let hits = SpecularHits {
             segments,
             depth,

@@ -34,11 +34,11 @@ fn scene(environment: Environment) -> Scene {
     }
 }
 
-fn white() -> Environment {
+pub(super) fn white() -> Environment {
     Environment::constant(Vec3::ONE)
 }
 
-fn settings(side: u32, samples: u32, bounces: u32) -> RenderSettings {
+pub(super) fn settings(side: u32, samples: u32, bounces: u32) -> RenderSettings {
     RenderSettings {
         samples,
         bounces,
@@ -47,7 +47,12 @@ fn settings(side: u32, samples: u32, bounces: u32) -> RenderSettings {
     }
 }
 
-fn image(shape: &dyn Shape, scene: &Scene, albedo: Vec3, settings: &RenderSettings) -> Film {
+pub(super) fn image(
+    shape: &dyn Shape,
+    scene: &Scene,
+    albedo: Vec3,
+    settings: &RenderSettings,
+) -> Film {
     let source = ParticleShading::constant(albedo);
     let never = AtomicBool::new(false);
     render(&[shape], scene, &source, settings, &never)
@@ -56,13 +61,13 @@ fn image(shape: &dyn Shape, scene: &Scene, albedo: Vec3, settings: &RenderSettin
 }
 
 /// The pixels that the shape covers, as colours.
-fn covered(film: &Film) -> Vec<Vec3> {
+pub(super) fn covered(film: &Film) -> Vec<Vec3> {
     let inside = film.color.iter().filter(|c| c[3] == 1.0);
     inside.map(|c| Vec3::from_slice(&c[..3])).collect()
 }
 
 /// Mean and standard deviation of pixels, over all components.
-fn statistics(pixels: &[Vec3]) -> (f32, f32) {
+pub(super) fn statistics(pixels: &[Vec3]) -> (f32, f32) {
     let count = pixels.len() as f32;
     let mean = pixels.iter().map(|p| p.element_sum() / 3.0).sum::<f32>() / count;
     let square = pixels
@@ -155,7 +160,7 @@ fn light_inside_a_ball_is_a_geometric_series() {
 }
 
 /// A floor seen straight from above.
-fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
+pub(super) fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
     let view = CameraView {
         eye: DVec3::new(0.0, 0.0, 10.0),
         look_at: DVec3::ZERO,
@@ -171,7 +176,8 @@ fn floor_from_above(environment: Environment, color: Vec3) -> Scene {
             center: Vec3::ZERO,
             fade_start: 1e4,
             fade_end: 2e4,
-            checker: None,
+            pattern: crate::scene::ground::Pattern::Plain,
+            particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
             shadow_catcher: None,
         }),
         ..scene(environment)
@@ -196,7 +202,7 @@ fn a_floor_shows_the_irradiance_of_the_environment() {
 }
 
 /// A clear material: no light is lost in it.
-const GLASS: Material = Material {
+pub(super) const GLASS: Material = Material {
     ior: 1.5,
     transmission: 1.0,
     fresnel: Fresnel::Exact,

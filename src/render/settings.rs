@@ -27,6 +27,12 @@ pub const MAX_BOUNCES: u32 = 1000;
 /// Default number of diffuse reflections of a path. Russian roulette ends most paths earlier.
 pub const DEFAULT_BOUNCES: u32 = 6;
 
+/// Maximum number of photons.
+pub const MAX_PHOTONS: u32 = 1_000_000_000;
+
+/// Default number of photons.
+pub const DEFAULT_PHOTONS: u32 = 500_000;
+
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 65_536;
 
@@ -53,6 +59,8 @@ pub struct RenderSettings {
     pub integrator: IntegratorKind,
     /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
     pub bounces: u32,
+    /// Path tracing: number of photons for caustics on the ground; 0 follows paths from the ground instead.
+    pub photons: u32,
     /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
     /// beyond the last level see the background.
     pub max_depth: u32,
@@ -82,6 +90,7 @@ impl RenderSettings {
             samples: 1,
             integrator: IntegratorKind::Whitted,
             bounces: DEFAULT_BOUNCES,
+            photons: 0,
             max_depth: 3,
             min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,

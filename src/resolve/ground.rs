@@ -5,7 +5,8 @@ use glam::DVec3;
 use super::{ResolveError, narrow, surface};
 use crate::manifest::{GroundKind, GroundPattern, Manifest};
 use crate::render::IntegratorKind;
-use crate::scene::{Bounds, Checker, Ground};
+use crate::scene::ground::Pattern;
+use crate::scene::{Bounds, Ground};
 use crate::surface::SurfaceKind;
 
 /// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
@@ -74,14 +75,15 @@ pub(super) fn ground(
     }
     // Colour it
     ground.color = render.ground_color;
-    let is_checkered =
-        kind == GroundKind::Checker || render.ground_pattern == GroundPattern::Checker;
-    ground.checker = is_checkered.then(|| Checker {
-        tile: match render.ground_tile {
-            Some(tile) => narrow(tile),
-            None => surface::round(bounds.diagonal() * TILE),
-        },
-    });
+    let tile = || match render.ground_tile {
+        Some(tile) => narrow(tile),
+        None => surface::round(bounds.diagonal() * TILE),
+    };
+    ground.pattern = match (kind, render.ground_pattern) {
+        (GroundKind::Checker, _) | (_, GroundPattern::Checker) => Pattern::Checker { tile: tile() },
+        (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
+        (_, GroundPattern::Plain) => Pattern::Plain,
+    };
     Ok(Some(ground))
 }
 
@@ -130,9 +132,9 @@ mod tests {
     fn each_kind_has_its_height_and_colour() {
         assert_eq!(of(GroundKind::None, |_| {}).unwrap(), None);
         let plain = of(GroundKind::Plain, |_| {}).unwrap().unwrap();
-        assert_eq!((plain.height, plain.checker), (3.0, None));
+        assert_eq!((plain.height, plain.pattern), (3.0, Pattern::Plain));
         let checker = of(GroundKind::Checker, |_| {}).unwrap().unwrap();
-        assert!(checker.checker.is_some());
+        assert!(matches!(checker.pattern, Pattern::Checker { .. }));
         let pattern = |manifest: &mut Manifest| {
             manifest.render.ground_pattern = GroundPattern::Checker;
         };

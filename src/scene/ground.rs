@@ -20,6 +20,15 @@ pub const DIFFUSE: f32 = 0.7;
 /// Colour of the darker squares of a checkerboard, as a fraction of the colour of the ground.
 const DARKER_PART: f32 = 0.35;
 
+/// Greatest difference of the colour of sand from its mean, as a fraction of that.
+const SAND_CONTRAST: f32 = 0.4;
+
+/// Number of sizes of spots in sand; each is half of the one before.
+const SAND_SIZES: u32 = 8;
+
+/// Contrast of spots as a fraction of that of spots of twice the size.
+const SAND_GAIN: f32 = 0.85;
+
 /// Default distance from the centre at which the ground starts to fade, in diagonals of the bounds.
 const FADE_START: f32 = 1.5;
 
@@ -41,24 +50,36 @@ pub struct Ground {
     pub height: f32,
     /// Diffuse colour, linear RGB.
     pub color: Vec3,
+    /// Corners of the box of the particles of all frames.
+    pub particles: [Vec3; 2],
     /// Centre of the fading.
     pub center: Vec3,
     /// Distance from `center` up to which the ground is opaque.
     pub fade_start: f32,
     /// Distance from which on only the background is visible.
     pub fade_end: f32,
-    /// Optional checkerboard.
-    pub checker: Option<Checker>,
+    /// Pattern of the colour.
+    pub pattern: Pattern,
     /// Strength of the shadows, 0 to 1, if camera rays see nothing but shadows on the ground: a shadow catcher. Only
     /// for path tracing.
     pub shadow_catcher: Option<f32>,
 }
 
-/// A checkerboard on the ground. Four corners meet at the centre of the ground.
+/// A pattern on the ground. Lengths are positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Checker {
-    /// Edge of a square; positive.
-    pub tile: f32,
+pub enum Pattern {
+    /// One colour.
+    Plain,
+    /// A checkerboard. Four corners meet at the centre of the ground.
+    Checker {
+        /// Edge of a square.
+        tile: f32,
+    },
+    /// Sand: slightly lighter and darker spots of many sizes.
+    Sand {
+        /// Distance between the largest spots.
+        tile: f32,
+    },
 }
 
 impl Ground {
@@ -76,10 +97,11 @@ impl Ground {
             up,
             height,
             color: DEFAULT_COLOR,
+            particles: [bounds.min, bounds.max].map(|corner| (corner - origin).as_vec3()),
             center: center + (height - center.dot(up)) * up,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,
-            checker: None,
+            pattern: Pattern::Plain,
             shadow_catcher: None,
         }
     }
@@ -93,7 +115,7 @@ impl Ground {
             color: CATCHER_COLOR,
             fade_start,
             fade_end,
-            checker: None,
+            pattern: Pattern::Plain,
             shadow_catcher: Some(strength),
             ..self
         }
@@ -102,21 +124,25 @@ impl Ground {
     /// The colour at a `point` of the ground.
     #[inline]
     pub fn color_at(&self, point: Vec3) -> Vec3 {
-        let Some(checker) = self.checker else {
-            return self.color;
+        let place = |tile: f32| {
+            let from_middle = (point - self.center) / tile;
+            self.axes().map(|axis| from_middle.dot(axis))
         };
-        let [across, along] = self.axes();
-        let from_middle = (point - self.center) / checker.tile;
-        let square = floor(from_middle.dot(across)) ^ floor(from_middle.dot(along));
-        if square & 1 == 0 {
-            self.color
-        } else {
-            DARKER_PART * self.color
+        match self.pattern {
+            Pattern::Plain => self.color,
+            Pattern::Checker { tile } => {
+                let [x, y] = place(tile).map(floor);
+                match (x ^ y) & 1 {
+                    0 => self.color,
+                    _ => DARKER_PART * self.color,
+                }
+            }
+            Pattern::Sand { tile } => (1.0 + SAND_CONTRAST * sand(place(tile))) * self.color,
         }
     }
 
     /// Two perpendicular directions of the plane; coordinate axes if `up` is one.
-    fn axes(&self) -> [Vec3; 2] {
+    pub fn axes(&self) -> [Vec3; 2] {
         let size = self.up.abs();
         let other_axis = if size.x >= size.y && size.x >= size.z {
             Vec3::Y
@@ -134,6 +160,48 @@ impl Ground {
         self.center += by * self.up;
         self.height += by;
     }
+}
+
+/// Noise from -1 to 1 with spots of many sizes: a sum of value noises (Perlin and Hoffert, "Hypertexture", 1989).
+fn sand([mut x, mut y]: [f32; 2]) -> f32 {
+    let (mut sum, mut whole, mut part) = (0.0, 0.0, 1.0);
+    for _ in 0..SAND_SIZES {
+        sum += part * value_noise(x, y);
+        whole += part;
+        part *= SAND_GAIN;
+        // Turned by 37 degrees, so that the lattices do not coincide
+        (x, y) = (
+            2.0 * (0.8 * x - 0.6 * y) + 0.37,
+            2.0 * (0.6 * x + 0.8 * y) + 0.71,
+        );
+    }
+    sum / whole
+}
+
+/// Random values from -1 to 1 at integers, interpolated smoothly.
+fn value_noise(x: f32, y: f32) -> f32 {
+    let (left, below) = (floor(x), floor(y));
+    let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
+    let (u, v) = (
+        smooth((x - left as f32).clamp(0.0, 1.0)),
+        smooth((y - below as f32).clamp(0.0, 1.0)),
+    );
+    let row = |row: i32| {
+        let ends = [left, left.wrapping_add(1)].map(|column| lattice_value(column, row));
+        ends[0] + u * (ends[1] - ends[0])
+    };
+    let (low, high) = (row(below), row(below.wrapping_add(1)));
+    low + v * (high - low)
+}
+
+/// A random value from -1 to 1 for a point with integer coordinates (hash by Wellons, "lowbias32", 2018).
+fn lattice_value(x: i32, y: i32) -> f32 {
+    let mut bits =
+        x.cast_unsigned().wrapping_mul(0x9e37_79b9) ^ y.cast_unsigned().wrapping_mul(0x85eb_ca6b);
+    bits = (bits ^ bits >> 16).wrapping_mul(0x7feb_352d);
+    bits = (bits ^ bits >> 15).wrapping_mul(0x846c_a68b);
+    bits ^= bits >> 16;
+    (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
 }
 
 /// The largest integer not above `value`; saturates. It avoids the function call that `floor` needs on machines
@@ -169,6 +237,33 @@ mod tests {
     }
 
     #[test]
+    fn sand_varies_around_its_colour() {
+        let ground = Ground {
+            pattern: Pattern::Sand { tile: 0.7 },
+            ..floor()
+        };
+        let shade = |i: i32, j: i32| {
+            let point = ground.center + 0.013 * Vec3::new(i as f32, j as f32, 0.0);
+            ground.color_at(point).x / ground.color.x
+        };
+        let shades: Vec<f32> = (0..10_000)
+            .map(|i| shade(i / 100 - 50, i % 100 - 50))
+            .collect();
+        let mean = shades.iter().sum::<f32>() / 1e4;
+        let largest = shades
+            .iter()
+            .fold(0.0_f32, |most, shade| most.max((shade - 1.0).abs()));
+        assert!((mean - 1.0).abs() < 0.05, "{mean}");
+        assert!((0.05..=SAND_CONTRAST).contains(&largest), "{largest}");
+        // Neighbours are alike, even far from the centre
+        let far = ground.color_at(ground.center + 1e7 * Vec3::X);
+        assert!(far.is_finite());
+        assert!(
+            (shade(0, 0) - ground.color_at(ground.center + 1e-5).x / ground.color.x).abs() < 1e-2
+        );
+    }
+
+    #[test]
     fn squares_alternate_around_the_middle() {
         for up in [
             Vec3::X,
@@ -179,7 +274,7 @@ mod tests {
         ] {
             let mut floor = Ground { up, ..floor() };
             assert_eq!(floor.color_at(floor.center), floor.color);
-            floor.checker = Some(Checker { tile: 0.5 });
+            floor.pattern = Pattern::Checker { tile: 0.5 };
             let [across, along] = floor.axes();
             let at = |x: f32, y: f32| floor.color_at(floor.center + x * across + y * along);
             let [light, dark] = [floor.color, DARKER_PART * floor.color];

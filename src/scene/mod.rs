@@ -23,7 +23,7 @@ pub use background::Background;
 pub use camera::{Camera, CameraError, CameraView, Framing};
 pub use colormap::{ColorMap, UnknownColorMap};
 pub use environment::{Environment, EnvironmentAxes, RadianceMap};
-pub use ground::{Checker, Ground};
+pub use ground::Ground;
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};

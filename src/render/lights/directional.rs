@@ -2,7 +2,7 @@
 
 use glam::Vec3;
 
-use super::light::{Light, LightSamples};
+use super::light::{Beam, Light, LightSamples};
 use crate::math::{Lanes, Lanes3, Supported, splat, splat3};
 
 /// A light with parallel rays.
@@ -33,5 +33,13 @@ impl Light for DirectionalLight {
 
     fn casts_shadow(&self) -> bool {
         self.casts_shadow
+    }
+
+    fn beam(&self) -> Option<Beam> {
+        self.casts_shadow.then_some(Beam {
+            to_light: self.to_light,
+            cap: 0.0,
+            irradiance: self.irradiance,
+        })
     }
 }

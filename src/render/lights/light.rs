@@ -1,7 +1,10 @@
 //! The interface between lights and integrators.
 
+use glam::Vec3;
+
 use crate::math::{Lanes, Lanes3, Supported, splat};
 use crate::ray::RayPacket;
+use crate::render::shading::in_cone;
 
 /// A light.
 pub(in crate::render) trait Light: Sync {
@@ -25,6 +28,11 @@ pub(in crate::render) trait Light: Sync {
         false
     }
 
+    /// The light as parallel rays, if it is infinitely far away and casts shadows: it emits photons.
+    fn beam(&self) -> Option<Beam> {
+        None
+    }
+
     /// Whether the camera sees the light.
     fn is_visible(&self) -> bool {
         false
@@ -34,6 +42,29 @@ pub(in crate::render) trait Light: Sync {
     fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
         let _ = (simd, rays);
         emission.lanes = 0;
+    }
+}
+
+/// Light from infinitely far away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::render) struct Beam {
+    /// Unit vector towards its centre.
+    pub(in crate::render) to_light: Vec3,
+    /// 1 minus the cosine of half the apparent diameter.
+    pub(in crate::render) cap: f32,
+    /// On surfaces that face the light, linear RGB.
+    pub(in crate::render) irradiance: Vec3,
+}
+
+impl Beam {
+    /// A unit vector towards the light; `u` is uniform in the unit square.
+    pub(in crate::render) fn direction(&self, u: [f32; 2]) -> Vec3 {
+        in_cone(self.to_light.to_array(), self.cap, u).into()
+    }
+
+    /// Tangent of half the apparent diameter.
+    pub(in crate::render) fn spread(&self) -> f32 {
+        (self.cap * (2.0 - self.cap)).sqrt() / (1.0 - self.cap)
     }
 }
 
@@ -62,7 +93,7 @@ pub(in crate::render) struct Emission {
     /// Probability density with which the light samples the direction of the ray, per steradian.
     pub(in crate::render) pdf: Lanes,
     /// Radiance of the light, linear RGB, the same in all lanes.
-    pub(in crate::render) radiance: glam::Vec3,
+    pub(in crate::render) radiance: Vec3,
     /// Lanes of rays that hit the light.
     pub(in crate::render) lanes: u32,
 }
@@ -72,7 +103,7 @@ impl Default for Emission {
         Self {
             t: splat(0.0),
             pdf: splat(0.0),
-            radiance: glam::Vec3::ZERO,
+            radiance: Vec3::ZERO,
             lanes: 0,
         }
     }

@@ -10,9 +10,9 @@ use std::f32::consts::PI;
 use glam::Vec3;
 
 use super::light::{Emission, Light, LightSamples};
-use super::sun::in_cone;
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
+use crate::render::shading::in_cone;
 
 /// See the module.
 #[derive(Debug, Clone, Copy)]

@@ -4,11 +4,10 @@ use std::f32::consts::PI;
 
 use glam::Vec3;
 
-use super::light::{Emission, Light, LightSamples};
-use crate::math::functions::sin_cos;
+use super::light::{Beam, Emission, Light, LightSamples};
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
-use crate::render::shading::to_world;
+use crate::render::shading::in_cone;
 
 /// See the module.
 #[derive(Debug, Clone, Copy)]
@@ -17,6 +16,7 @@ pub(super) struct SunLight {
     to_light: Vec3,
     /// 1 minus the cosine of half the apparent diameter.
     cap: f32,
+    irradiance: Vec3,
     radiance: Vec3,
     is_visible: bool,
 }
@@ -31,6 +31,7 @@ impl SunLight {
         Self {
             to_light,
             cap: narrow(2.0 * half_sin * half_sin),
+            irradiance,
             radiance: irradiance * narrow(1.0 / (std::f64::consts::PI * sin * sin)),
             is_visible,
         }
@@ -52,6 +53,14 @@ impl Light for SunLight {
         true
     }
 
+    fn beam(&self) -> Option<Beam> {
+        Some(Beam {
+            to_light: self.to_light,
+            cap: self.cap,
+            irradiance: self.irradiance,
+        })
+    }
+
     fn is_visible(&self) -> bool {
         self.is_visible
     }
@@ -59,15 +68,6 @@ impl Light for SunLight {
     fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
         intersect_sun(simd, self, rays, emission);
     }
-}
-
-/// The direction at `u` in a cone around `axis`: `cap` is 1 minus the cosine of half its opening angle.
-#[inline(always)]
-pub(super) fn in_cone(axis: [f32; 3], cap: f32, u: [f32; 2]) -> [f32; 3] {
-    let below = u[0] * cap;
-    let level = (below * (2.0 - below)).sqrt();
-    let (sin, cos) = sin_cos(2.0 * PI * u[1]);
-    to_world([level * cos, level * sin, 1.0 - below], axis)
 }
 
 #[inline(always)]

@@ -44,6 +44,15 @@ pub(in crate::render) fn to_world(local: [f32; 3], n: [f32; 3]) -> [f32; 3] {
     [world[0] * inverse, world[1] * inverse, world[2] * inverse]
 }
 
+/// The direction at `u` in a cone around `axis`: `cap` is 1 minus the cosine of half its opening angle.
+#[inline(always)]
+pub(in crate::render) fn in_cone(axis: [f32; 3], cap: f32, u: [f32; 2]) -> [f32; 3] {
+    let below = u[0] * cap;
+    let level = (below * (2.0 - below)).sqrt();
+    let (sin, cos) = sin_cos(2.0 * std::f32::consts::PI * u[1]);
+    to_world([level * cos, level * sin, 1.0 - below], axis)
+}
+
 #[cfg(test)]
 mod tests {
     use glam::Vec3;

@@ -14,4 +14,4 @@ pub(super) use arithmetic::{add, product, scale};
 pub(super) use backdrop::add_backdrop;
 pub(super) use background::{BackgroundLanes, add_background};
 pub(super) use camera::{CameraLanes, camera_rays, depths};
-pub(super) use frame::{disc, tangents, to_world};
+pub(super) use frame::{disc, in_cone, tangents, to_world};

@@ -254,7 +254,8 @@ fn floor(height: f32) -> Ground {
         center: Vec3::Z * height,
         fade_start: 4.0,
         fade_end: 12.0,
-        checker: None,
+        pattern: spherule::scene::ground::Pattern::Plain,
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
     }
 }

@@ -3,7 +3,8 @@
 use std::f32::consts::TAU;
 
 use glam::{DVec3, Quat, Vec2, Vec3};
-use spherule::scene::{Checker, Ground, Material};
+use spherule::scene::ground::Pattern;
+use spherule::scene::{Ground, Material};
 use spherule::surface::{NormalKind, SurfaceKind};
 
 use super::{MATT, SUNSET, Shot, floor, glass};
@@ -34,7 +35,8 @@ pub(in super::super) fn union() -> Shot {
     };
     shot.scene.background = SUNSET;
     shot.scene.ground = Some(Ground {
-        checker: Some(Checker { tile: 1.0 }),
+        pattern: Pattern::Checker { tile: 1.0 },
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
         shadow_catcher: None,
         ..floor(0.0)
     });
