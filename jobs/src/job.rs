@@ -19,7 +19,7 @@ use crate::ledger::{
     COMPACTED, LedgerFile, LedgerWatcher, LedgerWriter, compact, ledger_files, remove,
 };
 use crate::planning::{ExtendedPlan, merged_plan, new_plan, stored_path};
-use crate::workers::{WorkerRegistry, WorkerStatus, remove_stale_parts, worker_statuses};
+use crate::workers::{ListedParts, WorkerRegistry, WorkerStatus, worker_statuses};
 use crate::{
     EntryStatus, FrameClaims, FrameFailure, FrameState, InputChange, JobError, JobRequest,
     JobState, JobSummary, Ledger, LedgerEntry, OutputFile, Plan, ResumeMode,
@@ -445,24 +445,22 @@ fn remove_leftovers(
     registry: &WorkerRegistry,
 ) -> Result<(), JobError> {
     let failed = |e| JobError::io(dir, "removing incomplete files of a killed run", e);
-    let living_owners = registry.remove_dead().map_err(failed)?;
     let outputs = request.frames.iter().flat_map(|f| &f.outputs);
     let mut dirs: Vec<&Path> = outputs.filter_map(|path| path.parent()).collect();
     dirs.push(dir);
     dirs.sort_unstable();
     dirs.dedup();
+    let mut parts = ListedParts::default();
     for dir in &dirs {
-        match remove_stale_parts(dir, &living_owners) {
+        match parts.add(dir) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => {
-                return Err(JobError::io(
-                    dir,
-                    "removing incomplete files of a killed run",
-                    e,
-                ));
+                let doing = "removing incomplete files of a killed run";
+                return Err(JobError::io(dir, doing, e));
             }
             _ => {}
         }
     }
+    parts.remove_stale(&registry.remove_dead().map_err(failed)?);
     registry.set_output_dirs(dirs.into_iter().map(Path::to_owned).collect());
     Ok(())
 }

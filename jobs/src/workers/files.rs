@@ -78,21 +78,39 @@ pub(super) fn list_records(work_dir: &Path) -> io::Result<Vec<(PathBuf, Option<W
     Ok(records)
 }
 
-/// Removes the temporary files in `dir` whose owner is not in `living_owners`; returns their count.
-pub(crate) fn remove_stale_parts(dir: &Path, living_owners: &HashSet<String>) -> io::Result<usize> {
-    let mut removed = 0;
-    for entry in fs::read_dir(dir)? {
-        let entry = entry?;
-        let name = entry.file_name();
-        let Some(owner) = name.to_str().and_then(part_owner) else {
-            continue;
-        };
-        if living_owners.contains(owner) || !entry.file_type()?.is_file() {
-            continue;
+/// Temporary files that were listed before the living workers were: an owner that is not among those has ended, because
+/// workers register before they write. The other way around, a worker that registers in between would lose its files.
+#[derive(Debug, Default)]
+pub(crate) struct ListedParts {
+    /// Each with its owner.
+    parts: Vec<(PathBuf, String)>,
+}
+
+impl ListedParts {
+    /// Lists the temporary files in `dir`.
+    pub(crate) fn add(&mut self, dir: &Path) -> io::Result<()> {
+        for entry in fs::read_dir(dir)? {
+            let entry = entry?;
+            let name = entry.file_name();
+            if let Some(owner) = name.to_str().and_then(part_owner)
+                && entry.file_type()?.is_file()
+            {
+                self.parts.push((entry.path(), owner.to_owned()));
+            }
         }
-        removed += usize::from(fs::remove_file(entry.path()).is_ok());
+        Ok(())
     }
-    Ok(removed)
+
+    /// Removes the files whose owner is not in `living_owners`; returns their count.
+    pub(crate) fn remove_stale(&self, living_owners: &HashSet<String>) -> usize {
+        let stale = self
+            .parts
+            .iter()
+            .filter(|(_, owner)| !living_owners.contains(owner));
+        stale
+            .filter(|(path, _)| fs::remove_file(path).is_ok())
+            .count()
+    }
 }
 
 #[cfg(test)]
@@ -119,8 +137,14 @@ mod tests {
         let mut living = Publisher::create(&dir.path().join("b.exr")).unwrap();
         living.write_all(b"x").unwrap();
         let living_owners = [owner(), "h-2-ff"].map(str::to_owned).into();
-        assert_eq!(remove_stale_parts(dir.path(), &living_owners).unwrap(), 1);
+        let mut parts = ListedParts::default();
+        parts.add(dir.path()).unwrap();
+        // A worker that is not among the living, because it came after they were listed
+        let new = dir.path().join(".c.exr.h-3-ff.0.part");
+        fs::write(&new, b"new").unwrap();
+        assert_eq!(parts.remove_stale(&living_owners), 1);
         living.commit().unwrap();
-        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), keep.len() + 1);
+        assert!(new.exists());
+        assert_eq!(fs::read_dir(dir.path()).unwrap().count(), keep.len() + 2);
     }
 }

@@ -25,7 +25,7 @@ mod status;
 mod tests;
 
 pub use claim::{Claim, ClaimOutcome};
-pub(crate) use files::remove_stale_parts;
+pub(crate) use files::ListedParts;
 use heartbeat::HeartbeatSchedule;
 pub use heartbeat::start_heartbeat_thread;
 use liveness::{Liveness, LivenessMonitor};

@@ -11,7 +11,7 @@ use std::time::Duration;
 
 use spherule_publish::{owner, part_owner, publish};
 
-use super::files::{list_files, list_records, remove_if_exists, remove_stale_parts};
+use super::files::{ListedParts, list_files, list_records, remove_if_exists};
 use super::record::is_worker_name;
 use super::{HeartbeatSchedule, Liveness, LivenessMonitor, RECORD_SUFFIX, WORK_DIR, WorkerRecord};
 use crate::clock::Clock;
@@ -142,6 +142,10 @@ impl Drop for WorkerRegistry {
     fn drop(&mut self) {
         self.heartbeats.remove(&self.record_path);
         let _ = remove_if_exists(&self.record_path);
+        let mut parts = ListedParts::default();
+        for dir in self.output_dirs.get().into_iter().flatten() {
+            let _ = parts.add(dir);
+        }
         let Ok(mut living) = remove_dead(&self.work_dir, &self.monitor, None) else {
             return;
         };
@@ -150,9 +154,7 @@ impl Drop for WorkerRegistry {
         }
         // This process may have other jobs open
         living.insert(owner().to_owned());
-        for dir in self.output_dirs.get().into_iter().flatten() {
-            let _ = remove_stale_parts(dir, &living);
-        }
+        parts.remove_stale(&living);
     }
 }
 
