@@ -165,6 +165,7 @@ pub fn setup(
         material: surface::material(manifest, &bounds),
         background: background(manifest, up.as_vec3()),
         ground,
+        meshes: Vec::new(),
         environment,
         is_environment_visible: manifest.environment.visible,
     };
