@@ -23,9 +23,11 @@ mod denoise;
 mod environment;
 mod ground;
 mod lights;
+mod meshes;
 mod surface;
 
 pub use camera::check_views;
+pub use meshes::{add_meshes, mesh_settings};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -121,7 +123,7 @@ pub fn needs_environment_image(manifest: &Manifest) -> bool {
 }
 
 /// Determines everything about the images of a job. `map` is the image of the environment, if it
-/// [is needed](needs_environment_image).
+/// [is needed](needs_environment_image). [`add_meshes`] adds meshes.
 ///
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
@@ -195,6 +197,7 @@ pub fn setup(
         path,
         aspect,
         scene,
+        meshes: Vec::new(),
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,
