@@ -8,7 +8,7 @@ use spherule_formats::FrameError;
 use spherule_jobs::Fingerprint;
 
 use super::RunError;
-use crate::manifest::{Manifest, MeshPath};
+use crate::manifest::{Manifest, MeshPath, named_place};
 use crate::pipeline::{LoadedMesh, PictureMesh, load_mesh};
 use crate::reading::read_budget;
 use crate::resolve::mesh_settings;
@@ -83,15 +83,15 @@ impl JobMeshes {
     }
 }
 
-/// The file of a mesh that all images share.
+/// The file of a mesh that all images share; `dir` need not exist yet.
 fn shared_file(path: &MeshPath, dir: &Path) -> Option<PathBuf> {
-    (!path.has_number()).then(|| dir.join(path.as_str()))
+    (!path.has_number()).then(|| named_place(&dir.join(path.as_str())))
 }
 
 /// The files of the meshes that only `frame` has.
 pub(super) fn frame_files(manifest: &Manifest, dir: &Path, frame: i64) -> Vec<PathBuf> {
     let own = manifest.meshes.iter().filter(|mesh| mesh.path.has_number());
-    own.map(|mesh| dir.join(mesh.path.path_for(frame)))
+    own.map(|mesh| named_place(&dir.join(mesh.path.path_for(frame))))
         .collect()
 }
 

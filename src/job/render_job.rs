@@ -13,7 +13,7 @@ use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
 use crate::hdr::{HdrError, read_radiance_map};
-use crate::manifest::Manifest;
+use crate::manifest::{Manifest, named_place};
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
@@ -281,7 +281,8 @@ impl RenderJob {
     /// The path of the image of the environment, if there is one.
     fn environment_path(&self) -> Option<PathBuf> {
         let path = self.manifest.environment.image.as_ref()?;
-        needs_environment_image(&self.manifest).then(|| self.dir().join(path))
+        // The directory may not exist yet, so that the system cannot follow `..` from it
+        needs_environment_image(&self.manifest).then(|| named_place(&self.dir().join(path)))
     }
 
     /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.

@@ -11,7 +11,6 @@ use super::key::{Affects, Key};
 use super::keys::{Keys, keys};
 use super::pattern::FramePattern;
 use super::value::{Fault, Value, named, quoted};
-use crate::scene::mesh::DEFAULT_COLOR;
 use crate::surface::mesh::VisibleFaces;
 
 pub(super) const ABOUT: &[&str] =
@@ -116,8 +115,8 @@ pub struct Mesh {
     pub path: MeshPath,
     /// The material.
     pub material: MeshMaterial,
-    /// Base colour, or transmittance of glass, linear RGB.
-    pub color: Vec3,
+    /// Base colour, or transmittance of glass, linear RGB; by default light grey, and clear glass.
+    pub color: Option<Vec3>,
     /// Roughness of plastic and metal, 0 to 1.
     pub roughness: f32,
     /// The normals for shading.
@@ -137,7 +136,7 @@ impl Default for Mesh {
         Self {
             path: MeshPath::parse("tank.stl").expect("a file"),
             material: MeshMaterial::Matte,
-            color: DEFAULT_COLOR,
+            color: None,
             roughness: ROUGHNESS,
             normals: MeshShading::Smooth,
             faces: VisibleFaces::Both,
@@ -161,7 +160,7 @@ impl Mesh {
             /// others are matte.
             material => self.material;
             /// Colour, linear RGB; of glass, the part of the light that passes
-            color => self.color, from(0), to(1);
+            color => self.color, from(0), to(1), example("[0.6, 0.6, 0.6]"), unset("light grey, and clear glass");
             /// Roughness of plastic and metal, 0 (a mirror) to 1
             roughness => self.roughness, from(0), to(1), affects(Affects::PathTracing);
             /// Normals for shading: smooth (but for edges of more than 40 degrees) | flat

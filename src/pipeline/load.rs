@@ -93,7 +93,7 @@ pub fn load_frame(
         loaded.clamped_radii,
         "radii raised: too small to be seen, or no number",
     );
-    loaded.meshes = meshes_of(&setup.picture, task, &mut loaded.notes)?;
+    loaded.meshes = meshes_of(&setup.picture.meshes, task, &mut loaded.notes)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }

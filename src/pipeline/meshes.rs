@@ -10,7 +10,6 @@ use spherule_formats::mesh::read_mesh;
 use spherule_formats::{FrameError, MemoryBudget};
 
 use super::ImageTask;
-use super::setup::Picture;
 use crate::surface::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 
 /// How many times a mesh may be larger or smaller than the particles before that is noted.
@@ -163,27 +162,27 @@ fn ratio_note(path: &Path, tree: &MeshTree, particles: f64) -> Option<String> {
     ))
 }
 
-/// The meshes of the image of `task`: those of all pictures, and its own. Passes notes to `notes`.
+/// The trees of `meshes` for the image of `task`: those of all pictures, and its own. Passes notes to `notes`.
 ///
 /// # Errors
 /// One of its own cannot be read.
 pub(super) fn meshes_of(
-    picture: &Picture,
+    meshes: &[PictureMesh],
     task: &ImageTask,
     notes: &mut Vec<String>,
 ) -> Result<Vec<Arc<MeshTree>>, MeshLoadError> {
     let mut own = task.meshes.iter();
-    let mut meshes = Vec::with_capacity(picture.meshes.len());
-    for mesh in &picture.meshes {
+    let mut trees = Vec::with_capacity(meshes.len());
+    for mesh in meshes {
         if let Some(tree) = &mesh.tree {
-            meshes.push(Arc::clone(tree));
+            trees.push(Arc::clone(tree));
         } else if let Some(path) = own.next() {
             let loaded = load_mesh(path, &mesh.settings).map_err(|e| missing(e, path))?;
             notes.extend(loaded.notes);
-            meshes.push(loaded.tree);
+            trees.push(loaded.tree);
         }
     }
-    Ok(meshes)
+    Ok(trees)
 }
 
 fn missing(error: MeshLoadError, path: &Path) -> MeshLoadError {

@@ -70,7 +70,7 @@ impl RenderContext<'_> {
     }
 
     /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
-    /// covers all of it, unless the background is transparent.
+    /// covers all of it, unless the background is transparent. Holdouts cover nothing.
     pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => otherwise[lane],

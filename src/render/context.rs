@@ -7,7 +7,6 @@ use glam::Vec3;
 use super::{
     lights::{Light, light_of},
     materials::Dielectric,
-    panes::is_pane,
     sampler::FilmSampler,
     scratch::SEGMENTS,
     settings::RenderSettings,
@@ -69,6 +68,13 @@ impl Interior {
             (true, true) => Self::Body,
         }
     }
+}
+
+/// Whether `shape` is a pane in `scene`.
+fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
+    let mesh = shape.material().mesh_index();
+    mesh.and_then(|index| scene.meshes.get(index))
+        .is_some_and(MeshMaterial::is_pane)
 }
 
 impl<'a> RenderContext<'a> {

@@ -16,20 +16,13 @@ use super::{
 };
 use crate::math::{lane3, lanes_in, set_lane3, splat};
 use crate::ray::Ray;
+use crate::scene::MeshMaterial;
 use crate::scene::mesh::pane_reflectance;
-use crate::scene::{MeshMaterial, Scene};
-use crate::surface::{Intersection, Intersections, MaterialId, Shape};
+use crate::surface::{Intersection, Intersections, MaterialId};
 use glam::Vec3;
 
 /// Maximum number of panes along a ray; further ones are not there.
 const MAX_PANES: usize = 64;
-
-/// Whether `shape` is a pane in `scene`.
-pub(super) fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
-    let mesh = shape.material().mesh_index();
-    mesh.and_then(|index| scene.meshes.get(index))
-        .is_some_and(MeshMaterial::is_pane)
-}
 
 /// A ray at a pane.
 struct PaneCrossing {

@@ -424,7 +424,7 @@ impl PathIntegrator<'_> {
         next: &mut RayStreams,
     ) {
         let max = self.context.settings.max_depth;
-        let last = lanes & lanes_where(|l| depth - segments.bounces[l] >= max);
+        let last = lanes & lanes_where(|l| depth >= max + segments.bounces[l]);
         (self.context).reflect_at_panes(segments, lanes, last, packet, next);
         // At the last specular surface, rays see the environment
         if let Some(environment) = self.environment.filter(|_| last != 0) {
@@ -454,7 +454,7 @@ impl PathIntegrator<'_> {
         interface.shading_points(context.simd, rays, hits, inside, &mut packet.points);
         // At the last specular surface, rays see the environment
         let max = context.settings.max_depth;
-        let is_last = |l: usize| depth - segments.bounces[l] >= max;
+        let is_last = |l: usize| depth >= max + segments.bounces[l];
         let hits = SpecularHits {
             segments,
             depth,

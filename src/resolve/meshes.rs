@@ -5,6 +5,7 @@ use spherule_formats::MemoryBudget;
 
 use crate::manifest::{self, Manifest, MeshShading};
 use crate::pipeline::{MeshSettings, PictureMesh, Setup};
+use crate::scene::mesh::DEFAULT_COLOR;
 use crate::scene::{Bounds, Finish, MeshFinish, MeshMaterial};
 use crate::surface::mesh::MeshNormals;
 use crate::survey::Survey;
@@ -66,7 +67,10 @@ pub fn add_meshes(setup: &mut Setup, manifest: &Manifest, meshes: Vec<PictureMes
 fn material(mesh: &manifest::Mesh) -> MeshMaterial {
     let roughness = mesh.roughness;
     MeshMaterial {
-        color: mesh.color,
+        color: mesh.color.unwrap_or(match mesh.material {
+            manifest::MeshMaterial::Glass => Vec3::ONE,
+            _ => DEFAULT_COLOR,
+        }),
         finish: match mesh.material {
             manifest::MeshMaterial::Matte => MeshFinish::Opaque(Finish::Matte),
             manifest::MeshMaterial::Plastic => MeshFinish::Opaque(Finish::Plastic { roughness }),

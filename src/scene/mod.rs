@@ -84,7 +84,7 @@ pub struct Scene {
     pub background: Background,
     /// Optional ground.
     pub ground: Option<Ground>,
-    /// The materials of meshes; their shapes have the [`MaterialId`](crate::surface::MaterialId)s of these indices.
+    /// The materials of meshes, by the index of each mesh.
     pub meshes: Vec<MeshMaterial>,
     /// Light from infinitely far away, for path tracing.
     pub environment: Option<Arc<Environment>>,

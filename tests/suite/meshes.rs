@@ -68,7 +68,10 @@ fn stl(path: &Path, triangles: &[[Vec3; 3]]) {
 
 /// A wall at `y` across the left half of the view, facing the camera.
 fn wall(path: &Path, y: f32) {
-    stl(path, &side(Vec3::new(-9.0, y, -9.0), 9.0 * Vec3::X, 18.0 * Vec3::Z));
+    stl(
+        path,
+        &side(Vec3::new(-9.0, y, -9.0), 9.0 * Vec3::X, 18.0 * Vec3::Z),
+    );
 }
 
 /// A closed box from -2 to 2 with outward triangles.
@@ -185,7 +188,10 @@ fn units_and_places_are_those_of_the_manifest() {
     assert!((z.floats("Z")[18 * 64 + 31] - 3.5).abs() < 1e-4);
     // The manifest next to the images names the same file
     let written = fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
-    assert!(written.contains("path = \"../jobs/meshes/wall.stl\""), "{written}");
+    assert!(
+        written.contains("path = \"../jobs/meshes/wall.stl\""),
+        "{written}"
+    );
     workshop
         .run(&["render", "out/job.toml"])
         .expect(0)
@@ -234,7 +240,10 @@ fn each_frame_may_have_its_own_mesh() {
     // A frame without its mesh fails alone
     let ran = render(&workshop, "out", &options).expect(1);
     let message = ran.errors();
-    assert!(message.contains("wall.003.stl: the mesh of the frame does not exist"), "{message}");
+    assert!(
+        message.contains("wall.003.stl: the mesh of the frame does not exist"),
+        "{message}"
+    );
     assert!(message.contains("input.frames"), "{message}");
     assert!((z(1) - 4.0).abs() < 1e-5 && (z(2) - 3.0).abs() < 1e-5);
     wall(&workshop.join("wall.003.stl"), -4.0);
@@ -284,7 +293,9 @@ fn another_mesh_is_another_job() {
     render(&workshop, "out", &options)
         .expect(2)
         .prints("mesh.0.path");
-    render(&workshop, "out", &[]).expect(2).prints("mesh.0.path");
+    render(&workshop, "out", &[])
+        .expect(2)
+        .prints("mesh.0.path");
 }
 
 #[test]
@@ -312,8 +323,19 @@ fn meshes_that_cannot_be_rendered_are_named() {
 fn images_depend_on_neither_threads_nor_structures() {
     let workshop = particles(1);
     tank(&workshop.join("tank.stl"));
-    let sets = ["mesh.0.faces=back", "mesh.1.material=glass", "mesh.1.scale=0.5"];
-    let mut options = vec!["--mesh", "tank.stl", "--mesh", "tank.stl", "--integrator", "path"];
+    let sets = [
+        "mesh.0.faces=back",
+        "mesh.1.material=glass",
+        "mesh.1.scale=0.5",
+    ];
+    let mut options = vec![
+        "--mesh",
+        "tank.stl",
+        "--mesh",
+        "tank.stl",
+        "--integrator",
+        "path",
+    ];
     options.extend(sets.iter().flat_map(|set| ["--set", set]));
     options.extend(["--set", "image.samples=8"]);
     let mut all = Vec::new();
