@@ -96,13 +96,11 @@ impl RenderContext<'_> {
         if self.settings.channels == Channels::COLOR || packet.hits.mask == 0 {
             return;
         }
+        // The data of reflections at panes are of what is behind
+        self.restore_behind(packet);
         // Compute the depths of all samples
         let mut z = splat(f32::INFINITY);
         depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
-        // Reflections at panes have no data: those of the pixel are of what is behind
-        for lane in lanes_in(self.pane_lanes(&packet.hits)) {
-            z[lane] = f32::INFINITY;
-        }
         let samples = self.settings.samples as usize;
         let mut lane = 0;
         while lane < rays.len() {

@@ -71,6 +71,7 @@ impl RenderContext<'_> {
             get_1d_lanes(self.simd, &segments.path, PANE, &sample, &mut u);
         }
         packet.first_pane = splat(f32::INFINITY);
+        packet.behind.clear();
         for lane in lanes_in(segments.lanes()) {
             let mut u = u[lane];
             let mut throughput = lane3(&packet.throughput, lane);
@@ -85,6 +86,7 @@ impl RenderContext<'_> {
                 } else if let Some(rest) = pane.choose(&mut throughput, u) {
                     u = rest;
                 } else {
+                    self.keep_behind(lane, packet);
                     packet.hits.set(lane, &pane.hit, pane.material);
                     segments.rays.t_max[lane] = pane.hit.t;
                     break;
@@ -92,6 +94,27 @@ impl RenderContext<'_> {
                 rest.t_min = pane.hit.t + pane.hit.offset;
             }
             set_lane3(&mut packet.throughput, lane, throughput);
+        }
+    }
+
+    /// Keeps the intersection behind a pane that reflects the ray in `lane`, for the data of the pixel.
+    fn keep_behind(&self, lane: usize, packet: &mut PacketScratch) {
+        let (hit, material) = (packet.hits.get(lane), packet.hits.material[lane]);
+        let is_hidden = material == MaterialId::GROUND && self.catches_shadows();
+        if packet.hits.mask >> lane & 1 == 1 && !is_hidden {
+            packet.behind.set(lane, &hit, material);
+        }
+    }
+
+    /// Replaces the intersections of rays that panes reflect by those behind the panes.
+    pub(super) fn restore_behind(&self, packet: &mut PacketScratch) {
+        for lane in lanes_in(self.pane_lanes(&packet.hits)) {
+            if packet.behind.mask >> lane & 1 == 1 {
+                let (hit, material) = (packet.behind.get(lane), packet.behind.material[lane]);
+                packet.hits.set(lane, &hit, material);
+            } else {
+                packet.hits.mask &= !(1 << lane);
+            }
         }
     }
 
