@@ -12,8 +12,9 @@ use spherule_formats::{FrameError, MemoryBudget};
 use super::ImageTask;
 use crate::surface::mesh::{MeshError, MeshNormals, MeshTree, TriangleMesh, VisibleFaces};
 
-/// How many times a mesh may be larger or smaller than the particles before that is noted.
-const USUAL_RATIO: f64 = 1000.0;
+/// How many times a mesh may be larger or smaller than the particles before that is noted. A tank in millimetres around
+/// particles in metres is a thousand times its usual size, which may be a few times larger or smaller than they are.
+const USUAL_RATIO: f64 = 300.0;
 
 /// How the file of a mesh becomes a shape.
 #[derive(Debug, Clone, PartialEq)]
@@ -258,7 +259,7 @@ mod tests {
     fn units_that_differ_are_noted() {
         for (particle_extent, part) in [
             (1.0, None),
-            (900.0, None),
+            (100.0, None),
             (2e3, Some("1414 times smaller")),
             (1e-3, Some("1414 times larger")),
             (0.0, None),
