@@ -113,7 +113,7 @@ fn a_wall_hides_particles_behind_it() {
         };
         let without = with("plain", &[]);
         let found = with("wall", &["--mesh", "wall.stl"]);
-        for (pixel, id) in found.integers("id").iter().enumerate() {
+        for (pixel, id) in found.integers("id.I").iter().enumerate() {
             let is_left = pixel % 64 < 32;
             let value = |name: &str| found.floats(name)[pixel];
             if is_left {
@@ -124,11 +124,11 @@ fn a_wall_hides_particles_behind_it() {
                 assert_eq!(value("A"), 1.0);
                 assert!(integrator == "path" || value("R") > 0.05);
             } else {
-                assert_eq!(*id, without.integers("id")[pixel]);
+                assert_eq!(*id, without.integers("id.I")[pixel]);
                 assert_eq!(value("Z"), without.floats("Z")[pixel]);
             }
         }
-        assert!(without.integers("id").iter().any(|id| *id != NO_ID));
+        assert!(without.integers("id.I").iter().any(|id| *id != NO_ID));
         // A holdout is a hole in front of the particles
         let hole = with(
             "hole",
@@ -157,12 +157,12 @@ fn one_looks_into_a_tank_with_visible_backs() {
     let workshop = particles(1);
     tank(&workshop.join("tank.stl"));
     let middle = 18 * 64 + 32;
-    // The front of the box ends at the edges of the picture
+    // Beside the particles, one sees the rear wall
     let depth = |faces: &str| {
         let set = format!("mesh.0.faces={faces}");
         let image = picture(&workshop, faces, &["--mesh", "tank.stl", "--set", &set]);
         let z = image.floats("Z");
-        [z[middle], z[middle - 15]]
+        [z[middle], z[middle - 9]]
     };
     let near = |found: [f32; 2], wanted: [f32; 2]| {
         let far = |(a, b): (&f32, &f32)| (a - b).abs() > 0.02;
@@ -177,7 +177,10 @@ fn one_looks_into_a_tank_with_visible_backs() {
 fn units_and_places_are_those_of_the_manifest() {
     let workshop = particles(1);
     fs::create_dir_all(workshop.join("jobs/meshes")).expect("a directory");
-    wall(&workshop.join("jobs/meshes/wall.stl"), -2000.0);
+    // In thousandths of the unit of the particles
+    let corner = 1000.0 * Vec3::new(-9.0, -2.0, -9.0);
+    let wall = side(corner, 9000.0 * Vec3::X, 18_000.0 * Vec3::Z);
+    stl(&workshop.join("jobs/meshes/wall.stl"), &wall);
     let mesh = "[[mesh]]\npath = \"meshes/wall.stl\"\nscale = 0.001\ntranslate = [0, -0.5, 0]\n";
     let job = format!("input.path = \"../in\"\noutput.path = \"../out/f.#.exr\"\n{mesh}");
     fs::write(workshop.join("jobs/a.toml"), job).expect("a file");
@@ -197,13 +200,12 @@ fn units_and_places_are_those_of_the_manifest() {
         .expect(0)
         .prints("1 of 1 frames are done already");
     // Without the factor, the unit is doubtful
-    let ran = render(&workshop, "raw", &["--mesh", "jobs/meshes/wall.stl"]).expect(0);
+    let note = "times larger than the particles; if it is in another unit, set mesh.scale";
+    let mesh = ["--mesh", "jobs/meshes/wall.stl"];
+    render(&workshop, "raw", &mesh).expect(0).prints(note);
+    let scaled = [&mesh[..], &["--set", "mesh.0.scale=0.001"]].concat();
+    let ran = render(&workshop, "scaled", &scaled).expect(0);
     assert!(!ran.errors().contains("mesh.scale"), "{}", ran.errors());
-    let scale = ["--set", "mesh.0.scale=1000"];
-    let options = [&["--mesh", "jobs/meshes/wall.stl"][..], &scale].concat();
-    render(&workshop, "huge", &options)
-        .expect(0)
-        .prints("times larger than the particles; if it is in another unit, set mesh.scale");
 }
 
 #[test]
