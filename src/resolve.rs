@@ -23,10 +23,12 @@ mod denoise;
 mod environment;
 mod ground;
 mod lights;
+mod meshes;
 mod surface;
 
 pub use camera::check_views;
 use ground::Floor;
+pub use meshes::{add_meshes, mesh_settings};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
@@ -122,7 +124,7 @@ pub fn needs_environment_image(manifest: &Manifest) -> bool {
 }
 
 /// Determines everything about the images of a job. `map` is the image of the environment, if it
-/// [is needed](needs_environment_image).
+/// [is needed](needs_environment_image). [`add_meshes`] adds meshes.
 ///
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
@@ -173,6 +175,7 @@ pub fn setup(
         material: surface::material(manifest, &bounds),
         background: background(manifest, up.as_vec3()),
         ground,
+        meshes: Vec::new(),
         environment,
         is_environment_visible: manifest.environment.visible,
     };
@@ -203,6 +206,7 @@ pub fn setup(
         path,
         aspect,
         scene,
+        meshes: Vec::new(),
         renderer: crate::render::RendererKind::default(),
         render,
         denoise,

@@ -16,7 +16,7 @@ impl FingerprintCache {
     pub(crate) fn prefetch(request: &JobRequest, selected: &[i64], old: Option<&Plan>) -> Self {
         let mut fingerprints = Self::default();
         let needed = frames_to_fingerprint(request, selected, old);
-        for path in needed.iter().flat_map(|frame| &frame.inputs) {
+        for path in needed.iter().flat_map(|frame| frame.dependencies()) {
             fingerprints.get(path);
         }
         fingerprints

@@ -9,7 +9,7 @@ use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use crate::fingerprint_cache::FingerprintCache;
-use crate::{JobError, JobRequest, JobState, PlannedFrame, PlannedInput, ResumeMode};
+use crate::{FrameRequest, JobError, JobRequest, JobState, PlannedFrame, PlannedInput, ResumeMode};
 
 /// Number of frames whose contents are compared, spread over the sequence.
 const MAX_COMPARED: usize = 32;
@@ -75,10 +75,10 @@ fn has_same_contents(
     request: &JobRequest,
     fingerprints: &mut FingerprintCache,
 ) -> bool {
-    let shared: Vec<(&PlannedFrame, &[PathBuf])> = request
+    let shared: Vec<(&PlannedFrame, &FrameRequest)> = request
         .frames
         .iter()
-        .filter_map(|f| Some((state.plan.frame(f.number)?, &f.inputs[..])))
+        .filter_map(|f| Some((state.plan.frame(f.number)?, f)))
         .filter(|(old, _)| old.inputs.iter().all(|i| i.fingerprint.is_some()))
         .collect();
     // Prefer finished frames: the inputs of the others may have changed since they were planned
@@ -97,11 +97,11 @@ fn has_same_contents(
 
 fn is_same_frame(
     old: &[PlannedInput],
-    new: &[PathBuf],
+    new: &FrameRequest,
     fingerprints: &mut FingerprintCache,
 ) -> bool {
-    let mut pairs = old.iter().zip(new);
-    old.len() == new.len()
+    let mut pairs = old.iter().zip(new.dependencies());
+    old.len() == new.dependencies().count()
         && pairs.all(
             |(old, new)| match (&old.fingerprint, fingerprints.get(new)) {
                 (Some(old), Some(new)) => old.has_same_contents(&new),

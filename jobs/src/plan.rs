@@ -43,7 +43,7 @@ pub struct Plan {
 pub struct PlannedFrame {
     /// Frame number, unique in the plan.
     pub number: i64,
-    /// Input files.
+    /// Input files, and then those of [`crate::FrameRequest::companions`].
     pub inputs: Vec<PlannedInput>,
     /// Output files; relative paths are in the job's directory.
     pub outputs: Vec<String>,

@@ -162,7 +162,7 @@ fn planned_frames<'a>(
     let mut planned = Vec::new();
     for frame in frames {
         let mut inputs = Vec::with_capacity(frame.inputs.len());
-        for path in &frame.inputs {
+        for path in frame.dependencies() {
             inputs.push(PlannedInput {
                 path: utf8(path)?,
                 fingerprint: fingerprints.get(path),

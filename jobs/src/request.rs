@@ -49,8 +49,17 @@ pub struct FrameRequest {
     pub number: i64,
     /// Input files. They need not be readable.
     pub inputs: Vec<PathBuf>,
+    /// Further files that the outputs depend on, such as meshes. They do not tell one input from another.
+    pub companions: Vec<PathBuf>,
     /// Output files.
     pub outputs: Vec<PathBuf>,
+}
+
+impl FrameRequest {
+    /// All files that the outputs depend on.
+    pub(crate) fn dependencies(&self) -> impl Iterator<Item = &PathBuf> {
+        self.inputs.iter().chain(&self.companions)
+    }
 }
 
 impl JobRequest {

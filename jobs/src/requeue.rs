@@ -49,6 +49,7 @@ mod tests {
         let frame = |number| FrameRequest {
             number,
             inputs: Vec::new(),
+            companions: Vec::new(),
             outputs: vec![dir.join(format!("f.{number}"))],
         };
         let request = JobRequest {

@@ -68,6 +68,7 @@ impl Fixture {
                 .map(|number| FrameRequest {
                     number,
                     inputs: vec![self.input(number)],
+                    companions: Vec::new(),
                     outputs: vec![self.image(number)],
                 })
                 .collect(),

@@ -126,6 +126,12 @@ impl<'a> Check<'a> {
             }
         };
         self.setup = self.or_problem(setup);
+        if self.setup.is_some() {
+            let notes = self.or_problem(self.render_job.scene_notes());
+            for note in notes.iter().flatten() {
+                note!("{note}");
+            }
+        }
         self.survey_time = start.elapsed();
         let frames = match &self.dry_run {
             Some(dry_run) => dry_run.pending(),
@@ -206,7 +212,7 @@ impl<'a> Check<'a> {
     }
 
     fn size(&self, setup: &Setup, task: &ImageTask) -> FrameSize {
-        FrameSize::of(self.sequence, task.index, setup.run.weight.as_ref())
+        FrameSize::of_task(self.sequence, task, setup)
     }
 
     fn renderable(&self) -> impl Iterator<Item = &ImageTask> {

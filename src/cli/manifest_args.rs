@@ -9,7 +9,7 @@ use spherule_formats::sequence::SequenceError;
 use super::CliError;
 use super::key_flags::{KeyFlags, over};
 use super::numbers::number;
-use super::paths::text;
+use super::paths::{path_as_typed, text};
 use crate::job::JobManifest;
 use crate::manifest::{self, Look, Manifest, Override};
 
@@ -46,6 +46,12 @@ pub(super) struct ManifestArgs {
     #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
         help_heading = "Look", display_order = 0)]
     pub(super) range: Option<Vec<f64>>,
+    /// Triangle mesh next to the particles, such as a tank: STL, OBJ, PLY, VTK. May be repeated.
+    ///
+    /// A name with #### or %04d for the frame number is one mesh per frame. [[mesh]] in a manifest has more settings:
+    /// material, colour, unit.
+    #[arg(long, value_name = "FILE", help_heading = "Input", display_order = 0)]
+    pub(super) mesh: Vec<PathBuf>,
     /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
     ///
     /// `spherule init` prints all keys with their meaning.
@@ -138,6 +144,13 @@ impl ManifestArgs {
                     .map_err(|e| CliError::other(format!("--look: {e}")))?
                     .settings(&format!("--look {look}")),
             );
+        }
+        for mesh in &self.mesh {
+            let mut table = toml::Table::new();
+            let path = path_as_typed(&text(mesh)?, from_file)?;
+            table.insert("path".to_owned(), path.into());
+            let append = Override::append("mesh", table, "--mesh");
+            list.push(append.map_err(|e| CliError::other(e.to_string()))?);
         }
         for assignment in &self.set {
             list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);

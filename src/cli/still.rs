@@ -83,7 +83,7 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let render_job = RenderJob::new(requested, &sequence, None)?;
     message!("surveying the sequence");
     let (survey, mut setup) = render_job.survey(&sequence)?;
-    for note in render_job.environment_notes()? {
+    for note in render_job.scene_notes()? {
         note!("{note}");
     }
     if kind == PictureKind::Png {

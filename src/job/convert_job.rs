@@ -108,7 +108,11 @@ impl ConvertJob {
     fn request(&self, mode: ResumeMode) -> JobRequest {
         let mut settings = vec![(KIND.to_owned(), CONVERT.to_owned())];
         settings.extend(self.settings.settings());
-        let mut frames = frame_requests(&self.sequence, |frame| vec![self.output(frame)]);
+        let mut frames = frame_requests(
+            &self.sequence,
+            |_| Vec::new(),
+            |frame| vec![self.output(frame)],
+        );
         if let Some(range) = self.range.as_ref().filter(|_| self.name.is_some()) {
             frames.retain(|frame| range.contains(frame.number));
         }

@@ -10,7 +10,7 @@ use spherule_jobs::{FileError, FrameRange, JobError};
 use crate::conversion::UnknownAttribute;
 use crate::hdr::HdrError;
 use crate::manifest::{ManifestError, RebaseError};
-use crate::pipeline::MemoryLimitError;
+use crate::pipeline::{MemoryLimitError, MeshLoadError};
 use crate::resolve::ResolveError;
 
 /// Why a job cannot start or continue. Messages say what is wrong. Remedies that depend on a command line are the
@@ -35,6 +35,14 @@ pub enum RunError {
     /// The image of the environment cannot be read.
     #[error("environment.image: {0}")]
     Environment(#[from] HdrError),
+    /// A mesh cannot be read.
+    #[error("mesh.{index}.path: {source}")]
+    Mesh {
+        /// Its index in the manifest.
+        index: usize,
+        /// Why.
+        source: MeshLoadError,
+    },
     /// An attribute to convert does not exist.
     #[error(transparent)]
     UnknownAttribute(#[from] UnknownAttribute),

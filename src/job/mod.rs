@@ -46,6 +46,7 @@ mod error;
 mod follow;
 pub mod isolate;
 mod manifest_file;
+mod meshes;
 mod render_job;
 mod render_run;
 mod selection;

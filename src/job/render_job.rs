@@ -8,15 +8,16 @@ use spherule_formats::Sequence;
 use spherule_jobs::{Fingerprint, FrameRequest, Job, JobRequest, Plan, ResumeMode};
 
 use super::manifest_file::{JobManifest, ManifestFile};
+use super::meshes::{self, JobMeshes};
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
 use crate::hdr::{HdrError, read_radiance_map};
-use crate::manifest::Manifest;
+use crate::manifest::{Manifest, named_place};
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
 use crate::report::job::{HTML_FILE, JSON_FILE};
-use crate::resolve::{self, check_views, needs_environment_image, question};
+use crate::resolve::{self, add_meshes, check_views, needs_environment_image, question};
 use crate::scene::RadianceMap;
 use crate::survey::Survey;
 
@@ -31,6 +32,7 @@ pub struct RenderJob {
     shard: Option<Shard>,
     /// See [`RenderJob::environment_image`].
     environment_image: OnceLock<Option<RadianceMap>>,
+    meshes: JobMeshes,
 }
 
 impl RenderJob {
@@ -53,6 +55,7 @@ impl RenderJob {
             shown_output,
             shard,
             environment_image: OnceLock::new(),
+            meshes: JobMeshes::default(),
         })
     }
 
@@ -135,7 +138,11 @@ impl RenderJob {
         };
         Ok(JobRequest {
             settings: self.settings(mode)?,
-            frames: self.frames_of_job(frame_requests(sequence, outputs)),
+            frames: self.frames_of_job(frame_requests(
+                sequence,
+                |frame| self.mesh_files(frame),
+                outputs,
+            )),
             extra_outputs: [JSON_FILE, HTML_FILE]
                 .map(|name| self.dir().join(name))
                 .into(),
@@ -171,7 +178,7 @@ impl RenderJob {
     /// The settings of the images. Those with the same effect as in the existing plan are written as in the plan.
     fn settings(&self, mode: ResumeMode) -> Result<Vec<(String, String)>, RunError> {
         let mut settings = self.manifest.settings();
-        self.identify_environment(&mut settings)?;
+        self.identify_files(&mut settings)?;
         let Some(planned) = self.existing_plan(mode)? else {
             return Ok(settings);
         };
@@ -179,7 +186,7 @@ impl RenderJob {
         let mut as_planned = self
             .manifest
             .settings_as_planned(planned.settings(), has_rgb);
-        self.identify_environment(&mut as_planned)?;
+        self.identify_files(&mut as_planned)?;
         // Settings that are resolved again must be the new ones
         let resolves_again =
             mode == ResumeMode::KeepDone && !planned.changes_to(&as_planned).is_empty();
@@ -187,6 +194,17 @@ impl RenderJob {
             true => settings,
             false => as_planned,
         })
+    }
+
+    /// Replaces paths of files that all images depend on in `settings` by fingerprints: the files may be moved.
+    fn identify_files(&self, settings: &mut [(String, String)]) -> Result<(), RunError> {
+        self.identify_environment(settings)?;
+        meshes::identify(&self.manifest, self.dir(), settings)
+    }
+
+    /// The files of the meshes that only `frame` has.
+    fn mesh_files(&self, frame: i64) -> Vec<PathBuf> {
+        meshes::frame_files(&self.manifest, self.dir(), frame)
     }
 
     /// Replaces the path of the image of the environment in `settings` by its fingerprint: the image may be moved.
@@ -264,7 +282,9 @@ impl RenderJob {
     fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {
         let frames = sequence.frames().iter().map(|frame| frame.number);
         let map = self.environment_image()?;
-        let setup = resolve::setup(&self.manifest, survey, map)?;
+        let mut setup = resolve::setup(&self.manifest, survey, map)?;
+        let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
+        add_meshes(&mut setup, &self.manifest, meshes);
         check_views(&setup, frames)?;
         Ok(setup)
     }
@@ -272,7 +292,8 @@ impl RenderJob {
     /// The path of the image of the environment, if there is one.
     fn environment_path(&self) -> Option<PathBuf> {
         let path = self.manifest.environment.image.as_ref()?;
-        needs_environment_image(&self.manifest).then(|| self.dir().join(path))
+        // The directory may not exist yet, so that the system cannot follow `..` from it
+        needs_environment_image(&self.manifest).then(|| named_place(&self.dir().join(path)))
     }
 
     /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.
@@ -286,18 +307,22 @@ impl RenderJob {
         Ok(self.environment_image.get_or_init(|| reduced).as_ref())
     }
 
-    /// Notes for the user on the image of the environment.
+    /// Notes for the user on the image of the environment, and on meshes that have been read for a setup.
     ///
     /// # Errors
     /// The image cannot be read.
-    pub fn environment_notes(&self) -> Result<Vec<String>, RunError> {
+    pub fn scene_notes(&self) -> Result<Vec<String>, RunError> {
         let negative = self.environment_image()?.map_or(0, RadianceMap::negative);
         let note = |path: PathBuf| {
             let path = path.display();
             format!("{path}: {negative} pixels are negative, which counts as 0")
         };
         let path = self.environment_path().filter(|_| negative > 0);
-        Ok(path.map(note).into_iter().collect())
+        Ok(path
+            .map(note)
+            .into_iter()
+            .chain(self.meshes.notes())
+            .collect())
     }
 
     /// The setup with the survey that is stored in the plan.
@@ -322,6 +347,7 @@ impl RenderJob {
                 index,
                 image: self.image(frame),
                 preview: self.preview(frame),
+                meshes: self.mesh_files(frame),
                 refused: None,
             })
             .collect()
@@ -336,7 +362,7 @@ impl RenderJob {
     ) -> Schedule {
         let sizes: Vec<FrameSize> = tasks
             .iter()
-            .map(|task| FrameSize::of(sequence, task.index, setup.run.weight.as_ref()))
+            .map(|task| FrameSize::of_task(sequence, task, setup))
             .collect();
         let limit = self.manifest.render.memory_limit;
         let mut schedule = MemoryModel::new(setup).schedule(&sizes, limit, available());

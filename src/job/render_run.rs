@@ -50,7 +50,7 @@ impl RenderRun {
         let mut tasks = render_job.tasks(&sequence, &job.pending());
         let schedule = render_job.schedule(&sequence, &setup, &mut tasks);
         require_one_fits(&tasks)?;
-        notes.extend(render_job.environment_notes()?);
+        notes.extend(render_job.scene_notes()?);
         notes.extend(render_job.write_manifest(mode)?);
         if schedule.overlap == Overlap::None && tasks.len() > 1 {
             notes.push("one frame at a time, to reduce memory".to_owned());

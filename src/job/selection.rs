@@ -93,9 +93,11 @@ pub(super) fn select(
     }
 }
 
-/// Requests for all frames of `sequence`; `outputs` returns the output files of a frame.
+/// Requests for all frames of `sequence`; `companions` returns further files that the images of a frame depend on,
+/// `outputs` the output files.
 pub(super) fn frame_requests(
     sequence: &Sequence,
+    companions: impl Fn(i64) -> Vec<PathBuf>,
     outputs: impl Fn(i64) -> Vec<PathBuf>,
 ) -> Vec<FrameRequest> {
     let request = |(index, number)| {
@@ -103,6 +105,7 @@ pub(super) fn frame_requests(
         FrameRequest {
             number,
             inputs: inputs.map(Path::to_owned).collect(),
+            companions: companions(number),
             outputs: outputs(number),
         }
     };

@@ -22,7 +22,9 @@ fn manual() -> String {
     );
     let mut tables: Vec<&[Entry]> = tables(&entries).collect();
     // A list follows the table that contains it, as in the file.
-    tables.sort_by_key(|table| table[0].section.split('.').next() == Some("light"));
+    let is_list =
+        |table: &&[Entry]| matches!(table[0].section.split('.').next(), Some("light" | "mesh"));
+    tables.sort_by_key(is_list);
     for table in tables {
         let _ = write!(page, "\n## {}\n\n{}.\n", title(table), table[0].about);
         for entry in table {

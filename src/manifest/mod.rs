@@ -11,7 +11,7 @@ use spherule_jobs::FrameRange;
 
 use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
 use crate::scene::Fresnel;
-use crate::surface::{SurfaceKind, SurfaceSettings};
+use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
 
 use key::Affects;
 use keys::Keys;
@@ -36,6 +36,7 @@ mod list;
 #[cfg(test)]
 mod manual;
 mod material;
+mod mesh;
 mod nearest;
 mod output;
 mod pattern;
@@ -68,10 +69,11 @@ pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
 pub use material::{Material, MaterialKind};
+pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
 #[cfg(feature = "cli")]
 pub(crate) use nearest::nearest;
 pub use output::{Channel, Output};
-pub use pattern::OutputPattern;
+pub use pattern::{FramePattern, OutputPattern};
 pub use preset::Look;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
@@ -102,6 +104,8 @@ pub struct Manifest {
     pub environment: Environment,
     /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
     pub lights: Vec<Light>,
+    /// Meshes next to the particles.
+    pub meshes: Vec<Mesh>,
     /// The images.
     pub output: Output,
     /// Execution options; no image depends on them.
@@ -141,6 +145,7 @@ impl Manifest {
             material: Material::default(),
             environment: Environment::default(),
             lights: Vec::new(),
+            meshes: Vec::new(),
             output: Output::default(),
             job: Work::default(),
         }
@@ -232,6 +237,7 @@ impl Manifest {
             &mut self.lights,
             Light::keys,
         );
+        keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
     }
 
     /// Checks dependencies between tables.
@@ -239,6 +245,14 @@ impl Manifest {
         let Some(root) = root.reading() else {
             return;
         };
+        let meshes = self.meshes.len();
+        if meshes > MaterialId::MAX_MESHES {
+            let max = MaterialId::MAX_MESHES;
+            root.wrong(
+                "mesh",
+                &format!("{meshes} meshes, but at most {max} are possible"),
+            );
+        }
         if self.branches_at_spheres()
             && self.render.min_weight == 0.0
             && self.render.max_depth > MAX_LITERAL_DEPTH
@@ -319,6 +333,7 @@ impl Manifest {
         for (list, comment, is_empty) in [
             ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
+            ("mesh", NO_MESHES, self.meshes.is_empty()),
         ] {
             if is_empty {
                 let _ = write!(text, "\n# {comment}\n{}", examples.commented_out(list));
@@ -340,6 +355,7 @@ impl Manifest {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
         manifest.lights = Light::examples();
+        manifest.meshes = vec![Mesh::default()];
         manifest
     }
 }
@@ -355,6 +371,8 @@ const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these 
 
 const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
                            directional light has a direction instead of position and falloff.";
+
+const NO_MESHES: &str = "Tanks, obstacles and other bodies that are not particles.";
 
 /// All keys that are not in lists.
 fn known_keys() -> Vec<String> {

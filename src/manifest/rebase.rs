@@ -2,7 +2,7 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::{Manifest, OutputPattern};
+use super::{Manifest, MeshPath, OutputPattern};
 
 /// Why the paths of a manifest cannot be made relative to another directory.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
@@ -23,6 +23,14 @@ pub enum RebaseError {
     #[error("{path}: {reason}")]
     Output {
         /// The output.
+        path: String,
+        /// Why.
+        reason: String,
+    },
+    /// A mesh is not a pattern, because of the name of its directory.
+    #[error("{path}: {reason}")]
+    Mesh {
+        /// The mesh.
         path: String,
         /// Why.
         reason: String,
@@ -53,6 +61,11 @@ impl Manifest {
         })?;
         if let Some(path) = &mut self.environment.image {
             *path = rebased(path, from, to)?;
+        }
+        for mesh in &mut self.meshes {
+            let path = rebased(mesh.path.as_str(), from, to)?;
+            mesh.path =
+                MeshPath::parse(&path).map_err(|reason| RebaseError::Mesh { path, reason })?;
         }
         if let Some(path) = &mut self.job.stop_file {
             *path = rebased(path, from, to)?;
@@ -136,6 +149,7 @@ pub(crate) fn without_dots(path: &Path) -> PathBuf {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+    use crate::manifest::Mesh;
 
     #[test]
     fn paths_follow_the_manifest() {
@@ -143,6 +157,10 @@ mod tests {
         manifest.input.path.push("/abs/x.vtk".to_owned());
         manifest.input.path.push("../up/./x.vtk".to_owned());
         manifest.job.stop_file = Some("control/stop".to_owned());
+        manifest.meshes = vec![Mesh {
+            path: MeshPath::parse("walls.##.stl").unwrap(),
+            ..Mesh::default()
+        }];
         let (here, there) = (Path::new("/home/me/sim"), Path::new("/home/me/sim/out"));
         let before = manifest.clone();
         manifest.rebase(here, there).unwrap();
@@ -151,6 +169,7 @@ mod tests {
             ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]
         );
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
+        assert_eq!(manifest.meshes[0].path.as_str(), "../walls.##.stl");
         assert_eq!(
             manifest.job.stop_file_in(there),
             Path::new("/home/me/sim/out/../control/stop")

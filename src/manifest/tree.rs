@@ -33,6 +33,8 @@ pub struct Override {
     keys: Vec<String>,
     node: TomlNode,
     is_under: bool,
+    /// Whether it is another item of a list.
+    is_item: bool,
 }
 
 /// Why an override is invalid.
@@ -86,6 +88,7 @@ impl Override {
             keys,
             node: TomlNode { kind, place },
             is_under: false,
+            is_item: false,
         })
     }
 
@@ -106,6 +109,22 @@ impl Override {
             })?,
             node: TomlNode::from_value(value.into(), &place),
             is_under: false,
+            is_item: false,
+        })
+    }
+
+    /// Appends `item` to the list `key`; `shown` is its name in messages, such as `--mesh`.
+    ///
+    /// # Errors
+    /// A part of the key is empty.
+    pub fn append(
+        key: &str,
+        item: impl Into<toml::Value>,
+        shown: &str,
+    ) -> Result<Self, OverrideError> {
+        Ok(Self {
+            is_item: true,
+            ..Self::new(key, item, shown)?
         })
     }
 
@@ -252,7 +271,28 @@ impl TomlNode {
                 }
             };
         }
+        if overlay.is_item {
+            return node.append(&overlay);
+        }
         *node = overlay.node;
+        Ok(())
+    }
+
+    /// Appends the item of `overlay` to this list, which may be a new, empty table.
+    fn append(&mut self, overlay: &Override) -> Result<(), Problem> {
+        let item = overlay.node.clone();
+        let found = self.describe();
+        match &mut self.kind {
+            Kind::Array(items) => items.push(item),
+            Kind::Table(table) if table.is_empty() => self.kind = Kind::Array(vec![item]),
+            _ => {
+                return Err(Problem {
+                    place: overlay.node.place.clone(),
+                    key: overlay.keys.join("."),
+                    what: format!("is {found}, which is no list"),
+                });
+            }
+        }
         Ok(())
     }
 

@@ -1,5 +1,6 @@
 //! First stage: reads the files of a frame into the form that tree and shading need.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
 use spherule_formats::sequence::Sequence;
@@ -9,9 +10,11 @@ use super::ImageTask;
 use super::decoded::DecodedFrame;
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
+use super::meshes::meshes_of;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
+use crate::surface::mesh::MeshTree;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -22,6 +25,8 @@ pub struct LoadedFrame {
     pub notes: Vec<String>,
     /// The particles.
     pub particles: LoadedParticles,
+    /// The meshes of the image, one for each of the setup.
+    pub meshes: Vec<Arc<MeshTree>>,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// Number of particles that were dropped because they were not finite.
@@ -70,6 +75,7 @@ pub fn load_frame(
             task: task.clone(),
             notes,
             particles: LoadedParticles::Stored(frame),
+            meshes: Vec::new(),
             dropped: 0,
             clamped_radii,
             read_time: Duration::ZERO,
@@ -87,6 +93,7 @@ pub fn load_frame(
         loaded.clamped_radii,
         "radii raised: too small to be seen, or no number",
     );
+    loaded.meshes = meshes_of(&setup.picture.meshes, task, &mut loaded.notes)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }
@@ -110,6 +117,7 @@ fn decode(
         task: task.clone(),
         notes,
         particles: LoadedParticles::Decoded(decoded),
+        meshes: Vec::new(),
         time,
         dropped,
         clamped_radii,
@@ -147,7 +155,7 @@ fn first_file(sequence: &Sequence, task: &ImageTask) -> String {
 
 /// Rejects a frame that cannot fit into memory, before the system kills the whole job.
 fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
-    let size = FrameSize::of(sequence, task.index, setup.run.weight.as_ref());
+    let size = FrameSize::of_task(sequence, task, setup);
     let need = MemoryModel::new(setup).decoding(&size);
     match available().into_iter().chain(process_room()).min() {
         Some(available) if need > available => Err(LoadError::TooLarge {

@@ -2,6 +2,8 @@
 
 use spherule_formats::FrameError;
 
+use super::meshes::MeshLoadError;
+
 /// Reasons why a frame cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
@@ -13,6 +15,9 @@ pub enum LoadError {
         "{0}; this is the newest frame: if the simulation is still writing it, render again later"
     )]
     Newest(FrameError),
+    /// One of its meshes cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshLoadError),
     /// It does not fit into memory.
     #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]
     TooLarge {

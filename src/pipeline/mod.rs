@@ -11,6 +11,7 @@ mod in_place;
 mod load;
 mod load_error;
 mod memory_limit;
+mod meshes;
 mod predict;
 mod probe;
 mod rays;
@@ -31,6 +32,7 @@ pub use load::{LoadedFrame, LoadedParticles, load_frame};
 pub use load_error::LoadError;
 pub(crate) use load_error::attribute_list;
 pub use memory_limit::{MemoryLimitError, MemoryRemedy};
+pub use meshes::{LoadedMesh, MeshLoadError, MeshSettings, PictureMesh, load_mesh};
 pub use predict::{FrameSize, MemoryModel, MemoryNeed};
 pub use probe::{Probe, ProbeError, probe};
 pub use renderer::{BuiltFrame, FrameRenderer, TraceError, TracedFrame};
@@ -51,6 +53,8 @@ pub struct ImageTask {
     pub image: PathBuf,
     /// Path of the optional PNG.
     pub preview: Option<PathBuf>,
+    /// The files of the meshes that each frame has for itself, in the order of [`Picture::meshes`].
+    pub meshes: Vec<PathBuf>,
     /// Why it cannot be rendered, if that is known in advance.
     pub refused: Option<MemoryLimitError>,
 }

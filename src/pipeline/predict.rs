@@ -14,6 +14,7 @@ use spherule_formats::native::Access;
 use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
+use super::ImageTask;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
@@ -40,6 +41,8 @@ pub struct FrameSize {
     pub files: u64,
     /// Whether its file contains other frames too, and stays in memory for them.
     pub is_shared: bool,
+    /// Size of the files of the meshes that only this frame has.
+    pub meshes: u64,
 }
 
 impl FrameSize {
@@ -52,9 +55,18 @@ impl FrameSize {
         Self::estimate(stored, is_shared, known)
     }
 
+    /// Size of the frame of `task`, and of its own meshes.
+    pub fn of_task(sequence: &Sequence, task: &ImageTask, setup: &Setup) -> Self {
+        let meshes = task.meshes.iter().map(|path| unpacked_len(path));
+        Self {
+            meshes: meshes.filter_map(Result::ok).sum(),
+            ..Self::of(sequence, task.index, setup.run.weight.as_ref())
+        }
+    }
+
     /// Bytes to process when reading: the size of its file, or of the numbers in it if that is larger.
     pub(super) fn read_bytes(&self) -> u64 {
-        self.content.max(self.raw)
+        self.content.max(self.raw).max(self.meshes)
     }
 
     /// Whether it is read by as many threads as trace.
@@ -73,6 +85,7 @@ impl FrameSize {
                 positions: stored,
                 files: 1,
                 is_shared,
+                meshes: 0,
             };
         };
         let scaled = |value: u64| {
@@ -86,6 +99,7 @@ impl FrameSize {
             positions: scaled(known.positions),
             files: known.files,
             is_shared,
+            meshes: 0,
         }
     }
 }
@@ -102,7 +116,7 @@ pub struct MemoryNeed {
     pub particles: u64,
     /// The tree, and the scratch memory of its build.
     pub tree: u64,
-    /// The surface, without the tree.
+    /// The surface, without the tree, and meshes.
     pub surface: u64,
     /// The planes of the images that are traced and encoded.
     pub images: u64,
@@ -164,6 +178,8 @@ pub struct MemoryModel<'a> {
     has_ids: bool,
     has_velocities: bool,
     in_place: bool,
+    /// Memory of the meshes that all frames share.
+    meshes: u64,
 }
 
 /// Memory of the program: its data, the stacks of its threads and small allocations; large allocations are returned
@@ -202,6 +218,7 @@ impl<'a> MemoryModel<'a> {
             has_ids: known.ids,
             has_velocities: known.velocities,
             in_place: known.in_place && setup.traces_in_place(),
+            meshes: shared_meshes(setup),
         }
     }
 
@@ -228,6 +245,17 @@ impl<'a> MemoryModel<'a> {
             self.held_file(frame)
         } else {
             self.decoding(frame)
+        }
+    }
+
+    /// The same, with the meshes of the frame, which are read after its particles.
+    fn reading_with_meshes(&self, frame: &FrameSize) -> u64 {
+        match frame.meshes {
+            0 => self.reading(frame),
+            bytes => {
+                let meshes = self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes);
+                self.reading(frame).max(meshes)
+            }
         }
     }
 
@@ -385,8 +413,10 @@ impl<'a> MemoryModel<'a> {
         // Add up each phase: reading, building, tracing, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
+        let meshes = self.meshes + KEPT_PER_MESH_BYTE * frame.meshes;
         let first_read = MemoryNeed {
-            reading: self.reading(frame),
+            reading: self.reading_with_meshes(frame),
+            surface: self.meshes,
             ..idle
         };
         let building = MemoryNeed {
@@ -394,21 +424,24 @@ impl<'a> MemoryModel<'a> {
             // The kept data are in the memory that the allocator retains.
             reading: shared.max(self.retained(frame).saturating_sub(kept)),
             tree: tree + self.build(frame).scratch,
-            surface: surface.building,
+            surface: surface.building + meshes,
             images: film_before + film_kept,
             encoding: encoding_before,
             ..idle
         };
         let tracing = MemoryNeed {
-            reading: after.map_or(idle.reading, |after| self.reading(after).max(idle.reading)),
+            reading: after.map_or(idle.reading, |after| {
+                self.reading_with_meshes(after).max(idle.reading)
+            }),
             particles: self.shading(frame),
             tree,
-            surface: surface.kept,
+            surface: surface.kept + meshes,
             images: film + film_before + denoising.max(self.tracing_scratch() * threads),
             encoding: encoding_before,
             ..idle
         };
         let encoding = MemoryNeed {
+            surface: self.meshes,
             images: film,
             encoding: self.encoding(),
             ..idle
@@ -450,6 +483,18 @@ impl<'a> MemoryModel<'a> {
         let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
         (9 * pixels).max(bands)
     }
+}
+
+/// Memory of a mesh with its hierarchy, in bytes per byte of its file: the largest of the formats, binary PLY, where a
+/// triangle has 19 bytes in the file and about 84 in memory.
+const KEPT_PER_MESH_BYTE: u64 = 5;
+/// The same while it is read and its hierarchy is built.
+const READ_PER_MESH_BYTE: u64 = 16;
+
+/// Memory of the meshes that all frames share.
+fn shared_meshes(setup: &Setup) -> u64 {
+    let trees = (setup.picture.meshes.iter()).filter_map(|mesh| mesh.tree.as_ref());
+    trees.map(|tree| tree.bytes() as u64).sum()
 }
 
 /// Bytes of a sorted particle, with its volume and its share of the bins.

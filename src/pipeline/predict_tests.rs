@@ -12,6 +12,7 @@ fn plain(particles: u64) -> FrameSize {
         positions: 12 * particles,
         files: 1,
         is_shared: false,
+        meshes: 0,
     }
 }
 
@@ -68,6 +69,23 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
     let mut medium = setup();
     medium.picture.surface.kind = SurfaceKind::Union;
     assert_eq!(need(&medium, 1_000_000), need(&setup(), 1_000_000));
+}
+
+#[test]
+fn meshes_of_a_frame_are_counted() {
+    let setup = setup();
+    let model = MemoryModel::new(&setup);
+    let with = |meshes| FrameSize {
+        meshes,
+        ..plain(1000)
+    };
+    let (none, some) = (model.alone(&with(0)), model.alone(&with(10_000_000)));
+    // Reading one needs more than tracing it
+    assert!(some.total() > none.total() + 150_000_000, "{some}");
+    let two = model.peak(&[with(10_000_000); 2]);
+    assert_eq!(two.surface, 50_000_000);
+    assert!(two.reading > 160_000_000, "{two}");
+    assert_eq!(FrameSize::estimate(1200, false, None).meshes, 0);
 }
 
 #[test]

@@ -320,6 +320,7 @@ mod tests {
             index: 0,
             image: PathBuf::new(),
             preview: None,
+            meshes: Vec::new(),
             refused: None,
         };
         let cut_off =

@@ -1,6 +1,7 @@
 //! The interface between the stages of a run and the renderer.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
 use spherule_formats::FrameError;
 
@@ -15,6 +16,7 @@ use crate::metrics::MemoryUse;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;
 use crate::scene::{Camera, CameraError};
+use crate::surface::mesh::MeshTree;
 use crate::surface::smooth::SmoothError;
 
 /// Reasons why there is no image of a frame that was read.
@@ -67,6 +69,7 @@ pub struct TracedFrame {
 pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
+    pub(super) meshes: Vec<Arc<MeshTree>>,
     pub(super) time: Option<f64>,
     pub(super) report: FrameReport,
     /// Notes for the user.

@@ -3,6 +3,7 @@
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
+use super::meshes::PictureMesh;
 use super::rays::expected_rays;
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
@@ -95,6 +96,8 @@ pub struct Picture {
     /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
     /// the scene of a frame.
     pub scene: Scene,
+    /// The meshes; their materials are in the scene.
+    pub meshes: Vec<PictureMesh>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.

@@ -55,7 +55,7 @@ impl ReadStage<'_> {
 
     fn load(&self, task: &ImageTask) -> Result<LoadedFrame, ImageError> {
         task.check()?;
-        let size = FrameSize::of(self.sequence, task.index, self.setup.run.weight.as_ref());
+        let size = FrameSize::of_task(self.sequence, task, self.setup);
         let load = || load_frame(self.setup, self.sequence, task);
         Ok(self.threads.read(size.read_bytes(), load)?)
     }

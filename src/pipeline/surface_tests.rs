@@ -59,6 +59,7 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn 
         index: 0,
         image: PathBuf::new(),
         preview: None,
+        meshes: Vec::new(),
         refused: None,
     };
     let loaded = load_frame(setup, sequence, &task).expect("readable");

@@ -67,6 +67,7 @@ impl FrameRenderer for CpuRenderer {
         Ok(BuiltFrame {
             task: frame.task,
             particles,
+            meshes: frame.meshes,
             time: frame.time,
             report,
             notes,
@@ -160,18 +161,18 @@ impl CpuRenderer {
         stop: &dyn Stop,
     ) -> Result<RayCounts, TraceError> {
         let scene = setup.scene_at(frame.task.frame)?;
-        let surface = &self.surface;
+        let (surface, meshes) = (&self.surface, &frame.meshes);
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.picture.color, shading);
                 let tree = self.builder.tree().view();
-                Ok(surface.draw(setup, tree, &scene, &source, film, stop)?)
+                Ok(surface.draw(setup, tree, meshes, &scene, &source, film, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
                 let source = stored.shading(&setup.picture.color, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
-                let rays = surface.draw(setup, tree, &scene, &source, film, stop)?;
+                let rays = surface.draw(setup, tree, meshes, &scene, &source, film, stop)?;
                 // Reject the image if the file has changed meanwhile.
                 stored.check()?;
                 Ok(rays)

@@ -58,8 +58,11 @@ impl RenderContext<'_> {
         self.source.blended_color(blend)
     }
 
-    /// Base colour of the ground or of spray.
+    /// Base colour of the ground, of a mesh or of spray.
     fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
+        if let Some(mesh) = self.mesh(hits.material[lane]) {
+            return mesh.color;
+        }
         match (hits.material[lane], &self.scene.ground) {
             (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
             _ => SPRAY,
@@ -67,13 +70,18 @@ impl RenderContext<'_> {
     }
 
     /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
-    /// covers all of it, unless the background is transparent.
+    /// covers all of it, unless the background is transparent. Holdouts cover nothing.
     pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => otherwise[lane],
+            _ if self.is_holdout(hits.material[lane]) => 0.0,
             _ if self.settings.transparent_background => hits.opacity[lane],
             _ => 1.0,
         })
+    }
+
+    fn is_holdout(&self, material: MaterialId) -> bool {
+        self.mesh(material).is_some_and(|mesh| mesh.is_holdout)
     }
 
     /// Stores the data of the nearest sample of each pixel, the first in a tie. The rays belong to the samples from
@@ -88,6 +96,8 @@ impl RenderContext<'_> {
         if self.settings.channels == Channels::COLOR || packet.hits.mask == 0 {
             return;
         }
+        // The data of reflections at panes are of what is behind
+        self.restore_behind(packet);
         // Compute the depths of all samples
         let mut z = splat(f32::INFINITY);
         depths(self.simd, &self.camera, rays, &packet.hits, &mut z);

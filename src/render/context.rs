@@ -15,13 +15,17 @@ use super::{
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
-use crate::scene::{self, Scene};
+use crate::scene::{self, MeshMaterial, Scene};
 use crate::surface::{MaterialId, Shape, Side};
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes; the ground comes first, because it is the cheapest.
+    /// All shapes but panes; the ground comes first, because it is the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
+    /// Meshes that rays pass.
+    pub(super) panes: Vec<&'a dyn Shape>,
+    /// Whether there are meshes that only hide what is behind them.
+    pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
     pub(super) particles: Option<&'a dyn Shape>,
     pub(super) source: &'a dyn ShadeSource,
@@ -66,6 +70,13 @@ impl Interior {
     }
 }
 
+/// Whether `shape` is a pane in `scene`.
+fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
+    let mesh = shape.material().mesh_index();
+    mesh.and_then(|index| scene.meshes.get(index))
+        .is_some_and(MeshMaterial::is_pane)
+}
+
 impl<'a> RenderContext<'a> {
     pub(super) fn new(
         shapes: Vec<&'a dyn Shape>,
@@ -73,6 +84,8 @@ impl<'a> RenderContext<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
+        let is_opaque = |shape: &&dyn Shape| !is_pane(scene, *shape);
+        let (shapes, panes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_opaque);
         // Find the particles and the kind of their interior
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
@@ -85,6 +98,8 @@ impl<'a> RenderContext<'a> {
         Self {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
+            panes,
+            has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,
             scene,
@@ -99,6 +114,12 @@ impl<'a> RenderContext<'a> {
             sampler: FilmSampler::new(settings.samples),
             max_segments: SEGMENTS,
         }
+    }
+
+    /// The material of the mesh that `material` belongs to.
+    #[inline(always)]
+    pub(super) fn mesh(&self, material: MaterialId) -> Option<&MeshMaterial> {
+        self.scene.meshes.get(material.mesh_index()?)
     }
 
     /// The particles, if they bound one connected body.

@@ -12,3 +12,6 @@ pub(super) const CONTINUATION: u32 = 1;
 pub(super) const BSDF: u32 = 2;
 pub(super) const ENVIRONMENT: u32 = 3;
 pub(super) const LIGHTS: u32 = 4;
+
+/// Dimension of a path segment: the choice between passing panes and being reflected. It is beyond those of lights.
+pub(super) const PANE: u32 = u32::MAX;

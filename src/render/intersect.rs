@@ -27,6 +27,7 @@ impl RenderContext<'_> {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
         packet.throughput = segments.throughput;
+        self.pass_panes(segments, packet);
         self.absorb(segments, packet);
     }
 

@@ -29,6 +29,7 @@ mod integrator;
 mod intersect;
 mod lights;
 mod materials;
+mod panes;
 mod path;
 mod ray_counts;
 mod roulette;
@@ -54,6 +55,8 @@ mod catcher_tests;
 mod floor_tests;
 #[cfg(test)]
 mod image_tests;
+#[cfg(test)]
+mod panes_tests;
 #[cfg(test)]
 mod path_tests;
 #[cfg(test)]

@@ -46,7 +46,7 @@ pub(super) struct PathIntegrator<'a> {
     context: RenderContext<'a>,
     environment: Option<&'a Environment>,
     /// Opaque surfaces by [`MaterialId`].
-    bsdfs: [Box<dyn Bsdf>; MaterialId::COUNT],
+    bsdfs: Vec<Box<dyn Bsdf>>,
     /// The specular surface of transmissive particles.
     interface: Box<dyn Material>,
     split: SplitRule,
@@ -60,11 +60,11 @@ pub(super) struct PathIntegrator<'a> {
 impl<'a> PathIntegrator<'a> {
     pub(super) fn new(context: RenderContext<'a>) -> Self {
         let is_connected = context.connected_particles().is_some();
-        let [interface, ..] = materials_of(context.scene, is_connected);
+        let interface = materials_of(context.scene, is_connected).swap_remove(0);
         let environment = context.scene.environment.as_deref();
         Self {
             environment: environment.filter(|environment| !environment.is_black()),
-            bsdfs: bsdfs_of(context.scene.material.finish),
+            bsdfs: bsdfs_of(context.scene.material.finish, &context.scene.meshes),
             interface,
             split: SplitRule::new(context.settings, context.interior),
             catcher: Catcher::of(context.scene),
@@ -100,9 +100,15 @@ impl Integrator for PathIntegrator<'_> {
                 self.catch_shadows(catcher, &self.surface(segments, depth, lanes), packet);
             }
         }
-        self.add_escaped(segments, depth, segments.lanes() & !ended, packet);
-        if packet.hits.mask == 0 {
+        let held_out = self.context.holdout_lanes(depth, &packet.hits);
+        let lanes = segments.lanes() & !ended & !held_out;
+        self.add_escaped(segments, depth, lanes, packet);
+        if packet.hits.mask & !held_out == 0 {
             return;
+        }
+        let panes = self.context.pane_lanes(&packet.hits);
+        if panes != 0 {
+            self.shade_panes(segments, depth, panes, packet, next);
         }
         // End paths at a ground whose light is known
         let ground = packet.hits.lanes_of(MaterialId::GROUND);
@@ -117,8 +123,8 @@ impl Integrator for PathIntegrator<'_> {
             Interior::Spheres | Interior::Body => packet.hits.lanes_of(MaterialId::PARTICLES),
         };
         let max = self.context.settings.bounces;
-        let opaque =
-            packet.hits.mask & !clear & !ended & lanes_where(|l| segments.bounces[l] <= max);
+        let others = packet.hits.mask & !(clear | panes | held_out | ended);
+        let opaque = others & lanes_where(|l| segments.bounces[l] <= max);
         if opaque != 0 {
             self.shade_opaque(&self.surface(segments, depth, opaque), packet, next);
         }
@@ -423,6 +429,31 @@ impl PathIntegrator<'_> {
             }
         }
         lanes & !ended
+    }
+
+    /// Reflects the rays of `lanes` at panes.
+    fn shade_panes(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+    ) {
+        let max = self.context.settings.max_depth;
+        let last = lanes & lanes_where(|l| depth >= max + segments.bounces[l]);
+        (self.context).reflect_at_panes(segments, lanes, last, packet, next);
+        // At the last specular surface, rays see the environment
+        if let Some(environment) = self.environment.filter(|_| last != 0) {
+            let PacketScratch {
+                points, radiance, ..
+            } = packet;
+            let (simd, rays) = (self.context.simd, &points.reflected);
+            let mut seen = [splat(0.0); 3];
+            let (along, weight) = (&rays.direction, &rays.throughput);
+            environment_along(simd, environment, along, &rays.pdf, weight, &mut seen);
+            add(simd, &seen, &Vec3::ONE, last, radiance);
+        }
     }
 
     /// Reflects and refracts the rays of `lanes` at transmissive particles.

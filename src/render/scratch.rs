@@ -61,6 +61,10 @@ pub(super) struct PacketScratch {
     pub(super) hits: Intersections,
     /// Path throughput from the samples to the intersections.
     pub(super) throughput: Lanes3,
+    /// Distance of each ray to the first pane that it passes or that reflects it; only set if there are panes.
+    pub(super) first_pane: Lanes,
+    /// Intersections behind panes that reflect rays.
+    pub(super) behind: Intersections,
     /// Radiance that arrives at the samples, the result.
     pub(super) radiance: Lanes3,
     /// Base colours of the surfaces.

@@ -23,7 +23,7 @@ use crate::surface::MaterialId;
 pub(super) struct WhittedIntegrator<'a> {
     pub(super) context: RenderContext<'a>,
     /// The materials by [`MaterialId`].
-    materials: [Box<dyn Material>; MaterialId::COUNT],
+    materials: Vec<Box<dyn Material>>,
     /// Decides which of two rays are traced.
     pub(super) split: SplitRule,
 }
@@ -60,18 +60,20 @@ impl Integrator for WhittedIntegrator<'_> {
         next: &mut RayStreams,
     ) {
         let context = &self.context;
+        let held_out = context.holdout_lanes(depth, &packet.hits);
         // Add the background for rays that leave the scene
         if context.sees_background(depth) {
-            context.add_background(segments, depth, segments.lanes(), packet);
+            let lanes = segments.lanes() & !held_out;
+            context.add_background(segments, depth, lanes, packet);
         }
-        if packet.hits.mask == 0 {
+        if packet.hits.mask & !held_out == 0 {
             return;
         }
         context.base_colors(self.particle_constants().has_color(), packet);
         // Shade the intersections of each material
         for (number, material) in (0..).zip(&self.materials) {
             let id = MaterialId(number);
-            let lanes = packet.hits.lanes_of(id);
+            let lanes = packet.hits.lanes_of(id) & !held_out;
             if lanes == 0 {
                 continue;
             }

@@ -16,6 +16,7 @@ pub mod environment;
 pub mod ground;
 pub mod light;
 pub mod material;
+pub mod mesh;
 pub mod path;
 pub mod rgb;
 
@@ -26,6 +27,7 @@ pub use environment::{Environment, EnvironmentAxes, RadianceMap};
 pub use ground::Ground;
 pub use light::{Falloff, Light, LightKind, default_lights};
 pub use material::{Finish, Fresnel, Material, MaterialError};
+pub use mesh::{MeshFinish, MeshMaterial};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
 
@@ -82,6 +84,8 @@ pub struct Scene {
     pub background: Background,
     /// Optional ground.
     pub ground: Option<Ground>,
+    /// The materials of meshes, by the index of each mesh.
+    pub meshes: Vec<MeshMaterial>,
     /// Light from infinitely far away, for path tracing.
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
@@ -99,6 +103,7 @@ impl Scene {
             material: Material::DEFAULT,
             background: Background::Constant(Vec3::ZERO),
             ground: None,
+            meshes: Vec::new(),
             environment: None,
             is_environment_visible: false,
         }

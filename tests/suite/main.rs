@@ -18,6 +18,7 @@ mod golden;
 mod help;
 mod in_place;
 mod memory;
+mod meshes;
 mod printing;
 mod progress;
 mod resume;

@@ -55,6 +55,7 @@ fn request(dir: &Path) -> JobRequest {
     let frame = |number: i64| FrameRequest {
         number,
         inputs: vec![PathBuf::from(format!("in/f.{number}.vtk"))],
+        companions: Vec::new(),
         outputs: vec![dir.join(format!("f.{number}.exr"))],
     };
     JobRequest {

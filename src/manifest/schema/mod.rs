@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::list::{Entries, Entry};
-use super::{ABOUT, Manifest, camera, environment, work};
+use super::{ABOUT, Manifest, camera, environment, mesh, work};
 
 #[cfg(test)]
 mod tests;
@@ -47,7 +47,10 @@ fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
         let Some((list, _)) = section.rsplit_once('.') else {
             continue;
         };
-        let table = table(entries, section);
+        let mut table = table(entries, section);
+        if list == "mesh" {
+            table["allOf"] = mesh::conditions();
+        }
         match kinds.iter_mut().find(|(name, _)| *name == list) {
             Some((_, tables)) => tables.push(table),
             None => kinds.push((list, vec![table])),

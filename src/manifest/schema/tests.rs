@@ -18,6 +18,7 @@ render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern 
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true }
 material = { color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
 light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
+mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
 environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
 job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
@@ -82,7 +83,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 23] = [
+const TABLES: [(&str, &str); 24] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -118,6 +119,7 @@ const TABLES: [(&str, &str); 23] = [
         "/properties/light/items/oneOf/5",
         "[[light]]\ntype = \"disc\"\n",
     ),
+    ("/properties/mesh/items", "[[mesh]]\npath = \"a.stl\"\n"),
     ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),

@@ -11,8 +11,8 @@
 use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;
-use crate::scene::Finish;
-use crate::surface::{Intersections, MaterialId};
+use crate::scene::{Finish, MeshFinish, MeshMaterial};
+use crate::surface::Intersections;
 
 #[cfg(test)]
 mod finish_tests;
@@ -89,9 +89,16 @@ pub(super) trait Bsdf: Sync {
     );
 }
 
-/// The BSDFs of opaque surfaces by [`MaterialId`]. `particles`: the finish of the particles.
-pub(super) fn bsdfs_of(particles: Finish) -> [Box<dyn Bsdf>; MaterialId::COUNT] {
-    [bsdf_of(particles), Box::new(Matte), Box::new(Matte)]
+/// The BSDFs of opaque surfaces by [`MaterialId`](crate::surface::MaterialId). `particles`: the finish of the
+/// particles.
+pub(super) fn bsdfs_of(particles: Finish, meshes: &[MeshMaterial]) -> Vec<Box<dyn Bsdf>> {
+    let meshes = meshes.iter().map(|mesh| match mesh.finish {
+        MeshFinish::Opaque(finish) => finish,
+        // Panes are no opaque surfaces; the BSDF only keeps their place
+        MeshFinish::Pane => Finish::Matte,
+    });
+    let fixed = [particles, Finish::Matte, Finish::Matte];
+    fixed.into_iter().chain(meshes).map(bsdf_of).collect()
 }
 
 fn bsdf_of(finish: Finish) -> Box<dyn Bsdf> {

@@ -46,16 +46,17 @@ impl PathIntegrator<'_> {
                 if !is_first {
                     continue;
                 }
+                let along = self.throughput_to(emission.t[lane], lane, segments, packet);
                 // Add its radiance, or keep the nearest visible light
                 if sampled >> lane & 1 == 1 {
                     let pdf = segments.pdf[lane];
                     let weight = pdf / (pdf + emission.pdf[lane]);
-                    let arriving = lane3(&packet.throughput, lane) * (weight * emission.radiance);
+                    let arriving = along * (weight * emission.radiance);
                     let sum = lane3(&packet.radiance, lane) + arriving;
                     set_lane3(&mut packet.radiance, lane, sum);
                 } else if nearest[lane].is_none_or(|t| emission.t[lane] < t) {
                     nearest[lane] = Some(emission.t[lane]);
-                    color[lane] = emission.radiance;
+                    color[lane] = along * emission.radiance;
                 }
             }
         }
@@ -63,10 +64,26 @@ impl PathIntegrator<'_> {
         let ended = lanes_where(|l| nearest[l].is_some());
         for lane in lanes_in(ended) {
             packet.coverage[lane] = 1.0;
-            let sum = lane3(&packet.radiance, lane) + lane3(&packet.throughput, lane) * color[lane];
+            let sum = lane3(&packet.radiance, lane) + color[lane];
             set_lane3(&mut packet.radiance, lane, sum);
         }
         ended
+    }
+
+    /// The throughput of the ray in `lane` up to a light at distance `t`, which may be in front of the panes on the
+    /// ray.
+    fn throughput_to(
+        &self,
+        t: f32,
+        lane: usize,
+        segments: &SegmentPacket,
+        packet: &PacketScratch,
+    ) -> Vec3 {
+        let is_before_panes = !self.context.panes.is_empty() && t < packet.first_pane[lane];
+        match is_before_panes {
+            true => lane3(&segments.throughput, lane),
+            false => lane3(&packet.throughput, lane),
+        }
     }
 
     /// Adds the radiance for rays of `lanes` without an intersection, and behind surfaces that are not fully opaque:

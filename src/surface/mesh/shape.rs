@@ -1,5 +1,6 @@
 //! The hierarchy of a mesh, and the mesh as a shape.
 
+use std::fmt;
 use std::time::Duration;
 
 use glam::{DVec3, Vec3};
@@ -117,6 +118,15 @@ impl BvhSpace {
     }
 }
 
+impl fmt::Debug for MeshTree {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let triangles = self.mesh.len();
+        f.debug_struct("MeshTree")
+            .field("triangles", &triangles)
+            .finish_non_exhaustive()
+    }
+}
+
 impl MeshTree {
     /// Builds the hierarchy.
     pub fn new(mesh: TriangleMesh) -> Self {
@@ -162,6 +172,13 @@ impl MeshTree {
         self.mesh.bytes()
             + size_of_val(self.bvh.nodes.as_slice())
             + size_of_val(self.bvh.primitive_indices.as_slice())
+    }
+
+    /// The lowest and the highest corner of its box; None without triangles.
+    pub fn bounds(&self) -> Option<[Vec3; 2]> {
+        let BvhSpace { center, half, .. } = self.space;
+        let corners = [center - half, center + half].map(|corner| corner.as_vec3());
+        (!self.mesh.is_empty()).then_some(corners)
     }
 
     /// The nearest intersection with `faces`, and its triangle.
