@@ -10,7 +10,7 @@ use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{Channels, IntegratorKind, RenderSettings};
+use crate::render::{Channels, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
     Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
     material,
@@ -147,6 +147,7 @@ pub fn setup(
     let aspect = f64::from(image.width) / f64::from(image.height);
     let path = camera::path(manifest, &bounds, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
+    let lens = camera::lens(manifest, &path, aspect)?;
     // Set up lights and ground
     let environment = environment::environment(manifest, map, &path.start(), up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.render.integrator) {
@@ -176,8 +177,21 @@ pub fn setup(
             what: e.to_string(),
         }
     })?;
-    let mut render = RenderSettings::new(image.width, image.height);
+    // Manifests that were not read from a file are not checked
+    let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
+        key: "image.crop",
+        what: "the part of the image is empty or too large".to_owned(),
+    })?;
+    let window = image.data_window();
+    let mut render = RenderSettings::new(width, height);
+    render.window = Some(window);
     render.samples = image.samples;
+    render.filter = PixelFilter {
+        kind: image.filter,
+        width: image
+            .filter_width
+            .unwrap_or_else(|| image.filter.default_width()),
+    };
     render.integrator = manifest.render.integrator;
     render.bounces = manifest.render.bounces;
     render.max_depth = manifest.render.max_depth;
@@ -192,6 +206,7 @@ pub fn setup(
         radius,
         color,
         path,
+        lens,
         aspect,
         scene,
         renderer: crate::render::RendererKind::default(),
@@ -200,6 +215,7 @@ pub fn setup(
         surface,
         exr: ExrOptions {
             compression: output.compression,
+            window: Some(window),
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
@@ -208,6 +224,7 @@ pub fn setup(
         preview: PreviewOptions {
             exposure: output.preview_exposure,
             backdrop: None,
+            first_pixel: [window.left, window.top],
         },
     };
     // Collect the settings of the run

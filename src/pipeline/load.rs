@@ -2,11 +2,12 @@
 
 use std::time::{Duration, Instant};
 
+use glam::Vec3;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame};
 
 use super::ImageTask;
-use super::decoded::DecodedFrame;
+use super::decoded::{DecodedFrame, particle_with_id};
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
 use super::predict::{FrameSize, MemoryModel};
@@ -24,6 +25,8 @@ pub struct LoadedFrame {
     pub particles: LoadedParticles,
     /// Simulation time, if known.
     pub time: Option<f64>,
+    /// Position of the particle in focus, relative to the origin, if the camera follows one.
+    pub focus: Option<Vec3>,
     /// Number of particles that were dropped because they were not finite.
     pub dropped: u64,
     /// Number of radii raised to the minimum.
@@ -69,6 +72,7 @@ pub fn load_frame(
             time: frame.time(),
             task: task.clone(),
             notes,
+            focus: None,
             particles: LoadedParticles::Stored(frame),
             dropped: 0,
             clamped_radii,
@@ -105,16 +109,36 @@ fn decode(
     let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
     let (time, dropped) = (frame.time, frame.dropped);
     let file = first_file(sequence, task);
+    let focus = focus_point(setup, &frame, &file)?;
     let (decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
     Ok(LoadedFrame {
         task: task.clone(),
         notes,
         particles: LoadedParticles::Decoded(decoded),
         time,
+        focus,
         dropped,
         clamped_radii,
         read_time: Duration::ZERO,
     })
+}
+
+/// The position of the particle in focus, relative to the origin; None if the camera does not follow one.
+fn focus_point(
+    setup: &Setup,
+    frame: &ParticleFrame,
+    file: &str,
+) -> Result<Option<Vec3>, LoadError> {
+    let Some(id) = setup.focused_particle() else {
+        return Ok(None);
+    };
+    match particle_with_id(frame, id) {
+        Some(index) => Ok(Some(frame.positions[index])),
+        None => Err(LoadError::NoFocus {
+            file: file.to_owned(),
+            id,
+        }),
+    }
 }
 
 impl LoadedFrame {

@@ -2,6 +2,7 @@
 
 use std::path::PathBuf;
 
+use glam::Vec3;
 use spherule_formats::FrameError;
 
 use super::ImageTask;
@@ -68,6 +69,8 @@ pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
     pub(super) time: Option<f64>,
+    /// Position of the particle in focus.
+    pub(super) focus: Option<Vec3>,
     pub(super) report: FrameReport,
     /// Notes for the user.
     pub(super) notes: Vec<String>,

@@ -68,6 +68,7 @@ impl FrameRenderer for CpuRenderer {
             task: frame.task,
             particles,
             time: frame.time,
+            focus: frame.focus,
             report,
             notes,
         })
@@ -159,7 +160,7 @@ impl CpuRenderer {
         film: &mut Film,
         stop: &dyn Stop,
     ) -> Result<RayCounts, TraceError> {
-        let scene = setup.scene_at(frame.task.frame)?;
+        let scene = setup.scene_at(frame.task.frame, frame.focus)?;
         let surface = &self.surface;
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {

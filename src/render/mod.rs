@@ -43,6 +43,7 @@ mod stream;
 mod tile;
 mod visibility;
 mod whitted;
+mod window;
 
 #[cfg(test)]
 mod body_tests;
@@ -51,7 +52,11 @@ mod branch_tests;
 #[cfg(test)]
 mod catcher_tests;
 #[cfg(test)]
+mod filter_tests;
+#[cfg(test)]
 mod image_tests;
+#[cfg(test)]
+mod lens_tests;
 #[cfg(test)]
 mod path_tests;
 #[cfg(test)]
@@ -65,7 +70,7 @@ pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
 pub use film_rows::FilmRows;
 pub use ray_counts::RayCounts;
-pub use sampler::{FilmSampler, MultiJitter, PathSeed};
+pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, IntegratorKind, MAX_BOUNCES, MAX_DEPTH, MAX_LITERAL_DEPTH,
     MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError, RenderSettings,
@@ -73,6 +78,7 @@ pub use settings::{
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
+pub use window::DataWindow;
 
 use context::{Interior, RenderContext};
 use integrator::Integrator;
@@ -106,7 +112,7 @@ pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bo
 
 /// Renders one image on the current rayon pool.
 ///
-/// The aspect ratio of the camera should be `settings.width / settings.height`. No light is created: `reflection` and
+/// The aspect ratio of the camera should be that of the image, `settings.width / settings.height` without a window. No light is created: `reflection` and
 /// `transmission` are at most 1, which is checked, so the background never contributes more to a ray than its
 /// brightest colour.
 ///

@@ -82,7 +82,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 22] = [
+const TABLES: [(&str, &str); 23] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -136,6 +136,10 @@ const TABLES: [(&str, &str); 22] = [
     (
         "/properties/render/properties/ground/anyOf/2",
         "[render.ground]\n",
+    ),
+    (
+        "/properties/camera/properties/focus/anyOf/2",
+        "[camera.focus]\n",
     ),
     (
         "/properties/environment/properties/sun",
