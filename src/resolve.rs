@@ -182,9 +182,9 @@ pub fn setup(
         key: "image.crop",
         what: "the part of the image is empty or too large".to_owned(),
     })?;
-    let window = image.data_window();
+    let window = image.part().map(|_| image.data_window());
     let mut render = RenderSettings::new(width, height);
-    render.window = Some(window);
+    render.window = window;
     render.samples = image.samples;
     render.filter = PixelFilter {
         kind: image.filter,
@@ -215,7 +215,7 @@ pub fn setup(
         surface,
         exr: ExrOptions {
             compression: output.compression,
-            window: Some(window),
+            window,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
@@ -224,7 +224,7 @@ pub fn setup(
         preview: PreviewOptions {
             exposure: output.preview_exposure,
             backdrop: None,
-            first_pixel: [window.left, window.top],
+            first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
         },
     };
     // Collect the settings of the run

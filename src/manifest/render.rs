@@ -72,6 +72,12 @@ impl Image {
         Some([side(x0, x1)?, side(y0, y1)?])
     }
 
+    /// The rendered part of the image, `[x0, y0, x1, y1]`, if it is not the image itself.
+    pub fn part(&self) -> Option<[i64; 4]> {
+        let image = [0, 0, i64::from(self.width), i64::from(self.height)];
+        Some(self.data_bounds()).filter(|part| *part != image)
+    }
+
     /// Position of the rendered part in the image.
     pub fn data_window(&self) -> DataWindow {
         let [left, top, ..] = self.data_bounds();

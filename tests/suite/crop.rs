@@ -48,6 +48,19 @@ fn a_crop_equals_its_part_of_the_whole_image() {
         &["--set", "image.overscan=7", "--crop", "-7,-7,10,10"],
     );
 
+    let options = [
+        "check",
+        "in",
+        "--width",
+        "96",
+        "--height",
+        "54",
+        "--crop",
+        "17,5,61,40",
+    ];
+    let text = workshop.run(&options).expect(0).text();
+    assert!(text.contains(": 96x54, part [17, 5, 61, 40], "), "{text}");
+
     // The windows
     let display = IntegerBounds::from_dimensions((96, 54));
     let bounds = |x, y, width, height| IntegerBounds::new(Vec2(x, y), Vec2(width, height));
