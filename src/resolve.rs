@@ -10,7 +10,7 @@ use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{Channels, IntegratorKind, RenderSettings};
+use crate::render::{Channels, IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
     Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
     material,
@@ -150,6 +150,7 @@ pub fn setup(
     let aspect = f64::from(image.width) / f64::from(image.height);
     let path = camera::path(manifest, &bounds, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
+    let lens = camera::lens(manifest, &path, aspect)?;
     // Set up lights and ground
     let environment = environment::environment(manifest, map, &path.start(), up)?;
     let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
@@ -187,8 +188,21 @@ pub fn setup(
             what: e.to_string(),
         }
     })?;
-    let mut render = RenderSettings::new(image.width, image.height);
+    // Manifests that were not read from a file are not checked
+    let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
+        key: "image.crop",
+        what: "the part of the image is empty or too large".to_owned(),
+    })?;
+    let window = image.part().map(|_| image.data_window());
+    let mut render = RenderSettings::new(width, height);
+    render.window = window;
     render.samples = image.samples;
+    render.filter = PixelFilter {
+        kind: image.filter,
+        width: image
+            .filter_width
+            .unwrap_or_else(|| image.filter.default_width()),
+    };
     render.integrator = manifest.integrator();
     render.bounces = manifest.render.bounces;
     render.photons = manifest.render.caustics.photons;
@@ -204,6 +218,7 @@ pub fn setup(
         radius,
         color,
         path,
+        lens,
         aspect,
         scene,
         meshes: Vec::new(),
@@ -213,6 +228,7 @@ pub fn setup(
         surface,
         exr: ExrOptions {
             compression: output.compression,
+            window,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
@@ -221,6 +237,7 @@ pub fn setup(
         preview: PreviewOptions {
             exposure: output.preview_exposure,
             backdrop: None,
+            first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
         },
     };
     // Collect the settings of the run

@@ -127,9 +127,13 @@ fn argument(key: &KeyFlag) -> Arg {
             .num_args(0..=1)
             .require_equals(true)
             .default_missing_value(usual),
+        FlagKind::Integers => argument.allow_hyphen_values(true),
         FlagKind::NumberOrText | FlagKind::Switch => argument,
     }
-    .allow_negative_numbers(!matches!(key.kind, FlagKind::Text(_) | FlagKind::List))
+    .allow_negative_numbers(!matches!(
+        key.kind,
+        FlagKind::Text(_) | FlagKind::List | FlagKind::Integers
+    ))
 }
 
 /// The value that was given; of a switch, the opposite of the default.
@@ -150,6 +154,11 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
             let whole = text.parse::<i64>().map(Value::from);
             let number = whole.or_else(|_| text.parse::<f64>().map(Value::from));
             number.unwrap_or(Value::from(text))
+        }),
+        FlagKind::Integers => text().map(|text| {
+            let items = text.split(',').map(|item| item.trim().parse::<i64>());
+            let items: Result<Vec<i64>, _> = items.collect();
+            items.map_or_else(|_| Value::from(text), Value::from)
         }),
         FlagKind::List => {
             let items: Vec<String> = matches.get_many(name)?.cloned().collect();

@@ -14,12 +14,13 @@ const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard
 const COLORS: [&str; 3] = ["color_by", "map", "range"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 33] = [
+const FLAGS: [(&str, &str); 34] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
     ("--height 7", "image.height = 7"),
     ("--samples 7", "image.samples = 7"),
+    ("--crop 3,4,50,60", "image.crop = [3, 4, 50, 60]"),
     ("--radius 0.5", "input.radius = 0.5"),
     ("--up -y", "input.up = \"-y\""),
     (
@@ -89,7 +90,8 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 6] = [
+const WORDS: [&str; 7] = [
+    "crop",
     "memory-limit",
     "memory-ceiling",
     "parts",

@@ -5,10 +5,12 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
+use super::focus::FocusSetting;
 use super::keys::{Keys, section};
 use super::reader::Section;
 use super::value::named;
 use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::lens::DEFAULT_SENSOR_WIDTH;
 
 named! {
     /// Placement of the camera.
@@ -46,6 +48,21 @@ section! {
         elevation: Option<f64> = None, from(-90), to(90), unit("degrees"), example("20.0");
         /// turntable: rotation from one frame to the next, degrees
         degrees_per_frame: f64 = 1.0, unit("degrees");
+        /// f-number of the lens; 0 is a pinhole, with everything in focus
+        ///
+        /// The diameter of the aperture is the focal length divided by the f-number. The focal length is
+        /// sensor_width * height / (2 * width * tan(fov / 2)), with width and height of the image.
+        f_stop: f64 = 0.0, from(0), zero("a pinhole");
+        /// Width of the sensor in scene units; 0.036 is a 36 mm film still in metres
+        ///
+        /// It only affects the aperture that f_stop gives.
+        sensor_width: f64 = DEFAULT_SENSOR_WIDTH, above(0), unit("a length");
+        /// Diameter of the aperture in scene units, in place of f_stop
+        aperture: Option<f64> = None, from(0), unit("a length"), example("0.05"), unset("by f_stop");
+        /// In focus: auto (look_at), a distance along the view, or { particle = ID }
+        ///
+        /// auto focuses on the target point of the camera. A particle is followed by its id through all frames.
+        focus: FocusSetting = FocusSetting::Auto;
         @
         /// `[[camera.key]]`, ascending by frame
         keys: Vec<CameraKey>;
@@ -101,6 +118,9 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        if self.aperture.is_some() && self.f_stop > 0.0 {
+            section.wrong("aperture", "is given, but so is f_stop; remove one of them");
+        }
         // Only the fixed mode has the keys `eye` and `look_at`, and requires both
         let own = match self.mode {
             CameraMode::Auto => Some("the automatic camera chooses its own; set mode = \"fixed\""),
@@ -184,6 +204,10 @@ pub(super) fn conditions() -> Json {
             &["auto", "turntable", "keys"],
             json!({ "properties": { "eye": false, "look_at": false } }),
         ),
+        {
+            "if": { "required": ["aperture"] },
+            "then": { "properties": { "f_stop": { "const": 0 } } },
+        },
         // Without a mode, it follows from the other keys.
         {
             "if": { "required": ["eye"], "properties": { "mode": false } },

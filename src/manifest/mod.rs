@@ -23,10 +23,12 @@ use tree::TomlNode;
 mod camera;
 mod caustics;
 mod color;
+mod crop;
 mod environment;
 mod field;
 mod file;
 mod flags;
+mod focus;
 mod ground;
 mod input;
 mod key;
@@ -61,9 +63,11 @@ mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
 pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
+pub use crop::PixelBounds;
 pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
+pub use focus::FocusSetting;
 pub use ground::{GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
@@ -253,6 +257,7 @@ impl Manifest {
                 &format!("{meshes} meshes, but at most {max} are possible"),
             );
         }
+        self.image.check(root);
         if self.branches_at_spheres()
             && self.render.min_weight == 0.0
             && self.render.max_depth > MAX_LITERAL_DEPTH

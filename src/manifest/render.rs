@@ -3,17 +3,22 @@
 use glam::Vec3;
 
 use super::caustics::Caustics;
+use super::crop::PixelBounds;
 use super::ground::GroundSetting;
 use super::key::Affects;
 use super::keys::section;
+use super::reader::Section;
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::metrics::Bytes;
 use crate::render::{
-    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, IntegratorKind, MAX_BOUNCES, MAX_DEPTH, MAX_SAMPLES,
-    MAX_SIDE, MIN_WEIGHTS,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
+    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
 };
 use crate::scene::{Background, ground};
+
+/// Maximum number of pixels to add on each side of an image.
+const MAX_OVERSCAN: u32 = 8192;
 
 section! {
     /// Size and sampling of the image
@@ -24,6 +29,87 @@ section! {
         height: u32 = 1080, from(1), to(MAX_SIDE), unit("pixels"), flag("height", "HEIGHT", "Image");
         /// Samples per pixel
         samples: u32 = 16, from(1), to(MAX_SAMPLES), flag("samples", "SAMPLES", "Image");
+        /// Pixel filter: box | gaussian | blackman-harris
+        ///
+        /// The samples of a pixel are distributed like the filter and have equal weights. A single sample is at the
+        /// centre of the pixel.
+        filter: FilterKind = FilterKind::Box;
+        /// Width of the pixel filter in pixels
+        filter_width: Option<f32> = None, above(0), to(MAX_FILTER_WIDTH), unit("a number of pixels"),
+            example("2.0"), unset("1 for box, 2 for gaussian, 3 for blackman-harris");
+        /// Part of the image to render: [x0, y0, x1, y1] in pixels, from the top left, without column x1 and row y1
+        ///
+        /// Its pixels are those of the whole image. With denoising, they may differ near its border, where the denoiser
+        /// lacks the neighbours. The part is the data window of the EXR; previews show only the part.
+        crop: Option<PixelBounds> = None, example("[0, 0, 960, 540]"), unset("the whole image"),
+            flag("crop", "X0,Y0,X1,Y1", "Image");
+        /// Pixels to add on each side of the image; they extend the data window of the EXR
+        overscan: u32 = 0, from(0), to(MAX_OVERSCAN), unit("pixels");
+    }
+}
+
+impl Image {
+    /// The rendered pixels: columns and rows of the image from `[x0, y0]` up to, but without, `[x1, y1]`.
+    fn data_bounds(&self) -> [i64; 4] {
+        match self.crop {
+            Some(PixelBounds(bounds)) => bounds.map(i64::from),
+            None => self.largest_bounds(),
+        }
+    }
+
+    /// All pixels of the image, with its overscan.
+    fn largest_bounds(&self) -> [i64; 4] {
+        let [width, height, overscan] = [self.width, self.height, self.overscan].map(i64::from);
+        [-overscan, -overscan, width + overscan, height + overscan]
+    }
+
+    /// Width and height of the rendered part in pixels; None if it is empty or too large.
+    pub fn data_size(&self) -> Option<[u32; 2]> {
+        let [x0, y0, x1, y1] = self.data_bounds();
+        let side = |from: i64, to: i64| {
+            let side = u32::try_from(to - from).ok()?;
+            (1..=MAX_SIDE).contains(&side).then_some(side)
+        };
+        Some([side(x0, x1)?, side(y0, y1)?])
+    }
+
+    /// The rendered part of the image, `[x0, y0, x1, y1]`, if it is not the image itself.
+    pub fn part(&self) -> Option<[i64; 4]> {
+        let image = [0, 0, i64::from(self.width), i64::from(self.height)];
+        Some(self.data_bounds()).filter(|part| *part != image)
+    }
+
+    /// Position of the rendered part in the image.
+    pub fn data_window(&self) -> DataWindow {
+        let [left, top, ..] = self.data_bounds();
+        let pixel = |at: i64| i32::try_from(at).unwrap_or(i32::MIN);
+        DataWindow {
+            left: pixel(left),
+            top: pixel(top),
+            image: [self.width, self.height],
+        }
+    }
+
+    /// Checks that the rendered part is in the image.
+    pub(super) fn check(&self, root: &mut Section<'_>) {
+        let [left, top, right, bottom] = self.largest_bounds();
+        if let Some(PixelBounds(bounds)) = self.crop {
+            let [x0, y0, x1, y1] = bounds.map(i64::from);
+            if x0 >= x1 || y0 >= y1 {
+                root.section("image").wrong(
+                    "crop",
+                    "has no pixels; x0 must be below x1, and y0 below y1",
+                );
+            } else if x0 < left || y0 < top || x1 > right || y1 > bottom {
+                let what = format!(
+                    "reaches beyond the image, which is [{left}, {top}, {right}, {bottom}] with its overscan"
+                );
+                root.section("image").wrong("crop", &what);
+            }
+        } else if self.data_size().is_none() {
+            let what = format!("makes the image larger than {MAX_SIDE} pixels; make it smaller");
+            root.section("image").wrong("overscan", &what);
+        }
     }
 }
 
@@ -112,6 +198,7 @@ section! {
     }
 }
 
+named!(FilterKind: Box = "box", Gaussian = "gaussian", BlackmanHarris = "blackman-harris");
 named!(IntegratorKind: Whitted = "whitted", Path = "path");
 
 impl Named for Structure {

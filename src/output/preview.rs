@@ -18,6 +18,8 @@ pub struct PreviewOptions {
     pub exposure: f32,
     /// Linear RGB behind a film with a transparent background. `None` for a film whose colours include the background.
     pub backdrop: Option<Vec3>,
+    /// Column and row of the first pixel in the whole image, so that the dithering of a part is that of the whole.
+    pub first_pixel: [i32; 2],
 }
 
 /// Encodes `film` as an 8-bit sRGB PNG, dithered.
@@ -37,9 +39,10 @@ pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, 
             *pixel = view_transform((Vec3::new(r, g, b) + background) * gain).to_array();
         }
         let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
+        let [left, top] = options.first_pixel.map(i32::cast_unsigned);
         for (pixel, x) in pixels.zip(0..film.width) {
             // One threshold for all components, so that grey stays grey
-            *pixel = [dither_threshold(x, y); 3];
+            *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
         }
         bytes_from_linear(Supported::default(), &linear, &thresholds, bytes);
     }
@@ -128,12 +131,13 @@ mod tests {
     fn exposure_and_backdrop() {
         let options = PreviewOptions {
             exposure: 1.0,
-            backdrop: None,
+            ..PreviewOptions::default()
         };
         assert_near(mean([0.18, 0.0, 0.0, 1.0], &options).x, 0.36);
         let options = PreviewOptions {
             exposure: 0.0,
             backdrop: Some(Vec3::new(0.18, 0.2, 0.0)),
+            ..PreviewOptions::default()
         };
         assert_near(mean([0.09, 0.0, 0.0, 0.5], &options).x, 0.18);
     }

@@ -13,15 +13,17 @@ use exr::meta::header::Header;
 use thiserror::Error;
 
 use super::exr::planes::planes;
-use crate::render::Channels;
+use crate::render::{Channels, DataWindow};
 
 /// The expected size and channels of an image.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct ImageShape {
-    /// Width in pixels.
+    /// Width of the data window in pixels.
     pub width: u32,
-    /// Height in pixels.
+    /// Height of the data window in pixels.
     pub height: u32,
+    /// Position of the data window in the image.
+    pub window: DataWindow,
     /// The channels.
     pub channels: Channels,
 }
@@ -36,6 +38,14 @@ pub enum ImageFault {
         found: (usize, usize),
         /// Expected width and height, pixels.
         expected: (u32, u32),
+    },
+    /// It is another part of the image, or a part of an image of another size.
+    #[error("has the data window {found}, expected {expected}")]
+    Window {
+        /// The windows of the file.
+        found: String,
+        /// The expected windows.
+        expected: String,
     },
     /// It has other channels, or channels of another type.
     #[error("has the channels {found}, expected {expected}")]
@@ -100,6 +110,7 @@ pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), I
 fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
     check_size(size, expected)?;
+    check_window(header, &expected.window)?;
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
@@ -125,6 +136,27 @@ fn check_size(found: (usize, usize), expected: &ImageShape) -> Result<(), ImageF
     } else {
         Err(ImageFault::Size { found, expected })
     }
+}
+
+/// Compares the position of the data window and the display window.
+fn check_window(header: &Header, expected: &DataWindow) -> Result<(), ImageFault> {
+    let at = header.own_attributes.layer_position;
+    let image = header.shared_attributes.display_window;
+    let side = |side: usize| i64::try_from(side).unwrap_or(i64::MAX);
+    let found = [at.x(), at.y(), image.position.x(), image.position.y()].map(i64::from);
+    let wanted = [expected.left, expected.top, 0, 0].map(i64::from);
+    let found_size = [side(image.size.x()), side(image.size.y())];
+    let wanted_size = expected.image.map(i64::from);
+    if found == wanted && found_size == wanted_size {
+        return Ok(());
+    }
+    let text = |[x, y, left, top]: [i64; 4], [width, height]: [i64; 2]| {
+        format!("at ({x}, {y}) in an image of {width}x{height} at ({left}, {top})")
+    };
+    Err(ImageFault::Window {
+        found: text(found, found_size),
+        expected: text(wanted, wanted_size),
+    })
 }
 
 /// Names and types of channels for messages.

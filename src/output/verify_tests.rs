@@ -29,6 +29,7 @@ const fn shape(channels: Channels) -> ImageShape {
     ImageShape {
         width: 40,
         height: 37,
+        window: DataWindow::whole(40, 37),
         channels,
     }
 }
@@ -47,6 +48,36 @@ fn channel_sets() -> impl Iterator<Item = Channels> {
         albedo: bits & 16 != 0,
         id: bits & 32 != 0,
     })
+}
+
+#[test]
+fn another_part_of_the_image_is_a_fault() {
+    let film = film(40, 37, Channels::COLOR);
+    let window = DataWindow {
+        left: 3,
+        top: -8,
+        image: [64, 48],
+    };
+    let options = ExrOptions {
+        window: Some(window),
+        ..ExrOptions::default()
+    };
+    let bytes = encode_exr(&film, &options).unwrap().bytes;
+    let expected = |window| ImageShape {
+        window,
+        ..shape(Channels::COLOR)
+    };
+    assert_eq!(verify(&bytes, &expected(window)), Ok(()));
+    let moved = DataWindow { left: 4, ..window };
+    let larger = DataWindow {
+        image: [64, 49],
+        ..window
+    };
+    for other in [moved, larger] {
+        let fault = verify(&bytes, &expected(other)).unwrap_err();
+        let found = "has the data window at (3, -8) in an image of 64x48 at (0, 0), expected";
+        assert!(fault.starts_with(found), "{fault}");
+    }
 }
 
 #[test]

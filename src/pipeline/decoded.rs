@@ -241,6 +241,16 @@ fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
     })
 }
 
+/// The index of the particle that has `id` in the `id` channel.
+pub(super) fn particle_with_id(frame: &ParticleFrame, id: u32) -> Option<usize> {
+    match ids(frame) {
+        Some(ids) => ids.iter().position(|other| *other == id),
+        None => usize::try_from(id)
+            .ok()
+            .filter(|index| *index < frame.positions.len()),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -3,11 +3,12 @@
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 
+use glam::Vec3;
 use spherule_formats::sequence::Sequence;
 use spherule_formats::{FrameError, ParticleFrame};
 
 use super::ImageTask;
-use super::decoded::DecodedFrame;
+use super::decoded::{DecodedFrame, particle_with_id};
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
 use super::meshes::meshes_of;
@@ -29,6 +30,8 @@ pub struct LoadedFrame {
     pub meshes: Vec<Arc<MeshTree>>,
     /// Simulation time, if known.
     pub time: Option<f64>,
+    /// Position of the particle in focus, relative to the origin, if the camera follows one.
+    pub focus: Option<Vec3>,
     /// Number of particles that were dropped because they were not finite.
     pub dropped: u64,
     /// Number of radii raised to the minimum.
@@ -74,6 +77,7 @@ pub fn load_frame(
             time: frame.time(),
             task: task.clone(),
             notes,
+            focus: None,
             particles: LoadedParticles::Stored(frame),
             meshes: Vec::new(),
             dropped: 0,
@@ -112,6 +116,7 @@ fn decode(
     let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
     let (time, dropped) = (frame.time, frame.dropped);
     let file = first_file(sequence, task);
+    let focus = focus_point(setup, &frame, &file)?;
     let (decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
     Ok(LoadedFrame {
         task: task.clone(),
@@ -119,10 +124,29 @@ fn decode(
         particles: LoadedParticles::Decoded(decoded),
         meshes: Vec::new(),
         time,
+        focus,
         dropped,
         clamped_radii,
         read_time: Duration::ZERO,
     })
+}
+
+/// The position of the particle in focus, relative to the origin; None if the camera does not follow one.
+fn focus_point(
+    setup: &Setup,
+    frame: &ParticleFrame,
+    file: &str,
+) -> Result<Option<Vec3>, LoadError> {
+    let Some(id) = setup.focused_particle() else {
+        return Ok(None);
+    };
+    match particle_with_id(frame, id) {
+        Some(index) => Ok(Some(frame.positions[index])),
+        None => Err(LoadError::NoFocus {
+            file: file.to_owned(),
+            id,
+        }),
+    }
 }
 
 impl LoadedFrame {

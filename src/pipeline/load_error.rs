@@ -40,6 +40,16 @@ pub enum LoadError {
         /// The attributes of the frame.
         has: String,
     },
+    /// The camera focuses on a particle that it does not have.
+    #[error(
+        "{file}: no particle has the id {id}, which camera.focus follows; choose another one, or a distance"
+    )]
+    NoFocus {
+        /// The frame's first file.
+        file: String,
+        /// The id.
+        id: u32,
+    },
 }
 
 /// The error for an attribute that is not among those that the file `has`.

@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 use std::sync::Arc;
 
+use glam::Vec3;
 use spherule_formats::FrameError;
 
 use super::ImageTask;
@@ -71,6 +72,8 @@ pub struct BuiltFrame {
     pub(super) particles: BuiltParticles,
     pub(super) meshes: Vec<Arc<MeshTree>>,
     pub(super) time: Option<f64>,
+    /// Position of the particle in focus.
+    pub(super) focus: Option<Vec3>,
     pub(super) report: FrameReport,
     /// Notes for the user.
     pub(super) notes: Vec<String>,

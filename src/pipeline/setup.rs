@@ -9,7 +9,7 @@ use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
+use crate::scene::{Camera, CameraError, CameraPath, ColorMap, LensSettings, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -91,6 +91,8 @@ pub struct Picture {
     pub color: ColorRule,
     /// The camera path, in world units.
     pub path: CameraPath,
+    /// The lens of the camera; without one, it is a pinhole.
+    pub lens: Option<LensSettings>,
     /// Width of the images divided by their height; also used if fewer pixels are traced in a trial.
     pub aspect: f64,
     /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
@@ -133,7 +135,7 @@ pub struct RunSettings {
 }
 
 impl Setup {
-    /// The camera of `frame`.
+    /// The camera of `frame`, without its lens.
     ///
     /// # Errors
     /// The view is invalid; [`crate::resolve::check_views`] detects that in advance.
@@ -145,13 +147,20 @@ impl Setup {
         )
     }
 
-    /// The scene of `frame`: only the camera moves, lights and everything else are fixed.
+    /// The scene of `frame`: only the camera moves, lights and everything else are fixed. `focus` is the position of
+    /// the particle in focus, relative to the origin.
     ///
     /// # Errors
-    /// Same as [`Self::camera_at`].
-    pub fn scene_at(&self, frame: i64) -> Result<Scene, CameraError> {
+    /// Same as [`Self::camera_at`], or the focus is not in front of the camera.
+    pub fn scene_at(&self, frame: i64, focus: Option<Vec3>) -> Result<Scene, CameraError> {
+        let mut camera = self.camera_at(frame)?;
+        if let Some(lens) = self.picture.lens {
+            let view = self.picture.path.view(frame);
+            let point = focus.map(|point| self.picture.origin + point.as_dvec3());
+            camera = camera.with_lens(lens.lens(&view, self.picture.aspect, point)?);
+        }
         Ok(Scene {
-            camera: self.camera_at(frame)?,
+            camera,
             ..self.picture.scene.clone()
         })
     }
@@ -191,6 +200,9 @@ impl Setup {
                 "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
         }
+        if self.focused_particle().is_some() {
+            return Some("camera.focus searches for a particle in a copy of them".to_owned());
+        }
         let why = match self.picture.surface {
             SurfaceSettings {
                 kind: SurfaceKind::Smooth,
@@ -202,6 +214,11 @@ impl Setup {
             _ => return None,
         };
         Some(why.to_owned())
+    }
+
+    /// The id of the particle in focus.
+    pub(super) fn focused_particle(&self) -> Option<u32> {
+        self.picture.lens.as_ref().and_then(LensSettings::particle)
     }
 
     /// The structure to report for a native frame in place: its order is that of k-d cells.

@@ -69,6 +69,7 @@ impl FrameRenderer for CpuRenderer {
             particles,
             meshes: frame.meshes,
             time: frame.time,
+            focus: frame.focus,
             report,
             notes,
         })
@@ -160,7 +161,7 @@ impl CpuRenderer {
         film: &mut Film,
         stop: &dyn Stop,
     ) -> Result<RayCounts, TraceError> {
-        let scene = setup.scene_at(frame.task.frame)?;
+        let scene = setup.scene_at(frame.task.frame, frame.focus)?;
         let (surface, meshes) = (&self.surface, &frame.meshes);
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {

@@ -93,7 +93,7 @@ impl<'a> RenderContext<'a> {
         let interior = Interior::of(&scene.material, is_connected);
         // Prepare camera, background and lights for packets
         let eye = scene.camera.eye();
-        let [width, height] = settings.full_size();
+        let [width, height] = settings.data_window().image;
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
@@ -111,7 +111,7 @@ impl<'a> RenderContext<'a> {
             color: source.constant_color(),
             interior,
             boundary: Dielectric::new(&scene.material),
-            sampler: FilmSampler::new(settings.samples),
+            sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }
     }
@@ -133,10 +133,11 @@ impl<'a> RenderContext<'a> {
         ground.is_some_and(|ground| ground.shadow_catcher.is_some())
     }
 
-    /// The coherence of a packet at `depth`.
-    pub(super) fn coherence(depth: u32) -> Coherence {
+    /// The coherence of a packet at `depth`. Camera rays from a lens have no common origin, so beams around them are
+    /// wide.
+    pub(super) const fn coherence(&self, depth: u32) -> Coherence {
         match depth {
-            1 => Coherence::Coherent,
+            1 if !self.camera.has_lens() => Coherence::Coherent,
             _ => Coherence::Incoherent,
         }
     }

@@ -22,7 +22,7 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
     ) {
         packet.hits.clear();
-        let (coherence, inside) = (Self::coherence(depth), segments.inside);
+        let (coherence, inside) = (self.coherence(depth), segments.inside);
         for shape in &self.shapes {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
@@ -85,16 +85,16 @@ impl RenderContext<'_> {
             &background_part,
             &mut packet.weight,
         );
-        let direction = &segments.rays.direction;
+        let rays = &segments.rays;
         let (weight, radiance) = (&packet.weight, &mut packet.radiance);
         if depth == 1 && matches!(self.scene.background, Background::Studio { .. }) {
-            add_backdrop(self.simd, &self.camera, direction, weight, lanes, radiance);
+            add_backdrop(self.simd, &self.camera, rays, weight, lanes, radiance);
             return;
         }
         add_background(
             self.simd,
             &self.background,
-            direction,
+            &rays.direction,
             weight,
             lanes,
             radiance,

@@ -44,6 +44,7 @@ mod stream;
 mod tile;
 mod visibility;
 mod whitted;
+mod window;
 
 #[cfg(test)]
 mod body_tests;
@@ -52,9 +53,13 @@ mod branch_tests;
 #[cfg(test)]
 mod catcher_tests;
 #[cfg(test)]
+mod filter_tests;
+#[cfg(test)]
 mod floor_tests;
 #[cfg(test)]
 mod image_tests;
+#[cfg(test)]
+mod lens_tests;
 #[cfg(test)]
 mod panes_tests;
 #[cfg(test)]
@@ -70,7 +75,7 @@ pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
 pub use film_rows::FilmRows;
 pub use ray_counts::RayCounts;
-pub use sampler::{FilmSampler, MultiJitter, PathSeed};
+pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
     DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IntegratorKind, MAX_BOUNCES, MAX_DEPTH,
     MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError,
@@ -79,6 +84,7 @@ pub use settings::{
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
+pub use window::DataWindow;
 
 use context::{Interior, RenderContext};
 use integrator::Integrator;
@@ -117,9 +123,9 @@ pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
 
 /// Renders one image on the current rayon pool.
 ///
-/// The aspect ratio of the camera should be `settings.width / settings.height`. No light is created: `reflection` and
-/// `transmission` are at most 1, which is checked, so the background never contributes more to a ray than its
-/// brightest colour.
+/// The aspect ratio of the camera should be that of the image, `settings.width / settings.height` without a window. No
+/// light is created: `reflection` and `transmission` are at most 1, which is checked, so the background never contributes
+/// more to a ray than its brightest colour.
 ///
 /// # Errors
 /// If `stop` is raised (checked for each packet of samples), or if a setting is out of range.

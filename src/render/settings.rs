@@ -3,6 +3,8 @@
 use thiserror::Error;
 
 use super::film::Channels;
+use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
+use super::window::DataWindow;
 use crate::scene::{Material, MaterialError};
 
 /// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
@@ -49,12 +51,14 @@ pub enum IntegratorKind {
 /// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {
-    /// Width in pixels.
+    /// Width of the film in pixels.
     pub width: u32,
-    /// Height in pixels.
+    /// Height of the film in pixels.
     pub height: u32,
     /// Samples per pixel; a single one is exactly at the centre of the pixel.
     pub samples: u32,
+    /// How the samples are distributed around the centre of the pixel.
+    pub filter: PixelFilter,
     /// The light transport.
     pub integrator: IntegratorKind,
     /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
@@ -76,8 +80,10 @@ pub struct RenderSettings {
     pub channels: Channels,
     /// Also fills the planes that [denoising](crate::denoise) needs.
     pub has_features: bool,
-    /// If given, the image is a mosaic: its tiles of 16x16 pixels are tiles of an image with this width and height,
-    /// evenly distributed over it. The cost per pixel of a mosaic is an estimate for the whole image.
+    /// The part of the image that the film is; by default the whole image.
+    pub window: Option<DataWindow>,
+    /// If given, the film is a mosaic: its tiles of 16x16 pixels are tiles of a film with this width and height, evenly
+    /// distributed over it. The cost per pixel of a mosaic is an estimate for the whole film.
     pub mosaic_of: Option<[u32; 2]>,
 }
 
@@ -88,6 +94,7 @@ impl RenderSettings {
             width,
             height,
             samples: 1,
+            filter: PixelFilter::BOX,
             integrator: IntegratorKind::Whitted,
             bounces: DEFAULT_BOUNCES,
             photons: 0,
@@ -96,13 +103,20 @@ impl RenderSettings {
             transparent_background: false,
             channels: Channels::COLOR,
             has_features: false,
+            window: None,
             mosaic_of: None,
         }
     }
 
-    /// Width and height in pixels of the image that the camera sees.
-    pub(super) fn full_size(&self) -> [u32; 2] {
+    /// Width and height in pixels of the film, or of the film that it is a mosaic of.
+    fn full_size(&self) -> [u32; 2] {
         self.mosaic_of.unwrap_or([self.width, self.height])
+    }
+
+    /// The position of the film in the image of the camera.
+    pub(super) fn data_window(&self) -> DataWindow {
+        let [width, height] = self.full_size();
+        self.window.unwrap_or(DataWindow::whole(width, height))
     }
 
     pub(super) fn validate(&self) -> Result<(), RenderError> {
@@ -118,6 +132,16 @@ impl RenderSettings {
             if !(1..=max).contains(&value) {
                 return Err(RenderError::OutOfRange { name, value, max });
             }
+        }
+        let DataWindow { left, top, image } = self.data_window();
+        let is_near = |at: &i32| at.unsigned_abs() <= MAX_SIDE;
+        let is_side = |side: &u32| (1..=MAX_SIDE).contains(side);
+        if !([left, top].iter().all(is_near) && image.iter().all(is_side)) {
+            return Err(RenderError::Window);
+        }
+        let width = self.filter.width;
+        if !(width > 0.0 && width <= MAX_FILTER_WIDTH) {
+            return Err(RenderError::FilterWidth(width));
         }
         if self.bounces > MAX_BOUNCES {
             return Err(RenderError::TooManyBounces(self.bounces));
@@ -154,6 +178,16 @@ pub enum RenderError {
         /// Its maximum.
         max: u32,
     },
+    /// The position of the film in the image is out of range.
+    #[error(
+        "the window of the film is out of range; its sides and coordinates must be at most {MAX_SIDE} pixels"
+    )]
+    Window,
+    /// The width of the filter is out of range.
+    #[error(
+        "filter_width = {0} is out of range, it must be above 0 and at most {MAX_FILTER_WIDTH}"
+    )]
+    FilterWidth(f32),
     /// `bounces` is out of range.
     #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
     TooManyBounces(u32),

@@ -37,7 +37,7 @@ impl RenderContext<'_> {
     ) -> u32 {
         samples.rays.set_len(segments.rays.len());
         counts.shadow += u64::from(samples.lanes.count_ones());
-        let coherence = Self::coherence(depth);
+        let coherence = self.coherence(depth);
 
         // Trace opaque shapes first: occluded rays need no further tests
         self.occlude(coherence, samples, |shape| {
@@ -90,7 +90,7 @@ impl RenderContext<'_> {
     ) -> u32 {
         samples.rays.set_len(segments.rays.len());
         counts.shadow += u64::from(samples.lanes.count_ones());
-        self.occlude(Self::coherence(depth), samples, |_| true);
+        self.occlude(self.coherence(depth), samples, |_| true);
         self.attenuate_by_panes(samples);
         samples.lanes
     }

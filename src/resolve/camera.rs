@@ -3,10 +3,13 @@
 use glam::DVec3;
 
 use super::ResolveError;
-use crate::manifest::{self, CameraMode, Manifest};
+use crate::manifest::{self, CameraMode, FocusSetting, Manifest};
 use crate::pipeline::Setup;
 use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
-use crate::scene::{Bounds, Camera, CameraKey, CameraPath, CameraView, Framing, KeyedPath};
+use crate::scene::{
+    Aperture, Bounds, Camera, CameraKey, CameraPath, CameraView, Focus, Framing, KeyedPath,
+    LensSettings,
+};
 
 /// The path that the manifest describes; `up` is the default upward direction.
 pub(super) fn path(
@@ -68,6 +71,31 @@ pub(super) fn at_start(
         }
     }
     Ok(Camera::new(&path.start(), aspect, origin)?)
+}
+
+/// The lens that the manifest describes, if its aperture is not 0.
+pub(super) fn lens(
+    manifest: &Manifest,
+    path: &CameraPath,
+    aspect: f64,
+) -> Result<Option<LensSettings>, ResolveError> {
+    let camera = &manifest.camera;
+    let aperture = match (camera.aperture, camera.f_stop) {
+        (Some(diameter), _) if diameter > 0.0 => Aperture::Diameter(diameter),
+        (None, f_stop) if f_stop > 0.0 => Aperture::FStop {
+            f_stop,
+            sensor_width: camera.sensor_width,
+        },
+        _ => return Ok(None),
+    };
+    let focus = match camera.focus {
+        FocusSetting::Auto => Focus::Target,
+        FocusSetting::Distance(distance) => Focus::Distance(distance),
+        FocusSetting::Particle(id) => Focus::Particle(id),
+    };
+    let settings = LensSettings { aperture, focus };
+    settings.lens(&path.start(), aspect, None)?;
+    Ok(Some(settings))
 }
 
 /// Checks that the camera's view is valid at each of `frames`.

@@ -74,7 +74,7 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     });
     let setup = setup.unwrap();
     check_views(&setup, [0, 1, 2, i64::MAX]).unwrap();
-    let scenes = [0, 1].map(|frame| setup.scene_at(frame).unwrap());
+    let scenes = [0, 1].map(|frame| setup.scene_at(frame, None).unwrap());
     assert_eq!(scenes[0].camera, setup.picture.scene.camera);
     assert_ne!(scenes[1].camera, setup.picture.scene.camera);
     assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());

@@ -258,3 +258,57 @@ fn init_writes_camera_keys() {
     let text = workshop.run(&arguments).expect(0).text();
     assert!(text.contains("# [[camera.key]]\n# frame = 1 "), "{text}");
 }
+
+#[test]
+fn focus_follows_a_particle_through_the_frames() {
+    let workshop = Workshop::new();
+    // Particle 1 moves away from the camera, which looks along +y
+    for (frame, distance) in [(1, 4), (2, 7)] {
+        let text = format!("x,y,z\n-0.5,9,0\n0,{distance},0\n0.5,2,0\n");
+        fs::create_dir_all(workshop.join("in")).expect("a directory");
+        fs::write(workshop.join(format!("in/f_{frame}.csv")), text).expect("a file");
+    }
+    let render = |out: &str, focus: &str| {
+        let output = format!("{out}/f.####.exr");
+        let focus = format!("camera.focus={focus}");
+        let mut options = vec![
+            "render",
+            "in",
+            "-o",
+            output.as_str(),
+            "--set",
+            focus.as_str(),
+        ];
+        for setting in [
+            "input.radius=0.4",
+            "image.width=64",
+            "image.height=36",
+            "image.samples=4",
+            "camera.eye=[0, 0, 0]",
+            "camera.look_at=[0, 1, 0]",
+            "camera.up=[0, 0, 1]",
+            "camera.aperture=0.2",
+        ] {
+            options.extend(["--set", setting]);
+        }
+        workshop.run(&options)
+    };
+    render("followed", "{ particle = 1 }").expect(0);
+    render("auto", "auto").expect(0);
+    let at = |name: &str| Picture::open(&workshop.join(name));
+    for (frame, distance) in [(1, "4"), (2, "7")] {
+        let out = format!("at{distance}");
+        render(&out, distance).expect(0);
+        let (followed, fixed) = (
+            at(&format!("followed/{}", image(frame))),
+            at(&format!("{out}/{}", image(frame))),
+        );
+        assert_eq!(followed.floats("R"), fixed.floats("R"));
+        // The target is at distance 1
+        let target = at(&format!("auto/{}", image(frame)));
+        assert_ne!(followed.floats("R"), target.floats("R"));
+    }
+    let ran = render("none", "{ particle = 3 }").expect(1);
+    let errors = ran.errors();
+    assert!(errors.contains("no particle has the id 3"), "{errors}");
+}

@@ -11,6 +11,7 @@ mod camera;
 mod colors;
 mod convert;
 mod corpus;
+mod crop;
 mod damaged;
 mod denoise;
 mod export;

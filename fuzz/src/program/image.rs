@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use spherule::output::{ImageFault, ImageShape, verify_exr, verify_preview};
-use spherule::render::Channels;
+use spherule::render::{Channels, DataWindow};
 
 /// What the seeds are, and what no file of theirs can be. The first byte picks one.
 const SHAPES: [ImageShape; 4] = [
@@ -17,6 +17,7 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
     ImageShape {
         width,
         height,
+        window: DataWindow::whole(width, height),
         channels,
     }
 }

@@ -34,16 +34,17 @@ impl Check<'_> {
             self.tasks.iter().map(|t| json!(t.image)).collect(),
         );
         put("directory", json!(self.render_job.dir()));
-        put(
-            "image",
-            json!({
-                "width": manifest.image.width,
-                "height": manifest.image.height,
-                "samples": manifest.image.samples,
-                "channels": manifest.output.channels.iter().map(|c| c.name()).collect::<Vec<_>>(),
-                "preview": manifest.output.preview,
-            }),
-        );
+        let mut image = json!({
+            "width": manifest.image.width,
+            "height": manifest.image.height,
+            "samples": manifest.image.samples,
+            "channels": manifest.output.channels.iter().map(|c| c.name()).collect::<Vec<_>>(),
+            "preview": manifest.output.preview,
+        });
+        if let Some(part) = manifest.image.part() {
+            image["data_window"] = json!(part);
+        }
+        put("image", image);
         if let Some((survey, setup)) = &self.setup {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
@@ -83,10 +84,15 @@ impl Check<'_> {
         let manifest = self.render_job.manifest();
         let names: Vec<&str> = manifest.output.channels.iter().map(|c| c.name()).collect();
         lines.push(format!(
-            "images     {}: {}x{}, {} samples per pixel, {}{}",
+            "images     {}: {}x{}{}, {} samples per pixel, {}{}",
             self.render_job.shown_output().display(),
             manifest.image.width,
             manifest.image.height,
+            manifest
+                .image
+                .part()
+                .map(|part| format!(", part {part:?}"))
+                .unwrap_or_default(),
             manifest.image.samples,
             names.join(" "),
             if manifest.output.preview {

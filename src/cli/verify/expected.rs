@@ -3,6 +3,7 @@
 use spherule_jobs::Plan;
 
 use crate::job::KIND;
+use crate::manifest::{Image, PixelBounds};
 use crate::output::ImageShape;
 use crate::render::Channels;
 
@@ -53,9 +54,29 @@ impl ExpectedOutput {
             let names = list.as_array()?.iter().map(|name| name.as_str());
             Channels::from_names(names.collect::<Option<Vec<_>>>()?).ok()
         };
-        Ok(Self::Images(ImageShape {
+        // Plans of older versions have neither crop nor overscan
+        let crop = find("image.crop").map(|_| {
+            let list = value("image.crop")?;
+            let pixel = |v: &toml::Value| i32::try_from(v.as_integer()?).ok();
+            let pixels: Option<Vec<i32>> = list.as_array()?.iter().map(pixel).collect();
+            pixels?.try_into().ok().map(PixelBounds)
+        });
+        let crop = crop.map(|crop| crop.ok_or_else(|| wrong("image.crop")));
+        let image = Image {
             width: side("image.width")?,
             height: side("image.height")?,
+            crop: crop.transpose()?,
+            overscan: match find("image.overscan") {
+                Some(_) => side("image.overscan")?,
+                None => 0,
+            },
+            ..Image::default()
+        };
+        let [width, height] = image.data_size().ok_or_else(|| wrong("image.crop"))?;
+        Ok(Self::Images(ImageShape {
+            width,
+            height,
+            window: image.data_window(),
             channels: channels().ok_or_else(|| wrong("output.channels"))?,
         }))
     }
@@ -65,6 +86,7 @@ impl ExpectedOutput {
 mod tests {
     use super::*;
     use crate::manifest::Manifest;
+    use crate::render::DataWindow;
 
     fn set(settings: &mut [(String, String)], key: &str, value: &str) {
         let found = settings.iter_mut().find(|(k, _)| k == key);
@@ -77,6 +99,7 @@ mod tests {
         let shape = ImageShape {
             width: 1920,
             height: 1080,
+            window: DataWindow::whole(1920, 1080),
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
         };
         assert_eq!(
@@ -95,6 +118,34 @@ mod tests {
             let error = ExpectedOutput::of_settings(&wrong).unwrap_err();
             assert_eq!(error, InvalidSetting { key });
         }
+        // A part of the image, and margins around it
+        let mut part = settings.clone();
+        part.push(("image.crop".to_owned(), "[-5, 10, 100, 50]".to_owned()));
+        set(&mut part, "image.overscan", "5");
+        let expected = ImageShape {
+            width: 105,
+            height: 40,
+            window: DataWindow {
+                left: -5,
+                top: 10,
+                image: [1920, 1080],
+            },
+            ..shape
+        };
+        assert_eq!(
+            ExpectedOutput::of_settings(&part),
+            Ok(ExpectedOutput::Images(expected))
+        );
+        for wrong in ["[1, 2, 3]", "[1, 2, 1, 4]", "7"] {
+            set(&mut part, "image.crop", wrong);
+            let error = ExpectedOutput::of_settings(&part).unwrap_err();
+            assert_eq!(error.key, "image.crop", "{wrong}");
+        }
+        settings.retain(|(key, _)| key != "image.overscan");
+        assert_eq!(
+            ExpectedOutput::of_settings(&settings),
+            Ok(ExpectedOutput::Images(shape))
+        );
         settings.retain(|(key, _)| key != "image.width");
         assert!(ExpectedOutput::of_settings(&settings).is_err());
     }

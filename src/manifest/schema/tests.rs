@@ -83,7 +83,7 @@ fn written_manifests_are_valid() {
 }
 
 /// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
-const TABLES: [(&str, &str); 24] = [
+const TABLES: [(&str, &str); 25] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -142,6 +142,10 @@ const TABLES: [(&str, &str); 24] = [
     (
         "/properties/render/properties/caustics",
         "[render.caustics]\n",
+    ),
+    (
+        "/properties/camera/properties/focus/anyOf/2",
+        "[camera.focus]\n",
     ),
     (
         "/properties/environment/properties/sun",

@@ -41,6 +41,8 @@ pub enum FlagKind {
     NumberOrText,
     /// Text, with commas between items.
     List,
+    /// Integers with commas between them.
+    Integers,
 }
 
 /// A type of values.

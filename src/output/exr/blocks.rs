@@ -43,7 +43,7 @@ pub fn write_blocks(
         });
         for (index, block) in blocks.enumerate() {
             clamped += block.clamped;
-            writer.write_chunk(index, chunk(block))?;
+            writer.write_chunk(index, chunk(block, layout.top()))?;
         }
         Ok(())
     });
@@ -53,11 +53,12 @@ pub fn write_blocks(
     }
 }
 
-fn chunk(block: PackedBlock) -> Chunk {
+/// The chunk of a block of a film that begins in row `top` of the image.
+fn chunk(block: PackedBlock, top: i32) -> Chunk {
     Chunk {
         layer_index: 0,
         compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
-            y_coordinate: i32::try_from(block.y).expect("images have at most 65536 rows"),
+            y_coordinate: top + i32::try_from(block.y).expect("images have at most 65536 rows"),
             compressed_pixels_le: block.bytes,
         }),
     }

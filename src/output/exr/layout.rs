@@ -4,12 +4,12 @@ use exr::image::write::layers::WritableLayers;
 use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, ImageAttributes,
-    IntegerBounds, Layer, LineOrder, SampleType,
+    IntegerBounds, Layer, LineOrder, SampleType, Vec2,
 };
 
 use super::planes::{Plane, planes_in_file};
 use super::{Compression, ExrOptions, OutputError, attributes};
-use crate::render::{Channels, Film, FilmRows};
+use crate::render::{Channels, DataWindow, Film, FilmRows};
 
 /// Minimum number of rows in a band: the height of the renderer's tiles.
 const BAND_ROWS: u32 = 16;
@@ -52,9 +52,15 @@ impl ExrLayout {
         };
         let size = (width as usize, height as usize);
         let described = AnyChannels::sort(described.collect());
-        let layer = Layer::new(size, attributes(options)?, encoding, described);
-        let window = IntegerBounds::from_dimensions(size);
-        let header = layer.infer_headers(&ImageAttributes::new(window)).remove(0);
+        // Place it in the image
+        let DataWindow { left, top, image } =
+            options.window.unwrap_or(DataWindow::whole(width, height));
+        let mut attributes = attributes(options)?;
+        attributes.layer_position = Vec2(left, top);
+        let layer = Layer::new(size, attributes, encoding, described);
+        let display = IntegerBounds::from_dimensions((image[0] as usize, image[1] as usize));
+        let image = ImageAttributes::new(display);
+        let header = layer.infer_headers(&image).remove(0);
         Ok(Self {
             header,
             compression: options.compression,
@@ -68,6 +74,11 @@ impl ExrLayout {
     /// If an attribute cannot be stored.
     pub fn of(film: &Film, options: &ExrOptions) -> Result<Self, OutputError> {
         Self::new(film.width, film.height, film.channels(), options)
+    }
+
+    /// Row of the image in which the film begins.
+    pub(super) fn top(&self) -> i32 {
+        self.header.own_attributes.layer_position.y()
     }
 
     /// Number of rows in a block: 1, 16 or 32. The last block of an image may have fewer.

@@ -11,7 +11,7 @@ use exr::prelude::{AttributeValue, LayerAttributes, Text};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::render::Film;
+use crate::render::{DataWindow, Film};
 
 mod blocks;
 mod deflate;
@@ -59,6 +59,8 @@ pub struct CustomAttribute {
 pub struct ExrOptions {
     /// Compression of all channels.
     pub compression: Compression,
+    /// Data window and display window; by default both are the size of the film.
+    pub window: Option<DataWindow>,
     /// Attribute `framesPerSecond`, as numerator and denominator.
     pub frames_per_second: Option<(i32, u32)>,
     /// Attribute `worldToCamera`, from [`crate::scene::Camera::world_to_camera`].

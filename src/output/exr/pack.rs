@@ -117,7 +117,8 @@ fn compress_with_exr(
     });
     let top = i32::try_from(rows.top).expect("images have at most 65536 rows");
     let size = Vec2(rows.width as usize, rows.height as usize);
-    let section = IntegerBounds::new(Vec2(0, top), size);
+    let left = layout.header.own_attributes.layer_position.x();
+    let section = IntegerBounds::new(Vec2(left, layout.top() + top), size);
     let codec = layout.compression.codec();
     let packed = codec.compress_image_section_to_le(&layout.header, bytes, section);
     packed.map_err(OutputError::Exr)

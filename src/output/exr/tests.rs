@@ -1,4 +1,8 @@
-use exr::prelude::{Blocks, Encoding, FlatSamples, LineOrder, ReadChannels, ReadLayers, f16, read};
+use exr::meta::MetaData;
+use exr::prelude::{
+    Blocks, Encoding, FlatSamples, IntegerBounds, LineOrder, ReadChannels, ReadLayers, Vec2, f16,
+    read,
+};
 use glam::Vec3;
 
 use super::*;
@@ -97,6 +101,35 @@ fn round_trips_with_types_and_values() {
         assert_eq!(encoding.blocks, Blocks::ScanLines);
         assert_eq!(encoding.line_order, LineOrder::Increasing);
         check_attributes(&attributes);
+    }
+}
+
+#[test]
+fn windows_are_those_of_the_options() {
+    let film = film(37, 21, Channels::ALL);
+    for compression in COMPRESSIONS {
+        for [left, top] in [[100, 3], [-7, -20]] {
+            let window = DataWindow {
+                left,
+                top,
+                image: [160, 90],
+            };
+            let options = ExrOptions {
+                compression,
+                window: Some(window),
+                ..options()
+            };
+            let bytes = encode_exr(&film, &options).unwrap().bytes;
+            let meta = MetaData::read_from_buffered(Cursor::new(&bytes), true).unwrap();
+            let header = &meta.headers[0];
+            let data = IntegerBounds::new(Vec2(left, top), Vec2(37, 21));
+            assert_eq!(header.data_window(), data);
+            let display = IntegerBounds::from_dimensions((160, 90));
+            assert_eq!(header.shared_attributes.display_window, display);
+            for (name, samples) in &decode(&bytes).0 {
+                check_channel(&film, name, samples);
+            }
+        }
     }
 }
 

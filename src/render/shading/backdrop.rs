@@ -3,6 +3,7 @@
 
 use super::camera::CameraLanes;
 use crate::math::{LANES, Lanes3, lane_kernel};
+use crate::ray::RayPacket;
 use crate::scene::background::{STUDIO_BOTTOM, STUDIO_CENTER, STUDIO_TOP};
 
 /// Fraction by which the corners are darkened at most.
@@ -14,18 +15,22 @@ const FALLOFF: f32 = 1.6;
 /// Factor on horizontal distances from the centre.
 const STRETCH: f32 = 1.15;
 
-/// Adds the radiance of the backdrop along `direction` times `weight` to `radiance`, only for `lanes`.
+/// Adds the radiance of the backdrop along camera rays times `weight` to `radiance`, only for `lanes`.
 #[inline(always)]
 fn add_backdrop_body(
     camera: &CameraLanes,
-    direction: &Lanes3,
+    rays: &RayPacket,
     weight: &Lanes3,
     lanes: u32,
     radiance: &mut Lanes3,
 ) {
     let (bottom, top) = (STUDIO_BOTTOM.to_array(), STUDIO_TOP.to_array());
     for l in 0..LANES {
-        let [x, y] = camera.film_position([direction[0][l], direction[1][l], direction[2][l]]);
+        let (origin, direction) = (&rays.origin, &rays.direction);
+        let [x, y] = camera.film_position(
+            [origin[0][l], origin[1][l], origin[2][l]],
+            [direction[0][l], direction[1][l], direction[2][l]],
+        );
         let across = STRETCH * (x - STUDIO_CENTER[0]);
         let down = y - STUDIO_CENTER[1];
         let darkening = FALLOFF * (across * across + down * down);
@@ -43,7 +48,7 @@ fn add_backdrop_body(
 lane_kernel! {
     pub(in crate::render) fn add_backdrop(
         camera: &CameraLanes,
-        direction: &Lanes3,
+        rays: &RayPacket,
         weight: &Lanes3,
         lanes: u32,
         radiance: &mut Lanes3,
@@ -56,10 +61,11 @@ mod tests {
 
     use super::*;
     use crate::math::{Supported, lane3, set_lane3, splat};
-    use crate::scene::{Camera, CameraView};
+    use crate::render::shading::lens_rays;
+    use crate::scene::{Camera, CameraView, Lens};
 
     /// The colour at a position of the film.
-    fn backdrop(film: Vec2) -> Vec3 {
+    fn backdrop(film: Vec2, lens: Option<Vec2>) -> Vec3 {
         let view = CameraView {
             eye: DVec3::new(3.0, -10.0, 4.0),
             look_at: DVec3::ZERO,
@@ -67,12 +73,22 @@ mod tests {
             fov: 60.0,
         };
         let camera = Camera::new(&view, 1.6, DVec3::ZERO).unwrap();
-        let (mut direction, mut radiance) = ([splat(0.0); 3], [splat(0.0); 3]);
-        set_lane3(&mut direction, 2, camera.ray(film).direction);
+        let camera = camera.with_lens(Lens {
+            radius: if lens.is_some() { 0.5 } else { 0.0 },
+            focus: 4.0,
+        });
+        let (mut rays, mut radiance) = (RayPacket::default(), [splat(0.0); 3]);
+        let ray = camera.ray(film);
+        set_lane3(&mut rays.origin, 2, ray.origin);
+        set_lane3(&mut rays.direction, 2, ray.direction);
         let camera = CameraLanes::new(&camera, 160, 100);
         let weight = [splat(1.0); 3];
         let simd = Supported::default();
-        add_backdrop(simd, &camera, &direction, &weight, 0b100, &mut radiance);
+        if let Some(u) = lens {
+            lens_rays(simd, &camera, &u.to_array().map(splat), &mut rays);
+            assert_ne!(lane3(&rays.direction, 2), ray.direction);
+        }
+        add_backdrop(simd, &camera, &rays, &weight, 0b100, &mut radiance);
         lane3(&radiance, 2)
     }
 
@@ -82,8 +98,10 @@ mod tests {
             let squared = (1.15 * (x - 0.5_f32)).powi(2) + (y - 0.45_f32).powi(2);
             let wanted = STUDIO_BOTTOM.lerp(STUDIO_TOP, 1.0 - y);
             let wanted = wanted * (1.0 - 0.25 * (1.6 * squared).min(1.0));
-            let found = backdrop(Vec2::new(x, y));
-            assert!((found - wanted).abs().max_element() < 1e-5, "{x} {y}");
+            for lens in [None, Some(Vec2::new(0.9, 0.3))] {
+                let found = backdrop(Vec2::new(x, y), lens);
+                assert!((found - wanted).abs().max_element() < 1e-5, "{x} {y}");
+            }
         }
     }
 }
