@@ -21,6 +21,7 @@ use reader::Section;
 use tree::TomlNode;
 
 mod camera;
+mod channel;
 mod color;
 mod environment;
 mod field;
@@ -58,6 +59,7 @@ mod work;
 mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
+pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
 pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
@@ -67,9 +69,8 @@ pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
 pub use material::{Material, MaterialKind};
-#[cfg(feature = "cli")]
 pub(crate) use nearest::nearest;
-pub use output::{Channel, Output};
+pub use output::Output;
 pub use pattern::OutputPattern;
 pub use preset::Look;
 #[cfg(feature = "cli")]

@@ -30,6 +30,7 @@ const fn shape(channels: Channels) -> ImageShape {
         width: 40,
         height: 37,
         channels,
+        attributes: Vec::new(),
     }
 }
 
@@ -46,6 +47,7 @@ fn channel_sets() -> impl Iterator<Item = Channels> {
         velocity: bits & 8 != 0,
         albedo: bits & 16 != 0,
         id: bits & 32 != 0,
+        ..Channels::COLOR
     })
 }
 

@@ -12,6 +12,7 @@ use super::setup::Setup;
 use crate::accel::stored::StoredFault;
 use crate::denoise::DenoiseError;
 use crate::metrics::MemoryUse;
+use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;
 use crate::scene::{Camera, CameraError};
@@ -54,6 +55,8 @@ pub struct TracedFrame {
     pub camera: Camera,
     /// The planes.
     pub film: Film,
+    /// Attributes of the file that describe its layers.
+    pub texts: Vec<TextAttribute>,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// The report, without encoding.

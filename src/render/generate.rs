@@ -22,6 +22,7 @@ impl RenderContext<'_> {
         group: &mut SampleGroup,
     ) {
         group.clear();
+        group.layers.layers = self.settings.channels.layers;
         let [left, top] = self.first_pixel(tile);
         for (column, row) in pixels {
             let (x, y) = (left + column, top + row);

@@ -14,6 +14,7 @@ use super::{
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
+    layers::LightClass,
     lights::{environment_along, sample_environment},
     materials::{Material, materials_of},
     roulette::SplitRule,
@@ -30,6 +31,7 @@ use glam::Vec3;
 
 mod catcher;
 mod emission;
+mod light_channels;
 
 use catcher::Catcher;
 
@@ -89,6 +91,7 @@ impl Integrator for PathIntegrator<'_> {
         // Add what rays see of lights, and infinitely far away
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
+        packet.take_light(LightClass::Emission);
         if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
             let lanes = packet.hits.lanes_of(MaterialId::GROUND);
             if lanes != 0 {
@@ -96,6 +99,7 @@ impl Integrator for PathIntegrator<'_> {
             }
         }
         self.add_escaped(segments, depth, segments.lanes() & !ended, packet);
+        packet.take_light(LightClass::Background);
         if packet.hits.mask == 0 {
             return;
         }
@@ -199,7 +203,14 @@ impl PathIntegrator<'_> {
             return;
         };
         self.reflect_environment(environment, surface, lanes, packet);
+        self.divide_samples(surface, packet);
+        let unoccluded = packet.unoccluded();
         self.add_unoccluded(surface, packet);
+        packet.split.take_reflected(&packet.radiance);
+        if let Some((lanes, unoccluded)) = unoccluded {
+            let PacketScratch { split, light, .. } = packet;
+            split.add_direct(lanes, &unoccluded, light.lanes, &light.radiance);
+        }
     }
 
     /// Samples a direction from the environment, and the light from there that `lanes` reflect: `packet.light`.
@@ -248,12 +259,15 @@ impl PathIntegrator<'_> {
             if packet.light.lanes == 0 {
                 continue;
             }
+            self.divide_samples(surface, packet);
+            let unoccluded = packet.unoccluded();
             // Trace the shadow rays
             let PacketScratch {
                 light: samples,
                 crossings,
                 counts,
                 radiance,
+                split,
                 ..
             } = &mut *packet;
             let visible = if light.casts_shadow() {
@@ -269,6 +283,10 @@ impl PathIntegrator<'_> {
                 visible,
                 radiance,
             );
+            split.take_reflected(radiance);
+            if let Some((lanes, unoccluded)) = unoccluded {
+                split.add_direct(lanes, &unoccluded, visible, &samples.radiance);
+            }
         }
     }
 
@@ -298,6 +316,10 @@ impl PathIntegrator<'_> {
     fn bounce(&self, surface: &Surface<'_>, packet: &mut PacketScratch, next: &mut RayStreams) {
         let segments = surface.segments;
         let lanes = self.sample_bsdf(surface, packet);
+        if packet.split.is_active {
+            let direction = packet.points.reflected.direction;
+            self.divide(surface, &direction, packet);
+        }
         let rays = &mut packet.points.reflected;
         // The last segment of a path may be a shadow ray to the environment
         let max = self.context.settings.bounces;
@@ -313,6 +335,7 @@ impl PathIntegrator<'_> {
         // Infinite densities mark specular rays
         if last != 0 {
             self.add_last(surface, last, packet);
+            packet.split.take_reflected(&packet.radiance);
         }
         packet.points.reflected.pdf = splat(f32::INFINITY);
     }

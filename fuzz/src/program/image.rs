@@ -18,6 +18,7 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
         width,
         height,
         channels,
+        attributes: Vec::new(),
     }
 }
 

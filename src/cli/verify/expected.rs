@@ -3,11 +3,12 @@
 use spherule_jobs::Plan;
 
 use crate::job::KIND;
+use crate::manifest::ATTRIBUTE_CHANNEL as ATTRIBUTE;
 use crate::output::ImageShape;
 use crate::render::Channels;
 
 /// The kind of files that a job writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ExpectedOutput {
     /// Images, and previews of the same size.
     Images(ImageShape),
@@ -51,12 +52,24 @@ impl ExpectedOutput {
         let channels = || {
             let list = value("output.channels")?;
             let names = list.as_array()?.iter().map(|name| name.as_str());
-            Channels::from_names(names.collect::<Option<Vec<_>>>()?).ok()
+            let names = names.collect::<Option<Vec<_>>>()?;
+            let attributes = names.iter().filter_map(|name| name.strip_prefix(ATTRIBUTE));
+            let attributes: Vec<String> = attributes.map(str::to_owned).collect();
+            let is_named = |name: &&str| !name.starts_with(ATTRIBUTE);
+            let mut channels = Channels::from_names(names.into_iter().filter(is_named)).ok()?;
+            // Jobs of earlier versions have no levels
+            if let Some(levels) = value("output.cryptomatte_levels") {
+                let levels = u32::try_from(levels.as_integer()?).ok()?;
+                channels.layers.mattes.set_levels(levels);
+            }
+            Some((channels, attributes))
         };
+        let (channels, attributes) = channels().ok_or_else(|| wrong("output.channels"))?;
         Ok(Self::Images(ImageShape {
             width: side("image.width")?,
             height: side("image.height")?,
-            channels: channels().ok_or_else(|| wrong("output.channels"))?,
+            channels,
+            attributes,
         }))
     }
 }
@@ -78,6 +91,7 @@ mod tests {
             width: 1920,
             height: 1080,
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
+            attributes: Vec::new(),
         };
         assert_eq!(
             ExpectedOutput::of_settings(&settings),
