@@ -95,7 +95,8 @@ fn manifest(
             }
         }
     }
-    if setup.picture.scene.ground.is_some() {
+    let ground = setup.picture.scene.ground.as_ref();
+    if ground.is_some_and(|ground| ground.shadow_catcher.is_none()) {
         add(GROUND.as_bytes());
     }
     json.push('}');

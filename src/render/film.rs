@@ -437,6 +437,10 @@ mod tests {
         assert!(film.normal.is_none());
         assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * 24);
         assert_eq!(Film::bytes_for(3, 2, channels, true), 6 * (24 + 3 * 12));
+        let channels = Channels::from_names(["lights", "shadow", "crypto_part"]).unwrap();
+        assert_eq!(channels.layers.floats(), 18 + 1 + 12);
+        assert_eq!(Film::new(3, 2, channels).layers.unwrap().len(), 6 * 31);
+        assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * (16 + 4 * 31));
         let error = Channels::from_names(["depth"]).unwrap_err();
         assert!(error.to_string().contains("\"depth\""));
     }

@@ -145,14 +145,10 @@ fn light_channels_add_up_to_the_color() {
             let mut film = Film::default();
             render_into(&mut film, &[&ball], &scene, &source, &settings, &never).unwrap();
             for (lights, color) in film.layers.unwrap().chunks(18).zip(&film.color) {
-                for axis in 0..3 {
+                for (axis, expected) in color[..3].iter().enumerate() {
                     let sum: f32 = lights.iter().skip(axis).step_by(3).sum();
-                    let limit = 1e-5 * color[axis].max(1.0);
-                    assert!(
-                        (sum - color[axis]).abs() < limit,
-                        "{sum} of {}",
-                        color[axis]
-                    );
+                    let limit = 1e-5 * expected.max(1.0);
+                    assert!((sum - expected).abs() < limit, "{sum} of {expected}");
                 }
             }
         }

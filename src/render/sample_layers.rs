@@ -105,8 +105,8 @@ impl SampleLayers {
         self.objects[kind as usize][packet][lane] = object;
     }
 
-    /// Stores the layers of the pixel with the samples in `range`, except for the data of its nearest sample. The `mean`
-    /// of the samples has been limited to `color`. `coverage`: that of all samples.
+    /// Stores the layers of the pixel with the samples in `range`, except for the data of its nearest sample. The
+    /// `mean` of the samples has been limited to `color`. `coverage`: that of all samples.
     pub(super) fn accumulate(
         &mut self,
         range: Range<usize>,

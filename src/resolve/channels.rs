@@ -45,8 +45,7 @@ pub(super) fn channels(
     let names = attribute_planes(&attributes);
     if names.len() > MAX_ATTRIBUTE_FLOATS {
         return Err(unsupported(format!(
-            "attributes with {} components in total; at most {MAX_ATTRIBUTE_FLOATS} are possible",
-            names.len()
+            "the attributes have more than {MAX_ATTRIBUTE_FLOATS} components in total; leave some of them out"
         )));
     }
     channels.layers.attributes = u8::try_from(names.len()).unwrap_or(u8::MAX);
@@ -75,9 +74,10 @@ fn attribute(name: &str, survey: &Survey) -> Result<AttributeChannel, ResolveErr
         .iter()
         .position(|a| a.eq_ignore_ascii_case(name));
     let components = index.and_then(|index| survey.components.get(index));
+    let components = components.copied().unwrap_or(1);
     Ok(AttributeChannel {
         name: name.to_owned(),
-        components: components.copied().unwrap_or(1).max(1),
+        components: components.clamp(1, MAX_ATTRIBUTE_FLOATS + 1),
     })
 }
 

@@ -75,8 +75,8 @@ impl Plane {
     }
 }
 
-/// The planes of a file with `channels`, in the order of the channel names in the manual. `attributes`: the names of the
-/// planes of attributes.
+/// The planes of a file with `channels`, in the order of the channel names in the manual. `attributes`: the names of
+/// the planes of attributes.
 pub(in crate::output) fn planes(channels: Channels, attributes: &[String]) -> Vec<Plane> {
     let color = vectors(["R", "G", "B", "A"], Source::Color);
     let mut all = color.to_vec();

@@ -90,8 +90,8 @@ pub(super) trait Bsdf: Sync {
         samples: &mut BsdfSamples,
     );
 
-    /// Stores the diffuse part of the reflection of light from unit `direction` that leaves against `rays`, 0 to 1, only
-    /// for `lanes`.
+    /// Stores the diffuse part of the reflection of light from unit `direction` that leaves against `rays`, 0 to 1,
+    /// only for `lanes`.
     fn diffuse_part(
         &self,
         rays: &RayPacket,

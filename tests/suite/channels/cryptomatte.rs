@@ -1,5 +1,5 @@
-//! Cryptomatte layers, decoded by the steps of the specification: attributes by prefix, layers of four channels, objects
-//! as bits of floats, names from the manifest.
+//! Cryptomatte layers, decoded by the steps of the specification: attributes by prefix, layers of four channels,
+//! objects as bits of floats, names from the manifest.
 
 use std::collections::BTreeMap;
 use std::fs;

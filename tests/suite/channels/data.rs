@@ -10,7 +10,7 @@ const SIZE: [&str; 4] = ["--width", "64", "--height", "36"];
 fn write(workshop: &Workshop, frames: &[&str]) {
     fs::create_dir_all(workshop.join("in")).expect("a directory");
     for (number, text) in (1..).zip(frames) {
-        fs::write(workshop.join(&format!("in/f.{number:04}.csv")), text).expect("a file");
+        fs::write(workshop.join(format!("in/f.{number:04}.csv")), text).expect("a file");
     }
 }
 
@@ -19,7 +19,7 @@ fn rendered(workshop: &Workshop, out: &str, options: &[&str]) -> Picture {
     let pattern = format!("{out}/f.####.exr");
     let image = ["render", "in", "-o", &pattern];
     workshop.run(&[&image[..], options].concat()).expect(0);
-    Picture::open(&workshop.join(&format!("{out}/f.0001.exr")))
+    Picture::open(&workshop.join(format!("{out}/f.0001.exr")))
 }
 
 const TWO: &str = "x,y,z,id,density,velocity_x,velocity_y,velocity_z,radius\n\

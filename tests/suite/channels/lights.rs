@@ -66,8 +66,12 @@ fn light_channels_of_whitted_add_up() {
     dam_break(&workshop.join("in"), 6..=6);
     let usual = ["diffuse", "specular", "reflection"];
     let with_background = [&usual[..], &["background"]].concat();
-    check(&workshop, &["--ground"], &with_background);
-    check(&workshop, &["--set", "output.transparent=true"], &usual);
+    let check = |options: &[&str], expected: &[&str]| {
+        let whitted = ["--integrator", "whitted"];
+        check(&workshop, &[&whitted[..], options].concat(), expected);
+    };
+    check(&["--ground"], &with_background);
+    check(&["--set", "output.transparent=true"], &usual);
     let glass = ["--set", "material.transmission=0.8"];
     let classes = [
         "diffuse",
@@ -76,14 +80,14 @@ fn light_channels_of_whitted_add_up() {
         "refraction",
         "background",
     ];
-    check(&workshop, &glass, &classes);
+    check(&glass, &classes);
     let matte = [
         "--set",
         "material.reflection=0",
         "--set",
         "material.specular=0",
     ];
-    check(&workshop, &matte, &["diffuse", "background"]);
+    check(&matte, &["diffuse", "background"]);
 }
 
 #[test]
@@ -147,7 +151,7 @@ fn shadows_are_the_fraction_of_direct_light_that_arrives() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=6);
     for options in [
-        &["--ground"][..],
+        &["--ground", "--integrator", "whitted"][..],
         &[
             "--ground",
             "--integrator",
