@@ -205,6 +205,7 @@ fn with(film: &Film, channels: Channels) -> Film {
         velocity: plane(&film.velocity, channels.velocity),
         albedo: plane(&film.albedo, channels.albedo),
         id: film.id.clone().filter(|_| channels.id),
+        layers: None,
         odd: None,
         channels,
     }
@@ -254,6 +255,7 @@ fn film(file: &Path) -> Film {
             FlatSamples::U32(ids) => Some(ids.clone()),
             _ => None,
         }),
+        layers: None,
         odd: None,
         channels: Channels::COLOR,
     };
@@ -264,6 +266,7 @@ fn film(file: &Path) -> Film {
         velocity: film.velocity.is_some(),
         albedo: film.albedo.is_some(),
         id: film.id.is_some(),
+        ..Channels::COLOR
     };
     film
 }

@@ -4,13 +4,13 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting};
+use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting, nearest};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{Channels, IntegratorKind, PixelFilter, RenderSettings};
+use crate::render::{IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
     Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
     material,
@@ -19,6 +19,7 @@ use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
+mod channels;
 mod denoise;
 mod environment;
 mod ground;
@@ -45,12 +46,14 @@ pub enum ResolveError {
         what: String,
     },
     /// No frame has the requested attribute.
-    #[error("{key}: no attribute `{name}` in the sampled frames; available: {has}")]
+    #[error("{key}: no attribute `{name}` in the sampled frames{hint}; available: {has}")]
     MissingAttribute {
         /// The manifest's key.
         key: &'static str,
         /// Name of the attribute.
         name: String,
+        /// A similar name, if there is one.
+        hint: String,
         /// The existing attributes.
         has: String,
     },
@@ -179,15 +182,12 @@ pub fn setup(
         meshes: Vec::new(),
         environment,
         is_environment_visible: manifest.environment.visible,
+        next_frame: None,
     };
     // Collect the settings of the images
     let output = &manifest.output;
-    let channels = Channels::from_names(output.channels.iter().map(|c| c.name())).map_err(|e| {
-        ResolveError::Unsupported {
-            key: "output.channels",
-            what: e.to_string(),
-        }
-    })?;
+    let (channels, attributes) = channels::channels(output, survey)?;
+    let step = channels::frame_step(&channels, output, survey)?;
     // Manifests that were not read from a file are not checked
     let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
         key: "image.crop",
@@ -227,13 +227,17 @@ pub fn setup(
         denoise,
         surface,
         exr: ExrOptions {
+            attribute_planes: channels::attribute_planes(&attributes),
             compression: output.compression,
             window,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
             custom: None,
+            texts: Vec::new(),
         },
+        attributes,
+        step,
         preview: PreviewOptions {
             exposure: output.preview_exposure,
             backdrop: None,
@@ -344,8 +348,15 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
     Err(ResolveError::MissingAttribute {
         key,
         name: name.to_owned(),
+        hint: similar(name, &survey.attributes),
         has: attribute_list(survey.attributes.iter().map(String::as_str)),
     })
+}
+
+/// A question about the attribute that was probably meant.
+fn similar(name: &str, attributes: &[String]) -> String {
+    let known: Vec<&str> = attributes.iter().map(String::as_str).collect();
+    nearest(name, &known).map_or_else(String::new, |found| format!(" (did you mean `{found}`?)"))
 }
 
 /// The source of the colours of particles; "auto" depends on the attributes that exist.

@@ -22,6 +22,7 @@ use tree::TomlNode;
 
 mod camera;
 mod caustics;
+mod channel;
 mod color;
 mod crop;
 mod environment;
@@ -62,6 +63,7 @@ mod work;
 mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
+pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
 pub use crop::PixelBounds;
 pub use environment::{Environment, EnvironmentKind};
@@ -74,9 +76,8 @@ pub use key::Flag;
 pub use light::{Light, LightKind};
 pub use material::{Material, MaterialKind};
 pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
-#[cfg(feature = "cli")]
 pub(crate) use nearest::nearest;
-pub use output::{Channel, Output};
+pub use output::Output;
 pub use pattern::{FramePattern, OutputPattern};
 pub use preset::Look;
 #[cfg(feature = "cli")]

@@ -9,7 +9,8 @@ pub mod view;
 
 pub use exr::{
     Compression, CustomAttribute, EncodedExr, ExrLayout, ExrOptions, OutputError, PackBuffers,
-    PackedBlock, encode_exr, pack_block, write_blocks, write_exr,
+    PackedBlock, TextAttribute, ambiguous_name, attribute_planes, encode_exr, pack_block,
+    write_blocks, write_exr,
 };
 pub use preview::{PreviewOptions, encode_preview};
 pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

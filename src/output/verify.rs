@@ -12,11 +12,12 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use thiserror::Error;
 
-use super::exr::planes::planes;
+use super::exr::planes::{attribute_planes, planes};
+use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
 use crate::render::{Channels, DataWindow};
 
 /// The expected size and channels of an image.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageShape {
     /// Width of the data window in pixels.
     pub width: u32,
@@ -24,8 +25,10 @@ pub struct ImageShape {
     pub height: u32,
     /// Position of the data window in the image.
     pub window: DataWindow,
-    /// The channels.
+    /// The channels, without attributes.
     pub channels: Channels,
+    /// Names of the attributes with channels; their number of components is not known.
+    pub attributes: Vec<String>,
 }
 
 /// What is wrong with an image.
@@ -114,9 +117,12 @@ fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
-    let planes = planes(expected.channels).into_iter();
+    let mut channels = expected.channels;
+    let attributes = attributes(&found, &expected.attributes);
+    channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
+    let planes = planes(channels, &attributes).into_iter();
     let planes: Vec<_> = planes
-        .map(|plane| (plane.name.to_owned(), plane.sample_type()))
+        .map(|plane| (plane.name.to_string(), plane.sample_type()))
         .collect();
     let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
     let is_complete = header.channels.list.iter().all(has_all_pixels);
@@ -127,6 +133,19 @@ fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault
         found: listed(&found),
         expected: listed(&planes),
     })
+}
+
+/// The names of the planes of attributes `names`, with the number of components that each has among the channels
+/// `found`.
+fn attributes(found: &[(String, SampleType)], names: &[String]) -> Vec<String> {
+    let is_found = |plane: &String| found.iter().any(|(name, _)| name == plane);
+    let planes = |name: &String| {
+        let counts = (1..=MAX_ATTRIBUTE_FLOATS).rev();
+        let mut all = counts.map(|count| attribute_planes(name, count));
+        let complete = all.find(|planes| planes.iter().all(is_found));
+        complete.unwrap_or_else(|| attribute_planes(name, 1))
+    };
+    names.iter().flat_map(planes).collect()
 }
 
 fn check_size(found: (usize, usize), expected: &ImageShape) -> Result<(), ImageFault> {

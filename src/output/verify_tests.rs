@@ -31,6 +31,7 @@ const fn shape(channels: Channels) -> ImageShape {
         height: 37,
         window: DataWindow::whole(40, 37),
         channels,
+        attributes: Vec::new(),
     }
 }
 
@@ -47,6 +48,7 @@ fn channel_sets() -> impl Iterator<Item = Channels> {
         velocity: bits & 8 != 0,
         albedo: bits & 16 != 0,
         id: bits & 32 != 0,
+        ..Channels::COLOR
     })
 }
 

@@ -110,6 +110,7 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
             json: facts.to_string(),
         }),
         world_to_camera: Some(frame.camera.world_to_camera()),
+        texts: frame.texts.clone(),
         ..setup.picture.exr.clone()
     }
 }

@@ -14,9 +14,9 @@ use spherule_formats::native::Access;
 use spherule_formats::open::unpacked_len;
 use spherule_formats::sequence::Sequence;
 
-use super::ImageTask;
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
+use super::{ImageTask, mattes};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
 use crate::denoise;
 use crate::metrics::Bytes;
@@ -313,11 +313,14 @@ impl<'a> MemoryModel<'a> {
         let channels = self.setup.picture.render.channels;
         let color = self.setup.picture.color.bytes();
         // Particles that are moved need an explicit id.
-        let ids = channels.id && (self.has_ids || self.setup.picture.surface.spray);
+        let ids = channels.needs_ids() && (self.has_ids || self.setup.picture.surface.spray);
         let each = [
             (true, color),
             (ids, 4),
-            (channels.velocity && self.has_velocities, 12),
+            (channels.needs_velocities() && self.has_velocities, 12),
+            // Whether there are parts is not known in advance
+            (channels.needs_parts(), 4),
+            (true, 4 * u64::from(channels.layers.attributes)),
         ];
         let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
         frame.particles * each
@@ -414,6 +417,7 @@ impl<'a> MemoryModel<'a> {
         let kept = self.kept(frame);
         let surface = self.surface(frame);
         let meshes = self.meshes + KEPT_PER_MESH_BYTE * frame.meshes;
+        let names = mattes::predicted_bytes(self.setup, frame.particles);
         let first_read = MemoryNeed {
             reading: self.reading_with_meshes(frame),
             surface: self.meshes,
@@ -437,13 +441,13 @@ impl<'a> MemoryModel<'a> {
             tree,
             surface: surface.kept + meshes,
             images: film + film_before + denoising.max(self.tracing_scratch() * threads),
-            encoding: encoding_before,
+            encoding: encoding_before + names,
             ..idle
         };
         let encoding = MemoryNeed {
             surface: self.meshes,
             images: film,
-            encoding: self.encoding(),
+            encoding: self.encoding() + names,
             ..idle
         };
         first_read.larger(building).larger(tracing).larger(encoding)
@@ -516,7 +520,7 @@ fn smooth_bytes(setup: &Setup, particles: u64) -> SurfaceBytes {
     let surface = &setup.picture.surface;
     let channels = setup.picture.render.channels;
     let is_colored = setup.picture.color.is_by_particle();
-    let keeps = surface.exact || channels.id || channels.velocity || is_colored;
+    let keeps = surface.exact || channels.needs_particles() || is_colored;
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]
     let count = particles as f64;
     let voxels = f64::from(surface.voxel).powi(-2) / count.cbrt().max(1.0);

@@ -14,6 +14,7 @@ use super::setup::Setup;
 use crate::accel::stored::StoredFault;
 use crate::denoise::DenoiseError;
 use crate::metrics::MemoryUse;
+use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;
 use crate::scene::{Camera, CameraError};
@@ -57,6 +58,8 @@ pub struct TracedFrame {
     pub camera: Camera,
     /// The planes.
     pub film: Film,
+    /// Attributes of the file that describe its layers.
+    pub texts: Vec<TextAttribute>,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// The report, without encoding.

@@ -9,7 +9,7 @@ use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
 use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Camera, CameraError, CameraPath, ColorMap, LensSettings, Scene};
+use crate::scene::{Camera, CameraError, CameraPath, ColorMap, LensSettings, NextFrame, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -69,6 +69,24 @@ impl ColorRule {
     }
 }
 
+/// An attribute with channels in the images.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AttributeChannel {
+    /// Its name.
+    pub name: String,
+    /// Components per particle.
+    pub components: usize,
+}
+
+/// From one frame to the next, for motion on the film.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameStep {
+    /// Time, in the unit of the velocities.
+    pub time: f32,
+    /// Difference of the frame numbers.
+    pub numbers: i64,
+}
+
 /// The settings of a job: its pictures, and the execution of a run.
 #[derive(Debug, Clone)]
 pub struct Setup {
@@ -108,6 +126,10 @@ pub struct Picture {
     pub denoise: Option<DenoiseSettings>,
     /// The surface.
     pub surface: SurfaceSettings,
+    /// Attributes with channels, in the order of their floats in the film.
+    pub attributes: Vec<AttributeChannel>,
+    /// The next frame, if there is a channel for motion.
+    pub step: Option<FrameStep>,
     /// Options of the EXR; the camera is added for each frame.
     pub exr: ExrOptions,
     /// Options of the PNG; [`Setup::preview_from`] adds the background.
@@ -159,8 +181,20 @@ impl Setup {
             let point = focus.map(|point| self.picture.origin + point.as_dvec3());
             camera = camera.with_lens(lens.lens(&view, self.picture.aspect, point)?);
         }
+        let next_frame = match self.picture.step {
+            Some(step) => {
+                // Only views of frames in the sequence are checked in advance
+                let next = self.camera_at(frame.saturating_add(step.numbers));
+                Some(NextFrame {
+                    camera: next.or_else(|_| self.camera_at(frame))?,
+                    time: step.time,
+                })
+            }
+            None => None,
+        };
         Ok(Scene {
             camera,
+            next_frame,
             ..self.picture.scene.clone()
         })
     }
@@ -179,7 +213,7 @@ impl Setup {
         let channels = self.picture.render.channels;
         let structure = self.structure_for(particles);
         BuildSettings {
-            keep_indices: channels.id || channels.velocity || has_values,
+            keep_indices: channels.needs_particles() || has_values,
             bvh: self.run.bvh,
             sbvh: self.run.sbvh,
             ..BuildSettings::new(structure)

@@ -86,7 +86,7 @@ impl SurfaceBuilder {
         let channels = setup.picture.render.channels;
         let is_colored = setup.picture.color.is_by_particle();
         // Keep the particles if attributes are looked up at points of the surface
-        let keep = channels.id || channels.velocity || is_colored;
+        let keep = channels.needs_particles() || is_colored;
         let left = memory_left(setup.run.memory_limit);
         let made = self
             .smooth
@@ -128,7 +128,7 @@ impl SurfaceBuilder {
         // Find the spray in the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
-        let body = frame.move_to_end(&spray, setup.picture.render.channels.id);
+        let body = frame.move_to_end(&spray, setup.picture.render.channels.needs_ids());
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
         // Build the tree of the drops
         let drops = match &frame.radius {

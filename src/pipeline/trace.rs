@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
+use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{ColorRule, Setup};
 use super::surface::{SurfaceBuilder, spheres};
@@ -12,6 +13,7 @@ use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
 use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::metrics::MemoryUse;
+use crate::output::TextAttribute;
 use crate::render::{Colors, Film, ParticleShading, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
@@ -95,6 +97,7 @@ impl FrameRenderer for CpuRenderer {
         let mut film = std::mem::take(&mut self.film);
         let rays = self.draw(setup, &frame, &mut film, stop)?;
         let memory = MemoryUse::now();
+        let texts = matte_attributes(setup, &frame);
         let BuiltFrame {
             task,
             time,
@@ -108,6 +111,7 @@ impl FrameRenderer for CpuRenderer {
             camera: setup.camera_at(task.frame)?,
             task,
             film,
+            texts,
             time,
             report,
             memory,
@@ -182,6 +186,22 @@ impl CpuRenderer {
     }
 }
 
+/// The attributes of the Cryptomatte layers of `frame`.
+fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
+    if setup.picture.render.channels.layers.mattes.is_empty() {
+        return Vec::new();
+    }
+    let (count, color) = (frame.report.particles, &setup.picture.color);
+    match &frame.particles {
+        BuiltParticles::Decoded(shading) => {
+            mattes::attributes(setup, &particle_shading(color, shading), count)
+        }
+        BuiltParticles::Stored(stored) => {
+            mattes::attributes(setup, &stored.shading(color, DEFAULT_COLOR), count)
+        }
+    }
+}
+
 /// Denoises `film` if the setup says so. Returns the time, seconds.
 fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
     let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) = (
@@ -224,6 +244,11 @@ fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> Pa
         colors,
         ids: shading.ids.as_deref(),
         velocities: shading.velocities.as_deref(),
+        parts: shading
+            .parts
+            .as_ref()
+            .map(|(name, parts)| (name.as_str(), &parts[..])),
+        attributes: &shading.attributes,
     }
 }
 

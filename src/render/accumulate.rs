@@ -10,12 +10,14 @@ use crate::math::{LANES, Lanes, Lanes3, fold, lane3};
 impl SampleGroup {
     /// Stores the mean of the `samples` of each pixel, and the data of the pixel. `is_bounded`: samples may have
     /// negative radiance or a coverage above 1, but pixels may not.
-    pub(super) fn accumulate(&self, samples: u32, is_bounded: bool, tile: &mut FilmTile<'_>) {
+    pub(super) fn accumulate(&mut self, samples: u32, is_bounded: bool, tile: &mut FilmTile<'_>) {
         let (share, samples) = (1.0 / samples as f32, samples as usize);
+        let mut layers = std::mem::take(&mut self.layers);
         for (number, pixel) in self.pixels.iter().enumerate() {
             let range = number * samples..(number + 1) * samples;
-            let sum = pixel_sum(&self.radiance, &self.coverage, range);
-            let [r, g, b, a] = sum.map(|v| v * share);
+            let sum = pixel_sum(&self.radiance, &self.coverage, range.clone());
+            let mean = sum.map(|v| v * share);
+            let [r, g, b, a] = mean;
             let color = match is_bounded {
                 true => [r.max(0.0), g.max(0.0), b.max(0.0), a.min(1.0)],
                 false => [r, g, b, a],
@@ -26,7 +28,12 @@ impl SampleGroup {
                 let mean = self.odd_mean(number * samples, samples, is_bounded);
                 tile.set_odd(pixel.column, pixel.row, mean);
             }
+            if !layers.is_empty() {
+                let floats = tile.layers_mut(pixel.column, pixel.row);
+                layers.accumulate(range, &self.coverage, (mean, color), floats);
+            }
         }
+        self.layers = layers;
     }
 
     /// The mean radiance of every second of the `samples` from `first + 1` on.

@@ -33,6 +33,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) simd: Supported,
     pub(super) camera: CameraLanes,
+    /// The camera of the next frame, and the time until then.
+    pub(super) next_frame: Option<(CameraLanes, f32)>,
     pub(super) background: BackgroundLanes,
     pub(super) lights: Vec<Box<dyn Light>>,
     /// Base colour of all particles, if they share one.
@@ -106,6 +108,8 @@ impl<'a> RenderContext<'a> {
             settings,
             simd: Supported::default(),
             camera: CameraLanes::new(&scene.camera, width, height),
+            next_frame: (scene.next_frame.as_ref())
+                .map(|next| (CameraLanes::new(&next.camera, width, height), next.time)),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),

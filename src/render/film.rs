@@ -5,6 +5,7 @@ use glam::Vec3;
 use thiserror::Error;
 
 use super::aov::{DataSample, NO_ID};
+use super::layers::{Layers, MatteKind};
 
 /// The planes of a film in addition to `R G B A`, which it always has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,11 +22,17 @@ pub struct Channels {
     pub albedo: bool,
     /// `id`: the particle's id.
     pub id: bool,
+    /// Planes for compositing.
+    pub layers: Layers,
 }
 
 /// An unknown channel name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("no channel is called {name:?}, the known ones are RGBA, Z, N, P, V, albedo and id")]
+#[error(
+    "no channel is called {name:?}, the known ones are RGBA, Z, N, P, V, albedo, id, lights, diffuse, specular, \
+     reflection, refraction, emission, background, noisy, shadow, motion, cryptomatte, crypto_particle, \
+     crypto_material and crypto_part"
+)]
 pub struct UnknownChannel {
     /// The name.
     pub name: String,
@@ -40,9 +47,10 @@ impl Channels {
         velocity: false,
         albedo: false,
         id: false,
+        layers: Layers::NONE,
     };
 
-    /// All channels.
+    /// Colour and all data channels, without [`Layers`].
     pub const ALL: Self = Self {
         depth: true,
         normal: true,
@@ -50,7 +58,33 @@ impl Channels {
         velocity: true,
         albedo: true,
         id: true,
+        layers: Layers::NONE,
     };
+
+    /// Whether a channel depends on the ids of particles.
+    pub const fn needs_ids(&self) -> bool {
+        self.id || self.layers.mattes.contains(MatteKind::Particle)
+    }
+
+    /// Whether a channel depends on the velocities of particles.
+    pub const fn needs_velocities(&self) -> bool {
+        self.velocity || self.layers.motion
+    }
+
+    /// Whether a channel depends on the parts of particles.
+    pub const fn needs_parts(&self) -> bool {
+        self.layers.mattes.contains(MatteKind::Part)
+    }
+
+    /// Whether the nearest sample of a pixel needs the index of its particle.
+    pub const fn needs_nearest_particle(&self) -> bool {
+        self.id || self.needs_velocities() || self.layers.attributes > 0
+    }
+
+    /// Whether a channel depends on the attributes of single particles, so that their indices are needed.
+    pub const fn needs_particles(&self) -> bool {
+        self.needs_nearest_particle() || self.needs_ids() || self.needs_parts()
+    }
 
     /// These and, if `has_features`, those that are features for denoising.
     #[must_use]
@@ -63,7 +97,7 @@ impl Channels {
         }
     }
 
-    /// Channels by their names in a manifest; `RGBA` is allowed, and always included.
+    /// Channels by their names in a manifest; `RGBA` is allowed, and always included. Attributes have no fixed names.
     ///
     /// # Errors
     /// If a name is unknown.
@@ -80,11 +114,9 @@ impl Channels {
                 "V" => channels.velocity = true,
                 "albedo" => channels.albedo = true,
                 "id" => channels.id = true,
-                _ => {
-                    return Err(UnknownChannel {
-                        name: name.to_owned(),
-                    });
-                }
+                _ => channels.layers.insert(name).ok_or_else(|| UnknownChannel {
+                    name: name.to_owned(),
+                })?,
             }
         }
         Ok(channels)
@@ -113,6 +145,8 @@ pub struct Film {
     pub albedo: Option<Vec<Vec3>>,
     /// See [`DataSample::id`].
     pub id: Option<Vec<u32>>,
+    /// The floats of [`Channels::layers`], pixel by pixel.
+    pub layers: Option<Vec<f32>>,
     /// Mean of the samples 1, 3, 5 and so on of a film for [denoising](crate::denoise), linear RGB. Not a channel.
     pub odd: Option<Vec<Vec3>>,
     /// The channels; the film may have other planes as features for denoising.
@@ -134,6 +168,7 @@ impl Film {
             velocity: vectors(channels.velocity),
             albedo: vectors(channels.albedo),
             id: channels.id.then(|| vec![NO_ID; count]),
+            layers: layers(channels).map(|floats| vec![0.0; count * floats]),
             odd: None,
             channels,
         }
@@ -154,6 +189,7 @@ impl Film {
             velocity: vectors(planes.velocity),
             albedo: vectors(planes.albedo),
             id: planes.id.then(|| zeroed_vec(count)),
+            layers: layers(channels).map(|floats| zeroed_vec(count * floats)),
             odd: vectors(has_features),
             channels,
         }
@@ -185,7 +221,8 @@ impl Film {
             has_features,
         ];
         let count = |is_present: &[bool]| is_present.iter().filter(|w| **w).count() as u64;
-        let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors);
+        let layers = 4 * channels.layers.floats() as u64;
+        let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors) + layers;
         u64::from(width) * u64::from(height) * pixel
     }
 
@@ -198,6 +235,8 @@ impl Film {
         let mut velocity = chunks(&mut self.velocity, length);
         let mut albedo = chunks(&mut self.albedo, length);
         let mut id = chunks(&mut self.id, length);
+        let floats = self.channels.layers.floats();
+        let mut layers = chunks(&mut self.layers, length * floats);
         let mut odd = chunks(&mut self.odd, length);
         // Combine the chunks of all planes into bands
         let top_rows = (0..self.height).step_by(rows as usize);
@@ -215,10 +254,17 @@ impl Film {
                 velocity: next(&mut velocity),
                 albedo: next(&mut albedo),
                 id: next(&mut id),
+                layers: next(&mut layers),
+                floats,
                 odd: next(&mut odd),
             })
             .collect()
     }
+}
+
+/// Number of floats of a pixel, if there are layers.
+fn layers(channels: Channels) -> Option<usize> {
+    Some(channels.layers.floats()).filter(|floats| *floats > 0)
 }
 
 type Chunks<'a, T> = Option<std::slice::ChunksMut<'a, T>>;
@@ -244,6 +290,9 @@ pub(super) struct Band<'a> {
     velocity: Option<&'a mut [Vec3]>,
     albedo: Option<&'a mut [Vec3]>,
     id: Option<&'a mut [u32]>,
+    layers: Option<&'a mut [f32]>,
+    /// Number of floats of a pixel in `layers`.
+    floats: usize,
     odd: Option<&'a mut [Vec3]>,
 }
 
@@ -258,6 +307,8 @@ impl Band<'_> {
         let mut velocity = planes(&mut self.velocity, width, columns);
         let mut albedo = planes(&mut self.albedo, width, columns);
         let mut id = planes(&mut self.id, width, columns);
+        let floats = self.floats;
+        let mut layers = planes(&mut self.layers, width * floats, columns * floats);
         let mut odd = planes(&mut self.odd, width, columns);
         // Combine the rows of all planes into tiles
         let tile = |left: u32| FilmTile {
@@ -272,6 +323,8 @@ impl Band<'_> {
             velocity: next(&mut velocity),
             albedo: next(&mut albedo),
             id: next(&mut id),
+            layers: next(&mut layers),
+            floats,
             odd: next(&mut odd),
         };
         (0..self.width).step_by(columns).map(tile).collect()
@@ -317,6 +370,9 @@ pub(super) struct FilmTile<'a> {
     velocity: Option<Rows<'a, Vec3>>,
     albedo: Option<Rows<'a, Vec3>>,
     id: Option<Rows<'a, u32>>,
+    layers: Option<Rows<'a, f32>>,
+    /// Number of floats of a pixel in `layers`.
+    floats: usize,
     odd: Option<Rows<'a, Vec3>>,
 }
 
@@ -334,6 +390,15 @@ impl FilmTile<'_> {
     /// Stores the mean of the odd samples of the pixel in `column` and `row` of the tile, linear RGB.
     pub(super) fn set_odd(&mut self, column: u32, row: u32, mean: Vec3) {
         set_pixel(&mut self.odd, (column as usize, row as usize), mean);
+    }
+
+    /// The floats of the layers of the pixel in `column` and `row` of the tile; none without layers.
+    pub(super) fn layers_mut(&mut self, column: u32, row: u32) -> &mut [f32] {
+        let Some(rows) = &mut self.layers else {
+            return &mut [];
+        };
+        let start = column as usize * self.floats;
+        &mut rows[row as usize][start..start + self.floats]
     }
 
     /// Stores the data of the pixel in `column` and `row` of the tile in all planes that exist.
@@ -372,6 +437,10 @@ mod tests {
         assert!(film.normal.is_none());
         assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * 24);
         assert_eq!(Film::bytes_for(3, 2, channels, true), 6 * (24 + 3 * 12));
+        let channels = Channels::from_names(["lights", "shadow", "crypto_part"]).unwrap();
+        assert_eq!(channels.layers.floats(), 18 + 1 + 12);
+        assert_eq!(Film::new(3, 2, channels).layers.unwrap().len(), 6 * 31);
+        assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * (16 + 4 * 31));
         let error = Channels::from_names(["depth"]).unwrap_err();
         assert!(error.to_string().contains("\"depth\""));
     }

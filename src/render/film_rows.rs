@@ -27,6 +27,10 @@ pub struct FilmRows<'a> {
     pub albedo: Option<&'a [Vec3]>,
     /// See [`Film::id`].
     pub id: Option<&'a [u32]>,
+    /// See [`Film::layers`].
+    pub layers: Option<&'a [f32]>,
+    /// Number of floats of a pixel in `layers`.
+    pub floats: usize,
 }
 
 impl<'a> FilmRows<'a> {
@@ -50,7 +54,11 @@ impl<'a> FilmRows<'a> {
             position: self.position.map(|plane| &plane[range.clone()]),
             velocity: self.velocity.map(|plane| &plane[range.clone()]),
             albedo: self.albedo.map(|plane| &plane[range.clone()]),
-            id: self.id.map(|plane| &plane[range]),
+            id: self.id.map(|plane| &plane[range.clone()]),
+            layers: self
+                .layers
+                .map(|plane| &plane[range.start * self.floats..range.end * self.floats]),
+            floats: self.floats,
         }
     }
 }
@@ -70,6 +78,8 @@ impl Film {
             velocity: self.velocity.as_deref(),
             albedo: self.albedo.as_deref().filter(|_| channels.albedo),
             id: self.id.as_deref(),
+            layers: self.layers.as_deref(),
+            floats: channels.layers.floats(),
         }
     }
 

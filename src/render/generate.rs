@@ -25,6 +25,7 @@ impl RenderContext<'_> {
         group: &mut SampleGroup,
     ) {
         group.clear();
+        group.layers.layers = self.settings.channels.layers;
         let [left, top] = self.first_pixel(tile);
         for (column, row) in pixels {
             let (x, y) = (left + column.cast_signed(), top + row.cast_signed());

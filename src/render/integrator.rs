@@ -71,6 +71,7 @@ pub(super) trait Integrator: Sync {
             trace_group(self, stop, scratch)?;
             let is_bounded = context.catches_shadows();
             scratch.group.accumulate(samples, is_bounded, tile);
+            context.store_nearest(&scratch.group.pixels, tile);
         }
         Some(scratch.packet.counts)
     }
@@ -148,6 +149,8 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         group.radiance[number] = packet.radiance;
         group.coverage[number] = context.coverage(&packet.hits, &packet.coverage);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
+        group.layers.store(number, &packet.split);
+        context.gather_objects(&packet.hits, number, &mut group.layers);
     }
     Some(())
 }
@@ -167,6 +170,7 @@ fn trace_depth<I: Integrator + ?Sized>(
     for segments in current.packets_mut() {
         trace_packet(integrator, segments, depth, stop, packet, next)?;
         scratch.group.add(segments, &packet.radiance);
+        scratch.group.layers.add(segments, &packet.radiance);
     }
     Some(())
 }
@@ -186,6 +190,8 @@ fn trace_packet<I: Integrator + ?Sized>(
     integrator.context().intersect(segments, depth, packet);
     packet.radiance = [splat(0.0); 3];
     packet.coverage = splat(0.0);
+    let layers = &integrator.context().settings.channels.layers;
+    packet.split.start(layers, depth);
     integrator.shade(segments, depth, packet, next);
     Some(())
 }

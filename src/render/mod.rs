@@ -21,18 +21,22 @@ mod attributes;
 pub(crate) mod brute;
 mod bsdf;
 mod context;
+pub mod cryptomatte;
 mod dimensions;
 mod film;
 mod film_rows;
 mod generate;
 mod integrator;
 mod intersect;
+pub mod layers;
+mod light_split;
 mod lights;
 mod materials;
 mod panes;
 mod path;
 mod ray_counts;
 mod roulette;
+mod sample_layers;
 mod sampler;
 mod scratch;
 mod settings;
@@ -113,7 +117,12 @@ impl RendererKind {
 pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bool) -> u64 {
     let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
     let max_depth = integrator::max_depth(settings);
-    scratch::scratch_bytes(settings.samples, max_depth, max_paths)
+    scratch::scratch_bytes(
+        settings.samples,
+        max_depth,
+        max_paths,
+        &settings.channels.layers,
+    )
 }
 
 /// Upper bound of the memory for the light on the ground around transmissive particles, in bytes.

@@ -14,6 +14,7 @@ use super::{
     context::{Interior, RenderContext},
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
+    layers::LightClass,
     lights::{environment_along, sample_environment},
     materials::{Material, materials_of},
     roulette::SplitRule,
@@ -31,6 +32,7 @@ use glam::Vec3;
 mod catcher;
 mod emission;
 pub(super) mod floor;
+mod light_channels;
 
 use catcher::Catcher;
 use floor::FloorLight;
@@ -94,6 +96,7 @@ impl Integrator for PathIntegrator<'_> {
         // Add what rays see of lights, and infinitely far away
         let ended = self.add_emitted(segments, packet);
         packet.hits.mask &= !ended;
+        packet.take_light(LightClass::Emission);
         if let Some(catcher) = self.catcher.as_ref().filter(|_| depth == 1) {
             let lanes = packet.hits.lanes_of(MaterialId::GROUND);
             if lanes != 0 {
@@ -103,6 +106,7 @@ impl Integrator for PathIntegrator<'_> {
         let held_out = self.context.holdout_lanes(depth, &packet.hits);
         let lanes = segments.lanes() & !ended & !held_out;
         self.add_escaped(segments, depth, lanes, packet);
+        packet.take_light(LightClass::Background);
         if packet.hits.mask & !held_out == 0 {
             return;
         }
@@ -218,7 +222,19 @@ impl PathIntegrator<'_> {
             return;
         };
         self.reflect_environment(environment, surface, lanes, packet);
+        self.add_direct(surface, packet);
+    }
+
+    /// Adds the direct light of samples to which transmissive surfaces are opaque.
+    fn add_direct(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        self.divide_samples(surface, packet);
+        let unoccluded = packet.unoccluded();
         self.add_unoccluded(surface, packet);
+        packet.split.take_reflected(&packet.radiance);
+        if let Some((lanes, unoccluded)) = unoccluded {
+            let PacketScratch { split, light, .. } = packet;
+            split.add_direct(lanes, &unoccluded, light.lanes, &light.radiance);
+        }
     }
 
     /// Samples a direction from the environment, and the light from there that `lanes` reflect: `packet.light`.
@@ -276,16 +292,19 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
     ) {
         let context = &self.context;
+        if packet.light.lanes == 0 {
+            return;
+        }
+        self.divide_samples(surface, packet);
+        let unoccluded = packet.unoccluded();
         let PacketScratch {
             light: samples,
             crossings,
             counts,
             radiance,
+            split,
             ..
         } = packet;
-        if samples.lanes == 0 {
-            return;
-        }
         let visible = if casts_shadow {
             let (segments, depth) = (surface.segments, surface.depth);
             context.trace_shadow_rays(segments, depth, samples, crossings, counts)
@@ -294,6 +313,10 @@ impl PathIntegrator<'_> {
         };
         let simd = context.simd;
         add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+        split.take_reflected(radiance);
+        if let Some((lanes, unoccluded)) = unoccluded {
+            split.add_direct(lanes, &unoccluded, visible, &samples.radiance);
+        }
     }
 
     /// Samples a light source, and the light from there that the surface reflects: `packet.light`. `competes`: rays
@@ -322,6 +345,10 @@ impl PathIntegrator<'_> {
     fn bounce(&self, surface: &Surface<'_>, packet: &mut PacketScratch, next: &mut RayStreams) {
         let segments = surface.segments;
         let lanes = self.sample_bsdf(surface, packet);
+        if packet.split.is_active {
+            let direction = packet.points.reflected.direction;
+            self.divide(surface, &direction, packet);
+        }
         let rays = &mut packet.points.reflected;
         // The last segment of a path may be a shadow ray to the environment
         let max = self.context.settings.bounces;
@@ -337,6 +364,7 @@ impl PathIntegrator<'_> {
         // Infinite densities mark specular rays
         if last != 0 {
             self.add_last(surface, last, packet);
+            packet.split.take_reflected(&packet.radiance);
         }
         packet.points.reflected.pdf = splat(f32::INFINITY);
     }

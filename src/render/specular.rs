@@ -4,6 +4,7 @@
 use super::{
     context::{Interior, RenderContext},
     dimensions::{REFLECTED, REFRACTED},
+    layers::LightClass,
     materials::WhittedMaterial,
     roulette::SplitRule,
     scratch::PacketScratch,
@@ -46,6 +47,7 @@ impl RenderContext<'_> {
             points,
             throughput,
             radiance,
+            split: lights,
             ..
         } = packet;
         // Describe both rays: weight, stream, side and branch of the path
@@ -58,16 +60,16 @@ impl RenderContext<'_> {
             &mut points.reflected,
             &mut next.reflected,
             inside,
-            REFLECTED,
+            (REFLECTED, LightClass::Reflection),
         );
         let refracted = (
             material.dielectric.transmission,
             &mut points.refracted,
             &mut next.refracted,
             other_side,
-            REFRACTED,
+            (REFRACTED, LightClass::Refraction),
         );
-        for (weight, rays, stream, inside, branch) in [reflected, refracted] {
+        for (weight, rays, stream, inside, (branch, class)) in [reflected, refracted] {
             if weight <= 0.0 {
                 continue;
             }
@@ -77,6 +79,7 @@ impl RenderContext<'_> {
             scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
             if lanes & last != 0 {
                 escape(&rays.direction, &rays.throughput, lanes & last, radiance);
+                lights.take(class, radiance);
             }
             if lanes & !last != 0 {
                 stream.push(lanes & !last, rays, segments, inside, branch);

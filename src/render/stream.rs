@@ -1,6 +1,7 @@
 //! Streams of path segments, in packets of 16.
 
 use super::dimensions::BOUNCED;
+use super::light_split::FirstInteraction;
 use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
@@ -26,6 +27,8 @@ pub(super) struct SegmentPacket {
     pub(super) path: [PathSeed; LANES],
     /// Lanes of rays that start inside a connected body.
     pub(super) inside: u32,
+    /// The first interaction of each path.
+    pub(super) first: [FirstInteraction; LANES],
 }
 
 impl Default for SegmentPacket {
@@ -38,6 +41,7 @@ impl Default for SegmentPacket {
             sample: [0; LANES],
             path: [PathSeed::default(); LANES],
             inside: 0,
+            first: [FirstInteraction::default(); LANES],
         }
     }
 }
@@ -140,6 +144,7 @@ impl RayStream {
             segment.bounces[to] = parents.bounces[lane] + u32::from(branch == BOUNCED);
             segment.sample[to] = parents.sample[lane];
             segment.path[to] = parents.path[lane].child(branch);
+            segment.first[to] = parents.first[lane].continued(branch);
             segment.inside |= (inside >> lane & 1) << to;
             segment.rays.set_len(to + 1);
             self.len += 1;

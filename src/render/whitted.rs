@@ -9,7 +9,9 @@ use glam::Vec3;
 use super::{
     context::{Interior, RenderContext},
     integrator::Integrator,
-    materials::{Material, WhittedMaterial, materials_of},
+    layers::LightClass,
+    light_split::ratio,
+    materials::{Material, WhittedMaterial, materials_of, reflect_lights},
     roulette::SplitRule,
     scratch::PacketScratch,
     shading::{add, add_background, product, scale},
@@ -65,6 +67,7 @@ impl Integrator for WhittedIntegrator<'_> {
         if context.sees_background(depth) {
             let lanes = segments.lanes() & !held_out;
             context.add_background(segments, depth, lanes, packet);
+            packet.take_light(LightClass::Background);
         }
         if packet.hits.mask & !held_out == 0 {
             return;
@@ -137,6 +140,7 @@ impl WhittedIntegrator<'_> {
             crossings,
             weight,
             counts,
+            split,
             ..
         } = packet;
 
@@ -145,6 +149,7 @@ impl WhittedIntegrator<'_> {
         let mut colored = [splat(0.0); 3];
         product(simd, base, weight, &mut colored);
         add(simd, &colored, &constants.ambient, lanes, radiance);
+        split.take(LightClass::Diffuse, radiance);
 
         // Add the light of each visible light source
         if !constants.scatters() {
@@ -153,10 +158,25 @@ impl WhittedIntegrator<'_> {
         for light in &self.context.lights {
             light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
+            let arriving = split.is_active.then(|| samples.clone());
             material.reflect(simd, rays, points, base, weight, lanes, samples);
             if samples.lanes == 0 {
                 continue;
             }
+            if let Some(mut matte) = arriving {
+                // Reflect the light without the highlight
+                let constants = &WhittedMaterial {
+                    specular: 0.0,
+                    ..*constants
+                };
+                reflect_lights(
+                    simd, constants, rays, points, base, weight, lanes, &mut matte,
+                );
+                split.diffuse = ratio(&matte.radiance, &samples.radiance);
+            }
+            let unoccluded = split
+                .has_shadow
+                .then_some((samples.lanes, samples.radiance));
             let visible = if light.casts_shadow() {
                 let context = &self.context;
                 context.trace_shadow_rays(segments, depth, samples, crossings, counts)
@@ -164,6 +184,10 @@ impl WhittedIntegrator<'_> {
                 samples.lanes
             };
             add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+            split.take_reflected(radiance);
+            if let Some((lanes, unoccluded)) = unoccluded {
+                split.add_direct(lanes, &unoccluded, visible, &samples.radiance);
+            }
         }
     }
 }

@@ -92,6 +92,17 @@ pub struct Scene {
     pub environment: Option<Arc<Environment>>,
     /// Whether camera rays without an intersection see the environment instead of the background.
     pub is_environment_visible: bool,
+    /// The next frame, for motion on the film.
+    pub next_frame: Option<NextFrame>,
+}
+
+/// Where things are in the next frame.
+#[derive(Debug, Clone, Copy)]
+pub struct NextFrame {
+    /// Its camera.
+    pub camera: Camera,
+    /// Time until then, in the unit of the velocities.
+    pub time: f32,
 }
 
 impl Scene {
@@ -108,6 +119,7 @@ impl Scene {
             meshes: Vec::new(),
             environment: None,
             is_environment_visible: false,
+            next_frame: None,
         }
     }
 }

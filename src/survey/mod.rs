@@ -4,21 +4,24 @@
 //! It uses percentiles and not extremes, so that a single outlier neither shrinks the picture nor reduces the
 //! contrast of colours. The result is stored with the job, so that all frames, runs and machines use the same values.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin, names};
+use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin};
 
 use crate::scene::{RgbEncoding, is_rgb};
 
+mod attributes;
+mod moments;
 mod packing;
 mod robust;
 mod sample;
 mod stream;
 
+pub use attributes::{Named, id_of, part_of, velocity_of};
+use moments::Moments;
 use packing::Spacing;
 use packing::narrow;
 use robust::{
@@ -63,6 +66,15 @@ pub struct Survey {
     pub up: DVec3,
     /// Names of all attributes in the sampled frames.
     pub attributes: Vec<String>,
+    /// Components per particle of each of [`Self::attributes`]. Jobs of earlier versions lack them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub components: Vec<usize>,
+    /// Mean time between consecutive frames, if the files contain times.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_time: Option<f64>,
+    /// Mean difference of the numbers of consecutive frames, if there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_numbers: Option<i64>,
     /// Largest particle count of the sampled frames.
     pub most_particles: usize,
     /// Number of sampled frames.
@@ -183,11 +195,12 @@ struct Totals {
     color: Option<String>,
     velocity: Option<String>,
     rgb: Option<RgbAttribute>,
-    attributes: BTreeSet<String>,
+    attributes: BTreeMap<String, usize>,
     most_particles: usize,
     frames: usize,
     weight: Option<FrameWeight>,
     origin: Origins,
+    moments: Moments,
 }
 
 /// Origins of the coordinates in native frames.
@@ -254,16 +267,21 @@ impl Survey {
             color: None,
             velocity: None,
             rgb: None,
-            attributes: BTreeSet::new(),
+            attributes: BTreeMap::new(),
             most_particles: 0,
             frames: 0,
             weight: None,
             origin: Origins::None,
+            moments: Moments::default(),
         };
         let mut failure = None;
         for index in indices {
             match FrameSample::of(sequence, index, question.radius) {
-                Ok(sample) => totals.add(sample, question),
+                Ok(sample) => {
+                    let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
+                    totals.moments.add(index, number, sample.particles.time);
+                    totals.add(sample, question);
+                }
                 Err(error) => {
                     failure.get_or_insert(error);
                 }
@@ -279,56 +297,6 @@ impl Survey {
             })),
         }
     }
-}
-
-/// An attribute by name and number of components, in memory or in a file.
-pub trait Named {
-    /// Its name.
-    fn name(&self) -> &str;
-    /// Components per particle.
-    fn components(&self) -> usize;
-}
-
-impl Named for Attribute {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn components(&self) -> usize {
-        self.components
-    }
-}
-
-impl Named for AttributeView<'_> {
-    fn name(&self) -> &str {
-        self.name()
-    }
-
-    fn components(&self) -> usize {
-        self.components()
-    }
-}
-
-/// The attribute with velocities, if there is one.
-pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
-    names::VELOCITY.iter().find_map(|name| {
-        attributes
-            .iter()
-            .find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
-    })
-}
-
-/// The attribute with ids, if there is one. An exact match of the name is preferred over one that ignores case.
-pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
-    names::ID.iter().find_map(|name| {
-        let exact = attributes.iter().find(|a| a.name() == *name);
-        let alike = || {
-            attributes
-                .iter()
-                .find(|a| a.name().eq_ignore_ascii_case(name))
-        };
-        exact.or_else(alike).filter(|a| a.components() == 1)
-    })
 }
 
 /// The spacing of neighbours in a frame.
@@ -363,8 +331,10 @@ impl Totals {
             mut weight,
             ..
         } = sample;
-        self.attributes
-            .extend(raw.attributes.iter().map(|a| a.name.clone()));
+        for attribute in &raw.attributes {
+            let components = self.attributes.entry(attribute.name.clone()).or_insert(0);
+            *components = attribute.components.max(*components);
+        }
         // Extend the bounds
         let found = robust_bounds(&raw.positions, extremes);
         self.bounds = match (self.bounds, found) {
@@ -491,7 +461,10 @@ impl Totals {
             color,
             rgb,
             up,
-            attributes: self.attributes.into_iter().collect(),
+            components: self.attributes.values().copied().collect(),
+            attributes: self.attributes.into_keys().collect(),
+            frame_time: self.moments.time_step(),
+            frame_numbers: self.moments.number_step(),
             most_particles: self.most_particles,
             frames: self.frames,
             weight,

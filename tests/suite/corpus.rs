@@ -109,6 +109,7 @@ fn images() -> Vec<(String, u8, Vec<u8>)> {
         velocity: true,
         albedo: true,
         id: true,
+        ..Channels::COLOR
     };
     let mut images = Vec::new();
     let color = film(5, 3, Channels::COLOR);

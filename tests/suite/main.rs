@@ -8,6 +8,7 @@ mod architecture;
 mod arithmetic;
 mod bad_input;
 mod camera;
+mod channels;
 mod colors;
 mod convert;
 mod corpus;

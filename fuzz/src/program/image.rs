@@ -19,6 +19,7 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
         height,
         window: DataWindow::whole(width, height),
         channels,
+        attributes: Vec::new(),
     }
 }
 

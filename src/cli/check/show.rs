@@ -9,6 +9,7 @@ use crate::accel::Structure;
 use crate::cli::job::list;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
+use crate::manifest::Channel;
 use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
 use crate::survey::Survey;
@@ -38,7 +39,7 @@ impl Check<'_> {
             "width": manifest.image.width,
             "height": manifest.image.height,
             "samples": manifest.image.samples,
-            "channels": manifest.output.channels.iter().map(|c| c.name()).collect::<Vec<_>>(),
+            "channels": manifest.output.channels.iter().map(Channel::name).collect::<Vec<_>>(),
             "preview": manifest.output.preview,
         });
         if let Some(part) = manifest.image.part() {
@@ -82,7 +83,7 @@ impl Check<'_> {
     pub(super) fn to_lines(&self) -> Vec<String> {
         let mut lines = vec![self.frames_line()];
         let manifest = self.render_job.manifest();
-        let names: Vec<&str> = manifest.output.channels.iter().map(|c| c.name()).collect();
+        let names: Vec<_> = manifest.output.channels.iter().map(Channel::name).collect();
         lines.push(format!(
             "images     {}: {}x{}{}, {} samples per pixel, {}{}",
             self.render_job.shown_output().display(),

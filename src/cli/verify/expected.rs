@@ -3,12 +3,12 @@
 use spherule_jobs::Plan;
 
 use crate::job::KIND;
-use crate::manifest::{Image, PixelBounds};
+use crate::manifest::{ATTRIBUTE_CHANNEL as ATTRIBUTE, Image, PixelBounds};
 use crate::output::ImageShape;
 use crate::render::Channels;
 
 /// The kind of files that a job writes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(super) enum ExpectedOutput {
     /// Images, and previews of the same size.
     Images(ImageShape),
@@ -52,7 +52,17 @@ impl ExpectedOutput {
         let channels = || {
             let list = value("output.channels")?;
             let names = list.as_array()?.iter().map(|name| name.as_str());
-            Channels::from_names(names.collect::<Option<Vec<_>>>()?).ok()
+            let names = names.collect::<Option<Vec<_>>>()?;
+            let attributes = names.iter().filter_map(|name| name.strip_prefix(ATTRIBUTE));
+            let attributes: Vec<String> = attributes.map(str::to_owned).collect();
+            let is_named = |name: &&str| !name.starts_with(ATTRIBUTE);
+            let mut channels = Channels::from_names(names.into_iter().filter(is_named)).ok()?;
+            // Jobs of earlier versions have no levels
+            if let Some(levels) = value("output.cryptomatte_levels") {
+                let levels = u32::try_from(levels.as_integer()?).ok()?;
+                channels.layers.mattes.set_levels(levels);
+            }
+            Some((channels, attributes))
         };
         // Plans of older versions have neither crop nor overscan
         let crop = find("image.crop").map(|_| {
@@ -73,11 +83,13 @@ impl ExpectedOutput {
             ..Image::default()
         };
         let [width, height] = image.data_size().ok_or_else(|| wrong("image.crop"))?;
+        let (channels, attributes) = channels().ok_or_else(|| wrong("output.channels"))?;
         Ok(Self::Images(ImageShape {
             width,
             height,
             window: image.data_window(),
-            channels: channels().ok_or_else(|| wrong("output.channels"))?,
+            channels,
+            attributes,
         }))
     }
 }
@@ -101,10 +113,11 @@ mod tests {
             height: 1080,
             window: DataWindow::whole(1920, 1080),
             channels: Channels::from_names(["Z", "N", "id"]).unwrap(),
+            attributes: Vec::new(),
         };
         assert_eq!(
             ExpectedOutput::of_settings(&settings),
-            Ok(ExpectedOutput::Images(shape))
+            Ok(ExpectedOutput::Images(shape.clone()))
         );
         for (key, value) in [
             ("image.width", "-3"),
@@ -130,7 +143,7 @@ mod tests {
                 top: 10,
                 image: [1920, 1080],
             },
-            ..shape
+            ..shape.clone()
         };
         assert_eq!(
             ExpectedOutput::of_settings(&part),

@@ -103,7 +103,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     for chunk in frames.chunks(FRAMES_PER_THREAD * rayon::current_num_threads()) {
         let checked = chunk
             .par_iter()
-            .map(|frame| check_frame(&state, frame, expected));
+            .map(|frame| check_frame(&state, frame, &expected));
         let checked: Vec<FrameVerdict> = checked.collect();
         let reader = print::lines(checked.iter().flat_map(|f| f.lines(args.json)))?;
         damaged.extend(checked.iter().filter_map(FrameVerdict::damage));
@@ -162,7 +162,11 @@ fn selected<'a>(
     Ok(selected.iter().filter_map(|n| plan.frame(*n)).collect())
 }
 
-fn check_frame(state: &JobState, planned: &PlannedFrame, expected: ExpectedOutput) -> FrameVerdict {
+fn check_frame(
+    state: &JobState,
+    planned: &PlannedFrame,
+    expected: &ExpectedOutput,
+) -> FrameVerdict {
     let without_files = |verdict, reason| FrameVerdict {
         frame: planned.number,
         verdict,
@@ -193,7 +197,7 @@ fn check_file(
     dir: &Path,
     path: &str,
     entry: &LedgerEntry,
-    expected: ExpectedOutput,
+    expected: &ExpectedOutput,
 ) -> FileVerdict {
     let (verdict, reason) = match find_file(dir, path, entry) {
         Err((verdict, reason)) => (verdict, Some(reason)),
@@ -256,7 +260,7 @@ impl DecodeError {
 }
 
 /// Reads all of `file`.
-fn decode(file: &Path, expected: ExpectedOutput) -> Result<(), DecodeError> {
+fn decode(file: &Path, expected: &ExpectedOutput) -> Result<(), DecodeError> {
     let shape = match expected {
         ExpectedOutput::Frames => return Ok(decode_native(file)?),
         ExpectedOutput::Images(shape) => shape,
@@ -266,9 +270,9 @@ fn decode(file: &Path, expected: ExpectedOutput) -> Result<(), DecodeError> {
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if is_preview {
-        verify_preview(reader, &shape)?;
+        verify_preview(reader, shape)?;
     } else {
-        verify_exr(reader, &shape)?;
+        verify_exr(reader, shape)?;
     }
     Ok(())
 }

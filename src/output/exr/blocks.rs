@@ -10,11 +10,8 @@ use std::io::{Seek, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 
-use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
-use exr::block::writer::{ChunksWriter, write_chunks_with};
-use exr::prelude::SmallVec;
-
 use super::OutputError;
+use super::file::ScanLineFile;
 use super::layout::ExrLayout;
 use super::pack::{PackBuffers, PackedBlock, pack_block};
 use crate::render::Film;
@@ -30,38 +27,14 @@ pub fn write_blocks(
     blocks: impl IntoIterator<Item = Result<PackedBlock, OutputError>>,
 ) -> Result<u64, OutputError> {
     let mut clamped = 0;
-    // The crate `exr` passes on only errors of its own type
-    let mut failure = None;
-    let headers = SmallVec::from_iter([layout.header.clone()]);
-    let written = write_chunks_with(file, headers, true, |_, writer| {
-        let blocks = blocks.into_iter().map_while(|block| match block {
-            Ok(block) => Some(block),
-            Err(error) => {
-                failure = Some(error);
-                None
-            }
-        });
-        for (index, block) in blocks.enumerate() {
-            clamped += block.clamped;
-            writer.write_chunk(index, chunk(block, layout.top()))?;
-        }
-        Ok(())
-    });
-    match failure {
-        Some(error) => Err(error),
-        None => written.map(|()| clamped).map_err(OutputError::Exr),
+    let mut file = ScanLineFile::start(file, layout)?;
+    for block in blocks {
+        let block = block?;
+        clamped += block.clamped;
+        file.write(block)?;
     }
-}
-
-/// The chunk of a block of a film that begins in row `top` of the image.
-fn chunk(block: PackedBlock, top: i32) -> Chunk {
-    Chunk {
-        layer_index: 0,
-        compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
-            y_coordinate: top + i32::try_from(block.y).expect("images have at most 65536 rows"),
-            compressed_pixels_le: block.bytes,
-        }),
-    }
+    file.finish()?;
+    Ok(clamped)
 }
 
 /// Writes `film` with the help of the current pool. Returns it, so that another frame can reuse its memory, and the

@@ -8,7 +8,7 @@ use exr::prelude::{
 };
 
 use super::planes::{Plane, planes_in_file};
-use super::{Compression, ExrOptions, OutputError, attributes};
+use super::{Compression, ExrOptions, OutputError, TextAttribute, attributes};
 use crate::render::{Channels, DataWindow, Film, FilmRows};
 
 /// Minimum number of rows in a band: the height of the renderer's tiles.
@@ -21,6 +21,8 @@ pub struct ExrLayout {
     pub(super) compression: Compression,
     /// The planes in the order of the file.
     pub(super) planes: Vec<Plane>,
+    /// Attributes after those of `header`, in the order of the file.
+    pub(super) texts: Vec<TextAttribute>,
 }
 
 impl ExrLayout {
@@ -34,7 +36,7 @@ impl ExrLayout {
         channels: Channels,
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
-        let planes = planes_in_file(channels);
+        let planes = planes_in_file(channels, &options.attribute_planes);
         // Describe the channels; the header needs only names and types, so the samples may be empty
         let described = planes.iter().map(|plane| {
             let samples = match plane.sample_type() {
@@ -42,7 +44,7 @@ impl ExrLayout {
                 SampleType::F32 => FlatSamples::F32(Vec::new()),
                 SampleType::U32 => FlatSamples::U32(Vec::new()),
             };
-            AnyChannel::new(plane.name, samples)
+            AnyChannel::new(&*plane.name, samples)
         });
         // Make the header
         let encoding = Encoding {
@@ -65,6 +67,7 @@ impl ExrLayout {
             header,
             compression: options.compression,
             planes,
+            texts: options.texts.clone(),
         })
     }
 

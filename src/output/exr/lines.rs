@@ -26,8 +26,10 @@ impl LineBuffer {
         let width = rows.width as usize;
         let range = row * width..(row + 1) * width;
         self.words.resize(width, 0);
-        if let Source::Color(component) = source {
-            return self.halves(&rows.color[range], component);
+        match source {
+            Source::Color(component) => return self.halves(&rows.color[range], component),
+            Source::LayerColor(i) => return self.layer_halves(layer(rows, row), rows.floats, i),
+            _ => {}
         }
         let axis = |plane: Option<&[Vec3]>, axis, words: &mut [u32]| {
             let vectors = &plane.expect(HAS_PLANE)[range.clone()];
@@ -35,7 +37,12 @@ impl LineBuffer {
         };
         let words = &mut self.words[..];
         match source {
-            Source::Color(_) => unreachable!("done above"),
+            Source::Color(_) | Source::LayerColor(_) => unreachable!("done above"),
+            Source::Layer(i) | Source::ParticleLayer(i) => {
+                for (word, floats) in words.iter_mut().zip(layer(rows, row).chunks(rows.floats)) {
+                    *word = floats[i].to_bits().to_le();
+                }
+            }
             Source::Normal(component) => axis(rows.normal, component, words),
             Source::Position(component) => axis(rows.position, component, words),
             Source::Velocity(component) => axis(rows.velocity, component, words),
@@ -61,14 +68,39 @@ impl LineBuffer {
             _ => clamp_component::<3>(colors, floats),
         };
         self.clamped += u64::from(clamped);
-        let bits: &mut [u16] = &mut cast_slice_mut(&mut self.words)[..colors.len()];
+        self.converted()
+    }
+
+    /// Converts float `i` of the layers of each pixel as a colour.
+    fn layer_halves(&mut self, layers: &[f32], floats: usize, i: usize) -> &[u8] {
+        self.floats.clear();
+        self.floats
+            .extend(layers.chunks(floats).map(|pixel| pixel[i]));
+        for value in &mut self.floats {
+            let fits = value.abs() <= HALF_MAX;
+            self.clamped += u64::from(!fits);
+            let limited = value.clamp(-HALF_MAX, HALF_MAX);
+            *value = if value.is_nan() { 0.0 } else { limited };
+        }
+        self.converted()
+    }
+
+    /// The floats of the line as half-floats.
+    fn converted(&mut self) -> &[u8] {
+        let bits: &mut [u16] = &mut cast_slice_mut(&mut self.words)[..self.floats.len()];
         let halves: &mut [f16] = bits.reinterpret_cast_mut();
-        halves.convert_from_f32_slice(floats);
+        halves.convert_from_f32_slice(&self.floats);
         for bits in bits.iter_mut() {
             *bits = bits.to_le();
         }
         cast_slice(bits)
     }
+}
+
+/// The layers of row `row` of `rows`.
+fn layer<'a>(rows: &FilmRows<'a>, row: usize) -> &'a [f32] {
+    let width = rows.width as usize * rows.floats;
+    &rows.layers.expect(HAS_PLANE)[row * width..(row + 1) * width]
 }
 
 const HAS_PLANE: &str = "films have the planes of the layout that was made for them";

@@ -1,9 +1,9 @@
 //! OpenEXR files: one part, planar channels, scanlines.
 //!
-//! `R G B A` are half-floats, the data channels are floats, `id.I` is uint. This module packs blocks of rows (see
-//! [`pack_block`]); the crate `exr` writes the header and the packed blocks. A film always gives the same bytes,
-//! whatever the number of threads: scanlines are in increasing order, there is at most one custom attribute (the crate
-//! would write several in random order), and nothing depends on the clock.
+//! Colours are half-floats, the data channels are floats, `id.I` is uint. This module packs blocks of rows (see
+//! [`pack_block`]), and writes the file with attributes from the crate `exr`. A film always gives the same bytes,
+//! whatever the number of threads: scanlines are in increasing order, the crate writes at most one custom attribute (it
+//! would write several in random order; [`file`] writes the others), and nothing depends on the clock.
 
 use std::io::{self, Cursor, Seek, Write};
 
@@ -16,6 +16,7 @@ use crate::render::{DataWindow, Film};
 mod blocks;
 mod deflate;
 mod differences;
+mod file;
 mod layout;
 mod lines;
 mod pack;
@@ -24,6 +25,7 @@ pub(super) mod planes;
 pub use blocks::write_blocks;
 pub use layout::ExrLayout;
 pub use pack::{PackBuffers, PackedBlock, pack_block};
+pub use planes::{ambiguous_name, attribute_planes};
 
 /// Maximum length of an attribute name in the format, bytes.
 const NAME_MAX: usize = 255;
@@ -54,6 +56,15 @@ pub struct CustomAttribute {
     pub json: String,
 }
 
+/// An attribute of type `string`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TextAttribute {
+    /// Name, 1 to 31 bytes of ASCII.
+    pub name: String,
+    /// The value.
+    pub text: String,
+}
+
 /// Settings of an EXR file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExrOptions {
@@ -69,6 +80,10 @@ pub struct ExrOptions {
     pub comments: Option<String>,
     /// A custom attribute.
     pub custom: Option<CustomAttribute>,
+    /// Further attributes, in the order of the file.
+    pub texts: Vec<TextAttribute>,
+    /// Names of the planes of attribute channels, as many as the film has.
+    pub attribute_planes: Vec<String>,
 }
 
 /// An encoded image.

@@ -66,6 +66,10 @@ fn wild_film(width: u32, height: u32, channels: Channels) -> Film {
     if let Some(plane) = &mut film.id {
         plane[half..].fill_with(|| (numbers.next() >> 32) as u32);
     }
+    if let Some(plane) = &mut film.layers {
+        let half = plane.len() / 2;
+        plane[half..].fill_with(|| numbers.wild());
+    }
     film
 }
 
@@ -87,7 +91,16 @@ fn samples(film: &Film, source: Source) -> FlatSamples {
         Source::Velocity(axis) => floats(&film.velocity, axis),
         Source::Albedo(axis) => floats(&film.albedo, axis),
         Source::Id => FlatSamples::U32(film.id.clone().unwrap()),
+        Source::LayerColor(i) => FlatSamples::F16(layer(film, i).map(half).collect()),
+        Source::Layer(i) | Source::ParticleLayer(i) => FlatSamples::F32(layer(film, i).collect()),
     }
+}
+
+/// Float `i` of the layers of each pixel.
+fn layer(film: &Film, i: usize) -> impl Iterator<Item = f32> {
+    let floats = film.channels.layers.floats();
+    let layers = film.layers.as_ref().unwrap();
+    layers.iter().copied().skip(i).step_by(floats)
 }
 
 fn bits(samples: &FlatSamples) -> Vec<u32> {
@@ -101,8 +114,8 @@ fn bits(samples: &FlatSamples) -> Vec<u32> {
 /// The file that the crate `exr` writes on its own.
 fn written_by_exr(film: &Film, options: &ExrOptions) -> Vec<u8> {
     let size = (film.width as usize, film.height as usize);
-    let planes = planes_in_file(film.channels()).into_iter();
-    let list = planes.map(|plane| AnyChannel::new(plane.name, samples(film, plane.source)));
+    let planes = planes_in_file(film.channels(), &[]).into_iter();
+    let list = planes.map(|plane| AnyChannel::new(&*plane.name, samples(film, plane.source)));
     let encoding = Encoding {
         compression: options.compression.codec(),
         blocks: Blocks::ScanLines,
@@ -143,9 +156,9 @@ fn check(film: &Film, compression: Compression) {
     if !matches!(compression, Compression::Zip | Compression::Zips) {
         assert!(file == reference, "{compression:?} {size:?}");
     }
-    let expected: Vec<_> = planes_in_file(film.channels())
+    let expected: Vec<_> = planes_in_file(film.channels(), &[])
         .iter()
-        .map(|plane| (plane.name.to_owned(), bits(&samples(film, plane.source))))
+        .map(|plane| (plane.name.to_string(), bits(&samples(film, plane.source))))
         .collect();
     assert!(decoded(&file) == expected, "{compression:?} {size:?}");
 }
@@ -166,8 +179,20 @@ fn films_round_trip_and_match_the_exr_crate() {
             velocity: bits & 8 != 0,
             albedo: bits & 16 != 0,
             id: bits & 32 != 0,
+            ..Channels::COLOR
         };
         check(&wild_film(9, 20, channels), Compression::Zip);
+    }
+}
+
+#[test]
+fn layers_round_trip() {
+    for compression in COMPRESSIONS {
+        let names = ["lights", "noisy", "shadow", "motion", "cryptomatte"];
+        let channels = Channels::from_names(names).unwrap();
+        check(&wild_film(17, 33, channels), compression);
+        let channels = Channels::from_names(["shadow", "crypto_part"]).unwrap();
+        check(&wild_film(5, 20, channels), compression);
     }
 }
 

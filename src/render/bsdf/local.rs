@@ -7,7 +7,7 @@
 
 use super::microfacet::dot;
 use super::{BsdfSamples, BsdfValues, SurfacePoints};
-use crate::math::{LANES, Lanes, Lanes3, larger};
+use crate::math::{LANES, Lanes, Lanes3, lanes_in, larger};
 use crate::ray::RayPacket;
 use crate::render::shading::{tangents, to_world};
 
@@ -23,6 +23,9 @@ pub(super) trait LocalBsdf: Sync {
 
     /// A direction from which light may arrive that leaves in direction `out`. `u` is uniform in the unit square.
     fn direction(&self, base: [f32; 3], out: [f32; 3], u: [f32; 2]) -> [f32; 3];
+
+    /// The diffuse part of the value, 0 to 1 per component.
+    fn diffuse_part(&self, base: [f32; 3], out: [f32; 3], into: [f32; 3]) -> [f32; 3];
 }
 
 /// The component of each lane.
@@ -104,6 +107,26 @@ pub(super) fn sample_body<B: LocalBsdf>(
     }
 }
 
+/// [`super::Bsdf::diffuse_part`].
+pub(super) fn diffuse_part<B: LocalBsdf>(
+    bsdf: &B,
+    rays: &RayPacket,
+    points: &SurfacePoints,
+    direction: &Lanes3,
+    lanes: u32,
+    part: &mut Lanes3,
+) {
+    for l in lanes_in(lanes) {
+        let n = lane(&points.normal, l);
+        let into = to_local(lane(direction, l), n);
+        let (base, out) = (lane(&points.albedo, l), outgoing(rays, l, n));
+        let diffuse = bsdf.diffuse_part(base, out, into);
+        for axis in 0..3 {
+            part[axis][l] = diffuse[axis];
+        }
+    }
+}
+
 /// Implements [`super::Bsdf`] for a [`LocalBsdf`], with kernels of these names.
 macro_rules! lane_bsdf {
     ($bsdf:ty, $eval:ident, $sample:ident) => {
@@ -130,6 +153,19 @@ macro_rules! lane_bsdf {
                 samples: &mut $crate::render::bsdf::BsdfSamples,
             ) {
                 $sample(simd, self, rays, points, u, lanes, samples);
+            }
+
+            fn diffuse_part(
+                &self,
+                rays: &$crate::ray::RayPacket,
+                points: &$crate::render::bsdf::SurfacePoints,
+                direction: &$crate::math::Lanes3,
+                lanes: u32,
+                part: &mut $crate::math::Lanes3,
+            ) {
+                $crate::render::bsdf::local::diffuse_part(
+                    self, rays, points, direction, lanes, part,
+                );
             }
         }
 

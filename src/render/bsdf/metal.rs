@@ -69,4 +69,8 @@ impl LocalBsdf for Metal {
         let diffuse = cosine_direction(u);
         select(is_diffuse, diffuse, mirrored)
     }
+
+    fn diffuse_part(&self, _f0: [f32; 3], _out: [f32; 3], _into: [f32; 3]) -> [f32; 3] {
+        [0.0; 3]
+    }
 }

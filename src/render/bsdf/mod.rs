@@ -8,7 +8,9 @@
     reason = "one index for the lanes of many arrays"
 )]
 
-use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
+use glam::Vec3;
+
+use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel, lanes_in, set_lane3};
 use crate::ray::RayPacket;
 use crate::render::lights::LightSamples;
 use crate::scene::{Finish, MeshFinish, MeshMaterial};
@@ -87,6 +89,22 @@ pub(super) trait Bsdf: Sync {
         lanes: u32,
         samples: &mut BsdfSamples,
     );
+
+    /// Stores the diffuse part of the reflection of light from unit `direction` that leaves against `rays`, 0 to 1,
+    /// only for `lanes`.
+    fn diffuse_part(
+        &self,
+        rays: &RayPacket,
+        points: &SurfacePoints,
+        direction: &Lanes3,
+        lanes: u32,
+        part: &mut Lanes3,
+    ) {
+        let _ = (rays, points, direction);
+        for lane in lanes_in(lanes) {
+            set_lane3(part, lane, Vec3::ONE);
+        }
+    }
 }
 
 /// The BSDFs of opaque surfaces by [`MaterialId`](crate::surface::MaterialId). `particles`: the finish of the

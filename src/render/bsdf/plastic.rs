@@ -40,6 +40,24 @@ impl Plastic {
         let matte = (1.0 - coat) * larger(larger(base[0], base[1]), base[2]);
         matte / (matte + coat)
     }
+
+    /// The BSDF of the coat, and that of a white base, times the cosine of `into`. `h` is the half vector.
+    #[inline(always)]
+    fn lobes(&self, out: [f32; 3], into: [f32; 3], h: [f32; 3]) -> (f32, f32) {
+        let fresnel = COAT + (1.0 - COAT) * schlick_rise(dot(out, h));
+        let shadowing = self.ggx.shadowing(out[2], into[2]);
+        let coat = fresnel * self.ggx.density(h[2]) * shadowing / (4.0 * out[2]);
+        // Attenuate the light of the base by the coat, on its way in and out
+        let (there, back) = (1.0 - self.coat.at(out[2]), 1.0 - self.coat.at(into[2]));
+        let cosine = into[2] * FRAC_1_PI;
+        (coat, cosine * there * back / (1.0 - self.coat.mean))
+    }
+}
+
+/// The half vector of two directions.
+#[inline(always)]
+fn half_vector(out: [f32; 3], into: [f32; 3]) -> [f32; 3] {
+    normalized([out[0] + into[0], out[1] + into[1], out[2] + into[2]])
 }
 
 lane_bsdf!(Plastic, eval_plastic, sample_plastic);
@@ -47,14 +65,9 @@ lane_bsdf!(Plastic, eval_plastic, sample_plastic);
 impl LocalBsdf for Plastic {
     #[inline(always)]
     fn value(&self, base: [f32; 3], out: [f32; 3], into: [f32; 3]) -> ([f32; 3], f32) {
-        let h = normalized([out[0] + into[0], out[1] + into[1], out[2] + into[2]]);
-        let fresnel = COAT + (1.0 - COAT) * schlick_rise(dot(out, h));
-        let shadowing = self.ggx.shadowing(out[2], into[2]);
-        let coat = fresnel * self.ggx.density(h[2]) * shadowing / (4.0 * out[2]);
-        // Attenuate the light of the base by the coat, on its way in and out
-        let (there, back) = (1.0 - self.coat.at(out[2]), 1.0 - self.coat.at(into[2]));
+        let h = half_vector(out, into);
+        let (coat, matte) = self.lobes(out, into, h);
         let cosine = into[2] * FRAC_1_PI;
-        let matte = cosine * there * back / (1.0 - self.coat.mean);
         let part = self.base_part(base, out[2]);
         let pdf = part * cosine + (1.0 - part) * self.ggx.pdf(h[2], out[2]);
         let value = [
@@ -71,5 +84,13 @@ impl LocalBsdf for Plastic {
         let mirrored = mirror(out, self.ggx.sample_normal(out, u));
         let matte = cosine_direction(u);
         select(is_base, matte, mirrored)
+    }
+
+    fn diffuse_part(&self, base: [f32; 3], out: [f32; 3], into: [f32; 3]) -> [f32; 3] {
+        let (coat, matte) = self.lobes(out, into, half_vector(out, into));
+        base.map(|base| match base * matte + coat > 0.0 {
+            true => base * matte / (base * matte + coat),
+            false => 1.0,
+        })
     }
 }

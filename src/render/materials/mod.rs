@@ -12,6 +12,7 @@ mod points;
 mod two_sided;
 mod whitted;
 
+pub(super) use blinn_phong::reflect_lights;
 pub(super) use dielectric::{Dielectric, attenuate, cross_straight, leaving};
 use interface::Interface;
 pub(super) use material::Material;

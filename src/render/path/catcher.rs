@@ -83,6 +83,7 @@ impl PathIntegrator<'_> {
         for lane in lanes_in(surface.lanes) {
             let (whole, lost) = (lane3(&light.whole, lane), lane3(&light.lost, lane));
             let fraction = Vec3::select(whole.cmpgt(Vec3::ZERO), lost / whole, Vec3::ZERO);
+            packet.split.set_lost(lane, whole, lost);
             let shadow = catcher.strength * packet.hits.opacity[lane] * fraction;
             let throughput = lane3(&packet.throughput, lane) * (Vec3::ONE - shadow);
             set_lane3(&mut packet.throughput, lane, throughput);

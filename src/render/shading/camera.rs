@@ -46,6 +46,17 @@ impl CameraLanes {
         self.lens.is_some()
     }
 
+    /// The position of `point` on the film in pixels from its top left corner; None behind the camera.
+    pub(in crate::render) fn pixel_of(&self, point: Vec3) -> Option<[f32; 2]> {
+        let direction = point - self.eye;
+        if direction.dot(self.forward) <= 0.0 {
+            return None;
+        }
+        let direction = direction.normalize().to_array();
+        let [x, y] = self.film_position(self.eye.to_array(), direction);
+        Some([x * self.size[0], y * self.size[1]])
+    }
+
     /// The position on the film of the camera ray from `origin` with unit direction `d`; (0, 0) is the top left corner,
     /// (1, 1) the bottom right one.
     #[inline(always)]

@@ -14,6 +14,7 @@ use super::{PathIntegrator, Surface};
 use crate::math::{lane3, lanes_in, set_lane3, splat3};
 use crate::render::{
     bsdf::surface_points,
+    layers::LightClass,
     ray_counts::RayCounts,
     scratch::PacketScratch,
     settings::{IntegratorKind, RenderSettings},
@@ -192,6 +193,7 @@ impl<'a> PathIntegrator<'a> {
             surface.lanes,
             &mut packet.radiance,
         );
+        packet.take_light(LightClass::Diffuse);
         self.add_straight_light(surface, packet);
     }
 
@@ -201,7 +203,7 @@ impl<'a> PathIntegrator<'a> {
         for (index, light) in context.lights.iter().enumerate() {
             self.reflect_light(index, false, surface, packet);
             if light.beam().is_some() {
-                self.add_unoccluded(surface, packet);
+                self.add_direct(surface, packet);
             } else {
                 self.add_attenuated(light.casts_shadow(), surface, packet);
             }
