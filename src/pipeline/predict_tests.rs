@@ -79,12 +79,11 @@ fn meshes_of_a_frame_are_counted() {
         meshes,
         ..plain(1000)
     };
-    let (none, some) = (model.alone(&with(0)), model.alone(&with(10_000_000)));
-    // Reading one needs more than tracing it
-    assert!(some.total() > none.total() + 150_000_000, "{some}");
+    let one = model.alone(&with(10_000_000));
+    assert!(one.reading >= 160_000_000, "{one}");
     let two = model.peak(&[with(10_000_000); 2]);
     assert_eq!(two.surface, 50_000_000);
-    assert!(two.reading > 160_000_000, "{two}");
+    assert!(two.reading >= 160_000_000, "{two}");
     assert_eq!(FrameSize::estimate(1200, false, None).meshes, 0);
 }
 
