@@ -34,6 +34,8 @@ fn a_crop_equals_its_part_of_the_whole_image() {
             "54",
             "--samples",
             "3",
+            "--set",
+            "render.denoise=false",
         ];
         all.extend(["-o", output.as_str()]);
         all.extend(options);

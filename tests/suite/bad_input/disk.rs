@@ -51,7 +51,7 @@ fn full_disk_is_reported_without_partial_files() {
     for (size, code) in [
         ("8k", 2),
         ("16k", 2),
-        ("24k", 1),
+        ("24k", 2),
         ("28k", 1),
         ("32k", 1),
         ("48k", 1),
