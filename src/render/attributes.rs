@@ -96,7 +96,7 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
         pixels: &mut [Pixel],
     ) {
-        if self.settings.channels == Channels::COLOR || packet.hits.mask == 0 {
+        if self.settings.planes() == Channels::COLOR || packet.hits.mask == 0 {
             return;
         }
         // The data of reflections at panes are of what is behind
@@ -215,7 +215,7 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
     ) -> DataSample {
         let PacketScratch { hits, blend, .. } = packet;
-        let channels = self.settings.channels;
+        let channels = self.settings.planes();
         let is_particle = hits.material[lane].is_of_particles();
         // Look up the particle only if a channel needs it
         let needs_particle = is_particle && channels.needs_nearest_particle();

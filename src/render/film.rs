@@ -88,7 +88,7 @@ impl Channels {
 
     /// These and, if `has_features`, those that are features for denoising.
     #[must_use]
-    const fn with_features(self, has_features: bool) -> Self {
+    pub(super) const fn with_features(self, has_features: bool) -> Self {
         Self {
             depth: self.depth || has_features,
             normal: self.normal || has_features,

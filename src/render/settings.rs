@@ -119,6 +119,11 @@ impl RenderSettings {
         self.window.unwrap_or(DataWindow::whole(width, height))
     }
 
+    /// The channels of the film, with those that are features for denoising.
+    pub(super) const fn planes(&self) -> Channels {
+        self.channels.with_features(self.has_features)
+    }
+
     pub(super) fn validate(&self) -> Result<(), RenderError> {
         let [full_width, full_height] = self.full_size();
         for (name, value, max) in [

@@ -49,6 +49,22 @@ fn noise_is_removed_from_colours_only() {
 }
 
 #[test]
+fn colours_do_not_depend_on_the_channels_beside_them() {
+    let workshop = Workshop::new();
+    dam_break(&workshop.join("in"), 6..=6);
+    let of = |name: &str, channels| {
+        picture(&workshop, name, &["--channels", channels, "--samples", "4"])
+    };
+    let all = of("all.exr", "RGBA,Z,N,P,albedo,id");
+    for (name, channels) in [("color.exr", "RGBA"), ("some.exr", "RGBA,Z,N,id")] {
+        let some = of(name, channels);
+        for plane in ["R", "G", "B", "A"] {
+            assert!(some.planes[plane] == all.planes[plane], "{channels}: {plane}");
+        }
+    }
+}
+
+#[test]
 fn denoised_jobs_do_not_depend_on_threads() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 6..=7);
