@@ -5,7 +5,7 @@
 //! has left the box on the far side of that plane. `render.max_depth` is one more, since 1 is the light at the
 //! first event.
 
-#![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
+#![expect(clippy::print_stdout, reason = "a benchmark prints its measurements")]
 
 use glam::Vec3;
 use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
@@ -26,7 +26,7 @@ const OVERLAPS: [f32; 3] = [1.0, 1.8, 2.5];
 const RAYS: u16 = 32;
 /// Half the square's edge, at the centre's distance.
 const HALF_EDGE: f32 = 0.5;
-/// Numbers of events that are told of; paths that need more are taken for lost.
+/// Numbers of events that are printed; longer paths count as lost.
 const EVENTS: [usize; 8] = [1, 2, 4, 8, 16, 32, 64, 4096];
 
 /// Events of one path.
@@ -53,20 +53,20 @@ fn main() {
         };
         build(&mut builder, 1.0);
         let name = format!("{count} particles");
-        tell(&name, "spheres", &SphereSurface::new(builder.tree().view()));
+        print_depths(&name, "spheres", &SphereSurface::new(builder.tree().view()));
         for larger in OVERLAPS {
             build(&mut builder, larger);
             let name = format!("{name}, {larger} times the radius");
-            tell(&name, "medium", &UnionSurface::new(builder.tree().view()));
+            print_depths(&name, "union", &UnionSurface::new(builder.tree().view()));
         }
         let mut grid = SmoothGrid::default();
         grid.build(&centers, radius, &SurfaceSettings::DEFAULT, false, None)
             .expect("memory for the surface");
-        tell(&name, "smooth", &grid.surface());
+        print_depths(&name, "smooth", &grid.surface());
     }
 }
 
-fn tell<S: Shape>(of: &str, name: &str, surface: &S) {
+fn print_depths<S: Shape>(of: &str, name: &str, surface: &S) {
     let paths: Vec<Events> = rays().map(|ray| follow(surface, ray)).collect();
     let percent = |events: fn(&Events) -> Option<usize>, most: usize| {
         let within = |path: &&Events| events(path).is_some_and(|needed| needed <= most);

@@ -13,8 +13,6 @@ use std::fs;
 use std::io::Cursor;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Stdio};
-use std::thread;
-use std::time::Instant;
 
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, Image,
@@ -24,6 +22,11 @@ use exr::prelude::{
 use glam::Vec3;
 use spherule::output::{ExrLayout, ExrOptions, PackBuffers, pack_block, write_blocks};
 use spherule::render::{Channels, Film};
+
+#[path = "support/cpu_time.rs"]
+mod cpu_time;
+
+use cpu_time::CpuTime;
 
 /// Turns of each; the best counts.
 const TURNS: usize = 7;
@@ -191,7 +194,7 @@ fn by_the_crate(film: &Film) -> usize {
 
 /// The planes of `film` that are among `channels`.
 fn with(film: &Film, channels: Channels) -> Film {
-    let plane = |plane: &Option<Vec<Vec3>>, wanted: bool| plane.clone().filter(|_| wanted);
+    let plane = |plane: &Option<Vec<Vec3>>, is_stored: bool| plane.clone().filter(|_| is_stored);
     Film {
         width: film.width,
         height: film.height,
@@ -202,6 +205,9 @@ fn with(film: &Film, channels: Channels) -> Film {
         velocity: plane(&film.velocity, channels.velocity),
         albedo: plane(&film.albedo, channels.albedo),
         id: film.id.clone().filter(|_| channels.id),
+        layers: None,
+        odd: None,
+        channels,
     }
 }
 
@@ -234,7 +240,7 @@ fn film(file: &Path) -> Film {
     };
     let color = ["R", "G", "B", "A"].map(|name| floats(name).expect("colours"));
     let side = |pixels: usize| u32::try_from(pixels).expect("a side");
-    Film {
+    let mut film = Film {
         width: side(layer.size.x()),
         height: side(layer.size.y()),
         color: (0..color[0].len())
@@ -249,32 +255,18 @@ fn film(file: &Path) -> Film {
             FlatSamples::U32(ids) => Some(ids.clone()),
             _ => None,
         }),
-    }
-}
-
-/// What this thread has run so far; the time of day where the system does not tell.
-struct CpuTime {
-    nanoseconds: Option<u64>,
-    instant: Instant,
-}
-
-impl CpuTime {
-    fn now() -> Self {
-        // The kernel brings its books up to date when a thread gives way.
-        thread::yield_now();
-        let text = fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
-        Self {
-            nanoseconds: text.split_whitespace().next().and_then(|n| n.parse().ok()),
-            instant: Instant::now(),
-        }
-    }
-
-    /// Seconds since.
-    fn seconds(&self) -> f64 {
-        let now = Self::now();
-        match (self.nanoseconds, now.nanoseconds) {
-            (Some(before), Some(after)) => 1e-9 * (after - before) as f64,
-            _ => self.instant.elapsed().as_secs_f64(),
-        }
-    }
+        layers: None,
+        odd: None,
+        channels: Channels::COLOR,
+    };
+    film.channels = Channels {
+        depth: film.depth.is_some(),
+        normal: film.normal.is_some(),
+        position: film.position.is_some(),
+        velocity: film.velocity.is_some(),
+        albedo: film.albedo.is_some(),
+        id: film.id.is_some(),
+        ..Channels::COLOR
+    };
+    film
 }

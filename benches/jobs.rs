@@ -1,11 +1,11 @@
 //! What a job costs beside its images: 2,000 frames of 1,000 particles at 64x64, and `status` on 10,000 frames; and how
 //! much longer 200 frames of 10,000 particles at 640x360 take than the slowest of the stages that overlap.
 //!
-//! Stages overlap, so that the sum of their times says nothing of the rest. Writing images, with what syncing
+//! Stages overlap, so the sum of their times does not give the rest. Writing images, with what syncing
 //! them takes, is by far the longest here: what the run took beyond it is an upper bound of claims, ledger and
 //! all else, and of reading, building and tracing where these were not hidden behind it.
 
-#![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
+#![expect(clippy::print_stdout, reason = "a benchmark prints its measurements")]
 
 use std::fs;
 use std::path::Path;
@@ -18,7 +18,7 @@ use spherule_formats::write;
 
 const FRAMES: usize = 2000;
 const PARTICLES: usize = 1000;
-/// The job that `status` is asked about has so many times the frames.
+/// Factor on the number of frames of the job that `status` reads.
 const TIMES: usize = 5;
 const TURNS: usize = 5;
 /// Frames of the sequence, and their particles.
@@ -91,7 +91,7 @@ fn sequence(place: &Path) {
     }
 }
 
-/// Renders all frames and tells what that took beyond writing images.
+/// Renders all frames and prints the time beyond writing images.
 fn render(place: &Path, options: &[&str]) {
     let _ = fs::remove_dir_all(place.join("out"));
     let small = [
@@ -147,7 +147,7 @@ fn enlarge(place: &Path) {
         .filter_map(|entry| Some(entry.ok()?.path()))
         .find(|path| path.extension().is_some_and(|e| e == "jsonl"))
         .expect("a ledger");
-    let said: Vec<Value> = fs::read_to_string(ledger)
+    let entries: Vec<Value> = fs::read_to_string(ledger)
         .expect("a ledger")
         .lines()
         .map(json)
@@ -157,7 +157,7 @@ fn enlarge(place: &Path) {
         for frame in &planned {
             frames.push(renamed(frame, "number", "outputs", turn));
         }
-        for entry in &said {
+        for entry in &entries {
             let mut entry = renamed(entry, "frame", "outputs", turn);
             let number = entry["frame"].as_i64().expect("a number");
             entry["seq"] = number.into();

@@ -8,7 +8,7 @@
 //! radii away. Distances are in radii, positive where the vertex is outside of the surface; angles are between
 //! the two normals. Without a mesh it has nothing to do.
 
-#![expect(clippy::print_stdout, reason = "a benchmark tells what it measured")]
+#![expect(clippy::print_stdout, reason = "a benchmark prints its measurements")]
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -76,17 +76,17 @@ fn main() {
         .par_iter()
         .map(|vertex| difference(&grid.surface(), vertex, options.radius))
         .collect();
-    let met: Vec<&Difference> = found.iter().flatten().collect();
+    let hits: Vec<&Difference> = found.iter().flatten().collect();
     println!(
         "{} vertices, at {:.2} % of them no surface within {REACH} radii",
         vertices.len(),
-        100.0 * (vertices.len() - met.len()) as f64 / vertices.len() as f64
+        100.0 * (vertices.len() - hits.len()) as f64 / vertices.len() as f64
     );
-    tell("angle", "degrees", met.iter().map(|d| d.angle).collect());
-    tell(
+    print_percentiles("angle", "degrees", hits.iter().map(|d| d.angle).collect());
+    print_percentiles(
         "distance",
         "radii",
-        met.iter().map(|d| d.distance).collect(),
+        hits.iter().map(|d| d.distance).collect(),
     );
 }
 
@@ -152,7 +152,7 @@ fn difference(surface: &impl Shape, vertex: &Vertex, radius: f32) -> Option<Diff
 }
 
 /// Prints quantiles of all that was found.
-fn tell(name: &str, unit: &str, mut values: Vec<f32>) {
+fn print_percentiles(name: &str, unit: &str, mut values: Vec<f32>) {
     values.sort_by(f32::total_cmp);
     if values.is_empty() {
         return;

@@ -1,7 +1,7 @@
 //! Each of our structures against obvhs on the thesis's scene: one table.
 //!
 //! The two take turns, so that whatever else the machine does hits both; a ratio of the same turn
-//! is worth more than either rate. Ratios say how many times better ours is, in every row.
+//! is worth more than either rate. Ratios above 1 are in our favour, in every row.
 #![expect(clippy::print_stdout, reason = "the table is what it is for")]
 
 use std::env;
@@ -136,7 +136,7 @@ impl Table<'_> {
         // Positions and structure; neither keeps the way back to the particles' order.
         let our_bytes = report.position_bytes + report.structure_bytes;
         let their_bytes = (size_of_val(&scene.centers[..]) + node_bytes) as u64;
-        self.print_bytes(name, "bytes a particle", our_bytes, Some(their_bytes));
+        self.print_bytes(name, "bytes per particle", our_bytes, Some(their_bytes));
         self.print_bytes(name, "  while building", report.peak_bytes, None);
     }
 
@@ -156,7 +156,7 @@ impl Table<'_> {
         let turns = Turns::take(self.rounds, || build().nodes, || theirs.build(spheres));
         self.print_row(&name, "build, kept memory, s", &turns.text(Unit::Seconds));
         let bytes = report.position_bytes + report.structure_bytes;
-        self.print_bytes(&name, "bytes a particle", bytes, None);
+        self.print_bytes(&name, "bytes per particle", bytes, None);
         let held = report.peak_bytes - report.file_bytes;
         self.print_bytes(&name, "  while building", held, None);
         self.print_rays(&name, &ours.view(&leaves));
@@ -234,7 +234,7 @@ impl Table<'_> {
 #[derive(Debug, Clone, Copy)]
 enum Unit {
     Seconds,
-    /// Rays of each turn, told as millions in a second.
+    /// Rays of each repetition, printed in millions per second.
     MillionsOf(usize),
 }
 

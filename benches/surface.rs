@@ -182,7 +182,7 @@ fn print_row(place: &Path, case: &Case, size: Size) {
     );
 }
 
-/// What the report of a job says of its one frame.
+/// The report of the only frame of a job.
 fn frame_of(place: &Path, case: &Case, size: Size) -> Value {
     let out = place.join("out");
     // Left by the turn before.
@@ -225,8 +225,8 @@ fn run(arguments: &[&str]) {
         .stdout(Stdio::null())
         .output()
         .expect("the program starts");
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(output.status.success(), "{arguments:?}: {told}");
+    let errors = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{arguments:?}: {errors}");
 }
 
 fn text(seconds: &[f64]) -> String {

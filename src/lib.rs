@@ -1,10 +1,10 @@
-//! Renders particle-simulation time steps by CPU ray tracing: accelerators, surfaces, shading,
-//! images, and the pipeline and commands that join them.
+//! Renders particle-simulation time steps by CPU ray tracing: acceleration structures, surfaces, shading, images, and
+//! the pipeline and commands that connect them.
 //!
-//! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
-//! does not know what the work is. This crate joins them. Arrows never point the other way.
+//! `spherule-formats` turns bytes into frames and knows nothing about rays. `spherule-jobs` plans, records and resumes
+//! work and does not know what the work is. This crate connects the two; neither depends on it.
 //!
-//! A tree and a ray:
+//! This example builds a tree over two spheres and traces one ray:
 //!
 //! ```
 //! use glam::Vec3;
@@ -16,7 +16,7 @@
 //! let mut builder = TreeBuilder::new();
 //! builder.build(&spheres, &BuildSettings::default());
 //! let tree = builder.tree().view();
-//! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("straight at it");
+//! let hit = tree.nearest(&Ray::new(Vec3::new(-2.0, 0.0, 0.0), Vec3::X)).expect("a hit");
 //! assert_eq!(hit.t, 1.5);
 //! assert_eq!(tree.particle(hit.slot), 0);
 //! ```
@@ -26,10 +26,12 @@ pub mod accel;
 #[cfg(feature = "cli")]
 pub mod cli;
 pub mod conversion;
+pub mod denoise;
+pub mod hdr;
+pub mod job;
 pub mod manifest;
 pub mod math;
 pub mod metrics;
-mod mishap;
 pub mod output;
 pub mod pipeline;
 pub mod ray;

@@ -1,4 +1,4 @@
-//! The `spherule` command: a thin shell around the library.
+//! The `spherule` command. The library contains all of its code.
 
 use std::process::ExitCode;
 

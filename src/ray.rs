@@ -65,7 +65,7 @@ impl RayPacket {
     /// Adds a ray.
     ///
     /// # Panics
-    /// If there are 16 already.
+    /// If the packet is full.
     #[inline]
     pub fn push(&mut self, ray: &Ray) {
         let lane = self.len;
@@ -104,7 +104,7 @@ impl RayPacket {
         self.len
     }
 
-    /// Whether there is no ray.
+    /// Whether the packet has no rays.
     pub fn is_empty(&self) -> bool {
         self.len == 0
     }
@@ -117,7 +117,7 @@ impl RayPacket {
     /// The ray in `lane`.
     ///
     /// # Panics
-    /// If the packet has fewer rays.
+    /// If `lane` is not below [`RayPacket::len`].
     #[inline]
     pub fn ray(&self, lane: usize) -> Ray {
         assert!(lane < self.len, "the packet has fewer rays");

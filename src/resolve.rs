@@ -4,33 +4,35 @@ use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
 use crate::accel::{BvhSettings, SbvhSettings};
-use crate::manifest::{
-    ColorSetting, DEFAULT_MAP, GroundPattern, LightKind, Manifest, MapName, RadiusSetting,
-};
+use crate::manifest::{ColorSetting, DEFAULT_MAP, Manifest, MapName, RadiusSetting, nearest};
 use crate::metrics::memory::available;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::pipeline::{
     ColorRule, FrameSize, MemoryModel, Picture, RadiusRule, RunSettings, Setup, attribute_list,
 };
-use crate::render::{Channels, RenderSettings};
+use crate::render::{IntegratorKind, PixelFilter, RenderSettings};
 use crate::scene::{
-    Background, Bounds, CameraError, Checker, ColorMap, Ground, Light, PathError, Scene,
-    default_lights, material,
+    Background, Bounds, CameraError, ColorMap, PathError, RadianceMap, Scene, default_lights,
+    material,
 };
 use crate::surface::SurfaceKind;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 mod camera;
+mod channels;
+mod denoise;
+mod environment;
+mod ground;
+mod lights;
+mod meshes;
 mod surface;
 
 pub use camera::check_views;
+use ground::Floor;
+pub use meshes::{add_meshes, mesh_settings};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
 const LEAST_RADIUS: f64 = 1e-6;
-
-/// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
-/// through the particles, and none is only a few pixels wide.
-const TILE: f64 = 1.0 / 8.0;
 
 /// Reasons why there can be no images.
 #[derive(Debug, thiserror::Error)]
@@ -44,19 +46,21 @@ pub enum ResolveError {
         what: String,
     },
     /// No frame has the requested attribute.
-    #[error("{key}: no attribute `{name}` in any frame looked at; there are {has}")]
+    #[error("{key}: no attribute `{name}` in the sampled frames{hint}; available: {has}")]
     MissingAttribute {
         /// The manifest's key.
         key: &'static str,
         /// Name of the attribute.
         name: String,
+        /// A similar name, if there is one.
+        hint: String,
         /// The existing attributes.
         has: String,
     },
     /// There is no radius in the frames, and no estimate from the spacing of particles.
     #[error(
-        "input.radius: the frames bring none, and particles that are few, in one place or far apart \
-         do not tell it; give a length with --radius"
+        "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \
+         distant particles"
     )]
     NoRadius,
     /// The radius is too small: squares of lengths would underflow.
@@ -117,11 +121,21 @@ pub fn question(manifest: &Manifest) -> Question<'_> {
     }
 }
 
-/// Determines everything about the images of a job.
+/// Whether [`setup`] needs the image of `environment.image`.
+pub fn needs_environment_image(manifest: &Manifest) -> bool {
+    environment::needs_image(manifest)
+}
+
+/// Determines everything about the images of a job. `map` is the image of the environment, if it
+/// [is needed](needs_environment_image). [`add_meshes`] adds meshes.
 ///
 /// # Errors
 /// See [`ResolveError`]; the messages name the manifest's keys.
-pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError> {
+pub fn setup(
+    manifest: &Manifest,
+    survey: &Survey,
+    map: Option<&RadianceMap>,
+) -> Result<Setup, ResolveError> {
     // Determine surface, radius and colours
     let surface = surface::settings(manifest)?;
     let radius = radius_rule(manifest, survey)?;
@@ -139,21 +153,24 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
     let aspect = f64::from(image.width) / f64::from(image.height);
     let path = camera::path(manifest, &bounds, up, aspect)?;
     let camera = camera::at_start(&path, aspect, survey.origin)?;
+    let lens = camera::lens(manifest, &path, aspect)?;
     // Set up lights and ground
-    let lights = if manifest.lights.is_empty() {
-        default_lights(&bounds, up, &path.start())
-    } else {
-        lights(manifest, survey.origin)
+    let environment = environment::environment(manifest, map, &path.start(), up)?;
+    let mut lights = match (manifest.lights.is_empty(), manifest.integrator()) {
+        (false, _) => lights::lights(manifest, survey.origin, up)?,
+        (true, IntegratorKind::Whitted) => default_lights(&bounds, up, &path.start()),
+        // The environment is the light
+        (true, IntegratorKind::Path) => Vec::new(),
     };
-    let mut ground = ground(manifest, &bounds, up, survey.origin);
-    if surface.kind != SurfaceKind::Spheres
-        && manifest.render.ground_height.is_none()
-        && let Some(ground) = &mut ground
-    {
-        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
-        // a thin layer of air, which reflects all light at grazing angles.
-        ground.raise(narrow(reach.x));
-    }
+    lights.extend(environment::sun(manifest, &path.start(), up));
+    let floor = Floor {
+        bounds: &bounds,
+        reach: reach.x,
+        up,
+        origin: survey.origin,
+        has_layer: survey.rests_on_floor(up),
+    };
+    let ground = ground::ground(manifest, &floor)?;
     let scene = Scene {
         origin: survey.origin,
         camera,
@@ -162,42 +179,69 @@ pub fn setup(manifest: &Manifest, survey: &Survey) -> Result<Setup, ResolveError
         material: surface::material(manifest, &bounds),
         background: background(manifest, up.as_vec3()),
         ground,
+        meshes: Vec::new(),
+        environment,
+        is_environment_visible: manifest.environment.visible,
+        next_frame: None,
     };
     // Collect the settings of the images
     let output = &manifest.output;
-    let channels = Channels::from_names(output.channels.iter().map(|c| c.name())).map_err(|e| {
-        ResolveError::Unsupported {
-            key: "output.channels",
-            what: e.to_string(),
-        }
+    let (channels, attributes) = channels::channels(output, survey)?;
+    let step = channels::frame_step(&channels, output, survey)?;
+    // Manifests that were not read from a file are not checked
+    let [width, height] = image.data_size().ok_or_else(|| ResolveError::Unsupported {
+        key: "image.crop",
+        what: "the part of the image is empty or too large".to_owned(),
     })?;
-    let mut render = RenderSettings::new(image.width, image.height);
+    let window = image.part().map(|_| image.data_window());
+    let mut render = RenderSettings::new(width, height);
+    render.window = window;
     render.samples = image.samples;
+    render.filter = PixelFilter {
+        kind: image.filter,
+        width: image
+            .filter_width
+            .unwrap_or_else(|| image.filter.default_width()),
+    };
+    render.integrator = manifest.integrator();
+    render.bounces = manifest.render.bounces;
+    render.photons = manifest.render.caustics.photons;
     render.max_depth = manifest.render.max_depth;
     render.min_weight = manifest.render.min_weight;
     render.channels = channels;
     render.transparent_background = output.transparent;
+    let denoise = denoise::settings(manifest, &scene.material)?;
+    render.has_features = denoise.is_some();
     let picture = Picture {
         origin: survey.origin,
         least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
         radius,
         color,
         path,
+        lens,
         aspect,
         scene,
+        meshes: Vec::new(),
         renderer: crate::render::RendererKind::default(),
         render,
+        denoise,
         surface,
         exr: ExrOptions {
+            attribute_planes: channels::attribute_planes(&attributes),
             compression: output.compression,
+            window,
             frames_per_second: output.fps.map(fps),
             world_to_camera: None,
             comments: Some(COMMENTS.to_owned()),
             custom: None,
+            texts: Vec::new(),
         },
+        attributes,
+        step,
         preview: PreviewOptions {
             exposure: output.preview_exposure,
             backdrop: None,
+            first_pixel: window.map_or([0, 0], |window| [window.left, window.top]),
         },
     };
     // Collect the settings of the run
@@ -304,11 +348,20 @@ fn require_attribute(survey: &Survey, key: &'static str, name: &str) -> Result<(
     Err(ResolveError::MissingAttribute {
         key,
         name: name.to_owned(),
+        hint: similar(name, &survey.attributes),
         has: attribute_list(survey.attributes.iter().map(String::as_str)),
     })
 }
 
+/// A question about the attribute that was probably meant.
+fn similar(name: &str, attributes: &[String]) -> String {
+    let known: Vec<&str> = attributes.iter().map(String::as_str).collect();
+    nearest(name, &known).map_or_else(String::new, |found| format!(" (did you mean `{found}`?)"))
+}
+
+/// The source of the colours of particles; "auto" depends on the attributes that exist.
 fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, ResolveError> {
+    // Maps an attribute. The default range is that of the survey
     let mapped = |name: &str, map: Option<MapName>, range: Option<[f64; 2]>, required: bool| {
         let found = survey
             .color
@@ -363,51 +416,12 @@ fn color_rule(manifest: &Manifest, survey: &Survey) -> Result<ColorRule, Resolve
     }
 }
 
-fn lights(manifest: &Manifest, origin: DVec3) -> Vec<Light> {
-    manifest
-        .lights
-        .iter()
-        .filter_map(|light| {
-            let radiance = light.color * light.intensity;
-            match &light.kind {
-                LightKind::Point { position, falloff } => {
-                    Some(Light::point_with(*position, origin, radiance, *falloff))
-                }
-                LightKind::Directional { direction } => {
-                    Light::directional(direction.as_vec3(), radiance)
-                }
-            }
-        })
-        .collect()
-}
-
 fn background(manifest: &Manifest, up: Vec3) -> Background {
-    let asked = manifest.render.background;
-    asked.map_or_else(|| Background::default_for(up), |b| b.with_up(up))
-}
-
-fn ground(manifest: &Manifest, bounds: &Bounds, up: DVec3, origin: DVec3) -> Option<Ground> {
-    let render = &manifest.render;
-    if !render.ground {
-        return None;
+    match (manifest.render.background, manifest.integrator()) {
+        (Some(background), _) => background.with_up(up),
+        (None, IntegratorKind::Path) => Background::Studio { up },
+        (None, IntegratorKind::Whitted) => Background::default_for(up),
     }
-    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
-    if let Some(height) = render.ground_height {
-        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
-        ground.center += (relative - ground.height) * ground.up;
-        ground.height = relative;
-    }
-    ground.color = render.ground_color;
-    ground.checker = match render.ground_pattern {
-        GroundPattern::Plain => None,
-        GroundPattern::Checker => Some(Checker {
-            tile: match render.ground_tile {
-                Some(tile) => narrow(tile),
-                None => surface::round(bounds.diagonal() * TILE),
-            },
-        }),
-    };
-    Some(ground)
 }
 
 /// A rate as a fraction: 24 as 24/1, 29.97 as 29970/1000.

@@ -1,21 +1,21 @@
-//! Named per-particle values beside the positions: velocity, density, id...
+//! Named per-particle values beside the positions: velocity, density, id and others.
 
 use crate::ScalarType;
 
-/// One named array with `components` numbers a particle, interleaved (`x0 y0 z0 x1 ...`).
+/// One named array with `components` numbers per particle, interleaved (`x0 y0 z0 x1 ...`).
 #[derive(Debug, Clone, PartialEq)]
 pub struct Attribute {
-    /// Name as the file has it.
+    /// The name in the file.
     pub name: String,
-    /// Numbers a particle: 1 for a scalar, 3 for a vector.
+    /// Numbers per particle: 1 for a scalar, 3 for a vector.
     pub components: usize,
-    /// The numbers, `components` times the particle count of them.
+    /// The numbers: `components` for each particle.
     pub data: AttributeData,
 }
 
 /// The numbers of an attribute in the type of the file, so that ids stay exact.
 #[derive(Debug, Clone, PartialEq)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub enum AttributeData {
     I8(Vec<i8>),
     U8(Vec<u8>),
@@ -50,14 +50,14 @@ macro_rules! with_values {
 pub(crate) use with_values;
 
 impl AttributeData {
-    /// Makes room for `more` numbers if it can be had: pages that are not used cost nothing.
+    /// Reserves space for `more` numbers if the system allows it; pages that are not used cost nothing.
     pub(crate) fn reserve(&mut self, more: usize) {
         with_values!(self, v => {
             let _ = v.try_reserve_exact(more);
         });
     }
 
-    /// Appends the numbers of `more`, which has the same type; without effect for another type.
+    /// Appends the numbers of `more` if it has the same type; otherwise does nothing.
     pub(crate) fn append(&mut self, more: &mut Self) {
         macro_rules! append {
             ($($variant:ident),*) => {
@@ -70,7 +70,7 @@ impl AttributeData {
         append!(I8, U8, I16, U16, I32, U32, I64, U64, F32, F64);
     }
 
-    /// Gives back room that is not used.
+    /// Releases unused capacity.
     pub(crate) fn shrink(&mut self) {
         with_values!(self, v => v.shrink_to_fit());
     }
@@ -80,12 +80,12 @@ impl AttributeData {
         with_values!(self, v => v.len())
     }
 
-    /// True if there are none.
+    /// True if there are no scalars.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes that they take in memory.
+    /// Bytes of the scalars in memory.
     pub fn byte_len(&self) -> u64 {
         self.len() as u64 * self.scalar_type().size() as u64
     }
@@ -135,12 +135,12 @@ impl AttributeData {
 }
 
 impl Attribute {
-    /// Particles described.
+    /// Number of particles.
     pub fn count(&self) -> usize {
         self.data.len() / self.components.max(1)
     }
 
-    /// The value of particle `index`: a scalar itself, a vector by its Euclidean length.
+    /// The value of particle `index`: a scalar itself, or the Euclidean length of a vector.
     ///
     /// # Panics
     /// If `index` is out of range.

@@ -1,12 +1,13 @@
 //! Memory limit for reading one file.
 //!
-//! A file of a few hundred kilobytes can ask for gigabytes: as gzip, as a member of an archive, as a block of
-//! VTK XML, or as text of short numbers. The caller sets the limit; a file that needs more fails by
-//! name before the memory is taken.
+//! A file of a few hundred kilobytes can expand to gigabytes: as gzip, as a member of an archive, as a block of
+//! VTK XML, or as text of short numbers. The caller sets the limit. A file that needs more fails with an error
+//! that names it, before the memory is allocated.
 
 use crate::ParseError;
 
-/// The memory that one file may take while it is read: what is held of it, and the numbers made of it.
+/// The memory that one file may use while it is read: the part of the file that is in memory, and the decoded
+/// numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct MemoryBudget {
     bytes: u64,
@@ -14,20 +15,20 @@ pub struct MemoryBudget {
 }
 
 impl MemoryBudget {
-    /// No limit but that of the machine.
+    /// No limit except that of the machine.
     pub const UNLIMITED: Self = Self::new(u64::MAX, "free some memory");
 
-    /// A budget of `bytes`. Messages end with `remedy`, as in `raise the limit`.
+    /// A budget of `bytes`. Error messages end with `remedy`, for example `raise the limit`.
     pub const fn new(bytes: u64, remedy: &'static str) -> Self {
         Self { bytes, remedy }
     }
 
-    /// The bytes.
+    /// The limit in bytes.
     pub const fn bytes(self) -> u64 {
         self.bytes
     }
 
-    /// The same, but `bytes` if it is less.
+    /// The same budget, limited to `bytes`.
     #[must_use]
     pub fn at_least(self, bytes: u64) -> Self {
         Self {
@@ -44,8 +45,7 @@ impl MemoryBudget {
         }
     }
 
-    /// The share for the bytes of a file that has to be in memory as a whole: the rest is for
-    /// the numbers.
+    /// The share for the bytes of a file that must be in memory as a whole. The other half is for the numbers.
     pub(crate) const fn for_content(self) -> Self {
         Self {
             bytes: self.bytes / 2,
@@ -53,7 +53,7 @@ impl MemoryBudget {
         }
     }
 
-    /// Checks that `need` bytes are allowed; `what` begins the message, as in `decompressed it is`.
+    /// Checks that the budget allows `need` bytes. `what` begins the message, for example `decompressed it is`.
     ///
     /// # Errors
     /// [`ParseError::TooLarge`].
@@ -65,7 +65,7 @@ impl MemoryBudget {
         }
     }
 
-    /// The error of a file that needs more.
+    /// The error for a file that needs more than the budget.
     pub(crate) fn exceeded(self, what: &str) -> ParseError {
         let limit = match self.bytes >> 20 {
             0 => format!("{} bytes", self.bytes),
@@ -86,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_is_left_is_told_in_plain_units() {
+    fn remaining_time_has_readable_units() {
         let budget = MemoryBudget::new(64 << 20, "raise the limit");
         assert_eq!(budget.check(64 << 20, "it is"), Ok(()));
         let error = |budget: MemoryBudget| budget.check(u64::MAX, "it is").unwrap_err().to_string();

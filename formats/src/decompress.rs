@@ -1,4 +1,4 @@
-//! The bytes of a file from front to back, decompressed.
+//! Reads a file from front to back and decompresses it.
 
 use std::io::{self, BufRead, Read, Seek};
 
@@ -11,12 +11,12 @@ use crate::{FrameError, ParseError};
 /// Bytes that are decompressed between two checks of the budget.
 const STEP: usize = 1 << 20;
 
-/// Why the next bytes cannot be read.
+/// The reason why the next bytes cannot be read.
 #[derive(Debug)]
 pub(crate) enum StreamError {
     /// An error of the operating system.
     Io(io::Error),
-    /// The bytes are damaged, or too many.
+    /// The bytes are damaged, or there are too many.
     Bytes(ParseError),
 }
 
@@ -36,26 +36,26 @@ impl StreamError {
     }
 }
 
-/// Uncompressed bytes in order, a bounded number at a time.
+/// Uncompressed bytes in order, read in bounded amounts.
 pub(crate) trait ByteStream {
-    /// Appends up to `most` bytes to `to`; fewer only at the end.
+    /// Appends up to `most` bytes to `to`; fewer only at the end of the file.
     ///
     /// # Errors
     /// [`StreamError`].
     fn fill(&mut self, to: &mut Vec<u8>, most: usize) -> Result<usize, StreamError>;
 
-    /// Skips `count` bytes if that needs no reading; else returns false and does nothing.
+    /// Skips `count` bytes and returns true if that needs no reading; otherwise returns false and does nothing.
     fn pass(&mut self, count: usize) -> bool;
 
-    /// The number of bytes, and notes, once all have been returned.
+    /// The total number of bytes and the notes, once all bytes have been returned.
     fn ended(&self) -> Option<(usize, &[String])>;
 }
 
-/// The content of a file, compressed by gzip or not.
+/// The content of a file that may be compressed with gzip.
 pub(crate) struct Decompressor<R> {
     state: DecompressorState<R>,
     is_compressed: bool,
-    /// Uncompressed bytes so far.
+    /// Number of uncompressed bytes returned so far.
     at: usize,
     notes: Vec<String>,
 }
@@ -67,10 +67,10 @@ enum DecompressorState<R> {
 }
 
 impl<R: BufRead + Seek> Decompressor<R> {
-    /// The content of `reader`, from its beginning.
+    /// Reads the content of `reader` from its beginning.
     ///
     /// # Errors
-    /// It cannot be read.
+    /// If the file cannot be read.
     pub(crate) fn new(mut reader: R) -> io::Result<Self> {
         let is_compressed = is_gzip(reader.fill_buf()?);
         let state = if is_compressed {
@@ -86,10 +86,10 @@ impl<R: BufRead + Seek> Decompressor<R> {
         })
     }
 
-    /// Appends all that is left to `bytes`, which begin the content, and returns the notes.
+    /// Appends the rest of the content to `bytes`, which holds its beginning, and returns the notes.
     ///
     /// # Errors
-    /// [`StreamError`]; [`ParseError::TooLarge`] if the content is more than `budget` allows.
+    /// [`StreamError`]; [`ParseError::TooLarge`] if the content exceeds `budget`.
     pub(crate) fn finish(
         mut self,
         bytes: &mut Vec<u8>,
@@ -118,12 +118,12 @@ impl<R: BufRead + Seek> Decompressor<R> {
         self.is_compressed
     }
 
-    /// Notes so far.
+    /// The notes so far.
     pub(crate) fn into_notes(self) -> Vec<String> {
         self.notes
     }
 
-    /// The state after a gzip stream: another stream, or the end. Zeros are padding; anything else is ignored
+    /// The state after a gzip stream: another stream, or the end. Zeros are padding. Anything else is ignored
     /// with a note, as `gzip -d` does.
     fn after_member(&mut self, mut reader: R) -> io::Result<DecompressorState<R>> {
         let next = reader.fill_buf()?;
@@ -149,7 +149,7 @@ impl<R: BufRead + Seek> Decompressor<R> {
     }
 }
 
-/// Beginning of the message for too large content.
+/// Beginning of the message for content that is too large.
 const TOO_LARGE: &str = "decompressed it is";
 
 impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
@@ -173,6 +173,7 @@ impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
         while to.len() - start < most {
             let left = (most - (to.len() - start)) as u64;
             let before = to.len();
+            // Read from the current stream; at its end, prepare the next one
             match std::mem::replace(&mut self.state, DecompressorState::Ended) {
                 DecompressorState::Plain(mut reader) => {
                     let read = reader.by_ref().take(left).read_to_end(to);
@@ -199,7 +200,7 @@ impl<R: BufRead + Seek> ByteStream for Decompressor<R> {
     }
 }
 
-/// The error of a gzip stream after `at` good bytes.
+/// The error for a gzip stream that is damaged after `at` good bytes.
 fn damaged(at: usize, error: io::Error) -> StreamError {
     if error.raw_os_error().is_some() {
         return StreamError::Io(error);

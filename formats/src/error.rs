@@ -1,20 +1,20 @@
-//! Errors of frames, by what the caller can do next.
+//! Errors of frames, classified by what the caller can do next.
 //!
-//! Parsers work on bytes and report an offset ([`ParseError`]); the edge that opened the file adds
-//! the path ([`FrameError`]).
+//! Parsers work on bytes and report an offset ([`ParseError`]). The caller that opened the file adds the path
+//! ([`FrameError`]).
 //!
-//! Messages may quote the file, so they are made one line of bounded length where the error is
-//! made, for all readers.
+//! Messages may quote the file. The constructors therefore limit every message to one line of bounded length,
+//! for all readers.
 
 use std::io;
 use std::path::{Path, PathBuf};
 
 use crate::message::one_line;
 
-/// A fault in the bytes of a frame, without the path that only the opener knows.
+/// A fault in the bytes of a frame, without the path, which only the caller knows.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 pub enum ParseError {
-    /// The bytes break their own format: truncated, absurd counts, wrong tokens.
+    /// The bytes violate their format: truncated data, absurd counts, wrong tokens.
     #[error("byte {at}: {what}")]
     Malformed {
         /// Offset from the start of the uncompressed file.
@@ -22,13 +22,13 @@ pub enum ParseError {
         /// The fact, then the remedy if there is one; lower case, no full stop.
         what: String,
     },
-    /// A valid file of a kind this version does not read.
+    /// A valid file of a kind that this version does not read.
     #[error("{what}")]
     Unsupported {
         /// The kind of file and the remedy.
         what: String,
     },
-    /// Reading it takes more memory than is allowed.
+    /// Reading the file needs more memory than is allowed.
     #[error("{what}")]
     TooLarge {
         /// The limit and the remedy.
@@ -59,7 +59,7 @@ impl ParseError {
         }
     }
 
-    /// The same fault in a file with `start` bytes before those that were parsed.
+    /// The same fault with its offset increased by `start`, the number of bytes before the parsed ones.
     #[must_use]
     pub(crate) fn behind(self, start: usize) -> Self {
         match self {
@@ -73,14 +73,14 @@ impl ParseError {
 
     /// The same fault at the same offset, with the message changed by `reword`.
     #[must_use]
-    pub fn retold(self, tell: impl FnOnce(&str) -> String) -> Self {
+    pub fn map_message(self, message: impl FnOnce(&str) -> String) -> Self {
         match self {
             Self::Malformed { at, what } => Self::Malformed {
                 at,
-                what: one_line(tell(&what)),
+                what: one_line(message(&what)),
             },
-            Self::Unsupported { what } => Self::unsupported(tell(&what)),
-            Self::TooLarge { what } => Self::too_large(tell(&what)),
+            Self::Unsupported { what } => Self::unsupported(message(&what)),
+            Self::TooLarge { what } => Self::too_large(message(&what)),
         }
     }
 
@@ -95,10 +95,10 @@ impl ParseError {
     }
 }
 
-/// Why a frame could not be loaded.
+/// The reason why a frame could not be loaded.
 #[derive(Debug, thiserror::Error)]
 pub enum FrameError {
-    /// Skip this frame, carry on with the rest.
+    /// A malformed file: skip this frame and continue with the rest.
     #[error("{}: byte {at}: {what}", path.display())]
     Malformed {
         /// The file.
@@ -116,7 +116,7 @@ pub enum FrameError {
         /// The kind of file and the remedy.
         what: String,
     },
-    /// Reading it takes more memory than is allowed; worth a retry with more.
+    /// Reading the file needs more memory than is allowed; a retry with more memory may work.
     #[error("{}: {what}", path.display())]
     TooLarge {
         /// The file.
@@ -124,12 +124,12 @@ pub enum FrameError {
         /// The limit and the remedy.
         what: String,
     },
-    /// The operating system refused; perhaps worth a retry.
+    /// An error of the operating system; a retry may work.
     #[error("{}: {source}", path.display())]
     Io {
         /// The file.
         path: PathBuf,
-        /// The operating system's reason.
+        /// The error of the operating system.
         source: io::Error,
     },
 }
@@ -149,13 +149,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_errors_quote_stays_in_its_line() {
+    fn quoted_text_stays_on_its_line() {
         let name = "a\nb\u{1b}[2J";
         let errors = [
             ParseError::malformed(3, name),
             ParseError::unsupported(name),
-            ParseError::unsupported("it").retold(|it| format!("{name}: {it}")),
-            ParseError::malformed(3, "it").retold(|it| format!("{name}: {it}")),
+            ParseError::unsupported("it").map_message(|it| format!("{name}: {it}")),
+            ParseError::malformed(3, "it").map_message(|it| format!("{name}: {it}")),
         ];
         for error in errors {
             let text = error.to_string();

@@ -1,4 +1,4 @@
-//! A file format as a value: its reader, and what callers do with it.
+//! A file format as a value, with the operations that callers need.
 
 use std::fmt;
 
@@ -7,7 +7,8 @@ use crate::reader::{Reader, StreamUnit};
 use crate::step::Step;
 use crate::{MemoryBudget, ParseError, RawParticles};
 
-/// A file format that this crate reads. [`Self::all`] lists them; `read::ply::FORMAT` and the like name one.
+/// A file format that this crate reads. [`Self::all`] lists all formats; constants such as `read::ply::FORMAT`
+/// name one.
 #[derive(Clone, Copy)]
 pub struct Format(&'static dyn Reader);
 
@@ -31,12 +32,12 @@ impl Format {
         Self(reader)
     }
 
-    /// Its reader.
+    /// The reader of the format.
     pub(crate) const fn reader(self) -> &'static dyn Reader {
         self.0
     }
 
-    /// Name in reports.
+    /// The name in reports.
     pub fn name(self) -> &'static str {
         self.0.name()
     }
@@ -54,7 +55,7 @@ impl Format {
         self.steps_within(&mut ByteSource::whole(bytes), MemoryBudget::UNLIMITED)
     }
 
-    /// [`Self::steps`] of `source`, within `budget`.
+    /// [`Self::steps`] of `source`, limited by `budget`.
     pub(crate) fn steps_within(
         self,
         source: &mut ByteSource<'_>,
@@ -91,12 +92,12 @@ impl Format {
         self.0.read(source, step, budget)
     }
 
-    /// Bytes that are held beside the numbers while a file that begins with `head` is read in pieces.
+    /// Bytes held beside the numbers while a file that begins with `head` is read in pieces.
     pub(crate) fn stream_bytes(self, head: &[u8]) -> u64 {
         stream_bytes(self.0.stream_unit(head) == Some(StreamUnit::Rows))
     }
 
-    /// Whether a file that begins with `head`, and goes on, is text that can be read in pieces.
+    /// Whether a file that begins with `head` and is longer is text that can be read in pieces.
     pub(crate) fn is_streamed(self, head: &[u8]) -> bool {
         self.0.stream_unit(head).is_some()
     }

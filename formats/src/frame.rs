@@ -1,5 +1,5 @@
-//! One time step in memory: [`RawParticles`] as a reader found them, [`ParticleFrame`] as the
-//! renderer wants them (finite, f32, relative to the sequence's origin).
+//! One time step in memory: [`RawParticles`] as a reader returns them, and [`ParticleFrame`] as the renderer
+//! needs them (finite, f32, relative to the origin of the sequence).
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,9 +10,9 @@ use crate::{Attribute, AttributeData};
 /// Positions in the precision of the file, world units.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Positions {
-    /// Single precision, as most simulations write.
+    /// Single precision, which most simulations write.
     F32(Vec<Vec3>),
-    /// Double precision; shape is kept by subtracting an origin before rounding.
+    /// Double precision; an origin is subtracted before rounding, so that fine detail is kept.
     F64(Vec<DVec3>),
 }
 
@@ -25,12 +25,12 @@ impl Positions {
         }
     }
 
-    /// True if there are none.
+    /// True if there are no positions.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
 
-    /// Bytes that they take in memory.
+    /// Bytes of the positions in memory.
     pub fn byte_len(&self) -> u64 {
         match self {
             Self::F32(v) => size_of_val(&v[..]) as u64,
@@ -38,8 +38,8 @@ impl Positions {
         }
     }
 
-    /// The largest distance that a position moves when it is rounded to f32 relative to `origin`, as
-    /// [`ParticleFrame::from_raw`] does; those that are dropped then do not count.
+    /// The largest distance that a position moves when it is rounded to f32 relative to `origin`, as in
+    /// [`ParticleFrame::from_raw`]. Positions that are dropped there do not count.
     pub fn rounding(&self, origin: DVec3) -> f64 {
         if matches!(self, Self::F32(_)) && origin == DVec3::ZERO {
             return 0.0;
@@ -65,13 +65,12 @@ impl Positions {
     }
 }
 
-/// What a reader returns: everything of one step, unfiltered, in file order.
+/// All data of one step as a reader returns it: unfiltered, in file order.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RawParticles {
     /// Positions in the precision of the file.
     pub positions: Positions,
-    /// Everything else that is numeric and per particle; each holds exactly one value group a
-    /// particle.
+    /// All other numeric per-particle data; each attribute has exactly one value group per particle.
     pub attributes: Vec<Attribute>,
     /// Simulation time, if the file has it.
     pub time: Option<f64>,
@@ -80,13 +79,13 @@ pub struct RawParticles {
 }
 
 impl RawParticles {
-    /// Bytes that positions and attributes take in memory.
+    /// Bytes of positions and attributes in memory.
     pub fn byte_len(&self) -> u64 {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
         self.positions.byte_len() + attributes.sum::<u64>()
     }
 
-    /// Bytes of the largest of positions and attributes.
+    /// Bytes of the largest array among positions and attributes.
     pub(crate) fn largest_array_len(&self) -> u64 {
         let attributes = self.attributes.iter().map(|a| a.data.byte_len());
         attributes.fold(self.positions.byte_len(), u64::max)
@@ -96,34 +95,34 @@ impl RawParticles {
 /// Sphere radii in scene units.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Radius {
-    /// All particles alike.
+    /// All particles have this radius.
     Common(f32),
-    /// One each, in particle order.
+    /// One radius per particle, in particle order.
     PerParticle(Vec<f32>),
 }
 
-/// The particles of one time step, ready to build a tree over: every position finite.
+/// The particles of one time step, ready for building a tree: every position is finite.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ParticleFrame {
     /// Positions relative to `origin`, scene units.
     pub positions: Vec<Vec3>,
-    /// World position of the zero of `positions`; one for a whole sequence.
+    /// World position that `positions` are relative to; the same for a whole sequence.
     pub origin: DVec3,
-    /// Radii if the file carries them (an attribute named `radius`, `pscale`, or half a
-    /// `diameter`); `None` means: estimate from the spacing.
+    /// Radii, if the file has them (an attribute named `radius` or `pscale`, or half of a `diameter`). `None`
+    /// means that they must be estimated from the spacing.
     pub radius: Option<Radius>,
     /// Attributes in particle order.
     pub attributes: Vec<Attribute>,
     /// Simulation time, if known.
     pub time: Option<f64>,
-    /// Particles left out because a coordinate was no number or beyond [`FARTHEST`].
+    /// Particles that were dropped because a coordinate was NaN or beyond [`FARTHEST`].
     pub dropped: u64,
-    /// File-order index of each kept particle; `None` when nothing was dropped (then it is `i`).
+    /// File-order index of each kept particle; `None` if no particle was dropped (the indices are then equal).
     pub file_index: Option<Vec<u32>>,
 }
 
-/// The largest coordinate relative to a sequence's origin, and the largest radius, of a particle that is kept: boxes
-/// around such spheres and the quantised planes of tree nodes are finite, with room for what rounds them up.
+/// The largest coordinate relative to a sequence's origin, and the largest radius, of particles that are kept.
+/// Boxes around such spheres and the quantised planes of tree nodes are finite, even after rounding up.
 pub const FARTHEST: f32 = f32::MAX / 16.0;
 
 /// Whether a position relative to the origin is finite and within [`FARTHEST`].
@@ -137,8 +136,7 @@ pub fn is_radius(radius: f32) -> bool {
 }
 
 impl ParticleFrame {
-    /// Drops particles that are not [near](is_near) (counted), subtracts `origin` in f64 and
-    /// rounds to f32.
+    /// Drops and counts particles that are not [near](is_near), subtracts `origin` in f64 and rounds to f32.
     pub fn from_raw(raw: RawParticles, origin: DVec3) -> Self {
         let RawParticles {
             positions,
@@ -146,10 +144,12 @@ impl ParticleFrame {
             time,
             step: _,
         } = raw;
+        // Find the particles to keep
         let relative = relative_positions(positions, origin);
         let keep: Vec<bool> = relative.iter().map(is_near).collect();
         let kept = keep.iter().filter(|k| **k).count();
         let dropped = (relative.len() - kept) as u64;
+        // Keep the arrays if no particle is dropped
         if dropped == 0 {
             let radius = find_radius(&attributes);
             return Self {
@@ -162,6 +162,7 @@ impl ParticleFrame {
                 file_index: None,
             };
         }
+        // Remove the dropped particles
         for attribute in &mut attributes {
             attribute.data.retain_particles(attribute.components, &keep);
         }
@@ -185,7 +186,7 @@ impl ParticleFrame {
         }
     }
 
-    /// The attribute called `name`, exactly or failing that without regard to case.
+    /// The attribute called `name`: an exact match, else one that ignores case.
     pub fn attribute(&self, name: &str) -> Option<&Attribute> {
         let exact = self.attributes.iter().find(|a| a.name == name);
         exact.or_else(|| {
@@ -195,7 +196,7 @@ impl ParticleFrame {
         })
     }
 
-    /// Particle count (kept, finite).
+    /// Number of particles (kept ones, which are finite).
     pub fn len(&self) -> usize {
         self.positions.len()
     }
@@ -206,7 +207,7 @@ impl ParticleFrame {
     }
 }
 
-/// An f64 too large for f32 becomes infinite here and is dropped by the caller.
+/// An f64 that is too large for f32 becomes infinite here, and the caller drops the particle.
 fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
     match positions {
         Positions::F32(v) if origin == DVec3::ZERO => v,
@@ -220,16 +221,16 @@ fn relative_positions(positions: Positions, origin: DVec3) -> Vec<Vec3> {
     }
 }
 
-/// Radii by the names that simulations and Houdini use.
+/// The radii, by the names that simulations and Houdini use.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "radii are f32 in the renderer"
 )]
 pub(crate) fn find_radius(attributes: &[Attribute]) -> Option<Radius> {
-    let named = |wanted: &str| {
+    let named = |name: &str| {
         attributes.iter().find(|a| {
             a.components == 1
-                && a.name.eq_ignore_ascii_case(wanted)
+                && a.name.eq_ignore_ascii_case(name)
                 && matches!(a.data, AttributeData::F32(_) | AttributeData::F64(_))
         })
     };

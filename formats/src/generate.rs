@@ -1,17 +1,17 @@
-//! Seeded particle sets to measure with.
+//! Seeded particle sets for measurements.
 //!
-//! The box is the thesis's scene, filled by splitmix64, a generator of three lines, so that other
-//! programs can make exactly these particles and be compared on them.
+//! The box is the thesis's scene. It is filled with splitmix64, a generator of three lines, so that other
+//! programs can generate exactly the same particles and be compared.
 
 use glam::Vec3;
 use rayon::prelude::*;
 
-/// A box filled evenly at random.
+/// A box with a uniform random distribution of particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BoxSettings {
-    /// How many particles.
+    /// Number of particles.
     pub count: usize,
-    /// State of the generator at the start.
+    /// Seed: the initial state of the generator.
     pub seed: u64,
     /// Smallest corner, scene units.
     pub min: Vec3,
@@ -31,7 +31,7 @@ impl BoxSettings {
     }
 }
 
-/// The particles of `settings`: x, y and z of each are three successive numbers of splitmix64,
+/// The particles of `settings`. The x, y and z of each particle are three successive numbers of splitmix64:
 /// `min + ((next >> 40) * 2^-24) * (max - min)` in f32.
 ///
 /// ```
@@ -50,7 +50,8 @@ pub fn fill_box(settings: &BoxSettings) -> Vec<Vec3> {
 }
 
 impl BoxSettings {
-    /// Particle `index` of [`fill_box`]. The state only counts up, so every particle can start at its own state.
+    /// Particle `index` of [`fill_box`]. The state of the generator is a counter, so that each particle can be
+    /// computed alone.
     #[inline]
     pub fn particle(&self, index: u64) -> Vec3 {
         let first = index.wrapping_mul(3);
@@ -59,7 +60,7 @@ impl BoxSettings {
     }
 }
 
-/// Number `n` (from 1) of splitmix64 started at `seed`.
+/// Number `n` (from 1) of splitmix64 with the initial state `seed`.
 pub fn splitmix64(seed: u64, n: u64) -> u64 {
     const STEP: u64 = 0x9E37_79B9_7F4A_7C15;
     let state = seed.wrapping_add(n.wrapping_mul(STEP));
@@ -68,7 +69,7 @@ pub fn splitmix64(seed: u64, n: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// The upper 24 bits as a number in 0..1, exact in f32.
+/// The upper 24 bits as a number from 0 to 1 (exclusive), exact in f32.
 pub(crate) fn unit(bits: u64) -> f32 {
     const SCALE: f32 = 1.0 / 16_777_216.0;
     #[expect(clippy::cast_precision_loss, reason = "24 bits fit")]
@@ -81,7 +82,7 @@ pub(crate) fn unit(bits: u64) -> f32 {
 mod tests {
     use super::*;
 
-    /// First outputs for seed 1234567, as published with the generator.
+    /// The first outputs for seed 1234567, as published with the generator.
     #[test]
     fn the_generator_is_splitmix64() {
         let expected = [
@@ -94,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn the_box_is_the_serial_recipe() {
+    fn parallel_box_equals_the_serial_one() {
         let settings = BoxSettings::thesis(1000, 7);
         let mut state = settings.seed;
         let mut next = || {

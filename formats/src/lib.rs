@@ -1,5 +1,5 @@
-//! Bytes to particles and back: readers for what simulations write, the native frame file, and
-//! the sequence of files that makes an animation.
+//! Converts bytes to particles and back: readers for the formats of simulations, the native frame file, and the
+//! sequences of files that make animations.
 //!
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
@@ -8,6 +8,7 @@
 
 mod attribute;
 mod budget;
+mod decode;
 mod decompress;
 mod error;
 mod format;
@@ -20,11 +21,13 @@ mod registry;
 mod regular;
 mod scalar;
 mod step;
+mod value_error;
 
 pub mod blocks;
 pub mod convert;
 pub mod detect;
 pub mod generate;
+pub mod mesh;
 pub mod names;
 pub mod native;
 pub mod open;
@@ -43,3 +46,4 @@ pub use open::FrameFile;
 pub use origin::choose_origin;
 pub use scalar::{Endian, ScalarType};
 pub use sequence::{Sequence, SequenceError, SequenceFrame, SequenceInput};
+pub use value_error::ValueError;

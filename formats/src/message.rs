@@ -1,16 +1,17 @@
-//! Text from files, made fit for a line of a message.
+//! Makes text from files fit for a one-line message.
 
 use std::borrow::Cow;
 
-/// Characters that are kept of the start of a long message.
+/// Characters that are kept at the start of a long message.
 const START: usize = 560;
-/// Characters that are kept of its end, where the remedy is.
+/// Characters that are kept at its end, where the remedy is.
 const END: usize = 240;
-/// Messages up to this many characters are not shortened. A shortened one, with its note about the gap, is as long.
+/// Messages of up to this many characters are not shortened. A shortened message, including its note about the
+/// gap, is not longer.
 const MOST: usize = START + END + 60;
 
-/// `text` as one line of bounded length that a terminal shows as it is: characters that control it,
-/// break the line or turn its direction are written as escapes.
+/// `text` as one line of bounded length that is safe to show in a terminal: characters that control the
+/// terminal, break the line or change its direction become escapes.
 pub(crate) fn one_line(text: String) -> String {
     match escape_controls(&text) {
         Cow::Borrowed(_) => shortened(text),
@@ -18,8 +19,8 @@ pub(crate) fn one_line(text: String) -> String {
     }
 }
 
-/// `text` with every character that [controls](is_control) a terminal written as an escape: one line, shown as
-/// it is. Escaping twice changes nothing.
+/// `text` with every [control character](is_control) replaced by an escape: one line that is safe to show in a
+/// terminal. Escaping it again changes nothing.
 ///
 /// ```
 /// assert_eq!(spherule_formats::escape_controls("a\u{1b}[2J\n"), "a\\u{1b}[2J\\n");
@@ -39,8 +40,8 @@ pub fn escape_controls(text: &str) -> Cow<'_, str> {
     Cow::Owned(line)
 }
 
-/// Whether `c` does something to a terminal or to the text around it: control characters (C0, DEL, C1), line and
-/// paragraph separators, and those that reorder text.
+/// Whether `c` affects a terminal or the text around it: control characters (C0, DEL, C1), line and paragraph
+/// separators, and characters that reorder text.
 pub fn is_control(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
@@ -72,7 +73,7 @@ mod tests {
     }
 
     #[test]
-    fn what_would_control_a_terminal_is_escaped() {
+    fn terminal_control_characters_are_escaped() {
         shown("a `b\\c` d", "a `b\\c` d");
         shown("größe \u{3b1}", "größe \u{3b1}");
         shown("a\nb\r\tc", "a\\nb\\r\\tc");
@@ -85,7 +86,7 @@ mod tests {
     }
 
     #[test]
-    fn long_text_keeps_its_start_and_its_remedy() {
+    fn long_messages_keep_start_and_remedy() {
         let text = format!("start {}; remedy", "\u{3b1}\n".repeat(400));
         let line = one_line(text);
         assert!(line.starts_with("start \u{3b1}\\n") && line.ends_with("\\n; remedy"));

@@ -1,27 +1,28 @@
 //! The names of particle properties in files: one table for readers, conversion and rendering.
 //!
-//! The preferred name comes first. Names are compared without regard to case, see [`is_one_of`]. The lists for one
-//! property differ where formats do: `r` is a position among numpy arrays and a colour among columns. A property
-//! without a list, such as density or mass, has no meaning to the program and keeps the name that it has in its file.
+//! The preferred name comes first. Names are compared without regard to case, see [`is_one_of`]. Formats have
+//! different lists for the same property where their conventions differ: `r` is a position among numpy arrays
+//! and a colour among columns. A property without a list, such as density or mass, has no meaning to the
+//! program and keeps its name in the file.
 
-/// Names of a per-particle id. `ids` is numpy's plural, `Idp` is DualSPHysics'.
+/// Names of a per-particle id. `ids` is common in numpy files, `Idp` comes from DualSPHysics.
 pub const ID: [&str; 3] = ["id", "ids", "Idp"];
 
-/// Names of a velocity of three components.
+/// Names of a velocity with three components.
 pub const VELOCITY: [&str; 6] = ["velocity", "velocities", "vel", "velo", "v", "U"];
 
-/// The name under which native frames hold radii that differ.
+/// The name of radii that differ in native frames.
 pub const RADIUS: &str = "radius";
 
-/// Names of a radius or diameter, with the factor that makes it a radius. `pscale` is Houdini's.
+/// Names of a radius or diameter, with the factor that converts it to a radius. `pscale` is Houdini's name.
 pub const RADII: [(&str, f64); 3] = [(RADIUS, 1.0), ("pscale", 1.0), ("diameter", 0.5)];
 
-/// Names of a colour of three or four components.
+/// Names of a colour with three or four components.
 pub const COLOR: [&str; 8] = [
     "color", "colors", "colour", "colours", "rgb", "rgba", "rgbcolor", "cd",
 ];
 
-/// Names of a colour whose integers are sRGB codes. Not `Cd`, which is linear.
+/// Names of a colour whose integers are sRGB codes. `Cd` is missing because it is linear.
 pub(crate) const COLOR_CODES: [&str; 4] = ["color", "colors", "rgb", "rgba"];
 
 /// Names of numpy arrays and fields that hold positions.
@@ -37,7 +38,7 @@ pub(crate) const POSITION_ARRAYS: [&str; 9] = [
     "r",
 ];
 
-/// Names of position columns without the component: `pos` of `pos_x`. The empty one stands for plain `x`, `y`, `z`.
+/// Names of position columns without the component: `pos` for `pos_x`. The empty stem stands for plain `x`, `y`, `z`.
 pub(crate) const POSITION_STEMS: [&str; 11] = [
     "",
     "pos",
@@ -58,20 +59,20 @@ pub(crate) const POSITION_PROPERTIES: [&str; 4] = ["pos", "position", "positions
 /// Names of elements or species among the `Properties` of extended XYZ.
 pub(crate) const SPECIES_PROPERTIES: [&str; 3] = ["species", "element", "symbol"];
 
-/// LAMMPS columns of names, even if all of them happen to look like numbers.
+/// LAMMPS columns that hold names, even if all values look like numbers.
 pub(crate) const LAMMPS_CATEGORIES: [&str; 2] = ["element", "typelabel"];
 
 /// LAMMPS columns of integers that must stay exact.
 pub(crate) const LAMMPS_INTEGERS: [&str; 3] = ["id", "type", "mol"];
 
-/// LAMMPS columns that together are a vector, and its name.
+/// LAMMPS columns that form a vector together, with the name of the vector.
 pub(crate) const LAMMPS_VECTORS: [([&str; 3], &str); 2] = [
     (["vx", "vy", "vz"], "velocity"),
     (["fx", "fy", "fz"], "force"),
 ];
 
-/// Stems to which a component is joined without anything between, `vx` and `PosX`, and the name of the vector if the
-/// stem is not its name.
+/// Stems that are joined to a component without a separator, as in `vx` and `PosX`. The second entry is the
+/// name of the vector, if it differs from the stem.
 pub(crate) const JOINED_STEMS: [(&str, Option<&str>); 12] = [
     ("v", Some("velocity")),
     ("f", Some("force")),
@@ -87,10 +88,10 @@ pub(crate) const JOINED_STEMS: [(&str, Option<&str>); 12] = [
     ("force", None),
 ];
 
-/// Table columns that together are a colour.
+/// Table columns that form a colour together.
 pub(crate) const COLOR_COLUMNS: [[&str; 3]; 2] = [["red", "green", "blue"], ["r", "g", "b"]];
 
-/// Scalars of binary records that together are a vector, by its name. The first that is complete is taken.
+/// Scalars of binary records that form a vector together, with its name. The first complete entry is used.
 pub(crate) const RECORD_VECTORS: [(&str, &[&str]); 6] = [
     ("velocity", &["vx", "vy", "vz"]),
     ("normal", &["nx", "ny", "nz"]),

@@ -1,19 +1,19 @@
-//! The one world position that a sequence's f32 coordinates are relative to.
+//! Chooses the world position that the f32 coordinates of a sequence are relative to.
 
 use glam::DVec3;
 
-/// How many diagonals the centre may be from zero before the origin moves there.
+/// Largest distance of the centre from zero, in diagonals, for which the origin stays at zero.
 ///
-/// At `c` the spacing of f32 is at most `c * 2^-23`, so a position is rounded by up to
-/// `8 * 2^-24 = 2^-21` of the diagonal: with ten million particles (about 215 along an axis) a
-/// ten-thousandth of the particle spacing. Nearer data keep their own coordinates.
+/// At a coordinate `c`, the spacing of f32 is at most `c * 2^-23`, so that a position is rounded by up to
+/// `8 * 2^-24 = 2^-21` of the diagonal. With ten million particles (about 215 along an axis), this is a
+/// ten-thousandth of the particle spacing. Data nearer to zero keeps its coordinates.
 const NEAR: f64 = 8.0;
 
 /// The origin for particles between `min` and `max` (world units).
 ///
-/// Zero on every axis where the data are near it. Elsewhere the centre, rounded to a power of two
-/// about as large as the diagonal: f32 coordinates are multiples of a smaller power of two there,
-/// so that subtracting loses nothing. Bounds that are empty or not finite give zero.
+/// The origin is zero on every axis on which the data is near zero. On other axes it is the centre, rounded to
+/// a multiple of a power of two of about the diagonal's size. f32 coordinates there are multiples of a smaller
+/// power of two, so that the subtraction is exact. Bounds that are empty or not finite give zero.
 pub fn choose_origin(min: DVec3, max: DVec3) -> DVec3 {
     let valid = min.is_finite() && max.is_finite() && min.cmple(max).all();
     if !valid {
@@ -31,10 +31,10 @@ pub fn choose_origin(min: DVec3, max: DVec3) -> DVec3 {
     DVec3::new(axis(centre.x), axis(centre.y), axis(centre.z))
 }
 
-/// The largest power of two up to `value`; 0 for 0.
+/// The largest power of two that does not exceed `value`; 0 for 0.
 fn power_below(value: f64) -> f64 {
     if value > 0.0 && value.is_finite() {
-        // Without the fraction. The least numbers have no exponent, and count as nothing.
+        // Clear the fraction. Subnormal numbers have exponent 0 and give zero.
         f64::from_bits(value.to_bits() & f64::INFINITY.to_bits())
     } else {
         0.0
@@ -57,7 +57,7 @@ mod tests {
     }
 
     #[test]
-    fn bounds_of_nothing_give_zero() {
+    fn empty_bounds_have_a_zero_origin() {
         assert_eq!(
             choose_origin(DVec3::INFINITY, DVec3::NEG_INFINITY),
             DVec3::ZERO

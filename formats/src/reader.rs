@@ -1,14 +1,14 @@
-//! What a file format is to the rest of the crate.
+//! The interface between a file format and the rest of the crate.
 //!
-//! Each format is one implementation of [`Reader`] in a file of its own. `registry.rs` lists them; detection,
-//! opening, sequences and conversion use that list and know no format by name.
+//! Each format implements [`Reader`] in its own file. `registry.rs` lists the formats. Detection, opening,
+//! sequences and conversion use that list and refer to no format by name.
 
 use crate::read::ByteSource;
 use crate::read::columns::ParticleLayout;
 use crate::step::Step;
 use crate::{MemoryBudget, ParseError, RawParticles};
 
-/// Bytes that detection looks at. Shorter files are passed as a whole.
+/// Number of bytes that detection examines. A shorter file is passed as a whole.
 pub(crate) const HEAD_LEN: usize = 4096;
 
 /// How well the first bytes of a file match a format, from weakest to strongest.
@@ -16,11 +16,12 @@ pub(crate) const HEAD_LEN: usize = 4096;
 pub(crate) enum Confidence {
     /// The file is not of this format.
     No,
-    /// The file can be of this format, and is if its name has an extension of the format.
+    /// The file may be of this format; it is if its name has an extension of the format.
     IfNamed,
-    /// The content looks like this format. It is, unless the name has an extension of another format.
+    /// The content looks like this format. The file is of this format unless its name has an extension of
+    /// another format.
     Likely,
-    /// The signature of this format. The name does not matter.
+    /// The file has the signature of this format. The name does not matter.
     Signature,
 }
 
@@ -35,62 +36,62 @@ impl Confidence {
     }
 }
 
-/// What a text format consists of, which decides how much memory reading it in pieces takes.
+/// The unit of a text format, which decides how much memory reading it in pieces needs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) enum StreamUnit {
     /// Rows of a table: several pieces are parsed in parallel.
     Rows,
-    /// Numbers separated by white space: one piece at a time.
+    /// Numbers separated by white space: one piece is parsed at a time.
     Words,
 }
 
-/// How large a file is.
+/// The size of a file.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct FileExtent {
-    /// Bytes, decompressed.
+    /// Decompressed length, bytes.
     pub(crate) byte_len: u64,
-    /// Time steps.
+    /// Number of time steps.
     pub(crate) step_count: u64,
 }
 
-/// Reads the files of one format. Readers trust nothing in a file: they check every count against the bytes that
-/// are there, or against a budget, before they allocate.
+/// Reads the files of one format. A reader trusts nothing in a file: before it allocates, it checks every count
+/// against the available bytes or against a budget.
 pub(crate) trait Reader: Sync {
-    /// Name of the format in reports and messages. No two formats have the same.
+    /// Name of the format in reports and messages, distinct for each format.
     fn name(&self) -> &'static str;
 
-    /// Extensions of its files, in lower case without the dot.
+    /// File name extensions, in lower case without the dot.
     fn extensions(&self) -> &'static [&'static str];
 
-    /// Whether `stem` and `extension`, both in lower case and without `.gz`, are a name of this format.
+    /// Whether a file name is typical of this format. `stem` and `extension` are in lower case and without `.gz`.
     fn matches_name(&self, _stem: &str, extension: &str) -> bool {
         self.extensions().contains(&extension)
     }
 
-    /// How well `head`, up to [`HEAD_LEN`] first bytes of an uncompressed file, matches.
+    /// How well `head` matches: the first bytes of an uncompressed file, up to [`HEAD_LEN`].
     ///
     /// # Errors
-    /// [`ParseError::Unsupported`] for a relative of the format that is not read, with what to do instead.
+    /// [`ParseError::Unsupported`] for a related format that is not read, with a remedy.
     fn sniff(&self, head: &[u8]) -> Result<Confidence, ParseError>;
 
-    /// True if files may begin with any bytes. Then short signatures of other formats prove nothing.
+    /// True if files may begin with any bytes, so that short signatures of other formats prove nothing.
     fn has_no_signature(&self) -> bool {
         false
     }
 
-    /// True if a file may hold several time steps. Their files are opened to count the steps, and large ones are
-    /// mapped instead of read as a whole.
+    /// True if a file may hold several time steps. Such files are opened to count their steps, and large ones
+    /// are mapped instead of read as a whole.
     fn may_hold_many_steps(&self) -> bool {
         false
     }
 
-    /// Whether a file that begins with `head`, and goes on, can be read in pieces; if so, of what unit.
-    /// Then [`ByteSource::text`] is all that the reader may use.
+    /// The unit in which a file that begins with `head` and is longer can be read in pieces; `None` if it
+    /// cannot. If it can, the reader may use nothing but [`ByteSource::text`].
     fn stream_unit(&self, _head: &[u8]) -> Option<StreamUnit> {
         None
     }
 
-    /// Lists the time steps of a file. A step that is cut short is listed, so that reading it gives the error.
+    /// Lists the time steps of a file. A truncated step is listed too, so that reading it gives the error.
     ///
     /// # Errors
     /// [`ParseError`]; [`ParseError::TooLarge`] if the list needs more memory than `budget` allows.
@@ -100,7 +101,7 @@ pub(crate) trait Reader: Sync {
         budget: MemoryBudget,
     ) -> Result<Vec<Step>, ParseError>;
 
-    /// Reads one of the [`Self::steps`]. `budget` is for everything but the bytes of `source`.
+    /// Reads one of the [`Self::steps`]. `budget` limits everything except the bytes of `source`.
     ///
     /// # Errors
     /// [`ParseError`].
@@ -111,8 +112,9 @@ pub(crate) trait Reader: Sync {
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError>;
 
-    /// Where the numbers of the only step are, if they have fixed strides in the uncompressed file `bytes`. Conversion
-    /// then reads them from the mapped file. The same particles as [`Self::read`] gives, and the same errors.
+    /// The layout of the numbers of the only step, if they have fixed strides in the uncompressed file `bytes`.
+    /// Conversion then reads them from the mapped file. The particles and the errors must be the same as with
+    /// [`Self::read`].
     ///
     /// # Errors
     /// As [`Self::read`].
@@ -120,8 +122,8 @@ pub(crate) trait Reader: Sync {
         Ok(None)
     }
 
-    /// Bytes held beside the file and the numbers of `particles` while these are read: the largest array, if arrays of
-    /// the file are compressed or encoded. `head` is as much of the file as is in memory.
+    /// Bytes held beside the file and the numbers of `particles` while they are read: those of the largest array, if
+    /// the arrays of the file are compressed or encoded. `head` is the part of the file that is in memory.
     fn unpacked_arrays_len(
         &self,
         _head: &[u8],
@@ -136,8 +138,8 @@ pub(crate) trait Reader: Sync {
         false
     }
 
-    /// What a user should know about a file that begins with `head` and is not in its particles: a simulation
-    /// cell, the names behind numbers.
+    /// Notes for the user about a file that begins with `head`, on things that are not in its particles: a
+    /// simulation cell, or names behind numbers.
     fn remarks(&self, _head: &[u8]) -> Vec<String> {
         Vec::new()
     }

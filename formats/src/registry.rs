@@ -1,4 +1,4 @@
-//! The formats that this crate reads: one line each.
+//! The list of formats that this crate reads.
 
 use std::path::Path;
 
@@ -6,7 +6,7 @@ use crate::format::Format;
 use crate::native;
 use crate::read::{bgeo, csv, gsd, lammps, npy, ply, vtk, vtk_xml, xyz};
 
-/// Every format. Of formats that match a file equally well, the first is taken; messages list them in this order.
+/// All formats. If several formats match a file equally well, the first one wins. Messages list them in this order.
 const FORMATS: &[Format] = &[
     native::FORMAT,
     vtk::FORMAT,
@@ -22,12 +22,12 @@ const FORMATS: &[Format] = &[
 ];
 
 impl Format {
-    /// Every format.
+    /// All formats.
     pub const fn all() -> &'static [Self] {
         FORMATS
     }
 
-    /// The format that the file's name suggests, without `.gz`; `None` for other names.
+    /// The format that the name of the file suggests, without `.gz`; `None` for other names.
     pub fn by_name(path: &Path) -> Option<Self> {
         let name = path.file_name()?.to_string_lossy().to_ascii_lowercase();
         let (stem, extension) = strip_gz(&name).rsplit_once('.')?;
@@ -36,7 +36,7 @@ impl Format {
     }
 }
 
-/// `name` without a final `.gz` (given in lower case).
+/// `name` without a final `.gz`; `name` must be in lower case.
 pub(crate) fn strip_gz(name: &str) -> &str {
     name.strip_suffix(".gz").unwrap_or(name)
 }

@@ -1,4 +1,4 @@
-//! Regular files, and how to notice that one was written to.
+//! Regular files, and detection of changes to them.
 
 use std::fs;
 use std::io;
@@ -7,24 +7,25 @@ use std::time::SystemTime;
 
 use crate::{FrameError, ParseError};
 
-/// Length of a regular file. Reading a pipe or a device could take forever.
+/// The length of a regular file, bytes. Other files are refused because reading a pipe or a device could take
+/// forever.
 ///
 /// # Errors
-/// [`FrameError`] if there is no such file, or it is not a regular one.
+/// [`FrameError`] if the file does not exist or is not a regular file.
 pub(crate) fn regular_len(path: &Path) -> Result<u64, FrameError> {
     let meta = fs::metadata(path).map_err(|e| FrameError::io(path, e))?;
     if meta.is_file() {
         return Ok(meta.len());
     }
     let what = if meta.is_dir() {
-        "a directory, where a particle file was expected"
+        "a directory, where a file was expected"
     } else {
         "not a regular file; copy it to one first"
     };
     Err(ParseError::unsupported(what).in_file(path))
 }
 
-/// Length and time of modification of a file.
+/// Length and modification time of a file.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(crate) struct FileStamp {
     pub(crate) len: u64,
@@ -48,7 +49,7 @@ impl FileStamp {
     /// Checks that the file still has this stamp.
     ///
     /// # Errors
-    /// [`FrameError::Io`] if it was written to.
+    /// [`FrameError::Io`] if the file has changed.
     pub(crate) fn check(self, path: &Path) -> Result<(), FrameError> {
         self.check_same(Self::of(path)?)
             .map_err(|e| FrameError::io(path, e))
@@ -75,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_growing_file_is_noticed() {
+    fn growing_file_is_detected() {
         let stamp = |len, seconds| FileStamp {
             len,
             modified: Some(SystemTime::UNIX_EPOCH + std::time::Duration::from_secs(seconds)),

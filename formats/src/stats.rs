@@ -1,6 +1,6 @@
-//! What `inspect` reports about a frame: counts, bounds, means, and the range of every attribute.
+//! The statistics that `inspect` reports about a frame: counts, bounds, means, and the range of every attribute.
 //!
-//! All from the numbers as the file has them, in f64 or exact integers; sums are taken in fixed
+//! All numbers are computed from the values in the file, in f64 or exact integers. Sums are computed over fixed
 //! pieces, so that the result does not depend on the number of threads.
 
 use std::fmt;
@@ -11,17 +11,17 @@ use rayon::prelude::*;
 use crate::frame::find_radius;
 use crate::{Attribute, AttributeData, Positions, Radius, RawParticles, ScalarType};
 
-/// Particles in a piece that one thread sums up.
+/// Number of particles in a piece that one thread adds up.
 const PIECE: usize = 1 << 16;
 
-/// A frame in numbers, world units.
+/// Statistics of a frame, world units.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameStats {
-    /// Particles with finite positions.
+    /// Number of particles with finite positions.
     pub count: u64,
-    /// Particles with a NaN or infinite coordinate; they take part in nothing below.
+    /// Number of particles with a NaN or infinite coordinate; the other fields ignore them.
     pub dropped: u64,
-    /// Radii in the file, smallest and largest; `None` if it has none.
+    /// Smallest and largest radius in the file; `None` if the file has no radii.
     pub radius: Option<(f32, f32)>,
     /// Smallest and largest position; `None` without particles.
     pub bounds: Option<(DVec3, DVec3)>,
@@ -31,10 +31,10 @@ pub struct FrameStats {
     pub attributes: Vec<AttributeStats>,
 }
 
-/// An attribute in numbers.
+/// Statistics of an attribute.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttributeStats {
-    /// Name as the file has it.
+    /// The name in the file.
     pub name: String,
     /// Type of the numbers.
     pub scalar_type: ScalarType,
@@ -42,32 +42,32 @@ pub struct AttributeStats {
     pub components: Vec<ComponentStats>,
 }
 
-/// One component of an attribute over all particles.
+/// Statistics of one component of an attribute over all particles.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ComponentStats {
-    /// Smallest value that is a number; `None` if there is none.
+    /// Smallest value that is not NaN; `None` if all values are NaN.
     pub min: Option<Number>,
-    /// Largest value that is a number; `None` if there is none.
+    /// Largest value that is not NaN; `None` if all values are NaN.
     pub max: Option<Number>,
-    /// Mean of the values that are numbers; `None` if there is none.
+    /// Mean of the values that are not NaN; `None` if all values are NaN.
     pub mean: Option<f64>,
-    /// Sum of the values that are numbers; exact for integers.
+    /// Sum of the values that are not NaN; exact for integers.
     pub sum: Number,
-    /// Values that are NaN.
+    /// Number of NaN values.
     pub nan: u64,
 }
 
-/// A number that stays exact where it was one: i128 holds the sum of any array of 64-bit integers.
+/// A number that stays exact for integers: i128 holds the sum of any array of 64-bit integers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Number {
-    /// Of an integer attribute.
+    /// A number of an integer attribute.
     Int(i128),
-    /// Of a floating-point attribute.
+    /// A number of a floating-point attribute.
     Float(f64),
 }
 
 impl Number {
-    /// As f64; integers beyond 2^53 round.
+    /// The number as f64; integers beyond 2^53 are rounded.
     #[expect(clippy::cast_precision_loss, reason = "said in the doc comment")]
     pub const fn as_f64(self) -> f64 {
         match self {
@@ -130,7 +130,7 @@ fn axis_stats(positions: &Positions, keep: &[bool], axis: usize) -> FloatSum {
     }
 }
 
-/// Radii as the renderer takes them, of the particles that it keeps.
+/// The radii that the renderer uses, of the particles that it keeps.
 fn radius_range(raw: &RawParticles, keep: &[bool]) -> Option<(f32, f32)> {
     match find_radius(&raw.attributes)? {
         Radius::Common(radius) => Some((radius, radius)),
@@ -185,6 +185,7 @@ fn int_stats(
                 .reduce(IntSum::default, IntSum::join)
         };
     }
+    // Add up in the type of the file
     let sum = match data {
         AttributeData::I8(v) => sum!(v),
         AttributeData::U8(v) => sum!(v),
@@ -196,6 +197,7 @@ fn int_stats(
         AttributeData::U64(v) => sum!(v),
         AttributeData::F32(_) | AttributeData::F64(_) => IntSum::default(),
     };
+    // Compute the mean
     let some = sum.count > 0;
     #[expect(clippy::cast_precision_loss, reason = "a mean is rounded anyway")]
     let mean = sum.sum as f64 / sum.count as f64;
@@ -208,7 +210,7 @@ fn int_stats(
     }
 }
 
-/// Values of [`PIECE`] particles with their marks, in order.
+/// The values and the marks of [`PIECE`] particles at a time, in order.
 fn pieces<'a, T: Sync>(
     values: &'a [T],
     width: usize,
@@ -254,8 +256,7 @@ impl IntSum {
     }
 }
 
-/// Sums with the rounding errors carried along (Neumaier), so that the mean of ten million
-/// equal numbers is that number.
+/// A sum with compensated rounding errors (Neumaier), so that the mean of ten million equal numbers is that number.
 struct FloatSum {
     count: u64,
     nan: u64,
@@ -309,7 +310,7 @@ impl FloatSum {
     }
 
     fn total(&self) -> f64 {
-        // Infinite values make the error NaN; the sum is right then.
+        // With infinite values, the compensation is NaN and the plain sum is correct.
         if self.sum.is_finite() {
             self.sum + self.error
         } else {
@@ -365,7 +366,7 @@ mod tests {
     }
 
     #[test]
-    fn dropped_particles_take_part_in_nothing() {
+    fn dropped_particles_are_excluded_from_statistics() {
         let positions = vec![
             Vec3::new(1.0, 2.0, 3.0),
             Vec3::new(f32::NAN, 0.0, 0.0),
@@ -406,7 +407,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_has_no_bounds() {
+    fn empty_frames_have_no_bounds() {
         let ids = vec![
             ("id", 1, AttributeData::U8(vec![])),
             ("v", 3, AttributeData::F64(vec![])),
@@ -428,7 +429,7 @@ mod tests {
     }
 
     #[test]
-    fn means_lose_nothing_over_many_particles() {
+    fn means_are_accurate_over_many_particles() {
         let point = DVec3::new(1e6 + 0.1, -0.3, 1e-9);
         let stats = FrameStats::of(&raw(Positions::F64(vec![point; 3 * PIECE + 7]), vec![]));
         assert_eq!(stats.mean, Some(point));

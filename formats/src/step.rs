@@ -9,19 +9,19 @@ use crate::{MemoryBudget, ParseError};
 pub struct Step {
     /// Index among the steps of the file, from 0.
     pub index: usize,
-    /// Step number written in the file (LAMMPS `TIMESTEP`), if any.
+    /// Step number in the file (LAMMPS `TIMESTEP`), if there is one.
     pub number: Option<i64>,
-    /// Simulation time written in the file, if it is cheap to find.
+    /// Simulation time in the file, if it is cheap to find.
     pub time: Option<f64>,
     handle: StepHandle,
 }
 
-/// How a reader finds a step again. Only the reader that made it knows what it means.
+/// How a reader finds a step again. Only the reader that created it can interpret it.
 #[derive(Debug, Clone, PartialEq)]
 enum StepHandle {
     /// The step is one range of bytes.
     Bytes(Range<usize>),
-    /// A number that the reader chose: an index into an array of frames, the address of a group.
+    /// A number that the reader chose, such as an index into an array of frames or the address of a group.
     Key(u64),
 }
 
@@ -50,7 +50,7 @@ impl Step {
         }
     }
 
-    /// Adds a step in `range` to the steps of a file.
+    /// Appends a step with the bytes `range` to the steps of a file.
     ///
     /// # Errors
     /// [`ParseError::TooLarge`] if the list needs more memory than `budget` allows.
@@ -79,7 +79,7 @@ impl Step {
         handle: StepHandle,
         budget: MemoryBudget,
     ) -> Result<(), ParseError> {
-        // `Sequence` makes a list of its own.
+        // `Sequence` makes its own copy of the list.
         let need = 4 * size_of::<Self>() * (steps.len() + 1);
         budget.check(need as u64, "the list of its steps is")?;
         steps.push(Self::new(steps.len(), handle));
@@ -106,7 +106,7 @@ impl Step {
         }
     }
 
-    /// The key of [`Self::with_key`], else the index.
+    /// The key of [`Self::with_key`], or the index for a step without one.
     pub(crate) const fn key(&self) -> u64 {
         match self.handle {
             StepHandle::Bytes(_) => self.index as u64,

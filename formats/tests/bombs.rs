@@ -1,5 +1,5 @@
-//! Small files that become very large: each fails by name within its budget, and nothing else is said of
-//! files that fit.
+//! Small files that expand to a large size: each fails within its budget with an error that names it. Files
+//! that fit give their usual results.
 #![expect(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::fmt::Write as _;
@@ -14,10 +14,10 @@ use tempfile::TempDir;
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Far less than any of the bombs needs.
+/// Much less than any of the files needs.
 const BUDGET: MemoryBudget = MemoryBudget::new(8 << 20, "take care");
 
-/// Bytes of a bomb once it is unpacked.
+/// Size of an expanded file, bytes.
 const LARGE: usize = 40 << 20;
 
 fn gz(bytes: &[u8]) -> Vec<u8> {
@@ -50,7 +50,7 @@ fn read(path: &Path, budget: MemoryBudget) -> Result<RawParticles, FrameError> {
     FrameFile::open_within(path, budget)?.read(0)
 }
 
-/// The file cannot be read within [`BUDGET`], from the disk or from memory, and is small.
+/// Checks that the file is small and cannot be read within [`BUDGET`], neither from the disk nor from memory.
 #[track_caller]
 fn bomb(name: &str, bytes: &[u8], words: &str) {
     assert!(bytes.len() < LARGE / 40, "{name}: {} bytes", bytes.len());
@@ -88,7 +88,7 @@ fn tables_in_gzip() {
         &gz("1 2 3\n".repeat(LARGE / 6).as_bytes()),
         "larger than",
     );
-    // The length at the end of the file is that of its last member.
+    // The length at the end of the file is only that of its last member.
     let members = [gz(&csv(LARGE)), gz(b"1,2,3\n")].concat();
     bomb("a.csv.gz", &members, "larger than");
     bomb(
@@ -115,6 +115,7 @@ fn other_formats_in_gzip() {
         let head = format!("ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n{count}\nITEM: ATOMS x y z");
         format!("{head}\n{rows}").into_bytes()
     };
+    // Texts with too many rows
     let rows = "1 2 3\n";
     let count = LARGE / 6;
     let rows_of = |head: String| gz((head + &rows.repeat(count)).as_bytes());
@@ -136,14 +137,14 @@ fn other_formats_in_gzip() {
     let vtk = "# vtk DataFile Version 3.0\nt\nASCII\nDATASET POLYDATA\n";
     let points = format!("{vtk}POINTS {count} float\n");
     bomb("a.vtk.gz", &rows_of(points), "larger than");
-    // The text fits, its numbers do not.
+    // The text fits, but its numbers do not.
     let few = 500_000;
     bomb(
         "dump.0.gz",
         &gz(&dump(&rows.repeat(few), few)),
         "its numbers in memory are",
     );
-    // Lists of steps.
+    // The list of steps is too large.
     bomb(
         "dump.0.gz",
         &gz("ITEM: TIMESTEP\n".repeat(LARGE / 15).as_bytes()),
@@ -154,14 +155,14 @@ fn other_formats_in_gzip() {
         &gz("0\n\n".repeat(LARGE / 3).as_bytes()),
         "larger than",
     );
-    // One line.
+    // One line is too long.
     let line = "ITEM: ATOMS x".to_owned() + &" y".repeat(LARGE / 2);
     bomb("dump.0.gz", &gz(&dump(&line, 3)), "larger than");
     bomb("a.npy.gz", &gz(&npy(LARGE / 12)), "decompressed it is");
 }
 
 #[test]
-fn absurd_counts_in_gzip() {
+fn huge_counts_in_gzip() {
     let dir = Dir::new();
     let rows = "1 2 3\n".repeat(500_000);
     let count = usize::MAX / 32;
@@ -192,7 +193,7 @@ fn absurd_counts_in_gzip() {
     }
 }
 
-/// Texts of `rows` particles in every format but tables, some in two steps, with numbers of many digits.
+/// Texts of `rows` particles in every format except tables, some with two steps, with numbers of many digits.
 fn texts(rows: usize) -> [(&'static str, String); 4] {
     let zeros = "0".repeat(40);
     let row = |i: usize| format!("{zeros}{i}.25 {zeros}{}e-1 -{zeros}7", i * 3);
@@ -232,7 +233,7 @@ fn texts(rows: usize) -> [(&'static str, String); 4] {
     ]
 }
 
-/// All steps of the text.
+/// Reads all steps of the text.
 fn all(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameError> {
     let file = file?;
     (0..file.steps().len())
@@ -241,7 +242,7 @@ fn all(file: Result<FrameFile, FrameError>) -> Result<Vec<RawParticles>, FrameEr
 }
 
 #[test]
-fn texts_in_pieces_are_what_they_are_as_a_whole() {
+fn chunked_text_reads_as_whole_text() {
     let dir = Dir::new();
     for (name, text) in texts(30_000) {
         let whole = FrameFile::from_bytes(Path::new(name), text.clone().into_bytes());
@@ -251,7 +252,7 @@ fn texts_in_pieces_are_what_they_are_as_a_whole() {
         for path in [plain, gz] {
             let file = FrameFile::open(&path).expect(name);
             assert!(file.bytes().len() < text.len(), "{name} is in pieces");
-            // Forwards, backwards, and once more.
+            // Read the steps forwards, backwards, and once more.
             let steps = 0..file.steps().len();
             for index in steps.clone().chain(steps.clone().rev()).chain(steps) {
                 let particles = file.read(index).expect(name);
@@ -279,9 +280,10 @@ fn texts_may_be_larger_than_the_budget() {
 }
 
 #[test]
-fn faults_of_texts_in_pieces_are_told_at_their_place() {
+fn errors_in_chunked_text_have_the_file_offset() {
     let dir = Dir::new();
     for (name, text) in texts(30_000) {
+        // Damage one line, and truncate the text
         let at = text.len() - 100_000;
         let line = text[..at].rfind('\n').expect("a line") + 1;
         let mut word = text.clone();
@@ -303,7 +305,7 @@ fn faults_of_texts_in_pieces_are_told_at_their_place() {
                 expected.err()
             );
         }
-        // A stream that breaks off, and one with something behind it.
+        // A truncated stream, a damaged checksum, and a stream with trailing bytes.
         let packed = gz(text.as_bytes());
         let path = dir.file(&format!("{name}.gz"), &packed[..packed.len() - 99]);
         let error = all(FrameFile::open(&path)).expect_err("cut").to_string();
@@ -326,7 +328,7 @@ fn faults_of_texts_in_pieces_are_told_at_their_place() {
 #[test]
 fn gzip_in_gzip_is_not_unpacked() {
     let dir = Dir::new();
-    // What is inside is too large as well.
+    // The decompressed content is too large as well.
     let inner: Vec<u8> = std::iter::repeat_n(gz(&csv(LARGE)), 400)
         .flatten()
         .collect();
@@ -362,14 +364,14 @@ fn members_of_archives() {
         &npz(&[("pos", &large)]),
         "npz member pos: decompressed it is",
     );
-    // None alone is too large.
+    // No member alone is too large.
     let few = npy((2 << 20) / 12);
     let names = ["pos", "a", "b", "c", "d", "e", "f", "g"];
     let members: Vec<(&str, &[u8])> = names.iter().map(|name| (*name, few.as_slice())).collect();
     bomb("a.npz", &npz(&members), "decompressed it is");
 }
 
-/// Points of zeros as one block of `unpacked` bytes, or several blocks alike.
+/// Points of zeros as one block of `unpacked` bytes, or as several equal blocks.
 fn vtp(compressor: &str, blocks: &[&[u8]], unpacked: usize) -> Vec<u8> {
     let points = blocks.len() * unpacked / 12;
     let head = format!(
@@ -387,7 +389,7 @@ fn vtp(compressor: &str, blocks: &[&[u8]], unpacked: usize) -> Vec<u8> {
     file
 }
 
-/// `bytes` as an xz stream of one stored chunk, with a dictionary of 2^`bits` bytes.
+/// `bytes` as an xz stream with one uncompressed chunk and a dictionary of 2^`bits` bytes.
 fn xz(bytes: &[u8], bits: u8) -> Vec<u8> {
     let crc = |bytes: &[u8]| {
         let mut crc = Crc::new();
@@ -426,7 +428,7 @@ fn blocks_of_vtk_xml() {
     bomb("a.vtp", &vtp("vtkZLibDataCompressor", &[&zlib], len), words);
     let lz4 = lz4_flex::block::compress(&zeros);
     bomb("a.vtp", &vtp("vtkLZ4DataCompressor", &[&lz4], len), words);
-    // No more than its length counts before it is unpacked.
+    // Before decompression, only the declared length is checked.
     let mut xz = b"\xfd7zXZ\0".to_vec();
     xz.resize(8192, 0);
     bomb("a.vtp", &vtp("vtkLZMADataCompressor", &[&xz], len), words);
@@ -455,7 +457,7 @@ fn dictionaries_of_xz() {
     }
 }
 
-/// Rows of which columns turn from integers to fractions and to text where `turn` says.
+/// A table whose columns change from integers to fractions and to text at row `turn`.
 fn table(rows: usize, turn: usize) -> String {
     let mut text = String::from("# made by a test\nx;y;z;id;kind;v_x;v_y;v_z\n");
     for i in 0..rows {
@@ -475,7 +477,7 @@ fn table(rows: usize, turn: usize) -> String {
 }
 
 #[test]
-fn tables_in_pieces_are_what_they_are_as_a_whole() {
+fn chunked_tables_read_as_whole_tables() {
     let dir = Dir::new();
     let rows = 150_000;
     for turn in [0, rows / 2, rows - 1, rows] {
@@ -501,7 +503,7 @@ fn tables_in_pieces_are_what_they_are_as_a_whole() {
 }
 
 #[test]
-fn faults_in_pieces_are_told_at_their_place() {
+fn errors_in_chunked_tables_have_the_file_offset() {
     let dir = Dir::new();
     let text = table(150_000, 150_000);
     let at = text.len() - 100_000;
@@ -525,7 +527,7 @@ fn faults_in_pieces_are_told_at_their_place() {
             expected.to_string()
         );
     }
-    // A stream that breaks off, and one with something behind it.
+    // A truncated stream, and a stream with trailing bytes.
     let packed = gz(text.as_bytes());
     let cut = dir.file("a.csv.gz", &packed[..packed.len() - 99]);
     let error = FrameFile::open(&cut)

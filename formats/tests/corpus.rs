@@ -1,4 +1,4 @@
-//! The committed corpus of the fuzz targets, replayed with what the targets check.
+//! Replays the committed corpus of the fuzz targets with the checks of the targets.
 
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -17,7 +17,7 @@ fn corpus() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/corpus")
 }
 
-/// Files below `dir`, in order of their names.
+/// The files below `dir`, sorted by name.
 fn inputs(dir: &Path) -> Vec<PathBuf> {
     let entries = fs::read_dir(dir).expect("every target has a corpus");
     let mut paths: Vec<PathBuf> = entries
@@ -27,7 +27,7 @@ fn inputs(dir: &Path) -> Vec<PathBuf> {
     paths
 }
 
-/// Runs all inputs of a target and counts those that gave particles.
+/// Runs all inputs of a target and counts those that give particles.
 fn replay(name: &str, target: Target) -> usize {
     let paths = inputs(&corpus().join(name));
     let gave = |path: &&PathBuf| target(&fs::read(path).expect("readable")) > 0;
@@ -37,12 +37,12 @@ fn replay(name: &str, target: Target) -> usize {
 #[test]
 fn every_target_replays_its_corpus() {
     for (name, target) in TARGETS {
-        // With fewer, the targets would check nothing but errors.
+        // With fewer successes, the targets would check nothing but errors.
         assert!(replay(name, target) > 0, "nothing is read for {name}");
     }
 }
 
-/// What the seeds hold: a row of particles (`count` of them), a few far off.
+/// The contents of the seeds: a row of `count` particles, a few of them far away.
 fn frame(radius: Option<Radius>, origin: DVec3, count: u8) -> ParticleFrame {
     let positions: Vec<Vec3> = (0..count)
         .map(|i| Vec3::new(f32::from(i), -0.5, if i == 40 { 1e4 } else { 1.0 }))
@@ -73,7 +73,7 @@ fn own_radii(count: u8) -> Radius {
     Radius::PerParticle((0..count).map(|i| 0.5 / f32::from(i + 1)).collect())
 }
 
-/// A frame of attributes in fewer bits.
+/// Checks a frame with attributes in fewer bits.
 fn shrunk(path: &Path) {
     let range = [[-1.0, 1.0]].to_vec();
     let attribute = |name: &str, stored, ranges| native::AttributeSpec {
@@ -109,7 +109,7 @@ fn shrunk(path: &Path) {
     writer.finish().expect("writable");
 }
 
-/// After a change of the native layout: `cargo test -p spherule-formats --test corpus -- --ignored`.
+/// Run it after a change of the native layout: `cargo test -p spherule-formats --test corpus -- --ignored`.
 #[test]
 #[ignore = "writes into the corpus"]
 fn write_the_native_corpus() {
@@ -144,7 +144,7 @@ fn write_the_native_corpus() {
     shrunk(&dir.join("shrunk"));
 }
 
-/// The seeds reach what the target looks at: blocks kept as they are, radii in codes.
+/// The seeds cover the cases of the target: blocks stored as f32, and coded radii.
 #[test]
 fn the_native_corpus_has_every_kind_of_block() {
     let index = |name: &str| {

@@ -1,5 +1,5 @@
-//! Files with very many arrays, columns or properties. Work that grows with the square of their number takes
-//! minutes to hours here; nothing is timed.
+//! Files with very many arrays, columns or properties. Quadratic work in their number would take minutes to
+//! hours here. The tests do not measure time.
 #![expect(clippy::expect_used, reason = "a test says what it expects")]
 
 use std::io::{Cursor, Write};
@@ -11,7 +11,7 @@ use spherule_formats::{Attribute, AttributeData, ParseError, Positions, RawParti
 use zip::ZipWriter;
 use zip::write::SimpleFileOptions;
 
-/// Arrays in a file.
+/// Number of arrays in a file.
 const MANY: usize = 100_000;
 
 #[track_caller]
@@ -20,7 +20,7 @@ fn read(format: Format, bytes: &[u8]) -> Result<RawParticles, ParseError> {
     format.read(bytes, steps.first().expect("one step"))
 }
 
-/// Reads the first step and expects so many attributes.
+/// Reads the first step and checks its number of attributes.
 #[track_caller]
 fn has(format: Format, bytes: &[u8], attributes: usize) {
     let particles = read(format, bytes).expect("a good file");
@@ -28,7 +28,7 @@ fn has(format: Format, bytes: &[u8], attributes: usize) {
     assert_eq!(particles.positions.len(), 1);
 }
 
-/// A piece of one particle with the arrays `names`.
+/// A VTK XML piece with one particle and the arrays `names`.
 fn piece(names: impl Iterator<Item = String>) -> String {
     let array = |name: String| format!("<DataArray type=\"UInt8\" Name=\"{name}\">7</DataArray>\n");
     let arrays: String = names.map(array).collect();
@@ -74,7 +74,7 @@ fn vtk_xml_of_repeated_names_that_the_last_piece_lacks() {
 
 #[test]
 fn vtk_xml_of_arrays_that_share_their_bytes() {
-    // Each array would be looked for behind all the blanks.
+    // A slow reader would search for each array behind all blanks.
     let array = "<DataArray type=\"UInt8\" Name=\"a\" format=\"appended\" offset=\"0\"/>";
     let arrays: Vec<String> = (0..MANY)
         .map(|i| array.replace("\"a\"", &format!("\"a{i}\"")))
@@ -114,7 +114,7 @@ fn vtk_legacy_in_binary() {
     file.extend([0; 12]);
     file.extend(format!("\nPOINT_DATA 1\nFIELD FieldData {MANY}\n").bytes());
     for name in numbered(MANY) {
-        // Of a type whose size is found out by what follows.
+        // The size of this type depends on the bytes that follow.
         file.extend(format!("{name} 1 1 long\n").bytes());
         file.extend([0; 8]);
         file.push(b'\n');
@@ -156,7 +156,7 @@ fn csv() {
 #[test]
 fn xyz() {
     let numbers = " 7".repeat(MANY);
-    // The element is one more.
+    // The element is one more attribute.
     has(
         xyz::FORMAT,
         format!("1\n\nH 1 2 3{numbers}\n").as_bytes(),
@@ -176,7 +176,7 @@ fn lammps() {
     let names: String = numbered(MANY).map(|n| format!(" {n}")).collect();
     let values = " 7".repeat(MANY);
     has(lammps::FORMAT, dump(&names, &values).as_bytes(), MANY);
-    // One component of a vector, whose others are looked for.
+    // A slow reader would search for the other components of each vector.
     let file = dump(&" vx".repeat(MANY), &values);
     has(lammps::FORMAT, file.as_bytes(), MANY);
 }
@@ -212,7 +212,7 @@ fn bgeo() {
     has(bgeo::FORMAT, &file, 50_000);
 }
 
-/// An array of f32 as numpy saves it.
+/// An array of f32 in the format of `numpy.save`.
 fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
     let header = format!("{{'descr': {descr}, 'fortran_order': False, 'shape': {shape}, }}\n");
     let mut file = b"\x93NUMPY\x02\x00".to_vec();
@@ -224,7 +224,7 @@ fn npy(descr: &str, shape: &str, data: &[u8]) -> Vec<u8> {
 
 #[test]
 fn npy_of_many_fields() {
-    // Headers are believed up to 1 MiB.
+    // Headers of up to 1 MiB are accepted.
     let count = 50_000;
     let fields: String = numbered(count)
         .map(|n| format!("('{n}', '<f4'), "))

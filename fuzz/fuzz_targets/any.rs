@@ -8,8 +8,8 @@ use std::sync::LazyLock;
 use spherule_fuzz::{Target, repeated, targets};
 
 static TARGET: LazyLock<Target> = LazyLock::new(|| {
-    let wanted = env::var("SPHERULE_FUZZ_TARGET").unwrap_or_default();
-    match targets().find(|(name, _)| *name == wanted) {
+    let requested = env::var("SPHERULE_FUZZ_TARGET").unwrap_or_default();
+    match targets().find(|(name, _)| *name == requested) {
         Some((_, target)) => target,
         None => {
             let names: Vec<&str> = targets().map(|(name, _)| name).collect();

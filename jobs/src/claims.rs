@@ -1,93 +1,99 @@
-//! Sharing the frames of a job among workers.
+//! Claims of frames: how workers divide the frames of a job.
 
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 
-use crate::ledger::News;
-use crate::work::{Claimed, Desk};
-use crate::{Entry, JobError, Status};
+use crate::clock::Clock;
+use crate::ledger::LedgerWatcher;
+use crate::workers::{ClaimOutcome, WorkerRegistry};
+use crate::{EntryStatus, JobError, LedgerEntry};
 
-/// What a worker claims frames by; clones are the same worker's.
+/// Claims frames for a worker. Clones belong to the same worker.
 #[derive(Debug, Clone)]
-pub struct Claims {
+pub struct FrameClaims {
     dir: PathBuf,
-    desk: Arc<Desk>,
-    news: Arc<Mutex<News>>,
-    /// Whether there were other workers when it was last looked.
-    has_company: Arc<AtomicBool>,
+    registry: Arc<WorkerRegistry>,
+    watcher: Arc<Mutex<LedgerWatcher>>,
+    /// Whether other workers were registered at the last refresh.
+    has_other_workers: Arc<AtomicBool>,
 }
 
-impl Claims {
-    pub(crate) fn new(dir: &Path, desk: Arc<Desk>, news: News) -> Self {
+impl FrameClaims {
+    pub(crate) fn new(dir: &Path, registry: Arc<WorkerRegistry>, watcher: LedgerWatcher) -> Self {
         Self {
             dir: dir.to_owned(),
-            desk,
-            news: Arc::new(Mutex::new(news)),
-            has_company: Arc::new(AtomicBool::new(true)),
+            registry,
+            watcher: Arc::new(Mutex::new(watcher)),
+            has_other_workers: Arc::new(AtomicBool::new(true)),
         }
     }
 
-    pub(crate) const fn desk(&self) -> &Arc<Desk> {
-        &self.desk
+    pub(crate) const fn registry(&self) -> &Arc<WorkerRegistry> {
+        &self.registry
     }
 
-    /// Claims `frame`, which was still to be done when this worker began.
+    pub(crate) fn clock(&self) -> &Clock {
+        self.registry.clock()
+    }
+
+    /// Claims `frame`, which was pending when this worker started.
     ///
     /// # Errors
-    /// [`JobError::TakenForDead`], [`JobError::LedgerDamaged`], or trouble with files.
-    pub fn take(&self, frame: i64) -> Result<Claimed, JobError> {
-        if self.desk.is_buried() {
+    /// [`JobError::DeclaredDead`], [`JobError::LedgerDamaged`], or a file cannot be read or written.
+    pub fn claim(&self, frame: i64) -> Result<ClaimOutcome, JobError> {
+        if self.registry.is_declared_dead() {
             let dir = self.dir.clone();
-            return Err(JobError::TakenForDead { dir });
+            return Err(JobError::DeclaredDead { dir });
         }
-        if let Some(status) = self.ended(frame) {
-            return Ok(Claimed::Ended(status));
+        if let Some(status) = self.finished_by_other(frame) {
+            return Ok(ClaimOutcome::Finished(status));
         }
-        let claimed = self.desk.claim_frame(frame);
-        let claimed = claimed.map_err(|e| JobError::io(&self.dir, "claiming a frame", e))?;
-        // Whoever has ended the frame has said so before the claim was given back.
+        let outcome = self.registry.claim_frame(frame);
+        let outcome = outcome.map_err(|e| JobError::io(&self.dir, "claiming a frame", e))?;
+        // A worker records a frame before it drops the claim, so this sees whoever had it before
         self.refresh()?;
-        Ok(match (self.ended(frame), claimed) {
-            (Some(status), claimed) => {
-                if let Claimed::Mine(claim) = claimed {
-                    claim.end();
+        Ok(match (self.finished_by_other(frame), outcome) {
+            (Some(status), outcome) => {
+                if let ClaimOutcome::Acquired(claim) = outcome {
+                    claim.complete();
                 }
-                Claimed::Ended(status)
+                ClaimOutcome::Finished(status)
             }
-            (None, claimed) => claimed,
+            (None, outcome) => outcome,
         })
     }
 
-    fn ended(&self, frame: i64) -> Option<Status> {
-        self.news().ended(frame)
+    fn finished_by_other(&self, frame: i64) -> Option<EntryStatus> {
+        self.watcher().finished_by_other(frame)
     }
 
-    /// Takes in what others have said.
+    /// Reads new entries of the other workers.
     pub(crate) fn refresh(&self) -> Result<(), JobError> {
-        let workers = self.desk.names();
-        let workers =
-            workers.map_err(|e| JobError::io(&self.dir, "looking for other workers", e))?;
-        self.has_company.store(workers.len() > 1, Ordering::Relaxed);
-        self.news().refresh(&workers)
+        let workers = self.registry.worker_names();
+        let workers = workers.map_err(|e| JobError::io(&self.dir, "listing workers", e))?;
+        self.has_other_workers
+            .store(workers.len() > 1, Ordering::Relaxed);
+        let now = self.clock().now();
+        self.watcher().refresh(&workers, now)
     }
 
-    /// Whether others may wait for what this worker says.
-    pub(crate) fn has_company(&self) -> bool {
-        self.has_company.load(Ordering::Relaxed)
+    /// Whether other workers may be waiting for the entries of this worker.
+    pub(crate) fn has_other_workers(&self) -> bool {
+        self.has_other_workers.load(Ordering::Relaxed)
     }
 
-    /// A number for an entry that comes after all known ones.
-    pub(crate) fn take_seq(&self) -> u64 {
-        self.news().take_seq()
+    /// A sequence number for an entry that supersedes all known ones.
+    pub(crate) fn next_seq(&self) -> u64 {
+        self.watcher().next_seq()
     }
 
-    /// Takes in that this worker has set a frame back.
-    pub(crate) fn set_back(&self, entry: &Entry) {
-        self.news().set_back(entry);
+    /// Registers an entry with which this worker has requeued a frame.
+    pub(crate) fn add_requeued(&self, entry: &LedgerEntry) {
+        self.watcher().add_requeued(entry);
     }
 
-    fn news(&self) -> std::sync::MutexGuard<'_, News> {
-        self.news.lock().unwrap_or_else(|e| e.into_inner())
+    fn watcher(&self) -> std::sync::MutexGuard<'_, LedgerWatcher> {
+        self.watcher.lock().unwrap_or_else(|e| e.into_inner())
     }
 }

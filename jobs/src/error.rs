@@ -1,196 +1,194 @@
-//! What can go wrong with a job, by what the caller can do next.
+//! The errors of a job, divided by what the caller can do about them. Messages say what is wrong. Remedies that
+//! depend on the command line are the caller's.
 
 use std::fmt;
 use std::io;
 use std::path::{Path, PathBuf};
 
-/// One setting that is not what the plan was made with.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct SettingChange {
-    /// Dotted key.
-    pub key: String,
-    /// Value in the plan, if it was set.
-    pub old: Option<String>,
-    /// Value asked for now, if it is set.
-    pub new: Option<String>,
-}
+use crate::{FileError, FrameFailure, InputChange, SettingChange};
 
-impl fmt::Display for SettingChange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let show = |value: &Option<String>| value.clone().unwrap_or_else(|| "(not set)".to_owned());
-        write!(
-            f,
-            "{}: {} -> {}",
-            self.key,
-            show(&self.old),
-            show(&self.new)
-        )
-    }
-}
-
-/// One input file of a finished frame that is another file now.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct InputChange {
-    /// The frame.
-    pub frame: i64,
-    /// The file.
-    pub path: PathBuf,
-    /// What is different.
-    pub what: String,
-}
-
-impl fmt::Display for InputChange {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(
-            f,
-            "frame {}: {}: {}",
-            self.frame,
-            self.path.display(),
-            self.what
-        )
-    }
-}
-
-/// Why a job cannot start or go on.
+/// Why a job cannot start or continue.
 #[derive(Debug, thiserror::Error)]
 pub enum JobError {
-    /// The plan was made with other settings.
-    #[error("{}: settings have changed since this job began: {}; --force starts over, --keep-done keeps what is there", dir.display(), listed(changes))]
+    /// The settings differ from those in the plan.
+    #[error("{}: settings have changed since this job began: {}", dir.display(), list_some(changes))]
     SettingsChanged {
         /// The job's directory.
         dir: PathBuf,
-        /// Which, in the order of the settings.
+        /// The changes, in the order of the settings.
         changes: Vec<SettingChange>,
     },
-    /// Frames were finished from inputs that have been rewritten since.
-    #[error("{}: inputs of finished frames have changed: {}; --force starts over, --keep-done keeps what is there", dir.display(), listed(changes))]
+    /// Inputs of finished frames have changed.
+    #[error("{}: inputs of finished frames have changed: {}", dir.display(), list_some(changes))]
     InputChanged {
         /// The job's directory.
         dir: PathBuf,
-        /// Which, by frame.
+        /// The changes, by frame.
         changes: Vec<InputChange>,
     },
-    /// The job was begun with another input: none of its files is among those given, and the same frames
+    /// The job was started with another input: none of its files is among the given ones, and the same frames
     /// have other contents.
-    #[error("{}: this job was made from other files ({}, now {}); choose another output{}, or start over with --force", dir.display(), planned.display(), given.display(), if *is_same_dir { ", keep what is there with --keep-done" } else { "" })]
+    #[error("{}: this job was made from other files ({}, now {})", dir.display(), planned.display(), given.display())]
     OtherInput {
         /// The job's directory.
         dir: PathBuf,
-        /// A file that it was made from.
+        /// A file of the plan.
         planned: PathBuf,
-        /// A file given now.
+        /// A file of this request.
         given: PathBuf,
-        /// Whether they are in the same directory.
+        /// Whether they are in the same directory. [`crate::ResumeMode::KeepDone`] then accepts the input.
         is_same_dir: bool,
     },
-    /// Files have the names of outputs, and no worker of the job has made them.
-    #[error(
-        "{}: there already, and not made by this job; choose another output, move what is there, or replace it with --force",
-        existing(paths)
-    )]
+    /// Files with the names of outputs exist that no worker of this job has written.
+    #[error("{}: already exists and was not written by this job", first_of(paths))]
     OutputsExist {
-        /// Which; at least one.
+        /// The files; at least one.
         paths: Vec<PathBuf>,
     },
-    /// The plan is there but cannot be understood.
-    #[error("{}: {what}; restore it, or start over with --force", path.display())]
+    /// The plan exists but cannot be read.
+    #[error("{}: {source}", path.display())]
     PlanDamaged {
         /// The plan.
         path: PathBuf,
-        /// Where and why.
-        what: String,
+        /// Why.
+        source: PlanError,
     },
-    /// There is a ledger but no plan that would say what its lines mean.
-    #[error("{}: the ledger has lines but {} is missing; restore it, or start over with --force", ledger.display(), crate::PLAN_FILE)]
+    /// There is a ledger but no plan that gives its lines a meaning.
+    #[error("{}: the ledger has lines but {} is missing", ledger.display(), crate::PLAN_FILE)]
     PlanMissing {
         /// The ledger.
         ledger: PathBuf,
     },
-    /// A line of a ledger, other than a torn last one, cannot be understood.
-    #[error("{}: line {line}: {what}; remove that line to do its frame again, or start over with --force", path.display())]
+    /// A line of a ledger, other than an incomplete last one, cannot be read.
+    #[error("{}: line {line}: {source}", path.display())]
     LedgerDamaged {
         /// The ledger.
         path: PathBuf,
         /// The line, from 1.
         line: usize,
         /// Why.
-        what: String,
+        source: EntryError,
     },
-    /// What was asked must not be done while another worker is at the job.
-    #[error("{}: {who} is at work here; wait for it, or stop it first", dir.display())]
+    /// The operation is not possible while another worker is active.
+    #[error("{}: {worker} is working on this job", dir.display())]
     Busy {
         /// The job's directory.
         dir: PathBuf,
-        /// Who works there.
-        who: String,
+        /// The other worker.
+        worker: String,
     },
-    /// Others have taken this worker for dead, or the directory `job.work` was removed.
-    #[error("{}: this worker gave no sign of life for so long that others have taken it for dead; the same command joins again", dir.display())]
-    TakenForDead {
+    /// Other workers have declared this worker dead, or the directory `job.work` was removed.
+    #[error("{}: this worker missed its heartbeats and its frames were reassigned", dir.display())]
+    DeclaredDead {
         /// The job's directory.
         dir: PathBuf,
     },
-    /// The directory refuses files.
-    #[error("{}: cannot be written ({source}); check its permissions, or choose another directory", path.display())]
-    Unwritable {
-        /// The file or directory.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// No room. Nothing that was there is lost.
-    #[error("{}: no space left; free some, then the same command goes on from here", path.display())]
-    DiskFull {
-        /// What was being written.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// Any other trouble with a file of the job.
-    #[error("{}: {doing}: {source}", path.display())]
-    Io {
-        /// The file or directory.
-        path: PathBuf,
-        /// What was being done.
-        doing: &'static str,
-        /// What the system said.
-        source: io::Error,
-    },
-    /// The caller could not settle what "auto" means; the message is its own.
+    /// A file of the job cannot be read or written.
+    #[error(transparent)]
+    File(#[from] FileError),
+    /// The caller could not resolve the automatic settings.
     #[error(transparent)]
     Resolve(Box<dyn std::error::Error + Send + Sync>),
-    /// The request contradicts itself.
-    #[error("{0}")]
-    Request(String),
+    /// A failure of a frame stopped the run.
+    #[error(transparent)]
+    Stopped(FrameFailure),
+    /// The request has two frames with the same number.
+    #[error("frame {frame} occurs twice")]
+    DuplicateFrame {
+        /// The number.
+        frame: i64,
+    },
+    /// Two frames of the request have the same output.
+    #[error("{}: frames {} and {} have the same output", path.display(), frames[0], frames[1])]
+    SharedOutput {
+        /// The output.
+        path: PathBuf,
+        /// The frames.
+        frames: [i64; 2],
+    },
+    /// A frame of the request has the same output as another frame of the existing plan.
+    #[error("{}: frame {planned} of the job has this output, frame {requested} would have the same", path.display())]
+    PlannedOutput {
+        /// The output.
+        path: PathBuf,
+        /// The frame in the plan.
+        planned: i64,
+        /// The frame of the request.
+        requested: i64,
+    },
+    /// A path cannot be stored in a plan.
+    #[error("{}: the path is not UTF-8 and cannot be stored in a plan; rename it", path.display())]
+    NotUtf8 {
+        /// The path.
+        path: PathBuf,
+    },
+    /// A result was recorded for a frame that is not in the plan.
+    #[error("frame {frame} is not in the plan")]
+    UnknownFrame {
+        /// The number.
+        frame: i64,
+    },
+    /// A plan or a ledger entry cannot be serialised.
+    #[error("{}: cannot serialise: {source}", path.display())]
+    Serialize {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: serde_json::Error,
+    },
 }
 
 impl JobError {
-    /// That a file cannot be written, by what can be done about it.
-    pub fn writing(path: &Path, source: io::Error) -> Self {
-        Self::io(path, "writing", source)
-    }
-
-    /// Sorts an error of the system by what can be done about it.
-    pub(crate) fn io(path: &Path, doing: &'static str, source: io::Error) -> Self {
-        let path = path.to_owned();
-        match source.kind() {
-            io::ErrorKind::StorageFull | io::ErrorKind::QuotaExceeded => {
-                Self::DiskFull { path, source }
-            }
-            io::ErrorKind::PermissionDenied | io::ErrorKind::ReadOnlyFilesystem => {
-                Self::Unwritable { path, source }
-            }
-            _ => Self::Io {
-                path,
-                doing,
-                source,
-            },
-        }
+    /// The error for a file on which `action` failed.
+    pub(crate) fn io(path: &Path, action: &'static str, source: io::Error) -> Self {
+        Self::File(FileError::new(path, action, source))
     }
 }
 
-/// The first of `paths`, and how many more there are.
-fn existing(paths: &[PathBuf]) -> String {
+/// Why a plan cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// It is not JSON, or not that of a plan.
+    #[error("not a readable plan ({0})")]
+    Json(#[from] serde_json::Error),
+    /// Its version is unknown.
+    #[error("the plan has version {found}; this program reads versions 1 to {latest}")]
+    Version {
+        /// The version.
+        found: u32,
+        /// The latest known version.
+        latest: u32,
+    },
+    /// Its checksum is wrong.
+    #[error("the plan does not match its checksum; it is damaged or was edited")]
+    Checksum,
+    /// The checksum of the settings in a plan of version 1 is wrong.
+    #[error("the settings in the plan do not match their fingerprint")]
+    SettingsChecksum,
+    /// Its frames are not in ascending order.
+    #[error("the frames in the plan are not in ascending order")]
+    Unordered,
+}
+
+/// Why a line of a ledger cannot be read.
+#[derive(Debug, thiserror::Error)]
+pub enum EntryError {
+    /// It is not JSON, or not that of an entry.
+    #[error("not a ledger entry ({0})")]
+    Json(#[from] serde_json::Error),
+    /// It is too long.
+    #[error("not a ledger entry (longer than {max} bytes)")]
+    TooLong {
+        /// The limit.
+        max: u64,
+    },
+    /// The ledger cannot be read up to its end.
+    #[error(transparent)]
+    Io(#[from] io::Error),
+}
+
+/// The first of `paths`, and the number of the others.
+fn first_of(paths: &[PathBuf]) -> String {
     let first = paths.first().map(|path| path.display().to_string());
     let first = first.unwrap_or_default();
     match paths.len() {
@@ -200,12 +198,13 @@ fn existing(paths: &[PathBuf]) -> String {
     }
 }
 
-/// The first few of `items`, and how many more there are.
-fn listed(items: &[impl fmt::Display]) -> String {
-    const SHOWN: usize = 8;
-    let mut text: Vec<String> = items.iter().take(SHOWN).map(ToString::to_string).collect();
-    if items.len() > SHOWN {
-        text.push(format!("and {} more", items.len() - SHOWN));
+/// The first few of `items`, and the number of the others.
+fn list_some(items: &[impl fmt::Display]) -> String {
+    const MAX_SHOWN: usize = 8;
+    let shown = items.iter().take(MAX_SHOWN);
+    let mut text: Vec<String> = shown.map(ToString::to_string).collect();
+    if items.len() > MAX_SHOWN {
+        text.push(format!("and {} more", items.len() - MAX_SHOWN));
     }
     text.join("; ")
 }

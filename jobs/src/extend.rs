@@ -1,46 +1,47 @@
-//! Taking in what a growing sequence has become while the job is open.
+//! Extends an open job by the new frames of a growing sequence.
 
 use std::collections::HashSet;
 
 use crate::fingerprint_cache::FingerprintCache;
-use crate::planning::{Extension, extended_plan};
-use crate::{Entry, FrameState, InputChange, Job, JobError, JobRequest, JobState, foreign};
+use crate::planning::{ExtendedPlan, extended_plan};
+use crate::{FrameState, InputChange, Job, JobError, JobRequest, JobState, LedgerEntry};
 
 impl Job {
-    /// Takes in the frames that a growing sequence has by now; those selected in `request` are added to those
-    /// of this run. Finished ones whose inputs have changed since are set back, to be made anew, and returned.
+    /// Adds the new frames of a growing sequence to the job, and those selected in `request` to this run.
+    /// Finished frames whose inputs have changed are requeued and returned.
     ///
     /// # Errors
-    /// Those of [`Job::open`]; settings must be those that the job was opened with.
+    /// Those of [`Job::open`]. The settings must be those that the job was opened with.
     pub fn extend(&mut self, request: &JobRequest) -> Result<Vec<InputChange>, JobError> {
         request.check()?;
         let dir = self.state.dir.clone();
         let new = request.selected();
-        let mut prints = FingerprintCache::ahead(request, &new, Some(&self.state.plan));
-        let locking = |e| JobError::io(&dir, "agreeing with other workers", e);
-        let lock = self.claims.desk().lock().map_err(locking)?;
+        let mut fingerprints = FingerprintCache::prefetch(request, &new, Some(&self.state.plan));
+        let lock_failed = |e| JobError::io(&dir, "locking the job", e);
+        let lock = self.claims.registry().lock().map_err(lock_failed)?;
         self.refresh()?;
-        let Extension { plan, changes } = extended_plan(&self.state, request, &new, &mut prints)?;
-        foreign::refuse_new(&self.state, &plan)?;
-        // Ledger first: a plan with the new fingerprints would call the old images up to date.
-        self.set_back(&changes)?;
+        let ExtendedPlan { plan, changes } =
+            extended_plan(&self.state, request, &new, &mut fingerprints)?;
+        self.state.refuse_existing_outputs(&plan)?;
+        // The ledger first: with the new fingerprints in the plan, the old images would count as up to date
+        self.requeue_changed(&changes)?;
         if plan != self.state.plan {
             plan.store(&dir)?;
             let ledger = std::mem::take(&mut self.state.ledger);
             self.state = JobState::new(&dir, plan, ledger);
         }
-        lock.end();
+        lock.complete();
         let known: HashSet<i64> = self.selected.iter().copied().collect();
         let added = new.into_iter().filter(|frame| !known.contains(frame));
         self.selected.extend(added);
         Ok(changes)
     }
 
-    fn set_back(&mut self, changes: &[InputChange]) -> Result<(), JobError> {
+    fn requeue_changed(&mut self, changes: &[InputChange]) -> Result<(), JobError> {
         if changes.is_empty() {
             return Ok(());
         }
-        // What is said now must come after all that was said of these frames.
+        // The new entries must supersede all others of these frames
         self.claims.refresh()?;
         for change in changes {
             let reason = format!(
@@ -48,8 +49,8 @@ impl Job {
                 change.path.display(),
                 change.what
             );
-            let entry = Entry::set_back(self.claims.take_seq(), change.frame, reason);
-            self.claims.set_back(&entry);
+            let entry = LedgerEntry::requeued(self.claims.next_seq(), change.frame, reason);
+            self.claims.add_requeued(&entry);
             self.record(entry, FrameState::Failed)?;
         }
         Ok(())

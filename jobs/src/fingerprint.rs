@@ -1,7 +1,7 @@
-//! What makes a frame the frame it was: its input files and the settings of the job.
+//! Fingerprints of the input files and of the settings, to detect changes.
 //!
-//! A file is told by length, time of modification, and a BLAKE3 of its length, first and last
-//! 64 KiB: cheap for files of gigabytes, and a rewritten file changes at least one of the three.
+//! A file is identified by its length, its modification time, and a BLAKE3 hash of its length and its first
+//! and last 64 KiB. This is cheap for files of gigabytes, and rewriting a file changes at least one of them.
 
 use std::io::{self, Read, Seek, SeekFrom};
 use std::path::Path;
@@ -13,22 +13,22 @@ use crate::{SettingChange, open_regular};
 
 const SAMPLE_BYTES: u64 = 64 * 1024;
 
-/// Enough of a file to notice that it is another one now.
+/// Identifies the contents of a file well enough to detect changes.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Fingerprint {
     /// Length, bytes.
     pub length: u64,
-    /// Time of modification, nanoseconds since 1970.
+    /// Modification time, nanoseconds since 1970.
     pub modified_ns: i64,
     /// BLAKE3 of the length (little-endian u64), the first and the last 64 KiB, in hex.
     pub blake3: String,
 }
 
 impl Fingerprint {
-    /// Takes the fingerprint of the file at `path`, reading at most 128 KiB.
+    /// Computes the fingerprint of the file at `path`. Reads at most 128 KiB.
     ///
     /// # Errors
-    /// Whatever opening or reading it says.
+    /// The file cannot be opened or read.
     pub fn of_file(path: &Path) -> io::Result<Self> {
         let (mut file, metadata) = open_regular(path)?;
         let length = metadata.len();
@@ -51,19 +51,19 @@ impl Fingerprint {
         })
     }
 
-    /// Whether the contents are the same, whenever they were written: a copy is as good.
-    pub(crate) fn has_contents_of(&self, other: &Self) -> bool {
+    /// Whether the contents are the same. The modification time does not matter, so copies are equal.
+    pub(crate) fn has_same_contents(&self, other: &Self) -> bool {
         (self.length, &self.blake3) == (other.length, &other.blake3)
     }
 
-    /// How `self`, taken earlier, differs from `now`; None if it does not.
+    /// The difference between `self`, computed earlier, and `now`; None if there is none.
     pub fn difference(&self, now: &Self) -> Option<String> {
         if self.length != now.length {
             Some(format!("length {} -> {} bytes", self.length, now.length))
         } else if self.blake3 != now.blake3 {
             Some("other contents".to_owned())
         } else if self.modified_ns != now.modified_ns {
-            Some("written again since (time of modification)".to_owned())
+            Some("modification time has changed".to_owned())
         } else {
             None
         }
@@ -86,7 +86,8 @@ pub fn text_hash(text: &str) -> String {
     blake3::hash(text.as_bytes()).to_hex().to_string()
 }
 
-/// BLAKE3 of ordered settings, in hex. Lengths go in too, so that no two lists run together.
+/// BLAKE3 of ordered settings, in hex. The hash includes lengths, so that the boundaries of keys and values
+/// count.
 pub fn settings_hash(settings: &[(String, String)]) -> String {
     let mut hasher = blake3::Hasher::new();
     for text in settings.iter().flat_map(|(key, value)| [key, value]) {
@@ -96,14 +97,14 @@ pub fn settings_hash(settings: &[(String, String)]) -> String {
     hasher.finalize().to_hex().to_string()
 }
 
-/// The settings that are not the same in both lists, by key; their order does not matter.
+/// The settings that differ between both lists, by key. The order does not matter.
 pub fn compare_settings(old: &[(String, String)], new: &[(String, String)]) -> Vec<SettingChange> {
     let value_in = |list: &[(String, String)], key: &str| {
         list.iter().find(|(k, _)| k == key).map(|(_, v)| v.clone())
     };
-    let gone = old.iter().filter(|(key, _)| value_in(new, key).is_none());
+    let removed = old.iter().filter(|(key, _)| value_in(new, key).is_none());
     new.iter()
-        .chain(gone)
+        .chain(removed)
         .map(|(key, _)| SettingChange {
             key: key.clone(),
             old: value_in(old, key),
@@ -125,7 +126,7 @@ mod tests {
             .collect()
     }
 
-    /// Writes `bytes` under a fixed time, so that only what the test changes differs.
+    /// Writes `bytes` with a fixed modification time.
     fn write(path: &Path, bytes: &[u8], seconds: u64) -> Fingerprint {
         fs::write(path, bytes).unwrap();
         let time = SystemTime::UNIX_EPOCH + Duration::from_secs(seconds);
@@ -139,7 +140,7 @@ mod tests {
     }
 
     #[test]
-    fn notices_ends_length_and_time() {
+    fn detects_changes_of_ends_length_and_time() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("a.vtk");
         for size in [1, 1000, 65_536, 65_537, 131_072, 131_073, 300_000] {
@@ -174,7 +175,7 @@ mod tests {
     }
 
     #[test]
-    fn changed_settings_are_named() {
+    fn changed_settings_are_listed() {
         let old = pairs(&[
             ("render.max_depth", "3"),
             ("image.width", "640"),
@@ -201,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn hash_keeps_borders() {
+    fn hash_includes_boundaries() {
         assert_ne!(
             settings_hash(&pairs(&[("ab", "c")])),
             settings_hash(&pairs(&[("a", "bc")]))

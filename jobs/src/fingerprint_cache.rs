@@ -5,25 +5,25 @@ use std::path::{Path, PathBuf};
 
 use crate::{Fingerprint, FrameRequest, JobRequest, Plan};
 
-/// Fingerprints of input files, each taken once, however many frames share the file.
+/// Fingerprints of input files. Each is computed once, even if several frames share the file.
 #[derive(Debug, Default)]
 pub(crate) struct FingerprintCache {
     known: HashMap<PathBuf, Option<Fingerprint>>,
 }
 
 impl FingerprintCache {
-    /// Takes the fingerprints of all inputs of `request` that a plan over `old` needs.
-    pub(crate) fn ahead(request: &JobRequest, selected: &[i64], old: Option<&Plan>) -> Self {
+    /// Computes the fingerprints of all inputs of `request` that a plan based on `old` needs.
+    pub(crate) fn prefetch(request: &JobRequest, selected: &[i64], old: Option<&Plan>) -> Self {
         let mut fingerprints = Self::default();
-        let needed = wanted(request, selected, old);
-        for path in needed.iter().flat_map(|frame| &frame.inputs) {
-            fingerprints.of(path);
+        let needed = frames_to_fingerprint(request, selected, old);
+        for path in needed.iter().flat_map(|frame| frame.dependencies()) {
+            fingerprints.get(path);
         }
         fingerprints
     }
 
     /// The fingerprint of the file at `path`; `None` if it cannot be read.
-    pub(crate) fn of(&mut self, path: &Path) -> Option<Fingerprint> {
+    pub(crate) fn get(&mut self, path: &Path) -> Option<Fingerprint> {
         if let Some(known) = self.known.get(path) {
             return known.clone();
         }
@@ -33,9 +33,9 @@ impl FingerprintCache {
     }
 }
 
-/// The frames whose inputs are read: the selected ones and those that the plan does not know. So one of many runs over a
-/// long sequence reads only its own inputs.
-pub(crate) fn wanted<'a>(
+/// The frames whose inputs are read: the selected ones and those that are new to the plan. A run over a part of
+/// a long sequence thus reads only its own inputs.
+pub(crate) fn frames_to_fingerprint<'a>(
     request: &'a JobRequest,
     selected: &[i64],
     old: Option<&Plan>,

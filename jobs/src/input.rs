@@ -1,64 +1,66 @@
-//! Whether a request is about the input that a job was begun with: frames of two simulations under one
-//! camera and one colour range would look like one.
+//! Checks that a request has the same input as the job. Frames of two simulations with one camera and one
+//! colour range would look like one simulation.
 //!
-//! It is, if a file that the plan knows is among those given now, by directory and name. Data may be moved,
-//! and other machines may see them elsewhere; then the same frames must have the same contents.
+//! The input is the same if at least one given file has the directory and name of a file in the plan. Data may
+//! be moved, and other machines may mount them elsewhere. In that case the same frames must have the same
+//! contents.
 
 use std::collections::{BTreeSet, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use crate::fingerprint_cache::FingerprintCache;
-use crate::{JobError, JobRequest, JobState, Mode, PlannedFrame, PlannedInput};
+use crate::{FrameRequest, JobError, JobRequest, JobState, PlannedFrame, PlannedInput, ResumeMode};
 
-/// Frames whose contents are compared, spread over the sequence.
-const SAMPLES: usize = 32;
+/// Number of frames whose contents are compared, spread over the sequence.
+const MAX_COMPARED: usize = 32;
 
-/// Directories that a plan keeps: those of a job on several machines, or that was moved.
+/// Number of input directories that a plan stores. There are several if a job runs on several machines or its
+/// data were moved.
 const MAX_DIRS: usize = 16;
 
-/// Refuses a request that is about another input than the job in `state`.
+/// Refuses a request with another input than that of the job.
 ///
 /// # Errors
 /// [`JobError::OtherInput`], or a path cannot be resolved.
 pub(crate) fn check_input(
     state: &JobState,
     request: &JobRequest,
-    prints: &mut FingerprintCache,
+    fingerprints: &mut FingerprintCache,
 ) -> Result<(), JobError> {
     let planned = state.plan.frames().iter().flat_map(|f| &f.inputs);
     let mut given = request.frames.iter().flat_map(|f| &f.inputs);
     let (Some(old), Some(new)) = (planned.clone().next(), given.clone().next()) else {
         return Ok(());
     };
-    let mut dirs = Dirs::default();
+    let mut dirs = DirCache::default();
     let known_dirs: HashSet<PathBuf> = match state.plan.input_dirs() {
         [] => planned
             .clone()
-            .map(|i| dirs.of(Path::new(&i.path)))
+            .map(|i| dirs.get(Path::new(&i.path)))
             .collect(),
         known => known.iter().map(PathBuf::from).collect(),
     };
     let names: HashSet<_> = planned.map(|i| Path::new(&i.path).file_name()).collect();
     let mut is_same_dir = false;
     let is_known = given.any(|path| {
-        let is_in_known_dir = known_dirs.contains(&dirs.of(path));
+        let is_in_known_dir = known_dirs.contains(&dirs.get(path));
         is_same_dir |= is_in_known_dir;
         is_in_known_dir && names.contains(&path.file_name())
     });
-    let is_kept = request.mode == Mode::KeepDone && is_same_dir;
-    if is_known || is_kept || has_same_contents(state, request, prints) {
+    let is_kept = request.mode == ResumeMode::KeepDone && is_same_dir;
+    if is_known || is_kept || has_same_contents(state, request, fingerprints) {
         return Ok(());
     }
     Err(JobError::OtherInput {
         dir: state.dir.clone(),
-        planned: shown(old, &known_dirs),
+        planned: with_dir(old, &known_dirs),
         given: new.clone(),
         is_same_dir,
     })
 }
 
-/// A file of the plan with its directory, if that is clear.
-fn shown(input: &PlannedInput, dirs: &HashSet<PathBuf>) -> PathBuf {
+/// A file of the plan with its directory, if that is unambiguous.
+fn with_dir(input: &PlannedInput, dirs: &HashSet<PathBuf>) -> PathBuf {
     let path = PathBuf::from(&input.path);
     match (dirs.len(), dirs.iter().next(), path.file_name()) {
         (1, Some(dir), Some(name)) => dir.join(name),
@@ -66,47 +68,53 @@ fn shown(input: &PlannedInput, dirs: &HashSet<PathBuf>) -> PathBuf {
     }
 }
 
-/// Whether more than half of the frames that can be compared were made from files of the same contents. The
-/// first frames of two simulations often are the same; the last frame of one may have been completed since.
+/// Whether more than half of the comparable frames have files with the same contents. One frame is not enough:
+/// the first frames of two simulations are often equal, and the last frame may have been incomplete.
 fn has_same_contents(
     state: &JobState,
     request: &JobRequest,
-    prints: &mut FingerprintCache,
+    fingerprints: &mut FingerprintCache,
 ) -> bool {
-    let shared: Vec<(&PlannedFrame, &[PathBuf])> = request
+    let shared: Vec<(&PlannedFrame, &FrameRequest)> = request
         .frames
         .iter()
-        .filter_map(|f| Some((state.plan.frame(f.number)?, &f.inputs[..])))
+        .filter_map(|f| Some((state.plan.frame(f.number)?, f)))
         .filter(|(old, _)| old.inputs.iter().all(|i| i.fingerprint.is_some()))
         .collect();
-    // What is not finished may have changed since it was planned.
-    let (done, open): (Vec<_>, Vec<_>) = shared
+    // Prefer finished frames: the inputs of the others may have changed since they were planned
+    let (done, pending): (Vec<_>, Vec<_>) = shared
         .into_iter()
         .partition(|(old, _)| state.is_done(old.number));
-    let comparable = if done.is_empty() { open } else { done };
-    let step = comparable.len().div_ceil(SAMPLES).max(1);
+    let comparable = if done.is_empty() { pending } else { done };
+    let step = comparable.len().div_ceil(MAX_COMPARED).max(1);
     let compared: Vec<bool> = comparable
         .iter()
         .step_by(step)
-        .map(|(old, new)| is_same_frame(&old.inputs, new, prints))
+        .map(|(old, new)| is_same_frame(&old.inputs, new, fingerprints))
         .collect();
     2 * compared.iter().filter(|same| **same).count() > compared.len()
 }
 
-fn is_same_frame(old: &[PlannedInput], new: &[PathBuf], prints: &mut FingerprintCache) -> bool {
-    let mut pairs = old.iter().zip(new);
-    old.len() == new.len()
-        && pairs.all(|(old, new)| match (&old.fingerprint, prints.of(new)) {
-            (Some(old), Some(new)) => old.has_contents_of(&new),
-            _ => false,
-        })
+fn is_same_frame(
+    old: &[PlannedInput],
+    new: &FrameRequest,
+    fingerprints: &mut FingerprintCache,
+) -> bool {
+    let mut pairs = old.iter().zip(new.dependencies());
+    old.len() == new.dependencies().count()
+        && pairs.all(
+            |(old, new)| match (&old.fingerprint, fingerprints.get(new)) {
+                (Some(old), Some(new)) => old.has_same_contents(&new),
+                _ => false,
+            },
+        )
 }
 
-/// The directories of a plan that knew `old` ones when `request` goes on with it.
-pub(crate) fn input_dirs(old: &[String], request: &JobRequest) -> Vec<String> {
-    let mut dirs = Dirs::default();
+/// The input directories of a plan after `request`, given the `old` ones.
+pub(crate) fn merged_input_dirs(old: &[String], request: &JobRequest) -> Vec<String> {
+    let mut dirs = DirCache::default();
     let inputs = request.frames.iter().flat_map(|f| &f.inputs);
-    let given: BTreeSet<PathBuf> = inputs.map(|path| dirs.of(path)).collect();
+    let given: BTreeSet<PathBuf> = inputs.map(|path| dirs.get(path)).collect();
     let given = given.iter().filter_map(|dir| dir.to_str()).take(MAX_DIRS);
     let mut all = old.to_vec();
     for dir in given {
@@ -117,14 +125,14 @@ pub(crate) fn input_dirs(old: &[String], request: &JobRequest) -> Vec<String> {
     all.split_off(all.len().saturating_sub(MAX_DIRS))
 }
 
-/// Directories of files, absolute and without links, each asked for once.
+/// Directories of files, absolute and without links. Each is resolved once.
 #[derive(Default)]
-struct Dirs {
+struct DirCache {
     known: HashMap<PathBuf, PathBuf>,
 }
 
-impl Dirs {
-    fn of(&mut self, file: &Path) -> PathBuf {
+impl DirCache {
+    fn get(&mut self, file: &Path) -> PathBuf {
         let dir = match file.parent() {
             Some(dir) if !dir.as_os_str().is_empty() => dir,
             _ => Path::new("."),

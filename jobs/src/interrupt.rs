@@ -1,5 +1,5 @@
-//! Being asked to stop: the first time, the frame in hand is finished; the second time, it is
-//! dropped. Only the flag lives here; who hears the signals sets it.
+//! Requests to stop: after the first, frames in progress are finished; after the second, they are dropped. The
+//! signal handler is elsewhere; this module has only the flag.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU8, Ordering};
@@ -7,36 +7,36 @@ use std::sync::atomic::{AtomicU8, Ordering};
 /// How urgently to stop.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum InterruptLevel {
-    /// Nobody asked.
+    /// No request to stop.
     Run,
-    /// Finish the frames in hand, start no other.
+    /// Finish the frames in progress, start no other.
     FinishFrame,
-    /// Drop the frames in hand.
+    /// Drop the frames in progress.
     StopNow,
 }
 
-/// A flag that clones share. Raising it is one atomic operation, so a signal handler may do it.
+/// A flag that clones share. Raising it is one atomic operation, so it is safe in a signal handler.
 #[derive(Debug, Clone, Default)]
 pub struct Interrupt {
-    asked: Arc<AtomicU8>,
+    requests: Arc<AtomicU8>,
 }
 
 impl Interrupt {
-    /// A flag nobody has raised.
+    /// A flag that is not raised.
     pub fn new() -> Self {
         Self::default()
     }
 
-    /// Asks once more.
+    /// Requests to stop; the second request is more urgent.
     pub fn raise(&self) {
         let _ = self
-            .asked
+            .requests
             .fetch_update(Ordering::AcqRel, Ordering::Acquire, |n| n.checked_add(1));
     }
 
-    /// What has been asked so far.
+    /// The current level.
     pub fn level(&self) -> InterruptLevel {
-        match self.asked.load(Ordering::Acquire) {
+        match self.requests.load(Ordering::Acquire) {
             0 => InterruptLevel::Run,
             1 => InterruptLevel::FinishFrame,
             _ => InterruptLevel::StopNow,
@@ -48,7 +48,7 @@ impl Interrupt {
         self.level() >= InterruptLevel::FinishFrame
     }
 
-    /// Whether to drop the frames in hand.
+    /// Whether to drop the frames in progress.
     pub fn stop_now(&self) -> bool {
         self.level() == InterruptLevel::StopNow
     }

@@ -1,9 +1,9 @@
-//! A job: plan and ledgers together, opened for work ([`Job::open`]) or only looked at
-//! ([`Job::read`], [`Job::peek`], [`Job::foresee`]).
+//! A job: its plan and its ledgers, opened for work ([`Job::open`]) or only read ([`Job::read`],
+//! [`Job::read_plan`], [`Job::dry_run`]).
 //!
-//! Any number of processes may have the same job open, on one machine or on several that share its
-//! directory. They agree on who does what by claims ([`Claims`]), each writes a ledger of its own, and
-//! one at a time changes the plan.
+//! Any number of processes may have the same job open, on one machine or on several that share its directory.
+//! They divide the frames by claims ([`FrameClaims`]). Each writes its own ledger, and one at a time changes
+//! the plan.
 
 use std::error::Error;
 use std::fs;
@@ -15,66 +15,68 @@ use std::thread;
 use serde_json::Value;
 
 use crate::fingerprint_cache::FingerprintCache;
-use crate::ledger::{ENDED, LedgerFile, LedgerWriter, News, fold, ledger_files, remove};
-use crate::planning::{Extension, merged_plan, new_plan, stored_path};
-use crate::work::{Desk, WorkerView, sweep_parts, workers};
+use crate::ledger::{
+    COMPACTED, LedgerFile, LedgerWatcher, LedgerWriter, compact, ledger_files, remove,
+};
+use crate::planning::{ExtendedPlan, merged_plan, new_plan, stored_path};
+use crate::workers::{ListedParts, WorkerRegistry, WorkerStatus, worker_statuses};
 use crate::{
-    Claims, Entry, FrameState, InputChange, JobError, JobRequest, JobState, Ledger, Mode,
-    OutputFile, Plan, Status, Summary, foreign,
+    EntryStatus, FrameClaims, FrameFailure, FrameState, InputChange, JobError, JobRequest,
+    JobState, JobSummary, Ledger, LedgerEntry, OutputFile, Plan, ResumeMode,
 };
 
-/// So many ledgers of workers that have ended may lie about before they are brought together in one.
-const LOOSE_LEDGERS: usize = 8;
+/// Number of ledgers of ended workers above which they are compacted into one.
+const MAX_LOOSE_LEDGERS: usize = 8;
 
-/// How a job would stand if it were opened.
+/// The state that a job would have after [`Job::open`].
 #[derive(Debug, Clone)]
-pub struct Foreseen {
-    /// Its plan and what is done of it.
+pub struct DryRun {
+    /// Plan and finished frames.
     pub state: JobState,
-    /// The frames of the run, done or not, in the order asked for.
+    /// The frames of the run, done or not, in the requested order.
     pub selected: Vec<i64>,
-    /// What "auto" turned into when the job began; None if that would be settled anew.
+    /// The resolved automatic settings of the job; None if they would be resolved again.
     pub resolved: Option<Value>,
-    /// Finished frames that would be made again because their inputs have changed
-    /// ([`Mode::RequeueChanged`]).
+    /// Finished frames that would be repeated because their inputs have changed
+    /// ([`ResumeMode::RequeueChanged`]).
     pub requeued: Vec<InputChange>,
 }
 
-/// A job opened for work.
+/// A job that is open for work.
 #[derive(Debug)]
 pub struct Job {
     pub(crate) state: JobState,
     writer: LedgerWriter,
-    pub(crate) claims: Claims,
+    pub(crate) claims: FrameClaims,
     pub(crate) selected: Vec<i64>,
     requeued: Vec<InputChange>,
 }
 
 impl Job {
-    /// The plan in `dir`, or None if no job has begun there. Touches nothing.
+    /// Reads the plan in `dir`; None if there is no job. Changes nothing.
     ///
     /// # Errors
-    /// [`JobError::PlanDamaged`], or trouble reading.
-    pub fn peek(dir: &Path) -> Result<Option<Plan>, JobError> {
-        Plan::load(named(dir))
+    /// [`JobError::PlanDamaged`], or a file cannot be read.
+    pub fn read_plan(dir: &Path) -> Result<Option<Plan>, JobError> {
+        Plan::load(or_current_dir(dir))
     }
 
-    /// Whether a job has begun in `dir`, damaged or not: there is a plan, or a ledger with lines.
+    /// Whether there is a job in `dir`, damaged or not: a plan, or a ledger with lines.
     ///
     /// # Errors
-    /// Trouble reading the directory.
-    pub fn has_begun(dir: &Path) -> Result<bool, JobError> {
-        let dir = named(dir);
+    /// The directory cannot be read.
+    pub fn exists(dir: &Path) -> Result<bool, JobError> {
+        let dir = or_current_dir(dir);
         Ok(Plan::path_in(dir).exists() || ledger_files(dir)?.iter().any(|file| file.length > 0))
     }
 
-    /// How the job in `dir` stands, or None if none has begun there. Touches nothing, and may be
-    /// asked while another process works.
+    /// Reads the state of the job in `dir`; None if there is no job. Changes nothing. Other processes may be
+    /// working on the job.
     ///
     /// # Errors
-    /// [`JobError::PlanDamaged`], [`JobError::LedgerDamaged`], or trouble reading.
+    /// [`JobError::PlanDamaged`], [`JobError::LedgerDamaged`], or a file cannot be read.
     pub fn read(dir: &Path) -> Result<Option<JobState>, JobError> {
-        let dir = named(dir);
+        let dir = or_current_dir(dir);
         if !Plan::path_in(dir).exists() {
             return Ok(None);
         }
@@ -90,60 +92,60 @@ impl Job {
         Ok(plan?.map(|plan| JobState::new(dir, plan, ledger)))
     }
 
-    /// Who is at work in `dir`, also workers that died without a word. Touches nothing.
+    /// Reads the status of all workers of the job in `dir`, including workers that have crashed. Changes nothing.
     ///
     /// # Errors
-    /// Trouble reading.
-    pub fn workers(dir: &Path) -> Result<Vec<WorkerView>, JobError> {
-        let dir = named(dir);
-        workers(dir).map_err(|e| JobError::io(dir, "looking for workers", e))
+    /// A file cannot be read.
+    pub fn workers(dir: &Path) -> Result<Vec<WorkerStatus>, JobError> {
+        let dir = or_current_dir(dir);
+        worker_statuses(dir).map_err(|e| JobError::io(dir, "listing workers", e))
     }
 
-    /// How the job in `dir` would stand after [`Job::open`]. Touches nothing, and may be asked while
-    /// another process works.
+    /// The state that the job in `dir` would have after [`Job::open`]. Changes nothing. Other processes may be
+    /// working on the job.
     ///
     /// # Errors
-    /// Those of [`Job::open`] that are known before anything is written.
-    pub fn foresee(dir: &Path, request: &JobRequest) -> Result<Foreseen, JobError> {
-        let dir = named(dir);
+    /// Those errors of [`Job::open`] that occur before anything is written.
+    pub fn dry_run(dir: &Path, request: &JobRequest) -> Result<DryRun, JobError> {
+        let dir = or_current_dir(dir);
         request.check()?;
         let selected = request.selected();
-        let mut prints = FingerprintCache::default();
-        let forgotten = request.mode == Mode::Force || !dir.exists();
-        let (old, ledger) = if forgotten {
+        let mut fingerprints = FingerprintCache::default();
+        let starts_over = request.mode == ResumeMode::Force || !dir.exists();
+        let (old, ledger) = if starts_over {
             (None, Ledger::default())
         } else {
             (Plan::load(dir)?, Ledger::read(dir)?)
         };
-        let (plan, ledger, settled_anew, requeued) = match old {
+        let (plan, ledger, resolves_again, requeued) = match old {
             None => {
-                if !forgotten {
+                if !starts_over {
                     refuse_ledgers(dir)?;
                 }
-                if request.mode != Mode::Force {
-                    foreign::refuse_at_begin(request)?;
+                if request.mode != ResumeMode::Force {
+                    request.refuse_existing_outputs()?;
                 }
-                let plan = new_plan(dir, request, &mut prints)?;
+                let plan = new_plan(dir, request, &mut fingerprints)?;
                 (plan, ledger, true, Vec::new())
             }
             Some(old) => {
                 let state = JobState::new(dir, old, ledger);
-                let mut anew = false;
-                let Extension { plan, changes } =
-                    merged_plan(&state, request, &selected, &mut prints, |_| {
-                        anew = true;
+                let mut resolves_again = false;
+                let ExtendedPlan { plan, changes } =
+                    merged_plan(&state, request, &selected, &mut fingerprints, |_| {
+                        resolves_again = true;
                         Ok::<_, JobError>(Value::Null)
                     })?;
-                foreign::refuse_new(&state, &plan)?;
-                (plan, state.ledger, anew, changes)
+                state.refuse_existing_outputs(&plan)?;
+                (plan, state.ledger, resolves_again, changes)
             }
         };
-        let resolved = (!settled_anew).then(|| plan.resolved().clone());
+        let resolved = (!resolves_again).then(|| plan.resolved().clone());
         let mut state = JobState::new(dir, plan, ledger);
         for change in &requeued {
             state.states.insert(change.frame, FrameState::Pending);
         }
-        Ok(Foreseen {
+        Ok(DryRun {
             state,
             selected,
             resolved,
@@ -151,106 +153,105 @@ impl Job {
         })
     }
 
-    /// Begins the job in `dir` (created if need be), or goes on with it, alone or beside others.
+    /// Starts the job in `dir`, or resumes it. Other workers may have the same job open. The directory is
+    /// created if needed.
     ///
-    /// `resolve` settles what "auto" means. It is called only when that has to be settled: for a
-    /// new job with None, and with the saved values when settings have changed under
-    /// [`Mode::KeepDone`]. In any other case the saved values stand, also for frames that have
-    /// been added to the sequence.
+    /// `resolve` determines the values of automatic settings. It is called only if necessary: with None for a
+    /// new job, and with the stored values if settings have changed under [`ResumeMode::KeepDone`]. Otherwise
+    /// the stored values are used, also for frames that were added to the sequence.
     ///
     /// # Errors
-    /// See [`JobError`]; after any of them, finished work is as it was, except that
-    /// [`Mode::Force`] may already have removed some of the ledgers.
+    /// See [`JobError`]. Finished work stays intact, except that [`ResumeMode::Force`] may have removed some of
+    /// the ledgers.
     pub fn open<E: Into<Box<dyn Error + Send + Sync>>>(
         dir: &Path,
         request: JobRequest,
         resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
     ) -> Result<Self, JobError> {
-        if request.mode != Mode::RequeueChanged {
-            return Self::open_as_planned(dir, request, resolve);
+        if request.mode != ResumeMode::RequeueChanged {
+            return Self::open_unchanged(dir, request, resolve);
         }
         request.check()?;
-        // Opened without the frames that may have changed, the job then takes them in as it does those that
-        // change while it is open.
+        // Open the job without any frames, then add them like those that change while it is open
         let without = JobRequest {
             selection: Some(Vec::new()),
-            mode: Mode::Resume,
+            mode: ResumeMode::Resume,
             ..request.clone()
         };
-        let mut job = Self::open_as_planned(dir, without, resolve)?;
+        let mut job = Self::open_unchanged(dir, without, resolve)?;
         job.requeued = job.extend(&request)?;
         Ok(job)
     }
 
-    /// Opens it in any mode but [`Mode::RequeueChanged`].
-    fn open_as_planned<E: Into<Box<dyn Error + Send + Sync>>>(
+    /// Opens the job in any mode except [`ResumeMode::RequeueChanged`].
+    fn open_unchanged<E: Into<Box<dyn Error + Send + Sync>>>(
         dir: &Path,
         request: JobRequest,
         resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
     ) -> Result<Self, JobError> {
-        let dir = named(dir);
+        let dir = or_current_dir(dir);
         request.check()?;
         let selected = request.selected();
         fs::create_dir_all(dir).map_err(|e| JobError::io(dir, "creating the directory", e))?;
-        // The slow part is done before others are kept waiting.
+        // Compute fingerprints, the slow part, before the lock is taken
         let known = match request.mode {
-            Mode::Force => None,
+            ResumeMode::Force => None,
             _ => Plan::load(dir)?,
         };
-        let mut prints = FingerprintCache::ahead(&request, &selected, known.as_ref());
-        let desk = Desk::take(dir, request.patience)
-            .map_err(|e| JobError::io(dir, "beginning to work in it", e))?;
-        let locking = |e| JobError::io(dir, "agreeing with other workers", e);
-        let lock = desk.lock().map_err(locking)?;
-        clean(dir, &request, &desk)?;
-        if request.mode == Mode::Force {
-            alone(dir, &desk)?;
-            start_over(dir)?;
+        let mut fingerprints = FingerprintCache::prefetch(&request, &selected, known.as_ref());
+        let registry = WorkerRegistry::register(dir, request.takeover_after)
+            .map_err(|e| JobError::io(dir, "registering a worker", e))?;
+        let lock_failed = |e| JobError::io(dir, "locking the job", e);
+        let lock = registry.lock().map_err(lock_failed)?;
+        remove_leftovers(dir, &request, &registry)?;
+        if request.mode == ResumeMode::Force {
+            refuse_other_workers(dir, &registry)?;
+            remove_ledgers(dir)?;
         }
         let old = match request.mode {
-            Mode::Force => None,
+            ResumeMode::Force => None,
             _ => Plan::load(dir)?,
         };
         let ledger = Ledger::read(dir)?;
         let state = match old {
-            None => begin(dir, &request, ledger, &mut prints, resolve)?,
+            None => start(dir, &request, ledger, &mut fingerprints, resolve)?,
             Some(plan) => {
                 let old = JobState::new(dir, plan, ledger);
-                let merged = merged_plan(&old, &request, &selected, &mut prints, resolve)?;
-                go_on(old, merged.plan, &desk)?
+                let merged = merged_plan(&old, &request, &selected, &mut fingerprints, resolve)?;
+                resume(old, merged.plan, &registry)?
             }
         };
-        let news = if fold_ended(dir, &state.ledger, &desk)? {
-            // Lines have moved from file to file.
-            News::new(dir, desk.worker(), &Ledger::read(dir)?)
+        let watcher = if compact_ledgers(dir, &state.ledger, &registry)? {
+            // Lines have moved to another file
+            LedgerWatcher::new(dir, registry.worker(), &Ledger::read(dir)?)
         } else {
-            News::new(dir, desk.worker(), &state.ledger)
+            LedgerWatcher::new(dir, registry.worker(), &state.ledger)
         };
-        lock.end();
+        lock.complete();
         Ok(Self {
-            writer: LedgerWriter::new(dir, desk.worker()),
-            claims: Claims::new(dir, desk, news),
+            writer: LedgerWriter::new(dir, registry.worker()),
+            claims: FrameClaims::new(dir, registry, watcher),
             state,
             selected,
             requeued: Vec::new(),
         })
     }
 
-    /// Finished frames that were set back when the job was opened, because their inputs had changed
-    /// ([`Mode::RequeueChanged`]).
+    /// Finished frames that were requeued when the job was opened, because their inputs had changed
+    /// ([`ResumeMode::RequeueChanged`]).
     pub fn requeued(&self) -> &[InputChange] {
         &self.requeued
     }
 
-    /// What the frames of this job are claimed by, before they are worked on.
-    pub fn claims(&self) -> Claims {
+    /// Claims frames of this job.
+    pub fn claims(&self) -> FrameClaims {
         self.claims.clone()
     }
 
-    /// Reads again what all workers have planned and said so far.
+    /// Reads plan and ledgers again, which other workers may have changed.
     ///
     /// # Errors
-    /// [`JobError::PlanDamaged`], [`JobError::LedgerDamaged`], or trouble reading.
+    /// [`JobError::PlanDamaged`], [`JobError::LedgerDamaged`], or a file cannot be read.
     pub fn refresh(&mut self) -> Result<(), JobError> {
         let dir = self.state.dir.clone();
         let plan = match Plan::load(&dir)? {
@@ -261,38 +262,38 @@ impl Job {
         Ok(())
     }
 
-    /// The job as it stands now.
+    /// The current state of the job.
     pub const fn state(&self) -> &JobState {
         &self.state
     }
 
-    /// What "auto" turned into.
+    /// The resolved automatic settings.
     pub const fn resolved(&self) -> &Value {
         self.state.plan.resolved()
     }
 
-    /// The frames of this run, done or not, in the order asked for.
+    /// The frames of this run, done or not, in the requested order.
     pub fn selected(&self) -> &[i64] {
         &self.selected
     }
 
-    /// Frames of this run that are not done, in the order asked for. Failed ones are among them:
-    /// a new run tries them again.
+    /// Frames of this run that are not done, in the requested order. They include failed ones, which a new run
+    /// tries again.
     pub fn pending(&self) -> Vec<i64> {
-        let open = |frame: &i64| !self.state.is_done(*frame);
-        self.selected.iter().copied().filter(open).collect()
+        let is_pending = |frame: &i64| !self.state.is_done(*frame);
+        self.selected.iter().copied().filter(is_pending).collect()
     }
 
-    /// How the frames of this run stand.
-    pub fn summary(&self) -> Summary {
+    /// Counts the frames of this run by state.
+    pub fn summary(&self) -> JobSummary {
         self.state.summary_of(self.selected.iter().copied())
     }
 
-    /// Records that `frame` is done. `outputs` must be in place: image first, ledger second.
+    /// Records that `frame` is done. The `outputs` must exist already.
     ///
     /// # Errors
-    /// An output is not there, the frame is not in the plan, or the ledger cannot be written; the
-    /// ledger is then as before.
+    /// An output does not exist, the frame is not in the plan, or the ledger cannot be written. The ledger is
+    /// then unchanged.
     pub fn record_done(
         &mut self,
         frame: i64,
@@ -301,35 +302,33 @@ impl Job {
     ) -> Result<(), JobError> {
         let mut files = Vec::with_capacity(outputs.len());
         for path in outputs {
-            let metadata = fs::metadata(path)
-                .map_err(|e| JobError::io(path, "looking for the output just written", e))?;
+            let metadata =
+                fs::metadata(path).map_err(|e| JobError::io(path, "checking the output", e))?;
             files.push(OutputFile {
                 path: stored_path(&self.state.dir, path)?,
                 len: metadata.len(),
             });
         }
-        let mut entry = Entry::new(self.claims.take_seq(), frame, Status::Done, &details);
+        let mut entry =
+            LedgerEntry::new(self.claims.next_seq(), frame, EntryStatus::Done, &details);
         entry.outputs = files;
         self.record(entry, FrameState::Done)
     }
 
-    /// Records that `frame` could not be made, and why.
+    /// Records the failure of a frame.
     ///
     /// # Errors
     /// The frame is not in the plan, or the ledger cannot be written.
-    pub fn record_failed(
-        &mut self,
-        frame: i64,
-        reason: &str,
-        details: Value,
-    ) -> Result<(), JobError> {
-        let mut entry = Entry::new(self.claims.take_seq(), frame, Status::Failed, &details);
-        entry.reason = Some(reason.to_owned());
+    pub fn record_failed(&mut self, failure: &FrameFailure) -> Result<(), JobError> {
+        let seq = self.claims.next_seq();
+        let mut entry = LedgerEntry::new(seq, failure.frame, EntryStatus::Failed, &Value::Null);
+        entry.reason = Some(failure.to_string());
+        entry.failure = Some(failure.kind);
         self.record(entry, FrameState::Failed)
     }
 
-    /// Everything recorded so far is on the disk when this returns. Else that may be some tenths of a second
-    /// later, or at the end of the job.
+    /// Syncs all records to disk. Without this call they are synced within some tenths of a second, or at the end
+    /// of the job.
     ///
     /// # Errors
     /// The ledger cannot be written.
@@ -337,51 +336,50 @@ impl Job {
         self.writer.sync()
     }
 
-    pub(crate) fn record(&mut self, entry: Entry, state: FrameState) -> Result<(), JobError> {
+    pub(crate) fn record(&mut self, entry: LedgerEntry, state: FrameState) -> Result<(), JobError> {
         let frame = entry.frame;
         let Some(slot) = self.state.states.get_mut(&frame) else {
-            return Err(JobError::Request(format!(
-                "frame {frame} is not in the plan"
-            )));
+            return Err(JobError::UnknownFrame { frame });
         };
-        self.writer.append(&entry, self.claims.has_company())?;
+        self.writer
+            .append(&entry, self.claims.has_other_workers())?;
         *slot = state;
-        self.state.ledger.take_in(entry);
+        self.state.ledger.merge(entry);
         Ok(())
     }
 }
 
-impl Foreseen {
-    /// Frames of the run that are not done, in the order asked for.
+impl DryRun {
+    /// Frames of the run that are not done, in the requested order.
     pub fn pending(&self) -> Vec<i64> {
-        let open = |frame: &i64| !self.state.is_done(*frame);
-        self.selected.iter().copied().filter(open).collect()
+        let is_pending = |frame: &i64| !self.state.is_done(*frame);
+        self.selected.iter().copied().filter(is_pending).collect()
     }
 
-    /// How the frames of the run stand.
-    pub fn summary(&self) -> Summary {
+    /// Counts the frames of the run by state.
+    pub fn summary(&self) -> JobSummary {
         self.state.summary_of(self.selected.iter().copied())
     }
 }
 
-fn begin<E: Into<Box<dyn Error + Send + Sync>>>(
+fn start<E: Into<Box<dyn Error + Send + Sync>>>(
     dir: &Path,
     request: &JobRequest,
     ledger: Ledger,
-    prints: &mut FingerprintCache,
+    fingerprints: &mut FingerprintCache,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
 ) -> Result<JobState, JobError> {
     refuse_ledgers(dir)?;
-    if request.mode != Mode::Force {
-        foreign::refuse_at_begin(request)?;
+    if request.mode != ResumeMode::Force {
+        request.refuse_existing_outputs()?;
     }
-    let mut plan = new_plan(dir, request, prints)?;
-    plan.resolve(resolve(None).map_err(|e| JobError::Resolve(e.into()))?);
+    let mut plan = new_plan(dir, request, fingerprints)?;
+    plan.set_resolved(resolve(None).map_err(|e| JobError::Resolve(e.into()))?);
     plan.store(dir)?;
     Ok(JobState::new(dir, plan, ledger))
 }
 
-/// Refuses ledgers that no plan explains.
+/// Refuses ledgers without a plan.
 fn refuse_ledgers(dir: &Path) -> Result<(), JobError> {
     let mut files = ledger_files(dir)?.into_iter();
     match files.find(|file| file.length > 0) {
@@ -390,75 +388,85 @@ fn refuse_ledgers(dir: &Path) -> Result<(), JobError> {
     }
 }
 
-fn go_on(old: JobState, plan: Plan, desk: &Desk) -> Result<JobState, JobError> {
+fn resume(old: JobState, plan: Plan, registry: &WorkerRegistry) -> Result<JobState, JobError> {
     if plan == old.plan {
         return Ok(old);
     }
     if plan.settings() != old.plan.settings() {
-        // The others make their images with what they began with.
-        alone(&old.dir, desk)?;
+        // Other workers keep using the settings that they started with
+        refuse_other_workers(&old.dir, registry)?;
     }
-    foreign::refuse_new(&old, &plan)?;
+    old.refuse_existing_outputs(&plan)?;
     plan.store(&old.dir)?;
     Ok(JobState::new(&old.dir, plan, old.ledger))
 }
 
-/// Refuses what must not be done while others work.
-fn alone(dir: &Path, desk: &Desk) -> Result<(), JobError> {
-    let others = desk.others();
-    let others = others.map_err(|e| JobError::io(dir, "looking for other workers", e))?;
+/// Refuses an operation that is not possible while other workers are active.
+fn refuse_other_workers(dir: &Path, registry: &WorkerRegistry) -> Result<(), JobError> {
+    let others = registry.others();
+    let others = others.map_err(|e| JobError::io(dir, "listing workers", e))?;
     match others.first() {
         Some(other) => Err(JobError::Busy {
             dir: dir.to_owned(),
-            who: other.told(),
+            worker: other.description(),
         }),
         None => Ok(()),
     }
 }
 
-/// A plan without ledgers means nothing is done. It stays until the next one replaces it, so that a kill in
-/// between does not leave images that no plan knows.
-fn start_over(dir: &Path) -> Result<(), JobError> {
+/// Removes all ledgers, so that no frame counts as done. The plan stays until the next one replaces it. A kill in
+/// between thus leaves no images without a plan.
+fn remove_ledgers(dir: &Path) -> Result<(), JobError> {
     ledger_files(dir)?.iter().try_for_each(remove)
 }
 
-/// Brings ledgers of ended workers together if there are many; whether it did.
-fn fold_ended(dir: &Path, ledger: &Ledger, desk: &Desk) -> Result<bool, JobError> {
-    let names = desk.names();
-    let at_work = names.map_err(|e| JobError::io(dir, "looking for other workers", e))?;
+/// Compacts the ledgers of ended workers if there are many. Returns whether it did.
+fn compact_ledgers(
+    dir: &Path,
+    ledger: &Ledger,
+    registry: &WorkerRegistry,
+) -> Result<bool, JobError> {
+    let names = registry.worker_names();
+    let active = names.map_err(|e| JobError::io(dir, "listing workers", e))?;
     let mut files = ledger_files(dir)?;
-    files.retain(|file| !at_work.contains(&file.worker));
-    let loose = files.iter().filter(|file| file.worker != ENDED).count();
-    if loose <= LOOSE_LEDGERS {
+    files.retain(|file| !active.contains(&file.worker));
+    let loose = files.iter().filter(|file| file.worker != COMPACTED).count();
+    if loose <= MAX_LOOSE_LEDGERS {
         return Ok(false);
     }
-    fold(dir, ledger, &files)?;
+    compact(dir, ledger, &files)?;
     Ok(true)
 }
 
-/// Removes what killed runs left half written, here and where outputs go.
-fn clean(dir: &Path, request: &JobRequest, desk: &Desk) -> Result<(), JobError> {
-    let failed = |e| JobError::io(dir, "removing leftovers of a killed run", e);
-    let at_work = desk.sweep().map_err(failed)?;
+/// Removes incomplete files of killed runs, from the job's directory and from those of its outputs.
+fn remove_leftovers(
+    dir: &Path,
+    request: &JobRequest,
+    registry: &WorkerRegistry,
+) -> Result<(), JobError> {
+    let failed = |e| JobError::io(dir, "removing incomplete files of a killed run", e);
     let outputs = request.frames.iter().flat_map(|f| &f.outputs);
     let mut dirs: Vec<&Path> = outputs.filter_map(|path| path.parent()).collect();
     dirs.push(dir);
     dirs.sort_unstable();
     dirs.dedup();
+    let mut parts = ListedParts::default();
     for dir in &dirs {
-        match sweep_parts(dir, &at_work) {
+        match parts.add(dir) {
             Err(e) if e.kind() != io::ErrorKind::NotFound => {
-                return Err(JobError::io(dir, "removing leftovers of a killed run", e));
+                let doing = "removing incomplete files of a killed run";
+                return Err(JobError::io(dir, doing, e));
             }
             _ => {}
         }
     }
-    desk.writes_to(dirs.into_iter().map(Path::to_owned).collect());
+    parts.remove_stale(&registry.remove_dead().map_err(failed)?);
+    registry.set_output_dirs(dirs.into_iter().map(Path::to_owned).collect());
     Ok(())
 }
 
-/// The directory of a bare file name is the current one.
-fn named(dir: &Path) -> &Path {
+/// The directory of a bare file name is the current directory.
+fn or_current_dir(dir: &Path) -> &Path {
     if dir.as_os_str().is_empty() {
         Path::new(".")
     } else {

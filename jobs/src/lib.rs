@@ -1,55 +1,72 @@
-//! Plans, records and resumes frame-by-frame work, and does not know what the work is: the caller
-//! hands it frames, settings to fingerprint, and does the work itself.
+//! Plans, records and resumes frame-by-frame work. The crate does not know what the work is: the caller passes
+//! frames and the settings that outputs depend on, and does the work itself.
 //!
 //! `formats` turns bytes into frames and knows no rays. `jobs` plans, records and resumes work and
 //! does not know what the work is. `spherule` (accelerators, tracer, output, command line) joins
 //! them. Arrows never point the other way.
 //!
-//! A job lives in one directory. The *plan* ([`Plan`]) says which frames there are and under which
-//! settings; it is written once and again only when frames are added. The *ledger* ([`Ledger`])
-//! only grows: one line for each frame that was finished or failed, a file for each worker. Workers claim
-//! frames ([`Claims`]) before they do them. Outputs are published whole
-//! ([`Publisher`]) before their line is written, so a kill at any moment loses at most the frames
-//! in hand. [`export`] writes frames as work for other engines.
+//! A job is a directory. The *plan* ([`Plan`]) lists the frames and the settings. It is written once, and again
+//! only when frames are added. The *ledger* ([`Ledger`]) only grows: one line per finished or failed frame, in
+//! one file per worker. Workers claim frames ([`FrameClaims`]) before they work on them. Outputs are published
+//! complete ([`Publisher`]) before they are recorded, so a kill at any moment loses at most the frames in
+//! progress. [`run_frames`] is the loop that claims, processes and records frames; the work is a [`FrameWork`].
+//! [`export`] describes frames as work for other engines.
 #![deny(unsafe_code)]
 
+mod changes;
 mod claims;
+mod clock;
 mod error;
+mod existing_outputs;
 pub mod export;
 mod extend;
+mod failure;
+mod file_error;
 mod fingerprint;
 mod fingerprint_cache;
-mod foreign;
 mod input;
 mod interrupt;
 mod job;
 mod ledger;
+mod panic;
 #[doc(hidden)]
 pub mod parse;
 mod plan;
 mod planning;
 mod process;
-mod publish;
 mod queue;
 mod range;
 mod regular;
 mod request;
 mod requeue;
+mod run;
 mod state;
-mod work;
+mod workers;
 
-pub use claims::Claims;
-pub use error::{InputChange, JobError, SettingChange};
+pub use changes::{InputChange, SettingChange};
+pub use claims::FrameClaims;
+pub use error::{EntryError, JobError, PlanError};
+pub use failure::{FailureKind, FrameFailure};
+pub use file_error::FileError;
 pub use fingerprint::{Fingerprint, compare_settings, settings_hash, text_hash};
 pub use interrupt::{Interrupt, InterruptLevel};
-pub use job::{Foreseen, Job};
-pub use ledger::{Details, Entry, Ledger, OutputFile, Status};
-pub use plan::{PLAN_FILE, Plan, PlannedFrame, PlannedInput};
-pub use process::{owner, work_on_behalf_of};
-pub use publish::{Publisher, discard_own_parts, discard_parts, publish, publish_with};
-pub use queue::{Queue, QueueNews};
+pub use job::{DryRun, Job};
+pub use ledger::{Details, EntryStatus, Ledger, LedgerEntry, OutputFile};
+pub use panic::{Panic, catch_panic};
+pub use plan::{Plan, PlannedFrame, PlannedInput};
+pub use queue::{ClaimedFrame, FrameQueue, QueueEvent};
 pub use range::{FrameRange, RangeError};
 pub use regular::{open_regular, read_regular, read_regular_text};
-pub use request::{DEFAULT_PATIENCE, FrameRequest, JobRequest, Mode};
-pub use state::{FrameState, JobState, Summary};
-pub use work::{Claim, Claimed, WorkerView, start_heart};
+pub use request::{DEFAULT_TAKEOVER_AFTER, FrameRequest, JobRequest, ResumeMode};
+pub use run::{
+    FinishedFrame, FrameEvent, FrameRecorder, FrameWork, OnFrameEvent, Recorded, RunContext,
+    RunOptions, run_frames,
+};
+pub use spherule_publish::{
+    Publisher, discard_own_parts, discard_parts, owner, publish, publish_with, set_owner,
+};
+pub use state::{FrameState, JobState, JobSummary};
+pub use workers::{Claim, ClaimOutcome, WorkerStatus, start_heartbeat_thread};
+
+/// Name of the plan in the job's directory.
+pub const PLAN_FILE: &str = "job.plan.json";

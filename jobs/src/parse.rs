@@ -1,26 +1,26 @@
-//! What is read of a job's files, over bytes: for fuzzing. None of these panics, whatever the bytes.
+//! Parsers of the files of a job, for fuzzing. They never panic, whatever the bytes.
 
 use crate::ledger::parse_lines;
-use crate::work::Card;
-use crate::{Entry, Plan};
+use crate::workers::WorkerRecord;
+use crate::{EntryError, LedgerEntry, Plan, PlanError};
 
-/// A plan, from the bytes of its file.
+/// Parses the file of a plan.
 ///
 /// # Errors
-/// What is wrong with them.
-pub fn plan(bytes: &[u8]) -> Result<Plan, String> {
+/// Why it is invalid.
+pub fn plan(bytes: &[u8]) -> Result<Plan, PlanError> {
     Plan::parse(bytes)
 }
 
-/// The entries of a ledger, from the bytes of its file; what follows the last line feed is dropped.
+/// Parses the file of a ledger. Bytes after the last line feed are ignored.
 ///
 /// # Errors
-/// The number of the line that is no entry, from 1, and why.
-pub fn ledger(bytes: &[u8]) -> Result<Vec<Entry>, (usize, String)> {
+/// The number of the invalid line, from 1, and why it is invalid.
+pub fn ledger(bytes: &[u8]) -> Result<Vec<LedgerEntry>, (usize, EntryError)> {
     parse_lines(bytes)
 }
 
-/// The name of the worker whose card, or claim, these are the bytes of.
-pub fn card(bytes: &[u8]) -> Option<String> {
-    Card::parse(bytes).map(|card| card.worker)
+/// Parses a worker record or a claim; returns the name of the worker.
+pub fn worker_record(bytes: &[u8]) -> Option<String> {
+    WorkerRecord::parse(bytes).map(|record| record.worker)
 }

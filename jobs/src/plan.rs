@@ -1,6 +1,6 @@
-//! The plan: which frames a job has, from which inputs to which outputs, under which settings,
-//! and what "auto" turned into. One JSON file in the job's directory, replaced only as a whole, with a
-//! checksum of all of it: a plan with one wrong digit would give the remaining frames another camera.
+//! The plan: the frames of a job with their inputs and outputs, the settings, and the resolved automatic
+//! settings. It is one JSON file in the job's directory, always replaced as a whole. It has a checksum: with one
+//! wrong digit in the plan, the remaining frames would get another camera.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,62 +10,59 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 
 use crate::{
-    Fingerprint, JobError, SettingChange, compare_settings, publish, read_regular, settings_hash,
-    text_hash,
+    Fingerprint, JobError, PLAN_FILE, PlanError, SettingChange, compare_settings, publish,
+    read_regular, settings_hash, text_hash,
 };
 
-/// Name of the plan in the job's directory.
-pub const PLAN_FILE: &str = "job.plan.json";
-
-/// The version that is written. Version 1, of spherule 0.1.0, has a checksum of the settings alone and no
-/// `input_dirs`; it is read, and replaced when the job goes on.
+/// The version that is written. Version 1, of spherule 0.1.0, has a checksum of the settings only and no
+/// `input_dirs`. It is read, and replaced when the job is resumed.
 const VERSION: u32 = 2;
 
-/// More than a plan of two million frames needs.
+/// Bytes of the longest plan that is read: more than two million frames need.
 const MAX_BYTES: u64 = 1 << 30;
 
 /// See the module.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Plan {
-    /// That of the file it was read from.
+    /// Version of the file that it was read from.
     #[serde(skip, default = "current_version")]
     version: u32,
-    /// What outputs depend on, besides the inputs: dotted key and value, in the caller's order.
+    /// Everything that outputs depend on besides the inputs: dotted key and value, in the caller's order.
     settings: Vec<(String, String)>,
-    /// What "auto" turned into; means something to the caller only.
+    /// Resolved automatic settings, in the caller's format.
     resolved: Value,
-    /// The directories that inputs were found in, absolute and without links, the latest last.
+    /// Input directories, absolute and without links, most recent last.
     #[serde(default)]
     input_dirs: Vec<String>,
-    /// By number, ascending.
+    /// Ascending by number.
     frames: Vec<PlannedFrame>,
 }
 
 /// One frame of a [`Plan`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlannedFrame {
-    /// The frame's number, unique in the plan.
+    /// Frame number, unique in the plan.
     pub number: i64,
-    /// Files it is made from.
+    /// Input files, and then those of [`crate::FrameRequest::companions`].
     pub inputs: Vec<PlannedInput>,
-    /// Files it is made into; relative ones are in the job's directory.
+    /// Output files; relative paths are in the job's directory.
     pub outputs: Vec<String>,
 }
 
 /// One input of a [`PlannedFrame`].
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct PlannedInput {
-    /// As the caller gave it. Not part of the frame's identity: data may be moved.
+    /// Path as given by the caller. Not part of the frame's identity: data may be moved.
     pub path: String,
-    /// None if the file could not be read when it was planned.
+    /// None if the file was not readable when it was planned.
     pub fingerprint: Option<Fingerprint>,
 }
 
-/// The file of a plan.
+/// The serialised form of a plan.
 #[derive(Serialize, Deserialize)]
-struct SealedPlan<'a> {
+struct ChecksummedPlan<'a> {
     version: u32,
-    /// BLAKE3 of the text of `plan` as it stands in the file, in hex.
+    /// BLAKE3 of the text of `plan` exactly as in the file, in hex.
     blake3: String,
     #[serde(borrow)]
     plan: &'a RawValue,
@@ -91,27 +88,27 @@ impl Plan {
         }
     }
 
-    /// What outputs depend on, besides the inputs.
+    /// Everything that outputs depend on besides the inputs.
     pub fn settings(&self) -> &[(String, String)] {
         &self.settings
     }
 
-    /// How `settings` differ from the plan's.
+    /// The differences between the settings of the plan and `settings`.
     pub fn changes_to(&self, settings: &[(String, String)]) -> Vec<SettingChange> {
         compare_settings(&self.settings, settings)
     }
 
-    /// Settles what "auto" turned into.
-    pub(crate) fn resolve(&mut self, resolved: Value) {
+    /// Sets the resolved automatic settings.
+    pub(crate) fn set_resolved(&mut self, resolved: Value) {
         self.resolved = resolved;
     }
 
-    /// What "auto" turned into.
+    /// The resolved automatic settings.
     pub const fn resolved(&self) -> &Value {
         &self.resolved
     }
 
-    /// The directories that inputs were found in; empty in plans of version 1.
+    /// The input directories; empty in plans of version 1.
     pub(crate) fn input_dirs(&self) -> &[String] {
         &self.input_dirs
     }
@@ -131,7 +128,7 @@ impl Plan {
         dir.join(PLAN_FILE)
     }
 
-    /// The plan in `dir`, or None if there is none.
+    /// Reads the plan in `dir`; None if there is none.
     pub(crate) fn load(dir: &Path) -> Result<Option<Self>, JobError> {
         let path = Self::path_in(dir);
         let bytes = match read_regular(&path, MAX_BYTES) {
@@ -141,55 +138,54 @@ impl Plan {
         };
         Self::parse(&bytes)
             .map(Some)
-            .map_err(|what| JobError::PlanDamaged { path, what })
+            .map_err(|source| JobError::PlanDamaged { path, source })
     }
 
-    /// Reads the bytes of a plan's file. What is wrong with them is said without the file's name.
+    /// Parses the file of a plan. The error does not contain the file's name.
     ///
     /// # Errors
-    /// They are no plan, are damaged, or are of a version that is not known.
+    /// The bytes are not a plan, are damaged, or have an unknown version.
     #[doc(hidden)]
-    pub fn parse(bytes: &[u8]) -> Result<Self, String> {
+    pub fn parse(bytes: &[u8]) -> Result<Self, PlanError> {
         #[derive(Deserialize)]
         struct Versioned {
             version: u32,
         }
-        let version = serde_json::from_slice::<Versioned>(bytes)
-            .map_err(damaged)?
-            .version;
+        let version = serde_json::from_slice::<Versioned>(bytes)?.version;
         let plan = match version {
-            VERSION => Self::unsealed(bytes)?,
+            VERSION => Self::parse_version_2(bytes)?,
             1 => Self::parse_version_1(bytes)?,
-            _ => {
-                return Err(format!(
-                    "the plan has version {version}, this program knows versions 1 to {VERSION}"
-                ));
+            found => {
+                return Err(PlanError::Version {
+                    found,
+                    latest: VERSION,
+                });
             }
         };
         if !plan.frames.is_sorted_by(|a, b| a.number < b.number) {
-            return Err("the frames in the plan are not in ascending order".to_owned());
+            return Err(PlanError::Unordered);
         }
         Ok(plan)
     }
 
-    fn unsealed(bytes: &[u8]) -> Result<Self, String> {
-        let sealed: SealedPlan = serde_json::from_slice(bytes).map_err(damaged)?;
-        let text = sealed.plan.get();
-        if text_hash(text) != sealed.blake3 {
-            return Err("the plan does not match its checksum: it is damaged or edited".to_owned());
+    fn parse_version_2(bytes: &[u8]) -> Result<Self, PlanError> {
+        let checksummed: ChecksummedPlan = serde_json::from_slice(bytes)?;
+        let text = checksummed.plan.get();
+        if text_hash(text) != checksummed.blake3 {
+            return Err(PlanError::Checksum);
         }
-        serde_json::from_str(text).map_err(damaged)
+        Ok(serde_json::from_str(text)?)
     }
 
-    fn parse_version_1(bytes: &[u8]) -> Result<Self, String> {
+    fn parse_version_1(bytes: &[u8]) -> Result<Self, PlanError> {
         #[derive(Deserialize)]
         struct Hashed {
             settings_blake3: String,
         }
-        let hash: Hashed = serde_json::from_slice(bytes).map_err(damaged)?;
-        let mut plan: Self = serde_json::from_slice(bytes).map_err(damaged)?;
+        let hash: Hashed = serde_json::from_slice(bytes)?;
+        let mut plan: Self = serde_json::from_slice(bytes)?;
         if settings_hash(&plan.settings) != hash.settings_blake3 {
-            return Err("the settings in the plan do not match their fingerprint".to_owned());
+            return Err(PlanError::SettingsChecksum);
         }
         plan.version = 1;
         Ok(plan)
@@ -197,25 +193,26 @@ impl Plan {
 
     pub(crate) fn store(&self, dir: &Path) -> Result<(), JobError> {
         let path = Self::path_in(dir);
-        let bytes = self
-            .to_bytes()
-            .map_err(|e| JobError::Request(format!("the plan cannot be written as JSON: {e}")))?;
+        let bytes = self.to_bytes().map_err(|source| JobError::Serialize {
+            path: path.clone(),
+            source,
+        })?;
         publish(&path, &bytes).map_err(|e| JobError::io(&path, "writing the plan", e))
     }
 
     fn to_bytes(&self) -> serde_json::Result<Vec<u8>> {
         let text = RawValue::from_string(serde_json::to_string_pretty(self)?)?;
-        let sealed = SealedPlan {
+        let checksummed = ChecksummedPlan {
             version: VERSION,
             blake3: text_hash(text.get()),
             plan: &text,
         };
-        let mut bytes = serde_json::to_vec_pretty(&sealed)?;
+        let mut bytes = serde_json::to_vec_pretty(&checksummed)?;
         bytes.push(b'\n');
         Ok(bytes)
     }
 
-    /// Takes in `frames`, replacing those of the same number.
+    /// Adds `frames`. They replace frames with the same numbers.
     pub(crate) fn merge(&mut self, frames: Vec<PlannedFrame>) {
         for frame in frames {
             match self
@@ -229,12 +226,8 @@ impl Plan {
     }
 }
 
-fn damaged(error: serde_json::Error) -> String {
-    format!("this is no readable plan ({error})")
-}
-
 impl PlannedFrame {
-    /// The first input that is not what `self`, planned earlier, was made from.
+    /// The first input of `now` that differs from the inputs of `self`, which was planned earlier.
     pub(crate) fn changed_input(&self, now: &Self) -> Option<(PathBuf, String)> {
         if self.inputs.len() != now.inputs.len() {
             let path = now.inputs.first().or(self.inputs.first())?.path.clone();
@@ -244,8 +237,8 @@ impl PlannedFrame {
         self.inputs.iter().zip(&now.inputs).find_map(|(old, new)| {
             let what = match (&old.fingerprint, &new.fingerprint) {
                 (Some(old), Some(new)) => old.difference(new),
-                (Some(_), None) => Some("cannot be read any more".to_owned()),
-                (None, Some(_)) => Some("could not be read when it was planned".to_owned()),
+                (Some(_), None) => Some("is no longer readable".to_owned()),
+                (None, Some(_)) => Some("was not readable when it was planned".to_owned()),
                 (None, None) => None,
             };
             what.map(|what| (PathBuf::from(&new.path), what))

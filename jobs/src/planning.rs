@@ -1,4 +1,4 @@
-//! Plans as they come of requests: of nothing, or of the plan that is there.
+//! Makes plans from requests: new ones, and ones that extend an existing plan.
 
 use std::collections::HashMap;
 use std::error::Error;
@@ -6,55 +6,59 @@ use std::path::Path;
 
 use serde_json::Value;
 
-use crate::fingerprint_cache::{FingerprintCache, wanted};
-use crate::input::{check_input, input_dirs};
+use crate::fingerprint_cache::{FingerprintCache, frames_to_fingerprint};
+use crate::input::{check_input, merged_input_dirs};
 use crate::{
-    FrameRequest, InputChange, JobError, JobRequest, JobState, Mode, Plan, PlannedFrame,
-    PlannedInput,
+    FrameRequest, InputChange, JobError, JobRequest, JobState, Plan, PlannedFrame, PlannedInput,
+    ResumeMode,
 };
 
-/// The plan of a job that begins.
+/// The plan of a new job.
 pub(crate) fn new_plan(
     dir: &Path,
     request: &JobRequest,
-    prints: &mut FingerprintCache,
+    fingerprints: &mut FingerprintCache,
 ) -> Result<Plan, JobError> {
-    let mut frames = planned_frames(prints, dir, &request.frames)?;
+    let mut frames = planned_frames(fingerprints, dir, &request.frames)?;
     frames.sort_by_key(|f| f.number);
-    let dirs = input_dirs(&[], request);
+    let dirs = merged_input_dirs(&[], request);
     let settings = request.settings.clone();
     Ok(Plan::new(settings, Value::Null, dirs, frames))
 }
 
-/// The plan of a job that goes on. Changed inputs of finished frames are refused, or reported, as the
-/// request's mode says.
+/// The plan of a resumed job. Changed inputs of finished frames are refused or returned, depending on the mode
+/// of the request.
 pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     state: &JobState,
     request: &JobRequest,
     selected: &[i64],
-    prints: &mut FingerprintCache,
+    fingerprints: &mut FingerprintCache,
     resolve: impl FnOnce(Option<&Value>) -> Result<Value, E>,
-) -> Result<Extension, JobError> {
-    check_input(state, request, prints)?;
+) -> Result<ExtendedPlan, JobError> {
+    check_input(state, request, fingerprints)?;
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
-    if request.mode != Mode::KeepDone && !changes.is_empty() {
+    if request.mode != ResumeMode::KeepDone && !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
-    let mut frames = planned_frames(prints, &dir, wanted(request, selected, Some(&state.plan)))?;
-    let mut stale = Vec::new();
+    let mut frames = planned_frames(
+        fingerprints,
+        &dir,
+        frames_to_fingerprint(request, selected, Some(&state.plan)),
+    )?;
+    let mut outdated = Vec::new();
     match request.mode {
-        Mode::Resume => {
+        ResumeMode::Resume => {
             let changes = changed_inputs(state, &frames);
             if !changes.is_empty() {
                 return Err(JobError::InputChanged { dir, changes });
             }
         }
-        Mode::RequeueChanged => {
-            keep_cleared_away(state, &mut frames);
-            stale = changed_inputs(state, &frames);
+        ResumeMode::RequeueChanged => {
+            keep_unreadable_done(state, &mut frames);
+            outdated = changed_inputs(state, &frames);
         }
-        Mode::Force | Mode::KeepDone => {}
+        ResumeMode::Force | ResumeMode::KeepDone => {}
     }
     let resolved = if changes.is_empty() {
         state.plan.resolved().clone()
@@ -66,69 +70,72 @@ pub(crate) fn merged_plan<E: Into<Box<dyn Error + Send + Sync>>>(
     } else {
         request.settings.clone()
     };
-    let dirs = input_dirs(state.plan.input_dirs(), request);
+    let dirs = merged_input_dirs(state.plan.input_dirs(), request);
     let mut plan = Plan::new(settings, resolved, dirs, state.plan.frames().to_vec());
     plan.merge(frames);
     refuse_shared_outputs(&dir, &plan)?;
-    Ok(Extension {
+    Ok(ExtendedPlan {
         plan,
-        changes: stale,
+        changes: outdated,
     })
 }
 
-/// A request may have other frames than the plan, under a name that one of the plan's has.
+/// Refuses two frames with the same output: a request may have other frames than the plan.
 fn refuse_shared_outputs(dir: &Path, plan: &Plan) -> Result<(), JobError> {
     let mut owners = HashMap::new();
     for frame in plan.frames() {
         for output in &frame.outputs {
             if let Some(other) = owners.insert(output, frame.number) {
-                return Err(JobError::Request(format!(
-                    "{}: the job has frame {other} and would have frame {} under this name; put #### into \
-                     the name, choose another one, or start over with --force",
-                    dir.join(output).display(),
-                    frame.number
-                )));
+                return Err(JobError::PlannedOutput {
+                    path: dir.join(output),
+                    planned: other,
+                    requested: frame.number,
+                });
             }
         }
     }
     Ok(())
 }
 
-/// What comes of a sequence that may have grown.
-pub(crate) struct Extension {
+/// A plan with the new frames of a sequence.
+pub(crate) struct ExtendedPlan {
     pub(crate) plan: Plan,
-    /// Finished frames that are to be made anew.
+    /// Finished frames that must be repeated.
     pub(crate) changes: Vec<InputChange>,
 }
 
-/// The plan of a job that takes in the frames `new` while it is open.
+/// The plan of an open job to which the frames `new` are added.
 pub(crate) fn extended_plan(
     state: &JobState,
     request: &JobRequest,
     new: &[i64],
-    prints: &mut FingerprintCache,
-) -> Result<Extension, JobError> {
+    fingerprints: &mut FingerprintCache,
+) -> Result<ExtendedPlan, JobError> {
     let dir = state.dir.clone();
     let changes = state.plan.changes_to(&request.settings);
     if !changes.is_empty() {
         return Err(JobError::SettingsChanged { dir, changes });
     }
-    let mut frames = planned_frames(prints, &dir, wanted(request, new, Some(&state.plan)))?;
-    keep_cleared_away(state, &mut frames);
+    let mut frames = planned_frames(
+        fingerprints,
+        &dir,
+        frames_to_fingerprint(request, new, Some(&state.plan)),
+    )?;
+    keep_unreadable_done(state, &mut frames);
     let changes = changed_inputs(state, &frames);
     let mut plan = state.plan.clone();
     plan.merge(frames);
-    Ok(Extension { plan, changes })
+    Ok(ExtendedPlan { plan, changes })
 }
 
-/// Leaves finished frames that cannot be read any more out of `frames`, so that the plan keeps them as they were: an
-/// image is not stale because its input has been cleared away since.
-fn keep_cleared_away(state: &JobState, frames: &mut Vec<PlannedFrame>) {
+/// Removes finished frames that are no longer readable from `frames`, so that the plan keeps the old ones. An image
+/// is not outdated because its input was deleted.
+fn keep_unreadable_done(state: &JobState, frames: &mut Vec<PlannedFrame>) {
     let is_readable = |f: &PlannedFrame| f.inputs.iter().all(|i| i.fingerprint.is_some());
     frames.retain(|now| is_readable(now) || !state.is_done(now.number));
 }
 
-/// Only finished frames can be stale; the others will be made from what is there now.
+/// Finished frames whose inputs have changed. The other frames use the current inputs anyway.
 fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange> {
     let mut changes: Vec<InputChange> = frames
         .iter()
@@ -146,7 +153,7 @@ fn changed_inputs(state: &JobState, frames: &[PlannedFrame]) -> Vec<InputChange>
     changes
 }
 
-/// `frames` as a plan in `dir` lists them.
+/// Converts `frames` to frames of a plan in `dir`.
 fn planned_frames<'a>(
     fingerprints: &mut FingerprintCache,
     dir: &Path,
@@ -155,10 +162,10 @@ fn planned_frames<'a>(
     let mut planned = Vec::new();
     for frame in frames {
         let mut inputs = Vec::with_capacity(frame.inputs.len());
-        for path in &frame.inputs {
+        for path in frame.dependencies() {
             inputs.push(PlannedInput {
                 path: utf8(path)?,
-                fingerprint: fingerprints.of(path),
+                fingerprint: fingerprints.get(path),
             });
         }
         let outputs = frame.outputs.iter().map(|path| stored_path(dir, path));
@@ -171,19 +178,18 @@ fn planned_frames<'a>(
     Ok(planned)
 }
 
-/// Relative to `dir` where it can be, so that the directory may be moved.
+/// `path` relative to `dir` if possible, so that the directory can be moved.
 pub(crate) fn stored_path(dir: &Path, path: &Path) -> Result<String, JobError> {
-    let failed = |e| JobError::io(path, "finding its absolute path", e);
+    let failed = |e| JobError::io(path, "resolving the path", e);
     let path = std::path::absolute(path).map_err(failed)?;
     let dir = std::path::absolute(dir).map_err(failed)?;
     utf8(path.strip_prefix(dir).unwrap_or(&path))
 }
 
 fn utf8(path: &Path) -> Result<String, JobError> {
-    path.to_str().map(str::to_owned).ok_or_else(|| {
-        JobError::Request(format!(
-            "{}: the name is not UTF-8 and cannot go into a plan; rename it",
-            path.display()
-        ))
-    })
+    path.to_str()
+        .map(str::to_owned)
+        .ok_or_else(|| JobError::NotUtf8 {
+            path: path.to_owned(),
+        })
 }

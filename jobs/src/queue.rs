@@ -1,85 +1,105 @@
-//! What a worker does next: the frames of its run, in their order, that no other worker has in hand.
+//! The order of work of one worker: the frames of its run that no other worker holds.
 
 use std::collections::VecDeque;
-use std::thread;
 use std::time::Duration;
 
-use crate::{Claim, Claimed, Claims, Interrupt, JobError, Status};
+use crate::{Claim, ClaimOutcome, EntryStatus, FrameClaims, Interrupt, JobError};
 
-/// First and longest pause between looks at frames that others have in hand.
-const PAUSES: (Duration, Duration) = (Duration::from_millis(5), Duration::from_millis(500));
+/// Shortest and longest time between checks of frames that other workers hold.
+const POLL_INTERVALS: (Duration, Duration) = (Duration::from_millis(5), Duration::from_millis(500));
 
-/// Hands out the frames of a run one by one.
-#[derive(Debug)]
-pub struct Queue {
-    claims: Claims,
+/// Claims the frames of a run one after the other.
+pub struct FrameQueue<'a> {
+    claims: FrameClaims,
     interrupt: Interrupt,
-    /// Not looked at yet, with their places in the run.
-    fresh: VecDeque<(usize, i64)>,
-    /// In the hands of others when they were looked at.
+    on_event: &'a (dyn Fn(QueueEvent<'_>) + Sync),
+    /// Indices in the run and frames that were not tried yet.
+    untried: VecDeque<(usize, i64)>,
+    /// Frames that other workers held at the last check.
     held: VecDeque<(usize, i64)>,
 }
 
-/// What the queue has found out.
+/// A frame that no other worker processes meanwhile.
+#[derive(Debug)]
+pub struct ClaimedFrame {
+    /// Its index in the frames of the run.
+    pub index: usize,
+    /// Frame number.
+    pub frame: i64,
+    pub(crate) claim: Claim,
+}
+
+/// What other workers do with the frames of a queue.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum QueueNews<'a> {
-    /// Another worker has ended a frame.
-    Elsewhere(i64, Status),
-    /// Nothing is left but what others have in hand: a frame, and who has it.
+pub enum QueueEvent<'a> {
+    /// Another worker has finished this frame.
+    FinishedElsewhere(i64, EntryStatus),
+    /// All remaining frames are held by other workers: one of the frames, and a description of its worker.
     Waiting(i64, &'a str),
 }
 
-impl Queue {
-    /// For the `frames` of a run, which were to be done when its worker began.
-    pub fn new(
-        claims: Claims,
+impl<'a> FrameQueue<'a> {
+    /// A queue of the `frames` of a run, which were pending when the worker started.
+    pub(crate) fn new(
+        claims: FrameClaims,
         frames: impl IntoIterator<Item = i64>,
         interrupt: &Interrupt,
+        on_event: &'a (dyn Fn(QueueEvent<'_>) + Sync),
     ) -> Self {
         Self {
             claims,
             interrupt: interrupt.clone(),
-            fresh: frames.into_iter().enumerate().collect(),
+            on_event,
+            untried: frames.into_iter().enumerate().collect(),
             held: VecDeque::new(),
         }
     }
 
-    /// The next frame by its place in the run, claimed. With nothing left but what others have in hand,
-    /// waits until they have ended it or have died. None at the end, or once the interrupt is raised.
+    /// Claims the next frame. If other workers hold all remaining frames, blocks until they have finished or died.
+    /// None at the end of the run, or once the interrupt is raised.
     ///
     /// # Errors
-    /// Those of [`Claims::take`].
-    pub fn take(
-        &mut self,
-        news: &mut dyn FnMut(QueueNews),
-    ) -> Result<Option<(usize, Claim)>, JobError> {
-        let mut pause = PAUSES.0;
-        let mut has_told = false;
+    /// Those of [`FrameClaims::claim`].
+    #[expect(
+        clippy::should_implement_trait,
+        reason = "an iterator cannot return errors with `?`"
+    )]
+    pub fn next(&mut self) -> Result<Option<ClaimedFrame>, JobError> {
+        let mut interval = POLL_INTERVALS.0;
+        let mut has_reported = false;
         loop {
-            let mut who = None;
-            for _ in 0..self.fresh.len() + self.held.len() {
+            let mut waiting_for = None;
+            for _ in 0..self.untried.len() + self.held.len() {
                 if self.interrupt.is_raised() {
                     return Ok(None);
                 }
-                let next = self.fresh.pop_front().or_else(|| self.held.pop_front());
-                let Some((place, frame)) = next else { break };
-                match self.claims.take(frame)? {
-                    Claimed::Mine(claim) => return Ok(Some((place, claim))),
-                    Claimed::Ended(status) => news(QueueNews::Elsewhere(frame, status)),
-                    Claimed::Held(holder) => {
-                        self.held.push_back((place, frame));
-                        who = Some((frame, holder));
+                let next = self.untried.pop_front().or_else(|| self.held.pop_front());
+                let Some((index, frame)) = next else { break };
+                match self.claims.claim(frame)? {
+                    ClaimOutcome::Acquired(claim) => {
+                        return Ok(Some(ClaimedFrame {
+                            index,
+                            frame,
+                            claim,
+                        }));
+                    }
+                    ClaimOutcome::Finished(status) => {
+                        (self.on_event)(QueueEvent::FinishedElsewhere(frame, status));
+                    }
+                    ClaimOutcome::Held(holder) => {
+                        self.held.push_back((index, frame));
+                        waiting_for = Some((frame, holder));
                     }
                 }
             }
-            let Some((frame, who)) = who else {
+            let Some((frame, holder)) = waiting_for else {
                 return Ok(None);
             };
-            if !std::mem::replace(&mut has_told, true) {
-                news(QueueNews::Waiting(frame, &who));
+            if !std::mem::replace(&mut has_reported, true) {
+                (self.on_event)(QueueEvent::Waiting(frame, &holder));
             }
-            thread::sleep(pause);
-            pause = (2 * pause).min(PAUSES.1);
+            self.claims.clock().sleep(interval);
+            interval = (2 * interval).min(POLL_INTERVALS.1);
         }
     }
 }

@@ -1,16 +1,16 @@
-//! Frame ranges as people and render engines write them: `7`, `1-10`, `1-10x2`, `10-1x-3`,
-//! `-5--2`, `1-5:2`, `1-10y2`, and lists of these with commas.
+//! Frame ranges in the notation of render engines: `7`, `1-10`, `1-10x2`, `10-1x-3`, `-5--2`, `1-5:2`, `1-10y2`,
+//! and comma-separated lists of these.
 //!
-//! The notation is Fileseq's (`x` is a step, `y` is what a step leaves out), except that `:` is a
-//! step as in Open Job Description. A range is never expanded in memory: `0-9000000000000000000`
-//! costs as much as `7`.
+//! The notation is that of Fileseq (`x` is a step, `y` selects the frames that a step skips), except that `:` is a
+//! step as in Open Job Description. A range is never expanded in memory: `0-9000000000000000000` needs as much
+//! memory as `7`.
 
 use std::fmt;
 use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-/// One or more frames, in the order in which they were asked for; never empty.
+/// One or more frames, in the requested order; never empty.
 ///
 /// ```
 /// use spherule_jobs::FrameRange;
@@ -26,20 +26,20 @@ pub struct FrameRange {
     parts: Vec<Part>,
 }
 
-/// Why a text is no frame range.
+/// Why a text is not a frame range.
 #[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
 #[error("frame range `{text}`: character {at}: {what}")]
 pub struct RangeError {
-    /// The whole text.
+    /// The text.
     pub text: String,
-    /// Where, in characters from 1.
+    /// Position, in characters from 1.
     pub at: usize,
-    /// What is wrong there.
+    /// What is wrong.
     pub what: String,
 }
 
-/// `first-last` by `step`, whose sign points from `first` to `last`; with `fill`, the frames
-/// that the step leaves out. Holds at least one frame.
+/// The range `first-last` with a `step`, whose sign points from `first` to `last`. With `fill`, the frames that the
+/// step skips. Contains at least one frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 struct Part {
     first: i64,
@@ -49,7 +49,7 @@ struct Part {
 }
 
 impl FrameRange {
-    /// Frames in the order they were written, each once, found one at a time.
+    /// The frames in the order of the text, each once. Lazy.
     pub fn iter(&self) -> impl Iterator<Item = i64> + '_ {
         self.parts
             .iter()
@@ -61,21 +61,21 @@ impl FrameRange {
             })
     }
 
-    /// Whether `frame` is one of them; costs as many steps as there are commas.
+    /// Whether the range contains `frame`. The time is linear in the number of parts.
     pub fn contains(&self, frame: i64) -> bool {
         self.parts.iter().any(|part| part.contains(frame))
     }
 
     /// Whether there is more than one frame.
     pub fn has_several(&self) -> bool {
-        // Two of each part are enough, and looking back as `iter` does would take quadratic time in a long list.
+        // Two frames per part are enough. Removing duplicates as `iter` does would take quadratic time
         let mut frames = self.parts.iter().flat_map(|part| part.iter().take(2));
         let first = frames.next();
         frames.any(|frame| Some(frame) != first)
     }
 
-    /// Those of the `available` frames that are in the range, in the range's order, each once.
-    /// The cost follows `available`, not the size of the range.
+    /// The `available` frames that are in the range, in the order of the range, each once. The time depends on the
+    /// length of `available`, not on the size of the range.
     pub fn select(&self, available: &[i64]) -> Vec<i64> {
         let mut found: Vec<(usize, u64, i64)> = available
             .iter()
@@ -89,8 +89,7 @@ impl FrameRange {
         found.into_iter().map(|(_, _, frame)| frame).collect()
     }
 
-    /// The shortest-looking ascending range with exactly these frames: `1-3,7-15x4`. None if
-    /// there are no frames.
+    /// A short ascending range with exactly these frames: `1-3,7-15x4`. None if there are no frames.
     pub fn from_frames(frames: impl IntoIterator<Item = i64>) -> Option<Self> {
         let mut frames: Vec<i64> = frames.into_iter().collect();
         frames.sort_unstable();
@@ -119,8 +118,8 @@ impl FrameRange {
     }
 }
 
-/// Step and length of the evenly spaced run that `frames` (ascending) begins with, if it is worth
-/// writing as one: two neighbours, or three with a step.
+/// Step and length of the evenly spaced run at the start of `frames` (ascending), if it is worth writing as a
+/// range: two neighbours, or three frames with a step.
 fn even_run(frames: &[i64]) -> Option<(i64, usize)> {
     let step = frames.get(1)?.checked_sub(*frames.first()?)?;
     let pairs = frames
@@ -210,7 +209,7 @@ impl FromStr for FrameRange {
             None => Ok(Self { parts }),
             Some(other) => Err(scanner.error(
                 scanner.at,
-                format!("`{other}` has no place here, as in `1-10`, `1-10x2` or `7,9,20`"),
+                format!("unexpected `{other}`; examples: `1-10`, `1-10x2`, `7,9,20`"),
             )),
         }
     }
@@ -245,7 +244,7 @@ impl Scanner<'_> {
         }
     }
 
-    /// The next character that is no blank.
+    /// The next character that is not white space.
     fn peek(&mut self) -> Option<char> {
         while self.chars.get(self.at).is_some_and(|c| c.is_whitespace()) {
             self.at += 1;
@@ -253,8 +252,8 @@ impl Scanner<'_> {
         self.chars.get(self.at).copied()
     }
 
-    fn eat(&mut self, wanted: char) -> bool {
-        let found = self.peek() == Some(wanted);
+    fn eat(&mut self, expected: char) -> bool {
+        let found = self.peek() == Some(expected);
         self.at += usize::from(found);
         found
     }
@@ -270,7 +269,7 @@ impl Scanner<'_> {
         if digits == 0 {
             return Err(match self.chars.get(start) {
                 None => self.error(start, "a frame number is missing"),
-                Some(c) => self.error(start, format!("a frame number is wanted, not `{c}`")),
+                Some(c) => self.error(start, format!("expected a frame number, found `{c}`")),
             });
         }
         self.at = start + sign + digits;
@@ -312,13 +311,13 @@ impl Scanner<'_> {
         at: usize,
     ) -> Result<Part, RangeError> {
         if step == 0 {
-            return Err(self.error(at, "a step of 0 never arrives"));
+            return Err(self.error(at, "the step must not be 0"));
         }
         if step < 0 && first < last {
             return Err(self.error(at, format!("a step of {step} leads away from {last}")));
         }
         if fill && (step.unsigned_abs() == 1 || first == last) {
-            return Err(self.error(at, format!("`y{step}` leaves no frame here")));
+            return Err(self.error(at, format!("`y{step}` selects no frame")));
         }
         if first == last {
             return Ok(Part::single(first));

@@ -1,16 +1,16 @@
-//! Reading files that may be something else than what their name promises: regular files only, up to a
-//! limit. Opening a pipe waits for a writer that may never come, and a device may have no end.
+//! Reads regular files up to a size limit. A file name may lead to a pipe, which blocks until a writer opens it,
+//! or to a device without an end.
 
 use std::fs::{self, File, Metadata};
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Opens the regular file at `path` for reading, links followed.
+/// Opens the regular file at `path` for reading. Follows links.
 ///
 /// # Errors
 /// It is a pipe, a device, a socket or a directory, or cannot be opened.
 pub fn open_regular(path: &Path) -> io::Result<(File, Metadata)> {
-    // Before it is opened, which may take forever, and again for what was opened.
+    // Check before opening, which may block, and check the file that was opened
     check(&fs::metadata(path)?)?;
     let file = File::open(path)?;
     let metadata = file.metadata()?;
@@ -26,17 +26,17 @@ pub fn read_regular(path: &Path, limit: u64) -> io::Result<Vec<u8>> {
     let (file, metadata) = open_regular(path)?;
     let mut bytes = Vec::new();
     if metadata.len() <= limit {
-        // It may grow meanwhile.
+        // The file may grow meanwhile
         file.take(limit.saturating_add(1)).read_to_end(&mut bytes)?;
     }
     if metadata.len() > limit || bytes.len() as u64 > limit {
-        let what = format!("has more than {limit} bytes, too many for such a file");
+        let what = format!("has more than {limit} bytes, the limit for this kind of file");
         return Err(io::Error::new(io::ErrorKind::FileTooLarge, what));
     }
     Ok(bytes)
 }
 
-/// The same as text.
+/// The text of the regular file at `path`.
 ///
 /// # Errors
 /// Those of [`read_regular`], or the bytes are not UTF-8.
@@ -68,35 +68,35 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn refused(path: &Path, what: &str) {
+    fn refuses(path: &Path, what: &str) {
         let error = read_regular(path, 5).unwrap_err().to_string();
         assert!(error.contains(what), "{error}");
     }
 
     #[test]
-    fn files_up_to_the_limit_and_nothing_else() {
+    fn only_regular_files_up_to_the_limit_are_read() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("file");
         fs::write(&path, "12345").unwrap();
         assert_eq!(read_regular_text(&path, 5).unwrap(), "12345");
         fs::write(&path, "123456").unwrap();
-        refused(&path, "more than 5 bytes");
-        refused(dir.path(), "is a directory");
-        refused(&dir.path().join("none"), "");
+        refuses(&path, "more than 5 bytes");
+        refuses(dir.path(), "is a directory");
+        refuses(&dir.path().join("none"), "");
         #[cfg(unix)]
-        refused(Path::new("/dev/zero"), "not a regular file");
+        refuses(Path::new("/dev/zero"), "not a regular file");
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_pipe_is_an_error_and_not_a_wait() {
+    fn a_pipe_is_an_error_and_does_not_block() {
         let dir = tempfile::tempdir().unwrap();
         let pipe = dir.path().join("pipe");
         let made = std::process::Command::new("mkfifo").arg(&pipe).status();
         assert!(made.unwrap().success());
-        refused(&pipe, "not a regular file");
+        refuses(&pipe, "not a regular file");
         let link = dir.path().join("link");
         std::os::unix::fs::symlink(&pipe, &link).unwrap();
-        refused(&link, "not a regular file");
+        refuses(&link, "not a regular file");
     }
 }

@@ -1,4 +1,4 @@
-//! What a caller asks of a job.
+//! A caller's description of a job.
 
 use std::collections::{HashMap, HashSet};
 use std::path::PathBuf;
@@ -6,55 +6,64 @@ use std::time::Duration;
 
 use crate::JobError;
 
-/// What to do with what an earlier run left.
+/// How a run treats the results of earlier runs.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Mode {
-    /// Go on with it; refuse if settings, or inputs of finished frames, have changed, or if a new job's
-    /// outputs are there already.
+pub enum ResumeMode {
+    /// Continue. Refuse if settings or inputs of finished frames have changed, or if outputs of a new job exist.
     #[default]
     Resume,
-    /// As [`Mode::Resume`], but finished frames whose inputs have changed are made again
-    /// ([`crate::Job::requeued`]): for inputs that a running simulation still writes.
+    /// Like [`ResumeMode::Resume`], but repeat finished frames whose inputs have changed
+    /// ([`crate::Job::requeued`]). For inputs that a running simulation still writes.
     RequeueChanged,
-    /// Forget plan and ledgers, and replace whatever has the names of outputs. Images stay until then.
+    /// Discard plan and ledgers, and replace existing outputs. Images stay until they are replaced.
     Force,
-    /// Finished frames stay finished whatever has changed; the rest is done as asked now.
+    /// Keep finished frames although settings or inputs have changed. The other frames use the new settings.
     KeepDone,
 }
 
-/// What the caller wants done.
+/// A caller's description of a job.
 #[derive(Debug, Clone)]
 pub struct JobRequest {
     /// Everything that outputs depend on besides the inputs: dotted key and value.
     pub settings: Vec<(String, String)>,
-    /// All frames there are, each number and each output once.
+    /// All frames. Numbers and outputs must be unique.
     pub frames: Vec<FrameRequest>,
-    /// Files that the caller writes for the job as a whole: a new job does not replace them either.
+    /// Files that the caller writes for the whole job. A new job refuses to replace existing ones.
     pub extra_outputs: Vec<PathBuf>,
-    /// Numbers of those to do in this run, in this order; all if None. Not part of the job's identity.
+    /// Frames of this run, in this order; None for all. Not part of the identity of the job.
     pub selection: Option<Vec<i64>>,
-    /// What to do with what an earlier run left.
-    pub mode: Mode,
-    /// How long a worker on another machine may give no sign of life before its frames are taken over.
-    pub patience: Duration,
+    /// How this run treats the results of earlier runs.
+    pub mode: ResumeMode,
+    /// A worker on another machine is declared dead, and its frames are taken over, after this long without a
+    /// heartbeat.
+    pub takeover_after: Duration,
 }
 
-/// Usual [`JobRequest::patience`]: twelve signs of life missed.
-pub const DEFAULT_PATIENCE: Duration = Duration::from_secs(60);
+/// Default of [`JobRequest::takeover_after`]: twelve missed heartbeats.
+pub const DEFAULT_TAKEOVER_AFTER: Duration = Duration::from_secs(60);
 
 /// One frame of a [`JobRequest`].
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct FrameRequest {
-    /// The frame's number.
+    /// Frame number.
     pub number: i64,
-    /// Files it is made from; they need not be readable.
+    /// Input files. They need not be readable.
     pub inputs: Vec<PathBuf>,
-    /// Files it will be made into.
+    /// Further files that the outputs depend on, such as meshes. They do not tell one input from another.
+    pub companions: Vec<PathBuf>,
+    /// Output files.
     pub outputs: Vec<PathBuf>,
 }
 
+impl FrameRequest {
+    /// All files that the outputs depend on.
+    pub(crate) fn dependencies(&self) -> impl Iterator<Item = &PathBuf> {
+        self.inputs.iter().chain(&self.companions)
+    }
+}
+
 impl JobRequest {
-    /// The numbers of the frames to do in this run, in their order.
+    /// The frames of this run, in order.
     pub(crate) fn selected(&self) -> Vec<i64> {
         match &self.selection {
             Some(numbers) => numbers.clone(),
@@ -62,23 +71,21 @@ impl JobRequest {
         }
     }
 
-    /// Refuses a request that contradicts itself.
+    /// Refuses an inconsistent request.
     pub(crate) fn check(&self) -> Result<(), JobError> {
         let mut numbers = HashSet::new();
         let mut outputs = HashMap::new();
         for frame in &self.frames {
             if !numbers.insert(frame.number) {
-                let what = format!("frame {} is there twice", frame.number);
-                return Err(JobError::Request(what));
+                let frame = frame.number;
+                return Err(JobError::DuplicateFrame { frame });
             }
             for path in &frame.outputs {
                 if let Some(other) = outputs.insert(path, frame.number) {
-                    let what = format!(
-                        "{}: frames {other} and {} would both be written here; put #### into the output's name",
-                        path.display(),
-                        frame.number
-                    );
-                    return Err(JobError::Request(what));
+                    return Err(JobError::SharedOutput {
+                        path: path.clone(),
+                        frames: [other, frame.number],
+                    });
                 }
             }
         }

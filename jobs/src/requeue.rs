@@ -1,37 +1,37 @@
-//! Setting finished frames back, when what was made of them is no good.
+//! Requeues finished frames whose outputs are damaged.
 
-use crate::ledger::{LedgerWriter, News};
-use crate::work::Desk;
-use crate::{DEFAULT_PATIENCE, Entry, Job, JobError, JobState, Ledger, Status};
+use crate::ledger::{LedgerWatcher, LedgerWriter};
+use crate::workers::WorkerRegistry;
+use crate::{DEFAULT_TAKEOVER_AFTER, EntryStatus, Job, JobError, JobState, Ledger, LedgerEntry};
 
 impl Job {
-    /// Sets frames back that were finished when `seen` was read, each with what is wrong with it: the next
-    /// run makes them anew. Their outputs stay until then. Returns those that were set back: what another
-    /// worker has made anew meanwhile stays.
+    /// Requeues frames that were finished in `seen`, each with a reason: the next run repeats them. Their outputs
+    /// stay until then. Frames that another worker has repeated meanwhile are left alone. Returns the requeued
+    /// frames.
     ///
     /// # Errors
-    /// [`JobError::LedgerDamaged`], or trouble with files.
+    /// [`JobError::LedgerDamaged`], or a file cannot be read or written.
     pub fn requeue(seen: &JobState, frames: &[(i64, String)]) -> Result<Vec<i64>, JobError> {
         let dir = seen.dir();
-        let failed = |e| JobError::io(dir, "setting frames back", e);
-        let desk = Desk::take(dir, DEFAULT_PATIENCE).map_err(failed)?;
-        let lock = desk.lock().map_err(failed)?;
+        let failed = |e| JobError::io(dir, "requeueing frames", e);
+        let registry = WorkerRegistry::register(dir, DEFAULT_TAKEOVER_AFTER).map_err(failed)?;
+        let lock = registry.lock().map_err(failed)?;
         let ledger = Ledger::read(dir)?;
-        let mut news = News::new(dir, desk.worker(), &ledger);
-        let mut writer = LedgerWriter::new(dir, desk.worker());
-        let mut set_back = Vec::new();
+        let mut watcher = LedgerWatcher::new(dir, registry.worker(), &ledger);
+        let mut writer = LedgerWriter::new(dir, registry.worker());
+        let mut requeued = Vec::new();
         for (frame, reason) in frames {
             let now = ledger.entry(*frame).map(|entry| (entry.seq, entry.status));
             let then = seen.ledger().entry(*frame).map(|entry| entry.seq);
-            if now.is_none() || now != then.map(|seq| (seq, Status::Done)) {
+            if now.is_none() || now != then.map(|seq| (seq, EntryStatus::Done)) {
                 continue;
             }
-            let entry = Entry::set_back(news.take_seq(), *frame, reason.clone());
+            let entry = LedgerEntry::requeued(watcher.next_seq(), *frame, reason.clone());
             writer.append(&entry, true)?;
-            set_back.push(*frame);
+            requeued.push(*frame);
         }
-        lock.end();
-        Ok(set_back)
+        lock.complete();
+        Ok(requeued)
     }
 }
 
@@ -43,12 +43,13 @@ mod tests {
     use serde_json::json;
 
     use super::*;
-    use crate::{FrameRequest, FrameState, JobRequest, Mode};
+    use crate::{FrameRequest, FrameState, JobRequest, ResumeMode};
 
     fn open(dir: &Path) -> Job {
         let frame = |number| FrameRequest {
             number,
             inputs: Vec::new(),
+            companions: Vec::new(),
             outputs: vec![dir.join(format!("f.{number}"))],
         };
         let request = JobRequest {
@@ -56,27 +57,27 @@ mod tests {
             frames: (1..=3).map(frame).collect(),
             extra_outputs: Vec::new(),
             selection: None,
-            mode: Mode::Resume,
-            patience: DEFAULT_PATIENCE,
+            mode: ResumeMode::Resume,
+            takeover_after: DEFAULT_TAKEOVER_AFTER,
         };
         Job::open(dir, request, |_| Ok::<_, JobError>(json!(null))).unwrap()
     }
 
-    fn make(job: &mut Job, dir: &Path, frame: i64) {
+    fn finish(job: &mut Job, dir: &Path, frame: i64) {
         let path = dir.join(format!("f.{frame}"));
         fs::write(&path, "image").unwrap();
         job.record_done(frame, &[path], json!(null)).unwrap();
     }
 
     #[test]
-    fn frames_set_back_are_made_anew() {
+    fn requeued_frames_are_repeated() {
         let dir = tempfile::tempdir().unwrap();
         let mut job = open(dir.path());
-        make(&mut job, dir.path(), 1);
-        make(&mut job, dir.path(), 2);
+        finish(&mut job, dir.path(), 1);
+        finish(&mut job, dir.path(), 2);
         let seen = Job::read(dir.path()).unwrap().unwrap();
-        // Another worker was quicker with frame 2; frame 3 was never finished, 9 is none.
-        make(&mut job, dir.path(), 2);
+        // Another worker has repeated frame 2 meanwhile; 3 was never finished; 9 does not exist
+        finish(&mut job, dir.path(), 2);
         drop(job);
         let bad = [1, 2, 3, 9].map(|frame| (frame, format!("f.{frame}: torn")));
         assert_eq!(Job::requeue(&seen, &bad).unwrap(), [1]);
@@ -87,11 +88,11 @@ mod tests {
         assert!(dir.path().join("f.1").exists());
         let mut job = open(dir.path());
         assert_eq!(job.pending(), [1, 3]);
-        make(&mut job, dir.path(), 1);
+        finish(&mut job, dir.path(), 1);
         drop(job);
         let again = Job::read(dir.path()).unwrap().unwrap();
         assert_eq!(again.frame_state(1), Some(FrameState::Done));
-        // It stands no more as it did when it was looked at.
+        // Its entry is no longer the one in `seen`
         assert_eq!(Job::requeue(&seen, &bad).unwrap(), [0; 0]);
     }
 }

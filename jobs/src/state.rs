@@ -1,4 +1,4 @@
-//! How a job stands: plan and ledger together with what is really on the disk.
+//! The state of a job: plan, ledger, and the outputs that exist on disk.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -6,38 +6,37 @@ use std::panic;
 use std::path::{Path, PathBuf};
 use std::thread;
 
-use crate::{Entry, Ledger, OutputFile, Plan, PlannedFrame, Status};
+use crate::{EntryStatus, Ledger, LedgerEntry, OutputFile, Plan, PlannedFrame};
 
-/// How a frame stands.
+/// The state of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum FrameState {
     /// Not tried yet.
     Pending,
-    /// Tried and failed; the reason is in its ledger entry.
+    /// Failed; the ledger entry has the reason.
     Failed,
-    /// Was done, but an output that is wanted now is missing, has another length, or was not made
-    /// under that name.
+    /// Was done, but a requested output is missing, has another length, or was written under another name.
     Lost,
-    /// Done, and all outputs wanted now are there.
+    /// Done, and all requested outputs exist.
     Done,
 }
 
-/// How many frames stand how.
+/// Counts of frames by state.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
-pub struct Summary {
-    /// Frames looked at.
+pub struct JobSummary {
+    /// All frames.
     pub total: usize,
-    /// Done, outputs in place.
+    /// Done, and the outputs exist.
     pub done: usize,
     /// Not tried, or lost.
     pub pending: usize,
-    /// Done once, but with outputs gone; part of `pending`. Ascending.
+    /// Done, but outputs are missing. These frames are included in `pending`. Ascending.
     pub lost: Vec<i64>,
-    /// Failed. Ascending.
+    /// Failed frames, ascending.
     pub failed: Vec<i64>,
 }
 
-/// A job as it stands on disk.
+/// The state of a job on disk.
 #[derive(Debug, Clone)]
 pub struct JobState {
     pub(crate) dir: PathBuf,
@@ -48,7 +47,7 @@ pub struct JobState {
 
 impl JobState {
     pub(crate) fn new(dir: &Path, plan: Plan, ledger: Ledger) -> Self {
-        let states = look_at(dir, plan.frames(), &ledger);
+        let states = frame_states(dir, plan.frames(), &ledger);
         Self {
             dir: dir.to_owned(),
             plan,
@@ -72,19 +71,19 @@ impl JobState {
         &self.ledger
     }
 
-    /// How `frame` stands; None if it is not in the plan.
+    /// The state of `frame`; None if it is not in the plan.
     pub fn frame_state(&self, frame: i64) -> Option<FrameState> {
         self.states.get(&frame).copied()
     }
 
-    /// How all frames of the plan stand.
-    pub fn summary(&self) -> Summary {
+    /// Counts all frames of the plan by state.
+    pub fn summary(&self) -> JobSummary {
         self.summary_of(self.states.keys().copied())
     }
 
-    /// How these frames stand; those not in the plan are left out.
-    pub fn summary_of(&self, frames: impl IntoIterator<Item = i64>) -> Summary {
-        let mut summary = Summary::default();
+    /// Counts `frames` by state. Frames that are not in the plan are ignored.
+    pub fn summary_of(&self, frames: impl IntoIterator<Item = i64>) -> JobSummary {
+        let mut summary = JobSummary::default();
         for frame in frames {
             let Some(state) = self.frame_state(frame) else {
                 continue;
@@ -110,45 +109,46 @@ impl JobState {
     }
 }
 
-/// Threads that look at outputs: asking a network file system means waiting.
-const LOOKERS: usize = 8;
+/// Threads that check outputs. Most of their time they wait for a network file system.
+const MAX_THREADS: usize = 8;
 
-/// Frames that are looked at by one thread alone.
-const FEW: usize = 256;
+/// Frames per thread, at least.
+const MIN_FRAMES_PER_THREAD: usize = 256;
 
-/// Looks for the outputs of all frames.
-fn look_at(dir: &Path, frames: &[PlannedFrame], ledger: &Ledger) -> BTreeMap<i64, FrameState> {
-    let look = |some: &[PlannedFrame]| -> Vec<(i64, FrameState)> {
+/// Checks the outputs of all frames.
+fn frame_states(dir: &Path, frames: &[PlannedFrame], ledger: &Ledger) -> BTreeMap<i64, FrameState> {
+    let check = |chunk: &[PlannedFrame]| -> Vec<(i64, FrameState)> {
         let state = |f: &PlannedFrame| (f.number, frame_state(dir, f, ledger.entry(f.number)));
-        some.iter().map(state).collect()
+        chunk.iter().map(state).collect()
     };
-    let each = frames.len().div_ceil(LOOKERS).max(FEW);
+    let chunk_size = frames.len().div_ceil(MAX_THREADS);
+    let chunk_size = chunk_size.max(MIN_FRAMES_PER_THREAD);
     thread::scope(|scope| {
-        let lookers: Vec<_> = frames
-            .chunks(each)
-            .map(|some| scope.spawn(move || look(some)))
+        let threads: Vec<_> = frames
+            .chunks(chunk_size)
+            .map(|chunk| scope.spawn(move || check(chunk)))
             .collect();
-        let looked = lookers
+        let states = threads
             .into_iter()
-            .map(|looker| looker.join().unwrap_or_else(|e| panic::resume_unwind(e)));
-        looked.flatten().collect()
+            .map(|thread| thread.join().unwrap_or_else(|e| panic::resume_unwind(e)));
+        states.flatten().collect()
     })
 }
 
-/// What was made counts by what is wanted now: under other names the images are still to be made.
-fn frame_state(dir: &Path, planned: &PlannedFrame, entry: Option<&Entry>) -> FrameState {
-    let in_place = |file: &OutputFile| {
+/// A frame is done only if it was written under the names in the plan.
+fn frame_state(dir: &Path, planned: &PlannedFrame, entry: Option<&LedgerEntry>) -> FrameState {
+    let exists = |file: &OutputFile| {
         fs::metadata(dir.join(&file.path)).is_ok_and(|m| m.is_file() && m.len() == file.len)
     };
     match entry {
         None => FrameState::Pending,
-        Some(entry) if entry.status == Status::Failed => FrameState::Failed,
+        Some(entry) if entry.status == EntryStatus::Failed => FrameState::Failed,
         Some(entry) => {
-            let made = |path: &String| entry.outputs.iter().find(|o| o.path == *path);
+            let written = |path: &String| entry.outputs.iter().find(|o| o.path == *path);
             if planned
                 .outputs
                 .iter()
-                .all(|p| made(p).is_some_and(in_place))
+                .all(|p| written(p).is_some_and(exists))
             {
                 FrameState::Done
             } else {

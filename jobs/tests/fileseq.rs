@@ -1,10 +1,10 @@
-//! Frame ranges against Fileseq, whose notation they follow: its answers, as data.
+//! Compares frame ranges with the results of Fileseq, whose notation they follow.
 //!
-//! Made by version 3.4.0 of the Python package `Fileseq`: `list(fileseq.FrameSet(text))`.
+//! The results are those of version 3.4.0 of the Python package `Fileseq`: `list(fileseq.FrameSet(text))`.
 
 use spherule_jobs::FrameRange;
 
-/// What both read alike.
+/// Texts that both read in the same way.
 const SAME: [(&str, &[i64]); 61] = [
     ("1", &[1]),
     ("7", &[7]),
@@ -69,7 +69,7 @@ const SAME: [(&str, &[i64]); 61] = [
     ("1-4 , 9", &[1, 2, 3, 4, 9]),
 ];
 
-/// What neither reads.
+/// Texts that neither accepts.
 const REFUSED_BY_BOTH: [&str; 36] = [
     "-", "--", "--1", "1-", "-1-", "1--", "1---5", "1-5x", "1-5y", "1-5:", "x2", "1x2", "1y2",
     "1:2", "1-10x0", "1-10y0", "1-10:0", "1-10x-1", "1-10x-3", "1-10y-2", "1-10:-3", "1-10x2x3",
@@ -77,8 +77,8 @@ const REFUSED_BY_BOTH: [&str; 36] = [
     "1–5", "1-5;7", "1-5,a",
 ];
 
-/// `:` is a step, as in Open Job Description, whose engines write it. Fileseq takes it for a stagger, where the frames
-/// between come after: `1-5:2` is 1, 3, 5, 2, 4. These are answers of `IntRangeExpr.from_str(text)` of the Python package
+/// `:` is a step, as in Open Job Description. For Fileseq it is a stagger, in which the skipped frames follow:
+/// `1-5:2` is 1, 3, 5, 2, 4. These are the results of `IntRangeExpr.from_str(text)` of the Python package
 /// `openjd-model`, version 0.13.0.
 const STEPS_OF_ENGINES: [(&str, &[i64]); 8] = [
     ("1-10:2", &[1, 3, 5, 7, 9]),
@@ -91,7 +91,7 @@ const STEPS_OF_ENGINES: [(&str, &[i64]); 8] = [
     ("-1--5:-2", &[-1, -3, -5]),
 ];
 
-/// What Fileseq reads and is refused here, with what is told: a slip of the pen should not render other frames.
+/// Texts that Fileseq accepts and spherule rejects, with the error: a typing error must not select other frames.
 const REFUSED_HERE: [(&str, &str); 16] = [
     // No frames.
     ("", "missing"),
@@ -100,20 +100,20 @@ const REFUSED_HERE: [(&str, &str); 16] = [
     ("1-10y1", "no frame"),
     ("1-1y2", "no frame"),
     ("5-5y3", "no frame"),
-    // Commas with nothing between them.
+    // Empty items
     (",1", "`,`"),
     ("1,", "missing"),
     ("1,,2", "`,`"),
-    // Blanks inside numbers, which Fileseq takes out: 12, and 1 to 20.
+    // White space inside numbers, which Fileseq removes: 12, and 1 to 20
     ("1 2", "`2`"),
     ("1-2 0", "`0`"),
-    // The padding of file names.
+    // The padding of file names
     ("1-5#", "`#`"),
     ("1-5@", "`@`"),
-    // Parts of frames.
+    // Fractional frames
     ("1.5", "`.`"),
     ("1-5x1.5", "`.`"),
-    // Numbers without end.
+    // Numbers beyond 64 bits
     ("99999999999999999999", "64 bits"),
 ];
 
@@ -123,17 +123,17 @@ fn frames(text: &str) -> Vec<i64> {
 }
 
 #[test]
-fn what_fileseq_reads_is_read_alike() {
-    for (text, wanted) in SAME {
-        assert_eq!(frames(text), wanted, "{text:?}");
-        // As it is written again, too.
+fn valid_texts_are_read_like_fileseq_does() {
+    for (text, expected) in SAME {
+        assert_eq!(frames(text), expected, "{text:?}");
+        // The canonical text is read in the same way
         let range: FrameRange = text.parse().unwrap();
-        assert_eq!(frames(&range.to_string()), wanted, "{text:?} as {range}");
+        assert_eq!(frames(&range.to_string()), expected, "{text:?} as {range}");
     }
 }
 
 #[test]
-fn what_fileseq_refuses_is_refused() {
+fn texts_that_fileseq_rejects_are_rejected() {
     for text in REFUSED_BY_BOTH {
         let error = text.parse::<FrameRange>().expect_err(text);
         assert!(
@@ -145,13 +145,13 @@ fn what_fileseq_refuses_is_refused() {
 
 #[test]
 fn a_colon_is_a_step() {
-    for (text, wanted) in STEPS_OF_ENGINES {
-        assert_eq!(frames(text), wanted, "{text:?}");
+    for (text, expected) in STEPS_OF_ENGINES {
+        assert_eq!(frames(text), expected, "{text:?}");
     }
 }
 
 #[test]
-fn what_could_be_a_slip_is_refused() {
+fn likely_typing_errors_are_rejected() {
     for (text, what) in REFUSED_HERE {
         let error = text.parse::<FrameRange>().expect_err(text);
         assert!(error.what.contains(what), "{text:?}: {error}");

@@ -1,11 +1,11 @@
-//! Templates of Open Job Description, which `.ci/openjd` runs.
+//! Templates of Open Job Description. `.ci/openjd` runs such templates.
 
 use std::num::NonZeroUsize;
 
 use serde_json::{Value, json};
 use spherule_jobs::export::Chunks;
 use spherule_jobs::export::openjd::{
-    FRAMES, HostRequirements, JobTemplate, PathParameter, Spelling, literal, parameter,
+    FRAMES, HostRequirements, JobTemplate, PathParameter, TemplateFormat, literal, parameter,
 };
 
 fn chunks(frames: &[i64], size: usize) -> Chunks {
@@ -40,7 +40,7 @@ fn template<'a>(frames: &'a [i64], chunks: &'a Chunks) -> JobTemplate<'a> {
     }
 }
 
-const WHOLE: &str = r#"# Relative paths begin at the directory of this file.
+const WHOLE: &str = r#"# Paths are relative to the directory of this file.
 specificationVersion: jobtemplate-2023-09
 extensions: [TASK_CHUNKING]
 name: dam
@@ -59,11 +59,11 @@ parameterDefinitions:
     description: "A path."
   - name: Frames
     type: STRING
-    description: "Frames to do: 7, 1-10, 1-10:2, -5--2, and lists with commas."
+    description: "Frames to render: 7, 1-10, 1-10:2, -5--2, and comma-separated lists."
     default: "-2-1"
   - name: ChunkSize
     type: INT
-    description: "Frames in a task."
+    description: "Frames per task."
     minValue: 1
     default: 2
   - name: Program
@@ -79,7 +79,7 @@ steps:
           range: "{{Param.Frames}}"
           chunks:
             defaultTaskCount: "{{Param.ChunkSize}}"
-            # Frames with gaps make tasks as large.
+            # A task may contain frames with gaps.
             rangeConstraint: NONCONTIGUOUS
     hostRequirements:
       amounts:
@@ -97,29 +97,33 @@ steps:
           args: ["{{Param.Manifest}}", "--frames", "{{Task.Param.Frame}}"]
           # Seconds.
           timeout: 86400
-          # When told to stop, the frame in hand is finished.
+          # On a request to stop, the program finishes the frame in progress.
           cancelation:
             mode: NOTIFY_THEN_TERMINATE
             notifyPeriodInSeconds: 120
 "#;
 
 #[test]
-fn a_template_as_people_read_it() {
+fn the_yaml_of_a_template() {
     let frames = [-2, -1, 0, 1];
     let chunks = chunks(&frames, 2);
-    let text = template(&frames, &chunks).text(Spelling::Yaml).unwrap();
+    let text = template(&frames, &chunks)
+        .text(TemplateFormat::Yaml)
+        .unwrap();
     assert_eq!(text, WHOLE);
 }
 
-/// The template for these frames, as programs read it.
+/// The JSON template for these frames.
 fn read(frames: &[i64]) -> Value {
     let chunks = chunks(frames, 1);
-    let text = template(frames, &chunks).text(Spelling::Json).unwrap();
+    let text = template(frames, &chunks)
+        .text(TemplateFormat::Json)
+        .unwrap();
     serde_json::from_str(&text).unwrap()
 }
 
 #[test]
-fn frames_are_written_as_engines_write_them() {
+fn frames_are_written_in_the_notation_of_openjd() {
     for (frames, shown) in [
         (&[7][..], "7"),
         (&[1, 3, 5, 9, 20], "1-5:2,9,20"),
@@ -133,15 +137,15 @@ fn frames_are_written_as_engines_write_them() {
 }
 
 #[test]
-fn requirements_that_nobody_has_are_left_out() {
+fn unset_requirements_are_omitted() {
     let chunks = chunks(&[1], 1);
     let mut template = template(&[1], &chunks);
     template.host = HostRequirements::default();
-    let text = template.text(Spelling::Json).unwrap();
+    let text = template.text(TemplateFormat::Json).unwrap();
     let found: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(found["steps"][0]["hostRequirements"], Value::Null);
     template.host.memory = Some(1);
-    let text = template.text(Spelling::Json).unwrap();
+    let text = template.text(TemplateFormat::Json).unwrap();
     let found: Value = serde_json::from_str(&text).unwrap();
     assert_eq!(
         found["steps"][0]["hostRequirements"],
@@ -154,13 +158,13 @@ fn refused(what: &str, change: impl FnOnce(&mut JobTemplate)) {
     let chunks = chunks(&[1], 1);
     let mut template = template(&[1], &chunks);
     change(&mut template);
-    let error = template.text(Spelling::Yaml).unwrap_err().to_string();
+    let error = template.text(TemplateFormat::Yaml).unwrap_err().to_string();
     assert!(error.contains(what), "{error}");
 }
 
 #[test]
-fn what_a_template_cannot_hold_is_refused() {
-    refused("begins an expression", |t| t.name = "{{x}}");
+fn texts_that_a_template_cannot_contain_are_rejected() {
+    refused("starts an expression", |t| t.name = "{{x}}");
     refused("line break", |t| t.description = "a\nb".to_owned());
     refused("line break", |t| {
         t.arguments.push("a\u{2028}b".to_owned());
@@ -172,14 +176,14 @@ fn what_a_template_cannot_hold_is_refused() {
     refused("no frames", |t| t.frames = &[]);
     assert_eq!(literal("image", "f.####.exr").unwrap(), "f.####.exr");
     let error = literal("image", "a{{b").unwrap_err().to_string();
-    assert!(error.starts_with("image: \"a{{b\" has {{"), "{error}");
+    assert!(error.starts_with("image: \"a{{b\" contains {{"), "{error}");
 }
 
 #[test]
-fn a_list_of_frames_too_long_for_a_parameter_is_refused() {
+fn a_frame_list_beyond_the_length_limit_is_rejected() {
     let frames: Vec<i64> = (0..2000).filter(|n| n % 7 < 2 && n % 11 != 0).collect();
     let chunks = chunks(&frames, 1);
-    let error = template(&frames, &chunks).text(Spelling::Yaml);
+    let error = template(&frames, &chunks).text(TemplateFormat::Yaml);
     let error = error.unwrap_err().to_string();
-    assert!(error.contains("in parts with --frames"), "{error}");
+    assert!(error.contains("exceeds the 1024 characters"), "{error}");
 }

@@ -1,4 +1,4 @@
-//! Scripts for Slurm: what is in them, and what they do under a shell with a Slurm that is played.
+//! Scripts for Slurm: their text, and their behaviour in a shell with fake Slurm commands.
 
 use std::num::NonZeroUsize;
 
@@ -37,7 +37,7 @@ fn directives(script: &ArrayScript) -> Vec<String> {
     text.lines().filter_map(directive).collect()
 }
 
-/// Fails the test unless there is no script after `change`, because of `what`.
+/// Asserts that the script is rejected after `change` with an error that contains `what`.
 #[track_caller]
 fn refused(what: &str, change: impl FnOnce(&mut ArrayScript)) {
     let chunks = chunks(&[1], 1);
@@ -49,7 +49,7 @@ fn refused(what: &str, change: impl FnOnce(&mut ArrayScript)) {
 }
 
 #[test]
-fn what_is_not_said_is_left_to_the_cluster() {
+fn unset_resources_are_not_requested() {
     let chunks = chunks(&[1, 2, 3, 7], 3);
     assert_eq!(
         directives(&script(&chunks, "/bin/spherule")),
@@ -68,12 +68,12 @@ fn what_is_not_said_is_left_to_the_cluster() {
 }
 
 #[test]
-fn what_is_said_is_asked_for() {
+fn set_resources_are_requested() {
     let chunks = chunks(&[1, 2, 3, 7], 1);
     let mut script = script(&chunks, "/bin/spherule");
     script.resources = Resources {
         cpus: 2,
-        // A MiB that is begun is asked for.
+        // Memory is rounded up to MiB
         memory: Some((4 << 30) + 1),
         time: Some("90".parse().unwrap()),
         concurrent: Some(2),
@@ -82,7 +82,7 @@ fn what_is_said_is_asked_for() {
     };
     script.log_dir = "/data/100% it's";
     let found = directives(&script);
-    for wanted in [
+    for expected in [
         "array=0-3%2",
         "cpus-per-task=2",
         "mem=4097M",
@@ -91,18 +91,18 @@ fn what_is_said_is_asked_for() {
         "account=sim_42",
         "output=\"/data/100%% it's/%A_%a.log\"",
     ] {
-        assert!(found.iter().any(|d| d == wanted), "{wanted}: {found:?}");
+        assert!(found.iter().any(|d| d == expected), "{expected}: {found:?}");
     }
 }
 
 #[test]
-fn what_could_become_another_line_or_option_is_refused() {
+fn texts_that_could_become_another_line_or_option_are_rejected() {
     refused("line break", |s| s.title = "a\n#SBATCH --mem=0");
     refused("log directory", |s| s.log_dir = "/a\"b");
     refused("backslash", |s| s.log_dir = "/a\\b");
     refused("program", |s| s.command.program = "/a\nb");
     refused("argument", |s| s.command.arguments = &["a\rb"]);
-    refused("partition: \"a b\" is not a name", |s| {
+    refused("partition: \"a b\" is not a valid Slurm name", |s| {
         s.resources.partition = Some("a b");
     });
     refused("account", |s| s.resources.account = Some(""));
@@ -115,7 +115,7 @@ fn what_could_become_another_line_or_option_is_refused() {
 }
 
 #[test]
-fn names_are_what_slurm_can_show() {
+fn job_names_have_only_plain_characters() {
     let chunks = chunks(&[1], 1);
     for (name, shown) in [
         ("größe 7", "gr--e-7"),
@@ -141,13 +141,13 @@ mod run {
     use std::thread;
     use std::time::Duration;
 
-    /// A place where the script runs, with a `squeue`, a `scontrol` and a program that are played.
-    struct Stage {
+    /// A directory with a script, a fake `squeue` and `scontrol`, and a fake program.
+    struct FakeCluster {
         dir: tempfile::TempDir,
         script: PathBuf,
     }
 
-    /// Tells what it was called with, and stops on TERM as if with a frame in hand.
+    /// Prints its arguments, and stops on TERM like a program that finishes its frame.
     const PROGRAM: &str = r#"#!/bin/sh
 printf '%s\n' "$@" > called
 trap 'echo term >> terms; stop=1' TERM
@@ -156,35 +156,35 @@ while [ -z "$stop" ] && [ -z "$CODE" ]; do sleep 0.02; done
 exit "${CODE:-75}"
 "#;
 
-    impl Stage {
+    impl FakeCluster {
         fn new(frames: &[i64], size: usize) -> Self {
             let dir = tempfile::tempdir().unwrap();
             let chunks = chunks(frames, size);
             let program = dir.path().join("pro gram's");
             let text = script(&chunks, program.to_str().unwrap()).text().unwrap();
-            let stage = Self {
+            let cluster = Self {
                 script: dir.path().join("array.sh"),
                 dir,
             };
-            fs::write(&stage.script, text).unwrap();
-            stage.play("pro gram's", PROGRAM);
-            stage.play("bin/squeue", "#!/bin/sh\necho \"$STATE\"\n");
-            stage.play("bin/scontrol", "#!/bin/sh\necho \"$@\" >> scontrol\n");
-            stage
+            fs::write(&cluster.script, text).unwrap();
+            cluster.write_script("pro gram's", PROGRAM);
+            cluster.write_script("bin/squeue", "#!/bin/sh\necho \"$STATE\"\n");
+            cluster.write_script("bin/scontrol", "#!/bin/sh\necho \"$@\" >> scontrol\n");
+            cluster
         }
 
         fn path(&self, name: &str) -> PathBuf {
             self.dir.path().join(name)
         }
 
-        fn play(&self, name: &str, text: &str) {
+        fn write_script(&self, name: &str, text: &str) {
             let path = self.path(name);
             fs::create_dir_all(path.parent().unwrap()).unwrap();
             fs::write(&path, text).unwrap();
             fs::set_permissions(&path, fs::Permissions::from_mode(0o755)).unwrap();
         }
 
-        /// Task `task` of array 40, in the queue as `state`.
+        /// Starts task `task` of array 40, whose state in the queue is `state`.
         fn start(&self, task: usize, state: &str, more: &[(&str, &str)]) -> Child {
             let path = std::env::var("PATH").unwrap();
             Command::new("bash")
@@ -204,11 +204,11 @@ exit "${CODE:-75}"
                 .unwrap()
         }
 
-        fn said(&self, name: &str) -> String {
+        fn output(&self, name: &str) -> String {
             fs::read_to_string(self.path(name)).unwrap_or_default()
         }
 
-        /// Starts a task, sends TERM to the script once the program listens; the exit code.
+        /// Starts a task and sends TERM once the program handles it. Returns the exit code.
         fn stopped(&self, state: &str, more: &[(&str, &str)]) -> Option<i32> {
             let _ = fs::remove_file(self.path("ready"));
             let mut task = self.start(0, state, more);
@@ -234,92 +234,99 @@ exit "${CODE:-75}"
     }
 
     #[test]
-    fn each_task_does_its_frames() {
-        let stage = Stage::new(&[-5, -4, -2, 1, 3, 5, 9], 3);
+    fn each_task_processes_its_frames() {
+        let cluster = FakeCluster::new(&[-5, -4, -2, 1, 3, 5, 9], 3);
         for (task, frames) in ["-5--4,-2", "1-5x2", "9"].into_iter().enumerate() {
-            let ran = stage.start(task, "", &[("CODE", "0")]);
+            let ran = cluster.start(task, "", &[("CODE", "0")]);
             assert_eq!(code(ran), Some(0));
             assert_eq!(
-                stage.said("called"),
+                cluster.output("called"),
                 format!("render\n/data/it's/job.toml\n--frames\n{frames}\n--threads\n3\n")
             );
         }
-        assert_eq!(code(stage.start(3, "", &[])), Some(2));
-        let ran = stage.start(0, "", &[("CODE", "0"), ("SLURM_MEM_PER_NODE", "4000")]);
+        assert_eq!(code(cluster.start(3, "", &[])), Some(2));
+        let ran = cluster.start(0, "", &[("CODE", "0"), ("SLURM_MEM_PER_NODE", "4000")]);
         assert_eq!(code(ran), Some(0));
-        assert!(stage.said("called").ends_with("--memory-limit\n3600MiB\n"));
+        assert!(
+            cluster
+                .output("called")
+                .ends_with("--memory-limit\n3600MiB\n")
+        );
     }
 
     #[test]
-    fn another_program_can_be_named() {
-        let stage = Stage::new(&[1], 1);
+    fn the_program_can_be_overridden() {
+        let cluster = FakeCluster::new(&[1], 1);
         let other = "#!/bin/sh\necho other > called\n";
-        stage.play("bin/other", other);
-        assert_eq!(code(stage.start(0, "", &[("SPHERULE", "other")])), Some(0));
-        assert_eq!(stage.said("called"), "other\n");
+        cluster.write_script("bin/other", other);
+        assert_eq!(
+            code(cluster.start(0, "", &[("SPHERULE", "other")])),
+            Some(0)
+        );
+        assert_eq!(cluster.output("called"), "other\n");
     }
 
     #[test]
-    fn codes_are_passed_on_and_only_75_puts_a_task_back() {
-        let stage = Stage::new(&[1], 1);
+    fn exit_codes_are_forwarded_and_only_75_requeues_the_task() {
+        let cluster = FakeCluster::new(&[1], 1);
         for failed in ["0", "1", "2", "137"] {
-            let ran = stage.start(0, "RUNNING None", &[("CODE", failed)]);
+            let ran = cluster.start(0, "RUNNING None", &[("CODE", failed)]);
             assert_eq!(code(ran), failed.parse().ok());
-            assert_eq!(stage.said("scontrol"), "", "{failed}");
+            assert_eq!(cluster.output("scontrol"), "", "{failed}");
         }
-        let ran = stage.start(0, "RUNNING None", &[("CODE", "75")]);
+        let ran = cluster.start(0, "RUNNING None", &[("CODE", "75")]);
         assert_eq!(code(ran), Some(75));
-        assert_eq!(stage.said("scontrol"), "requeue 40_0\n");
+        assert_eq!(cluster.output("scontrol"), "requeue 40_0\n");
     }
 
     #[test]
-    fn term_is_passed_on_and_the_task_put_back() {
-        let stage = Stage::new(&[1], 1);
-        assert_eq!(stage.stopped("RUNNING None", &[]), Some(75));
-        assert_eq!(stage.said("terms"), "term\n");
-        assert_eq!(stage.said("scontrol"), "requeue 40_0\n");
+    fn term_is_forwarded_and_the_task_requeued() {
+        let cluster = FakeCluster::new(&[1], 1);
+        assert_eq!(cluster.stopped("RUNNING None", &[]), Some(75));
+        assert_eq!(cluster.output("terms"), "term\n");
+        assert_eq!(cluster.output("scontrol"), "requeue 40_0\n");
     }
 
     #[test]
-    fn a_program_that_does_not_listen_yet_is_put_back_too() {
-        let stage = Stage::new(&[1], 1);
+    fn a_program_without_a_signal_handler_yet_is_requeued_too() {
+        let cluster = FakeCluster::new(&[1], 1);
         let deaf = "#!/bin/sh\necho > ready\nwhile :; do sleep 0.02; done\n";
-        stage.play("pro gram's", deaf);
-        assert_eq!(stage.stopped("RUNNING None", &[]), Some(143));
-        assert_eq!(stage.said("scontrol"), "requeue 40_0\n");
+        cluster.write_script("pro gram's", deaf);
+        assert_eq!(cluster.stopped("RUNNING None", &[]), Some(143));
+        assert_eq!(cluster.output("scontrol"), "requeue 40_0\n");
     }
 
     #[test]
-    fn a_frame_longer_than_the_notice_puts_the_task_back_too() {
-        let stage = Stage::new(&[1], 1);
-        assert_eq!(stage.stopped("COMPLETING TimeLimit", &[]), Some(75));
-        assert_eq!(stage.said("scontrol"), "requeue 40_0\n");
+    fn a_frame_longer_than_the_notice_requeues_the_task_too() {
+        let cluster = FakeCluster::new(&[1], 1);
+        assert_eq!(cluster.stopped("COMPLETING TimeLimit", &[]), Some(75));
+        assert_eq!(cluster.output("scontrol"), "requeue 40_0\n");
     }
 
     #[test]
-    fn a_cancelled_task_is_not_put_back() {
-        let stage = Stage::new(&[1], 1);
-        assert_eq!(stage.stopped("COMPLETING None", &[]), Some(75));
-        assert_eq!(stage.said("scontrol"), "");
+    fn a_cancelled_task_is_not_requeued() {
+        let cluster = FakeCluster::new(&[1], 1);
+        assert_eq!(cluster.stopped("COMPLETING None", &[]), Some(75));
+        assert_eq!(cluster.output("scontrol"), "");
     }
 
     #[test]
-    fn a_task_is_not_put_back_for_ever() {
-        let stage = Stage::new(&[1, 2], 2);
-        let often = [("SLURM_RESTART_COUNT", "22")];
-        assert_eq!(stage.stopped("RUNNING None", &often), Some(75));
-        assert_eq!(stage.said("scontrol"), "");
-        let less = [("SLURM_RESTART_COUNT", "21")];
-        assert_eq!(stage.stopped("RUNNING None", &less), Some(75));
-        assert_eq!(stage.said("scontrol"), "requeue 40_0\n");
+    fn the_number_of_restarts_is_limited() {
+        let cluster = FakeCluster::new(&[1, 2], 2);
+        let at_limit = [("SLURM_RESTART_COUNT", "22")];
+        assert_eq!(cluster.stopped("RUNNING None", &at_limit), Some(75));
+        assert_eq!(cluster.output("scontrol"), "");
+        let below = [("SLURM_RESTART_COUNT", "21")];
+        assert_eq!(cluster.stopped("RUNNING None", &below), Some(75));
+        assert_eq!(cluster.output("scontrol"), "requeue 40_0\n");
     }
 
     proptest! {
         #![proptest_config(ProptestConfig::with_cases(48))]
 
-        /// Whatever a path has in it, the shell takes for nothing else.
+        /// The shell reads quoted words unchanged.
         #[test]
-        fn words_come_back_from_the_shell(text in "[ -~äß€]{0,30}") {
+        fn the_shell_reads_words_unchanged(text in "[ -~äß€]{0,30}") {
             let chunks = chunks(&[1], 1);
             let arguments = ["[%s]", text.as_str()];
             let mut script = script(&chunks, "printf");
@@ -330,23 +337,23 @@ exit "${CODE:-75}"
                 .env_remove("SPHERULE")
                 .output()
                 .unwrap();
-            let told = String::from_utf8(output.stdout).unwrap();
-            let wanted = format!("[{text}][--frames][1][--threads][1]");
-            prop_assert_eq!(told.lines().last(), Some(wanted.as_str()));
+            let printed = String::from_utf8(output.stdout).unwrap();
+            let expected = format!("[{text}][--frames][1][--threads][1]");
+            prop_assert_eq!(printed.lines().last(), Some(expected.as_str()));
         }
     }
 
     #[test]
-    fn outside_an_array_it_says_what_to_do() {
-        let stage = Stage::new(&[1], 1);
+    fn outside_an_array_the_script_names_the_remedy() {
+        let cluster = FakeCluster::new(&[1], 1);
         let alone = Command::new("bash")
-            .arg(&stage.script)
-            .current_dir(&stage.dir)
+            .arg(&cluster.script)
+            .current_dir(&cluster.dir)
             .env_remove("SLURM_ARRAY_TASK_ID")
             .output()
             .unwrap();
         assert_eq!(alone.status.code(), Some(2));
         assert!(String::from_utf8_lossy(&alone.stderr).contains("sbatch"));
-        assert!(!stage.path("called").exists());
+        assert!(!cluster.path("called").exists());
     }
 }

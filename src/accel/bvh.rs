@@ -22,43 +22,10 @@ use rayon::prelude::*;
 
 use super::collapse::{Collapsed, Content, collapse};
 use super::ploc::{Clustered, cluster};
-pub use super::preset::BvhPreset;
 use super::report::PhaseClock;
 use super::wide::WideTree;
-use super::{Aabb, BuildReport, BuildSettings, SphereRadius, Spheres, Structure, lbvh};
+use super::{Aabb, BuildReport, BuildSettings, BvhLeaves, SphereRadius, Spheres, Structure, lbvh};
 use spherule_formats::blocks::Block;
-
-/// What the tree is built over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub enum BvhLeaves {
-    /// Blocks of 16 particles along a space-filling curve.
-    #[default]
-    Blocks,
-    /// Single particles: about 200 bytes per particle during the build, and blocks that are not full.
-    Particles,
-}
-
-/// Settings of [`Structure::Bvh`].
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
-pub struct BvhSettings {
-    /// Effort of the build.
-    pub preset: BvhPreset,
-    /// What the tree is built over.
-    pub leaves: BvhLeaves,
-}
-
-impl BvhLeaves {
-    /// All kinds of leaves.
-    pub const ALL: [Self; 2] = [Self::Blocks, Self::Particles];
-
-    /// The name in files.
-    pub const fn name(self) -> &'static str {
-        match self {
-            Self::Blocks => "blocks",
-            Self::Particles => "particles",
-        }
-    }
-}
 
 /// Builds a tree over `spheres` in the memory of `tree`.
 pub(super) fn build(

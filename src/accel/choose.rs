@@ -47,7 +47,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn many_rays_pay_for_a_better_tree() {
+    fn many_rays_favour_the_better_tree() {
         let full_hd = 3.3e6;
         assert_eq!(choose(100_000, full_hd, 16), Structure::Kdtree);
         assert_eq!(choose(1_000_000, full_hd, 16), Structure::Kdtree);

@@ -76,7 +76,7 @@ fn leaves(centers: &[Vec3], size: usize) -> Vec<(Aabb, Vec<u32>)> {
 }
 
 #[test]
-fn particles_of_any_shape_of_tree() {
+fn particles_of_trees_of_any_shape() {
     let shapes: [fn(usize) -> usize; 3] = [|n| n / 2, |_| 1, |n| n - 1];
     for count in [0, 1, 2, 16, 17, 300, 5000] {
         let centers = points(count);
@@ -95,7 +95,7 @@ fn particles_of_any_shape_of_tree() {
 }
 
 #[test]
-fn small_subtrees_share_a_block_where_that_is_cheaper() {
+fn small_subtrees_share_a_block_if_cheaper() {
     let near = points(8);
     let mut tree = WideTree::default();
     let tree_of = |leaves: &[_]| binary(leaves, |n| n / 2);
@@ -117,7 +117,7 @@ fn small_subtrees_share_a_block_where_that_is_cheaper() {
 }
 
 #[test]
-fn blocks_change_places_and_the_unfilled_one_comes_last() {
+fn blocks_are_permuted_and_the_partial_one_is_last() {
     for count in [1, 16, 100, 5000] {
         let centers = points(count);
         let blocks = centers.len().div_ceil(BLOCK_SIZE);
@@ -145,7 +145,7 @@ fn blocks_change_places_and_the_unfilled_one_comes_last() {
 
 /// Every sphere is cut in two at a plane, as by spatial splits.
 #[test]
-fn clipped_spheres_are_found_from_either_side_and_once() {
+fn clipped_spheres_are_hit_once_from_either_side() {
     let centers = points(700);
     let whole = leaves(&centers, 10);
     let mut halves = Vec::new();
@@ -164,22 +164,25 @@ fn clipped_spheres_are_found_from_either_side_and_once() {
     other.build(&spheres(&centers), &BuildSettings::default());
     let (tree, other) = (tree.view(), other.tree().view());
     let (mut ours, mut theirs) = (Vec::new(), Vec::new());
-    let mut met = 0;
+    let mut hit_count = 0;
     for (i, target) in centers.iter().enumerate() {
         let away = Vec3::new(1.0, 0.3 * (i % 7) as f32 - 1.0, 0.1 * (i % 11) as f32);
         let ray = Ray::new(*target + away, -away.normalize());
         tree.crossings(&ray, &mut ours);
         other.crossings(&ray, &mut theirs);
-        let told =
+        let describe =
             |tree: &TreeView, c: &super::traverse::TreeCrossing| (c.t, tree.particle(c.slot));
         assert_eq!(
-            ours.iter().map(|c| told(&tree, c)).collect::<Vec<_>>(),
-            theirs.iter().map(|c| told(&other, c)).collect::<Vec<_>>(),
+            ours.iter().map(|c| describe(&tree, c)).collect::<Vec<_>>(),
+            theirs
+                .iter()
+                .map(|c| describe(&other, c))
+                .collect::<Vec<_>>(),
             "ray {i}"
         );
         let hit = tree.nearest(&ray).map(|hit| hit.t);
         assert_eq!(hit, ours.first().map(|c| c.t), "ray {i}");
-        met += ours.len();
+        hit_count += ours.len();
     }
-    assert!(met > 2 * centers.len(), "rays were aimed at spheres");
+    assert!(hit_count > 2 * centers.len(), "rays were aimed at spheres");
 }

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use super::topology::{Linked, NodeRef, Topology};
+use super::tree_fault::TreeFault;
 use super::wide::WideTree;
 use super::{SphereRadius, Spheres};
 use spherule_formats::blocks::BLOCK_SIZE;
@@ -28,7 +29,7 @@ impl WideTree {
     ///
     /// # Errors
     /// Describes the first sphere with an uncovered point.
-    pub(super) fn validate_coverage(&self, spheres: &Spheres) -> Result<(), String> {
+    pub(super) fn validate_coverage(&self, spheres: &Spheres) -> Result<(), TreeFault> {
         let mut covered: Vec<Points> = vec![0; self.count];
         let everywhere = Cell {
             min: DVec3::NEG_INFINITY,
@@ -62,10 +63,10 @@ impl WideTree {
         let all = (1 << POINTS) - 1;
         match covered.iter().position(|points| *points != all) {
             None => Ok(()),
-            Some(index) => Err(format!(
-                "particle {index}: no part has its surface towards {}",
-                directions[covered[index].trailing_ones() as usize]
-            )),
+            Some(index) => Err(TreeFault::Uncovered {
+                particle: index,
+                direction: directions[covered[index].trailing_ones() as usize],
+            }),
         }
     }
 
@@ -126,7 +127,7 @@ mod tests {
 
     /// Large spheres among small ones are cut; the test removes one part.
     #[test]
-    fn a_lost_part_is_found() {
+    fn missing_part_is_detected() {
         let centers: Vec<Vec3> = (0..1000_u16)
             .map(|i| {
                 Vec3::new(
@@ -166,6 +167,9 @@ mod tests {
         let fault = tree
             .validate_coverage(&spheres)
             .expect_err("a part is lost");
-        assert!(fault.starts_with("particle 100"), "{fault}");
+        assert!(
+            matches!(fault, TreeFault::Uncovered { particle: 100, .. }),
+            "{fault}"
+        );
     }
 }

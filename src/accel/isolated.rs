@@ -19,7 +19,7 @@ impl TreeView<'_> {
     pub(crate) fn isolated(&self, support: f32, enough: usize) -> Vec<u32> {
         assert!(
             enough <= MAX_NEIGHBOURS,
-            "only few neighbours are told apart"
+            "only few neighbours are distinguished"
         );
         let slots = self.slot_count();
         // Check every particle, block by block

@@ -31,29 +31,27 @@ mod predict;
 mod preset;
 mod report;
 mod sbvh;
+mod settings;
 pub mod simd;
 pub mod stored;
 mod top_levels;
 mod topology;
 pub mod traverse;
+mod tree_fault;
 mod validate;
 pub mod view;
 mod walk;
 pub mod wide;
 
-pub use builder::{BuildSettings, Structure, TreeBuilder};
-pub use bvh::{BvhLeaves, BvhPreset, BvhSettings};
+pub use builder::TreeBuilder;
 pub use choose::choose;
 pub use hits::{Coherence, TreeHits};
 pub use predict::{BuildBytes, predicted_bytes, predicted_stored_bytes};
-pub(crate) use report::PhaseClock;
+pub use preset::BvhPreset;
 pub use report::{BuildReport, Phase};
-pub use sbvh::SbvhSettings;
+pub use settings::{BuildSettings, BvhLeaves, BvhSettings, SbvhSettings, Structure};
 pub use spherule_formats::blocks::Aabb;
-
-/// Index of a particle in the frame that the tree was built over.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
-pub struct PrimIdx(pub u32);
+pub use tree_fault::{ChildFault, ParticleFault, TreeFault};
 
 /// Radii of the spheres of a frame, scene units.
 #[derive(Debug, Clone, Copy)]

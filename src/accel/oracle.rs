@@ -7,12 +7,12 @@ use crate::ray::Ray;
 
 /// A complete binary tree: the children of particle `i` are `2 i + 1` and `2 i + 2`.
 pub(super) struct ParticleTree {
-    nodes: Vec<Node>,
+    nodes: Vec<OracleNode>,
     radius: f64,
 }
 
 #[derive(Clone, Copy, Default)]
-struct Node {
+struct OracleNode {
     center: DVec3,
     particle: usize,
     axis: usize,
@@ -22,7 +22,7 @@ impl ParticleTree {
     pub(super) fn new(centers: &[Vec3], radius: f32) -> Self {
         let mut particles: Vec<(DVec3, usize)> =
             (0..).zip(centers).map(|(i, c)| (c.as_dvec3(), i)).collect();
-        let mut nodes = vec![Node::default(); centers.len()];
+        let mut nodes = vec![OracleNode::default(); centers.len()];
         place(&mut particles, 0, &mut nodes);
         Self {
             nodes,
@@ -83,7 +83,7 @@ struct Search {
 }
 
 impl Search {
-    fn meet(&mut self, node: &Node, radius: f64) {
+    fn meet(&mut self, node: &OracleNode, radius: f64) {
         let to_center = node.center - self.origin;
         let middle = to_center.dot(self.direction);
         let across = (to_center - self.direction * middle).length();
@@ -104,7 +104,7 @@ impl Search {
 }
 
 /// Puts the median of the widest axis at `index`, so that the tree is filled from the left.
-fn place(particles: &mut [(DVec3, usize)], index: usize, nodes: &mut [Node]) {
+fn place(particles: &mut [(DVec3, usize)], index: usize, nodes: &mut [OracleNode]) {
     if particles.is_empty() {
         return;
     }
@@ -117,7 +117,7 @@ fn place(particles: &mut [(DVec3, usize)], index: usize, nodes: &mut [Node]) {
     let left = left_size(particles.len());
     particles.select_nth_unstable_by(left, |a, b| a.0[axis].total_cmp(&b.0[axis]));
     let (center, particle) = particles[left];
-    nodes[index] = Node {
+    nodes[index] = OracleNode {
         center,
         particle,
         axis,

@@ -312,7 +312,7 @@ mod tests {
     }
 
     #[test]
-    fn boxes_come_back_in_their_own_coordinates() {
+    fn boxes_are_returned_in_their_own_coordinates() {
         let line: Vec<Vec3> = (0..COUNT).map(|i| Vec3::X * (100 * i) as f32).collect();
         let tree = clustered(&line, BvhPreset::Fast).tree;
         let root = tree.nodes[0].bounds;

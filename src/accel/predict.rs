@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn builders_take_what_was_predicted() {
+    fn builders_use_the_predicted_memory() {
         let particles = BvhSettings {
             leaves: BvhLeaves::Particles,
             ..BvhSettings::default()

@@ -74,7 +74,7 @@ impl fmt::Display for StoredFault {
                 expected,
             } => write!(f, "{found} {what}, should be {expected}"),
             Self::ChildMask { node } => {
-                write!(f, "node {node} does not have the blocks that lie below it")
+                write!(f, "node {node} does not have the blocks below it")
             }
             Self::Plane { node } => {
                 write!(

@@ -6,6 +6,7 @@ use proptest::prelude::*;
 
 use super::oracle::ParticleTree;
 use super::simd::SimdLevel;
+use super::simd::tested_levels::tested_levels;
 use super::view::TreeView;
 use super::{
     BuildSettings, BvhLeaves, BvhPreset, BvhSettings, SbvhSettings, SphereRadius, Spheres,
@@ -218,7 +219,7 @@ fn check(scene: &Scene, settings: &BuildSettings, ray_count: usize) -> usize {
         let report = builder.build(&scene.spheres(), &settings);
         assert_eq!(report.particles, scene.centers.len() as u64);
         builder.tree().validate(&scene.spheres()).expect(scene.name);
-        for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+        for level in tested_levels() {
             builder.tree_mut().set_simd(level);
             for ray in rays(scene, ray_count, 11) {
                 let certain = check_ray(scene, &builder.tree().view(), &ray, keep_indices, level);
@@ -314,22 +315,27 @@ fn awkward_scenes_match_brute_force() {
     }
 }
 
+fn tested_fused_levels() -> Vec<SimdLevel> {
+    let mut levels = tested_levels();
+    levels.retain(|level| *level != SimdLevel::Portable);
+    levels
+}
+
 #[test]
-fn levels_with_fused_multiply_add_agree_to_the_bit() {
-    let fused = [SimdLevel::Avx2, SimdLevel::Avx512];
-    if !fused.iter().all(|level| level.is_supported()) {
-        return;
-    }
+fn fma_levels_agree_to_the_bit() {
+    let fused = tested_fused_levels();
     for settings in all_settings() {
         for scene in awkward_scenes() {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &settings);
             for ray in rays(&scene, 2000, 5) {
-                let [a, b] = fused.map(|level| {
-                    builder.tree_mut().set_simd(level);
-                    builder.tree().view().nearest(&ray)
-                });
-                assert_eq!(a, b, "{} {settings:?} {ray:?}", scene.name);
+                let mut first = None;
+                for level in &fused {
+                    builder.tree_mut().set_simd(*level);
+                    let hit = builder.tree().view().nearest(&ray);
+                    let what = format!("{} {settings:?} {level:?} {ray:?}", scene.name);
+                    assert_eq!(*first.get_or_insert(hit), hit, "{what}");
+                }
             }
         }
     }
@@ -342,8 +348,7 @@ fn fused_kernels_of_all_processors_agree_to_the_bit() {
     let scene = Scene::common("cloud", random_points(5000, 21), 0.05);
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());
-    let fused = [SimdLevel::Neon, SimdLevel::Avx2, SimdLevel::Avx512];
-    for level in fused.into_iter().filter(|level| level.is_supported()) {
+    for level in tested_fused_levels() {
         builder.tree_mut().set_simd(level);
         let mut hash = 0xcbf2_9ce4_8422_2325_u64;
         let mut crossings = Vec::new();
@@ -425,7 +430,7 @@ fn tree_by_threads(
 
 /// Also if the last frame was built with another structure.
 #[test]
-fn a_builder_forgets_the_last_frame() {
+fn builder_keeps_no_state_between_frames() {
     let mut builder = TreeBuilder::new();
     for scene in awkward_scenes() {
         for settings in all_settings() {
@@ -452,7 +457,7 @@ fn large_among_small(count: usize) -> Scene {
 }
 
 #[test]
-fn cut_spheres_are_found_once() {
+fn clipped_spheres_are_hit_once() {
     let scene = large_among_small(3000);
     let settings = every_sbvh().map(|sbvh| BuildSettings {
         sbvh,

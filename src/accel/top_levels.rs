@@ -81,7 +81,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_place_once_and_runs_compact() {
+    fn slots_are_used_once_and_runs_are_compact() {
         // A line of boxes in a shuffled order.
         let boxes: Vec<Aabb> = (0..512)
             .map(|i| {
@@ -90,10 +90,11 @@ mod tests {
             })
             .collect();
         let order = kd_order(&boxes);
-        let mut seen = order.clone();
-        seen.sort_unstable();
+        let mut sorted = order.clone();
+        sorted.sort_unstable();
         assert!(
-            seen.iter()
+            sorted
+                .iter()
                 .enumerate()
                 .all(|(i, place)| i == *place as usize)
         );

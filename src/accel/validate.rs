@@ -3,6 +3,7 @@
 
 use super::levels::MAX_LEVELS;
 use super::topology::{Implicit, Linked, NodeRef, Topology};
+use super::tree_fault::{ChildFault, ParticleFault, TreeFault};
 use super::view::TreeView;
 use super::wide::WideTree;
 use super::{Aabb, SphereRadius, Spheres};
@@ -13,13 +14,12 @@ impl WideTree {
     ///
     /// # Errors
     /// Describes the first fault.
-    pub fn validate(&self, spheres: &Spheres) -> Result<(), String> {
+    pub fn validate(&self, spheres: &Spheres) -> Result<(), TreeFault> {
         if self.count != spheres.centers.len() {
-            return Err(format!(
-                "{} particles, should be {}",
-                self.count,
-                spheres.centers.len()
-            ));
+            return Err(TreeFault::ParticleCount {
+                found: self.count,
+                expected: spheres.centers.len(),
+            });
         }
         self.validate_particles(spheres)?;
         if self.links.is_empty() {
@@ -42,7 +42,7 @@ impl WideTree {
     }
 
     /// Checks complete levels from the blocks up.
-    fn validate_levels(&self) -> Result<(), String> {
+    fn validate_levels(&self) -> Result<(), TreeFault> {
         let view = self.view();
         let topology = view.implicit();
         let levels = self.level_starts.len();
@@ -53,7 +53,7 @@ impl WideTree {
             below = self.validate_level(level, topology, &below)?;
         }
         if levels > 0 && below.len() != 1 {
-            return Err(format!("{} roots", below.len()));
+            return Err(TreeFault::Roots(below.len()));
         }
         Ok(())
     }
@@ -64,7 +64,7 @@ impl WideTree {
         level: usize,
         topology: Implicit,
         below: &[Aabb],
-    ) -> Result<Vec<Aabb>, String> {
+    ) -> Result<Vec<Aabb>, TreeFault> {
         let start = self.level_starts[level] as usize;
         let end = self
             .level_starts
@@ -79,17 +79,13 @@ impl WideTree {
             for slot in 0..node.child_count() {
                 let place = topology.first_child(number, index) + slot;
                 let Some(child) = below.get(place) else {
-                    return Err(format!("level {level} node {index}: no child {slot}"));
+                    return Err(TreeFault::in_level(level, index, slot, ChildFault::Missing));
                 };
                 if std::mem::replace(&mut reached[place], true) {
-                    return Err(format!(
-                        "level {level} node {index}: child {slot} has two parents"
-                    ));
+                    return Err(TreeFault::in_level(level, index, slot, ChildFault::Shared));
                 }
                 if !node.child_holds(slot, child) {
-                    return Err(format!(
-                        "level {level} node {index}: child {slot} sticks out"
-                    ));
+                    return Err(TreeFault::in_level(level, index, slot, ChildFault::Outside));
                 }
                 bounds = bounds.union(*child);
             }
@@ -97,19 +93,18 @@ impl WideTree {
         }
         // Check that each child has a parent
         if let Some(lost) = reached.iter().position(|r| !r) {
-            return Err(format!("level {level}: nobody has child {lost}"));
+            return Err(TreeFault::Orphan { level, child: lost });
         }
         Ok(own)
     }
 
     /// Checks a tree with links from the root down.
-    fn validate_links(&self) -> Result<(), String> {
+    fn validate_links(&self) -> Result<(), TreeFault> {
         if self.links.len() != self.nodes.len() {
-            return Err(format!(
-                "{} links for {} nodes",
-                self.links.len(),
-                self.nodes.len()
-            ));
+            return Err(TreeFault::LinkCount {
+                links: self.links.len(),
+                nodes: self.nodes.len(),
+            });
         }
         let mut reached = Reached {
             nodes: vec![false; self.nodes.len()],
@@ -131,13 +126,13 @@ impl WideTree {
         code: u32,
         levels: usize,
         reached: &mut Reached,
-    ) -> Result<Aabb, String> {
+    ) -> Result<Aabb, TreeFault> {
         let topology = view.linked();
         let NodeRef::Node(index) = Linked::decode(code) else {
-            return Err(format!("code {code} is no node"));
+            return Err(TreeFault::NotANode(code));
         };
         if levels == 0 {
-            return Err(format!("node {index}: deeper than {MAX_LEVELS} levels"));
+            return Err(TreeFault::TooDeep(index));
         }
         let node = &self.nodes[index];
         let mut own = Aabb::EMPTY;
@@ -147,7 +142,7 @@ impl WideTree {
             let node_ref = Linked::decode(child);
             reached
                 .mark(node_ref)
-                .map_err(|fault| format!("node {index}, child {slot}: {fault}"))?;
+                .map_err(|fault| TreeFault::in_node(index, slot, fault))?;
             // Check the subtree of the child
             let bounds = match node_ref {
                 NodeRef::Block(block) => self.block_bounds(block),
@@ -155,7 +150,7 @@ impl WideTree {
             };
             // The parts of clipped spheres are checked from above (`coverage.rs`).
             if !self.is_clipped && !node.child_holds(slot as usize, &bounds) {
-                return Err(format!("node {index}: child {slot} sticks out"));
+                return Err(TreeFault::in_node(index, slot, ChildFault::Outside));
             }
             own = own.union(bounds);
         }
@@ -164,10 +159,10 @@ impl WideTree {
 
     /// Checks that every particle is stored once, or several times if there may be copies, with its own centre and
     /// radius.
-    fn validate_particles(&self, spheres: &Spheres) -> Result<(), String> {
+    fn validate_particles(&self, spheres: &Spheres) -> Result<(), TreeFault> {
         if self.indices.is_empty() {
             return if self.has_copies {
-                Err("copies that cannot be told apart".to_owned())
+                Err(TreeFault::UnidentifiedCopies)
             } else {
                 Ok(())
             };
@@ -178,23 +173,23 @@ impl WideTree {
             let index = self.indices[slot] as usize;
             match is_stored.get_mut(index) {
                 Some(is_stored) if self.has_copies || !*is_stored => *is_stored = true,
-                Some(_) => return Err(format!("particle {index} twice")),
-                None => return Err(format!("slot {slot}: particle {index} does not exist")),
+                Some(_) => return Err(TreeFault::Particle(index, ParticleFault::Repeated)),
+                None => return Err(TreeFault::Particle(index, ParticleFault::Unknown)),
             }
             // Compare centre and radius with the input
             let (block, lane) = (slot / BLOCK_SIZE, slot % BLOCK_SIZE);
             if self.blocks[block].center(lane) != spheres.centers[index] {
-                return Err(format!("slot {slot}: not the centre of particle {index}"));
+                return Err(TreeFault::Particle(index, ParticleFault::Center));
             }
             if let (SphereRadius::Each(radii), Some(own)) = (spheres.radius, self.radii.get(block))
                 && own.0[lane].to_bits() != radii[index].to_bits()
             {
-                return Err(format!("slot {slot}: not the radius of particle {index}"));
+                return Err(TreeFault::Particle(index, ParticleFault::Radius));
             }
         }
         // Check that no particle is missing
-        if let Some(lost) = is_stored.iter().position(|seen| !seen) {
-            return Err(format!("particle {lost} is nowhere"));
+        if let Some(lost) = is_stored.iter().position(|stored| !stored) {
+            return Err(TreeFault::Particle(lost, ParticleFault::Missing));
         }
         Ok(())
     }
@@ -207,14 +202,14 @@ struct Reached {
 }
 
 impl Reached {
-    fn mark(&mut self, node_ref: NodeRef<usize>) -> Result<(), String> {
+    fn mark(&mut self, node_ref: NodeRef<usize>) -> Result<(), ChildFault> {
         let mark = match node_ref {
             NodeRef::Node(node) => self.nodes.get_mut(node),
             NodeRef::Block(block) => self.blocks.get_mut(block),
         };
         match mark {
-            None => Err(format!("{node_ref:?} does not exist")),
-            Some(true) => Err(format!("{node_ref:?} has two parents")),
+            None => Err(ChildFault::Missing),
+            Some(true) => Err(ChildFault::Shared),
             Some(mark) => {
                 *mark = true;
                 Ok(())
@@ -222,12 +217,12 @@ impl Reached {
         }
     }
 
-    fn all(&self) -> Result<(), String> {
+    fn all(&self) -> Result<(), TreeFault> {
         let lost = |marks: &[bool]| marks.iter().position(|mark| !mark);
         match (lost(&self.nodes), lost(&self.blocks)) {
             (None, None) => Ok(()),
-            (Some(node), _) => Err(format!("nobody has node {node}")),
-            (_, Some(block)) => Err(format!("nobody has block {block}")),
+            (Some(node), _) => Err(TreeFault::UnreachedNode(node)),
+            (_, Some(block)) => Err(TreeFault::UnreachedBlock(block)),
         }
     }
 }

@@ -1,14 +1,15 @@
-//! `spherule check`: what `render` would do with the same arguments. Writes nothing but its answer.
+//! `spherule check`: prints what `render` would do with the same arguments. Writes no files.
 
 use std::time::{Duration, Instant};
 
 use clap::Args;
 use spherule_formats::Sequence;
-use spherule_jobs::{Foreseen, FrameState, Job, Mode};
+use spherule_jobs::{DryRun, FrameState, Job, ResumeMode};
 
-use super::plan::{Plan, RunArgs, one_fits};
-use super::work::use_threads;
+use super::job::use_threads;
+use super::render::RunArgs;
 use super::{CliError, Outcome, disk, print};
+use crate::job::{RenderJob, require_one_fits};
 use crate::metrics::Bytes;
 use crate::metrics::memory::available;
 use crate::pipeline::{FrameSize, ImageTask, Probe, Schedule, Setup, probe};
@@ -20,11 +21,11 @@ mod show;
 const EXAMPLES: &str = "\
 Examples:
   spherule check run1 -o out/frame.####.exr
-      What the same render would do, need and take
+      Frames, memory, disk space and time of the same render
   spherule check run1 --memory-limit 2GiB
-      Which frames fit into a limit
+      The frames that fit into a memory limit
   spherule check out/job.toml --json
-      How a job stands and what is left of it, for scripts";
+      The state of a job and its remaining work, for scripts";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -37,22 +38,27 @@ pub(super) struct CheckArgs {
 }
 
 pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
-    let asked = args.run.manifest.manifest()?;
-    use_threads(asked.manifest.job.threads)?;
-    let sequence = asked.sequence()?;
+    let requested = args.run.manifest.manifest()?;
+    use_threads(requested.manifest.job.threads)?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
-    let plan = Plan::new(asked, &sequence, args.run.work.shard)?;
-    let mut check = Check::new(&plan, &sequence);
-    check.look(&args.run);
+    let mode = args.run.job.mode();
+    let mut render_job = RenderJob::new(requested, &sequence, args.run.job.shard)?;
+    // The check reports a directory that cannot be used
+    if render_job.check_output_dir(mode).is_ok() {
+        render_job = render_job.resuming(mode)?;
+    }
+    let mut check = Check::new(&render_job, &sequence);
+    check.run(&args.run);
     if args.json {
         print::pretty_json(&check.to_json())?;
     } else {
         print::lines(check.to_lines())?;
     }
     for problem in &check.problems {
-        say!("error: {problem}");
+        message!("error: {problem}");
     }
     Ok(if check.problems.is_empty() {
         Outcome::Done
@@ -61,17 +67,17 @@ pub(super) fn run(args: &CheckArgs) -> Result<Outcome, CliError> {
     })
 }
 
-/// What was found.
+/// The results of a check.
 struct Check<'a> {
-    plan: &'a Plan,
+    render_job: &'a RenderJob,
     sequence: &'a Sequence,
-    /// What would make `render` refuse.
+    /// Reasons for which `render` would refuse to start.
     problems: Vec<String>,
-    foreseen: Option<Foreseen>,
-    pictures: Option<(Survey, Setup)>,
+    dry_run: Option<DryRun>,
+    setup: Option<(Survey, Setup)>,
     tasks: Vec<ImageTask>,
     schedule: Option<Schedule>,
-    /// Looking at the sequence takes the same time when it is rendered.
+    /// The render will need the same time for its survey.
     survey_time: Duration,
     probe: Option<Probe>,
     free_memory: Option<u64>,
@@ -79,13 +85,13 @@ struct Check<'a> {
 }
 
 impl<'a> Check<'a> {
-    fn new(plan: &'a Plan, sequence: &'a Sequence) -> Self {
+    fn new(render_job: &'a RenderJob, sequence: &'a Sequence) -> Self {
         Self {
-            plan,
+            render_job,
             sequence,
             problems: Vec::new(),
-            foreseen: None,
-            pictures: None,
+            dry_run: None,
+            setup: None,
             tasks: Vec::new(),
             schedule: None,
             survey_time: Duration::ZERO,
@@ -95,64 +101,76 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Keeps what went well; what did not is a problem.
-    fn noted<T>(&mut self, result: Result<T, CliError>) -> Option<T> {
+    /// Returns the value, or adds the error to the problems.
+    fn or_problem<T, E: Into<CliError>>(&mut self, result: Result<T, E>) -> Option<T> {
         result
-            .map_err(|error| self.problems.extend(error.messages()))
+            .map_err(|error| self.problems.extend(error.into().messages()))
             .ok()
     }
 
-    fn look(&mut self, args: &RunArgs) {
-        if self.look_at_place(args.work.mode()) {
-            let request = self.plan.request(self.sequence, args.work.mode());
-            let foreseen = request.and_then(|r| Ok(Job::foresee(&self.plan.dir, &r)?));
-            self.foreseen = self.noted(foreseen);
-            for change in self.foreseen.iter().flat_map(|f| &f.requeued) {
+    fn run(&mut self, args: &RunArgs) {
+        if self.check_output_dir(args.job.mode()) {
+            let request = self.render_job.request(self.sequence, args.job.mode());
+            let dry_run = request.and_then(|r| Ok(Job::dry_run(self.render_job.dir(), &r)?));
+            self.dry_run = self.or_problem(dry_run);
+            for change in self.dry_run.iter().flat_map(|d| &d.requeued) {
                 note!("{change} since it was rendered; it would be rendered again");
             }
         }
         let start = Instant::now();
-        let pictures = match self.foreseen.as_ref().and_then(|f| f.resolved.as_ref()) {
-            Some(resolved) => self.plan.settle(resolved, self.sequence),
-            None => self.plan.survey(self.sequence),
+        let setup = match self.dry_run.as_ref().and_then(|d| d.resolved.as_ref()) {
+            Some(resolved) => self.render_job.stored_setup(resolved, self.sequence),
+            None => {
+                message!("surveying the sequence");
+                self.render_job.survey(self.sequence)
+            }
         };
-        self.pictures = self.noted(pictures);
+        self.setup = self.or_problem(setup);
+        if self.setup.is_some() {
+            let notes = self.or_problem(self.render_job.scene_notes());
+            for note in notes.iter().flatten() {
+                note!("{note}");
+            }
+        }
         self.survey_time = start.elapsed();
-        let frames = match &self.foreseen {
-            Some(foreseen) => foreseen.pending(),
-            None => self.plan.selected(self.sequence),
+        let frames = match &self.dry_run {
+            Some(dry_run) => dry_run.pending(),
+            None => self.render_job.selected(self.sequence),
         };
-        let mut tasks = self.plan.tasks(self.sequence, &frames);
-        if let Some((_, setup)) = &self.pictures {
-            let schedule = self.plan.fit(self.sequence, setup, &mut tasks);
-            let fits = one_fits(&tasks);
+        let mut tasks = self.render_job.tasks(self.sequence, &frames);
+        if let Some((_, setup)) = &self.setup {
+            let schedule = self.render_job.schedule(self.sequence, setup, &mut tasks);
+            let fits = require_one_fits(&tasks);
             self.tasks = tasks;
-            self.look_at_room(&schedule);
+            self.check_memory(&schedule);
             self.schedule = Some(schedule);
-            if self.noted(fits).is_some() {
-                self.look_at_time();
+            if self.or_problem(fits).is_some() {
+                self.estimate_time();
             }
         }
     }
 
-    /// Looks at where the images go; whether that is, or could be, a directory.
-    fn look_at_place(&mut self, mode: Mode) -> bool {
-        if self.noted(self.plan.guard_directory(mode)).is_none() {
+    /// Checks the output directory. Returns whether it is, or could be, a directory.
+    fn check_output_dir(&mut self, mode: ResumeMode) -> bool {
+        if self
+            .or_problem(self.render_job.check_output_dir(mode))
+            .is_none()
+        {
             return false;
         }
-        self.noted(self.plan.guard_manifest());
-        let there = disk::existing(&self.plan.dir);
-        self.free_disk = disk::free(&there);
-        if let Err(error) = disk::writable(&there) {
+        self.or_problem(self.render_job.check_manifest_file());
+        let existing = disk::nearest_existing(self.render_job.dir());
+        self.free_disk = disk::free(&existing);
+        if let Err(error) = disk::check_writable(&existing) {
             self.problems.push(format!(
                 "{}: cannot be written ({error}); check its permissions, or choose another directory",
-                there.display()
+                existing.display()
             ));
         }
         true
     }
 
-    fn look_at_room(&mut self, schedule: &Schedule) {
+    fn check_memory(&mut self, schedule: &Schedule) {
         let need = schedule.need.total();
         if let Some(free) = self.free_memory.filter(|free| need > *free) {
             self.problems.push(format!(
@@ -165,25 +183,28 @@ impl<'a> Check<'a> {
         }
     }
 
-    /// Measures the heaviest frame that is to be done, and some others.
-    fn look_at_time(&mut self) {
-        let Some((_, setup)) = &self.pictures else {
+    /// Measures the pending frame with the most particles, and some others.
+    fn estimate_time(&mut self) {
+        let Some((_, setup)) = &self.setup else {
             return;
         };
-        let Some(heaviest) = self.to_do().max_by_key(|task| self.size(setup, task).raw) else {
+        let Some(heaviest) = self
+            .renderable()
+            .max_by_key(|task| self.size(setup, task).raw)
+        else {
             return;
         };
         let others = self.spread_tasks(heaviest);
         match probe(setup, self.sequence, heaviest, &others) {
             Ok(probe) => self.probe = Some(probe),
-            // Costs that frame alone when its turn comes.
+            // Only that frame will fail
             Err(reason) => note!("frame {}: {reason}", heaviest.frame),
         }
         let needed = self.disk_bytes().unwrap_or(0.0);
         if let Some(free) = self.free_disk.filter(|free| needed > *free as f64) {
             self.problems.push(format!(
-                "{}: the images need about {}, {} are free; choose another place",
-                self.plan.shown_output.display(),
+                "{}: the images need about {}, {} are free; choose another directory",
+                self.render_job.shown_output().display(),
                 Bytes(whole(needed)),
                 Bytes(free)
             ));
@@ -191,16 +212,16 @@ impl<'a> Check<'a> {
     }
 
     fn size(&self, setup: &Setup, task: &ImageTask) -> FrameSize {
-        FrameSize::of(self.sequence, task.index, setup.run.weight.as_ref())
+        FrameSize::of_task(self.sequence, task, setup)
     }
 
-    fn to_do(&self) -> impl Iterator<Item = &ImageTask> {
+    fn renderable(&self) -> impl Iterator<Item = &ImageTask> {
         self.tasks.iter().filter(|task| task.refused.is_none())
     }
 
-    /// Up to four frames that are to be done, spread evenly over them; not the `heaviest`.
+    /// Up to four pending frames, spread evenly, without the `heaviest`.
     fn spread_tasks(&self, heaviest: &ImageTask) -> Vec<&ImageTask> {
-        let all: Vec<&ImageTask> = self.to_do().collect();
+        let all: Vec<&ImageTask> = self.renderable().collect();
         let mut spread: Vec<&ImageTask> = Vec::new();
         for eighth in [1, 5, 3, 7] {
             let task = all[all.len() * eighth / 8];
@@ -212,29 +233,32 @@ impl<'a> Check<'a> {
     }
 
     fn disk_bytes(&self) -> Option<f64> {
-        // An image that was given up tells no size.
+        // The size is unknown if the image was not finished
         let probe = self.probe.filter(|probe| !probe.is_lower_bound)?;
-        Some(probe.image_bytes * self.to_do().count() as f64)
+        Some(probe.image_bytes * self.renderable().count() as f64)
     }
 
     fn seconds(&self) -> Option<f64> {
         let probe = self.probe?;
-        let (_, setup) = self.pictures.as_ref()?;
+        let (_, setup) = self.setup.as_ref()?;
         let threads = rayon::current_num_threads();
         let overlap = self.schedule.as_ref()?.overlap;
-        let sizes: Vec<FrameSize> = self.to_do().map(|task| self.size(setup, task)).collect();
-        let probed = self.to_do().find(|task| task.frame == probe.frame)?;
+        let sizes: Vec<FrameSize> = self
+            .renderable()
+            .map(|task| self.size(setup, task))
+            .collect();
+        let probed = self.renderable().find(|task| task.frame == probe.frame)?;
         let frames = probe.seconds_for(&sizes, &self.size(setup, probed), overlap, threads);
         Some(self.survey_time.as_secs_f64() + frames)
     }
 
-    /// Frames of the run that stand so.
-    fn standing(&self, state: FrameState) -> Vec<i64> {
-        let Some(foreseen) = &self.foreseen else {
+    /// Frames of the run in this state.
+    fn in_state(&self, state: FrameState) -> Vec<i64> {
+        let Some(dry_run) = &self.dry_run else {
             return Vec::new();
         };
-        let all = foreseen.selected.iter().copied();
-        all.filter(|frame| foreseen.state.frame_state(*frame) == Some(state))
+        let all = dry_run.selected.iter().copied();
+        all.filter(|frame| dry_run.state.frame_state(*frame) == Some(state))
             .collect()
     }
 

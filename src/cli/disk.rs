@@ -1,37 +1,37 @@
-//! What can be known of a place for images without writing there.
+//! Checks an output directory without writing to it.
 
 use std::path::{Path, PathBuf};
 
-/// The part of `dir` that is there: `dir` itself, or the nearest directory above it.
-pub(super) fn existing(dir: &Path) -> PathBuf {
+/// `dir` itself if it exists, otherwise its nearest existing ancestor.
+pub(super) fn nearest_existing(dir: &Path) -> PathBuf {
     let found = dir.ancestors().find(|p| p.exists());
     found.unwrap_or(Path::new("/")).to_owned()
 }
 
-/// Whether files can be made in the directory `dir`, as far as its permissions tell.
+/// Checks that the permissions of the directory `dir` allow to create files.
 ///
 /// # Errors
-/// Why not.
+/// The error that creating a file would give.
 #[cfg(unix)]
-pub(super) fn writable(dir: &Path) -> Result<(), std::io::Error> {
+pub(super) fn check_writable(dir: &Path) -> Result<(), std::io::Error> {
     use rustix::fs::Access;
     Ok(rustix::fs::access(dir, Access::WRITE_OK | Access::EXEC_OK)?)
 }
 
-/// Bytes that can still be written to the file system of `dir`; None where the system does not tell.
+/// Free bytes on the file system of `dir`; None if unknown.
 #[cfg(unix)]
 pub(super) fn free(dir: &Path) -> Option<u64> {
     let found = rustix::fs::statvfs(dir).ok()?;
     Some(found.f_bavail.saturating_mul(found.f_frsize))
 }
 
-/// Not known here.
+/// Not available on this system.
 #[cfg(not(unix))]
-pub(super) fn writable(_dir: &Path) -> Result<(), std::io::Error> {
+pub(super) fn check_writable(_dir: &Path) -> Result<(), std::io::Error> {
     Ok(())
 }
 
-/// Not known here.
+/// Not available on this system.
 #[cfg(not(unix))]
 pub(super) fn free(_dir: &Path) -> Option<u64> {
     None
@@ -42,18 +42,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearest_directory_that_is_there() {
+    fn the_nearest_existing_directory() {
         let dir = tempfile::tempdir().unwrap();
-        assert_eq!(existing(&dir.path().join("a/b")), dir.path());
-        assert_eq!(existing(dir.path()), dir.path());
+        assert_eq!(nearest_existing(&dir.path().join("a/b")), dir.path());
+        assert_eq!(nearest_existing(dir.path()), dir.path());
     }
 
     #[cfg(unix)]
     #[test]
-    fn a_temporary_directory_has_room() {
+    fn a_temporary_directory_is_writable() {
         let dir = tempfile::tempdir().unwrap();
-        assert!(writable(dir.path()).is_ok());
+        assert!(check_writable(dir.path()).is_ok());
         assert!(free(dir.path()) > Some(0));
-        assert!(writable(&dir.path().join("none")).is_err());
+        assert!(check_writable(&dir.path().join("none")).is_err());
     }
 }

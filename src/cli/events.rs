@@ -1,8 +1,8 @@
-//! `--progress json`: events as JSON, one object a line, alone on standard output. docs/progress.md describes them;
-//! whoever changes an event changes it there.
+//! `--progress json`: events as JSON, one object per line, on standard output. docs/progress.md describes them. Keep
+//! it up to date.
 //!
-//! There is one standard output, so there is one stream of events in a process. Commands that were not asked for
-//! events send them all the same: they go nowhere.
+//! There is one standard output, so a process has one stream of events. Commands send events in any case; without
+//! `--progress json` they are discarded.
 
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 
@@ -10,13 +10,13 @@ use serde_json::{Map, Value, json};
 
 use super::print::{self, Reader};
 
-/// None if no events were asked for.
+/// None unless events were requested.
 static STREAM: Mutex<Option<Stream>> = Mutex::new(None);
 
 struct Stream {
-    /// What is known of the run when it ends.
+    /// Fields of the last event.
     summary: Map<String, Value>,
-    /// Whether nobody reads any more, or nothing can be written.
+    /// Whether the reader has gone, or nothing can be written.
     is_closed: bool,
 }
 
@@ -24,8 +24,8 @@ fn stream() -> MutexGuard<'static, Option<Stream>> {
     STREAM.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Sends events from now on.
-pub(super) fn begin() {
+/// Starts the stream of events.
+pub(super) fn start() {
     *stream() = Some(Stream {
         summary: Map::new(),
         is_closed: false,
@@ -39,28 +39,28 @@ pub(super) fn send(event: &str, facts: Value) {
     }
 }
 
-/// Prints a note for people, and sends it.
+/// Prints a note and sends it as an event.
 pub(super) fn note(text: &str) {
-    say!("note: {text}");
+    message!("note: {text}");
     send("note", json!({"text": text}));
 }
 
-/// Adds to what the last event tells.
-pub(super) fn at_end(facts: Value) {
+/// Adds fields to the last event.
+pub(super) fn add_to_end(facts: Value) {
     if let (Some(stream), Value::Object(facts)) = (&mut *stream(), facts) {
         stream.summary.extend(facts);
     }
 }
 
-/// Sends the last event: the exit code, and what ended the run before its work was done.
+/// Sends the last event: exit code and errors.
 pub(super) fn end(code: u8, errors: &[String]) {
     if let Some(stream) = stream().take() {
         stream.end(code, errors);
     }
 }
 
-/// The same from a thread that must not wait: an event that is just being sent to somebody who does not read is
-/// the last one then.
+/// Sends the last event from a thread that must not block. If another event is being sent to a reader that does
+/// not read, that one stays the last.
 pub(super) fn end_at_once(code: u8) {
     let stream = match STREAM.try_lock() {
         Ok(mut stream) => stream.take(),
@@ -80,11 +80,11 @@ impl Stream {
         facts["event"] = json!(event);
         match print::json(&facts) {
             Ok(Reader::Listening) => {}
-            // The work goes on: what counts is in the ledger.
+            // Continue: the results are in the ledger
             Ok(Reader::Gone) => self.is_closed = true,
             Err(error) => {
                 self.is_closed = true;
-                say!("note: {error}; no more events are sent");
+                message!("note: {error}; no more events are sent");
             }
         }
     }

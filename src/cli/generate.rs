@@ -1,4 +1,4 @@
-//! `spherule generate`: seeded particles that others can make exactly.
+//! `spherule generate`: reproducible test particles from a seed.
 
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -10,22 +10,22 @@ use spherule_formats::convert::{
 };
 use spherule_formats::generate::BoxSettings;
 use spherule_formats::native::{Bound, Encoding};
-use spherule_formats::write;
+use spherule_formats::{ValueError, write};
 use spherule_jobs::Interrupt;
 
-use super::numbers::{USUAL_BOUND, not_negative, positive};
+use super::numbers::{DEFAULT_BOUND, not_negative, positive};
 use super::{CliError, Outcome, signals};
 use crate::metrics::Bytes;
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping",
-    at_once: "stopped",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping",
+    stopped: "stopped",
 };
 
 const EXAMPLES: &str = "\
 Examples:
   spherule generate box --particles 1e6 -o box.npy
-      The thesis's box
+      The box of the thesis
   spherule generate block --particles 1e7 --velocity -o water.spf
       A block of water as a native frame
   spherule generate box --particles 1e8 --radius 0.01 --encoding q16 -o box.spf
@@ -40,9 +40,9 @@ pub(super) struct GenerateArgs {
 
 #[derive(Debug, Subcommand)]
 enum What {
-    /// The thesis's box (3,5,-2)-(7,8,2), filled evenly by splitmix64.
+    /// The box of the thesis, from (3,5,-2) to (7,8,2), filled uniformly at random.
     Box(BoxArgs),
-    /// A block of water, about 4:2:1, under a wavy surface: particles two radii apart in a little disorder.
+    /// A block of water with waves, about 4:2:1: slightly disordered particles, two radii apart.
     Block(BlockArgs),
 }
 
@@ -50,7 +50,7 @@ enum What {
 struct BoxArgs {
     #[command(flatten)]
     common: CommonArgs,
-    /// Radius of all particles, which native frames tell.
+    /// Radius of all particles, stored in native frames.
     #[arg(long, value_parser = positive)]
     radius: Option<f32>,
 }
@@ -59,38 +59,36 @@ struct BoxArgs {
 struct BlockArgs {
     #[command(flatten)]
     common: CommonArgs,
-    /// Radius of all particles; without one the block is about 1 high.
+    /// Radius of all particles [default: so that the block is about 1 high]
     #[arg(long, value_parser = positive)]
     radius: Option<f32>,
-    /// Gives particles a velocity.
+    /// Store a velocity for each particle.
     #[arg(long)]
     velocity: bool,
 }
 
 #[derive(Debug, Args)]
 struct CommonArgs {
-    /// Particles; 1e6 is understood.
+    /// Number of particles, such as 1e6.
     #[arg(long, value_parser = count)]
     particles: usize,
-    /// The generator's first state.
+    /// Seed of the random numbers.
     #[arg(long, default_value_t = 1)]
     seed: u64,
     /// File to write: .spf, .npy or .vtk.
     #[arg(short, long)]
     output: PathBuf,
-    /// How native frames store positions: f32 (12 bytes a particle), q16 (6) or q10 (4) [default: f32]
+    /// Encoding of positions in native frames: f32 (12 bytes per particle), q16 (6) or q10 (4) [default: f32]
     ///
-    /// With a largest error, the default is what needs the fewest bytes.
+    /// If --max-error is given, the default is the smallest encoding within that error.
     #[arg(long)]
     encoding: Option<Encoding>,
-    /// Largest error of a stored position as a fraction of the radius [default: 0.02 for q16 and q10]
-    ///
-    /// The default holds where there is a radius.
+    /// Largest error of a position as a fraction of the radius [default: 0.02 for q16 and q10 with a radius]
     #[arg(long, value_name = "FRACTION", value_parser = not_negative)]
     max_error: Option<f64>,
-    /// Memory that making a native frame may take, beside what the program itself needs.
+    /// Memory limit for writing a native frame: 4GiB, 512MiB.
     ///
-    /// What does not fit lies beside the file meanwhile.
+    /// A larger frame is sorted in parts, in a temporary file next to the output.
     #[arg(long, value_name = "SIZE", default_value = "2GiB")]
     memory: Bytes,
 }
@@ -103,7 +101,7 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
     let format = Format::of(&common.output)?;
     if common.max_error.is_some() && matches!(args.what, What::Box(_)) && radius.is_none() {
         return Err(CliError::other(
-            "--max-error is a fraction of the radius; say --radius too",
+            "--max-error is a fraction of the radius and needs --radius",
         ));
     }
     let settings = BoxSettings::thesis(common.particles, common.seed);
@@ -116,8 +114,8 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
             has_velocity: args.velocity,
         })),
     };
-    let signals = signals::listen(WORDS)?;
-    let until = Until(signals.at_work());
+    let signals = signals::listen(SIGNAL_MESSAGES)?;
+    let until = Until(signals.start_work());
     match write(format, &*source, common, &until) {
         Err(ConvertError::Interrupted) => return Ok(Outcome::Interrupted),
         result => result.map_err(|e| CliError::Other(e.to_string()))?,
@@ -128,11 +126,11 @@ pub(super) fn run(args: &GenerateArgs) -> Result<Outcome, CliError> {
         output,
         ..
     } = common;
-    say!("{}: {particles} particles, seed {seed}", output.display());
+    message!("{}: {particles} particles, seed {seed}", output.display());
     Ok(Outcome::Done)
 }
 
-/// Goes on until a signal comes.
+/// Stops at the first signal.
 struct Until<'a>(&'a Interrupt);
 
 impl Progress for Until<'_> {
@@ -161,7 +159,7 @@ impl Format {
             Some("vtk") => Ok(Self::Vtk),
             Some("spf") => Ok(Self::Native),
             _ => Err(CliError::other(format!(
-                "{}: which format? name the file .spf, .npy or .vtk",
+                "{}: the name must end in .spf, .npy or .vtk",
                 path.display()
             ))),
         }
@@ -182,8 +180,8 @@ fn write(
             let report = convert(source, path, &args.settings(source), until)?;
             let phases = report.seconds.iter();
             let seconds = phases.map(|(phase, s)| format!("{} {s:.2} s", phase.name()));
-            say!(
-                "{}, largest error {:.3e}, parts {}, memory {}, put aside {}: {}",
+            message!(
+                "{}, largest error {:.3e}, parts {}, memory {}, temporary files {}: {}",
                 report.index.encoding(),
                 report.index.max_error,
                 report.parts,
@@ -199,7 +197,7 @@ fn write(
 impl CommonArgs {
     fn settings(&self, source: &dyn ParticleSource) -> ConvertSettings {
         let is_plain = self.max_error.is_none() && self.encoding.is_none();
-        let usual = source.common_radius().map(|_| USUAL_BOUND);
+        let usual = source.common_radius().map(|_| DEFAULT_BOUND);
         ConvertSettings {
             encoding: self.encoding.or(is_plain.then_some(Encoding::F32)),
             bound: match self.max_error.or(usual) {
@@ -213,12 +211,12 @@ impl CommonArgs {
 }
 
 /// A whole number, also as 1e6 or 2_000_000.
-pub(super) fn count(text: &str) -> Result<usize, String> {
+pub(super) fn count(text: &str) -> Result<usize, ValueError> {
     let plain = text.replace('_', "");
     if let Ok(count) = plain.parse() {
         return Ok(count);
     }
-    let wrong = || format!("`{text}` is no number of particles, as 100000 or 1e5");
+    let wrong = || ValueError::new("a particle count, such as 100000 or 1e5", text);
     let value: f64 = plain.parse().map_err(|_| wrong())?;
     // All integers to 2^53 are exact in f64, and no frame holds more.
     if value.fract() != 0.0 || !(0.0..=9e15).contains(&value) {
@@ -233,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn counts_are_whole() {
+    fn counts_are_integers() {
         assert_eq!(count("100000"), Ok(100_000));
         assert_eq!(count("1e6"), Ok(1_000_000));
         assert_eq!(count("2_000"), Ok(2000));

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::job::ManifestArgs;
+use super::manifest_args::ManifestArgs;
 use super::{CliError, Outcome, print};
 
 #[derive(Debug, Args)]
@@ -12,11 +12,11 @@ pub(super) struct InitArgs {
 }
 
 pub(super) fn run(args: &InitArgs) -> Result<Outcome, CliError> {
-    let asked = args.manifest.manifest()?;
-    let sequence = asked.sequence()?;
+    let requested = args.manifest.manifest()?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
-    print::file(&asked.manifest.to_commented_toml())?;
+    print::file(&requested.manifest.to_commented_toml())?;
     Ok(Outcome::Done)
 }

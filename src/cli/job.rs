@@ -1,210 +1,159 @@
-//! From arguments to a manifest and its sequence: what `render` and `init` share.
+//! Shared by the commands that run jobs: how earlier runs are resumed, where files go, and the report at the end.
 
-use std::io;
-use std::panic;
+use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
-use std::thread;
+use std::time::Instant;
 
 use clap::Args;
-use spherule_formats::sequence::{Sequence, SequenceError, SequenceInput};
+use serde_json::json;
+use spherule_jobs::{FrameRange, Interrupt, Job, JobError, PLAN_FILE, ResumeMode};
 
-use super::CliError;
-use super::key_flags::{KeyFlags, over};
-use super::numbers::number;
-use super::paths::{absolute, text};
-use crate::manifest::{self, Look, Manifest, Override};
-use crate::metrics::Bytes;
-use crate::reading::read_budget;
+use super::manifest_args::{is_manifest, read_manifest};
+use super::paths::absolute;
+use super::progress::{FinishedFrames, duration};
+use super::{CliError, Outcome, events};
+use crate::job::{RunError, Shard};
+use crate::manifest::{Manifest, real_dir};
 
-/// Options that set keys of the manifest: `--set` for any of them, and an option for the usual ones.
+/// How one run treats the results of earlier runs. These options are not in the manifest: a manifest that always
+/// starts over would discard finished work.
 #[derive(Debug, Args)]
-pub(super) struct ManifestArgs {
-    /// A directory, a pattern (dump.#.vtk, frame_%04d.bgeo, *), files, or a manifest (.toml).
-    #[arg(required = true)]
-    pub(super) input: Vec<PathBuf>,
-
-    #[command(flatten)]
-    pub(super) keys: KeyFlags,
-
-    /// A look, for everything that is not set otherwise: water.
-    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
-    pub(super) look: Option<String>,
-    /// Attribute to colour by [default: velocity, else the particles' own colours]
+#[command(next_help_heading = "Job")]
+pub(super) struct JobArgs {
+    /// Start over and discard the results of earlier runs.
+    #[arg(long)]
+    pub(super) force: bool,
+    /// Keep finished frames although settings or inputs have changed.
+    #[arg(long, conflicts_with = "force")]
+    pub(super) keep_done: bool,
+    /// Process only one part of the frames: 2/4 is the second of four.
     ///
-    /// Colours (Cd, color, rgb, bytes) are taken as they are unless --map or --range is given; vectors count by
-    /// their length.
-    #[arg(
-        long,
-        value_name = "ATTRIBUTE",
-        help_heading = "Look",
-        display_order = 0
-    )]
-    pub(super) color_by: Option<String>,
-    /// Colour map of the attribute [default: viridis]
-    ///
-    /// viridis, turbo, plasma, inferno, magma, cividis, red-blue or greys.
-    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
-    pub(super) map: Option<String>,
-    /// Values at the ends of the colour map [default: what the sequence has]
-    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
-        help_heading = "Look", display_order = 0)]
-    pub(super) range: Option<Vec<f64>>,
-    /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
-    ///
-    /// `spherule init` prints all keys with what they mean.
-    #[arg(
-        long,
-        value_name = "KEY=VALUE",
-        help_heading = "Job",
-        display_order = 0
-    )]
-    pub(super) set: Vec<String>,
+    /// Several workers on the same job share its frames without this option too.
+    #[arg(long, value_name = "I/N", allow_hyphen_values = true)]
+    pub(super) shard: Option<Shard>,
 }
 
-/// A manifest as asked for, and where its paths begin.
-#[derive(Clone)]
-pub(super) struct Asked {
-    /// With all options laid over it.
-    pub(super) manifest: Manifest,
-    /// The directory that its paths are relative to; empty for the current one.
-    pub(super) base: PathBuf,
-    /// The manifest's own file, if there is one.
-    pub(super) file: Option<PathBuf>,
-    /// What that file says without the options, if it can stand alone.
-    pub(super) unchanged: Option<Manifest>,
-}
-
-impl ManifestArgs {
-    /// Reads the manifest, or makes one of the arguments.
-    pub(super) fn manifest(&self) -> Result<Asked, CliError> {
-        let mut overrides = Vec::new();
-        let file = self.manifest_file()?;
-        let (text, base) = match &file {
-            Some(path) => {
-                let text = read_manifest(path)?;
-                (
-                    text,
-                    path.parent().map_or_else(PathBuf::new, Path::to_owned),
-                )
-            }
-            None => {
-                overrides.push(self.input_override()?);
-                (String::new(), PathBuf::new())
-            }
-        };
-        self.add_overrides(&mut overrides, file.is_some())?;
-        let shown = file
-            .clone()
-            .unwrap_or_else(|| PathBuf::from("command line"));
-        let (manifest, warnings) = Manifest::parse_with_warnings(&text, &shown, overrides)?;
-        for warning in warnings {
-            note!("{warning}");
+impl JobArgs {
+    /// The mode that the options select.
+    pub(super) const fn mode(&self) -> ResumeMode {
+        match (self.force, self.keep_done) {
+            (true, _) => ResumeMode::Force,
+            (_, true) => ResumeMode::KeepDone,
+            _ => ResumeMode::Resume,
         }
-        let unchanged = file
-            .as_ref()
-            .and_then(|path| Manifest::parse(&text, path).ok());
-        Ok(Asked {
-            manifest,
-            base,
-            file,
-            unchanged,
-        })
-    }
-
-    fn manifest_file(&self) -> Result<Option<PathBuf>, CliError> {
-        match self.input.iter().find(|path| is_manifest(path)) {
-            None => Ok(None),
-            Some(path) if self.input.len() == 1 => Ok(Some(path.clone())),
-            Some(path) => Err(CliError::other(format!(
-                "{}: a manifest stands alone; its input.path names the particles",
-                path.display()
-            ))),
-        }
-    }
-
-    fn input_override(&self) -> Result<Override, CliError> {
-        let paths = self
-            .input
-            .iter()
-            .map(|p| text(p))
-            .collect::<Result<Vec<_>, _>>()?;
-        let value = match <[String; 1]>::try_from(paths) {
-            Ok([one]) => toml::Value::from(one),
-            Err(many) => toml::Value::from(many),
-        };
-        over("input.path", value, "INPUT")
-    }
-
-    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
-        self.keys.add_overrides(list, from_file)?;
-        if let Some(attribute) = &self.color_by {
-            let mut table = toml::Table::new();
-            table.insert("attribute".to_owned(), attribute.clone().into());
-            list.push(over("material.color", table, "--color-by")?);
-        }
-        if let Some(map) = &self.map {
-            list.push(over("material.color.map", map.clone(), "--map")?);
-        }
-        if let Some(range) = &self.range {
-            list.push(over("material.color.range", range.clone(), "--range")?);
-        }
-        if let Some(look) = &self.look {
-            list.extend(Look::named(look).map_err(CliError::Other)?.settings());
-        }
-        for assignment in &self.set {
-            list.push(Override::parse(assignment).map_err(CliError::Other)?);
-        }
-        Ok(())
     }
 }
 
-impl Asked {
-    /// Finds the frames.
-    pub(super) fn sequence(&self) -> Result<Sequence, CliError> {
-        let input = &self.manifest.input;
-        let paths = input.path.iter().map(|p| self.base.join(p)).collect();
-        let limit = |size: &Option<Bytes>| size.as_ref().map(|size| size.0);
-        let limits = &self.manifest;
-        let budget = read_budget(
-            limit(&limits.render.memory_limit),
-            limit(&limits.job.memory_ceiling),
+/// Useful threads per processor. Far more threads block each other: 2000 on two processors need minutes for the
+/// work that two do in milliseconds.
+const MAX_THREADS_PER_PROCESSOR: usize = 4;
+
+/// Sets the number of threads; None uses the default of the machine.
+pub(super) fn use_threads(threads: Option<u32>) -> Result<(), CliError> {
+    let Some(count) = threads.and_then(|t| usize::try_from(t).ok()) else {
+        return Ok(());
+    };
+    let count = useful_threads(count);
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(count)
+        .build_global()
+        .map_err(|e| CliError::other(format!("{count} threads: {e}")))
+}
+
+/// `requested` threads, limited to the number that is useful on this machine.
+pub(super) fn useful_threads(requested: usize) -> usize {
+    let processors = std::thread::available_parallelism().map_or(1, NonZeroUsize::get);
+    let max = processors.saturating_mul(MAX_THREADS_PER_PROCESSOR);
+    if requested > max {
+        note!(
+            "--threads {requested}: {max} are used, {MAX_THREADS_PER_PROCESSOR} for each of {processors} processors"
         );
-        let paths = SequenceInput::from_paths(paths);
-        let mut sequence = apart(|| Sequence::open_within(&paths, budget))?;
-        if let Some(parts) = &input.parts {
-            sequence.keep_parts(parts)?;
+    }
+    requested.min(max)
+}
+
+/// The directory of a job that is given as a directory or as a manifest.
+pub(super) fn job_directory(job: &Path) -> Result<PathBuf, CliError> {
+    if !is_manifest(job) || job.is_dir() {
+        return Ok(job.to_owned());
+    }
+    let text = read_manifest(job)?;
+    let manifest = Manifest::parse(&text, job)?;
+    let base = absolute(job.parent().unwrap_or(Path::new("")))?;
+    Ok(real_dir(&base.join(manifest.output.path.dir())))
+}
+
+/// The error for a directory without a job.
+pub(super) fn no_job(dir: &Path) -> CliError {
+    CliError::other(format!(
+        "{}: no job here (no {PLAN_FILE}); give the directory of its images, or its job.toml",
+        dir.display()
+    ))
+}
+
+/// Reports how many frames of the run are done already.
+pub(super) fn report_kept(job: &Job, tasks: usize) {
+    let selected = job.selected().len();
+    if selected > tasks {
+        message!("{} of {selected} frames are done already", selected - tasks);
+    }
+}
+
+/// The end of a run.
+pub(super) struct FinishedRun<'a> {
+    pub(super) job: &'a Job,
+    /// Number of frames that were pending.
+    pub(super) task_count: usize,
+    /// The finished frames.
+    pub(super) frames: FinishedFrames,
+    pub(super) start: Instant,
+    pub(super) interrupt: &'a Interrupt,
+    /// The output path that the user gave.
+    pub(super) output: &'a Path,
+}
+
+impl FinishedRun<'_> {
+    /// Reports finished and failed frames, and the error if `result` is one. Returns the exit status.
+    pub(super) fn report(&self, result: Result<(), RunError>) -> Outcome {
+        let summary = self.job.summary();
+        message!(
+            "{} of {} frames done in {}: {}",
+            summary.done,
+            summary.total,
+            duration(self.start.elapsed().as_secs_f64()),
+            self.output.display()
+        );
+        // Only frames of this run: others may have failed earlier without being retried
+        if !self.frames.failed.is_empty() {
+            message!("failed: {}", list(&self.frames.failed));
         }
-        Ok(sequence)
+        events::add_to_end(json!({
+            "done": summary.done,
+            "total": summary.total,
+            "failed": self.frames.failed,
+        }));
+        match result {
+            Err(error) => {
+                // The same command rejoins the job
+                let is_temporary = matches!(error, RunError::Job(JobError::DeclaredDead { .. }));
+                let error = CliError::from(error).to_string();
+                message!("error: {error}");
+                events::add_to_end(json!({"errors": [error]}));
+                match is_temporary {
+                    true => Outcome::Interrupted,
+                    false => Outcome::SomeFailed,
+                }
+            }
+            Ok(()) if self.interrupt.is_raised() && self.frames.count < self.task_count => {
+                Outcome::Interrupted
+            }
+            Ok(()) if summary.done < summary.total => Outcome::SomeFailed,
+            Ok(()) => Outcome::Done,
+        }
     }
-
-    /// The directory that paths begin at, absolute.
-    pub(super) fn absolute_base(&self) -> Result<PathBuf, CliError> {
-        absolute(&self.base)
-    }
 }
 
-/// The text of the manifest `path`.
-pub(super) fn read_manifest(path: &Path) -> Result<String, CliError> {
-    manifest::read_manifest(path).map_err(|error| match error.kind() {
-        io::ErrorKind::NotFound => SequenceError::missing(path).into(),
-        _ => CliError::io(path)(error),
-    })
-}
-
-/// Whether the name is that of a manifest.
-pub(super) fn is_manifest(path: &Path) -> bool {
-    path.extension()
-        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
-}
-
-/// Does `work` in a thread of its own. Allocators keep what a thread has freed for the next thread
-/// that comes: that will be the one that reads frames, and needs as much. Freed by the main thread,
-/// it would lie there unused.
-pub(super) fn apart<T: Send>(work: impl FnOnce() -> T + Send) -> T {
-    thread::scope(|scope| {
-        let worker = scope.spawn(work);
-        worker
-            .join()
-            .unwrap_or_else(|fault| panic::resume_unwind(fault))
-    })
+/// Frame numbers as a range.
+pub(super) fn list(frames: &[i64]) -> String {
+    FrameRange::from_frames(frames.iter().copied()).map_or_else(String::new, |r| r.to_string())
 }

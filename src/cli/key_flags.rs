@@ -33,7 +33,7 @@ impl KeyFlags {
         value.as_str().map(str::to_owned)
     }
 
-    /// What was asked for; `from_file` if it replaces values of a manifest from a file.
+    /// Adds the given options; `from_file` if they replace values of a manifest from a file.
     pub(super) fn add_overrides(
         &self,
         list: &mut Vec<Override>,
@@ -85,12 +85,13 @@ pub(super) fn over(
     value: impl Into<toml::Value>,
     shown: &str,
 ) -> Result<Override, CliError> {
-    Override::new(key, value, shown).map_err(CliError::Other)
+    Override::new(key, value, shown).map_err(|e| CliError::other(e.to_string()))
 }
 
 fn argument(key: &KeyFlag) -> Arg {
     let is_switch = key.kind == FlagKind::Switch;
-    let default = key.default.as_ref().filter(|_| !is_switch);
+    let needs_value = !is_switch && !matches!(key.kind, FlagKind::SwitchOrText(_));
+    let default = key.default.as_ref().filter(|_| needs_value);
     let default = default.map(|default| format!(" [default: {default}]"));
     let help = format!("{}{}", key.help, default.unwrap_or_default());
     let mut argument = Arg::new(key.flag.name)
@@ -121,9 +122,18 @@ fn argument(key: &KeyFlag) -> Arg {
         FlagKind::Text(may_begin_with_hyphen) => {
             argument.allow_hyphen_values(may_begin_with_hyphen)
         }
+        // With `=`, so that an argument that follows is not taken as the value
+        FlagKind::SwitchOrText(usual) => argument
+            .num_args(0..=1)
+            .require_equals(true)
+            .default_missing_value(usual),
+        FlagKind::Integers => argument.allow_hyphen_values(true),
         FlagKind::NumberOrText | FlagKind::Switch => argument,
     }
-    .allow_negative_numbers(!matches!(key.kind, FlagKind::Text(_) | FlagKind::List))
+    .allow_negative_numbers(!matches!(
+        key.kind,
+        FlagKind::Text(_) | FlagKind::List | FlagKind::Integers
+    ))
 }
 
 /// The value that was given; of a switch, the opposite of the default.
@@ -139,11 +149,16 @@ fn value(key: &KeyFlag, matches: &ArgMatches) -> Option<Value> {
         FlagKind::Number | FlagKind::Seconds => {
             matches.get_one::<f64>(name).map(|v| Value::from(*v))
         }
-        FlagKind::Text(_) => text().map(Value::from),
+        FlagKind::Text(_) | FlagKind::SwitchOrText(_) => text().map(Value::from),
         FlagKind::NumberOrText => text().map(|text| {
             let whole = text.parse::<i64>().map(Value::from);
             let number = whole.or_else(|_| text.parse::<f64>().map(Value::from));
             number.unwrap_or(Value::from(text))
+        }),
+        FlagKind::Integers => text().map(|text| {
+            let items = text.split(',').map(|item| item.trim().parse::<i64>());
+            let items: Result<Vec<i64>, _> = items.collect();
+            items.map_or_else(|_| Value::from(text), Value::from)
         }),
         FlagKind::List => {
             let items: Vec<String> = matches.get_many(name)?.cloned().collect();

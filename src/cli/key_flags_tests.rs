@@ -3,7 +3,7 @@
 use std::collections::BTreeSet;
 
 use super::*;
-use crate::cli::plan::RunArgs;
+use crate::cli::render::RunArgs;
 use crate::manifest::Manifest;
 
 /// Options that are no property of a job: where it is, any key, many keys, and what one run does with what is
@@ -14,12 +14,13 @@ const ACTIONS: [&str; 6] = ["input", "set", "look", "force", "keep_done", "shard
 const COLORS: [&str; 3] = ["color_by", "map", "range"];
 
 /// Other options with a value that is not the default, and the key that it is laid over.
-const FLAGS: [(&str, &str); 32] = [
+const FLAGS: [(&str, &str); 34] = [
     ("--output x.####.exr", "output.path = \"x.####.exr\""),
     ("--frames 3-4", "input.frames = \"3-4\""),
     ("--width 7", "image.width = 7"),
     ("--height 7", "image.height = 7"),
     ("--samples 7", "image.samples = 7"),
+    ("--crop 3,4,50,60", "image.crop = [3, 4, 50, 60]"),
     ("--radius 0.5", "input.radius = 0.5"),
     ("--up -y", "input.up = \"-y\""),
     (
@@ -31,6 +32,10 @@ const FLAGS: [(&str, &str); 32] = [
     ("--channels RGBA,Z", "output.channels = [\"RGBA\", \"Z\"]"),
     ("--max-depth 7", "render.max_depth = 7"),
     ("--ground", "render.ground = true"),
+    (
+        "--ground=shadow_catcher",
+        "render.ground = \"shadow_catcher\"",
+    ),
     ("--surface union", "render.surface = \"union\""),
     ("--smoothing 0.5", "surface.smoothing = 0.5"),
     ("--exact-surface", "surface.exact = true"),
@@ -68,8 +73,8 @@ fn manifest(flags: &str) -> Manifest {
 
 #[test]
 fn every_option_is_a_key() {
-    for (flags, wanted) in FLAGS.iter() {
-        let (key, value) = wanted.split_once(" = ").unwrap();
+    for (flags, expected) in FLAGS.iter() {
+        let (key, value) = expected.split_once(" = ").unwrap();
         let mut plain = Manifest::new("data");
         assert_ne!(manifest(flags), plain, "{flags}");
         let mut sets = vec![format!("{key}={value}")];
@@ -85,7 +90,8 @@ fn every_option_is_a_key() {
 }
 
 /// Options whose `[default: ...]` is no value that could be given.
-const WORDS: [&str; 6] = [
+const WORDS: [&str; 7] = [
+    "crop",
     "memory-limit",
     "memory-ceiling",
     "parts",
@@ -128,7 +134,10 @@ fn no_option_is_forgotten() {
     for argument in command().get_arguments() {
         let name = argument.get_id().as_str();
         assert!(
-            ACTIONS.contains(&name) || COLORS.contains(&name) || of_keys.contains(&name),
+            ACTIONS.contains(&name)
+                || COLORS.contains(&name)
+                || name == "mesh"
+                || of_keys.contains(&name),
             "{name}"
         );
         assert!(

@@ -1,7 +1,7 @@
-//! The command line: one thin file per command. Only this room prints and decides exit codes.
+//! The command line: one thin file per command. Only this module prints and decides exit codes.
 //!
 //! Results go to standard output, everything else to standard error. Exit codes: 0 all done, 1 some
-//! frames or files failed, 2 could not start, 75 interrupted and to be resumed.
+//! frames or files failed, 2 could not start, 75 interrupted.
 use std::env;
 use std::ffi::OsString;
 use std::io::Write;
@@ -10,14 +10,14 @@ use std::process::ExitCode;
 use clap::{Parser, Subcommand};
 use spherule_formats::escape_controls;
 
-/// A line on standard error.
-macro_rules! say {
+/// Prints a line on standard error.
+macro_rules! message {
     ($($text:tt)*) => {
         $crate::cli::print::message(&format!($($text)*))
     };
 }
 
-/// What a user should know of, on standard error; also an event for programs.
+/// Prints a note on standard error and sends it as an event.
 macro_rules! note {
     ($($text:tt)*) => {
         $crate::cli::events::note(&format!($($text)*))
@@ -37,20 +37,18 @@ mod init;
 mod inspect;
 mod job;
 mod key_flags;
+mod manifest_args;
 mod numbers;
 mod paths;
-mod plan;
 mod print;
 mod progress;
 mod render;
 mod scale;
 mod schema;
-mod shard;
 mod signals;
 mod status;
 mod still;
 mod verify;
-mod work;
 
 use errors::CliError;
 
@@ -66,11 +64,11 @@ struct Cli {
 enum Command {
     /// Render a directory, pattern or list of particle files, or a manifest, to images.
     Render(Box<render::RenderArgs>),
-    /// Render one picture of one frame, PNG or EXR, without a job: for trying looks.
+    /// Render a single frame to a PNG or EXR, without a job, to try settings.
     Still(Box<still::StillArgs>),
-    /// Tell what `render` would do, in what memory and time; touch nothing.
+    /// Print what `render` would do, with memory and time. Changes nothing.
     Check(Box<check::CheckArgs>),
-    /// Tell how a job stands: frames done, failed, missing and running, rate and time left.
+    /// Print the state of a job: frames done, failed, missing and running, rate and time left.
     Status(status::StatusArgs),
     /// Print a complete, commented manifest for an input.
     Init(Box<init::InitArgs>),
@@ -82,19 +80,19 @@ enum Command {
     Inspect(inspect::InspectArgs),
     /// Convert particle files to compact native frames (.spf).
     Convert(Box<convert::ConvertArgs>),
-    /// Make particles to measure with.
+    /// Generate test particles.
     Generate(generate::GenerateArgs),
-    /// Write a job as work for a cluster (Slurm) or a render farm (Open Job Description).
+    /// Export a job to a cluster (Slurm) or a render farm (Open Job Description).
     Export(export::ExportArgs),
     /// Measure images per second, build time and memory over particle counts and structures.
     Scale(Box<scale::ScaleArgs>),
 }
 
-/// Parses the arguments of the process, runs the command, reports what went wrong.
+/// Parses the arguments of the process, runs the command, and prints errors.
 pub fn main() -> ExitCode {
     allocator::return_large_pieces();
     let arguments: Vec<OsString> = env::args_os().collect();
-    let result = match own_command(&arguments) {
+    let result = match hidden_command(&arguments) {
         Some(command) => command(),
         None => match parse(&arguments) {
             Ok(command) => run(command),
@@ -106,15 +104,14 @@ pub fn main() -> ExitCode {
         Err(error) => (Outcome::Refused.code(), error.messages()),
     };
     for error in &errors {
-        say!("error: {error}");
+        message!("error: {error}");
     }
     events::end(code, &errors);
     ExitCode::from(code)
 }
 
-/// The commands that this program gives to processes of its own. clap does not know them, so it neither lists nor
-/// suggests them.
-fn own_command(arguments: &[OsString]) -> Option<fn() -> Result<Outcome, CliError>> {
+/// The commands of child processes. clap does not know them, so it neither lists nor suggests them.
+fn hidden_command(arguments: &[OsString]) -> Option<fn() -> Result<Outcome, CliError>> {
     let [_, name] = arguments else {
         return None;
     };
@@ -125,7 +122,7 @@ fn own_command(arguments: &[OsString]) -> Option<fn() -> Result<Outcome, CliErro
     }
 }
 
-/// The command of the process; without one, help or a message has been printed, and this is the exit code.
+/// Parses the command. If there is none, prints help or a message and returns the exit code.
 fn parse(arguments: &[OsString]) -> Result<Command, u8> {
     let error = match Cli::try_parse_from(arguments) {
         Ok(cli) => return Ok(cli.command),
@@ -136,19 +133,19 @@ fn parse(arguments: &[OsString]) -> Result<Command, u8> {
         return Err(match print::written_to_stdout(printed) {
             Ok(_) => Outcome::Done.code(),
             Err(error) => {
-                say!("error: {error}");
+                message!("error: {error}");
                 Outcome::Refused.code()
             }
         });
     }
-    // clap's message has several lines, and quotes the arguments as they are: so it is made again of escaped ones.
+    // The message of clap quotes the arguments, so parse escaped arguments to get an escaped message
     let escaped = arguments.iter().map(|argument| {
         let text = argument.to_string_lossy();
         escape_controls(&text).into_owned()
     });
     let error = Cli::try_parse_from(escaped).err().unwrap_or(error);
     for line in error.render().to_string().lines() {
-        say!("{line}");
+        message!("{line}");
     }
     Err(Outcome::Refused.code())
 }
@@ -170,16 +167,16 @@ fn run(command: Command) -> Result<Outcome, CliError> {
     }
 }
 
-/// How a command ended.
+/// The result of a command.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Outcome {
-    /// Everything was done.
+    /// Everything is done.
     Done,
-    /// Some frames or files failed; they were named.
+    /// Some frames or files failed; they were printed.
     SomeFailed,
-    /// Nothing could be started; it was said why.
+    /// The command could not start; the reason was printed.
     Refused,
-    /// Stopped by a signal; the same command goes on.
+    /// Stopped by a signal; the same command continues.
     Interrupted,
 }
 
@@ -195,5 +192,5 @@ impl Outcome {
     }
 }
 
-/// `EX_TEMPFAIL`: queueing systems take it as "try again".
+/// `EX_TEMPFAIL`: queueing systems retry after it.
 const INTERRUPTED: u8 = 75;

@@ -1,66 +1,72 @@
-//! Numbers on the command line that commands have in common.
+//! Parsers of numbers on the command line.
 
+use std::str::FromStr;
 use std::time::Duration;
 
-/// The bound that coded positions keep if none is given: a fraction of the radius.
-pub(super) const USUAL_BOUND: f64 = 0.02;
+use spherule_formats::ValueError;
 
-/// A side of an image. How many pixels there may be, the manifest says.
-pub(super) fn pixels(text: &str) -> Result<i64, String> {
-    text.parse()
-        .map_err(|_| "wants a number of pixels, as in --width 3840 --height 2160".to_owned())
+/// Default error bound of encoded positions, as a fraction of the radius.
+pub(super) const DEFAULT_BOUND: f64 = 0.02;
+
+fn parse<T: FromStr>(text: &str, expected: &str) -> Result<T, ValueError> {
+    text.parse().map_err(|_| ValueError::new(expected, text))
 }
 
-/// A whole number, whatever its range.
-pub(super) fn whole(text: &str) -> Result<i64, String> {
-    text.parse()
-        .map_err(|_| "wants a whole number, as in 16".to_owned())
+/// A number of pixels. The manifest checks the range.
+pub(super) fn pixels(text: &str) -> Result<i64, ValueError> {
+    parse(text, "a number of pixels, such as 3840")
 }
 
-/// A number with or without a fraction, whatever its range.
-pub(super) fn number(text: &str) -> Result<f64, String> {
-    text.parse()
-        .map_err(|_| "wants a number, as in 0.5".to_owned())
+/// An integer in any range.
+pub(super) fn whole(text: &str) -> Result<i64, ValueError> {
+    parse(text, "a whole number, such as 16")
 }
 
-/// A number of seconds, whatever its range.
-pub(super) fn seconds(text: &str) -> Result<f64, String> {
-    text.parse()
-        .map_err(|_| "wants seconds as a number, as in 90 for a minute and a half".to_owned())
+/// A number in any range.
+pub(super) fn number(text: &str) -> Result<f64, ValueError> {
+    parse(text, "a number, such as 0.5")
 }
 
-/// A side of an image, from 1 to `most` pixels.
-pub(super) fn pixels_to(most: u32) -> impl Fn(&str) -> Result<u32, String> + Clone + Send + Sync {
+/// A number of seconds in any range.
+pub(super) fn seconds(text: &str) -> Result<f64, ValueError> {
+    parse(text, "a number of seconds, such as 90")
+}
+
+/// A number of pixels from 1 to `max`.
+pub(super) fn pixels_to(
+    max: u32,
+) -> impl Fn(&str) -> Result<u32, ValueError> + Clone + Send + Sync {
     move |text| {
-        let count = pixels(text)?;
-        let fitting = u32::try_from(count).ok().filter(|c| (1..=most).contains(c));
-        fitting.ok_or_else(|| format!("{count} is not in 1..={most}"))
+        let count = u32::try_from(pixels(text)?).ok();
+        let in_range = count.filter(|count| (1..=max).contains(count));
+        let expected = || format!("a number of pixels from 1 to {max}");
+        in_range.ok_or_else(|| ValueError::new(expected(), text))
     }
 }
 
-/// A largest error: 0 or more.
-pub(super) fn not_negative(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if value >= 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("`{text}` is no error; 0.02 is one"))
-    }
+/// An error bound: 0 or more.
+pub(super) fn not_negative(text: &str) -> Result<f64, ValueError> {
+    let expected = "a number from 0, such as 0.02";
+    let value: f64 = parse(text, expected)?;
+    let is_valid = value >= 0.0 && value.is_finite();
+    is_valid
+        .then_some(value)
+        .ok_or_else(|| ValueError::new(expected, text))
 }
 
 /// A time in seconds: 0 or more.
-pub(super) fn duration(text: &str) -> Result<Duration, String> {
-    let time = text.parse().ok();
-    let time = time.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
-    time.ok_or_else(|| format!("`{text}` is not a time in seconds; 30 is one"))
+pub(super) fn duration(text: &str) -> Result<Duration, ValueError> {
+    let expected = "a number of seconds from 0, such as 30";
+    let time = Duration::try_from_secs_f64(parse(text, expected)?);
+    time.map_err(|_| ValueError::new(expected, text))
 }
 
 /// A radius: above 0.
-pub(super) fn positive(text: &str) -> Result<f32, String> {
-    let value: f32 = text.parse().map_err(|_| format!("`{text}` is no number"))?;
-    if value > 0.0 && value.is_finite() {
-        Ok(value)
-    } else {
-        Err(format!("`{text}` is no radius"))
-    }
+pub(super) fn positive(text: &str) -> Result<f32, ValueError> {
+    let expected = "a radius above 0, such as 0.05";
+    let value: f32 = parse(text, expected)?;
+    let is_valid = value > 0.0 && value.is_finite();
+    is_valid
+        .then_some(value)
+        .ok_or_else(|| ValueError::new(expected, text))
 }

@@ -1,9 +1,8 @@
-//! Writing to standard output and standard error. Nothing else does, except clap's help and the progress bar.
+//! Writes to standard output and standard error. Nothing else does, except clap's help and the progress bar.
 //!
-//! File names, attribute names, manifest keys and the messages that quote them come from outside. They could
-//! control the terminal, forge a line of ours, or reorder the text around them. So a line is escaped here, as a
-//! whole: whoever makes text for people hands over its lines one by one and escapes nothing. JSON keeps its
-//! meaning: its strings get JSON's own escapes.
+//! File names, attribute names, manifest keys and the messages that quote them are untrusted. They could control
+//! the terminal, forge a line, or reorder the text around them. So this module escapes whole lines: callers pass
+//! text line by line and escape nothing. JSON uses the escapes of JSON.
 
 use std::fmt::Write as _;
 use std::io::{self, Write};
@@ -14,16 +13,15 @@ use spherule_formats::{escape_controls, is_control};
 
 use super::CliError;
 
-/// Whether somebody still reads standard output.
+/// Whether standard output is still being read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Reader {
     Listening,
-    /// The reader has closed the pipe: it has what it needs. This is no error.
+    /// The reader has closed the pipe. This is not an error.
     Gone,
 }
 
-/// Prints one line to standard error. A reader that has gone away, or a log on a full disk, is no reason to stop
-/// work.
+/// Prints one line to standard error. Ignores errors: a closed pipe or a full disk must not stop a job.
 pub(super) fn message(text: &str) {
     let _ = io::stderr().write_all(line(text).as_bytes());
 }
@@ -37,14 +35,14 @@ pub(super) fn lines(lines: impl IntoIterator<Item = impl AsRef<str>>) -> Result<
     write(&text)
 }
 
-/// The same on a terminal that shows nothing else afterwards.
+/// Clears the terminal and prints lines to standard output.
 ///
 /// # Errors
 /// They cannot be written.
 pub(super) fn lines_afresh(
     lines: impl IntoIterator<Item = impl AsRef<str>>,
 ) -> Result<Reader, CliError> {
-    // To the first line and column, with everything below cleared away.
+    // Move to the first line and column, and clear everything below
     write("\x1b[H\x1b[J")?;
     self::lines(lines)
 }
@@ -62,11 +60,11 @@ pub(super) fn json(value: &Value) -> Result<Reader, CliError> {
 /// # Errors
 /// It cannot be written.
 pub(super) fn pretty_json(value: &Value) -> Result<Reader, CliError> {
-    // Line breaks are between its parts alone.
+    // Strings in JSON contain no line breaks
     lines(format!("{value:#}").lines().map(escape_json))
 }
 
-/// Prints the content of a file to standard output, as it is.
+/// Prints the content of a file to standard output unchanged.
 ///
 /// # Errors
 /// It cannot be written.
@@ -74,15 +72,15 @@ pub(super) fn file(content: &str) -> Result<Reader, CliError> {
     write(content)
 }
 
-/// Puts `text` on standard output. It is flushed: what stays in a buffer is lost without an error at the end.
+/// Writes and flushes `text` to standard output. Text that stays in a buffer at exit would be lost without an error.
 fn write(text: &str) -> Result<Reader, CliError> {
-    // One piece, so that lines of several threads or processes do not mix.
+    // A single write, so that lines of several threads or processes do not mix
     let mut out = io::stdout().lock();
     let written = out.write_all(text.as_bytes()).and_then(|()| out.flush());
     written_to_stdout(written)
 }
 
-/// What came of writing to standard output.
+/// Converts the result of a write to standard output.
 ///
 /// # Errors
 /// It cannot be written.
@@ -99,12 +97,12 @@ fn line(text: &str) -> String {
     escape_controls(text).into_owned() + "\n"
 }
 
-/// JSON on one line in which nothing controls a terminal.
+/// JSON on one line without control characters.
 pub(super) fn json_line(value: &Value) -> String {
     escape_json(&value.to_string())
 }
 
-/// `json` without line breaks between its parts: what controls a terminal can only be in its strings.
+/// Escapes control characters in `json`, which must be one line, so that they can only be in strings.
 fn escape_json(json: &str) -> String {
     let mut text = String::with_capacity(json.len());
     for c in json.chars() {
@@ -123,7 +121,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_line_stays_one_line() {
+    fn lines_stay_single_lines() {
         assert_eq!(line("a.xyz: 3 particles"), "a.xyz: 3 particles\n");
         assert_eq!(
             line("a\nerror: b\u{1b}[31m\u{202e}"),

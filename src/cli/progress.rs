@@ -1,5 +1,4 @@
-//! What a running job shows: bars on a terminal, one plain line a frame elsewhere, or lines for
-//! programs.
+//! Shows the progress of a job: a bar on a terminal, otherwise one line per frame, or lines for other programs.
 
 use std::io::{IsTerminal, stderr};
 use std::path::Path;
@@ -11,7 +10,7 @@ use clap::ValueEnum;
 use clap::builder::PossibleValue;
 use indicatif::{ProgressBar, ProgressStyle};
 use serde_json::{Value, json};
-use spherule_jobs::{QueueNews, Status};
+use spherule_jobs::{EntryStatus, FinishedFrame, FrameEvent, FrameFailure, QueueEvent};
 
 use super::{events, print};
 use crate::manifest::ProgressMode;
@@ -30,66 +29,75 @@ impl ValueEnum for ProgressMode {
     fn to_possible_value(&self) -> Option<PossibleValue> {
         Some(PossibleValue::new(self.name()).help(match self {
             Self::Auto => "Bars on a terminal, plain lines elsewhere",
-            Self::Plain => "One line a frame",
-            Self::Json => "Events as JSON, one a line, on standard output",
-            Self::Openjd => "The lines that Open Job Description engines read",
-            Self::None => "Nothing but warnings and errors",
+            Self::Plain => "One line per frame",
+            Self::Json => "JSON events, one per line, on standard output",
+            Self::Openjd => "Messages for Open Job Description engines",
+            Self::None => "Only warnings and errors",
         }))
     }
 }
 
-/// Shows the frames of one run.
-pub(super) struct Progress {
-    show: Show,
-    total: AtomicUsize,
-    start: Instant,
-    ended: Mutex<Ended>,
+/// A report of a finished frame that can be shown.
+pub(super) trait ShowReport {
+    /// A summary for people.
+    fn summary(&self) -> String;
+
+    /// Fields of the event for programs. `output` is the main output.
+    fn facts(&self, output: String) -> Value;
 }
 
-/// How the frames of this run ended.
+/// Shows the progress of one run.
+pub(super) struct Progress {
+    display: Display,
+    total: AtomicUsize,
+    start: Instant,
+    finished: Mutex<FinishedFrames>,
+}
+
+/// The finished frames of a run.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Ended {
-    /// How many, well or badly.
+pub(super) struct FinishedFrames {
+    /// Done or failed.
     pub(super) count: usize,
-    /// Those that failed.
+    /// Failed frames.
     pub(super) failed: Vec<i64>,
 }
 
-enum Show {
+enum Display {
     Bar(ProgressBar),
     Plain,
     Openjd,
-    /// For people, that is: events are sent whatever is shown.
+    /// Nothing. Events are sent in any case.
     Nothing,
 }
 
 impl Progress {
-    /// For a run of `command` that makes `total` frames, in `output` as the user named it.
+    /// Progress of a run of `command` with `total` frames. `output` is the path that the user gave.
     pub(super) fn new(mode: ProgressMode, command: &str, total: usize, output: &Path) -> Self {
         let output = output.display().to_string();
         events::send(
             "start",
             json!({"command": command, "total": total, "output": output}),
         );
-        let show = match mode {
-            ProgressMode::Auto if stderr().is_terminal() => Show::Bar(bar(total)),
-            ProgressMode::Auto | ProgressMode::Plain => Show::Plain,
-            ProgressMode::Openjd => Show::Openjd,
-            ProgressMode::Json | ProgressMode::None => Show::Nothing,
+        let display = match mode {
+            ProgressMode::Auto if stderr().is_terminal() => Display::Bar(bar(total)),
+            ProgressMode::Auto | ProgressMode::Plain => Display::Plain,
+            ProgressMode::Openjd => Display::Openjd,
+            ProgressMode::Json | ProgressMode::None => Display::Nothing,
         };
         Self {
-            show,
+            display,
             total: AtomicUsize::new(total),
             start: Instant::now(),
-            ended: Mutex::default(),
+            finished: Mutex::default(),
         }
     }
 
-    /// There are `count` frames more to do.
-    pub(super) fn more(&self, count: usize) {
+    /// Adds `count` frames to the run.
+    pub(super) fn add_frames(&self, count: usize) {
         let total = count + self.total.fetch_add(count, Ordering::Relaxed);
         events::send("frames_added", json!({"added": count, "total": total}));
-        if let Show::Bar(bar) = &self.show {
+        if let Display::Bar(bar) = &self.display {
             bar.inc_length(count as u64);
         }
     }
@@ -98,18 +106,39 @@ impl Progress {
         self.total.load(Ordering::Relaxed)
     }
 
-    /// A frame is in hand: `doing` says what is being done with it.
-    pub(super) fn entered(&self, frame: i64, doing: &str) {
-        if let Show::Bar(bar) = &self.show {
-            bar.set_message(format!("{doing} frame {frame}"));
+    /// Shows an event of a run. Called from several threads.
+    pub(super) fn show<R: ShowReport>(&self, event: &FrameEvent<'_, R>) {
+        match event {
+            FrameEvent::Stage { frame, stage } => self.stage(*frame, stage),
+            FrameEvent::Done { frame, finished } => self.done(*frame, finished),
+            FrameEvent::Failed(failure) => self.failed(failure),
+            FrameEvent::Retrying {
+                failure,
+                attempt,
+                attempts,
+            } => self.note(&format!(
+                "frame {}: attempt {attempt} of {attempts} failed: {failure}",
+                failure.frame
+            )),
+            FrameEvent::OtherWorker(event) => self.other_worker(*event),
+            FrameEvent::Note(note) => self.note(note),
         }
     }
 
-    /// `frame` has become the file `output`: `told` for people, `facts` for programs.
-    pub(super) fn done(&self, frame: i64, output: &Path, told: &str, facts: Value) {
+    /// A frame has entered a stage: `reading`.
+    fn stage(&self, frame: i64, stage: &str) {
+        if let Display::Bar(bar) = &self.display {
+            bar.set_message(format!("{stage} frame {frame}"));
+        }
+    }
+
+    fn done<R: ShowReport>(&self, frame: i64, finished: &FinishedFrame<R>) {
         let done = self.count(None);
-        let output = output.display().to_string();
-        let plain = format!("frame {frame}: {output} ({told})");
+        let output = finished.outputs.first();
+        let output = output.map_or_else(String::new, |path| path.display().to_string());
+        let summary = finished.report.summary();
+        let plain = format!("frame {frame}: {output} ({summary})");
+        let facts = finished.report.facts(output);
         let mut event = json!({"frame": frame, "done": done, "total": self.total()});
         if let (Value::Object(event), Value::Object(facts)) = (&mut event, facts) {
             event.extend(facts);
@@ -118,8 +147,8 @@ impl Progress {
         self.line(done, &plain);
     }
 
-    /// `frame` could not be made.
-    pub(super) fn failed(&self, frame: i64, reason: &str) {
+    fn failed(&self, failure: &FrameFailure) {
+        let (frame, reason) = (failure.frame, failure.to_string());
         let done = self.count(Some(frame));
         self.message(&format!("error: frame {frame}: {reason}"));
         let facts = json!({"frame": frame, "reason": reason, "done": done, "total": self.total()});
@@ -127,19 +156,19 @@ impl Progress {
         self.line(done, "");
     }
 
-    /// What other workers do.
-    pub(super) fn others(&self, news: QueueNews) {
-        match news {
-            QueueNews::Waiting(frame, who) => {
-                let text = format!("waiting for frame {frame}, which {who} has in hand");
+    /// Another worker has finished a frame or holds one.
+    fn other_worker(&self, event: QueueEvent) {
+        match event {
+            QueueEvent::Waiting(frame, worker) => {
+                let text = format!("waiting for frame {frame}: {worker} is working on it");
                 self.message(&text);
                 events::send("note", json!({"text": text}));
             }
-            QueueNews::Elsewhere(frame, status) => {
-                let is_done = status == Status::Done;
+            QueueEvent::FinishedElsewhere(frame, status) => {
+                let is_done = status == EntryStatus::Done;
                 let done = self.count((!is_done).then_some(frame));
-                let told = if is_done { "done" } else { "failed" };
-                let plain = format!("frame {frame}: {told} by another worker");
+                let result = if is_done { "done" } else { "failed" };
+                let plain = format!("frame {frame}: {result} by another worker");
                 let facts = json!({"frame": frame, "elsewhere": true,
                     "done": done, "total": self.total()});
                 let event = if is_done {
@@ -153,50 +182,52 @@ impl Progress {
         }
     }
 
-    /// What a user should know of, whatever the mode.
-    pub(super) fn note(&self, text: &str) {
-        match &self.show {
-            Show::Bar(bar) => bar.suspend(|| note!("{text}")),
+    /// Prints a note, whatever the mode.
+    fn note(&self, text: &str) {
+        match &self.display {
+            Display::Bar(bar) => bar.suspend(|| note!("{text}")),
             _ => note!("{text}"),
         }
     }
 
-    /// A line for people, whatever the mode.
+    /// Prints a line on standard error, whatever the mode.
     fn message(&self, text: &str) {
-        match &self.show {
-            Show::Bar(bar) => bar.suspend(|| say!("{text}")),
-            _ => say!("{text}"),
+        match &self.display {
+            Display::Bar(bar) => bar.suspend(|| message!("{text}")),
+            _ => message!("{text}"),
         }
     }
 
-    /// Takes the bar away.
-    pub(super) fn finish(self) -> Ended {
-        if let Show::Bar(bar) = &self.show {
+    /// Removes the bar.
+    pub(super) fn finish(self) -> FinishedFrames {
+        if let Display::Bar(bar) = &self.display {
             bar.finish_and_clear();
         }
-        self.ended.into_inner().unwrap_or_else(|e| e.into_inner())
+        self.finished
+            .into_inner()
+            .unwrap_or_else(|e| e.into_inner())
     }
 
-    /// Another frame has ended.
+    /// Counts a finished frame.
     fn count(&self, failed: Option<i64>) -> usize {
-        let mut ended = self.ended.lock().unwrap_or_else(|e| e.into_inner());
-        ended.count += 1;
-        ended.failed.extend(failed);
-        ended.count
+        let mut finished = self.finished.lock().unwrap_or_else(|e| e.into_inner());
+        finished.count += 1;
+        finished.failed.extend(failed);
+        finished.count
     }
 
-    /// One frame has ended, well or badly.
+    /// Shows that a frame is done or has failed.
     fn line(&self, done: usize, plain: &str) {
-        match &self.show {
-            Show::Bar(bar) => bar.set_position(done as u64),
-            Show::Plain if plain.is_empty() => {}
-            Show::Plain => say!(
+        match &self.display {
+            Display::Bar(bar) => bar.set_position(done as u64),
+            Display::Plain if plain.is_empty() => {}
+            Display::Plain => message!(
                 "[{done}/{}] {plain}, {}",
                 self.total(),
                 self.remaining(done)
             ),
-            Show::Openjd => openjd(done, self.total(), plain),
-            Show::Nothing => {}
+            Display::Openjd => openjd(done, self.total(), plain),
+            Display::Nothing => {}
         }
     }
 
@@ -207,19 +238,19 @@ impl Progress {
     }
 }
 
-/// Engines read these on standard output.
+/// Prints the lines that Open Job Description engines read on standard output.
 pub(super) fn openjd(done: usize, total: usize, plain: &str) {
     let percent = 100.0 * done as f64 / total.max(1) as f64;
     let mut lines = vec![format!("openjd_progress: {percent:.1}")];
     if !plain.is_empty() {
         lines.push(format!("openjd_status: {plain}"));
     }
-    // An engine that does not listen any more is no reason to stop work.
+    // Continue even if the engine no longer reads
     let _ = print::lines(lines);
 }
 
 fn bar(total: usize) -> ProgressBar {
-    let template = "{bar:30} {pos}/{len} frames  {msg}  {elapsed} gone, {eta} left";
+    let template = "{bar:30} {pos}/{len} frames  {msg}  {elapsed} elapsed, {eta} left";
     let style = ProgressStyle::with_template(template)
         .expect("the template is well formed")
         .progress_chars("━╸─");
@@ -228,7 +259,7 @@ fn bar(total: usize) -> ProgressBar {
     bar
 }
 
-/// Seconds as a person says them.
+/// Formats seconds: `12 s`, `3:20 min`.
 pub(super) fn duration(seconds: f64) -> String {
     #[expect(clippy::cast_possible_truncation, reason = "saturates")]
     let whole = seconds.round().max(0.0) as u64;

@@ -1,8 +1,8 @@
-//! TERM and Ctrl-C: the first asks the job to finish the frame in hand, for as long as the grace period lasts, the
-//! second stops at once. Before there is a frame in hand, so does the first.
+//! TERM and Ctrl-C. The first signal asks the job to finish the frames in progress, within the grace period. The
+//! second stops at once. Before any frame is in progress, the first one stops at once too.
 //!
-//! When the grace period is over, tracing drops the frame. Stages that do not look at the interrupt (reading, tree
-//! builders, encoders) get a moment more, then the process ends under them.
+//! When the grace period ends, tracing drops its frame. Stages that do not check the interrupt (reading, tree
+//! builders, encoders) get a moment more, then the process exits.
 
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, OnceLock};
@@ -15,92 +15,96 @@ use spherule_jobs::{Interrupt, discard_own_parts};
 
 use super::{CliError, INTERRUPTED, events};
 
-/// Time after the grace period to record what was done and to write the reports.
-const WIND_UP: Duration = Duration::from_secs(2);
+/// Time after the grace period to record frames and to write reports.
+const SHUTDOWN_TIME: Duration = Duration::from_secs(2);
 
-/// What is said to whoever sent a signal.
+/// Messages after a signal.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Words {
-    /// After the first, with work in hand.
-    pub(super) asked: &'static str,
-    /// After the one that ends the process.
-    pub(super) at_once: &'static str,
+pub(super) struct SignalMessages {
+    /// After the first signal, with frames in progress.
+    pub(super) stopping: &'static str,
+    /// When the process exits at once.
+    pub(super) stopped: &'static str,
 }
 
-/// Whoever listens for signals.
-pub(super) struct Listener {
-    /// Raised by the first signal once there are frames in hand.
+/// Listens for signals until the process ends.
+pub(super) struct SignalListener {
+    /// Raised by the first signal once frames are in progress.
     interrupt: Interrupt,
-    at_work: Arc<AtomicBool>,
-    /// How long a frame in hand may take after the first signal; without it, as long as it takes.
+    has_started: Arc<AtomicBool>,
+    /// How long frames in progress may take after the first signal; unlimited if not set.
     grace: Arc<OnceLock<Duration>>,
 }
 
-impl Listener {
-    /// From now on there are frames in hand.
-    pub(super) fn at_work(&self) -> &Interrupt {
-        self.at_work.store(true, Ordering::Release);
+impl SignalListener {
+    /// Declares that frames are in progress from now on.
+    pub(super) fn start_work(&self) -> &Interrupt {
+        self.has_started.store(true, Ordering::Release);
         &self.interrupt
     }
 
-    /// From now on there are frames in hand, which are dropped when they take longer than `grace` after the first
-    /// signal.
-    pub(super) fn at_work_within(&self, grace: Duration) -> &Interrupt {
-        // Commands say it once.
+    /// Declares that frames are in progress from now on. They are dropped if they take longer than `grace` after
+    /// the first signal.
+    pub(super) fn start_work_with_grace(&self, grace: Duration) -> &Interrupt {
+        // A command calls this once
         let _ = self.grace.set(grace);
-        self.at_work()
+        self.start_work()
     }
 }
 
-/// Listens until the process ends.
-pub(super) fn listen(words: Words) -> Result<Listener, CliError> {
+/// Starts to listen for signals.
+pub(super) fn listen(messages: SignalMessages) -> Result<SignalListener, CliError> {
     let interrupt = Interrupt::new();
-    let at_work = Arc::new(AtomicBool::new(false));
+    let has_started = Arc::new(AtomicBool::new(false));
     let grace = Arc::new(OnceLock::new());
     let mut signals = Signals::new([SIGINT, SIGTERM])
         .map_err(|e| CliError::other(format!("cannot listen for signals: {e}")))?;
-    let listener = Listener {
+    let listener = SignalListener {
         interrupt: interrupt.clone(),
-        at_work: Arc::clone(&at_work),
+        has_started: Arc::clone(&has_started),
         grace: Arc::clone(&grace),
     };
-    // Threads that begin after the survey find the memory that it has left, which is for the frames.
-    spherule_jobs::start_heart();
+    // Threads that start after the survey reuse the memory that it has freed, which should be left to the frames
+    spherule_jobs::start_heartbeat_thread();
     thread::spawn(move || {
         for _ in signals.forever() {
-            if interrupt.is_raised() || !at_work.load(Ordering::Acquire) {
-                // Nothing is lost: images appear whole or not at all.
-                end_now(words);
+            if interrupt.is_raised() || !has_started.load(Ordering::Acquire) {
+                // Nothing is lost: images appear complete or not at all
+                exit_now(messages);
             }
             interrupt.raise();
             match grace.get() {
                 Some(grace) => {
-                    say!("{} (grace period: {} s)", words.asked, grace.as_secs_f64());
+                    message!(
+                        "{} (grace period: {} s)",
+                        messages.stopping,
+                        grace.as_secs_f64()
+                    );
                     let (grace, interrupt) = (*grace, interrupt.clone());
-                    thread::spawn(move || end_after(grace, &interrupt, words));
+                    thread::spawn(move || stop_after(grace, &interrupt, messages));
                 }
-                None => say!("{}", words.asked),
+                None => message!("{}", messages.stopping),
             }
         }
     });
     Ok(listener)
 }
 
-/// Has frames dropped that are still in hand after `grace`.
-fn end_after(grace: Duration, interrupt: &Interrupt, words: Words) {
+/// Drops the frames that are still in progress after `grace`.
+fn stop_after(grace: Duration, interrupt: &Interrupt, messages: SignalMessages) {
     thread::sleep(grace);
-    say!(
+    message!(
         "the grace period of {} s is over (--grace): stopping now",
         grace.as_secs_f64()
     );
     interrupt.raise();
-    thread::sleep(WIND_UP);
-    end_now(words);
+    thread::sleep(SHUTDOWN_TIME);
+    exit_now(messages);
 }
 
-/// Ends the process, whatever its threads are at.
-fn end_now(words: Words) -> ! {
-    say!("{}", words.at_once);
+/// Ends the process, whatever its threads are doing.
+fn exit_now(messages: SignalMessages) -> ! {
+    message!("{}", messages.stopped);
     discard_own_parts();
     events::end_at_once(INTERRUPTED);
     std::process::exit(i32::from(INTERRUPTED));

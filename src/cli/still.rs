@@ -1,4 +1,4 @@
-//! `spherule still`: one picture of one frame, for trying looks. No job: no plan, ledger, manifest or report.
+//! `spherule still`: renders a single frame to try settings. No job: no plan, ledger, manifest or report.
 
 use std::ffi::OsStr;
 use std::fs::{self, File};
@@ -10,20 +10,19 @@ use clap::Args;
 use spherule_formats::Sequence;
 use spherule_jobs::{FrameRange, Job};
 
-use super::job::{Asked, ManifestArgs};
+use super::job::{list, use_threads};
+use super::manifest_args::ManifestArgs;
 use super::paths::absolute;
-use super::plan::{Plan, one_fits};
-use super::render::tell;
-use super::work::{chosen, list, use_threads};
+use super::render::print_summary;
 use super::{CliError, Outcome, print, signals};
-use crate::pipeline::{PictureKind, SingleFault, make_picture};
+use crate::job::{JobManifest, RenderJob, frames_in, require_one_fits};
+use crate::pipeline::{ImageError, PictureKind, WriteError, make_picture};
 use crate::render::Channels;
 
-/// How files begin that a still may replace: OpenEXR and PNG.
-const IMAGE_STARTS: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
+/// Signatures of the files that `still` may replace: OpenEXR and PNG.
+const IMAGE_SIGNATURES: [&[u8]; 2] = [b"\x76\x2f\x31\x01", b"\x89PNG\r\n\x1a\n"];
 
-const OUTPUT_HELP: &str =
-    "Picture to write: look.png or look.exr. An image of that name is replaced.";
+const OUTPUT_HELP: &str = "Image to write: look.png or look.exr; an existing image is replaced";
 
 const EXAMPLES: &str = "Examples:
   spherule still dump -o look.png
@@ -49,55 +48,59 @@ const EXAMPLES: &str = "Examples:
 pub(super) struct StillArgs {
     #[command(flatten)]
     manifest: ManifestArgs,
-    /// Frame to render, by its number; otherwise the one in the middle.
+    /// Number of the frame to render [default: the middle one]
     #[arg(long, value_name = "NUMBER", allow_negative_numbers = true)]
     frame: Option<i64>,
 }
 
-/// An option that means something for jobs alone: without one it is refused.
+/// Hides and refuses an option that only applies to jobs.
 fn no_job(option: clap::Arg) -> clap::Arg {
     option.hide(true).conflicts_with("output")
 }
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping",
-    at_once: "stopped; no picture was written",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping",
+    stopped: "stopped; no image was written",
 };
 
 pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
     let start = Instant::now();
-    let _signals = signals::listen(WORDS)?;
+    let _signals = signals::listen(SIGNAL_MESSAGES)?;
     let shown = args.manifest.keys.take("output").map(PathBuf::from);
     let shown = shown.ok_or_else(|| CliError::other("--output: is missing"))?;
     let kind = kind(&shown)?;
     let output = absolute(&shown)?;
-    let mut asked = args.manifest.manifest()?;
-    use_threads(asked.manifest.job.threads)?;
-    let sequence = asked.sequence()?;
+    let mut requested = args.manifest.manifest()?;
+    use_threads(requested.manifest.job.threads)?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
-    guard(&shown, &output, asked.file.as_deref(), &sequence)?;
-    let frame = frame(args.frame, &asked, &sequence)?;
-    asked.manifest.input.frames = FrameRange::from_frames([frame]);
+    guard(&shown, &output, requested.file.as_deref(), &sequence)?;
+    let frame = frame(args.frame, &requested, &sequence)?;
+    requested.manifest.input.frames = FrameRange::from_frames([frame]);
 
-    let plan = Plan::new(asked, &sequence, None)?;
-    let (survey, mut setup) = plan.survey(&sequence)?;
+    let render_job = RenderJob::new(requested, &sequence, None)?;
+    message!("surveying the sequence");
+    let (survey, mut setup) = render_job.survey(&sequence)?;
+    for note in render_job.scene_notes()? {
+        note!("{note}");
+    }
     if kind == PictureKind::Png {
         setup.picture.render.channels = Channels::COLOR;
     }
-    tell(&sequence, &survey, &setup);
-    let mut tasks = plan.tasks(&sequence, &[frame]);
+    print_summary(&sequence, &survey, &setup);
+    let mut tasks = render_job.tasks(&sequence, &[frame]);
     for task in &mut tasks {
         task.image.clone_from(&output);
         task.preview = None;
     }
-    plan.fit(&sequence, &setup, &mut tasks);
-    one_fits(&tasks)?;
+    render_job.schedule(&sequence, &setup, &mut tasks);
+    require_one_fits(&tasks)?;
     let task = tasks.first().expect("the frame is in the sequence");
     make_directory(&output)?;
-    let made = make_picture(&setup, &sequence, task, kind, |note| note!("{note}"));
-    match made {
+    let rendered = make_picture(&setup, &sequence, task, kind, |note| note!("{note}"));
+    match rendered {
         Ok(report) => {
             print::lines([format!(
                 "{}: frame {frame}, {} particles, {:.2} s",
@@ -107,46 +110,50 @@ pub(super) fn run(mut args: StillArgs) -> Result<Outcome, CliError> {
             )])?;
             Ok(Outcome::Done)
         }
-        Err(SingleFault::Frame(reason)) => {
-            say!("error: frame {frame}: {reason}");
+        Err(ImageError::Write(WriteError::Io { source, .. })) => Err(CliError::io(&shown)(source)),
+        Err(error) => {
+            message!("error: frame {frame}: {error}");
             Ok(Outcome::SomeFailed)
         }
-        Err(SingleFault::Place(_, error)) => Err(CliError::io(&shown)(error)),
     }
 }
 
-/// The file format by the name.
+/// The file format of the extension.
 fn kind(path: &Path) -> Result<PictureKind, CliError> {
     let extension = path.extension().map(OsStr::to_ascii_lowercase);
     match extension.as_ref().and_then(|e| e.to_str()) {
         Some("exr") => Ok(PictureKind::Exr),
         Some("png") => Ok(PictureKind::Png),
         _ => Err(CliError::other(format!(
-            "--output {}: the name must end in .png or .exr, which says what is written",
+            "--output {}: the name must end in .png or .exr",
             path.display()
         ))),
     }
 }
 
-/// The frame asked for, or that in the middle of those that the manifest selects: a simulation's first frame is
-/// seldom what a look is for.
-fn frame(wanted: Option<i64>, asked: &Asked, sequence: &Sequence) -> Result<i64, CliError> {
-    let Some(wanted) = wanted else {
-        let range = asked.manifest.input.frames.as_ref();
-        let frames = chosen(sequence, range, "input.frames")?;
+/// The requested frame, or the middle one of those that the manifest selects. The first frame of a simulation is
+/// rarely typical.
+fn frame(
+    number: Option<i64>,
+    requested: &JobManifest,
+    sequence: &Sequence,
+) -> Result<i64, CliError> {
+    let Some(number) = number else {
+        let range = requested.manifest.input.frames.as_ref();
+        let frames = frames_in(sequence, range)?;
         return Ok(frames[frames.len() / 2]);
     };
     let numbers: Vec<i64> = sequence.frames().iter().map(|f| f.number).collect();
-    if numbers.contains(&wanted) {
-        return Ok(wanted);
+    if numbers.contains(&number) {
+        return Ok(number);
     }
     Err(CliError::other(format!(
-        "--frame {wanted}: is not among the frames: {}",
+        "--frame {number}: is not among the frames: {}",
         list(&numbers)
     )))
 }
 
-/// Refuses to replace anything but an image that is no part of the input or of a job.
+/// Refuses to replace anything but an image, and images that belong to the input or to a job.
 fn guard(
     shown: &Path,
     output: &Path,
@@ -160,7 +167,7 @@ fn guard(
     if is_planned(output)? {
         return refused("is an image of the job in that directory");
     }
-    let Ok(there) = fs::metadata(output) else {
+    let Ok(existing) = fs::metadata(output) else {
         return Ok(());
     };
     let real = output.canonicalize().map_err(CliError::io(shown))?;
@@ -169,7 +176,7 @@ fn guard(
     if inputs.chain(manifest).any(is_output) {
         return refused("is an input and would be overwritten");
     }
-    if !there.is_file() {
+    if !existing.is_file() {
         return refused("is not a file");
     }
     if !is_image(output).map_err(CliError::io(shown))? {
@@ -178,12 +185,12 @@ fn guard(
     Ok(())
 }
 
-/// Whether a job beside `output` makes a file of this name.
+/// Whether a job in the same directory has an output of this name.
 fn is_planned(output: &Path) -> Result<bool, CliError> {
     let (Some(dir), Some(name)) = (output.parent(), output.file_name()) else {
         return Ok(false);
     };
-    let Some(plan) = Job::peek(dir)? else {
+    let Some(plan) = Job::read_plan(dir)? else {
         return Ok(false);
     };
     let mut outputs = plan.frames().iter().flat_map(|frame| &frame.outputs);
@@ -193,11 +200,13 @@ fn is_planned(output: &Path) -> Result<bool, CliError> {
     }))
 }
 
-/// Whether the file begins as an image does; an empty one has nothing to lose.
+/// Whether the file has the signature of an image, or is empty.
 fn is_image(path: &Path) -> io::Result<bool> {
     let mut start = Vec::new();
     File::open(path)?.take(8).read_to_end(&mut start)?;
-    let is_known = IMAGE_STARTS.iter().any(|known| start.starts_with(known));
+    let is_known = IMAGE_SIGNATURES
+        .iter()
+        .any(|known| start.starts_with(known));
     Ok(is_known || start.is_empty())
 }
 

@@ -1,10 +1,10 @@
-//! The value of `--attributes`: which attributes are stored, and how.
+//! The storage of attributes: the value of `--attributes`.
 
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
 
-/// Name for all attributes that are not listed.
+/// The name that stands for all other attributes.
 const OTHERS: &str = "*";
 
 /// Storage of the values of an attribute.
@@ -24,10 +24,10 @@ pub enum Storage {
 }
 
 impl Storage {
-    /// All kinds of storage.
+    /// All values.
     pub const ALL: [Self; 5] = [Self::Keep, Self::F32, Self::F16, Self::U8, Self::Off];
 
-    /// The name on the command line.
+    /// Name on the command line.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Keep => "keep",
@@ -39,8 +39,8 @@ impl Storage {
     }
 }
 
-/// Storage of each attribute. Written `velocity:f16,density:u8,*:off`, where `*` stands for all attributes that are
-/// not listed; without it they are kept.
+/// The storage of each attribute. Text form: `velocity:f16,density:u8,*:off`. `*` stands for all other attributes;
+/// by default they are kept.
 #[derive(Debug, Clone, PartialEq, Eq, Default)]
 pub struct AttributeChoices {
     named: BTreeMap<String, Storage>,
@@ -48,13 +48,13 @@ pub struct AttributeChoices {
 }
 
 impl AttributeChoices {
-    /// No attribute is stored.
+    /// Stores no attributes.
     pub const NONE: Self = Self {
         named: BTreeMap::new(),
         others: Storage::Off,
     };
 
-    /// Storage of the attribute `name`. An exact match of the name is preferred over one that ignores case.
+    /// The storage of the attribute `name`. An exact match has priority over one that ignores case.
     pub fn of(&self, name: &str) -> Storage {
         let alike = || {
             let mut named = self.named.iter();
@@ -73,7 +73,7 @@ impl AttributeChoices {
             .any(|known| known.eq_ignore_ascii_case(name))
     }
 
-    /// All choices: attributes and their storage, followed by `*` for the others.
+    /// All listed attributes and their storage, with `*` last.
     pub fn iter(&self) -> impl Iterator<Item = (&str, Storage)> {
         let named = self.named.iter().map(|(name, s)| (name.as_str(), *s));
         named.chain([(OTHERS, self.others)])
@@ -102,7 +102,7 @@ impl FromStr for AttributeChoices {
                 choices.named.insert(name.to_owned(), storage).is_some()
             };
             if is_repeated {
-                return Err(format!("`{name}` is there twice"));
+                return Err(format!("`{name}` occurs twice"));
             }
         }
         Ok(choices)
@@ -117,14 +117,15 @@ fn choice(item: &str) -> Result<(&str, Storage), String> {
         .map(|(name, how)| (name.trim(), how.trim()))
         .filter(|(name, _)| !name.is_empty())
         .ok_or_else(|| {
-            format!("`{item}` does not say how; write NAME:HOW, where HOW is one of {names}")
+            format!("`{item}` has no storage; write NAME:HOW, where HOW is one of {names}")
         })?;
     let storage = Storage::ALL.into_iter().find(|s| s.name() == how);
-    let storage = storage.ok_or_else(|| format!("`{item}`: there is no `{how}`, but {names}"))?;
+    let storage =
+        storage.ok_or_else(|| format!("`{item}`: unknown storage `{how}`; use one of {names}"))?;
     Ok((name, storage))
 }
 
-/// The text is the same for equal choices, whatever their order on input.
+/// The text does not depend on the order in which the attributes were given.
 impl fmt::Display for AttributeChoices {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         for (index, (name, storage)) in self.iter().enumerate() {
@@ -144,7 +145,7 @@ mod tests {
     }
 
     #[test]
-    fn names_rule_over_the_others() {
+    fn listed_names_have_priority() {
         let choices = parsed("velocity:f16, a:b:u8 ,*:off,Id:keep");
         assert_eq!(choices.of("velocity"), Storage::F16);
         assert_eq!(choices.of("VELOCITY"), Storage::F16);
@@ -158,7 +159,7 @@ mod tests {
     }
 
     #[test]
-    fn the_text_is_the_same_for_the_same_choices() {
+    fn equal_choices_have_the_same_text() {
         assert_eq!(AttributeChoices::default().to_string(), "*:keep");
         assert_eq!(AttributeChoices::NONE.to_string(), "*:off");
         let text = parsed("velocity:f16,density:u8").to_string();
@@ -167,22 +168,25 @@ mod tests {
     }
 
     #[test]
-    fn names_that_no_frame_has_are_found() {
+    fn unknown_names_are_found() {
         let known = ["velocity".to_owned(), "id".to_owned()];
         assert_eq!(parsed("ID:off,*:f16").unknown(&known), None);
         assert_eq!(parsed("id:off,vel:f16").unknown(&known), Some("vel"));
     }
 
     #[test]
-    fn what_cannot_be_meant_is_told() {
+    fn invalid_texts_are_rejected() {
         for (text, what) in [
-            ("", "does not say how"),
+            ("", "has no storage"),
             ("velocity", "write NAME:HOW"),
-            (":f16", "does not say how"),
-            ("v:f16,,", "does not say how"),
-            ("v:f64", "there is no `f64`, but keep, f32, f16, u8, off"),
-            ("v:f16,v:off", "`v` is there twice"),
-            ("*:f16,*:off", "`*` is there twice"),
+            (":f16", "has no storage"),
+            ("v:f16,,", "has no storage"),
+            (
+                "v:f64",
+                "unknown storage `f64`; use one of keep, f32, f16, u8, off",
+            ),
+            ("v:f16,v:off", "`v` occurs twice"),
+            ("*:f16,*:off", "`*` occurs twice"),
         ] {
             let error = text.parse::<AttributeChoices>().expect_err(text);
             assert!(error.contains(what), "{text}: {error}");

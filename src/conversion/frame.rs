@@ -1,4 +1,4 @@
-//! Converts a frame to a native one.
+//! Converts one frame.
 
 use std::fmt;
 use std::time::Instant;
@@ -15,41 +15,41 @@ use spherule_formats::{ScalarType, Sequence};
 use super::attributes::{AttributeChoices, Storage};
 use super::{Conversion, ConvertTask};
 
-/// Result of converting a frame.
+/// The result of converting a frame.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ConvertedFrame {
     /// Number of particles stored.
     pub particles: u64,
-    /// Number of particles dropped because a coordinate was not finite.
+    /// Particles that were dropped because a coordinate was not finite.
     pub dropped: u64,
     /// Encoding of positions.
     pub encoding: &'static str,
     /// Bytes of positions and nodes.
     pub bytes: u64,
-    /// Maximum error of a stored position, scene units.
+    /// Largest position error, scene units.
     pub max_error: f64,
-    /// The same as a fraction of the smallest radius, if there is one.
+    /// Largest position error as a fraction of the smallest radius, if there is one.
     pub max_error_of_radius: Option<f64>,
     /// Wall-clock time of the conversion, seconds.
     pub seconds: f64,
     /// Wall-clock time by phase, seconds.
     pub phases: Vec<(&'static str, f64)>,
-    /// Peak anonymous memory of the conversion, by its own accounting.
+    /// Peak of anonymous memory, as counted by the conversion.
     pub peak_bytes: u64,
     /// Bytes written to temporary files.
     pub spilled_bytes: u64,
-    /// Number of parts that were ordered one after another.
+    /// Number of parts that were sorted separately.
     pub parts: usize,
     /// Notes for the user.
     #[serde(skip)]
     pub notes: Vec<String>,
 }
 
-/// Converts the frame of `task`; its file appears complete or not at all. Binary files are mapped and streamed in
-/// runs; all others are read completely.
+/// Converts the frame of `task`. Its file appears complete or not at all. Binary files are mapped and streamed;
+/// other files are read into memory.
 ///
 /// # Errors
-/// [`ConvertError`] if the frame cannot be read, cannot be stored with these settings, or its file cannot be written.
+/// [`ConvertError`] if the frame cannot be read, cannot be stored with these settings, or cannot be written.
 pub fn convert_frame(
     conversion: &Conversion,
     sequence: &Sequence,
@@ -85,48 +85,48 @@ pub fn convert_frame(
 }
 
 impl Conversion {
-    /// Settings of the conversion engine for a frame from `source`.
+    /// The settings of the conversion library for a frame from `source`.
     fn engine_settings(&self, source: &dyn ParticleSource) -> convert::ConvertSettings {
-        let asked = &self.settings;
+        let settings = &self.settings;
         let choice = |attribute: &SourceAttribute| {
-            let choice = asked.attributes.choice(attribute);
+            let choice = settings.attributes.choice(attribute);
             (attribute.name.clone(), choice)
         };
         convert::ConvertSettings {
-            encoding: asked.encoding,
-            bound: asked.bound,
+            encoding: settings.encoding,
+            bound: settings.bound,
             origin: self.origin,
             is_y_up: self.is_y_up,
-            radius: match asked.radius {
+            radius: match settings.radius {
                 Some(radius) => RadiusRule::All(radius),
                 None => RadiusRule::Source {
                     otherwise: self.estimate,
                 },
             },
-            memory: asked
+            memory: settings
                 .memory
                 .map_or(convert::ConvertSettings::USUAL_MEMORY, |m| m.0),
             other_attributes: AttributeChoice::AsIs,
             attributes: source.attributes().iter().map(choice).collect(),
-            keep_ids: asked.keep_ids,
+            keep_ids: settings.keep_ids,
             scratch_dir: None,
         }
     }
 }
 
 impl AttributeChoices {
-    /// Storage of an attribute of a source. The choice for attributes that are not listed does not apply to integers
-    /// and radii, which would lose precision.
+    /// The storage of an attribute of a source. The rule for other attributes (`*`) does not apply to integers and
+    /// radii, which would lose too much precision.
     fn choice(&self, attribute: &SourceAttribute) -> AttributeChoice {
         let storage = self.of(&attribute.name);
         let is_float = matches!(attribute.scalar, ScalarType::F32 | ScalarType::F64);
         let is_radius = attribute.name.eq_ignore_ascii_case("radius");
-        let is_meant = self.names(&attribute.name) || is_float && !is_radius;
+        let applies = self.names(&attribute.name) || is_float && !is_radius;
         match storage {
             Storage::Off => AttributeChoice::LeaveOut,
-            Storage::F32 if is_meant => AttributeChoice::Single,
-            Storage::F16 if is_meant => AttributeChoice::Half,
-            Storage::U8 if is_meant => AttributeChoice::Ranged,
+            Storage::F32 if applies => AttributeChoice::Single,
+            Storage::F16 if applies => AttributeChoice::Half,
+            Storage::U8 if applies => AttributeChoice::Ranged,
             _ => AttributeChoice::AsIs,
         }
     }
@@ -159,14 +159,14 @@ impl ConvertedFrame {
     }
 }
 
-/// Count, bytes and error for messages.
+/// Count, bytes and error.
 impl fmt::Display for ConvertedFrame {
-    #[expect(clippy::cast_precision_loss, reason = "for people")]
+    #[expect(clippy::cast_precision_loss, reason = "only displayed")]
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let each = self.bytes as f64 / self.particles.max(1) as f64;
         write!(
             f,
-            "{} particles, {}, {each:.2} bytes each for positions and nodes, largest error {:.3e}",
+            "{} particles, {}, {each:.2} bytes per particle for positions and nodes, largest error {:.3e}",
             self.particles, self.encoding, self.max_error
         )?;
         if let Some(fraction) = self.max_error_of_radius {

@@ -1,29 +1,24 @@
-//! Converts a sequence to native frames, one after another. Each is recorded in the job after its file is complete.
-//!
-//! Settings that are common to all frames are in [`Conversion`]. The caller decides which [`Event`]s are shown to the
-//! user.
+//! Converts the frames of a sequence to native frames, one after the other. Each is recorded in the job once its file
+//! exists. [`Conversion`] has the settings that all frames share.
 
-use std::collections::HashSet;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-use serde_json::json;
-use spherule_formats::convert::{ConvertError, Phase, Progress};
-use spherule_formats::write::own_temporaries;
-use spherule_formats::{FrameError, Sequence};
-use spherule_jobs::{Interrupt, Job, JobError, Queue, QueueNews};
+use spherule_formats::Sequence;
+use spherule_formats::convert::{Phase, Progress};
+use spherule_jobs::{ClaimedFrame, FinishedFrame, FrameFailure, FrameWork, RunContext};
 
 mod attributes;
+mod error;
 mod frame;
 mod settings;
 
 pub use attributes::{AttributeChoices, Storage};
+pub use error::{ConversionError, UnknownAttribute};
 pub use frame::{ConvertedFrame, convert_frame};
 pub use settings::{Conversion, ConvertSettings};
 
-use crate::mishap::{guarded, is_place_at_fault, may_be_unfinished};
-
-/// One native frame to be made.
+/// One frame to convert.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ConvertTask {
     /// Frame number.
@@ -34,106 +29,53 @@ pub struct ConvertTask {
     pub output: PathBuf,
 }
 
-/// Events of a run.
-#[derive(Debug)]
-pub enum Event<'a> {
-    /// The conversion of a frame has started.
-    Entered(i64),
-    /// Progress of a phase of the current frame: particles done, and their total number.
-    Advanced(i64, Phase, u64, u64),
-    /// The file of a frame is complete and recorded.
-    Done(&'a ConvertTask, &'a ConvertedFrame),
-    /// A frame could not be converted. It is recorded with this reason, and the run continues.
-    Failed(i64, &'a str),
-    /// Other workers are working on frames of the run.
-    Others(QueueNews<'a>),
-    /// A note for the user.
-    Note(&'a str),
+/// Converts the frames of a job.
+#[derive(Debug, Clone, Copy)]
+pub struct ConvertWork<'a> {
+    /// The settings that all frames share.
+    pub conversion: &'a Conversion,
+    /// The frames of the input.
+    pub sequence: &'a Sequence,
+    /// The native frames, in the order of the frames of the run.
+    pub tasks: &'a [ConvertTask],
 }
 
-/// An event handler, called from many threads.
-pub type Watch<'a> = &'a (dyn Fn(Event) + Sync);
+impl FrameWork for ConvertWork<'_> {
+    type Report = ConvertedFrame;
 
-/// Reports the progress of the current frame.
-struct Watched<'a> {
+    fn process(
+        &self,
+        frame: &ClaimedFrame,
+        context: &RunContext<'_, ConvertedFrame>,
+    ) -> Result<FinishedFrame<ConvertedFrame>, FrameFailure> {
+        let task = &self.tasks[frame.index];
+        context.report_stage(task.frame, "converting");
+        let progress = FrameProgress {
+            frame: task.frame,
+            context,
+        };
+        let converted = convert_frame(self.conversion, self.sequence, task, &progress);
+        let mut report = converted
+            .map_err(|e| ConversionError::new(e, self.sequence, task.index).into_failure(task))?;
+        context.report_notes(report.notes.drain(..));
+        Ok(FinishedFrame {
+            outputs: vec![task.output.clone()],
+            report,
+        })
+    }
+}
+
+/// Reports the phases of one frame.
+struct FrameProgress<'a> {
     frame: i64,
-    watch: Watch<'a>,
+    context: &'a RunContext<'a, ConvertedFrame>,
 }
 
-impl Progress for Watched<'_> {
+impl Progress for FrameProgress<'_> {
     fn advanced(&self, phase: Phase, done: u64, total: u64) -> ControlFlow<()> {
-        (self.watch)(Event::Advanced(self.frame, phase, done, total));
+        let percent = 100 * u128::from(done) / u128::from(total).max(1);
+        let stage = format!("converting ({} {percent} %)", phase.name());
+        self.context.report_stage(self.frame, &stage);
         ControlFlow::Continue(())
     }
-}
-
-/// Converts those of `tasks` that no other worker has claimed, in order, and records each in `job`. Returns when all
-/// of them are finished, by any worker. If `interrupt` is raised, finishes only the current frame.
-///
-/// # Errors
-/// The ledger cannot be written, or the disk is full: further frames could not be recorded.
-pub fn run(
-    conversion: &Conversion,
-    sequence: &Sequence,
-    tasks: &[ConvertTask],
-    job: &mut Job,
-    interrupt: &Interrupt,
-    watch: Watch,
-) -> Result<(), JobError> {
-    let mut told = HashSet::new();
-    // Mark temporary files with the owner, so that the job recognises those of a killed run.
-    own_temporaries(spherule_jobs::owner());
-    let frames = tasks.iter().map(|task| task.frame);
-    let mut queue = Queue::new(job.claims(), frames, interrupt);
-    let mut heard = |news: QueueNews| watch(Event::Others(news));
-    while let Some((place, claim)) = queue.take(&mut heard)? {
-        // Convert the frame
-        let task = &tasks[place];
-        watch(Event::Entered(task.frame));
-        let watched = Watched {
-            frame: task.frame,
-            watch,
-        };
-        match guarded(|| Ok(convert_frame(conversion, sequence, task, &watched))) {
-            Ok(Ok(converted)) => {
-                // A note that applies to every frame is reported once.
-                for note in &converted.notes {
-                    if told.insert(note.clone()) {
-                        watch(Event::Note(note));
-                    }
-                }
-                let outputs = std::slice::from_ref(&task.output);
-                job.record_done(task.frame, outputs, json!(converted))?;
-                watch(Event::Done(task, &converted));
-            }
-            // The disk is at fault, not the frame, which remains to be done.
-            Ok(Err(ConvertError::Frame(FrameError::Io { path, source })))
-                if path.starts_with(task.output.parent().unwrap_or(&task.output))
-                    && is_place_at_fault(&source) =>
-            {
-                return Err(JobError::writing(&path, source));
-            }
-            Ok(Err(error)) => fail(job, watch, task, &reason(sequence, task, &error))?,
-            Err(fault) => fail(job, watch, task, &fault)?,
-        }
-        claim.end();
-    }
-    Ok(())
-}
-
-fn fail(job: &mut Job, watch: Watch, task: &ConvertTask, reason: &str) -> Result<(), JobError> {
-    watch(Event::Failed(task.frame, reason));
-    job.record_failed(task.frame, reason, json!(null))
-}
-
-/// The reason why a frame cannot be converted, with a remedy.
-fn reason(sequence: &Sequence, task: &ConvertTask, error: &ConvertError) -> String {
-    if let ConvertError::Frame(error) = error
-        && may_be_unfinished(sequence, task.index, error)
-    {
-        return format!(
-            "{error}; it is the newest frame, perhaps still being written: convert again later"
-        );
-    }
-    error.to_string()
 }

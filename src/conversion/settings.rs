@@ -1,32 +1,33 @@
-//! Settings of a conversion: those of the user, and those determined by a survey.
+//! The settings of a conversion: those of the user, and those from the survey of the sequence.
 
 use glam::DVec3;
 use spherule_formats::native::layout::VERSION;
 use spherule_formats::native::{Bound, Encoding};
 
 use super::attributes::AttributeChoices;
+use super::error::UnknownAttribute;
 use crate::metrics::Bytes;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
-/// Settings of the user.
+/// The settings of the user.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvertSettings {
-    /// Encoding of positions; `None` selects the smallest one within the bound.
+    /// Encoding of positions; `None` uses the smallest one within the bound.
     pub encoding: Option<Encoding>,
-    /// Maximum error of stored positions.
+    /// Error bound of positions.
     pub bound: Bound,
     /// Replaces the radii of the files, scene units.
     pub radius: Option<f32>,
     /// Storage of attributes.
     pub attributes: AttributeChoices,
-    /// Whether the position of each particle in its file is stored if there is no `id`.
+    /// Whether the index of each particle in its file is stored, if there is no attribute `id`.
     pub keep_ids: bool,
-    /// Memory limit of a conversion. Larger frames are ordered in parts; the limit determines where they are divided.
+    /// Memory limit. Frames that do not fit are sorted in parts, whose boundaries depend on it.
     pub memory: Option<Bytes>,
 }
 
 impl ConvertSettings {
-    /// All settings that the frames depend on, for the plan: key and value.
+    /// Everything that the frames depend on, for the plan: key and value.
     pub fn settings(&self) -> Vec<(String, String)> {
         let encoding = match self.encoding {
             Some(encoding) => encoding.to_string(),
@@ -36,7 +37,7 @@ impl ConvertSettings {
             ("version".to_owned(), VERSION.to_string()),
             ("encoding".to_owned(), encoding),
         ];
-        // Exact positions do not depend on the bound.
+        // Exact positions do not depend on the bound
         match self.bound {
             _ if self.encoding == Some(Encoding::F32) => {}
             Bound::None => {}
@@ -58,7 +59,7 @@ impl ConvertSettings {
         settings
     }
 
-    /// What the survey must find out.
+    /// The properties that the survey must determine.
     pub const fn question(&self) -> Question<'static> {
         Question {
             color: ColorQuestion::None,
@@ -73,27 +74,27 @@ impl ConvertSettings {
 /// Settings for converting the frames of a job.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conversion {
-    /// Settings of the user.
+    /// The settings of the user.
     pub settings: ConvertSettings,
     /// World position that stored positions are relative to.
     pub origin: DVec3,
     /// Whether y is the usual up direction of the format.
     pub is_y_up: bool,
-    /// Radius for frames without radii, scene units.
+    /// Radius for frames without one, scene units.
     pub estimate: Option<f32>,
 }
 
 impl Conversion {
-    /// Combines the settings of the user with the results of the survey.
+    /// Combines the settings of the user with the survey.
     ///
     /// # Errors
-    /// If an attribute is listed that no frame has.
-    pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, String> {
+    /// The settings name an attribute that no frame has.
+    pub fn new(settings: ConvertSettings, survey: &Survey) -> Result<Self, UnknownAttribute> {
         if let Some(name) = settings.attributes.unknown(&survey.attributes) {
-            let has = crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..]));
-            return Err(format!(
-                "--attributes: no frame has `{name}`; there are {has}"
-            ));
+            return Err(UnknownAttribute {
+                name: name.to_owned(),
+                known: crate::pipeline::attribute_list(survey.attributes.iter().map(|n| &n[..])),
+            });
         }
         Ok(Self {
             estimate: survey.radius.filter(|_| settings.radius.is_none()),
@@ -121,7 +122,7 @@ mod tests {
     }
 
     #[test]
-    fn what_makes_no_difference_is_no_setting() {
+    fn settings_without_effect_are_omitted() {
         let exact = settings(Some(Encoding::F32), Bound::None);
         assert_eq!(settings(Some(Encoding::F32), Bound::OfRadius(0.02)), exact);
         let coded = settings(Some(Encoding::Q16), Bound::OfRadius(0.02));

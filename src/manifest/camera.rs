@@ -5,10 +5,12 @@ use std::collections::BTreeSet;
 use glam::DVec3;
 use serde_json::{Value as Json, json};
 
-use super::key::{Keys, section};
+use super::focus::FocusSetting;
+use super::keys::{Keys, section};
 use super::reader::Section;
 use super::value::named;
 use crate::scene::camera::DEFAULT_FOV;
+use crate::scene::lens::DEFAULT_SENSOR_WIDTH;
 
 named! {
     /// Placement of the camera.
@@ -25,16 +27,16 @@ named! {
 }
 
 section! {
-    /// Where the image is taken from
+    /// Position and motion of the camera
     Camera {
         /// Placement: auto | fixed | turntable | keys
         ///
-        /// Without a mode, the camera is fixed if there is an eye, goes through keys if there are keys, and is
+        /// Without a mode, the camera is fixed if there is an eye, moves through the keys if there are keys, and is
         /// placed automatically otherwise.
         mode: CameraMode = CameraMode::Auto;
         /// fixed: position of the camera
         eye: Option<DVec3> = None, example("[0.0, 0.0, 0.0]");
-        /// fixed: the point in the middle of the image
+        /// fixed: target point, in the centre of the image
         look_at: Option<DVec3> = None, example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("input.up");
@@ -46,6 +48,21 @@ section! {
         elevation: Option<f64> = None, from(-90), to(90), unit("degrees"), example("20.0");
         /// turntable: rotation from one frame to the next, degrees
         degrees_per_frame: f64 = 1.0, unit("degrees");
+        /// f-number of the lens; 0 is a pinhole, with everything in focus
+        ///
+        /// The diameter of the aperture is the focal length divided by the f-number. The focal length is
+        /// sensor_width * height / (2 * width * tan(fov / 2)), with width and height of the image.
+        f_stop: f64 = 0.0, from(0), zero("a pinhole");
+        /// Width of the sensor in scene units; 0.036 is a 36 mm film still in metres
+        ///
+        /// It only affects the aperture that f_stop gives.
+        sensor_width: f64 = DEFAULT_SENSOR_WIDTH, above(0), unit("a length");
+        /// Diameter of the aperture in scene units, in place of f_stop
+        aperture: Option<f64> = None, from(0), unit("a length"), example("0.05"), unset("by f_stop");
+        /// In focus: auto (look_at), a distance along the view, or { particle = ID }
+        ///
+        /// auto focuses on the target point of the camera. A particle is followed by its id through all frames.
+        focus: FocusSetting = FocusSetting::Auto;
         @
         /// `[[camera.key]]`, ascending by frame
         keys: Vec<CameraKey>;
@@ -62,7 +79,7 @@ section! {
         frame: i64 = 0, required(KEY_NEEDS), example("1");
         /// Position of the camera
         eye: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[0.0, 0.0, 0.0]");
-        /// The point in the middle of the image
+        /// Target point, in the centre of the image
         look_at: DVec3 = DVec3::ZERO, required(KEY_NEEDS), example("[5.0, 5.0, 0.0]");
         /// Direction that points up in the image
         up: Option<DVec3> = None, direction(), example("[0.0, 0.0, 1.0]"), unset("camera.up");
@@ -101,8 +118,12 @@ impl Camera {
     }
 
     fn check(&self, section: &Section<'_>) {
+        if self.aperture.is_some() && self.f_stop > 0.0 {
+            section.wrong("aperture", "is given, but so is f_stop; remove one of them");
+        }
+        // Only the fixed mode has the keys `eye` and `look_at`, and requires both
         let own = match self.mode {
-            CameraMode::Auto => Some("the automatic camera finds its own; say mode = \"fixed\""),
+            CameraMode::Auto => Some("the automatic camera chooses its own; set mode = \"fixed\""),
             CameraMode::Turntable => {
                 Some("a turntable finds its own; azimuth and elevation place it")
             }
@@ -115,11 +136,12 @@ impl Camera {
                     section.wrong(key, &format!("is given, but {own}"));
                 }
                 None if section.lacks(key) => {
-                    section.missing(key, "a fixed camera needs it, as [5.0, 5.0, 0.0]");
+                    section.missing(key, "a fixed camera needs it, such as [5.0, 5.0, 0.0]");
                 }
                 _ => {}
             }
         }
+        // Check that the view is valid
         if self.mode == CameraMode::Fixed
             && let (Some(eye), Some(look_at)) = (self.eye, self.look_at)
         {
@@ -182,6 +204,10 @@ pub(super) fn conditions() -> Json {
             &["auto", "turntable", "keys"],
             json!({ "properties": { "eye": false, "look_at": false } }),
         ),
+        {
+            "if": { "required": ["aperture"] },
+            "then": { "properties": { "f_stop": { "const": 0 } } },
+        },
         // Without a mode, it follows from the other keys.
         {
             "if": { "required": ["eye"], "properties": { "mode": false } },

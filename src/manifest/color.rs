@@ -3,8 +3,9 @@
 use glam::Vec3;
 use serde_json::{Value as Json, json};
 
+use super::field::Field;
 use super::key::Key;
-use super::reader::{Field, nearest};
+use super::nearest::nearest;
 use super::value::{Fault, Value, numbers_schema, quoted};
 use crate::scene::Background;
 
@@ -88,7 +89,7 @@ impl Value for MapName {
 /// The ends of a colour map.
 impl Value for [f64; 2] {
     fn kind(_: &Key) -> String {
-        "two rising numbers, as [0.0, 4.0]".to_owned()
+        "two rising numbers, such as [0.0, 4.0]".to_owned()
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
@@ -107,7 +108,7 @@ impl Value for [f64; 2] {
 
 impl Value for ColorSetting {
     fn kind(_: &Key) -> String {
-        "three numbers from 0, as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\""
+        "three numbers from 0, such as [0.6, 0.7, 0.9], { attribute = \"velocity\", map = \"viridis\" }, or \"auto\""
             .to_owned()
     }
 
@@ -123,7 +124,7 @@ impl Value for ColorSetting {
         let (mut attribute, mut map, mut range) = (String::new(), None, None);
         let mut name = Key::new("attribute", &[]);
         if !is_auto {
-            name = name.required("the name of an attribute, as \"velocity\"");
+            name = name.required("the name of an attribute, such as \"velocity\"");
         }
         section.read(&name, &mut attribute);
         section.read(&Key::new("map", &[]), &mut map);
@@ -177,19 +178,30 @@ impl Value for ColorSetting {
     }
 }
 
+/// Name of the background of a photo studio.
+const STUDIO: &str = "studio";
+
 /// The up direction is set by [`Background::with_up`].
 impl Value for Background {
     fn kind(_: &Key) -> String {
-        "three numbers from 0, as [0.1, 0.1, 0.1], { bottom = [...], top = [...] },".to_owned()
+        "three numbers from 0, such as [0.1, 0.1, 0.1], { bottom = [...], top = [...] }, \"studio\""
+            .to_owned()
+    }
+
+    fn words() -> Vec<&'static str> {
+        vec![STUDIO]
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
+        if field.as_text() == Some(STUDIO) {
+            return Ok(Self::Studio { up: Vec3::Z });
+        }
         let Some(mut section) = field.as_table() else {
             return Vec3::parse(field, key).map(Self::Constant);
         };
         let (mut bottom, mut top) = (Vec3::ZERO, Vec3::ZERO);
         for (name, color) in [("bottom", &mut bottom), ("top", &mut top)] {
-            let key = Key::new(name, &[]).required("three numbers from 0, as [0.1, 0.1, 0.1]");
+            let key = Key::new(name, &[]).required("three numbers from 0, such as [0.1, 0.1, 0.1]");
             section.read(&key, color);
         }
         section.finish();
@@ -203,6 +215,7 @@ impl Value for Background {
             Self::Gradient { bottom, top, .. } => {
                 format!("{{ bottom = {}, top = {} }}", bottom.toml(), top.toml())
             }
+            Self::Studio { .. } => quoted(STUDIO),
         }
     }
 
@@ -216,6 +229,7 @@ impl Value for Background {
                 "required": ["bottom", "top"],
                 "additionalProperties": false,
             },
+            { "const": STUDIO },
         ] })
     }
 }

@@ -45,7 +45,7 @@ mod tests {
     use crate::manifest::Manifest;
 
     #[test]
-    fn what_was_edited_is_told_from_what_was_written() {
+    fn edited_pages_are_distinguished_from_generated_ones() {
         let manifest = Manifest::new("in");
         let text = marked(&manifest.to_commented_toml());
         assert!(is_marked(&text));

@@ -5,8 +5,9 @@ use std::ops::{Deref, DerefMut};
 use serde_json::{Value as Json, json};
 use spherule_jobs::FrameRange;
 
-use super::key::{Affects, Key, section};
-use super::reader::Field;
+use super::field::Field;
+use super::key::{Affects, Key};
+use super::keys::section;
 use super::value::{Fault, FlagKind, Value, named};
 
 named! {
@@ -58,32 +59,32 @@ pub enum RadiusSetting {
 }
 
 section! {
-    /// Which particles to render, and what their data mean
+    /// Particles to render, and the interpretation of their data
     Input {
         /// A directory, a pattern (#, %04d, *), or a list of files
         path: Paths = Paths::default(), affects(Affects::Nothing),
             required("a directory, a pattern as \"dump.#.vtk\", or a list of files");
         /// Frames to render: 7 | 1-10 | 1-10x2 | 1-5,8
         frames: Option<FrameRange> = None, or("all"), affects(Affects::Nothing), flag("frames", "RANGE", "Input");
-        /// Parts to keep of a frame that has several sets or blocks: fluid,oil
+        /// Parts to keep if frames consist of several files or blocks: fluid,oil
         ///
-        /// Case does not matter, and part of a name is enough.
+        /// Case does not matter, and a fragment of a name is enough.
         parts: Option<Vec<String>> = None, example("[\"fluid\"]"), unset("all"), flag("parts", "LIST", "Input");
         /// Particle radius: a length, auto, or { attribute = "radius", scale = 1.0 }
         ///
-        /// `auto` takes the radius of the files. Where they have none, it is half the usual distance of neighbours;
-        /// for a union of spheres 1.8 times as much.
+        /// `auto` takes the radius from the files. Without one, it is half the typical distance between neighbours
+        /// for spheres, an estimate from the particle density for smooth, and 1.8 times this estimate for union.
         radius: RadiusSetting = RadiusSetting::Auto, flag("radius", "RADIUS", "Input");
         /// Axis that points up: x, y, z, -x, -y, -z, or auto
         ///
-        /// `auto` is y for BGEO files and those of SPlisHSPlasH, else z. Everything else about the camera is set by
-        /// --set: camera.eye, camera.look_at, camera.fov, camera.mode.
+        /// `auto` is y for BGEO files and files of SPlisHSPlasH, and z for all others. To set the camera itself, use
+        /// --set with camera.eye, camera.look_at, camera.fov or camera.mode.
         up: Option<UpAxis> = None, or("auto"), flag("up", "UP", "Camera");
-        /// Whether native frames are mapped into memory; --no-mmap reads them instead
+        /// Memory-map native frames; --no-mmap reads them instead
         ///
-        /// Where files may be truncated while they are used, they must be read.
+        /// Use --no-mmap if another program may truncate the files during the render.
         mmap: bool = true, affects(Affects::Nothing), flag("no-mmap", "", "Input");
-        /// Whether native frames are compared with their checksums: auto (up to 1 GiB) | true | false
+        /// Verify the checksums of native frames: auto (up to 1 GiB) | true | false
         verify: Option<bool> = None, or("auto"), affects(Affects::Nothing);
     }
 }
@@ -163,7 +164,8 @@ impl Value for RadiusSetting {
             return length.map(Self::Length).ok_or(Fault::Unwanted);
         };
         let (mut attribute, mut scale) = (String::new(), 1.0);
-        let name = Key::new("attribute", &[]).required("the name of an attribute, as \"radius\"");
+        let name =
+            Key::new("attribute", &[]).required("the name of an attribute, such as \"radius\"");
         section.read(&name, &mut attribute);
         section.read(&Key::new("scale", &[]).above(0), &mut scale);
         section.finish();

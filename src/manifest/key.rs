@@ -1,64 +1,5 @@
-//! One declaration per key: its name, its values, its description in `init`, the schema, the manual and the command
-//! line, and whether images depend on it.
-//!
-//! `section!` declares a table of the manifest as a struct, `keys!` the keys of a struct that is defined elsewhere.
-//! Both expand to one call of [`Keys::key`] per key. The same calls read a manifest and list it.
-
-use super::list::Entries;
-use super::reader::Section;
-use super::value::{Slot, Value};
-
-/// Declares a table of the manifest: a struct, its defaults and its keys. The doc comment of a field is the text that
-/// users read; its first paragraph is the comment in the file. A field after `@` has keys of its own.
-macro_rules! section {
-    ($(#[doc = $about:literal])+ $name:ident {
-        $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $default:expr
-            $(, $rule:ident($($argument:expr),* $(,)?))*;)+
-        $(@ $(#[doc = $extra_doc:literal])+ $extra:ident: $extra_type:ty;)*
-    }) => {
-        $(#[doc = $about])+
-        #[derive(Debug, Clone, PartialEq)]
-        pub struct $name {
-            $($(#[doc = $doc])+ pub $field: $type,)+
-            $($(#[doc = $extra_doc])+ pub $extra: $extra_type,)*
-        }
-
-        impl Default for $name {
-            fn default() -> Self {
-                Self {
-                    $($field: $default,)+
-                    $($extra: Default::default(),)*
-                }
-            }
-        }
-
-        impl $name {
-            pub(super) const ABOUT: &[&str] = &[$($about),+];
-
-            pub(super) fn keys(&mut self, keys: &mut $crate::manifest::key::Keys<'_>) {
-                $(keys.key(
-                    $crate::manifest::key::Key::new(stringify!($field), &[$($doc),+])
-                        $(.$rule($($argument),*))*,
-                    &mut self.$field,
-                );)+
-            }
-        }
-    };
-}
-pub(super) use section;
-
-/// Declares the keys of values that are stored elsewhere: `name => place, rules;`.
-macro_rules! keys {
-    ($keys:ident: $($(#[doc = $doc:literal])+ $name:ident => $place:expr
-        $(, $rule:ident($($argument:expr),* $(,)?))*;)+) => {{
-        $($keys.key(
-            $crate::manifest::key::Key::new(stringify!($name), &[$($doc),+])
-                $(.$rule($($argument),*))*,
-            &mut $place,
-        );)+
-    }};
-}
-pub(super) use keys;
+//! The declaration of a key: its name, its description in `init`, the schema, the manual and the command line, the
+//! rules for its values, and whether images depend on it. `keys.rs` has the macros that declare keys.
 
 /// Conditions under which images depend on a key.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -70,6 +11,8 @@ pub(super) enum Affects {
     Bodies,
     /// Spheres that reflect and refract.
     BranchingSpheres,
+    /// The path integrator.
+    PathTracing,
 }
 
 impl Affects {
@@ -77,11 +20,12 @@ impl Affects {
     #[cfg(test)]
     pub(super) const fn text(self) -> &'static str {
         match self {
-            Self::Images => "yes",
-            Self::Nothing => "no",
-            Self::SmoothSurfaces => "smooth surfaces only",
-            Self::Bodies => "unions and smooth surfaces only",
-            Self::BranchingSpheres => "spheres that reflect and transmit only",
+            Self::Images => "Changes images.",
+            Self::Nothing => "Does not change images.",
+            Self::SmoothSurfaces => "Changes images of smooth surfaces.",
+            Self::Bodies => "Changes images of unions and smooth surfaces.",
+            Self::BranchingSpheres => "Changes images of spheres that reflect and transmit.",
+            Self::PathTracing => "Changes images of `integrator = \"path\"`.",
         }
     }
 }
@@ -252,16 +196,6 @@ impl Key {
         let in_range = self.low.is_none_or(above) && self.high.is_none_or(below);
         value.is_finite() && (in_range || self.or_zero && value == 0.0)
     }
-
-    /// Description of the expected value for messages.
-    pub(super) fn wants<T: Value>(&self) -> String {
-        let kind = T::kind(self);
-        match self.word {
-            Some(word @ "all") => format!("\"{word}\" or {kind}"),
-            Some(word) => format!("{kind} or \"{word}\""),
-            None => kind,
-        }
-    }
 }
 
 /// A bound for messages; bounds of single precision appear as they were written.
@@ -281,82 +215,4 @@ pub(super) fn paragraphs(docs: &[&str]) -> Vec<String> {
         .split(|line| line.is_empty())
         .map(|p| p.join(" "))
         .collect()
-}
-
-/// A pass over the keys of a table, to read or to list them.
-pub(super) enum Keys<'a> {
-    Read(Section<'a>),
-    List(&'a mut Entries),
-}
-
-impl<'a> Keys<'a> {
-    /// Visits one key.
-    pub(super) fn key<S: Slot>(&mut self, key: Key, slot: &mut S) {
-        match self {
-            Self::Read(section) => section.read(&key, slot),
-            Self::List(entries) => entries.push::<S::Value>(key, slot.get()),
-        }
-    }
-
-    /// Visits the table `name`.
-    pub(super) fn section(
-        &mut self,
-        name: &'static str,
-        about: &[&'static str],
-        keys: impl FnOnce(&mut Keys<'_>),
-    ) {
-        match self {
-            Self::Read(section) => {
-                let mut inner = Keys::Read(section.section(name));
-                keys(&mut inner);
-                inner.finish();
-            }
-            Self::List(entries) => {
-                entries.section(name, about);
-                keys(&mut Keys::List(entries));
-            }
-        }
-    }
-
-    /// Visits the list of tables `name`; `path` is the full key.
-    pub(super) fn list<T: Default>(
-        &mut self,
-        name: &'static str,
-        path: &'static str,
-        about: &[&'static str],
-        items: &mut Vec<T>,
-        mut keys: impl FnMut(&mut T, &mut Keys<'_>),
-    ) {
-        match self {
-            Self::Read(section) => {
-                for item in section.sections(name) {
-                    let mut inner = Keys::Read(item);
-                    let mut value = T::default();
-                    keys(&mut value, &mut inner);
-                    inner.finish();
-                    items.push(value);
-                }
-            }
-            Self::List(entries) => {
-                for (index, item) in items.iter_mut().enumerate() {
-                    entries.item(path, index, about);
-                    keys(item, &mut Keys::List(entries));
-                }
-            }
-        }
-    }
-
-    /// The table that is being read, for checks of dependencies between keys.
-    pub(super) const fn reading(&mut self) -> Option<&mut Section<'a>> {
-        match self {
-            Self::Read(section) => Some(section),
-            Self::List(_) => None,
-        }
-    }
-
-    pub(super) fn finish(self) {
-        if let Self::Read(section) = self {
-            section.finish();
-        }
-    }
 }

@@ -6,12 +6,12 @@ use super::list::{Entries, Entry};
 use super::{ABOUT, Manifest};
 
 const INTRODUCTION: &str = "\
-`spherule init INPUT > job.toml` writes a manifest with every key and its default. Each key can also be set on the command
-line: `--set image.width=1280`; some have an option of their own. `spherule schema` prints a JSON schema of the file for
-editors.
+`spherule init INPUT > job.toml` writes a manifest with every key and its default. `--set image.width=1280` sets a key
+on the command line; this works for every key. Frequent keys also have an option of their own.
+`spherule schema` prints a JSON schema of the manifest for editors.
 
-Keys that do not change images may differ from run to run of a job. If any other key differs, the job does not resume unless
-`--force` or `--keep-done` is given. *How to add a key:* [adding-a-manifest-key.md](adding-a-manifest-key.md).
+Keys that do not change images may change between runs of a job. If any other key has changed, the job does not resume
+unless you give `--force` or `--keep-done`. [Adding a manifest key](adding-a-manifest-key.md) explains how to add a key.
 ";
 
 /// The page in Markdown.
@@ -22,25 +22,17 @@ fn manual() -> String {
     );
     let mut tables: Vec<&[Entry]> = tables(&entries).collect();
     // A list follows the table that contains it, as in the file.
-    tables.sort_by_key(|table| table[0].section.split('.').next() == Some("light"));
+    let is_list =
+        |table: &&[Entry]| matches!(table[0].section.split('.').next(), Some("light" | "mesh"));
+    tables.sort_by_key(is_list);
     for table in tables {
-        let _ = write!(
-            page,
-            "\n## {}\n\n{}.\n\n{HEADINGS}",
-            title(table),
-            table[0].about
-        );
+        let _ = write!(page, "\n## {}\n\n{}.\n", title(table), table[0].about);
         for entry in table {
-            page += &row(entry);
+            page += &section(entry);
         }
     }
     page
 }
-
-const HEADINGS: &str = "\
-| Key | Type | Range | Default | Option | Changes images | Meaning |
-|---|---|---|---|---|---|---|
-";
 
 fn tables(entries: &Entries) -> impl Iterator<Item = &[Entry]> {
     entries.list().chunk_by(|a, b| a.section == b.section)
@@ -57,35 +49,68 @@ fn title(table: &[Entry]) -> String {
     }
 }
 
-fn row(entry: &Entry) -> String {
+/// A heading, what the key means, and its properties.
+fn section(entry: &Entry) -> String {
     let key = &entry.declared;
-    let range = key.range();
-    let kind = entry.kind.replacen(&range, "", 1);
-    let kind = kind.split(", as ").next().unwrap_or_default();
-    let kind = match key.word {
-        Some(word) => format!("{kind}, or `\"{word}\"`"),
-        None => kind.to_owned(),
-    };
-    let default = match (key.required, &entry.value, key.unset) {
-        (Some(_), ..) => "required".to_owned(),
-        (None, Some(value), _) => format!("`{value}`"),
-        (None, None, Some(unset)) => unset.to_owned(),
-        (None, None, None) => "-".to_owned(),
-    };
-    let flag = key.flag.map(|flag| format!("`--{}`", flag.name));
+    let mut properties = vec![value(entry), default(entry)];
+    if let Some(flag) = key.flag {
+        properties.push(format!("Option: `--{}`.", flag.name));
+    }
+    properties.push(key.affects.text().to_owned());
     let meaning = [vec![key.comment()], key.details()].concat().join(". ");
-    let cells = [
-        format!("`{}`", entry.name()),
-        kind,
-        range.trim().to_owned(),
-        default,
-        flag.unwrap_or_default(),
-        key.affects.text().to_owned(),
-        meaning,
-    ];
-    let cells = cells.map(|cell| cell.replace('|', "\\|"));
-    format!("| {} |\n", cells.join(" | "))
+    let end = if meaning.ends_with(['.', ':']) {
+        ""
+    } else {
+        "."
+    };
+    let heading = entry.name();
+    let meaning = wrapped(&format!("{meaning}{end}"));
+    let properties = wrapped(&properties.join(" "));
+    format!("\n### `{heading}`\n\n{meaning}\n{properties}")
 }
+
+/// The kind of value and its range.
+fn value(entry: &Entry) -> String {
+    let range = entry.declared.range();
+    let kind = entry.kind.replacen(&range, "", 1);
+    let kind = kind.split(", such as ").next().unwrap_or_default();
+    let word = entry.declared.word;
+    let word = word.map_or_else(String::new, |word| format!(", or `\"{word}\"`"));
+    format!("Value: {kind}{range}{word}.")
+}
+
+fn default(entry: &Entry) -> String {
+    let key = &entry.declared;
+    match (key.required, &entry.value, key.unset) {
+        (Some(_), ..) => "Required.".to_owned(),
+        (None, Some(value), _) => format!("Default: `{value}`."),
+        (None, None, Some(unset)) => format!("Default: {unset}."),
+        (None, None, None) => "No default.".to_owned(),
+    }
+}
+
+/// The paragraph `text` in lines of at most 120 characters.
+fn wrapped(text: &str) -> String {
+    let mut lines = String::new();
+    let mut column = 0;
+    for word in text.split_whitespace() {
+        let length = word.chars().count();
+        if column > 0 && column + 1 + length > LINE {
+            lines.push('\n');
+            column = 0;
+        } else if column > 0 {
+            lines.push(' ');
+            column += 1;
+        }
+        lines += word;
+        column += length;
+    }
+    lines.push('\n');
+    lines
+}
+
+/// Longest line in characters.
+const LINE: usize = 120;
 
 /// The command that generates the page.
 const COMMAND: &str = "cargo test --lib manual::tests::write -- --ignored";

@@ -3,17 +3,54 @@
 use glam::Vec3;
 
 use super::color::ColorSetting;
-use super::key::{Keys, keys};
+use super::key::{Affects, Key};
+use super::keys::{Keys, keys};
 use super::value::named;
-use crate::scene::{self, Fresnel};
+use crate::scene::{self, Finish, Fresnel};
 
 named!(Fresnel: Schlick = "schlick", Exact = "exact");
 
-pub(super) const ABOUT: &[&str] = &["What particles are made of"];
+named! {
+    /// Kinds of materials.
+    MaterialKind {
+        /// Light leaves in all directions alike.
+        Matte = "matte",
+        /// A matte base under a clear coat.
+        Plastic = "plastic",
+        /// A mirror in the base colour.
+        Metal = "metal",
+        /// A clear body of glass.
+        Glass = "glass",
+        /// A clear body of water.
+        Water = "water",
+        /// The terms of the thesis's model.
+        Whitted = "whitted",
+    }
+}
+
+pub(super) const ABOUT: &[&str] = &["Material of the particles"];
+
+/// The comment of `type`.
+const TYPE: &str =
+    "Kind: auto | matte | plastic | metal | glass | water | whitted; auto is whitted";
+
+/// Details of `type`.
+const KINDS: [&str; 3] = [
+    "Plastic and metal need integrator = \"path\"; other integrators treat them as whitted. Glass and water set",
+    "reflection and transmission to 1 and use the exact Fresnel equations; the index of refraction of glass is 1.5 and",
+    "that of water 1.333, unless ior has another value than 1.33.",
+];
+
+/// Default roughness: satin plastic, and a brushed metal.
+const ROUGHNESS: f32 = 0.55;
 
 /// `[material]`, the terms of the thesis's equations 4.1 to 4.3.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Material {
+    /// Kind of material; by default that of the terms in [`Self::constants`].
+    pub kind: Option<MaterialKind>,
+    /// Roughness of plastic and metal, 0 to 1.
+    pub roughness: f32,
     /// Source of the colours.
     pub color: ColorSetting,
     /// The constants, except `fresnel` and `extinction`, which follow from the fields below.
@@ -27,9 +64,21 @@ pub struct Material {
     pub absorption_length: Option<f64>,
 }
 
+/// Terms of the thesis's model. All but `transmission` have no effect on opaque surfaces in path tracing.
+pub(super) const THESIS_TERMS: [&str; 6] = [
+    "ambient",
+    "diffuse",
+    "specular",
+    "shininess",
+    "reflection",
+    "transmission",
+];
+
 impl Default for Material {
     fn default() -> Self {
         Self {
+            kind: None,
+            roughness: ROUGHNESS,
             color: ColorSetting::Auto,
             constants: scene::Material::DEFAULT,
             fresnel: None,
@@ -39,10 +88,55 @@ impl Default for Material {
     }
 }
 
+/// Indices of refraction.
+const GLASS: f32 = 1.5;
+const WATER: f32 = 1.333;
+
 impl Material {
+    /// The constants, except `extinction`, with those that the kind of material sets. `fresnel` is the formula unless
+    /// the kind or a key sets one.
+    pub fn resolved(&self, fresnel: Fresnel) -> scene::Material {
+        let roughness = self.roughness;
+        let opaque = |finish| scene::Material {
+            transmission: 0.0,
+            finish,
+            ..self.constants
+        };
+        let clear = |ior| scene::Material {
+            reflection: 1.0,
+            transmission: 1.0,
+            ior: match self.constants.ior == scene::Material::DEFAULT.ior {
+                true => ior,
+                false => self.constants.ior,
+            },
+            fresnel: Fresnel::Exact,
+            ..self.constants
+        };
+        let usual = scene::Material {
+            fresnel,
+            ..self.constants
+        };
+        let found = match self.kind {
+            None | Some(MaterialKind::Whitted) => usual,
+            Some(MaterialKind::Matte) => opaque(Finish::Matte),
+            Some(MaterialKind::Plastic) => opaque(Finish::Plastic { roughness }),
+            Some(MaterialKind::Metal) => opaque(Finish::Metal { roughness }),
+            Some(MaterialKind::Glass) => clear(GLASS),
+            Some(MaterialKind::Water) => clear(WATER),
+        };
+        scene::Material {
+            fresnel: self.fresnel.unwrap_or(found.fresnel),
+            ..found
+        }
+    }
+
     pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
         let constants = &mut self.constants;
+        let key = Key::new("type", &[TYPE, "", KINDS[0], KINDS[1], KINDS[2]]).or("auto");
+        keys.key(key, &mut self.kind);
         keys!(keys:
+            /// Roughness of plastic and metal, 0 (a mirror) to 1
+            roughness => self.roughness, from(0), to(1), affects(Affects::PathTracing);
             /// Colour: auto (by speed), linear RGB, or { attribute = "velocity", map = "viridis", range = [0.0, 4.0] }
             color => self.color;
             /// Weight of ambient light
@@ -55,15 +149,15 @@ impl Material {
             shininess => constants.shininess, above(0);
             /// Index of refraction; water is 1.33
             ior => constants.ior, above(0);
-            /// Weight of reflected rays, 0 to 1, times the Fresnel reflectance
+            /// Weight of reflected rays, 0 to 1; a factor on the Fresnel reflectance
             reflection => constants.reflection, from(0), to(1);
-            /// Weight of refracted rays, 0 (opaque) to 1, times the Fresnel transmittance
+            /// Weight of refracted rays, 0 (opaque) to 1; a factor on the Fresnel transmittance
             transmission => constants.transmission, from(0), to(1);
-            /// Fresnel equations: auto | schlick | exact; auto is schlick for spheres, exact for one body
+            /// Fresnel equations: auto | schlick | exact; auto is schlick for spheres, exact for union and smooth
             fresnel => self.fresnel, or("auto");
-            /// Linear RGB of white light after absorption_length inside; [1, 1, 1] is clear
-            absorption => self.absorption, to(1);
-            /// Length for which absorption holds, or auto
+            /// Colour of white light after absorption_length inside, linear RGB; [1, 1, 1] is clear
+            absorption => self.absorption, from(0), to(1);
+            /// Distance after which white light has the colour absorption, or auto
             absorption_length => self.absorption_length, or("auto"), unit("a length"), above(0), single();
         );
     }

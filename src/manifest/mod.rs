@@ -1,6 +1,6 @@
 //! The manifest: all settings of a job with their types and defaults, read from TOML.
 //!
-//! Each key is declared once (`key.rs`). Options of the command line replace values of the file ([`Override`]). All
+//! Each key is declared once (`keys.rs`). Options of the command line replace values of the file ([`Override`]). All
 //! problems are reported at once, each with line and column (or the option) and key. `resolve` determines the meaning
 //! of "auto" for the given particles.
 
@@ -9,35 +9,50 @@ use std::path::Path;
 
 use spherule_jobs::FrameRange;
 
-use crate::render::{MAX_LITERAL_DEPTH, RendererKind};
-use crate::surface::{SurfaceKind, SurfaceSettings};
+use crate::render::{IntegratorKind, MAX_LITERAL_DEPTH, RendererKind};
+use crate::scene::Fresnel;
+use crate::surface::{MaterialId, SurfaceKind, SurfaceSettings};
 
-use key::{Affects, Keys};
+use key::Affects;
+use keys::Keys;
 use list::Entries;
-use reader::{Problem, Problems, Section};
-use tree::{Node, Place};
+use problem::{Place, Problem, Problems};
+use reader::Section;
+use tree::TomlNode;
 
 mod camera;
+mod caustics;
+mod channel;
 mod color;
+mod crop;
+mod environment;
+mod field;
 mod file;
 mod flags;
+mod focus;
+mod ground;
 mod input;
 mod key;
+mod keys;
 mod light;
 mod list;
 #[cfg(test)]
 mod manual;
 mod material;
+mod mesh;
+mod nearest;
 mod output;
 mod pattern;
 #[cfg(test)]
 mod places_tests;
 mod preset;
+mod problem;
 mod reader;
 mod rebase;
 mod render;
 mod same;
 mod schema;
+mod sun;
 mod surface;
 #[cfg(test)]
 mod tests;
@@ -48,23 +63,30 @@ mod work;
 mod work_tests;
 
 pub use camera::{Camera, CameraKey, CameraMode};
+pub use channel::{ATTRIBUTE_CHANNEL, Channel, NamedChannel};
 pub use color::{COLOR_MAPS, ColorSetting, DEFAULT_MAP, MapName};
+pub use crop::PixelBounds;
+pub use environment::{Environment, EnvironmentKind};
 pub use file::{is_marked, marked, read_manifest};
 pub use flags::{KeyFlag, key_flags};
+pub use focus::FocusSetting;
+pub use ground::{GroundKind, GroundSetting};
 pub use input::{Input, Paths, RadiusSetting, UpAxis};
 pub use key::Flag;
 pub use light::{Light, LightKind};
-pub use material::Material;
-pub use output::{Channel, Output};
-pub use pattern::OutputPattern;
+pub use material::{Material, MaterialKind};
+pub use mesh::{Mesh, MeshMaterial, MeshPath, MeshShading};
+pub(crate) use nearest::nearest;
+pub use output::Output;
+pub use pattern::{FramePattern, OutputPattern};
 pub use preset::Look;
-pub(crate) use reader::nearest;
 #[cfg(feature = "cli")]
 pub(crate) use rebase::without_dots;
-pub use rebase::{named_place, real_dir};
+pub use rebase::{RebaseError, named_place, real_dir};
 pub use render::{GroundPattern, Image, Render};
 pub use schema::{SCHEMA_FILE, job_schema};
-pub use tree::Override;
+pub use sun::Sun;
+pub use tree::{Override, OverrideError};
 pub use value::FlagKind;
 pub use work::{MAX_THREADS, ProgressMode, STOP_FILE, Work};
 
@@ -83,8 +105,12 @@ pub struct Manifest {
     pub surface: SurfaceSettings,
     /// The material of the particles.
     pub material: Material,
+    /// Light from infinitely far away.
+    pub environment: Environment,
     /// Light sources; without any, a key light and a soft fill light are placed relative to the camera.
     pub lights: Vec<Light>,
+    /// Meshes next to the particles.
+    pub meshes: Vec<Mesh>,
     /// The images.
     pub output: Output,
     /// Execution options; no image depends on them.
@@ -122,7 +148,9 @@ impl Manifest {
             render: Render::default(),
             surface: SurfaceSettings::DEFAULT,
             material: Material::default(),
+            environment: Environment::default(),
             lights: Vec::new(),
+            meshes: Vec::new(),
             output: Output::default(),
             job: Work::default(),
         }
@@ -159,7 +187,7 @@ impl Manifest {
         overrides: Vec<Override>,
     ) -> Result<(Self, Vec<String>), ManifestError> {
         let problems = Problems::default();
-        let mut tree = Node::parse(text).map_err(|(place, what)| {
+        let mut tree = TomlNode::parse(text).map_err(|(place, what)| {
             let key = String::new();
             ManifestError::new(vec![Problem { place, key, what }], text, path)
         })?;
@@ -174,6 +202,10 @@ impl Manifest {
         let mut manifest = Self::new("");
         let mut root = Keys::Read(Section::root(&tree, &problems));
         manifest.keys(&mut root);
+        let has_term = |term: &&str| tree.contains("material", term);
+        if !tree.contains("render", "integrator") && material::THESIS_TERMS.iter().any(has_term) {
+            manifest.render.integrator = Some(IntegratorKind::Whitted);
+        }
         manifest.check(&mut root);
         root.finish();
         let errors = problems.errors.into_inner();
@@ -198,6 +230,9 @@ impl Manifest {
             surface::all_keys(&mut self.surface, keys);
         });
         keys.section("material", material::ABOUT, |keys| self.material.keys(keys));
+        keys.section("environment", environment::ABOUT, |keys| {
+            self.environment.keys(keys);
+        });
         keys.section("output", Output::ABOUT, |keys| self.output.keys(keys));
         keys.section("job", Work::ABOUT, |keys| self.job.all_keys(keys));
         keys.list(
@@ -207,6 +242,7 @@ impl Manifest {
             &mut self.lights,
             Light::keys,
         );
+        keys.list("mesh", "mesh", mesh::ABOUT, &mut self.meshes, Mesh::keys);
     }
 
     /// Checks dependencies between tables.
@@ -214,6 +250,15 @@ impl Manifest {
         let Some(root) = root.reading() else {
             return;
         };
+        let meshes = self.meshes.len();
+        if meshes > MaterialId::MAX_MESHES {
+            let max = MaterialId::MAX_MESHES;
+            root.wrong(
+                "mesh",
+                &format!("{meshes} meshes, but at most {max} are possible"),
+            );
+        }
+        self.image.check(root);
         if self.branches_at_spheres()
             && self.render.min_weight == 0.0
             && self.render.max_depth > MAX_LITERAL_DEPTH
@@ -229,9 +274,15 @@ impl Manifest {
         }
     }
 
+    /// The integrator of the images.
+    pub fn integrator(&self) -> IntegratorKind {
+        self.render.integrator.unwrap_or(IntegratorKind::Path)
+    }
+
     /// Whether rays at spheres split into reflected and refracted ones; `render.min_weight` has no effect otherwise.
     fn branches_at_spheres(&self) -> bool {
-        self.surface.kind == SurfaceKind::Spheres && self.material.constants.branches()
+        self.surface.kind == SurfaceKind::Spheres
+            && self.material.resolved(Fresnel::Schlick).branches()
     }
 
     /// Whether images of this manifest depend on keys with this `affects`.
@@ -242,6 +293,7 @@ impl Manifest {
             Affects::SmoothSurfaces => self.surface.kind == SurfaceKind::Smooth,
             Affects::Bodies => self.surface.kind != SurfaceKind::Spheres,
             Affects::BranchingSpheres => self.branches_at_spheres(),
+            Affects::PathTracing => self.integrator() == IntegratorKind::Path,
         }
     }
 
@@ -261,7 +313,7 @@ impl Manifest {
         };
         Err(ManifestError {
             lines: vec![format!(
-                "output.path: {} for {count}: {NEEDS_NUMBER}, or choose one frame with --frames",
+                "output.path: {} for {count}: {NEEDS_NUMBER}, or select one frame (input.frames)",
                 self.output.path
             )],
         })
@@ -287,6 +339,7 @@ impl Manifest {
         for (list, comment, is_empty) in [
             ("camera.key", NO_KEYS, self.camera.keys.is_empty()),
             ("light", AUTO_LIGHTS, self.lights.is_empty()),
+            ("mesh", NO_MESHES, self.meshes.is_empty()),
         ] {
             if is_empty {
                 let _ = write!(text, "\n# {comment}\n{}", examples.commented_out(list));
@@ -307,23 +360,25 @@ impl Manifest {
     fn examples() -> Self {
         let mut manifest = Self::new("");
         manifest.camera.keys = vec![CameraKey::default()];
-        manifest.lights = Light::examples().to_vec();
+        manifest.lights = Light::examples();
+        manifest.meshes = vec![Mesh::default()];
         manifest
     }
 }
 
 /// Description of a manifest.
-const ABOUT: &str =
-    "A spherule job. Paths are relative to this file; lengths are those of the simulation.";
+const ABOUT: &str = "A spherule job. Paths are relative to this file; lengths are in the unit of the particle files.";
 
 const NEEDS_NUMBER: &str =
-    "several frames would get the same name; put #### into it, as in frame.####.exr";
+    "several frames would get the same name; put #### into the name (example: frame.####.exr)";
 
 const NO_KEYS: &str = "In mode \"keys\" the camera moves smoothly through these views, and stands still before the \
                        first and after the last.";
 
-const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill are placed by the camera. A directional light has \
-                           a direction instead of position and falloff.";
+const AUTO_LIGHTS: &str = "Without [[light]], a key light and a soft fill light are placed relative to the camera. A \
+                           directional light has a direction instead of position and falloff.";
+
+const NO_MESHES: &str = "Tanks, obstacles and other bodies that are not particles.";
 
 /// All keys that are not in lists.
 fn known_keys() -> Vec<String> {

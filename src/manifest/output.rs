@@ -2,54 +2,55 @@
 
 use serde_json::{Value as Json, json};
 
-use super::key::{Key, section};
+use super::channel::{Channel, NamedChannel};
+use super::field::Field;
+use super::key::Key;
+use super::keys::section;
 use super::pattern::OutputPattern;
-use super::reader::Field;
 use super::value::{Fault, Value, named, quoted};
 use crate::output::Compression;
-
-named! {
-    /// Channels of an image.
-    Channel {
-        /// Colour and coverage, premultiplied.
-        Rgba = "RGBA",
-        /// Distance along the view axis.
-        Z = "Z",
-        /// Normal.
-        N = "N",
-        /// Particle id.
-        Id = "id",
-        /// Position in the world.
-        P = "P",
-        /// Velocity.
-        V = "V",
-        /// Base colour, before lighting.
-        Albedo = "albedo",
-    }
-}
+use crate::render::layers::Mattes;
 
 named!(Compression: None = "none", Rle = "rle", Zip = "zip", Zips = "zips", Piz = "piz");
+
+/// Default channels.
+const DEFAULT_CHANNELS: [NamedChannel; 4] = [
+    NamedChannel::Rgba,
+    NamedChannel::Z,
+    NamedChannel::N,
+    NamedChannel::Id,
+];
 
 /// Default names of images.
 const DEFAULT_PATH: &str = "out/frame.####.exr";
 
 section! {
-    /// Which images are written, and what is in them
+    /// Images to write, and their channels
     Output {
         /// Images to write; #### or %04d is the frame number, with at least that many digits
         path: OutputPattern = OutputPattern::parse(DEFAULT_PATH).expect("a good pattern"),
             flag("output", "PATTERN", "Output");
-        /// Channels of the images: RGBA,Z,N,id,P,V,albedo
-        channels: Vec<Channel> = vec![Channel::Rgba, Channel::Z, Channel::N, Channel::Id],
+        /// Channels of the images: RGBA,Z,N,id,P,V,albedo,lights,shadow,motion,cryptomatte,attribute:NAME
+        ///
+        /// RGBA is always included. `lights` stands for the light channels diffuse, specular, reflection, refraction,
+        /// emission and background, whose sum is `noisy`, the colour before denoising. `cryptomatte` stands for
+        /// crypto_particle, crypto_material and crypto_part. `attribute:density` is the attribute `density`.
+        channels: Vec<Channel> = DEFAULT_CHANNELS.map(Channel::Named).to_vec(),
             example("[\"RGBA\", \"Z\"]"), flag("channels", "LIST", "Output");
+        /// Maximum number of objects in a pixel of each Cryptomatte layer, rounded up to an even number
+        cryptomatte_levels: u32 = u32::from(Mattes::DEFAULT_LEVELS), from(2), to(Mattes::MAX_LEVELS);
         /// Lossless compression of the EXR: none | rle | zip | zips | piz
         compression: Compression = Compression::Zip;
-        /// A PNG beside each image
+        /// Write a PNG next to each image
         preview: bool = true;
-        /// Exposure of the PNG in stops
+        /// Exposure of the PNG, stops
         preview_exposure: f32 = 0.0, from(-100), to(100), unit("stops");
-        /// No background in the EXR, for compositing; previews show it
+        /// Omit the background from the EXR, for compositing; previews show it
         transparent: bool = false;
+        /// Time from one frame to the next, for the channel motion
+        ///
+        /// In the unit of time of the velocities. By default, it comes from the times in the files, or is 1 / fps.
+        frame_time: Option<f64> = None, above(0), example("0.04"), unset("from the files, or 1 / fps");
         /// Frames per second, stored in the images
         fps: Option<f64> = None, above(0), example("24.0"), unset("not stored");
     }

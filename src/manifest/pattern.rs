@@ -1,15 +1,16 @@
-//! Name patterns of images, such as `out/frame.####.exr` or `out/frame.%04d.exr`, and the resulting paths.
+//! Names with a frame number, such as `out/frame.####.exr` or `out/frame.%04d.exr`, and the resulting paths.
 
 use std::fmt;
+use std::ops::Deref;
 use std::path::{Path, PathBuf};
 
 /// Maximum number of digits in a pattern; frame numbers have at most 19.
 const MAX_DIGITS: usize = 32;
 
-/// An output path with a placeholder for the frame number. The length in `#` (or `%0Nd`) is the minimum number of
+/// A path with an optional placeholder for the frame number. The length in `#` (or `%0Nd`) is the minimum number of
 /// digits; larger numbers use more.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct OutputPattern {
+pub struct FramePattern {
     text: String,
     /// Directory and start of the name, up to the number.
     before: String,
@@ -18,20 +19,13 @@ pub struct OutputPattern {
     digits: Option<usize>,
 }
 
-impl OutputPattern {
-    /// Parses a pattern for EXR files.
+impl FramePattern {
+    /// Parses a pattern. Messages show `example`.
     ///
     /// # Errors
-    /// It does not end in `.exr`, does not name a file, has a number in the name of a directory or several numbers,
-    /// an unknown `%`, or a number with too many digits.
-    pub fn parse(text: &str) -> Result<Self, String> {
-        // Check the extension
-        let is_exr = Path::new(text)
-            .extension()
-            .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
-        if !is_exr {
-            return Err("must end in .exr, as in out/frame.####.exr".to_owned());
-        }
+    /// It has a number in the name of a directory or several numbers, an unknown `%`, or a number with too many
+    /// digits.
+    pub fn parse(text: &str, example: &str) -> Result<Self, String> {
         // Find the number in the file name
         let name_at = text.rfind(std::path::is_separator).map_or(0, |i| i + 1);
         let (dir, name) = text.split_at(name_at);
@@ -49,7 +43,9 @@ impl OutputPattern {
         // Reject a second number
         let after = &name[end..];
         if find_number(after)?.is_some() {
-            return Err("has room for two numbers; one is wanted, as in frame.####.exr".into());
+            return Err(format!(
+                "has places for two numbers; use one (example: {example})"
+            ));
         }
         Ok(Self {
             text: text.to_owned(),
@@ -83,7 +79,7 @@ impl OutputPattern {
         &self.text[name_at..]
     }
 
-    /// The path of the image of `frame`. A negative number has its sign before the padded digits.
+    /// The path for `frame`. A negative number has its sign before the padded digits.
     pub fn path_for(&self, frame: i64) -> PathBuf {
         let Some(digits) = self.digits else {
             return PathBuf::from(&self.text);
@@ -95,6 +91,26 @@ impl OutputPattern {
             self.before, self.after
         ))
     }
+}
+
+/// The [`FramePattern`] of images.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct OutputPattern(FramePattern);
+
+impl OutputPattern {
+    /// Parses a pattern for EXR files.
+    ///
+    /// # Errors
+    /// It does not end in `.exr` or does not name a file, and those of [`FramePattern::parse`].
+    pub fn parse(text: &str) -> Result<Self, String> {
+        let is_exr = Path::new(text)
+            .extension()
+            .is_some_and(|e| e.eq_ignore_ascii_case("exr"));
+        if !is_exr {
+            return Err("must end in .exr (example: out/frame.####.exr)".to_owned());
+        }
+        FramePattern::parse(text, "frame.####.exr").map(Self)
+    }
 
     /// The path of the preview of `frame`: that of the image with `.png`.
     pub fn preview_path_for(&self, frame: i64) -> PathBuf {
@@ -102,9 +118,17 @@ impl OutputPattern {
     }
 }
 
+impl Deref for OutputPattern {
+    type Target = FramePattern;
+
+    fn deref(&self) -> &FramePattern {
+        &self.0
+    }
+}
+
 impl fmt::Display for OutputPattern {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.text)
+        f.write_str(self.as_str())
     }
 }
 
@@ -118,7 +142,7 @@ fn find_number(text: &str) -> Result<Option<(usize, usize, usize)>, String> {
         let digits = rest.bytes().take_while(|b| *b == b'#').count();
         return Ok(Some((start, start + digits, at_most(digits)?)));
     }
-    let unknown = || format!("`{rest}` is no frame number; use #### or %04d");
+    let unknown = || format!("invalid frame number `{rest}`; use #### or %04d");
     let width = rest[1..].find('d').ok_or_else(unknown)?;
     let digits = match &rest[1..=width] {
         "" => 1,
@@ -146,9 +170,9 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn path(pattern: &str, frame: i64, wanted: &str) {
+    fn path(pattern: &str, frame: i64, expected: &str) {
         let pattern = OutputPattern::parse(pattern).unwrap();
-        assert_eq!(pattern.path_for(frame), Path::new(wanted));
+        assert_eq!(pattern.path_for(frame), Path::new(expected));
     }
 
     #[test]
@@ -194,7 +218,7 @@ mod tests {
     }
 
     #[test]
-    fn refusals() {
+    fn rejected_patterns() {
         refused("", ".exr");
         refused("out/", ".exr");
         refused("out/.exr", ".exr");

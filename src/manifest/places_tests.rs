@@ -1,24 +1,24 @@
-//! That whatever is wrong with a manifest is told with line, column and the nearest known key.
+//! Messages about invalid manifests: each names line, column and the nearest known key.
 
 use std::path::Path;
 
 use super::*;
 
-/// `text` must give exactly one message, which is `wanted` after the file's name.
+/// Checks that `text` gives exactly one message: the file's name, followed by `expected`.
 #[track_caller]
-fn told(text: &str, wanted: &str) {
+fn fails_with(text: &str, expected: &str) {
     let error = Manifest::parse(text, Path::new("job.toml")).unwrap_err();
-    assert_eq!(error.messages(), [format!("job.toml: {wanted}")]);
+    assert_eq!(error.messages(), [format!("job.toml: {expected}")]);
 }
 
-/// The same for what follows a good beginning of two lines.
+/// Same as [`fails_with`], with two valid lines in front of `text`.
 #[track_caller]
-fn told_below(text: &str, wanted: &str) {
-    told(&format!("[input]\npath = \"ä\"\n{text}"), wanted);
+fn fails_below(text: &str, expected: &str) {
+    fails_with(&format!("[input]\npath = \"ä\"\n{text}"), expected);
 }
 
 #[test]
-fn an_old_word_is_read_with_a_warning() {
+fn obsolete_value_is_accepted_with_a_warning() {
     let text = "input.path = \"a\"\n[render]\nsurface = \"medium\"";
     let read = |text| Manifest::parse_with_warnings(text, Path::new("job.toml"), Vec::new());
     let (manifest, warnings) = read(text).unwrap();
@@ -76,7 +76,7 @@ fn keys_in_tables() {
             "job.threads",
         ),
     ] {
-        told_below(
+        fails_below(
             text,
             &format!("{place}: {key}: unknown key; did you mean `{nearest}`?"),
         );
@@ -84,12 +84,12 @@ fn keys_in_tables() {
 }
 
 #[test]
-fn keys_below_the_wrong_table() {
-    told_below(
+fn keys_in_the_wrong_table() {
+    fails_below(
         "samples = 4",
         "line 3, column 1: input.samples: unknown key here; did you mean `image.samples`?",
     );
-    told_below(
+    fails_below(
         "[output]\nthreads = 4",
         "line 4, column 1: output.threads: unknown key here; did you mean `job.threads`?",
     );
@@ -97,19 +97,19 @@ fn keys_below_the_wrong_table() {
 
 #[test]
 fn keys_in_items_of_lists() {
-    told_below(
+    fails_below(
         "[[light]]\ntype = \"point\"\nposition = [0, 0, 1]\nintesity = 2",
         "line 6, column 1: light.0.intesity: unknown key; did you mean `light.0.intensity`?",
     );
-    told_below(
+    fails_below(
         "[[light]]\ntype = \"point\"\nposition = [0, 0, 1]\n[[light]]\ntype = \"directional\"\ndirectoin = [0, 0, 1]\ndirection = [0, 0, 1]",
         "line 8, column 1: light.1.directoin: unknown key; did you mean `light.1.direction`?",
     );
-    told_below(
+    fails_below(
         "[[camera.key]]\nframe = 1\neye = [1, 0, 0]\nlook_at = [0, 0, 0]\nfow = 30",
         "line 7, column 1: camera.key.0.fow: unknown key; did you mean `camera.key.0.fov`?",
     );
-    told_below(
+    fails_below(
         "[[camera.key]]\nframe = 1\neye = [1, 0, 0]\nlookat = [0, 0, 0]\nlook_at = [0, 0, 0]",
         "line 6, column 1: camera.key.0.lookat: unknown key; did you mean `camera.key.0.look_at`?",
     );
@@ -117,27 +117,27 @@ fn keys_in_items_of_lists() {
 
 #[test]
 fn keys_in_inline_tables() {
-    told(
+    fails_with(
         "input = { path = \"ä\", raduis = 3 }",
         "line 1, column 23: input.raduis: unknown key; did you mean `input.radius`?",
     );
-    told(
+    fails_with(
         "input = { path = \"ä\", radius = { attribute = \"h\", scael = 3 } }",
         "line 1, column 51: input.radius.scael: unknown key; did you mean `input.radius.scale`?",
     );
-    told_below(
+    fails_below(
         "[render]\nbackground = { bottom = [0, 0, 0], top = [1, 1, 1], botom = 3 }",
         "line 4, column 53: render.background.botom: unknown key; did you mean `render.background.bottom`?",
     );
-    told_below(
+    fails_below(
         "[material.color]\nattribute = \"v\"\nrnage = [0, 1]",
         "line 5, column 1: material.color.rnage: unknown key; did you mean `material.color.range`?",
     );
-    told(
+    fails_with(
         "input.path = \"a\"\nlight = [{ type = \"point\", position = [0, 0, 1], colour = [1, 1, 1] }]",
         "line 2, column 50: light.0.colour: unknown key; did you mean `light.0.color`?",
     );
-    told(
+    fails_with(
         "input.path = \"a\"\ncamera.key = [{ frame = 1, eye = [1, 0, 0], look_at = [0, 0, 0], fvo = 3 }]",
         "line 2, column 66: camera.key.0.fvo: unknown key; did you mean `camera.key.0.fov`?",
     );
@@ -145,15 +145,15 @@ fn keys_in_inline_tables() {
 
 #[test]
 fn values_in_every_kind_of_table() {
-    told_below(
+    fails_below(
         "[job]\nsettle = \"soon\"",
-        "line 4, column 10: job.settle: wants seconds from 0 to 1e9, not the text \"soon\"",
+        "line 4, column 10: job.settle: expected seconds from 0 to 1e9, found the text \"soon\"",
     );
-    told_below(
+    fails_below(
         "[[light]]\ntype = \"spot\"",
-        "line 4, column 8: light.0.type: wants one of point, directional, not the text \"spot\"",
+        "line 4, column 8: light.0.type: expected one of point, directional, sun, sphere, rect, disc, found the text \"spot\"",
     );
-    told(
+    fails_with(
         "input.path = \"a\"\nmaterial.color = { attribute = \"v\", map = \"trubo\" }",
         "line 2, column 43: material.color.map: unknown colour map `trubo`; choose one of viridis, turbo, \
          plasma, inferno, magma, cividis, red-blue, greys; did you mean turbo?",
@@ -161,7 +161,7 @@ fn values_in_every_kind_of_table() {
 }
 
 #[test]
-fn what_is_no_toml() {
+fn invalid_toml() {
     for (text, place) in [
         ("[job", "line 3, column 5"),
         ("[job]\nthreads = ", "line 4, column 11"),
@@ -179,9 +179,9 @@ fn what_is_no_toml() {
         let text = format!("[input]\npath = \"ä\"\n{text}");
         let error = Manifest::parse(&text, Path::new("job.toml")).unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
-        let wanted = format!("job.toml: {place}: ");
+        let expected = format!("job.toml: {place}: ");
         assert!(
-            error.to_string().starts_with(&wanted),
+            error.to_string().starts_with(&expected),
             "{error}, not {place}"
         );
     }

@@ -1,25 +1,37 @@
 //! Looks: named sets of defaults, which values in a manifest and options override.
 
+use spherule_formats::ValueError;
 use toml::Value;
 
-use super::{Override, nearest};
+use super::Override;
+use super::nearest::nearest;
 
 /// A look, see the module.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Look {
-    /// Clear water on a checkerboard, under a sky.
+    /// Clear water on sand, under a clear sky.
     Water,
+    /// Matte particles in a photo studio, with path tracing.
+    Studio,
+    /// The same in front of white, for print.
+    Paper,
+    /// The model of the thesis: lights without extent, ambient light and highlights.
+    Whitted,
 }
 
-/// Water: one body with a smooth surface. It has no diffuse reflection, so its colour comes from absorption, and its
-/// reflections from the sky. Tuned by eye on dam breaks.
+/// Water: one body with a smooth surface. Its colour comes from absorption, and its reflections from the sky; the sun
+/// makes caustics on the ground. The terms of the thesis's model and the background are for `integrator = "whitted"`.
+/// Tuned by eye on dam breaks.
 const WATER: &str = r#"
+render.integrator = "path"
 render.surface = "smooth"
 render.max_depth = 8
 render.background = { bottom = [0.75, 0.80, 0.86], top = [0.30, 0.52, 0.92] }
 render.ground = true
-render.ground_color = [0.46, 0.44, 0.41]
-render.ground_pattern = "checker"
+render.ground_color = [0.36, 0.33, 0.28]
+render.ground_pattern = "sand"
+environment.type = "sky"
+environment.visible = true
 material.color = [0.6, 0.85, 0.9]
 material.ambient = 0.0
 material.diffuse = 0.0
@@ -31,33 +43,56 @@ material.transmission = 1.0
 material.absorption = [0.42, 0.78, 0.86]
 "#;
 
+/// A photo studio, whose light is the default environment.
+const STUDIO: &str = r#"
+render.integrator = "path"
+render.ground = "shadow_catcher"
+render.background = "studio"
+"#;
+
+/// White paper in the light of a studio.
+const PAPER: &str = r#"
+render.integrator = "path"
+render.ground = "shadow_catcher"
+render.background = [1.0, 1.0, 1.0]
+"#;
+
+/// The thesis's equation 4.1, without a ground.
+const WHITTED: &str = r#"
+render.integrator = "whitted"
+render.ground = false
+"#;
+
 impl Look {
     /// All looks with their names.
-    pub const ALL: &[(Self, &'static str)] = &[(Self::Water, "water")];
+    pub const ALL: &[(Self, &'static str)] = &[
+        (Self::Water, "water"),
+        (Self::Studio, "studio"),
+        (Self::Paper, "paper"),
+        (Self::Whitted, "whitted"),
+    ];
 
     /// The look with a name.
     ///
     /// # Errors
     /// The name is unknown; lists the known ones.
-    pub fn named(name: &str) -> Result<Self, String> {
+    pub fn named(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.iter().find(|(_, known)| *known == name);
         found.map(|(look, _)| *look).ok_or_else(|| {
             let known: Vec<&str> = Self::ALL.iter().map(|(_, known)| *known).collect();
-            let hint = nearest(name, &known).map(|n| format!("; did you mean {n}?"));
-            format!(
-                "--look {name}: there is no such look, known are: {}{}",
-                known.join(", "),
-                hint.unwrap_or_default()
-            )
+            ValueError::one_of(&known, name).with_similar(nearest(name, &known))
         })
     }
 
-    /// Its defaults.
-    pub fn settings(self) -> Vec<Override> {
-        let (text, shown) = match self {
-            Self::Water => (WATER, "--look water"),
+    /// Its defaults. `shown` is the name of their origin in messages: the option that selected the look.
+    pub fn settings(self, shown: &str) -> Vec<Override> {
+        let text = match self {
+            Self::Water => WATER,
+            Self::Studio => STUDIO,
+            Self::Paper => PAPER,
+            Self::Whitted => WHITTED,
         };
-        let sections: toml::Table = text.parse().expect("a look of our own is TOML");
+        let sections: toml::Table = text.parse().expect("built-in looks are valid TOML");
         let key = |(section, keys): (String, Value)| match keys {
             Value::Table(keys) => keys
                 .into_iter()
@@ -80,13 +115,18 @@ mod tests {
     use glam::Vec3;
 
     use super::*;
-    use crate::manifest::{GroundPattern, Manifest};
+    use crate::manifest::{GroundKind, GroundPattern, GroundSetting, Manifest};
+    use crate::render::IntegratorKind;
     use crate::scene::Background;
     use crate::surface::SurfaceKind;
 
     fn water(text: &str, sets: &[&str]) -> Manifest {
         let sets = sets.iter().map(|set| Override::parse(set).unwrap());
-        let all = Look::Water.settings().into_iter().chain(sets).collect();
+        let all = Look::Water
+            .settings("--look water")
+            .into_iter()
+            .chain(sets)
+            .collect();
         Manifest::parse_with(text, Path::new("job.toml"), all).unwrap()
     }
 
@@ -96,24 +136,53 @@ mod tests {
             assert_eq!(Look::named(name).unwrap(), *look);
             let text = "input.path = \"data\"";
             let manifest =
-                Manifest::parse_with(text, Path::new("job.toml"), look.settings()).unwrap();
+                Manifest::parse_with(text, Path::new("job.toml"), look.settings("--look water"))
+                    .unwrap();
             let shown = manifest.to_commented_toml();
             assert_eq!(Manifest::parse(&shown, Path::new("x")).unwrap(), manifest);
         }
     }
 
     #[test]
-    fn water_is_one_clear_body_on_a_floor() {
+    fn water_preset_is_a_transparent_union_on_a_ground() {
         let plain = water("input.path = \"data\"", &[]);
         assert_eq!(plain.surface.kind, SurfaceKind::Smooth);
         assert_eq!(plain.render.max_depth, 8);
-        assert_eq!(plain.render.ground_pattern, GroundPattern::Checker);
+        assert_eq!(plain.render.ground_pattern, GroundPattern::Sand);
         assert_eq!(plain.material.constants.transmission, 1.0);
-        assert!(plain.render.ground && plain.material.absorption[0] < 1.0);
+        assert!(
+            plain.render.ground == Some(GroundSetting(GroundKind::Plain))
+                && plain.material.absorption[0] < 1.0
+        );
     }
 
     #[test]
-    fn what_is_said_goes_before_a_look() {
+    fn studio_and_paper_trace_paths_above_a_shadow_catcher() {
+        let look = |look: Look, text: &str| {
+            let text = format!("input.path = \"data\"\n{text}");
+            Manifest::parse_with(&text, Path::new("job.toml"), look.settings("--look")).unwrap()
+        };
+        for (name, background) in [
+            (Look::Studio, Background::Studio { up: Vec3::Z }),
+            (Look::Paper, Background::Constant(Vec3::ONE)),
+        ] {
+            let plain = look(name, "").render;
+            assert_eq!(plain.integrator, Some(IntegratorKind::Path));
+            assert_eq!(plain.ground, Some(GroundSetting(GroundKind::ShadowCatcher)));
+            assert_eq!(plain.background, Some(background));
+            // A source of light of the manifest's own
+            look(name, "environment.image = \"hall.exr\"");
+        }
+        let own = look(
+            Look::Studio,
+            "render.integrator = \"whitted\"\nrender.ground = false",
+        );
+        assert_eq!(own.integrator(), IntegratorKind::Whitted);
+        assert_eq!(own.render.ground, Some(GroundSetting(GroundKind::None)));
+    }
+
+    #[test]
+    fn explicit_settings_override_a_look() {
         let text = "input.path = \"data\"\n[render]\nmax_depth = 5\nground_tile = 2\n[material]\nabsorption = [1, 1, 1]";
         let mixed = water(
             text,
@@ -124,22 +193,26 @@ mod tests {
         assert_eq!(mixed.material.absorption, Vec3::ONE);
         assert_eq!(mixed.surface.kind, SurfaceKind::Spheres);
         assert_eq!(mixed.render.background, Some(Background::Constant(Vec3::X)));
-        assert!(mixed.render.ground);
-        // What is wrong there is told once, by its own place.
+        assert_eq!(mixed.render.ground, Some(GroundSetting(GroundKind::Plain)));
+        // An error in the file is reported once, with its position.
         let wrong = "input.path = \"data\"\nrender = 3";
-        let error = Manifest::parse_with(wrong, Path::new("job.toml"), Look::Water.settings());
+        let error = Manifest::parse_with(
+            wrong,
+            Path::new("job.toml"),
+            Look::Water.settings("--look water"),
+        );
         let error = error.unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
         assert!(error.to_string().contains("line 2"), "{error}");
     }
 
     #[test]
-    fn an_unknown_look_names_the_known() {
+    fn unknown_look_lists_the_known_ones() {
         let error = Look::named("watre").unwrap_err();
-        assert!(
-            error.contains("known are: water; did you mean water?"),
-            "{error}"
+        assert_eq!(
+            error.to_string(),
+            "expected one of water, studio, paper, whitted, found \"watre\"; did you mean water?"
         );
-        assert!(!Look::named("lava").unwrap_err().contains("did you mean"));
+        assert_eq!(Look::named("lava").unwrap_err().similar, None);
     }
 }

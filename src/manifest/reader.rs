@@ -1,70 +1,34 @@
-//! Reads typed values from a [`Node`] tree and collects all problems with location and key, so that one run is enough
+//! Reads typed values from a [`TomlNode`] tree and collects all problems with location and key, so that one run is enough
 //! to fix a manifest.
 
-use std::cell::RefCell;
-
+use super::field::Field;
 use super::key::Key;
-use super::tree::{Kind, Node, Place};
-use super::value::{Fault, Slot, Value};
-
-/// An error in a manifest, or a warning.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Problem {
-    pub(super) place: Place,
-    /// The dotted key; empty for the file as a whole.
-    pub(super) key: String,
-    pub(super) what: String,
-}
-
-/// All problems found so far.
-#[derive(Debug, Default)]
-pub(super) struct Problems {
-    pub(super) errors: RefCell<Vec<Problem>>,
-    pub(super) warnings: RefCell<Vec<Problem>>,
-}
-
-impl Problems {
-    fn note(&self, place: &Place, key: &str, what: &str) {
-        push(&self.errors, place, key, what);
-    }
-}
-
-fn push(list: &RefCell<Vec<Problem>>, place: &Place, key: &str, what: &str) {
-    list.borrow_mut().push(Problem {
-        place: place.clone(),
-        key: key.to_owned(),
-        what: what.to_owned(),
-    });
-}
+use super::nearest::nearest;
+use super::problem::{Place, Problems};
+use super::tree::{Kind, TomlNode};
+use super::value::Slot;
 
 /// A table that is being read. Keys that have not been read before [`Section::finish`] are unknown.
 pub(super) struct Section<'a> {
     path: String,
-    node: Option<&'a Node>,
-    asked: Vec<&'static str>,
+    node: Option<&'a TomlNode>,
+    known: Vec<&'static str>,
     problems: &'a Problems,
     /// Number of errors before the first key was read.
     errors_before: usize,
     is_closed: bool,
 }
 
-/// A value that is present.
-pub(super) struct Field<'a> {
-    key: String,
-    node: &'a Node,
-    problems: &'a Problems,
-}
-
 impl<'a> Section<'a> {
-    pub(super) fn root(node: &'a Node, problems: &'a Problems) -> Self {
+    pub(super) fn root(node: &'a TomlNode, problems: &'a Problems) -> Self {
         Self::new(String::new(), Some(node), problems)
     }
 
-    fn new(path: String, node: Option<&'a Node>, problems: &'a Problems) -> Self {
+    fn new(path: String, node: Option<&'a TomlNode>, problems: &'a Problems) -> Self {
         Self {
             path,
             node,
-            asked: Vec::new(),
+            known: Vec::new(),
             problems,
             errors_before: problems.errors.borrow().len(),
             is_closed: false,
@@ -81,7 +45,7 @@ impl<'a> Section<'a> {
 
     /// The value of `key`, if it is present.
     pub(super) fn get(&mut self, key: &'static str) -> Option<Field<'a>> {
-        self.asked.push(key);
+        self.known.push(key);
         let Some(Kind::Table(table)) = self.node.map(|n| &n.kind) else {
             return None;
         };
@@ -110,13 +74,8 @@ impl<'a> Section<'a> {
         let old = key.renamed.filter(|[old, _]| field.as_text() == Some(old));
         let renamed = old.map(|[old, new]| {
             let what = format!("\"{old}\" is now called \"{new}\"; the old name still works");
-            push(
-                &self.problems.warnings,
-                &field.node.place,
-                &field.key,
-                &what,
-            );
-            Node {
+            self.problems.warn(&field.node.place, &field.key, &what);
+            TomlNode {
                 kind: Kind::Text(new.to_owned()),
                 place: field.node.place.clone(),
             }
@@ -141,7 +100,7 @@ impl<'a> Section<'a> {
         };
         let items = field.items().unwrap_or_else(|| {
             field.fail(&format!(
-                "wants a list of tables, as [[{}]] begins, not {}",
+                "expected a list of tables, such as [[{}]] begins, found {}",
                 field.key,
                 field.node.describe()
             ));
@@ -202,17 +161,17 @@ impl<'a> Section<'a> {
             return;
         };
         for (key, (place, _)) in table {
-            if self.asked.contains(&key.as_str()) {
+            if self.known.contains(&key.as_str()) {
                 continue;
             }
             if self.problems.errors.borrow().len() > super::MOST_SHOWN {
                 break;
             }
-            let what = match nearest(key, &self.asked) {
+            let what = match nearest(key, &self.known) {
                 Some(known) => format!("unknown key; did you mean `{}`?", self.full_key(known)),
                 None => match elsewhere(key, &self.path) {
                     Some(known) => format!("unknown key here; did you mean `{known}`?"),
-                    None => format!("unknown key; known here: {}", self.asked.join(", ")),
+                    None => format!("unknown key; known here: {}", self.known.join(", ")),
                 },
             };
             self.problem(place.clone(), key, &what);
@@ -221,79 +180,6 @@ impl<'a> Section<'a> {
 }
 
 impl<'a> Field<'a> {
-    /// The value; reports a problem and returns None if it is invalid.
-    pub(super) fn value<T: Value>(&self, key: &Key) -> Option<T> {
-        let what = match T::parse(self, key) {
-            Ok(value) => return Some(value),
-            Err(Fault::Noted) => return None,
-            Err(Fault::Because(what)) => what,
-            Err(Fault::Unwanted) => {
-                let text = self.as_text().unwrap_or_default();
-                let hint = nearest(text, &T::words()).map(|n| format!("; did you mean {n}?"));
-                let (wants, hint) = (key.wants::<T>(), hint.unwrap_or_default());
-                format!("wants {wants}, not {}{hint}", self.node.describe())
-            }
-        };
-        self.fail(&what);
-        None
-    }
-
-    /// Reports that the value is invalid.
-    pub(super) fn fail(&self, what: &str) {
-        self.problems.note(&self.node.place, &self.key, what);
-    }
-
-    pub(super) fn as_text(&self) -> Option<&'a str> {
-        match &self.node.kind {
-            Kind::Text(text) => Some(text),
-            _ => None,
-        }
-    }
-
-    pub(super) const fn as_integer(&self) -> Option<i64> {
-        match self.node.kind {
-            Kind::Integer(i) => Some(i),
-            _ => None,
-        }
-    }
-
-    pub(super) const fn as_bool(&self) -> Option<bool> {
-        match self.node.kind {
-            Kind::Bool(b) => Some(b),
-            _ => None,
-        }
-    }
-
-    /// A finite number; integers need no decimal point.
-    pub(super) fn as_number(&self) -> Option<f64> {
-        match self.node.kind {
-            #[expect(clippy::cast_precision_loss, reason = "what the user means by it")]
-            Kind::Integer(i) => Some(i as f64),
-            Kind::Float(f) if f.is_finite() => Some(f),
-            _ => None,
-        }
-    }
-
-    /// A list of `N` finite numbers.
-    pub(super) fn as_numbers<const N: usize>(&self) -> Option<[f64; N]> {
-        let numbers: Vec<f64> = self.items()?.iter().filter_map(Self::as_number).collect();
-        let all = numbers.len() == self.items()?.len();
-        numbers.try_into().ok().filter(|_| all)
-    }
-
-    /// The items of a list.
-    pub(super) fn items(&self) -> Option<Vec<Self>> {
-        let Kind::Array(items) = &self.node.kind else {
-            return None;
-        };
-        let item = |(index, node)| Self {
-            key: format!("{}.{index}", self.key),
-            node,
-            problems: self.problems,
-        };
-        Some(items.iter().enumerate().map(item).collect())
-    }
-
     /// The value as a table.
     pub(super) fn as_table(&self) -> Option<Section<'a>> {
         let is_table = matches!(self.node.kind, Kind::Table(_));
@@ -303,27 +189,10 @@ impl<'a> Field<'a> {
     fn section(&self) -> Option<Section<'a>> {
         let table = self.as_table();
         if table.is_none() {
-            self.fail(&format!("wants a table, not {}", self.node.describe()));
+            self.fail(&format!("expected a table, found {}", self.node.describe()));
         }
         table
     }
-}
-
-#[expect(
-    clippy::cast_possible_truncation,
-    reason = "callers check that it is finite"
-)]
-pub(super) const fn narrow(value: f64) -> f32 {
-    value as f32
-}
-
-/// The known word that was probably meant, if one is similar enough.
-pub(crate) fn nearest<'k>(word: &str, known: &[&'k str]) -> Option<&'k str> {
-    let distance = |k: &str| strsim::damerau_levenshtein(&word.to_lowercase(), &k.to_lowercase());
-    let best = known.iter().min_by_key(|k| distance(k))?;
-    let is_part = word.len() >= 4 && best.contains(word) || best.len() >= 4 && word.contains(*best);
-    let limit = (word.chars().count().max(best.chars().count()) / 3).max(1);
-    (is_part || distance(best) <= limit).then_some(*best)
 }
 
 /// The same key in another section that has it: `samples` belongs to `image`.

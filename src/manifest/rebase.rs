@@ -2,7 +2,40 @@
 
 use std::path::{Component, Path, PathBuf};
 
-use super::{Manifest, OutputPattern};
+use super::{Manifest, MeshPath, OutputPattern};
+
+/// Why the paths of a manifest cannot be made relative to another directory.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+pub enum RebaseError {
+    /// A directory is not absolute.
+    #[error("{}: an absolute directory is needed", dir.display())]
+    NotAbsolute {
+        /// The directory.
+        dir: PathBuf,
+    },
+    /// A path is not UTF-8, as a manifest is.
+    #[error("{}: the path is not UTF-8", path.display())]
+    NotUtf8 {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The output is not a pattern for images, because of the name of its directory.
+    #[error("{path}: {reason}")]
+    Output {
+        /// The output.
+        path: String,
+        /// Why.
+        reason: String,
+    },
+    /// A mesh is not a pattern, because of the name of its directory.
+    #[error("{path}: {reason}")]
+    Mesh {
+        /// The mesh.
+        path: String,
+        /// Why.
+        reason: String,
+    },
+}
 
 impl Manifest {
     /// Converts relative paths from the base `from` to the base `to`; both must be absolute. Absolute paths do not
@@ -10,20 +43,30 @@ impl Manifest {
     ///
     /// # Errors
     /// A directory that would appear in a path is not UTF-8, or `from` or `to` is not absolute.
-    pub fn rebase(&mut self, from: &Path, to: &Path) -> Result<(), String> {
+    pub fn rebase(&mut self, from: &Path, to: &Path) -> Result<(), RebaseError> {
         for dir in [from, to] {
             if !dir.is_absolute() {
-                return Err(format!(
-                    "{}: an absolute directory is needed",
-                    dir.display()
-                ));
+                return Err(RebaseError::NotAbsolute {
+                    dir: dir.to_owned(),
+                });
             }
         }
         for path in self.input.path.iter_mut() {
             *path = rebased(path, from, to)?;
         }
         let output = rebased(self.output.path.as_str(), from, to)?;
-        self.output.path = OutputPattern::parse(&output)?;
+        self.output.path = OutputPattern::parse(&output).map_err(|reason| RebaseError::Output {
+            path: output,
+            reason,
+        })?;
+        if let Some(path) = &mut self.environment.image {
+            *path = rebased(path, from, to)?;
+        }
+        for mesh in &mut self.meshes {
+            let path = rebased(mesh.path.as_str(), from, to)?;
+            mesh.path =
+                MeshPath::parse(&path).map_err(|reason| RebaseError::Mesh { path, reason })?;
+        }
         if let Some(path) = &mut self.job.stop_file {
             *path = rebased(path, from, to)?;
         }
@@ -31,7 +74,7 @@ impl Manifest {
     }
 }
 
-fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
+fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, RebaseError> {
     if Path::new(path).is_absolute() {
         return Ok(path.to_owned());
     }
@@ -46,7 +89,7 @@ fn rebased(path: &str, from: &Path, to: &Path) -> Result<String, String> {
 }
 
 /// `target` relative to `base`, both absolute and without `..`.
-fn relative(target: &Path, base: &Path) -> Result<String, String> {
+fn relative(target: &Path, base: &Path) -> Result<String, RebaseError> {
     let shared = target
         .components()
         .zip(base.components())
@@ -62,7 +105,7 @@ fn relative(target: &Path, base: &Path) -> Result<String, String> {
     match relative.to_str() {
         Some("") => Ok(".".to_owned()),
         Some(text) => Ok(text.to_owned()),
-        None => Err(format!("{}: the path is not UTF-8", relative.display())),
+        None => Err(RebaseError::NotUtf8 { path: relative }),
     }
 }
 
@@ -106,6 +149,7 @@ pub(crate) fn without_dots(path: &Path) -> PathBuf {
 #[cfg(all(test, unix))]
 mod tests {
     use super::*;
+    use crate::manifest::Mesh;
 
     #[test]
     fn paths_follow_the_manifest() {
@@ -113,6 +157,10 @@ mod tests {
         manifest.input.path.push("/abs/x.vtk".to_owned());
         manifest.input.path.push("../up/./x.vtk".to_owned());
         manifest.job.stop_file = Some("control/stop".to_owned());
+        manifest.meshes = vec![Mesh {
+            path: MeshPath::parse("walls.##.stl").unwrap(),
+            ..Mesh::default()
+        }];
         let (here, there) = (Path::new("/home/me/sim"), Path::new("/home/me/sim/out"));
         let before = manifest.clone();
         manifest.rebase(here, there).unwrap();
@@ -121,6 +169,7 @@ mod tests {
             ["../data/dump.#.vtk", "/abs/x.vtk", "../../up/x.vtk"]
         );
         assert_eq!(manifest.output.path.as_str(), "frame.####.exr");
+        assert_eq!(manifest.meshes[0].path.as_str(), "../walls.##.stl");
         assert_eq!(
             manifest.job.stop_file_in(there),
             Path::new("/home/me/sim/out/../control/stop")
@@ -147,11 +196,11 @@ mod tests {
         }
         std::os::unix::fs::symlink(at("disk/deep/out"), at("work/out")).unwrap();
         std::os::unix::fs::symlink(at("disk/data"), at("work/data")).unwrap();
-        let seen = |path: &str, to: &str| rebased(path, &at("work"), &at(to)).unwrap();
-        assert_eq!(seen("in/f_#.vtk", "work/out"), "../../../work/in/f_#.vtk");
-        assert_eq!(seen("out/../f_#.vtk", "work/in"), "../../disk/deep/f_#.vtk");
-        assert_eq!(seen("data/f_#.vtk", "work/in"), "../data/f_#.vtk");
-        assert_eq!(seen("in/f_#.vtk", "work/new/out"), "../../in/f_#.vtk");
+        let from = |path: &str, to: &str| rebased(path, &at("work"), &at(to)).unwrap();
+        assert_eq!(from("in/f_#.vtk", "work/out"), "../../../work/in/f_#.vtk");
+        assert_eq!(from("out/../f_#.vtk", "work/in"), "../../disk/deep/f_#.vtk");
+        assert_eq!(from("data/f_#.vtk", "work/in"), "../data/f_#.vtk");
+        assert_eq!(from("in/f_#.vtk", "work/new/out"), "../../in/f_#.vtk");
         let real = root.path().canonicalize().unwrap();
         assert_eq!(
             real_dir(&at("work/out/../new/../a")),

@@ -2,12 +2,23 @@
 
 use glam::Vec3;
 
-use super::key::{Affects, section};
+use super::caustics::Caustics;
+use super::crop::PixelBounds;
+use super::ground::GroundSetting;
+use super::key::Affects;
+use super::keys::section;
+use super::reader::Section;
 use super::value::{Named, named};
 use crate::accel::{BvhLeaves, BvhPreset, SbvhSettings, Structure};
 use crate::metrics::Bytes;
-use crate::render::{DEFAULT_MIN_WEIGHT, MAX_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS};
+use crate::render::{
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DataWindow, FilterKind, IntegratorKind, MAX_BOUNCES,
+    MAX_DEPTH, MAX_FILTER_WIDTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
+};
 use crate::scene::{Background, ground};
+
+/// Maximum number of pixels to add on each side of an image.
+const MAX_OVERSCAN: u32 = 8192;
 
 section! {
     /// Size and sampling of the image
@@ -18,6 +29,87 @@ section! {
         height: u32 = 1080, from(1), to(MAX_SIDE), unit("pixels"), flag("height", "HEIGHT", "Image");
         /// Samples per pixel
         samples: u32 = 16, from(1), to(MAX_SAMPLES), flag("samples", "SAMPLES", "Image");
+        /// Pixel filter: box | gaussian | blackman-harris
+        ///
+        /// The samples of a pixel are distributed like the filter and have equal weights. A single sample is at the
+        /// centre of the pixel.
+        filter: FilterKind = FilterKind::Box;
+        /// Width of the pixel filter in pixels
+        filter_width: Option<f32> = None, above(0), to(MAX_FILTER_WIDTH), unit("a number of pixels"),
+            example("2.0"), unset("1 for box, 2 for gaussian, 3 for blackman-harris");
+        /// Part of the image to render: [x0, y0, x1, y1] in pixels, from the top left, without column x1 and row y1
+        ///
+        /// Its pixels are those of the whole image. With denoising, they may differ near its border, where the denoiser
+        /// lacks the neighbours. The part is the data window of the EXR; previews show only the part.
+        crop: Option<PixelBounds> = None, example("[0, 0, 960, 540]"), unset("the whole image"),
+            flag("crop", "X0,Y0,X1,Y1", "Image");
+        /// Pixels to add on each side of the image; they extend the data window of the EXR
+        overscan: u32 = 0, from(0), to(MAX_OVERSCAN), unit("pixels");
+    }
+}
+
+impl Image {
+    /// The rendered pixels: columns and rows of the image from `[x0, y0]` up to, but without, `[x1, y1]`.
+    fn data_bounds(&self) -> [i64; 4] {
+        match self.crop {
+            Some(PixelBounds(bounds)) => bounds.map(i64::from),
+            None => self.largest_bounds(),
+        }
+    }
+
+    /// All pixels of the image, with its overscan.
+    fn largest_bounds(&self) -> [i64; 4] {
+        let [width, height, overscan] = [self.width, self.height, self.overscan].map(i64::from);
+        [-overscan, -overscan, width + overscan, height + overscan]
+    }
+
+    /// Width and height of the rendered part in pixels; None if it is empty or too large.
+    pub fn data_size(&self) -> Option<[u32; 2]> {
+        let [x0, y0, x1, y1] = self.data_bounds();
+        let side = |from: i64, to: i64| {
+            let side = u32::try_from(to - from).ok()?;
+            (1..=MAX_SIDE).contains(&side).then_some(side)
+        };
+        Some([side(x0, x1)?, side(y0, y1)?])
+    }
+
+    /// The rendered part of the image, `[x0, y0, x1, y1]`, if it is not the image itself.
+    pub fn part(&self) -> Option<[i64; 4]> {
+        let image = [0, 0, i64::from(self.width), i64::from(self.height)];
+        Some(self.data_bounds()).filter(|part| *part != image)
+    }
+
+    /// Position of the rendered part in the image.
+    pub fn data_window(&self) -> DataWindow {
+        let [left, top, ..] = self.data_bounds();
+        let pixel = |at: i64| i32::try_from(at).unwrap_or(i32::MIN);
+        DataWindow {
+            left: pixel(left),
+            top: pixel(top),
+            image: [self.width, self.height],
+        }
+    }
+
+    /// Checks that the rendered part is in the image.
+    pub(super) fn check(&self, root: &mut Section<'_>) {
+        let [left, top, right, bottom] = self.largest_bounds();
+        if let Some(PixelBounds(bounds)) = self.crop {
+            let [x0, y0, x1, y1] = bounds.map(i64::from);
+            if x0 >= x1 || y0 >= y1 {
+                root.section("image").wrong(
+                    "crop",
+                    "has no pixels; x0 must be below x1, and y0 below y1",
+                );
+            } else if x0 < left || y0 < top || x1 > right || y1 > bottom {
+                let what = format!(
+                    "reaches beyond the image, which is [{left}, {top}, {right}, {bottom}] with its overscan"
+                );
+                root.section("image").wrong("crop", &what);
+            }
+        } else if self.data_size().is_none() {
+            let what = format!("makes the image larger than {MAX_SIDE} pixels; make it smaller");
+            root.section("image").wrong("overscan", &what);
+        }
     }
 }
 
@@ -28,50 +120,86 @@ named! {
         Plain = "plain",
         /// Squares, every other one darker.
         Checker = "checker",
+        /// Spots of many sizes.
+        Sand = "sand",
     }
 }
 
 section! {
-    /// How the image is traced
+    /// Settings of the renderer
     Render {
         /// Acceleration structure: auto, lbvh, kdtree, bvh or sbvh
         ///
-        /// lbvh is the fastest to build, kdtree the fastest to trace. The image is the same; auto goes by the number
-        /// of rays for each particle.
+        /// lbvh is the fastest to build, kdtree the fastest to trace. The image is the same. auto chooses one of these
+        /// two by the number of rays per particle.
         accelerator: Option<Structure> = None, or("auto"), affects(Affects::Nothing),
             flag("accelerator", "NAME", "Job");
         /// Build quality of bvh: fast | medium | high
         bvh_preset: BvhPreset = BvhPreset::default(), affects(Affects::Nothing);
-        /// Primitives of bvh: blocks, or particles (200 bytes each while building)
+        /// Primitives of bvh: blocks, or particles (200 bytes per particle while building)
         bvh_leaves: BvhLeaves = BvhLeaves::default(), affects(Affects::Nothing);
-        /// sbvh tries spatial splits where boxes overlap by more than this part of the scene's area
+        /// sbvh tries spatial splits where boxes overlap by more than this fraction of the scene's surface area
         sbvh_alpha: f32 = SbvhSettings::DEFAULT.alpha, affects(Affects::Nothing),
             from(*SbvhSettings::ALPHAS.start()), to(*SbvhSettings::ALPHAS.end());
-        /// References that the spatial splits of sbvh may add, per particle; 0 allows no spatial splits
+        /// Maximum number of references per particle that the spatial splits of sbvh add; 0 turns them off
         sbvh_budget: f32 = SbvhSettings::DEFAULT.budget, affects(Affects::Nothing),
             zero("no spatial splits"), from(*SbvhSettings::BUDGETS.start()), to(*SbvhSettings::BUDGETS.end());
-        /// Reflections and refractions followed; 1 is direct light only
+        /// Light transport: auto | path | whitted; auto is path
+        ///
+        /// path is lit by the environment and by lights, and follows the light that surfaces reflect. whitted is the
+        /// model of the thesis: lights without extent, ambient light and highlights. A manifest that has one of the
+        /// thesis's terms in `[material]` (ambient, diffuse, specular, shininess, reflection, transmission) and no
+        /// integrator is rendered with whitted, as is a job of a version without path.
+        integrator: Option<IntegratorKind> = None, or("auto"), flag("integrator", "NAME", "Look");
+        /// Diffuse reflections that light may take before its last one; 0 is direct light only
+        bounces: u32 = DEFAULT_BOUNCES, from(0), to(MAX_BOUNCES), affects(Affects::PathTracing),
+            flag("bounces", "COUNT", "Look");
+        /// Light on the ground through transmissive particles: number of photons; 0 is none
+        ///
+        /// With photons, paths end at the ground, whose light is computed once for each image. It is that of the
+        /// environment and of suns and directional lights; of other lights there are no caustics. Without photons,
+        /// paths go on from the ground, and find a sun only where nothing refracts its light.
+        caustics: Caustics = Caustics::DEFAULT, affects(Affects::PathTracing);
+        /// Removes noise from R, G and B: auto | true | false; auto is true with path
+        ///
+        /// It takes at least 2 samples per pixel. Other channels do not change.
+        denoise: Option<bool> = None, or("auto"), flag("denoise", "", "Look");
+        /// Maximum depth of reflections and refractions; 1 is direct light only
         max_depth: u32 = 3, from(1), to(MAX_DEPTH), flag("max-depth", "MAX_DEPTH", "Look");
-        /// Transmissive spheres: path weight below which one of two branches is followed; 0 follows both
+        /// Transmissive spheres: path weight below which only one of the two branches is followed; 0 always follows
+        /// both
         min_weight: f32 = DEFAULT_MIN_WEIGHT, affects(Affects::BranchingSpheres), or_zero(),
             from(*MIN_WEIGHTS.start()), to(*MIN_WEIGHTS.end());
-        /// Background: auto, linear RGB, or { bottom = [...], top = [...] }
+        /// Background: auto, studio, linear RGB, or { bottom = [...], top = [...] }
+        ///
+        /// studio is a grey gradient over the image with darker corners. It does not move with the camera. auto is
+        /// studio with path, and a darker gradient along the up axis with whitted.
         background: Option<Background> = None, or("auto");
-        /// A ground plane under the particles, which receives shadows
-        ground: bool = false, flag("ground", "", "Look");
+        /// Ground under the particles: auto | false | true (plain) | checker | shadow_catcher
+        ///
+        /// A shadow catcher is invisible: it shows the background, darker where particles take light away. It needs
+        /// integrator = "path" and has no colour. auto is a shadow catcher with path if particles lie on the floor of
+        /// their domain at some time, otherwise false. `[render.ground]` with `type = "checker"` is the same as
+        /// ground = "checker".
+        ground: Option<GroundSetting> = None, or("auto"), flag("ground", "KIND", "Look");
         /// Height of the ground along input.up, or auto
         ground_height: Option<f64> = None, or("auto"), unit("a height");
         /// Colour of the ground, linear RGB
         ground_color: Vec3 = ground::DEFAULT_COLOR;
-        /// Pattern of the ground: plain | checker (every other square is darker)
+        /// Pattern of the ground: plain | checker (every other square is darker) | sand
         ground_pattern: GroundPattern = GroundPattern::Plain;
-        /// Edge length of the pattern's squares, or auto
+        /// Strength of the shadows on a shadow catcher; 1 is physical
+        ground_shadow: f32 = 1.0, from(0), to(1), affects(Affects::PathTracing);
+        /// Edge length of the squares of the pattern, or of its largest spots, or auto
         ground_tile: Option<f64> = None, or("auto"), unit("a length"), above(0), single();
-        /// Most memory to use: 4GiB, 512MiB; frames that need more fail
-        memory_limit: Option<Bytes> = None, example("\"4GiB\""), unset("what is free"), affects(Affects::Nothing),
+        /// Maximum memory to use: 4GiB, 512MiB; frames that need more fail
+        memory_limit: Option<Bytes> = None, example("\"4GiB\""), unset("the free memory"), affects(Affects::Nothing),
             flag("memory-limit", "SIZE", "Job");
     }
 }
+
+named!(FilterKind: Box = "box", Gaussian = "gaussian", BlackmanHarris = "blackman-harris");
+named!(IntegratorKind: Whitted = "whitted", Path = "path");
 
 impl Named for Structure {
     fn names() -> Vec<(Self, &'static str)> {

@@ -4,10 +4,18 @@
 //! an effect on the images must not count as changes.
 
 use super::value::Value;
-use super::{ColorSetting, DEFAULT_MAP, Manifest};
+use super::{ColorSetting, DEFAULT_MAP, GroundKind, GroundSetting, Manifest};
+use crate::render::IntegratorKind;
 
 const MIN_WEIGHT: &str = "render.min_weight";
 const COLOR: &str = "material.color";
+const INTEGRATOR: &str = "render.integrator";
+const GROUND: &str = "render.ground";
+/// The defaults of older versions.
+const OLD_INTEGRATOR: &str = "\"whitted\"";
+const OLD_GROUND: &str = "false";
+/// Keys whose defaults have changed.
+const CHANGED_DEFAULTS: [(&str, &str); 2] = [(INTEGRATOR, OLD_INTEGRATOR), (GROUND, OLD_GROUND)];
 const SURFACE: &str = "render.surface";
 /// The value of [`SURFACE`] in older versions, and the equivalent current one.
 const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
@@ -15,6 +23,22 @@ const UNION: [&str; 2] = ["\"medium\"", "\"union\""];
 pub(super) const RENDERER: &str = "renderer";
 
 impl Manifest {
+    /// Gives automatic settings the defaults of the version that made a plan with the settings `planned`, so that a job
+    /// is finished as it was begun.
+    pub fn adopt_old_defaults(&mut self, planned: &[(String, String)]) {
+        let is_old = |key: &str, old: &str| {
+            let found = planned.iter().find(|(k, _)| k == key);
+            found.is_none_or(|(_, value)| value == old)
+        };
+        let render = &mut self.render;
+        if render.integrator.is_none() && is_old(INTEGRATOR, OLD_INTEGRATOR) {
+            render.integrator = Some(IntegratorKind::Whitted);
+        }
+        if render.ground.is_none() && is_old(GROUND, OLD_GROUND) {
+            render.ground = Some(GroundSetting(GroundKind::None));
+        }
+    }
+
     /// The [`Manifest::settings`], but written as in the `planned` settings of a job if that means the same images.
     /// `has_rgb`: the attribute for the colours of the job contains colours.
     pub fn settings_as_planned(
@@ -31,14 +55,24 @@ impl Manifest {
             (Some(0.0), None) => settings.retain(|(key, _)| key != MIN_WEIGHT),
             _ => {}
         }
-        // Versions without a key made the same images as its current default; the exceptions are handled above
-        let usual = Self::new("").settings();
+        // Versions without a key made the same images as its current default, or as its old one
+        let mut usual = Self::new("").settings();
+        usual.retain(|(key, _)| CHANGED_DEFAULTS.iter().all(|(changed, _)| key != changed));
+        usual.extend(CHANGED_DEFAULTS.map(|(key, value)| (key.to_owned(), value.to_owned())));
         let is_usual =
             |setting: &(String, String)| usual.contains(setting) && setting.0 != MIN_WEIGHT;
         settings.retain(|setting| value(&setting.0).is_some() || !is_usual(setting));
         // Versions without this key had one renderer.
         if value(RENDERER).is_none() {
             settings.retain(|(key, _)| key != RENDERER);
+        }
+        // The usual integrator may be written by name
+        if let Some(old) = value(INTEGRATOR)
+            && old != OLD_INTEGRATOR
+            && self.integrator() == IntegratorKind::Path
+            && let Some((_, new)) = settings.iter_mut().find(|(key, _)| key == INTEGRATOR)
+        {
+            new.clone_from(old);
         }
         // Use the old names of values
         if value(SURFACE).is_some_and(|old| old == UNION[0])
@@ -99,7 +133,7 @@ mod tests {
         Manifest::parse(&text, Path::new("job.toml")).unwrap()
     }
 
-    /// The settings of `manifest` as another version wrote them: `key` with another value, or without it.
+    /// The settings of `manifest` as another version may have written them: `key` has another value, or is missing.
     fn rewritten(manifest: &Manifest, key: &str, value: Option<&str>) -> Vec<(String, String)> {
         let mut settings = manifest.settings();
         settings.retain(|(k, _)| k != key);
@@ -115,9 +149,34 @@ mod tests {
     }
 
     #[test]
-    fn the_least_weight_matters_to_transmissive_spheres_alone() {
+    fn jobs_of_older_versions_keep_their_integrator_and_ground() {
+        let (mut old, mut current) = (manifest("render.integrator = \"whitted\""), manifest(""));
+        old.render.ground = Some(GroundSetting(GroundKind::None));
+        // Plans of versions with and without the keys
+        let with = old.settings();
+        let without = rewritten(&old, INTEGRATOR, None);
+        for planned in [with, without] {
+            assert_eq!(changes(&current, &planned, false).len(), 2);
+            let mut adopted = current.clone();
+            adopted.adopt_old_defaults(&planned);
+            assert_eq!(adopted.integrator(), IntegratorKind::Whitted);
+            assert_eq!(changes(&adopted, &planned, false), [""; 0]);
+        }
+        // A plan of this version
+        let planned = current.settings();
+        current.adopt_old_defaults(&planned);
+        assert_eq!(current, manifest(""));
+        let named = manifest("render.integrator = \"path\"");
+        assert_eq!(changes(&named, &planned, false), [""; 0]);
+        assert_eq!(changes(&current, &named.settings(), false), [""; 0]);
+        let whitted = manifest("render.integrator = \"whitted\"");
+        assert_ne!(changes(&whitted, &planned, false), [""; 0]);
+    }
+
+    #[test]
+    fn min_weight_affects_only_transmissive_spheres() {
         let glass = "material.transmission = 1\n";
-        for (rest, planned, wanted) in [
+        for (rest, planned, expected) in [
             ("", None, ""),
             ("", Some("0.5"), ""),
             ("render.min_weight = 0.5", None, ""),
@@ -133,12 +192,12 @@ mod tests {
             let manifest = manifest(rest);
             let planned = rewritten(&manifest, MIN_WEIGHT, planned);
             let found = changes(&manifest, &planned, false);
-            assert_eq!(found.join("; "), wanted, "{rest}");
+            assert_eq!(found.join("; "), expected, "{rest}");
         }
     }
 
     #[test]
-    fn a_key_that_was_added_later_has_its_default() {
+    fn missing_keys_have_their_defaults() {
         let key = "image.samples";
         let plain = manifest("");
         let without = rewritten(&plain, key, None);
@@ -149,7 +208,7 @@ mod tests {
     }
 
     #[test]
-    fn a_union_was_once_called_a_medium() {
+    fn medium_is_an_obsolete_name_of_union() {
         let union = manifest("render.surface = \"union\"");
         let planned = rewritten(&union, SURFACE, Some("\"medium\""));
         assert!(changes(&union, &planned, false).is_empty());
@@ -162,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn the_usual_map_may_be_named_or_not() {
+    fn default_map_may_be_explicit() {
         let by = |rest: &str| format!("{{ attribute = \"density\"{rest} }}");
         let (plain, viridis, turbo) = (by(""), by(", map = \"viridis\""), by(", map = \"turbo\""));
         let range = ", range = [1.0, 2.0]";
@@ -170,7 +229,7 @@ mod tests {
         for (now, planned, has_rgb, is_same) in [
             (&plain, &viridis, false, true),
             (&viridis, &plain, false, true),
-            // These particles bring colours: without a map they are taken as they are.
+            // The particles contain colours, which are used unchanged if there is no map.
             (&plain, &viridis, true, false),
             (&viridis, &plain, true, false),
             (&viridis, &viridis, true, true),

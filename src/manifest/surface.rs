@@ -1,6 +1,7 @@
 //! `[surface]` and `render.surface`: the surface that rays hit.
 
-use super::key::{Affects, Keys, keys};
+use super::key::Affects;
+use super::keys::{Keys, keys};
 use super::value::named;
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 
@@ -19,7 +20,7 @@ named!(SurfaceKind: Spheres = "spheres", Union = "union", Smooth = "smooth");
 named!(NormalKind: Auto = "auto", Sphere = "sphere", Field = "field", Pca = "pca");
 
 pub(super) const ABOUT: &[&str] =
-    &["What rays hit, beside the kind of surface in render.surface; lengths are in particle radii"];
+    &["Settings of the surface; its kind is render.surface; lengths are in particle radii"];
 
 /// The kind of surface, a key of `[render]`.
 pub(super) fn kind_key(settings: &mut SurfaceSettings, keys: &mut Keys<'_>) {
@@ -34,20 +35,21 @@ pub(super) fn all_keys(settings: &mut SurfaceSettings, keys: &mut Keys<'_>) {
     keys!(keys:
         /// Normals: auto | sphere | field (smooth, not of spheres) | pca (smooth, of spheres)
         normals => settings.normals;
-        /// Smoothing of a smooth surface: 0 (every particle shows) to 1 (calm water); drops and thin sheets stay
+        /// Smoothing of a smooth surface: 0 (every particle shows) to 1 (calm water); drops and thin sheets keep their
+        /// shape
         smoothing => settings.smoothing, from(0), to(1), affects(Affects::SmoothSurfaces),
             flag("smoothing", "NUMBER", "Look");
         /// Positions and normals from the particles instead of the grid, without smoothing
         exact => settings.exact, affects(Affects::SmoothSurfaces), flag("exact-surface", "", "Look");
-        /// Edge of a voxel in particle radii, as splashsurf's -c
+        /// Edge of a voxel in particle radii, like splashsurf's -c
         voxel => settings.voxel, from(VOXELS[0]), to(VOXELS[1]), unit("a number of particle radii"),
             affects(Affects::SmoothSurfaces);
-        /// Smoothing length of the kernel in particle radii, as splashsurf's -l
+        /// Smoothing length of the kernel in particle radii, like splashsurf's -l
         smoothing_length => settings.smoothing_length, from(SMOOTHING_LENGTHS[0]), to(SMOOTHING_LENGTHS[1]),
             unit("a number of particle radii"), affects(Affects::Bodies);
-        /// Value of the field at the surface, as splashsurf's -t; larger is thinner
+        /// Value of the field at the surface, like splashsurf's -t; a larger value makes the body thinner
         threshold => settings.threshold, above(0), to(MAX_THRESHOLD), affects(Affects::SmoothSurfaces);
-        /// Particles with few neighbours are small white spheres beside the surface
+        /// Particles with few neighbours become small white spheres outside the surface
         spray => settings.spray, affects(Affects::Bodies), flag("spray", "", "Look");
     );
 }

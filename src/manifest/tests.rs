@@ -5,7 +5,7 @@ use super::*;
 use crate::output::Compression;
 use crate::scene::{Background, Falloff};
 
-/// The example of the design, as users find it in the documentation.
+/// The example in the design, which is also in the user documentation.
 const EXAMPLE: &str = r#"
 [input]
 path = "ParticleData_Fluid_#.vtk"   # a directory, a pattern, or a list of files
@@ -67,7 +67,7 @@ fn with_sets(sets: &[&str]) -> Result<Manifest, ManifestError> {
     Manifest::parse_with(EXAMPLE, path(), sets)
 }
 
-/// `section` added to a good manifest must be refused with exactly one message, which has all of
+/// Checks that a valid manifest with `section` appended is rejected with exactly one message, which contains all
 /// `parts`.
 #[track_caller]
 fn refused(section: &str, parts: &[&str]) {
@@ -80,30 +80,33 @@ fn refused(section: &str, parts: &[&str]) {
 }
 
 #[test]
-fn the_example_reads() {
+fn example_manifest_is_valid() {
     let manifest = parse(EXAMPLE);
-    let mut wanted = Manifest::new("ParticleData_Fluid_#.vtk");
-    wanted.input.frames = Some("1-17".parse().unwrap());
-    wanted.input.up = Some(UpAxis::Y);
-    wanted.camera.mode = CameraMode::Fixed;
-    wanted.camera.eye = Some(DVec3::ZERO);
-    wanted.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
-    wanted.camera.up = Some(DVec3::Z);
-    wanted.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
-    wanted.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
-    wanted.lights = vec![Light {
+    let mut expected = Manifest::new("ParticleData_Fluid_#.vtk");
+    expected.input.frames = Some("1-17".parse().unwrap());
+    expected.input.up = Some(UpAxis::Y);
+    expected.camera.mode = CameraMode::Fixed;
+    expected.camera.eye = Some(DVec3::ZERO);
+    expected.camera.look_at = Some(DVec3::new(5.0, 5.0, 0.0));
+    expected.camera.up = Some(DVec3::Z);
+    expected.render.integrator = Some(IntegratorKind::Whitted);
+    expected.render.ground = Some(GroundSetting(GroundKind::None));
+    expected.render.background = Some(Background::Constant(Vec3::new(0.05, 0.06, 0.08)));
+    expected.material.color = ColorSetting::Rgb(Vec3::new(0.6, 0.7, 0.9));
+    expected.lights = vec![Light {
         kind: LightKind::Point {
             position: DVec3::new(0.0, 0.0, 10.0),
             falloff: Falloff::None,
         },
         color: Vec3::ONE,
         intensity: 1.0,
+        visible: false,
     }];
-    assert_eq!(manifest, wanted);
+    assert_eq!(manifest, expected);
 }
 
 #[test]
-fn a_path_is_enough() {
+fn path_is_the_only_required_key() {
     assert_eq!(parse("[input]\npath = \"data\""), Manifest::new("data"));
     let overlay = Override::new("input.path", "5", "INPUT").unwrap();
     let manifest = Manifest::parse_with("", path(), vec![overlay]).unwrap();
@@ -144,20 +147,22 @@ fn unknown_keys_name_the_nearest() {
 }
 
 #[test]
-fn wrong_types_say_what_is_wanted() {
+fn wrong_types_name_the_expected_type() {
     refused(
         "[image]\nwidth = \"wide\"",
         &[
-            "line 3, column 9: image.width: wants a whole number from 1 to 65536, not the text \"wide\"",
+            "line 3, column 9: image.width: expected a whole number from 1 to 65536, found the text \"wide\"",
         ],
     );
-    refused("[image]\nwidth = 0", &["image.width", "not 0"]);
+    refused("[image]\nwidth = 0", &["image.width", "found 0"]);
     refused("[image]\nsamples = 0", &["image.samples", "from 1"]);
-    refused("[image]\nheight = -5", &["image.height", "not -5"]);
+    refused("[image]\nheight = -5", &["image.height", "found -5"]);
     refused("[image]\nheight = 10.5", &["image.height", "whole"]);
     refused(
         "[render]\nground = 1",
-        &["render.ground: wants true or false, not 1"],
+        &[
+            "render.ground: expected true, false or one of none, plain, checker, shadow_catcher or \"auto\", found 1",
+        ],
     );
     refused(
         "[render]\nbackground = [1, 2]",
@@ -174,18 +179,18 @@ fn wrong_types_say_what_is_wanted() {
     );
     refused(
         "[render]\nbvh_leaves = 16",
-        &["render.bvh_leaves: wants one of blocks, particles"],
+        &["render.bvh_leaves: expected one of blocks, particles"],
     );
     for wrong in ["-0.5", "nan", "8.01", "1e39", "inf", "\"much\"", "[1]"] {
         refused(
             &format!("[render]\nsbvh_budget = {wrong}"),
-            &["render.sbvh_budget: wants a number from 0 (no spatial splits) to 8, not"],
+            &["render.sbvh_budget: expected a number from 0 (no spatial splits) to 8, found"],
         );
     }
     for wrong in ["-1e-5", "1.5", "nan"] {
         refused(
             &format!("[render]\nsbvh_alpha = {wrong}"),
-            &["render.sbvh_alpha: wants a number from 0 to 1, not"],
+            &["render.sbvh_alpha: expected a number from 0 to 1, found"],
         );
     }
     for right in ["0", "0.5", "8"] {
@@ -237,7 +242,7 @@ fn wrong_types_say_what_is_wanted() {
     );
     refused(
         "[light]\ntype = \"point\"",
-        &["light: wants a list of tables, as [[light]]"],
+        &["light: expected a list of tables, such as [[light]]"],
     );
     refused("[[light]]\n", &["light.0.type: is missing"]);
     refused(
@@ -254,9 +259,9 @@ fn wrong_types_say_what_is_wanted() {
     refused("[output]\nfps = 0", &["output.fps"]);
     refused(
         "[output]\ncompression = 3",
-        &["one of none, rle, zip, zips, piz, not 3"],
+        &["one of none, rle, zip, zips, piz, found 3"],
     );
-    refused("render = 3", &["render: wants a table, not 3"]);
+    refused("render = 3", &["render: expected a table, found 3"]);
 }
 
 #[test]
@@ -273,7 +278,7 @@ fn keys_of_the_camera_are_checked() {
         ),
         (
             "look_at = [0,1]",
-            "line 5, column 11: camera.key.0.look_at: wants three numbers",
+            "line 5, column 11: camera.key.0.look_at: expected three numbers",
         ),
         (
             "look_at = [0,0,1]\nup = [0,0,-2]",
@@ -281,7 +286,7 @@ fn keys_of_the_camera_are_checked() {
         ),
         (
             "look_at = [0,0,1]\nup = [0,0,0]",
-            "line 6, column 6: camera.key.0.up: wants three numbers that are not all 0",
+            "line 6, column 6: camera.key.0.up: expected three numbers that are not all 0",
         ),
         (
             "look_at = [0,0,1]\n[camera]\nup = [0,0,3]",
@@ -289,7 +294,7 @@ fn keys_of_the_camera_are_checked() {
         ),
         (
             "look_at = [0,1,1]\nfov = 180",
-            "line 6, column 7: camera.key.0.fov: wants degrees",
+            "line 6, column 7: camera.key.0.fov: expected degrees",
         ),
         (
             "look_at = [0,1,1]\nupp = [0,0,1]",
@@ -341,12 +346,12 @@ fn input_is_checked() {
         assert_eq!(error.messages().len(), 1, "{error}");
         assert!(error.to_string().contains(part), "{error}");
     };
-    refused("[input]\npath = \"\"", "input.path: wants a name");
-    refused("[input]\npath = []", "input.path: wants a directory");
+    refused("[input]\npath = \"\"", "input.path: expected a name");
+    refused("[input]\npath = []", "input.path: expected a directory");
     refused("[input]\npath = [\"a\", 3]", "input.path.1");
     refused(
         "[input]\npath = \"a\"\nradius = 0",
-        "input.radius: wants a length above 0",
+        "input.radius: expected a length above 0",
     );
     refused(
         "[input]\npath = \"a\"\nradius = { scale = 2 }",
@@ -357,7 +362,7 @@ fn input_is_checked() {
     assert_eq!(*manifest.input.path, ["a", "b"]);
     assert_eq!(manifest.input.frames, Some("7".parse().unwrap()));
     assert_eq!(manifest.input.radius, RadiusSetting::Length(2.0));
-    // Which of the frames 1-3 there are is known only with the sequence.
+    // Which of the frames 1-3 exist is unknown without the sequence.
     for range in ["3", "1-3"] {
         let text =
             format!("input = {{ path = \"a\", frames = \"{range}\" }}\noutput.path = \"a.exr\"");
@@ -374,7 +379,7 @@ fn input_is_checked() {
 }
 
 #[test]
-fn no_toml_names_the_place() {
+fn toml_errors_have_line_and_column() {
     let error = Manifest::parse("[input]\npath = \n", path())
         .unwrap_err()
         .to_string();
@@ -386,7 +391,7 @@ fn no_toml_names_the_place() {
 }
 
 #[test]
-fn everything_wrong_is_told_at_once() {
+fn all_problems_are_reported_at_once() {
     let error = Manifest::parse("[image]\nwidth = 0\n[render]\nx = 1\n", path()).unwrap_err();
     let messages = error.messages();
     assert_eq!(messages.len(), 3, "{error}");
@@ -396,7 +401,7 @@ fn everything_wrong_is_told_at_once() {
 }
 
 #[test]
-fn sets_lie_over_the_file() {
+fn overrides_replace_file_values() {
     let manifest = with_sets(&[
         "render.max_depth=5",
         "output.compression = piz",
@@ -424,7 +429,7 @@ fn sets_lie_over_the_file() {
 }
 
 #[test]
-fn a_map_alone_is_laid_into_what_is_there() {
+fn map_alone_keeps_the_attribute() {
     let auto = |range| ColorSetting::AutoWith {
         map: MapName::named("turbo"),
         range,
@@ -448,7 +453,7 @@ fn a_map_alone_is_laid_into_what_is_there() {
 }
 
 #[test]
-fn strings_that_control_a_terminal_are_escapes() {
+fn control_characters_in_strings_are_escaped() {
     let hostile = "a\u{1b}[2J\nb\u{9b}\u{202e}\"\\";
     let text = Manifest::new(hostile).to_commented_toml();
     let raw = text
@@ -460,7 +465,7 @@ fn strings_that_control_a_terminal_are_escapes() {
 }
 
 #[test]
-fn sets_that_will_not_do() {
+fn invalid_overrides() {
     let wrong = |set: &str, part: &str| {
         let error = with_sets(&[set]).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
@@ -471,7 +476,7 @@ fn sets_that_will_not_do() {
     );
     wrong(
         "image.width=wide",
-        "--set image.width=wide: image.width: wants",
+        "--set image.width=wide: image.width: expected",
     );
     wrong(
         "image.width.x=1",
@@ -480,11 +485,11 @@ fn sets_that_will_not_do() {
     wrong("light.1.intensity=1", "light.1: the list has no such item");
     for (set, part) in [
         ("a", "no `=`"),
-        ("a..b=1", "dotted key"),
-        ("=1", "dotted key"),
+        ("a..b=1", "invalid key"),
+        ("=1", "invalid key"),
         ("a=[1", "--set a=[1: "),
     ] {
-        let error = Override::parse(set).unwrap_err();
+        let error = Override::parse(set).unwrap_err().to_string();
         assert!(error.contains(part), "{error}");
     }
 }
@@ -548,7 +553,7 @@ fn settings_are_what_images_depend_on() {
 }
 
 #[test]
-fn commented_file_reads_back_and_shows_every_key() {
+fn commented_file_round_trips_with_every_key() {
     let plain = Manifest::new("a \"quoted\"\\path\n#.vtk");
     let text = plain.to_commented_toml();
     assert_eq!(parse(&text), plain);
@@ -557,7 +562,7 @@ fn commented_file_reads_back_and_shows_every_key() {
         assert!(text.contains(&format!("{name} = ")), "{key}\n{text}");
     }
     assert_eq!(parse(&parse(EXAMPLE).to_commented_toml()), parse(EXAMPLE));
-    // What is shown as a comment must be right too.
+    // Check that the keys in comments are valid too
     let uncommented: String = text
         .lines()
         .map(|l| {
@@ -572,6 +577,7 @@ fn commented_file_reads_back_and_shows_every_key() {
         .to_string();
     assert!(error.contains("camera.eye: is given"), "{error}");
     let all = uncommented.replace("mode = \"auto\"", "mode = \"fixed\"");
+    let all = all.replace("type = \"studio\"", "type = \"image\"");
     let all = parse(&all.replace("isolate = false", "isolate = true"));
     assert_eq!(all.lights.len(), 1);
     assert_eq!(all.camera.keys.len(), 1);
@@ -581,7 +587,7 @@ fn commented_file_reads_back_and_shows_every_key() {
 }
 
 #[test]
-fn lists_of_everything_read_back() {
+fn lists_of_all_kinds_round_trip() {
     let text = r#"
 input = { path = ["a", "b"], radius = { attribute = "d", scale = 0.5 }, up = "-y" }
 camera.key = [{ frame = 9, eye = [1,2,3], look_at = [0,0,0], fov = 30 }, { frame = -1, eye = [1,1,1], look_at = [0,0,0], up = [0,1,0] }]
@@ -599,7 +605,7 @@ light = [{ type = "directional", direction = [0,0,-2] }, { type = "point", posit
 
 proptest! {
     #[test]
-    fn numbers_read_back_to_the_bit(
+    fn numbers_round_trip_to_the_bit(
         wide in prop::array::uniform3(prop::num::f64::NORMAL | prop::num::f64::SUBNORMAL),
         narrow in prop::num::f32::POSITIVE | prop::num::f32::SUBNORMAL,
         path in "[^\\PC]{1,8}x",
@@ -610,27 +616,43 @@ proptest! {
             kind: LightKind::Point { position: wide.into(), falloff: Falloff::None },
             color: Vec3::splat(narrow),
             intensity: narrow,
+            visible: false,
         }];
         manifest.material.color = ColorSetting::Rgb(Vec3::splat(narrow));
         prop_assert_eq!(&parse(&manifest.to_commented_toml()), &manifest);
     }
 
     #[test]
-    fn any_text_is_answered(text in "[a-z\\[\\]=.\"0-9{}, \n#]{0,60}") {
+    fn arbitrary_text_never_panics(text in "[a-z\\[\\]=.\"0-9{}, \n#]{0,60}") {
         let _ = Manifest::parse(&text, path());
     }
 }
 
 #[test]
-fn many_problems_are_told_in_part() {
+fn number_of_reported_problems_is_limited() {
     let keys: String = (0..100_000).map(|i| format!("widt{i} = 1\n")).collect();
     let text = format!("input.path = \"a\"\n[image]\n{keys}");
     let error = Manifest::parse(&text, Path::new("job.toml")).expect_err("unknown keys");
-    let told = error.to_string();
+    let message = error.to_string();
     assert!(
-        told.contains("line 3, column 1: image.widt0: unknown key; did you mean"),
-        "{told}"
+        message.contains("line 3, column 1: image.widt0: unknown key; did you mean"),
+        "{message}"
     );
-    assert!(told.ends_with("job.toml: and more like these"), "{told}");
-    assert_eq!(told.lines().count(), 51);
+    assert!(
+        message.ends_with("job.toml: and more like these"),
+        "{message}"
+    );
+    assert_eq!(message.lines().count(), 51);
+}
+
+#[test]
+fn terms_of_the_thesis_select_its_model() {
+    let integrator = |text: &str| parse(&format!("input.path = \"a\"\n{text}")).integrator();
+    let whitted = IntegratorKind::Whitted;
+    assert_eq!(integrator("material.shininess = 5"), whitted);
+    assert_eq!(integrator(""), IntegratorKind::Path);
+    assert_eq!(integrator("material.ior = 1.5"), IntegratorKind::Path);
+    // The integrator that a manifest names is the one that it gets
+    let both = "render.integrator = \"path\"\nmaterial.shininess = 5";
+    assert_eq!(integrator(both), IntegratorKind::Path);
 }

@@ -6,21 +6,10 @@ use std::collections::BTreeMap;
 use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
-use super::Problem;
-
-/// Origin of a value.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Place {
-    /// Byte in the file.
-    Byte(usize),
-    /// The option as the user typed it.
-    Option(String),
-    /// The value is missing.
-    Nowhere,
-}
+use super::problem::{Place, Problem};
 
 #[derive(Debug, Clone)]
-pub(super) struct Node {
+pub(super) struct TomlNode {
     pub(super) kind: Kind,
     pub(super) place: Place,
 }
@@ -31,9 +20,9 @@ pub(super) enum Kind {
     Integer(i64),
     Float(f64),
     Bool(bool),
-    Array(Vec<Node>),
+    Array(Vec<TomlNode>),
     /// Values by key, with the location of each key.
-    Table(BTreeMap<String, (Place, Node)>),
+    Table(BTreeMap<String, (Place, TomlNode)>),
     /// Dates, and integers beyond 64 bits.
     Other,
 }
@@ -42,8 +31,29 @@ pub(super) enum Kind {
 #[derive(Debug, Clone)]
 pub struct Override {
     keys: Vec<String>,
-    node: Node,
+    node: TomlNode,
     is_under: bool,
+    /// Whether it is another item of a list.
+    is_item: bool,
+}
+
+/// Why an override is invalid.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error("{shown}: {fault}")]
+pub struct OverrideError {
+    /// The option as the user typed it.
+    shown: String,
+    fault: OverrideFault,
+}
+
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+enum OverrideFault {
+    #[error("no `=` (example: render.max_depth=5)")]
+    NoValue,
+    #[error("invalid key `{0}` (example: render.max_depth)")]
+    Key(String),
+    #[error("{0}")]
+    Toml(String),
 }
 
 impl Override {
@@ -52,28 +62,33 @@ impl Override {
     ///
     /// # Errors
     /// There is no `=`, a key is empty, or a list, table or quoted text is incomplete.
-    pub fn parse(assignment: &str) -> Result<Self, String> {
+    pub fn parse(assignment: &str) -> Result<Self, OverrideError> {
         let shown = format!("--set {assignment}");
-        let Some((key, value)) = assignment.split_once('=') else {
-            return Err(format!("{shown}: no `=`, as in render.max_depth=5"));
+        let error = |fault| OverrideError {
+            shown: shown.clone(),
+            fault,
         };
-        let keys = split_key(key).map_err(|e| format!("{shown}: {e}"))?;
+        let Some((key, value)) = assignment.split_once('=') else {
+            return Err(error(OverrideFault::NoValue));
+        };
+        let keys = split_key(key).map_err(error)?;
         let place = Place::Option(shown.clone());
         let value = value.trim();
         let kind = match DeValue::parse(value) {
-            Ok(parsed) => match Node::from_toml(parsed, &|_| place.clone()).kind {
+            Ok(parsed) => match TomlNode::from_toml(parsed, &|_| place.clone()).kind {
                 Kind::Other => Kind::Text(value.to_owned()),
                 kind => kind,
             },
             Err(e) if value.starts_with(['[', '{', '"', '\'']) => {
-                return Err(format!("{shown}: {}", e.message()));
+                return Err(error(OverrideFault::Toml(e.message().to_owned())));
             }
             Err(_) => Kind::Text(value.to_owned()),
         };
         Ok(Self {
             keys,
-            node: Node { kind, place },
+            node: TomlNode { kind, place },
             is_under: false,
+            is_item: false,
         })
     }
 
@@ -81,12 +96,35 @@ impl Override {
     ///
     /// # Errors
     /// A part of the key is empty.
-    pub fn new(key: &str, value: impl Into<toml::Value>, shown: &str) -> Result<Self, String> {
+    pub fn new(
+        key: &str,
+        value: impl Into<toml::Value>,
+        shown: &str,
+    ) -> Result<Self, OverrideError> {
         let place = Place::Option(shown.to_owned());
         Ok(Self {
-            keys: split_key(key).map_err(|e| format!("{shown}: {e}"))?,
-            node: Node::from_value(value.into(), &place),
+            keys: split_key(key).map_err(|fault| OverrideError {
+                shown: shown.to_owned(),
+                fault,
+            })?,
+            node: TomlNode::from_value(value.into(), &place),
             is_under: false,
+            is_item: false,
+        })
+    }
+
+    /// Appends `item` to the list `key`; `shown` is its name in messages, such as `--mesh`.
+    ///
+    /// # Errors
+    /// A part of the key is empty.
+    pub fn append(
+        key: &str,
+        item: impl Into<toml::Value>,
+        shown: &str,
+    ) -> Result<Self, OverrideError> {
+        Ok(Self {
+            is_item: true,
+            ..Self::new(key, item, shown)?
         })
     }
 
@@ -104,15 +142,24 @@ impl Override {
     }
 }
 
-fn split_key(key: &str) -> Result<Vec<String>, String> {
+fn split_key(key: &str) -> Result<Vec<String>, OverrideFault> {
     let keys: Vec<String> = key.split('.').map(|k| k.trim().to_owned()).collect();
     if keys.iter().any(String::is_empty) {
-        return Err(format!("`{key}` is no dotted key, as render.max_depth is"));
+        return Err(OverrideFault::Key(key.to_owned()));
     }
     Ok(keys)
 }
 
-impl Node {
+impl TomlNode {
+    /// Whether `table` is a table with `key`.
+    pub(super) fn contains(&self, table: &str, key: &str) -> bool {
+        let Kind::Table(tables) = &self.kind else {
+            return false;
+        };
+        let table = tables.get(table).map(|(_, node)| &node.kind);
+        matches!(table, Some(Kind::Table(keys)) if keys.contains_key(key))
+    }
+
     /// Parses a whole file.
     pub(super) fn parse(text: &str) -> Result<Self, (Place, String)> {
         match DeTable::parse(text) {
@@ -224,7 +271,28 @@ impl Node {
                 }
             };
         }
+        if overlay.is_item {
+            return node.append(&overlay);
+        }
         *node = overlay.node;
+        Ok(())
+    }
+
+    /// Appends the item of `overlay` to this list, which may be a new, empty table.
+    fn append(&mut self, overlay: &Override) -> Result<(), Problem> {
+        let item = overlay.node.clone();
+        let found = self.describe();
+        match &mut self.kind {
+            Kind::Array(items) => items.push(item),
+            Kind::Table(table) if table.is_empty() => self.kind = Kind::Array(vec![item]),
+            _ => {
+                return Err(Problem {
+                    place: overlay.node.place.clone(),
+                    key: overlay.keys.join("."),
+                    what: format!("is {found}, which is no list"),
+                });
+            }
+        }
         Ok(())
     }
 
@@ -249,7 +317,7 @@ impl Kind {
                 .into_iter()
                 .map(|(key, value)| {
                     let at = place(key.span().start);
-                    let node = Node::from_toml(value, place);
+                    let node = TomlNode::from_toml(value, place);
                     (key.into_inner().into_owned(), (at, node))
                 })
                 .collect(),

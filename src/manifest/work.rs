@@ -9,7 +9,8 @@ use std::time::Duration;
 
 use serde_json::{Value as Json, json};
 
-use super::key::{Affects, Keys, section};
+use super::key::Affects;
+use super::keys::{Keys, section};
 use super::value::named;
 use crate::metrics::Bytes;
 
@@ -46,17 +47,17 @@ section! {
     Work {
         /// Threads to use: all, or a number
         ///
-        /// At most 4 for each processor are used: more only get in each other's way.
+        /// At most 4 threads per processor are used; more would slow each other down.
         threads: Option<u32> = None, or("all"), from(1), to(MAX_THREADS), affects(Affects::Nothing),
             flag("threads", "COUNT", "Job");
         /// How progress is shown: auto | plain | json | openjd | none
         progress: ProgressMode = ProgressMode::Auto, affects(Affects::Nothing), flag("progress", "PROGRESS", "Job");
-        /// Render each frame in a process of its own
+        /// Render each frame in a separate process
         isolate: bool = false, affects(Affects::Nothing), flag("isolate", "", "Job");
-        /// Most anonymous memory of such a process: 4GiB, 512MiB
+        /// Maximum anonymous memory per frame, if isolate is set: 4GiB, 512MiB
         memory_ceiling: Option<Bytes> = None, example("\"4GiB\""), unset("no limit"), affects(Affects::Nothing),
             flag("memory-ceiling", "SIZE", "Job");
-        /// How often a frame whose process died is tried again in the same run
+        /// Number of times that a run retries a frame whose process died
         retries: u32 = 1, from(0), to(MAX_RETRIES), affects(Affects::Nothing), flag("retries", "COUNT", "Job");
         /// Seconds without a heartbeat after which another machine's frames are reassigned
         takeover_after: Duration = Duration::from_secs(60), above(0), to(MAX_SECONDS), affects(Affects::Nothing),
@@ -64,7 +65,7 @@ section! {
         /// Seconds that a running frame may take to finish after TERM or Ctrl-C
         grace: Duration = Duration::from_secs(30), from(0), to(MAX_SECONDS), affects(Affects::Nothing),
             flag("grace", "SECONDS", "Job");
-        /// Continue with frames that a running simulation writes
+        /// Render frames while a running simulation writes them
         follow: bool = false, affects(Affects::Nothing), flag("follow", "", "Job");
         /// Seconds without a new frame after which following ends
         idle: Duration = Duration::from_secs(600), above(0), to(MAX_SECONDS), affects(Affects::Nothing),
@@ -73,7 +74,7 @@ section! {
         settle: Duration = Duration::from_secs(2), from(0), to(MAX_SECONDS), affects(Affects::Nothing),
             flag("settle", "SECONDS", "Job");
         /// Following ends when this file appears
-        stop_file: Option<String> = None, example("\"job.stop\""), unset("job.stop beside the images"),
+        stop_file: Option<String> = None, example("\"job.stop\""), unset("job.stop next to the images"),
             affects(Affects::Nothing), flag("stop-file", "FILE", "Job");
     }
 }
@@ -94,7 +95,7 @@ impl Work {
         {
             section.wrong(
                 "memory_ceiling",
-                "is that of a frame's own process; say job.isolate = true (--isolate) too, or render.memory_limit",
+                "applies to the process of a frame; set job.isolate = true too, or use render.memory_limit",
             );
         }
     }

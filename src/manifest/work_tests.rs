@@ -1,11 +1,11 @@
-//! `[job]`, and that every key can be given by `--set`.
+//! The table `[job]`, and every key as an argument of `--set`.
 
 use std::path::Path;
 use std::time::Duration;
 
 use super::*;
 
-/// Keys of `[job]` with a value that is not the default, and what that needs.
+/// Keys of `[job]`, each with a value other than the default, and with the settings that it requires.
 const OTHERS: [(&str, &str); 11] = [
     ("threads=3", ""),
     ("progress=json", ""),
@@ -36,7 +36,7 @@ fn job(sets: [&str; 2]) -> Result<Manifest, ManifestError> {
 }
 
 #[test]
-fn no_image_depends_on_how_the_work_is_gone_about() {
+fn images_do_not_depend_on_job_settings() {
     let plain = Manifest::new("data");
     for entry in plain.entries().list() {
         let is_execution = entry.section == "job";
@@ -53,58 +53,67 @@ fn no_image_depends_on_how_the_work_is_gone_about() {
 }
 
 #[test]
-fn values_that_will_not_do() {
+fn invalid_values() {
     #[track_caller]
     fn refused(set: &str, what: &str) {
         let error = job([set, ""]).unwrap_err();
         assert_eq!(error.messages().len(), 1, "{error}");
-        let wanted = format!("--set job.{set}: job.{what}");
-        assert!(error.to_string().starts_with(&wanted), "{error}");
+        let expected = format!("--set job.{set}: job.{what}");
+        assert!(error.to_string().starts_with(&expected), "{error}");
     }
     for wrong in ["0", "-1", "1025", "1.5", "many", "true"] {
-        let wanted = "threads: wants \"all\" or a whole number from 1 to 1024, not";
-        refused(&format!("threads={wrong}"), wanted);
+        let expected = "threads: expected \"all\" or a whole number from 1 to 1024, found";
+        refused(&format!("threads={wrong}"), expected);
     }
     refused(
         "progress=jsno",
-        "progress: wants one of auto, plain, json, openjd, none, not the text \"jsno\"; did you mean json?",
+        "progress: expected one of auto, plain, json, openjd, none, found the text \"jsno\"; did you mean json?",
     );
-    refused("isolate=1", "isolate: wants true or false");
-    refused("memory_ceiling=0", "memory_ceiling: wants a size above 0");
+    refused("isolate=1", "isolate: expected true or false");
+    refused(
+        "memory_ceiling=0",
+        "memory_ceiling: expected a size above 0",
+    );
     refused(
         "memory_ceiling=4GiB",
-        "memory_ceiling: is that of a frame's own process; say job.isolate = true (--isolate)",
+        "memory_ceiling: applies to the process of a frame; set job.isolate = true too",
     );
-    refused("retries=-1", "retries: wants a whole number from 0 to 100");
-    refused("retries=101", "retries: wants a whole number from 0 to 100");
+    refused(
+        "retries=-1",
+        "retries: expected a whole number from 0 to 100",
+    );
+    refused(
+        "retries=101",
+        "retries: expected a whole number from 0 to 100",
+    );
     for wrong in ["0", "-1", "1.1e9", "inf", "nan", "soon"] {
         for key in ["takeover_after", "idle"] {
             refused(
                 &format!("{key}={wrong}"),
-                &format!("{key}: wants seconds above 0, at most 1e9, not"),
+                &format!("{key}: expected seconds above 0, at most 1e9, found"),
             );
         }
     }
-    refused("settle=-0.1", "settle: wants seconds from 0 to 1e9");
-    refused("stop_file=\"\"", "stop_file: wants a name in quotes");
+    refused("settle=-0.1", "settle: expected seconds from 0 to 1e9");
+    refused("stop_file=\"\"", "stop_file: expected a name in quotes");
     refused("idel=3", "idel: unknown key; did you mean `job.idle`?");
     assert!(job(["threads=all", ""]).unwrap().job.threads.is_none());
 }
 
 #[test]
 fn any_time_is_a_duration() {
-    for (set, wanted) in [
+    for (set, expected) in [
         ("settle=0", Duration::ZERO),
         ("settle=1e-300", Duration::ZERO),
         ("settle=0.25", Duration::from_millis(250)),
         ("settle=1e9", Duration::from_secs(1_000_000_000)),
     ] {
         let work = job([set, ""]).unwrap().job;
-        assert_eq!(work.settle, wanted, "{set}");
+        assert_eq!(work.settle, expected, "{set}");
     }
 }
 
-/// The manifest that all keys are tried on: what some of them need is there.
+/// Keys that require other keys, and these keys with values.
 const NEEDS: [(&str, &[&str]); 3] = [
     ("camera.eye", &["camera.look_at=[1,2,3]"]),
     (
@@ -126,7 +135,7 @@ fn every_key_can_be_set() {
         let all = manifest.entries();
         let found = all.list().iter().find(|e| e.key == *key).unwrap();
         assert_eq!(found.value.as_deref(), Some(value), "{set}");
-        // What is set can be laid over by another value, so it did not pass unread.
+        // The reader checks the key: it rejects a table with an unknown key.
         let error = with(&[&format!("{key}={{ no_such = 1 }}")]).unwrap_err();
         assert!(error.to_string().contains(key), "{error}");
     }

@@ -127,7 +127,7 @@ macro_rules! lane_kernel {
                     $body($($arg),*)
                 }
                 match level.level() {
-                    // SAFETY: `Supported` says that the machine has the instructions of its level.
+                    // SAFETY: `Supported` guarantees that the machine has the instructions of its level.
                     $crate::math::SimdLevel::Avx512 => return unsafe { avx512($($arg),*) },
                     // SAFETY: as above.
                     $crate::math::SimdLevel::Avx2 => return unsafe { avx2($($arg),*) },

@@ -1,11 +1,11 @@
 //! Elementary functions in single precision, without the C library and without branches, so that loops over lanes
 //! vectorise and all platforms give the same bits.
 //!
-//! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`, `sinf`, `cosf`;
-//! "Methods and Programs for Mathematical Functions", 1989). The tests of this file measured the stated errors
-//! against double precision.
+//! The polynomials are those of Moshier's Cephes library (single precision: `exp2f`, `logf`, `asinf`, `atanf`,
+//! `sinf`, `cosf`; "Methods and Programs for Mathematical Functions", 1989). The tests of this file measured the stated
+//! errors against double precision.
 
-use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, LN_2, LOG2_E, PI};
+use std::f32::consts::{FRAC_1_PI, FRAC_PI_2, FRAC_PI_4, LN_2, LOG2_E, PI};
 
 /// Adding and subtracting this constant rounds a number of magnitude below 2^22 to an integer, ties to even.
 const ROUND: f32 = 12_582_912.0;
@@ -118,6 +118,31 @@ pub fn acos(x: f32) -> f32 {
     if is_large { large } else { small }
 }
 
+/// The angle of the vector `(x, y)` from the x axis, -pi to pi, absolute error below 4e-7. 0 for the zero vector.
+#[inline(always)]
+pub fn atan2(y: f32, x: f32) -> f32 {
+    // Reduce to the octant next to the x axis, where tan is 0..=1
+    let (ax, ay) = (x.abs(), y.abs());
+    let is_steep = ay > ax;
+    let (small, large) = if is_steep { (ax, ay) } else { (ay, ax) };
+    let large = if large > 0.0 { large } else { 1.0 };
+    // Above tan(pi/8), use atan(t) = pi/4 + atan((t - 1) / (t + 1))
+    let is_far = small > 0.414_213_57 * large;
+    let (above, below) = (small - large, small + large);
+    let t = if is_far { above / below } else { small / large };
+    let z = t * t;
+    let mut p = 8.053_744_5e-2;
+    p = p * z - 1.387_768_6e-1;
+    p = p * z + 1.997_771_1e-1;
+    p = p * z - 3.333_295e-1;
+    let angle = p * z * t + t;
+    let angle = if is_far { FRAC_PI_4 + angle } else { angle };
+    // Return to the octant of the vector
+    let angle = if is_steep { FRAC_PI_2 - angle } else { angle };
+    let angle = if x < 0.0 { PI - angle } else { angle };
+    angle.copysign(y)
+}
+
 /// Sine and cosine of an angle of magnitude up to 8192 radians, absolute error below 2e-7.
 #[inline(always)]
 #[expect(
@@ -171,15 +196,15 @@ mod tests {
         bound: impl Fn(f64, f64) -> f64,
     ) {
         for x in steps(low, high) {
-            let wanted = exact(f64::from(x));
-            let error = (f64::from(own(x)) - wanted).abs();
-            let most = bound(f64::from(x), wanted);
-            assert!(error <= most, "{x}: {} instead of {wanted}", own(x));
+            let expected = exact(f64::from(x));
+            let error = (f64::from(own(x)) - expected).abs();
+            let most = bound(f64::from(x), expected);
+            assert!(error <= most, "{x}: {} instead of {expected}", own(x));
         }
     }
 
     #[test]
-    fn powers_of_two_keep_their_error() {
+    fn exp2_is_within_its_error_bound() {
         check(-125.0, 127.9, exp2, f64::exp2, |_, y| 2e-7 * y);
         check(-1.0, 1.0, exp2, f64::exp2, |_, y| 2e-7 * y);
         check(-80.0, 80.0, exp, f64::exp, |x, y| {
@@ -195,7 +220,7 @@ mod tests {
     }
 
     #[test]
-    fn logarithms_keep_their_error() {
+    fn log2_is_within_its_error_bound() {
         let bound = |_: f64, y: f64| 2e-7 + 1e-7 * y.abs();
         check(0.3, 3.0, log2, f64::log2, bound);
         check(1e-30, 1e-20, log2, f64::log2, bound);
@@ -206,11 +231,12 @@ mod tests {
     }
 
     #[test]
-    fn powers_keep_their_error() {
+    fn pow_is_within_its_error_bound() {
         for y in [0.5_f32, 1.0, 2.2, 32.0, 500.0] {
             let exponent = f64::from(y);
-            let bound =
-                |x: f64, wanted: f64| wanted * (2e-7 + 2e-7 * exponent * x.log2().abs()) + 1e-37;
+            let bound = |x: f64, expected: f64| {
+                expected * (2e-7 + 2e-7 * exponent * x.log2().abs()) + 1e-37
+            };
             check(1e-3, 1.0, |x| pow(x, y), |x| x.powf(exponent), bound);
         }
         assert_eq!(pow(0.0, 0.0), 1.0);
@@ -220,14 +246,37 @@ mod tests {
     }
 
     #[test]
-    fn arcs_keep_their_error() {
+    fn arc_functions_are_within_their_error_bounds() {
         check(-1.0, 1.0, asin, f64::asin, |_, _| 3e-7);
         check(-1.0, 1.0, acos, f64::acos, |_, _| 4e-7);
         assert_eq!((asin(0.0), acos(1.0)), (0.0, 0.0));
     }
 
     #[test]
-    fn sine_and_cosine_keep_their_error() {
+    fn angles_of_vectors_are_within_their_error_bounds() {
+        for angle in steps(-std::f32::consts::PI, std::f32::consts::PI) {
+            let exact = f64::from(angle);
+            for length in [1e-20, 1.0, 3e4] {
+                #[expect(clippy::cast_possible_truncation, reason = "the argument is f32")]
+                let (x, y) = ((length * exact.cos()) as f32, (length * exact.sin()) as f32);
+                let expected = f64::from(y).atan2(f64::from(x));
+                let error = (f64::from(atan2(y, x)) - expected).abs();
+                assert!(
+                    error < 4e-7,
+                    "{x} {y}: {} instead of {expected}",
+                    atan2(y, x)
+                );
+            }
+        }
+        assert_eq!(atan2(0.0, 0.0), 0.0);
+        assert_eq!(atan2(0.0, -1.0), PI);
+        assert_eq!(atan2(1.0, 0.0), FRAC_PI_2);
+        assert_eq!(atan2(-2.0, 0.0), -FRAC_PI_2);
+        assert!(atan2(f32::NAN, 1.0).is_nan());
+    }
+
+    #[test]
+    fn sine_and_cosine_are_within_their_error_bounds() {
         for (low, high) in [(-8.0, 8.0), (-8192.0, 8192.0)] {
             check(low, high, |x| sin_cos(x).0, f64::sin, |_, _| 2e-7);
             check(low, high, |x| sin_cos(x).1, f64::cos, |_, _| 2e-7);

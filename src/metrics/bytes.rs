@@ -3,6 +3,8 @@
 use std::fmt;
 use std::str::FromStr;
 
+use spherule_formats::ValueError;
+
 /// A number of bytes. Displayed in binary units with three digits (`1.25 GiB`).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub struct Bytes(pub u64);
@@ -26,12 +28,11 @@ const UNITS: [(&str, u64); 13] = [
 ];
 
 impl FromStr for Bytes {
-    type Err = String;
+    type Err = ValueError;
 
     /// `4GiB`, `1.5G`, `512MiB`, `4GB`, `4294967296`: a number without a unit is in bytes.
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong =
-            || format!("{text:?} is no size; write it as 4GiB, 512MiB or a number of bytes");
+    fn from_str(text: &str) -> Result<Self, ValueError> {
+        let wrong = || ValueError::new("a size, such as 4GiB, 512MiB or a number of bytes", text);
         let trimmed = text.trim();
         let digits = trimmed.find(|c: char| !c.is_ascii_digit() && c != '.');
         let (number, unit) = trimmed.split_at(digits.unwrap_or(trimmed.len()));
@@ -85,7 +86,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn sizes_as_people_write_them() {
+    fn parses_sizes_with_units() {
         for (text, bytes) in [
             ("4096", 4096),
             ("0", 0),
@@ -115,12 +116,12 @@ mod tests {
             ".",
         ] {
             let error = text.parse::<Bytes>().unwrap_err();
-            assert!(error.contains("4GiB"), "{text}: {error}");
+            assert!(error.expected.contains("4GiB"), "{text}: {error}");
         }
     }
 
     #[test]
-    fn sizes_as_people_read_them() {
+    fn formats_sizes_with_three_digits() {
         for (bytes, text) in [
             (0, "0 B"),
             (1023, "1023 B"),

@@ -3,8 +3,8 @@
 //! `VmHWM` is the exact peak of all resident memory, including mapped files; the kernel separates only the current
 //! value into anonymous and file-backed pages. If no data are mapped, the file-backed pages are the code of the
 //! program, a few MiB that only grow. So [`MemoryPeaks`] computes the peak of anonymous memory as `VmHWM` minus the
-//! largest file-backed part seen, which misses nothing between two samples. If frames are mapped, their pages come
-//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::looks_only`]), so
+//! largest sampled file-backed part, which misses nothing between two samples. If frames are mapped, their pages come
+//! and go, and would be counted. Then the peak is the largest sample of `RssAnon` ([`MemoryPeaks::use_samples_only`]), so
 //! samples must be taken where it is highest, at the ends of phases.
 
 use std::fs;
@@ -79,31 +79,33 @@ impl MemoryUse {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct MemoryPeaks {
     /// Heap and stacks: the larger of `total` minus `file` and any sample of `RssAnon`, or only the latter
-    /// ([`Self::looks_only`]).
+    /// ([`Self::use_samples_only`]).
     pub anonymous: u64,
     /// Mapped files, largest sample ([`MemoryUse::file`]).
     pub file: u64,
     /// Everything, at any time (`VmHWM`).
     pub total: u64,
     /// Heap and stacks, largest sample.
-    seen: u64,
-    looks_only: bool,
+    sampled_anonymous: u64,
+    use_samples_only: bool,
 }
 
 impl MemoryPeaks {
     /// From now on data files are mapped: only samples of anonymous memory count.
-    pub fn looks_only(&mut self) {
-        self.looks_only = true;
+    pub fn use_samples_only(&mut self) {
+        self.use_samples_only = true;
     }
 
     /// Adds the sample `now`.
-    pub fn take_in(&mut self, now: MemoryUse) {
+    pub fn update(&mut self, now: MemoryUse) {
         self.file = self.file.max(now.file);
         self.total = self.total.max(now.peak);
-        self.seen = self.seen.max(now.anonymous);
-        self.anonymous = match self.looks_only {
-            true => self.seen,
-            false => self.seen.max(self.total.saturating_sub(self.file)),
+        self.sampled_anonymous = self.sampled_anonymous.max(now.anonymous);
+        self.anonymous = match self.use_samples_only {
+            true => self.sampled_anonymous,
+            false => self
+                .sampled_anonymous
+                .max(self.total.saturating_sub(self.file)),
         };
     }
 }
@@ -113,29 +115,29 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_peak_between_two_looks_counts() {
+    fn peak_between_two_samples_counts() {
         let mut peaks = MemoryPeaks::default();
         let use_of = |peak, anonymous, file| MemoryUse {
             peak,
             anonymous,
             file,
         };
-        peaks.take_in(use_of(100, 30, 8));
+        peaks.update(use_of(100, 30, 8));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (92, 8, 100));
-        peaks.take_in(use_of(100, 40, 10));
+        peaks.update(use_of(100, 40, 10));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (90, 10, 100));
-        // Files let go by then: what was seen holds.
-        peaks.take_in(use_of(140, 95, 60));
+        // The maps were closed before the second sample; the peak remains.
+        peaks.update(use_of(140, 95, 60));
         assert_eq!((peaks.anonymous, peaks.file, peaks.total), (95, 60, 140));
     }
 
     #[test]
-    fn pages_of_mapped_frames_are_no_anonymous_memory() {
+    fn mapped_pages_are_not_anonymous_memory() {
         let mut peaks = MemoryPeaks::default();
-        peaks.looks_only();
-        // The map was larger between two looks.
+        peaks.use_samples_only();
+        // The map was larger between two samples.
         for (peak, anonymous, file) in [(1000, 50, 600), (1000, 40, 20)] {
-            peaks.take_in(MemoryUse {
+            peaks.update(MemoryUse {
                 peak,
                 anonymous,
                 file,
@@ -145,7 +147,7 @@ mod tests {
     }
 
     #[test]
-    fn reads_the_kernels_table() {
+    fn parses_proc_status() {
         let status = "Name:\tx\nVmHWM:\t    2048 kB\nRssAnon:\t 1024 kB\nRssFile:\t   12 kB\nRssShmem: 4 kB\n";
         let expected = MemoryUse {
             peak: 2 << 20,

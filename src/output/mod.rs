@@ -1,5 +1,6 @@
-//! Films to bytes: OpenEXR for work, PNG to look at. Encodes into memory; putting a file in place
-//! whole is the caller's. And back: whether such a file is sound.
+//! Encodes films as OpenEXR images and PNG previews, and verifies such files.
+//!
+//! This module opens no files: callers pass readers and writers, and publish complete files.
 
 mod exr;
 mod preview;
@@ -8,7 +9,8 @@ pub mod view;
 
 pub use exr::{
     Compression, CustomAttribute, EncodedExr, ExrLayout, ExrOptions, OutputError, PackBuffers,
-    PackedBlock, encode_exr, pack_block, write_blocks, write_exr,
+    PackedBlock, TextAttribute, ambiguous_name, attribute_planes, encode_exr, pack_block,
+    write_blocks, write_exr,
 };
 pub use preview::{PreviewOptions, encode_preview};
 pub use verify::{ImageFault, ImageShape, verify_exr, verify_preview};

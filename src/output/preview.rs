@@ -1,4 +1,4 @@
-//! A PNG to look at: the film over an opaque background, through the view transform.
+//! PNG previews: the film over an opaque background, after the view transform.
 
 use glam::Vec3;
 use image::{ExtendedColorType, ImageEncoder, codecs::png::PngEncoder};
@@ -11,14 +11,15 @@ use crate::math::Supported;
 use crate::math::functions::exp2;
 use crate::render::Film;
 
-/// How to show a film.
+/// Settings of a preview.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct PreviewOptions {
-    /// Brightens by this many stops (factors of two).
+    /// Exposure in stops: each stop doubles the brightness.
     pub exposure: f32,
-    /// What lies behind a film that was rendered with a transparent background (linear RGB). A film
-    /// that has its background in its colours shows that: leave this `None`.
+    /// Linear RGB behind a film with a transparent background. `None` for a film whose colours include the background.
     pub backdrop: Option<Vec3>,
+    /// Column and row of the first pixel in the whole image, so that the dithering of a part is that of the whole.
+    pub first_pixel: [i32; 2],
 }
 
 /// Encodes `film` as an 8-bit sRGB PNG, dithered.
@@ -34,13 +35,14 @@ pub fn encode_preview(film: &Film, options: &PreviewOptions) -> Result<Vec<u8>, 
     for (y, (row, bytes)) in (0..film.height).zip(rows) {
         let pixels = linear.as_chunks_mut().0.iter_mut();
         for (pixel, &[r, g, b, a]) in pixels.zip(row) {
-            let behind = options.backdrop.unwrap_or_default() * (1.0 - a);
-            *pixel = view_transform((Vec3::new(r, g, b) + behind) * gain).to_array();
+            let background = options.backdrop.unwrap_or_default() * (1.0 - a);
+            *pixel = view_transform((Vec3::new(r, g, b) + background) * gain).to_array();
         }
         let pixels = thresholds.as_chunks_mut::<3>().0.iter_mut();
+        let [left, top] = options.first_pixel.map(i32::cast_unsigned);
         for (pixel, x) in pixels.zip(0..film.width) {
-            // One threshold for all components: grey stays grey.
-            *pixel = [dither_threshold(x, y); 3];
+            // One threshold for all components, so that grey stays grey
+            *pixel = [dither_threshold(left.wrapping_add(x), top.wrapping_add(y)); 3];
         }
         bytes_from_linear(Supported::default(), &linear, &thresholds, bytes);
     }
@@ -69,7 +71,7 @@ mod tests {
         film
     }
 
-    /// The mean of each component of a film of one `color`, in bytes.
+    /// Mean of each 8-bit component in the preview of a film of one `color`.
     fn mean(color: [f32; 4], options: &PreviewOptions) -> Vec3 {
         let image = decode(&encode_preview(&film(color), options).unwrap());
         let count = f32::from(u8::try_from(image.pixels().len()).unwrap());
@@ -78,8 +80,8 @@ mod tests {
     }
 
     fn assert_near(shown: f32, linear: f32) {
-        let wanted = 255.0 * srgb_from_linear(linear);
-        assert!((shown - wanted).abs() < 0.05, "{shown} {wanted}");
+        let expected = 255.0 * srgb_from_linear(linear);
+        assert!((shown - expected).abs() < 0.05, "{shown} {expected}");
     }
 
     #[test]
@@ -104,8 +106,8 @@ mod tests {
     }
 
     #[test]
-    fn a_faint_gradient_has_no_bands() {
-        // Three bytes from left to right: in bands each would be hundreds of pixels wide.
+    fn faint_gradient_has_no_banding() {
+        // The gradient spans about three 8-bit values. Without dithering, each band would be hundreds of pixels wide.
         let mut film = Film::new(600, 16, Channels::COLOR);
         for (index, color) in film.color.iter_mut().enumerate() {
             let across = (index % 600) as f32 / 600.0;
@@ -113,12 +115,15 @@ mod tests {
         }
         let image = decode(&encode_preview(&film, &PreviewOptions::default()).unwrap());
         for left in (0..600).step_by(16).filter(|left| left + 16 <= 600) {
-            let (mut shown, mut wanted) = (0.0, 0.0);
+            let (mut shown, mut expected) = (0.0, 0.0);
             for (x, y) in (0..256).map(|i| (left + i % 16, i / 16)) {
                 shown += f32::from(image.get_pixel(x, y).0[0]) / 256.0;
-                wanted += 255.0 * srgb_from_linear(0.2 + 0.006 * x as f32 / 600.0) / 256.0;
+                expected += 255.0 * srgb_from_linear(0.2 + 0.006 * x as f32 / 600.0) / 256.0;
             }
-            assert!((shown - wanted).abs() < 0.05, "{left}: {shown} {wanted}");
+            assert!(
+                (shown - expected).abs() < 0.05,
+                "{left}: {shown} {expected}"
+            );
         }
     }
 
@@ -126,12 +131,13 @@ mod tests {
     fn exposure_and_backdrop() {
         let options = PreviewOptions {
             exposure: 1.0,
-            backdrop: None,
+            ..PreviewOptions::default()
         };
         assert_near(mean([0.18, 0.0, 0.0, 1.0], &options).x, 0.36);
         let options = PreviewOptions {
             exposure: 0.0,
             backdrop: Some(Vec3::new(0.18, 0.2, 0.0)),
+            ..PreviewOptions::default()
         };
         assert_near(mean([0.09, 0.0, 0.0, 0.5], &options).x, 0.18);
     }

@@ -1,9 +1,9 @@
-//! Whether images are what they were written as: every block of every channel decoded, with the size and
-//! the channels they must have. Block by block and row by row: an image is never in memory as a whole.
+//! Verifies image files: decodes every block of every channel, and compares size and channels with those of the job.
+//! Works block by block and row by row, so that an image is never in memory as a whole.
 //!
-//! Damage inside a block is found where its compression has a checksum (`zip` and `zips`, by Adler-32; all
-//! previews) or cannot be undone. A block without compression, as all are in files without, may hold any
-//! numbers.
+//! Damage inside a block is found if the compression has a checksum (Adler-32 in `zip` and `zips`; all previews have
+//! checksums), or if the block cannot be decompressed. Uncompressed blocks may contain any numbers, so damage in them
+//! is not found.
 
 use std::io::{BufRead, Read, Seek};
 
@@ -12,40 +12,53 @@ use exr::meta::attribute::{ChannelDescription, SampleType};
 use exr::meta::header::Header;
 use thiserror::Error;
 
-use super::exr::planes::planes;
-use crate::render::Channels;
+use super::exr::planes::{attribute_planes, planes};
+use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
+use crate::render::{Channels, DataWindow};
 
-/// What an image of a job must be.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+/// The expected size and channels of an image.
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ImageShape {
-    /// Pixels across.
+    /// Width of the data window in pixels.
     pub width: u32,
-    /// Pixels down.
+    /// Height of the data window in pixels.
     pub height: u32,
-    /// What is in it.
+    /// Position of the data window in the image.
+    pub window: DataWindow,
+    /// The channels, without attributes.
     pub channels: Channels,
+    /// Names of the attributes with channels; their number of components is not known.
+    pub attributes: Vec<String>,
 }
 
 /// What is wrong with an image.
 #[derive(Debug, Error)]
 pub enum ImageFault {
-    /// It is another picture.
-    #[error("is {}x{}, {}x{} is wanted", found.0, found.1, wanted.0, wanted.1)]
+    /// It has another size.
+    #[error("is {}x{}, expected {}x{}", found.0, found.1, expected.0, expected.1)]
     Size {
-        /// Width and height of the file.
+        /// Width and height of the image, pixels.
         found: (usize, usize),
-        /// Width and height it must have.
-        wanted: (u32, u32),
+        /// Expected width and height, pixels.
+        expected: (u32, u32),
     },
-    /// It holds other channels, or of another type.
-    #[error("has the channels {found}, {wanted} are wanted")]
-    Channels {
-        /// Those of the file.
+    /// It is another part of the image, or a part of an image of another size.
+    #[error("has the data window {found}, expected {expected}")]
+    Window {
+        /// The windows of the file.
         found: String,
-        /// Those it must have.
-        wanted: String,
+        /// The expected windows.
+        expected: String,
     },
-    /// The file breaks its format, or cannot be read.
+    /// It has other channels, or channels of another type.
+    #[error("has the channels {found}, expected {expected}")]
+    Channels {
+        /// The channels of the file, with their types.
+        found: String,
+        /// The expected channels, with their types.
+        expected: String,
+    },
+    /// The file violates its format, or cannot be read.
     #[error("{0}")]
     Damaged(String),
 }
@@ -62,21 +75,21 @@ impl From<png::DecodingError> for ImageFault {
     }
 }
 
-/// Decodes the OpenEXR file `file`.
+/// Decodes the OpenEXR file `file` and compares it with `expected`.
 ///
 /// # Errors
-/// The first fault.
-pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), ImageFault> {
+/// The first fault found.
+pub fn verify_exr(file: impl Read + Seek, expected: &ImageShape) -> Result<(), ImageFault> {
     let reader = exr::block::read(file, true)?;
     let meta = reader.meta_data().clone();
     let [header] = &meta.headers[..] else {
         let count = meta.headers.len();
         return Err(ImageFault::Damaged(format!("has {count} parts, not one")));
     };
-    // Before anything as large as the header says is made.
-    check_header(header, wanted)?;
+    // Check the size before memory is allocated for the size in the header
+    check_header(header, expected)?;
+    // Decode the blocks at the offsets in the file, like viewers do
     let mut rows = 0;
-    // By the offsets in the file, as viewers do.
     for chunk in reader.filter_chunks(true, |_, _, _| true)? {
         let block = UncompressedBlock::decompress_chunk(chunk?, &meta, true)?;
         let (at, size) = (block.index.pixel_position, block.index.pixel_size);
@@ -97,55 +110,98 @@ pub fn verify_exr(file: impl Read + Seek, wanted: &ImageShape) -> Result<(), Ima
     }
 }
 
-fn check_header(header: &Header, wanted: &ImageShape) -> Result<(), ImageFault> {
+fn check_header(header: &Header, expected: &ImageShape) -> Result<(), ImageFault> {
     let size = (header.layer_size.x(), header.layer_size.y());
-    check_size(size, wanted)?;
+    check_size(size, expected)?;
+    check_window(header, &expected.window)?;
     let found = header.channels.list.iter();
     let found = found.map(|c| (c.name.to_string(), c.sample_type));
     let found: Vec<(String, SampleType)> = found.collect();
-    let planes = planes(wanted.channels).into_iter();
+    let mut channels = expected.channels;
+    let attributes = attributes(&found, &expected.attributes);
+    channels.layers.attributes = u8::try_from(attributes.len()).unwrap_or(u8::MAX);
+    let planes = planes(channels, &attributes).into_iter();
     let planes: Vec<_> = planes
-        .map(|plane| (plane.name.to_owned(), plane.sample_type()))
+        .map(|plane| (plane.name.to_string(), plane.sample_type()))
         .collect();
-    let is_whole = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
-    let are_whole = header.channels.list.iter().all(is_whole);
-    if are_whole && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {
+    let has_all_pixels = |c: &ChannelDescription| c.sampling.x() == 1 && c.sampling.y() == 1;
+    let is_complete = header.channels.list.iter().all(has_all_pixels);
+    if is_complete && found.len() == planes.len() && planes.iter().all(|p| found.contains(p)) {
         return Ok(());
     }
     Err(ImageFault::Channels {
         found: listed(&found),
-        wanted: listed(&planes),
+        expected: listed(&planes),
     })
 }
 
-fn check_size(found: (usize, usize), wanted: &ImageShape) -> Result<(), ImageFault> {
-    let wanted = (wanted.width, wanted.height);
-    if found == (wanted.0 as usize, wanted.1 as usize) {
+/// The names of the planes of attributes `names`, with the number of components that each has among the channels
+/// `found`.
+fn attributes(found: &[(String, SampleType)], names: &[String]) -> Vec<String> {
+    let is_found = |plane: &String| found.iter().any(|(name, _)| name == plane);
+    let planes = |name: &String| {
+        let counts = (1..=MAX_ATTRIBUTE_FLOATS).rev();
+        let mut all = counts.map(|count| attribute_planes(name, count));
+        let complete = all.find(|planes| planes.iter().all(is_found));
+        complete.unwrap_or_else(|| attribute_planes(name, 1))
+    };
+    names.iter().flat_map(planes).collect()
+}
+
+fn check_size(found: (usize, usize), expected: &ImageShape) -> Result<(), ImageFault> {
+    let expected = (expected.width, expected.height);
+    if found == (expected.0 as usize, expected.1 as usize) {
         Ok(())
     } else {
-        Err(ImageFault::Size { found, wanted })
+        Err(ImageFault::Size { found, expected })
     }
 }
 
+/// Compares the position of the data window and the display window.
+fn check_window(header: &Header, expected: &DataWindow) -> Result<(), ImageFault> {
+    let at = header.own_attributes.layer_position;
+    let image = header.shared_attributes.display_window;
+    let side = |side: usize| i64::try_from(side).unwrap_or(i64::MAX);
+    let found = [at.x(), at.y(), image.position.x(), image.position.y()].map(i64::from);
+    let wanted = [expected.left, expected.top, 0, 0].map(i64::from);
+    let found_size = [side(image.size.x()), side(image.size.y())];
+    let wanted_size = expected.image.map(i64::from);
+    if found == wanted && found_size == wanted_size {
+        return Ok(());
+    }
+    let text = |[x, y, left, top]: [i64; 4], [width, height]: [i64; 2]| {
+        format!("at ({x}, {y}) in an image of {width}x{height} at ({left}, {top})")
+    };
+    Err(ImageFault::Window {
+        found: text(found, found_size),
+        expected: text(wanted, wanted_size),
+    })
+}
+
+/// Names and types of channels for messages.
 fn listed(planes: &[(String, SampleType)]) -> String {
-    let told = |(name, kind): &(String, SampleType)| match kind {
+    let description = |(name, kind): &(String, SampleType)| match kind {
         SampleType::F16 => format!("{name} (half)"),
         SampleType::F32 => format!("{name} (float)"),
         SampleType::U32 => format!("{name} (uint)"),
     };
-    planes.iter().map(told).collect::<Vec<_>>().join(", ")
+    planes
+        .iter()
+        .map(description)
+        .collect::<Vec<_>>()
+        .join(", ")
 }
 
-/// Decodes the PNG file `file`.
+/// Decodes the PNG file `file` and compares its size with `expected`.
 ///
 /// # Errors
-/// The first fault.
-pub fn verify_preview(file: impl BufRead + Seek, wanted: &ImageShape) -> Result<(), ImageFault> {
+/// The first fault found.
+pub fn verify_preview(file: impl BufRead + Seek, expected: &ImageShape) -> Result<(), ImageFault> {
     let mut options = png::DecodeOptions::default();
     options.set_ignore_checksums(false);
     let mut decoder = png::Decoder::new_with_options(file, options);
     let header = decoder.read_header_info()?;
-    check_size((header.width as usize, header.height as usize), wanted)?;
+    check_size((header.width as usize, header.height as usize), expected)?;
     let mut reader = decoder.read_info()?;
     while reader.next_row()?.is_some() {}
     Ok(reader.finish()?)

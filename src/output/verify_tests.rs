@@ -6,7 +6,8 @@ use super::*;
 use crate::output::{Compression, ExrOptions, PreviewOptions, encode_exr, encode_preview};
 use crate::render::Film;
 
-/// Not even, and with few values, so that compression has something to do and every block is stored compressed.
+/// An irregular film with few different values, so that every block is smaller when compressed and is stored
+/// compressed.
 fn film(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
     for (at, color) in film.color.iter_mut().enumerate() {
@@ -28,16 +29,18 @@ const fn shape(channels: Channels) -> ImageShape {
     ImageShape {
         width: 40,
         height: 37,
+        window: DataWindow::whole(40, 37),
         channels,
+        attributes: Vec::new(),
     }
 }
 
-fn verify(bytes: &[u8], wanted: &ImageShape) -> Result<(), String> {
-    verify_exr(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
+fn verify(bytes: &[u8], expected: &ImageShape) -> Result<(), String> {
+    verify_exr(Cursor::new(bytes), expected).map_err(|e| e.to_string())
 }
 
-/// Every choice of channels.
-fn choices() -> impl Iterator<Item = Channels> {
+/// All combinations of channels.
+fn channel_sets() -> impl Iterator<Item = Channels> {
     (0..64_u32).map(|bits| Channels {
         depth: bits & 1 != 0,
         normal: bits & 2 != 0,
@@ -45,12 +48,43 @@ fn choices() -> impl Iterator<Item = Channels> {
         velocity: bits & 8 != 0,
         albedo: bits & 16 != 0,
         id: bits & 32 != 0,
+        ..Channels::COLOR
     })
 }
 
 #[test]
-fn what_is_written_is_sound() {
-    for channels in choices() {
+fn another_part_of_the_image_is_a_fault() {
+    let film = film(40, 37, Channels::COLOR);
+    let window = DataWindow {
+        left: 3,
+        top: -8,
+        image: [64, 48],
+    };
+    let options = ExrOptions {
+        window: Some(window),
+        ..ExrOptions::default()
+    };
+    let bytes = encode_exr(&film, &options).unwrap().bytes;
+    let expected = |window| ImageShape {
+        window,
+        ..shape(Channels::COLOR)
+    };
+    assert_eq!(verify(&bytes, &expected(window)), Ok(()));
+    let moved = DataWindow { left: 4, ..window };
+    let larger = DataWindow {
+        image: [64, 49],
+        ..window
+    };
+    for other in [moved, larger] {
+        let fault = verify(&bytes, &expected(other)).unwrap_err();
+        let found = "has the data window at (3, -8) in an image of 64x48 at (0, 0), expected";
+        assert!(fault.starts_with(found), "{fault}");
+    }
+}
+
+#[test]
+fn written_files_verify() {
+    for channels in channel_sets() {
         let bytes = exr(&film(40, 37, channels), Compression::Zip);
         assert_eq!(verify(&bytes, &shape(channels)), Ok(()), "{channels:?}");
     }
@@ -67,28 +101,28 @@ fn what_is_written_is_sound() {
 }
 
 #[test]
-fn another_picture_is_a_fault() {
+fn wrong_size_or_channels_are_faults() {
     let bytes = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
-    let mut wanted = shape(Channels::COLOR);
-    wanted.height = 38;
+    let mut expected = shape(Channels::COLOR);
+    expected.height = 38;
     assert_eq!(
-        verify(&bytes, &wanted).unwrap_err(),
-        "is 40x37, 40x38 is wanted"
+        verify(&bytes, &expected).unwrap_err(),
+        "is 40x37, expected 40x38"
     );
-    let wanted = shape(Channels {
+    let expected = shape(Channels {
         id: true,
         ..Channels::COLOR
     });
     assert_eq!(
-        verify(&bytes, &wanted).unwrap_err(),
+        verify(&bytes, &expected).unwrap_err(),
         "has the channels A (half), B (half), G (half), R (half), \
-         R (half), G (half), B (half), A (half), id.I (uint) are wanted"
+         expected R (half), G (half), B (half), A (half), id.I (uint)"
     );
     let more = exr(&film(40, 37, Channels::ALL), Compression::Zip);
     assert!(verify(&more, &shape(Channels::COLOR)).is_err());
 }
 
-/// All samples, block by block.
+/// All samples of a file, block by block.
 fn samples(bytes: &[u8]) -> Vec<u8> {
     let reader = exr::block::read(Cursor::new(bytes), true).unwrap();
     let meta = reader.meta_data().clone();
@@ -102,12 +136,12 @@ fn samples(bytes: &[u8]) -> Vec<u8> {
         .collect()
 }
 
-/// Where the table of offsets begins: blocks follow it to the end of the file.
+/// Start of the table of block offsets. The blocks follow it, up to the end of the file.
 fn end_of_header(bytes: &[u8]) -> usize {
     let reader = exr::block::read(Cursor::new(bytes), true).unwrap();
     let chunks = reader.all_chunks(true).unwrap().map(Result::unwrap);
     let lengths = chunks.map(|chunk| match chunk.compressed_block {
-        // With its offset, its row and its length.
+        // Plus the entry in the table (8 bytes), the row (4) and the length (4)
         CompressedBlock::ScanLine(block) => block.compressed_pixels_le.len() + 8 + 4 + 4,
         other => panic!("{other:?}"),
     });
@@ -115,7 +149,7 @@ fn end_of_header(bytes: &[u8]) -> usize {
 }
 
 #[test]
-fn flipped_bits_that_change_a_pixel_are_found() {
+fn flipped_bits_that_change_a_pixel_are_detected() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Zip);
     let good = samples(&bytes);
     let start = end_of_header(&bytes);
@@ -124,23 +158,23 @@ fn flipped_bits_that_change_a_pixel_are_found() {
         for bit in 0..8 {
             let mut damaged = bytes.clone();
             damaged[at] ^= 1 << bit;
-            // The last byte of a block has bits that mean nothing.
+            // The last byte of a block has unused bits, so some flips change no sample
             let is_sound = verify(&damaged, &shape(Channels::ALL)).is_ok();
             missed += usize::from(is_sound && samples(&damaged) != good);
         }
     }
-    // Adler-32 is weak where there are few values: some ways of moving bytes about pass it.
+    // Adler-32 is weak for data with few different values: some permutations of bytes have the same checksum
     let all = 8 * (bytes.len() - start);
     assert!(missed * 100 < all, "{missed} of {all}");
 }
 
 #[test]
-fn a_file_cut_short_is_found_and_costs_no_memory() {
+fn truncated_files_are_detected_and_huge_sizes_allocate_nothing() {
     let bytes = exr(&film(40, 37, Channels::ALL), Compression::Piz);
     for length in 0..bytes.len() {
         assert!(verify(&bytes[..length], &shape(Channels::ALL)).is_err());
     }
-    // A picture of absurd size is refused before anything is made for it.
+    // An absurd size in the header is rejected before memory is allocated
     let mut huge = exr(&film(40, 37, Channels::COLOR), Compression::Zip);
     let window = b"dataWindow\0box2i\0";
     let at = huge
@@ -155,21 +189,21 @@ fn a_file_cut_short_is_found_and_costs_no_memory() {
 #[test]
 fn previews_are_decoded_to_their_last_byte() {
     let png = encode_preview(&film(40, 37, Channels::COLOR), &PreviewOptions::default()).unwrap();
-    let verify = |bytes: &[u8], wanted: &ImageShape| {
-        verify_preview(Cursor::new(bytes), wanted).map_err(|e| e.to_string())
+    let verify = |bytes: &[u8], expected: &ImageShape| {
+        verify_preview(Cursor::new(bytes), expected).map_err(|e| e.to_string())
     };
-    let wanted = shape(Channels::COLOR);
-    assert_eq!(verify(&png, &wanted), Ok(()));
+    let expected = shape(Channels::COLOR);
+    assert_eq!(verify(&png, &expected), Ok(()));
     for at in 0..png.len() {
         let mut damaged = png.clone();
         damaged[at] ^= 4;
-        assert!(verify(&damaged, &wanted).is_err(), "byte {at} flipped");
-        assert!(verify(&png[..at], &wanted).is_err(), "cut at byte {at}");
+        assert!(verify(&damaged, &expected).is_err(), "byte {at} flipped");
+        assert!(verify(&png[..at], &expected).is_err(), "cut at byte {at}");
     }
-    let mut other = wanted;
+    let mut other = expected;
     other.width = 41;
     assert_eq!(
         verify(&png, &other).unwrap_err(),
-        "is 40x37, 41x37 is wanted"
+        "is 40x37, expected 41x37"
     );
 }

@@ -1,23 +1,24 @@
-//! From scene light to a screen: highlights beyond white, the sRGB transfer function, and 8 bits.
+//! The view transform, from linear scene light to 8-bit sRGB: highlights brighter than white, the sRGB transfer
+//! function, and dithering.
 //!
-//! Colours whose brightest component stays within 1 are left exactly as they are, so that a white background is
-//! white and colours of a colour map are those of its legend. A shoulder below 1, as tone mappers for film have,
-//! would need room there and make every white grey (243 of 255 with a knee at 0.8). Brighter colours follow the
-//! part of Khronos's PBR neutral tone mapper (2024) that keeps hues: all components are scaled until the brightest
-//! is 1, and the more light that takes away, the more the colour loses saturation, so that a highlight on a
-//! coloured sphere still has a gradient and ends white. Shades of grey beyond 1 are white.
+//! Colours whose brightest component is at most 1 do not change, so that a white background is white and the colours
+//! of a colour map match its legend. A shoulder below 1, as in filmic tone mappers, would compress them and turn white
+//! into grey (243 of 255 with a knee at 0.8). Brighter colours follow the hue-preserving part of the Khronos PBR
+//! Neutral tone mapper (2024): all components are scaled so that the brightest becomes 1, and brighter colours lose
+//! more saturation. A highlight on a coloured sphere therefore still has a gradient and ends in white. Shades of grey
+//! above 1 become white.
 
 use glam::Vec3;
 
 use crate::math::functions::pow;
 use crate::math::lane_kernel;
 
-/// How fast highlights go to white with the light that is taken away.
+/// Rate at which highlights fade to white with the amount of light above 1; the value of the Khronos tone mapper.
 const DESATURATION: f32 = 0.15;
 
-/// Linear scene light to linear screen light in 0 to 1.
+/// Converts linear scene light to linear display light in 0 to 1.
 pub fn view_transform(color: Vec3) -> Vec3 {
-    // NaN must not spread; a screen shows no negative light.
+    // Replace NaN by 0, and negative light, which a display cannot show
     let color = Vec3::select(color.is_nan_mask(), Vec3::ZERO, color);
     let color = color.clamp(Vec3::ZERO, Vec3::splat(f32::MAX));
     let peak = color.max_element();
@@ -38,8 +39,9 @@ pub fn srgb_from_linear(linear: f32) -> f32 {
     }
 }
 
-/// A screen's byte for linear light, rounded up where what is left of it is above `1 - threshold`: 0.5 rounds to the
-/// nearest. Thresholds between 1/512 and 511/512 leave light that is a byte's own as that byte.
+/// The 8-bit sRGB value of linear light, with a rounding threshold for dithering: fractions of at least
+/// `1 - threshold` are rounded up, so 0.5 rounds to nearest. Light that is exactly an 8-bit value keeps this value with
+/// every threshold between 1/512 and 511/512.
 #[inline(always)]
 #[expect(
     clippy::cast_possible_truncation,
@@ -51,7 +53,7 @@ pub fn byte_from_linear(linear: f32, threshold: f32) -> u8 {
 }
 
 lane_kernel! {
-    /// [`byte_from_linear`] for many values at once; all slices are of one length.
+    /// [`byte_from_linear`] for many values at once; all slices have the same length.
     pub(super) fn bytes_from_linear(linear: &[f32], thresholds: &[f32], bytes: &mut [u8]) = bytes_body;
 }
 
@@ -62,13 +64,13 @@ fn bytes_body(linear: &[f32], thresholds: &[f32], bytes: &mut [u8]) {
     }
 }
 
-/// Where the pixel in column `x` and row `y` rounds up, from 1/512 to 511/512: dithering, so that gradients do not
-/// band in 8 bits.
+/// The rounding threshold of the pixel in column `x` and row `y`, from 1/512 to 511/512. It dithers 8-bit images, so
+/// that gradients have no bands.
 ///
-/// The fractions `x / p + y / p^2`, with `p` the plastic number, fill the interval evenly over any few neighbouring
-/// pixels, much as blue noise does but without a table (Roberts, "The unreasonable effectiveness of quasirandom
-/// sequences", 2018). The triangle wave takes away the jump from 1 to 0. All of it are integers, so that pictures
-/// are the same everywhere.
+/// The fractional parts of `x / p + y / p^2`, with the plastic number `p`, fill the interval evenly over small groups
+/// of neighbouring pixels, similar to blue noise but without a table (Roberts, "The unreasonable effectiveness of
+/// quasirandom sequences", 2018). A triangle wave removes the jump from 1 to 0. All arithmetic is on integers, so the
+/// images are the same on every machine.
 pub fn dither_threshold(x: u32, y: u32) -> f32 {
     /// `2^32 / p` and `2^32 / p^2`.
     const STEPS: [u32; 2] = [3_242_174_889, 2_447_445_414];
@@ -86,7 +88,7 @@ mod tests {
     use crate::math::{SimdLevel, Supported};
 
     #[test]
-    fn what_a_screen_can_show_stays_true() {
+    fn colours_within_the_display_range_do_not_change() {
         for color in [
             Vec3::ZERO,
             Vec3::splat(0.18),
@@ -97,13 +99,13 @@ mod tests {
             assert_eq!(view_transform(color), color);
         }
         assert_eq!(byte_from_linear(0.18, 0.5), 118);
-        // The linear piece: 0.002 * 12.92 * 255 = 6.59.
+        // The linear segment of sRGB: 0.002 * 12.92 * 255 = 6.59
         assert_eq!(byte_from_linear(0.002, 0.5), 7);
         assert_eq!(byte_from_linear(0.002, 0.25), 6);
     }
 
     #[test]
-    fn white_is_white_and_bytes_stay_themselves_under_every_threshold() {
+    fn white_is_white_and_exact_bytes_keep_their_value_at_every_threshold() {
         let linear_from_byte = |byte: u8| {
             let value = f64::from(byte) / 255.0;
             let linear = match value <= 0.04045 {
@@ -124,17 +126,17 @@ mod tests {
     }
 
     #[test]
-    fn many_bytes_are_those_of_one_after_the_other() {
+    fn conversion_in_lanes_equals_single_conversion() {
         let linear: Vec<f32> = (0..5000_u16)
             .map(|i| f32::from(i) / 4900.0 - 0.01)
             .collect();
         let thresholds: Vec<f32> = (0..5000).map(|i| dither_threshold(i, i / 7)).collect();
-        let wanted = linear.iter().zip(&thresholds);
-        let wanted: Vec<u8> = wanted.map(|(l, t)| byte_from_linear(*l, *t)).collect();
+        let expected = linear.iter().zip(&thresholds);
+        let expected: Vec<u8> = expected.map(|(l, t)| byte_from_linear(*l, *t)).collect();
         for level in SimdLevel::ALL {
             let mut bytes = vec![7; linear.len()];
             bytes_from_linear(Supported::or_best(level), &linear, &thresholds, &mut bytes);
-            assert!(bytes == wanted, "{level:?}");
+            assert!(bytes == expected, "{level:?}");
         }
     }
 
@@ -142,7 +144,7 @@ mod tests {
     fn dithering_keeps_the_mean_of_few_neighbours() {
         let side = 16;
         for (left, top) in [(0, 0), (1000, 3), (65_520, 65_520)] {
-            for (level, wanted) in [(0.25, 100.25), (0.5, 100.5), (0.9, 100.9)] {
+            for (level, expected) in [(0.25, 100.25), (0.5, 100.5), (0.9, 100.9)] {
                 let mut sum = 0.0;
                 for (x, y) in (0..side * side).map(|i| (left + i % side, top + i / side)) {
                     let threshold = dither_threshold(x, y);
@@ -150,14 +152,17 @@ mod tests {
                     sum += (100.0 + level + threshold).floor();
                 }
                 let mean = sum / (side * side) as f32;
-                assert!((mean - wanted).abs() < 0.02, "{left} {top} {level}: {mean}");
+                assert!(
+                    (mean - expected).abs() < 0.02,
+                    "{left} {top} {level}: {mean}"
+                );
             }
         }
     }
 
     #[test]
     fn highlights_keep_their_hue_and_end_white() {
-        // No step where white begins.
+        // There is no jump at 1
         let below = view_transform(Vec3::new(1.0, 0.5, 0.25));
         let above = view_transform(Vec3::new(1.001, 0.5005, 0.250_25));
         assert!((above - below).abs().max_element() < 1e-3);

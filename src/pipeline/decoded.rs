@@ -8,7 +8,7 @@ use spherule_formats::{Attribute, AttributeData, ParticleFrame, Radius, is_radiu
 use super::load_error::{LoadError, missing};
 use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::scene::RgbEncoding;
-use crate::survey::{id_of, velocity_of};
+use crate::survey::{id_of, part_of, velocity_of};
 
 /// A frame in memory, before the tree is built.
 #[derive(Debug)]
@@ -31,8 +31,12 @@ pub struct DecodedShading {
     pub colors: Vec<Vec3>,
     /// Values for the `id` channel; None if the index of the particle is used.
     pub ids: Option<Vec<u32>>,
-    /// Velocities for the `V` channel.
+    /// Velocities for the channels `V` and `motion`.
     pub velocities: Option<Vec<Vec3>>,
+    /// The attribute that divides particles into parts, and their parts, for Cryptomatte.
+    pub parts: Option<(String, Vec<i32>)>,
+    /// The floats of attribute channels, one plane for each.
+    pub attributes: Vec<Vec<f32>>,
 }
 
 impl DecodedFrame {
@@ -61,12 +65,25 @@ impl DecodedFrame {
         };
         // Extract ids and velocities for the channels
         let channels = setup.picture.render.channels;
-        let ids = if channels.id { ids(&frame) } else { None };
-        let velocities = if channels.velocity {
+        let ids = if channels.needs_ids() {
+            ids(&frame)
+        } else {
+            None
+        };
+        let velocities = if channels.needs_velocities() {
             velocity_of(&frame.attributes).map(vectors)
         } else {
             None
         };
+        let parts = match channels.needs_parts() {
+            true => part_of(&frame.attributes).and_then(parts),
+            false => None,
+        };
+        let mut planes = Vec::new();
+        for channel in &setup.picture.attributes {
+            let found = attribute(&frame, &channel.name, "a channel", file)?;
+            planes.extend((0..channel.components).map(|c| component(found, c)));
+        }
         let decoded = Self {
             centers: frame.positions,
             radius,
@@ -75,6 +92,8 @@ impl DecodedFrame {
                 colors,
                 ids,
                 velocities,
+                parts,
+                attributes: planes,
             },
         };
         Ok((decoded, clamped))
@@ -102,6 +121,12 @@ impl DecodedFrame {
         }
         if let Some(velocities) = &mut shading.velocities {
             move_to_end(velocities, chosen);
+        }
+        if let Some((_, parts)) = &mut shading.parts {
+            move_to_end(parts, chosen);
+        }
+        for plane in &mut shading.attributes {
+            move_to_end(plane, chosen);
         }
         count - chosen.len()
     }
@@ -135,7 +160,13 @@ impl DecodedShading {
         let ids = self.ids.as_deref().unwrap_or_default();
         let velocities = self.velocities.as_deref().unwrap_or_default();
         let colors = size_of_val(&self.values[..]) + size_of_val(&self.colors[..]);
-        (colors + size_of_val(ids) + size_of_val(velocities)) as u64
+        let parts = self
+            .parts
+            .as_ref()
+            .map_or(0, |(_, parts)| size_of_val(&parts[..]));
+        let attributes = self.attributes.iter().map(|plane| size_of_val(&plane[..]));
+        let channels = size_of_val(ids) + size_of_val(velocities) + parts;
+        (colors + channels + attributes.sum::<usize>()) as u64
     }
 }
 
@@ -221,24 +252,61 @@ fn vectors(attribute: &Attribute) -> Vec<Vec3> {
         .collect()
 }
 
+/// Component `c` of an attribute; nothing in a frame without particles, and zeros if there is no such component.
+#[expect(clippy::cast_possible_truncation, reason = "the channel is f32")]
+fn component(attribute: Option<&Attribute>, c: usize) -> Vec<f32> {
+    let Some(attribute) = attribute else {
+        return Vec::new();
+    };
+    let components = attribute.components;
+    let value = |i: usize| match c < components {
+        true => attribute.data.get_f64(i * components + c) as f32,
+        false => 0.0,
+    };
+    (0..attribute.count()).into_par_iter().map(value).collect()
+}
+
 /// The ids of the particles, or their positions in the file if particles between them were dropped.
+fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
+    let ids = id_of(&frame.attributes).and_then(|ids| low_bits(&ids.data));
+    ids.or_else(|| frame.file_index.clone())
+}
+
+/// The name of an attribute with parts, and the parts.
+fn parts(attribute: &Attribute) -> Option<(String, Vec<i32>)> {
+    let parts = low_bits(&attribute.data)?;
+    let parts = parts.into_iter().map(u32::cast_signed).collect();
+    Some((attribute.name.clone(), parts))
+}
+
+/// The low 32 bits of integers; None if the values are no integers.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
     reason = "the channel has 32 bits; larger ids keep their low ones"
 )]
-fn ids(frame: &ParticleFrame) -> Option<Vec<u32>> {
-    Some(match id_of(&frame.attributes).map(|a| &a.data) {
-        Some(AttributeData::U32(v)) => v.clone(),
-        Some(AttributeData::I32(v)) => v.iter().map(|id| id.cast_unsigned()).collect(),
-        Some(AttributeData::U64(v)) => v.iter().map(|id| *id as u32).collect(),
-        Some(AttributeData::I64(v)) => v.iter().map(|id| *id as u32).collect(),
-        Some(AttributeData::U16(v)) => v.iter().map(|id| u32::from(*id)).collect(),
-        Some(AttributeData::I16(v)) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
-        Some(AttributeData::U8(v)) => v.iter().map(|id| u32::from(*id)).collect(),
-        Some(AttributeData::I8(v)) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
-        _ => return frame.file_index.clone(),
+fn low_bits(data: &AttributeData) -> Option<Vec<u32>> {
+    Some(match data {
+        AttributeData::U32(v) => v.clone(),
+        AttributeData::I32(v) => v.iter().map(|id| id.cast_unsigned()).collect(),
+        AttributeData::U64(v) => v.iter().map(|id| *id as u32).collect(),
+        AttributeData::I64(v) => v.iter().map(|id| *id as u32).collect(),
+        AttributeData::U16(v) => v.iter().map(|id| u32::from(*id)).collect(),
+        AttributeData::I16(v) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
+        AttributeData::U8(v) => v.iter().map(|id| u32::from(*id)).collect(),
+        AttributeData::I8(v) => v.iter().map(|id| i32::from(*id).cast_unsigned()).collect(),
+        _ => return None,
     })
+}
+
+/// The index of the particle that has `id` in the `id` channel.
+pub(super) fn particle_with_id(frame: &ParticleFrame, id: u32) -> Option<usize> {
+    match ids(frame) {
+        Some(ids) => ids.iter().position(|other| *other == id),
+        None => usize::try_from(id)
+            .ok()
+            .filter(|index| *index < frame.positions.len()),
+    }
 }
 
 #[cfg(test)]
@@ -253,8 +321,9 @@ mod tests {
             shading: DecodedShading {
                 values: (0..6_u16).map(f32::from).collect(),
                 colors: (0..6_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
-                ids: None,
-                velocities: None,
+                parts: Some(("part".to_owned(), (0..6).collect())),
+                attributes: vec![(0..6_u16).map(f32::from).collect()],
+                ..DecodedShading::default()
             },
         };
         assert_eq!(frame.move_to_end(&[], true), 6);
@@ -266,6 +335,8 @@ mod tests {
         assert_eq!(frame.shading.values, order);
         assert_eq!(frame.shading.colors, order.map(Vec3::splat));
         assert_eq!(frame.shading.ids, Some(vec![1, 2, 4, 0, 3, 5]));
+        assert_eq!(frame.shading.parts.as_ref().unwrap().1, [1, 2, 4, 0, 3, 5]);
+        assert_eq!(frame.shading.attributes, [order]);
         assert_eq!(frame.move_to_end(&[0, 1, 2, 3, 4, 5], false), 0);
     }
 }

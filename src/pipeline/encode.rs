@@ -1,115 +1,22 @@
-//! Third stage: encodes images, publishes them under their final names, and records them.
+//! Encodes images, and publishes them under their final names.
 
 use std::io::{self, Seek, Write};
-use std::path::{Path, PathBuf};
-use std::sync::mpsc::{Receiver, Sender, SyncSender};
+use std::path::Path;
 use std::time::Instant;
 
 use serde_json::json;
-use spherule_formats::sequence::Sequence;
-use spherule_jobs::{Job, JobError, Publisher, publish};
+use spherule_jobs::{Publisher, publish};
 
+use super::error::WriteError;
 use super::renderer::TracedFrame;
 use super::setup::Setup;
-use super::{ClaimedFrame, Event, Stage, StageResult, Watch};
 use crate::metrics::{MemoryPeaks, MemoryUse};
-use crate::mishap::is_place_at_fault;
-use crate::output::{
-    CustomAttribute, EncodedExr, ExrOptions, OutputError, encode_exr, encode_preview, write_exr,
-};
+use crate::output::{CustomAttribute, ExrOptions, encode_preview, write_exr};
 use crate::render::Film;
 use crate::report::FrameReport;
 use crate::report::frame::RssSummary;
 
-/// Reasons why an image could not be written.
-#[derive(Debug, thiserror::Error)]
-pub(super) enum WriteError {
-    /// Encoding failed.
-    #[error(transparent)]
-    Encode(#[from] OutputError),
-    /// Writing failed.
-    #[error("{}: {source}", path.display())]
-    Io {
-        /// The image.
-        path: PathBuf,
-        /// The operating system's reason.
-        source: io::Error,
-    },
-}
-
-/// Channels to notify when an image has been written. Their receivers may have ended.
-pub(super) struct WriteSignals {
-    /// To the reader, if it waits for that before it reads the next frame.
-    pub(super) is_written: Option<SyncSender<()>>,
-    /// To the tracer, for the planes to be reused.
-    pub(super) films: Option<Sender<Film>>,
-}
-
-pub(super) fn write_stage(
-    setup: &Setup,
-    sequence: &Sequence,
-    traced: Receiver<ClaimedFrame<TracedFrame>>,
-    next: &WriteSignals,
-    job: &mut Job,
-    watch: Watch,
-) -> Result<(), JobError> {
-    let mut peaks = MemoryPeaks::default();
-    let mut image_before = Instant::now();
-    for ClaimedFrame { claim, result } in traced {
-        match result {
-            StageResult::Frame(frame) => {
-                watch(Event::Entered(frame.task.frame, Stage::Write));
-                // Stop if another worker has taken over
-                if !claim.is_valid() {
-                    let dir = job.state().dir().to_owned();
-                    return Err(JobError::TakenForDead { dir });
-                }
-                // Encode and publish the image
-                let task = frame.task.clone();
-                if sequence.maps_files() {
-                    peaks.looks_only();
-                }
-                match write_frame(setup, frame, &mut peaks) {
-                    Ok((mut report, film)) => {
-                        // Return the planes to the tracer, and record the frame
-                        if let Some(films) = &next.films {
-                            let _ = films.send(film);
-                        }
-                        report.seconds.wall = image_before.elapsed().as_secs_f64();
-                        image_before = Instant::now();
-                        let outputs: Vec<_> = std::iter::once(&task.image)
-                            .chain(&task.preview)
-                            .cloned()
-                            .collect();
-                        job.record_done(task.frame, &outputs, json!(report))?;
-                        watch(Event::Done(&task, &report));
-                    }
-                    // The disk is at fault, not the frame, which remains to be done.
-                    Err(WriteError::Io { path, source }) if is_place_at_fault(&source) => {
-                        return Err(JobError::writing(&path, source));
-                    }
-                    Err(error) => {
-                        let reason = error.to_string();
-                        watch(Event::Failed(task.frame, &reason));
-                        job.record_failed(task.frame, &reason, json!(null))?;
-                    }
-                }
-            }
-            StageResult::Failed(task, reason) => {
-                watch(Event::Failed(task.frame, &reason));
-                job.record_failed(task.frame, &reason, json!(null))?;
-            }
-        }
-        // Release the frame, and let the next one be read
-        claim.end();
-        if let Some(is_written) = &next.is_written {
-            let _ = is_written.send(());
-        }
-    }
-    Ok(())
-}
-
-/// Encodes and publishes the images of `frame`. Returns the completed report, and the planes for reuse.
+/// Encodes and publishes the images of `frame`. Returns the complete report and the planes, which can be reused.
 pub(super) fn write_frame(
     setup: &Setup,
     frame: TracedFrame,
@@ -122,15 +29,15 @@ pub(super) fn write_frame(
         let path = path.to_owned();
         move |source| WriteError::Io { path, source }
     };
-    // Publish the preview first: a ledger line vouches for both, and the EXR is the file that users wait for
+    // The preview first: users wait for the EXR, and the ledger entry covers both
     if let Some(path) = &task.preview {
         let png = encode_preview(&frame.film, &setup.preview_from(&frame.camera))?;
         publish(path, &png).map_err(at(path))?;
     }
     if report.bytes.file.total() > 0 {
-        peaks.looks_only();
+        peaks.use_samples_only();
     }
-    peaks.take_in(frame.memory);
+    peaks.update(frame.memory);
     // Encode and publish the EXR
     let mut file = Publisher::create(&task.image).map_err(at(&task.image))?;
     let mut sampler = MemorySampler {
@@ -149,7 +56,7 @@ pub(super) fn write_frame(
     file.commit().map_err(at(&task.image))?;
     report.seconds.encode = start.elapsed().as_secs_f64();
     let now = MemoryUse::now();
-    peaks.take_in(now);
+    peaks.update(now);
     report.rss = RssSummary {
         anonymous_peak: peaks.anonymous,
         file_peak: peaks.file,
@@ -159,21 +66,21 @@ pub(super) fn write_frame(
     Ok((report, film))
 }
 
-/// Samples the memory in use when the first bytes are written: all memory of encoding is allocated then.
+/// Samples memory use during the first writes, when all buffers of the encoder exist.
 struct MemorySampler<'a, W> {
     out: &'a mut W,
     peaks: &'a mut MemoryPeaks,
     samples: u32,
 }
 
-/// Number of writes to sample: the header is written before blocks are compressed.
+/// Number of writes with a sample. The header is written before blocks are compressed.
 const MAX_SAMPLES: u32 = 16;
 
 impl<W: Write> Write for MemorySampler<'_, W> {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.samples < MAX_SAMPLES {
             self.samples += 1;
-            self.peaks.take_in(MemoryUse::now());
+            self.peaks.update(MemoryUse::now());
         }
         self.out.write(bytes)
     }
@@ -189,15 +96,7 @@ impl<W: Seek> Seek for MemorySampler<'_, W> {
     }
 }
 
-/// The EXR of `frame` in memory.
-///
-/// # Errors
-/// If the image cannot be encoded.
-pub fn encode_frame(setup: &Setup, frame: &TracedFrame) -> Result<EncodedExr, OutputError> {
-    encode_exr(&frame.film, &exr_options(setup, frame))
-}
-
-/// Options for the EXR of `frame`, with an attribute of metadata for compositing.
+/// Options of the EXR of `frame`, including an attribute with data for compositing.
 fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
     let facts = json!({
         "frame": frame.task.frame,
@@ -211,6 +110,7 @@ fn exr_options(setup: &Setup, frame: &TracedFrame) -> ExrOptions {
             json: facts.to_string(),
         }),
         world_to_camera: Some(frame.camera.world_to_camera()),
+        texts: frame.texts.clone(),
         ..setup.picture.exr.clone()
     }
 }

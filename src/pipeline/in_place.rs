@@ -14,7 +14,7 @@ use super::setup::{ColorRule, RadiusRule, Setup};
 use crate::accel::Structure;
 use crate::render::{NO_ID, ShadeSource, mean};
 use crate::scene::{ColorMap, RgbEncoding};
-use crate::survey::{Named, id_of, velocity_of};
+use crate::survey::{Named, id_of, part_of, velocity_of};
 
 /// In frames up to this size (bytes), all data in use are verified with their checksums before tracing. In larger
 /// frames only the nodes are, which are read anyway; rays touch little of the rest.
@@ -37,6 +37,9 @@ struct Names {
     values: Option<String>,
     ids: Option<String>,
     velocities: Option<String>,
+    parts: Option<String>,
+    /// Attributes with channels; the second is the number of components.
+    channels: Vec<(Option<String>, usize)>,
 }
 
 /// Result of opening a frame.
@@ -107,7 +110,7 @@ impl StoredFrame {
     /// Whether attributes are looked up by particle.
     pub fn needs_indices(&self, setup: &Setup) -> bool {
         let channels = setup.picture.render.channels;
-        channels.id || channels.velocity || self.names.values.is_some()
+        channels.needs_particles() || self.names.values.is_some()
     }
 
     /// The particles in place.
@@ -138,6 +141,10 @@ impl StoredFrame {
             color,
             ids: view(&self.names.ids),
             velocities: view(&self.names.velocities),
+            parts: view(&self.names.parts),
+            channels: (self.names.channels.iter())
+                .map(|(name, components)| (view(name), *components))
+                .collect(),
         }
     }
 
@@ -183,8 +190,13 @@ impl StoredFrame {
 
 impl Names {
     fn all(&self) -> Vec<&str> {
-        let all = [&self.values, &self.ids, &self.velocities];
-        all.into_iter().filter_map(Option::as_deref).collect()
+        let all = [&self.values, &self.ids, &self.velocities, &self.parts];
+        let channels = self.channels.iter().map(|(name, _)| name);
+        let all = all.into_iter().chain(channels);
+        let mut names: Vec<&str> = all.filter_map(Option::as_deref).collect();
+        names.sort_unstable();
+        names.dedup();
+        names
     }
 
     fn of(setup: &Setup, file: &NativeFile) -> Result<Self, LoadError> {
@@ -202,13 +214,27 @@ impl Names {
                 found
             }
         };
+        let mut with_channels = Vec::new();
+        for channel in &setup.picture.attributes {
+            let found = frame.attribute(&channel.name).map(|a| a.name().to_owned());
+            if found.is_none() && file.index().count > 0 {
+                let path = file.path().display().to_string();
+                let has = attributes.iter().map(Named::name);
+                return Err(missing(&channel.name, "a channel", &path, has));
+            }
+            with_channels.push((found, channel.components));
+        }
         let channels = setup.picture.render.channels;
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {
             values,
             // Only integers are ids, as in decoded frames.
-            ids: name(id_of(&attributes).filter(|a| channels.id && a.low_bits(0).is_some())),
-            velocities: name(velocity_of(&attributes).filter(|_| channels.velocity)),
+            ids: name(
+                id_of(&attributes).filter(|a| channels.needs_ids() && a.low_bits(0).is_some()),
+            ),
+            velocities: name(velocity_of(&attributes).filter(|_| channels.needs_velocities())),
+            parts: name(part_of(&attributes).filter(|_| channels.needs_parts())),
+            channels: with_channels,
         })
     }
 }
@@ -229,7 +255,7 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     }
     if DVec3::from_array(index.origin) != setup.picture.origin {
         return Err(
-            "they are relative to another origin than the sequence, for 12 bytes a particle \
+            "they are relative to another origin than the sequence, for 12 bytes per particle \
                     and more; convert the sequence as a whole to save that"
                 .to_owned(),
         );
@@ -237,7 +263,9 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
     // Find the radii
     let common = match (&setup.picture.radius, &index.radius) {
         (RadiusRule::Attribute { .. }, _) => {
-            return Err("the radius is an attribute, for 12 bytes a particle and more".to_owned());
+            return Err(
+                "the radius is an attribute, for 12 bytes per particle and more".to_owned(),
+            );
         }
         (RadiusRule::Common(radius), _) | (RadiusRule::FileOr(radius), RadiusIndex::None) => {
             *radius
@@ -268,11 +296,14 @@ fn particles_in_place(setup: &Setup, index: &FrameIndex) -> Result<PlacedRadius,
 }
 
 /// A [`ShadeSource`] over attributes in place.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub struct StoredShading<'a> {
     color: StoredColor<'a>,
     ids: Option<AttributeView<'a>>,
     velocities: Option<AttributeView<'a>>,
+    parts: Option<AttributeView<'a>>,
+    /// Attributes with channels; the second is the number of components.
+    channels: Vec<(Option<AttributeView<'a>>, usize)>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -349,5 +380,23 @@ impl ShadeSource for StoredShading<'_> {
             let component = |c: usize| velocities.get(index as usize, c) as f32;
             Vec3::new(component(0), component(1), component(2))
         })
+    }
+
+    fn part(&self, index: u32) -> Option<(&str, i32)> {
+        let parts = self.parts.as_ref()?;
+        Some((parts.name(), parts.low_bits(index as usize)?.cast_signed()))
+    }
+
+    #[expect(clippy::cast_possible_truncation, reason = "the channel is f32")]
+    fn attributes(&self, index: u32, floats: &mut [f32]) {
+        let components = self.channels.iter().flat_map(|(view, components)| {
+            (0..*components).map(move |c| {
+                let view = view.as_ref().filter(|view| c < view.components());
+                view.map_or(0.0, |view| view.get(index as usize, c) as f32)
+            })
+        });
+        for (float, value) in floats.iter_mut().zip(components) {
+            *float = value;
+        }
     }
 }

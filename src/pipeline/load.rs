@@ -1,18 +1,21 @@
 //! First stage: reads the files of a frame into the form that tree and shading need.
 
+use std::sync::Arc;
 use std::time::{Duration, Instant};
 
-use spherule_formats::ParticleFrame;
+use glam::Vec3;
 use spherule_formats::sequence::Sequence;
+use spherule_formats::{FrameError, ParticleFrame};
 
 use super::ImageTask;
-use super::decoded::DecodedFrame;
+use super::decoded::{DecodedFrame, particle_with_id};
 use super::in_place::{Opened, StoredFrame};
 use super::load_error::LoadError;
+use super::meshes::meshes_of;
 use super::predict::{FrameSize, MemoryModel};
 use super::setup::Setup;
 use crate::metrics::memory::{available, process_room};
-use crate::mishap::may_be_unfinished;
+use crate::surface::mesh::MeshTree;
 
 /// A frame before its tree is built.
 #[derive(Debug)]
@@ -23,8 +26,12 @@ pub struct LoadedFrame {
     pub notes: Vec<String>,
     /// The particles.
     pub particles: LoadedParticles,
+    /// The meshes of the image, one for each of the setup.
+    pub meshes: Vec<Arc<MeshTree>>,
     /// Simulation time, if known.
     pub time: Option<f64>,
+    /// Position of the particle in focus, relative to the origin, if the camera follows one.
+    pub focus: Option<Vec3>,
     /// Number of particles that were dropped because they were not finite.
     pub dropped: u64,
     /// Number of radii raised to the minimum.
@@ -70,7 +77,9 @@ pub fn load_frame(
             time: frame.time(),
             task: task.clone(),
             notes,
+            focus: None,
             particles: LoadedParticles::Stored(frame),
+            meshes: Vec::new(),
             dropped: 0,
             clamped_radii,
             read_time: Duration::ZERO,
@@ -88,6 +97,7 @@ pub fn load_frame(
         loaded.clamped_radii,
         "radii raised: too small to be seen, or no number",
     );
+    loaded.meshes = meshes_of(&setup.picture.meshes, task, &mut loaded.notes)?;
     loaded.read_time = start.elapsed();
     Ok(loaded)
 }
@@ -106,16 +116,37 @@ fn decode(
     let frame = ParticleFrame::from_raw(loaded.particles, setup.picture.origin);
     let (time, dropped) = (frame.time, frame.dropped);
     let file = first_file(sequence, task);
+    let focus = focus_point(setup, &frame, &file)?;
     let (decoded, clamped_radii) = DecodedFrame::of(setup, frame, &file)?;
     Ok(LoadedFrame {
         task: task.clone(),
         notes,
         particles: LoadedParticles::Decoded(decoded),
+        meshes: Vec::new(),
         time,
+        focus,
         dropped,
         clamped_radii,
         read_time: Duration::ZERO,
     })
+}
+
+/// The position of the particle in focus, relative to the origin; None if the camera does not follow one.
+fn focus_point(
+    setup: &Setup,
+    frame: &ParticleFrame,
+    file: &str,
+) -> Result<Option<Vec3>, LoadError> {
+    let Some(id) = setup.focused_particle() else {
+        return Ok(None);
+    };
+    match particle_with_id(frame, id) {
+        Some(index) => Ok(Some(frame.positions[index])),
+        None => Err(LoadError::NoFocus {
+            file: file.to_owned(),
+            id,
+        }),
+    }
 }
 
 impl LoadedFrame {
@@ -130,7 +161,9 @@ impl LoadedFrame {
 /// Marks errors of the last frame of a sequence, which may still be growing.
 fn newest(error: LoadError, sequence: &Sequence, task: &ImageTask) -> LoadError {
     match error {
-        LoadError::Frame(error) if may_be_unfinished(sequence, task.index, &error) => {
+        LoadError::Frame(error @ FrameError::Malformed { .. })
+            if task.index + 1 == sequence.frames().len() =>
+        {
             LoadError::Newest(error)
         }
         other => other,
@@ -146,7 +179,7 @@ fn first_file(sequence: &Sequence, task: &ImageTask) -> String {
 
 /// Rejects a frame that cannot fit into memory, before the system kills the whole job.
 fn check_memory(setup: &Setup, sequence: &Sequence, task: &ImageTask) -> Result<(), LoadError> {
-    let size = FrameSize::of(sequence, task.index, setup.run.weight.as_ref());
+    let size = FrameSize::of_task(sequence, task, setup);
     let need = MemoryModel::new(setup).decoding(&size);
     match available().into_iter().chain(process_room()).min() {
         Some(available) if need > available => Err(LoadError::TooLarge {

@@ -2,15 +2,22 @@
 
 use spherule_formats::FrameError;
 
+use super::meshes::MeshLoadError;
+
 /// Reasons why a frame cannot be rendered.
 #[derive(Debug, thiserror::Error)]
 pub enum LoadError {
     /// Its files cannot be read.
     #[error(transparent)]
     Frame(FrameError),
-    /// The same for the last frame of the sequence, which a simulation may still be writing.
-    #[error("{0}; it is the newest frame, perhaps still being written: render again later")]
+    /// The same for the last frame of the sequence, which a simulation may be at.
+    #[error(
+        "{0}; this is the newest frame: if the simulation is still writing it, render again later"
+    )]
     Newest(FrameError),
+    /// One of its meshes cannot be read.
+    #[error(transparent)]
+    Mesh(#[from] MeshLoadError),
     /// It does not fit into memory.
     #[error("{file}: the frame needs about {need} MiB, {available} MiB of memory are free")]
     TooLarge {
@@ -32,6 +39,16 @@ pub enum LoadError {
         purpose: &'static str,
         /// The attributes of the frame.
         has: String,
+    },
+    /// The camera focuses on a particle that it does not have.
+    #[error(
+        "{file}: no particle has the id {id}, which camera.focus follows; choose another one, or a distance"
+    )]
+    NoFocus {
+        /// The frame's first file.
+        file: String,
+        /// The id.
+        id: u32,
     },
 }
 

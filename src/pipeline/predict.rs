@@ -16,10 +16,13 @@ use spherule_formats::sequence::Sequence;
 
 use super::read_threads::needs_many;
 use super::setup::{RadiusRule, Setup};
+use super::{ImageTask, mattes};
 use crate::accel::{BuildBytes, BuildSettings, Structure, predicted_bytes, predicted_stored_bytes};
+use crate::denoise;
 use crate::metrics::Bytes;
 use crate::output::PackBuffers;
-use crate::render::{Film, scratch_bytes};
+use crate::render::{Film, floor_light_bytes, scratch_bytes};
+use crate::scene::Environment;
 use crate::surface::SurfaceKind;
 use crate::survey::FrameWeight;
 
@@ -38,6 +41,8 @@ pub struct FrameSize {
     pub files: u64,
     /// Whether its file contains other frames too, and stays in memory for them.
     pub is_shared: bool,
+    /// Size of the files of the meshes that only this frame has.
+    pub meshes: u64,
 }
 
 impl FrameSize {
@@ -50,9 +55,18 @@ impl FrameSize {
         Self::estimate(stored, is_shared, known)
     }
 
+    /// Size of the frame of `task`, and of its own meshes.
+    pub fn of_task(sequence: &Sequence, task: &ImageTask, setup: &Setup) -> Self {
+        let meshes = task.meshes.iter().map(|path| unpacked_len(path));
+        Self {
+            meshes: meshes.filter_map(Result::ok).sum(),
+            ..Self::of(sequence, task.index, setup.run.weight.as_ref())
+        }
+    }
+
     /// Bytes to process when reading: the size of its file, or of the numbers in it if that is larger.
     pub(super) fn read_bytes(&self) -> u64 {
-        self.content.max(self.raw)
+        self.content.max(self.raw).max(self.meshes)
     }
 
     /// Whether it is read by as many threads as trace.
@@ -71,6 +85,7 @@ impl FrameSize {
                 positions: stored,
                 files: 1,
                 is_shared,
+                meshes: 0,
             };
         };
         let scaled = |value: u64| {
@@ -84,6 +99,7 @@ impl FrameSize {
             positions: scaled(known.positions),
             files: known.files,
             is_shared,
+            meshes: 0,
         }
     }
 }
@@ -100,7 +116,7 @@ pub struct MemoryNeed {
     pub particles: u64,
     /// The tree, and the scratch memory of its build.
     pub tree: u64,
-    /// The surface, without the tree.
+    /// The surface, without the tree, and meshes.
     pub surface: u64,
     /// The planes of the images that are traced and encoded.
     pub images: u64,
@@ -157,11 +173,13 @@ impl fmt::Display for MemoryNeed {
 /// Predicts the memory of the frames of a job.
 #[derive(Debug, Clone, Copy)]
 pub struct MemoryModel<'a> {
-    setup: &'a Setup,
+    pub(super) setup: &'a Setup,
     own_radii: bool,
     has_ids: bool,
     has_velocities: bool,
     in_place: bool,
+    /// Memory of the meshes that all frames share.
+    meshes: u64,
 }
 
 /// Memory of the program: its data, the stacks of its threads and small allocations; large allocations are returned
@@ -200,6 +218,7 @@ impl<'a> MemoryModel<'a> {
             has_ids: known.ids,
             has_velocities: known.velocities,
             in_place: known.in_place && setup.traces_in_place(),
+            meshes: shared_meshes(setup),
         }
     }
 
@@ -226,6 +245,17 @@ impl<'a> MemoryModel<'a> {
             self.held_file(frame)
         } else {
             self.decoding(frame)
+        }
+    }
+
+    /// The same, with the meshes of the frame, which are read after its particles.
+    fn reading_with_meshes(&self, frame: &FrameSize) -> u64 {
+        match frame.meshes {
+            0 => self.reading(frame),
+            bytes => {
+                let meshes = self.kept(frame) + READ_PER_MESH_BYTE.saturating_mul(bytes);
+                self.reading(frame).max(meshes)
+            }
         }
     }
 
@@ -283,11 +313,14 @@ impl<'a> MemoryModel<'a> {
         let channels = self.setup.picture.render.channels;
         let color = self.setup.picture.color.bytes();
         // Particles that are moved need an explicit id.
-        let ids = channels.id && (self.has_ids || self.setup.picture.surface.spray);
+        let ids = channels.needs_ids() && (self.has_ids || self.setup.picture.surface.spray);
         let each = [
             (true, color),
             (ids, 4),
-            (channels.velocity && self.has_velocities, 12),
+            (channels.needs_velocities() && self.has_velocities, 12),
+            // Whether there are parts is not known in advance
+            (channels.needs_parts(), 4),
+            (true, 4 * u64::from(channels.layers.attributes)),
         ];
         let each: u64 = each.iter().filter(|(has, _)| *has).map(|(_, b)| b).sum();
         frame.particles * each
@@ -355,27 +388,39 @@ impl<'a> MemoryModel<'a> {
         tree: u64,
     ) -> MemoryNeed {
         let render = &self.setup.picture.render;
-        let film = Film::bytes_for(render.width, render.height, render.channels);
+        let film = self.film();
         let threads = rayon::current_num_threads() as u64;
+        let denoising = self.setup.picture.denoise.map_or(0, |settings| {
+            denoise::predicted_bytes(render.width, render.height, &settings, threads)
+        });
         let film_before = if before > 0 { film } else { 0 };
         let film_kept = if before > 1 { film } else { 0 };
         let encoding_before = if before > 0 { self.encoding() } else { 0 };
         let shared = if frame.is_shared { frame.content } else { 0 };
+        let scene = &self.setup.picture.scene;
+        // A shadow catcher has a table of its own
+        let tables = 1 + u64::from(scene.ground.is_some_and(|g| g.shadow_catcher.is_some()));
+        let environment = scene.environment.as_deref();
+        let environment = tables * environment.map_or(0, Environment::byte_len);
+        let light = environment + floor_light_bytes(scene, render);
         // Count the threads, including those for reading
         let has_read_pool = [Some(frame), after]
             .into_iter()
             .flatten()
             .any(FrameSize::needs_many);
         let idle = MemoryNeed {
-            program: PROGRAM + THREAD * threads * if has_read_pool { 2 } else { 1 },
+            program: PROGRAM + light + THREAD * threads * if has_read_pool { 2 } else { 1 },
             reading: shared.max(self.retained(frame)),
             ..MemoryNeed::default()
         };
         // Add up each phase: reading, building, tracing, encoding
         let kept = self.kept(frame);
         let surface = self.surface(frame);
+        let meshes = self.meshes + KEPT_PER_MESH_BYTE * frame.meshes;
+        let names = mattes::predicted_bytes(self.setup, frame.particles);
         let first_read = MemoryNeed {
-            reading: self.reading(frame),
+            reading: self.reading_with_meshes(frame),
+            surface: self.meshes,
             ..idle
         };
         let building = MemoryNeed {
@@ -383,26 +428,40 @@ impl<'a> MemoryModel<'a> {
             // The kept data are in the memory that the allocator retains.
             reading: shared.max(self.retained(frame).saturating_sub(kept)),
             tree: tree + self.build(frame).scratch,
-            surface: surface.building,
+            surface: surface.building + meshes,
             images: film_before + film_kept,
             encoding: encoding_before,
             ..idle
         };
         let tracing = MemoryNeed {
-            reading: after.map_or(idle.reading, |after| self.reading(after).max(idle.reading)),
+            reading: after.map_or(idle.reading, |after| {
+                self.reading_with_meshes(after).max(idle.reading)
+            }),
             particles: self.shading(frame),
             tree,
-            surface: surface.kept,
-            images: film + film_before + self.tracing_scratch() * threads,
-            encoding: encoding_before,
+            surface: surface.kept + meshes,
+            images: film + film_before + denoising.max(self.tracing_scratch() * threads),
+            encoding: encoding_before + names,
             ..idle
         };
         let encoding = MemoryNeed {
+            surface: self.meshes,
             images: film,
-            encoding: self.encoding(),
+            encoding: self.encoding() + names,
             ..idle
         };
         first_read.larger(building).larger(tracing).larger(encoding)
+    }
+
+    /// Memory of the planes of an image.
+    fn film(&self) -> u64 {
+        let render = &self.setup.picture.render;
+        Film::bytes_for(
+            render.width,
+            render.height,
+            render.channels,
+            render.has_features,
+        )
     }
 
     /// Memory of a thread during tracing.
@@ -420,7 +479,7 @@ impl<'a> MemoryModel<'a> {
     fn encoding(&self) -> u64 {
         let render = &self.setup.picture.render;
         let pixels = u64::from(render.width) * u64::from(render.height);
-        let film = Film::bytes_for(render.width, render.height, render.channels);
+        let film = self.film();
         // Bands have 32 rows at most, and 16 for compression methods with large blocks. Colours are in half precision.
         let band = 16 * (film - 8 * pixels) / u64::from(render.height.max(16));
         let threads = rayon::current_num_threads() as u64;
@@ -428,6 +487,18 @@ impl<'a> MemoryModel<'a> {
         let bands = (threads + 1) * PackBuffers::predicted_bytes(band) + (threads + 2) * band;
         (9 * pixels).max(bands)
     }
+}
+
+/// Memory of a mesh with its hierarchy, in bytes per byte of its file: the largest of the formats, binary PLY, where a
+/// triangle has 19 bytes in the file and about 84 in memory.
+const KEPT_PER_MESH_BYTE: u64 = 5;
+/// The same while it is read and its hierarchy is built.
+const READ_PER_MESH_BYTE: u64 = 16;
+
+/// Memory of the meshes that all frames share.
+fn shared_meshes(setup: &Setup) -> u64 {
+    let trees = (setup.picture.meshes.iter()).filter_map(|mesh| mesh.tree.as_ref());
+    trees.map(|tree| tree.bytes() as u64).sum()
 }
 
 /// Bytes of a sorted particle, with its volume and its share of the bins.
@@ -449,7 +520,7 @@ fn smooth_bytes(setup: &Setup, particles: u64) -> SurfaceBytes {
     let surface = &setup.picture.surface;
     let channels = setup.picture.render.channels;
     let is_colored = setup.picture.color.is_by_particle();
-    let keeps = surface.exact || channels.id || channels.velocity || is_colored;
+    let keeps = surface.exact || channels.needs_particles() || is_colored;
     #[expect(clippy::cast_precision_loss, reason = "an estimate")]
     let count = particles as f64;
     let voxels = f64::from(surface.voxel).powi(-2) / count.cbrt().max(1.0);

@@ -12,12 +12,15 @@ fn plain(particles: u64) -> FrameSize {
         positions: 12 * particles,
         files: 1,
         is_shared: false,
+        meshes: 0,
     }
 }
 
 fn setup() -> Setup {
     let mut manifest = crate::manifest::Manifest::new("in");
     manifest.input.radius = crate::manifest::RadiusSetting::Length(0.1);
+    // Without tables of an environment
+    manifest.render.integrator = Some(crate::render::IntegratorKind::Whitted);
     let directory = tempfile::tempdir().expect("a directory");
     let file = directory.path().join("f_1.npy");
     spherule_formats::write::npy::write(&file, &[glam::Vec3::ZERO]).expect("a file");
@@ -25,7 +28,7 @@ fn setup() -> Setup {
     let sequence = Sequence::open(&input).expect("a frame");
     let question = crate::resolve::question(&manifest);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    crate::resolve::setup(&manifest, &survey).expect("pictures")
+    crate::resolve::setup(&manifest, &survey, None).expect("pictures")
 }
 
 #[test]
@@ -69,21 +72,37 @@ fn a_smooth_surface_has_a_grid_and_no_tree() {
 }
 
 #[test]
+fn meshes_of_a_frame_are_counted() {
+    let setup = setup();
+    let model = MemoryModel::new(&setup);
+    let with = |meshes| FrameSize {
+        meshes,
+        ..plain(1000)
+    };
+    let one = model.alone(&with(10_000_000));
+    assert!(one.reading >= 160_000_000, "{one}");
+    let two = model.peak(&[with(10_000_000); 2]);
+    assert_eq!(two.surface, 50_000_000);
+    assert!(two.reading >= 160_000_000, "{two}");
+    assert_eq!(FrameSize::estimate(1200, false, None).meshes, 0);
+}
+
+#[test]
 fn limits_leave_out_what_does_not_fit_alone() {
     let setup = setup();
     let model = MemoryModel::new(&setup);
     let frames = [plain(1000), plain(20_000_000), plain(1000)];
     let small = model.peak(&[frames[0], frames[2]]).total();
-    let schedule = model.schedule(&frames, Some(small), None);
+    let schedule = model.schedule(&frames, Some(Bytes(small)), None);
     let left_out: Vec<usize> = schedule.too_large.iter().map(|(place, _)| *place).collect();
     assert_eq!(left_out, [1]);
     assert_eq!(schedule.overlap, Overlap::Stages);
     assert_eq!(schedule.need.total(), small);
 
     let alone = model.alone(&frames[1]).total();
-    let schedule = model.schedule(&frames, Some(alone), None);
+    let schedule = model.schedule(&frames, Some(Bytes(alone)), None);
     assert!(schedule.too_large.is_empty());
-    let schedule = model.schedule(&[frames[1]; 2], Some(alone), None);
+    let schedule = model.schedule(&[frames[1]; 2], Some(Bytes(alone)), None);
     assert_eq!(schedule.overlap, Overlap::None);
     assert_eq!(schedule.need.total(), alone);
     // With less free memory, no frame is rejected here; they only do not overlap.

@@ -7,15 +7,15 @@
 
 use std::time::{Duration, Instant};
 
-use rayon::ThreadPoolBuilder;
+use rayon::{ThreadPoolBuildError, ThreadPoolBuilder};
 use serde::Serialize;
 use spherule_formats::sequence::Sequence;
 
 use super::{
-    BuiltFrame, FrameRenderer, FrameSize, ImageTask, Overlap, Setup, TraceError, load_frame,
-    renderer_of,
+    BuiltFrame, FrameRenderer, FrameSize, ImageTask, LoadError, Overlap, Setup, TraceError,
+    load_frame, renderer_of,
 };
-use crate::output::{encode_exr, encode_preview};
+use crate::output::{OutputError, encode_exr, encode_preview};
 use crate::render::{Deadline, Film, RenderError};
 
 /// Width in pixels of the first mosaic of tiles; each further one is twice as wide.
@@ -56,6 +56,23 @@ pub struct Probe {
     pub is_lower_bound: bool,
 }
 
+/// Why a frame cannot be measured.
+#[derive(Debug, thiserror::Error)]
+pub enum ProbeError {
+    /// It cannot be read.
+    #[error(transparent)]
+    Load(#[from] LoadError),
+    /// It cannot be traced.
+    #[error(transparent)]
+    Trace(#[from] TraceError),
+    /// Its image cannot be encoded.
+    #[error(transparent)]
+    Encode(#[from] OutputError),
+    /// The system refuses threads.
+    #[error(transparent)]
+    Threads(#[from] ThreadPoolBuildError),
+}
+
 /// A traced mosaic of an image.
 struct Trial {
     setup: Setup,
@@ -81,7 +98,7 @@ pub fn probe(
     sequence: &Sequence,
     heaviest: &ImageTask,
     others: &[&ImageTask],
-) -> Result<Probe, String> {
+) -> Result<Probe, ProbeError> {
     probe_for(Probe::TIME_BOX, setup, sequence, heaviest, others)
 }
 
@@ -92,7 +109,7 @@ fn probe_for(
     sequence: &Sequence,
     heaviest: &ImageTask,
     others: &[&ImageTask],
-) -> Result<Probe, String> {
+) -> Result<Probe, ProbeError> {
     let start = Instant::now();
     let mut renderer = renderer_of(setup.picture.renderer);
 
@@ -144,9 +161,9 @@ fn prepare(
     setup: &Setup,
     sequence: &Sequence,
     task: &ImageTask,
-) -> Result<BuiltFrame, String> {
-    let loaded = load_frame(setup, sequence, task).map_err(|e| e.to_string())?;
-    renderer.prepare(setup, loaded).map_err(|e| e.to_string())
+) -> Result<BuiltFrame, ProbeError> {
+    let loaded = load_frame(setup, sequence, task)?;
+    Ok(renderer.prepare(setup, loaded)?)
 }
 
 /// Traces mosaics of the image of `frame` with increasing size until one is sufficient. Returns the last one that
@@ -156,7 +173,7 @@ fn largest_trial(
     setup: &Setup,
     frame: &BuiltFrame,
     deadline: Instant,
-) -> Result<Trial, String> {
+) -> Result<Trial, ProbeError> {
     let full = &setup.picture.render;
     let mut width = FIRST_WIDTH.min(full.width);
     let mut last: Option<Trial> = None;
@@ -187,7 +204,7 @@ impl Trial {
         frame: &BuiltFrame,
         [width, height]: [u32; 2],
         deadline: Instant,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, ProbeError> {
         // Set up the mosaic
         let mut setup = setup.clone();
         let settings = &mut setup.picture.render;
@@ -203,7 +220,7 @@ impl Trial {
             Err(TraceError::Render(RenderError::Interrupted)) => {
                 (Film::new(width, height, channels), true)
             }
-            Err(error) => return Err(error.to_string()),
+            Err(error) => return Err(error.into()),
         };
         Ok(Self {
             setup,
@@ -227,17 +244,17 @@ impl Trial {
     }
 
     /// Estimated cost of the full image.
-    fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, String> {
+    fn cost(&self, full: &Setup, task: &ImageTask) -> Result<ImageCost, ProbeError> {
         // Images are encoded by one thread while the pool traces, so measure with one thread.
         let pool = ThreadPoolBuilder::new().num_threads(1).build();
-        let pool = pool.map_err(|e| e.to_string())?;
+        let pool = pool?;
         let start = Instant::now();
         let exr = pool.install(|| encode_exr(&self.film, &full.picture.exr));
-        let mut bytes = exr.map_err(|e| e.to_string())?.bytes.len();
+        let mut bytes = exr?.bytes.len();
         if task.preview.is_some() {
-            let camera = full.camera_at(task.frame).map_err(|e| e.to_string())?;
+            let camera = full.camera_at(task.frame).map_err(TraceError::Camera)?;
             let options = full.preview_from(&camera);
-            let png = encode_preview(&self.film, &options).map_err(|e| e.to_string())?;
+            let png = encode_preview(&self.film, &options)?;
             bytes += png.len();
         }
         let encode = start.elapsed().as_secs_f64();
@@ -297,12 +314,13 @@ mod tests {
         let manifest = crate::manifest::Manifest::new("in");
         let question = crate::resolve::question(&manifest);
         let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-        let setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
+        let setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
         let task = ImageTask {
             frame: 1,
             index: 0,
             image: PathBuf::new(),
             preview: None,
+            meshes: Vec::new(),
             refused: None,
         };
         let cut_off =

@@ -1,15 +1,22 @@
 //! Estimates the number of rays of an image, as needed to choose a tree.
 
-use super::Setup;
+use crate::render::{IntegratorKind, RenderSettings};
+use crate::scene::Scene;
 
 /// Assumed fraction of rays that hit a particle; in the thesis's picture it is 0.3 of the primary and 0.6 of the
 /// reflected rays.
 const HIT_FRACTION: f64 = 0.4;
 
+/// Number of diffuse reflections after which few paths remain.
+const MOST_BOUNCES: u32 = 4;
+
 /// Estimated number of rays of one image.
-pub(super) fn expected_rays(setup: &Setup) -> f64 {
-    let (image, scene) = (&setup.picture.render, &setup.picture.scene);
+pub(super) fn expected_rays(image: &RenderSettings, scene: &Scene) -> f64 {
     let paths = f64::from(image.width) * f64::from(image.height) * f64::from(image.samples);
+    if image.integrator == IntegratorKind::Path {
+        let lights = scene.lights.len() + usize::from(scene.environment.is_some());
+        return paths * rays_per_path(lights, 1, 1 + image.bounces.min(MOST_BOUNCES));
+    }
     let material = &scene.material;
     let branches = [material.reflection, material.transmission]
         .iter()

@@ -1,7 +1,9 @@
 //! The interface between the stages of a run and the renderer.
 
 use std::path::PathBuf;
+use std::sync::Arc;
 
+use glam::Vec3;
 use spherule_formats::FrameError;
 
 use super::ImageTask;
@@ -10,10 +12,13 @@ use super::in_place::StoredFrame;
 use super::load::LoadedFrame;
 use super::setup::Setup;
 use crate::accel::stored::StoredFault;
+use crate::denoise::DenoiseError;
 use crate::metrics::MemoryUse;
+use crate::output::TextAttribute;
 use crate::render::{Film, RayCounts, RenderError, Stop};
 use crate::report::FrameReport;
 use crate::scene::{Camera, CameraError};
+use crate::surface::mesh::MeshTree;
 use crate::surface::smooth::SmoothError;
 
 /// Reasons why there is no image of a frame that was read.
@@ -33,6 +38,9 @@ pub enum TraceError {
     /// A native frame changed while it was traced, or cannot be used on this machine.
     #[error(transparent)]
     File(#[from] FrameError),
+    /// The image cannot be denoised.
+    #[error(transparent)]
+    Denoise(#[from] DenoiseError),
     /// The surface does not fit into memory.
     #[error(transparent)]
     Surface(#[from] SmoothError),
@@ -50,6 +58,8 @@ pub struct TracedFrame {
     pub camera: Camera,
     /// The planes.
     pub film: Film,
+    /// Attributes of the file that describe its layers.
+    pub texts: Vec<TextAttribute>,
     /// Simulation time, if known.
     pub time: Option<f64>,
     /// The report, without encoding.
@@ -63,7 +73,10 @@ pub struct TracedFrame {
 pub struct BuiltFrame {
     pub(super) task: ImageTask,
     pub(super) particles: BuiltParticles,
+    pub(super) meshes: Vec<Arc<MeshTree>>,
     pub(super) time: Option<f64>,
+    /// Position of the particle in focus.
+    pub(super) focus: Option<Vec3>,
     pub(super) report: FrameReport,
     /// Notes for the user.
     pub(super) notes: Vec<String>,

@@ -1,6 +1,8 @@
 //! Schedules the frames of a job within memory: overlapping, one at a time, or not at all.
 
+use super::memory_limit::MemoryLimitError;
 use super::predict::{FrameSize, MemoryModel, MemoryNeed};
+use crate::metrics::Bytes;
 
 /// Whether several frames are in flight.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -19,8 +21,8 @@ pub struct Schedule {
     pub need: MemoryNeed,
     /// Whether frames overlap.
     pub overlap: Overlap,
-    /// Frames that do not fit, by their index in the input, with the memory that they need.
-    pub too_large: Vec<(usize, MemoryNeed)>,
+    /// Frames that do not fit, by their index in the input.
+    pub too_large: Vec<(usize, MemoryLimitError)>,
 }
 
 impl MemoryModel<'_> {
@@ -29,7 +31,7 @@ impl MemoryModel<'_> {
     pub fn schedule(
         &self,
         frames: &[FrameSize],
-        limit: Option<u64>,
+        limit: Option<Bytes>,
         free: Option<u64>,
     ) -> Schedule {
         let mut too_large = Vec::new();
@@ -37,15 +39,19 @@ impl MemoryModel<'_> {
         // Exclude frames that do not fit alone
         for (index, frame) in frames.iter().enumerate() {
             let need = self.alone(frame);
-            if limit.is_some_and(|limit| need.total() > limit) {
-                too_large.push((index, need));
-            } else {
-                fitting.push(*frame);
+            match limit.filter(|limit| need.total() > limit.0) {
+                Some(limit) => {
+                    let error = MemoryLimitError::new(self.setup, frame, need, limit);
+                    too_large.push((index, error));
+                }
+                None => fitting.push(*frame),
             }
         }
         // Overlap the others if that fits
         let overlapping = self.peak(&fitting);
-        let bound = limit.unwrap_or(u64::MAX).min(free.unwrap_or(u64::MAX));
+        let bound = limit
+            .map_or(u64::MAX, |limit| limit.0)
+            .min(free.unwrap_or(u64::MAX));
         let (overlap, need) = if overlapping.total() <= bound {
             (Overlap::Stages, overlapping)
         } else {

@@ -3,11 +3,13 @@
 use glam::{DVec3, Vec3};
 use spherule_formats::native::Access;
 
+use super::meshes::PictureMesh;
 use super::rays::expected_rays;
 use crate::accel::{BuildSettings, BvhSettings, SbvhSettings, Structure, choose};
+use crate::denoise::DenoiseSettings;
 use crate::output::{ExrOptions, PreviewOptions};
 use crate::render::{RenderSettings, RendererKind};
-use crate::scene::{Camera, CameraError, CameraPath, ColorMap, Scene};
+use crate::scene::{Camera, CameraError, CameraPath, ColorMap, LensSettings, NextFrame, Scene};
 use crate::surface::{SurfaceKind, SurfaceSettings};
 use crate::survey::FrameWeight;
 
@@ -45,7 +47,7 @@ pub enum ColorRule {
         name: String,
         /// The map with the range of the whole sequence.
         map: ColorMap,
-        /// Whether it was asked for by name, so that a frame without it is an error. Otherwise such
+        /// Whether the user named it, so that a frame without it is an error. Otherwise such
         /// a frame has the default colour.
         required: bool,
     },
@@ -65,6 +67,24 @@ impl ColorRule {
             Self::Rgb { .. } => size_of::<Vec3>() as u64,
         }
     }
+}
+
+/// An attribute with channels in the images.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct AttributeChannel {
+    /// Its name.
+    pub name: String,
+    /// Components per particle.
+    pub components: usize,
+}
+
+/// From one frame to the next, for motion on the film.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FrameStep {
+    /// Time, in the unit of the velocities.
+    pub time: f32,
+    /// Difference of the frame numbers.
+    pub numbers: i64,
 }
 
 /// The settings of a job: its pictures, and the execution of a run.
@@ -89,17 +109,27 @@ pub struct Picture {
     pub color: ColorRule,
     /// The camera path, in world units.
     pub path: CameraPath,
+    /// The lens of the camera; without one, it is a pinhole.
+    pub lens: Option<LensSettings>,
     /// Width of the images divided by their height; also used if fewer pixels are traced in a trial.
     pub aspect: f64,
     /// Lights, material, background, ground; with the camera at the start of the path. [`Setup::scene_at`] returns
     /// the scene of a frame.
     pub scene: Scene,
+    /// The meshes; their materials are in the scene.
+    pub meshes: Vec<PictureMesh>,
     /// The renderer.
     pub renderer: RendererKind,
     /// Image size, samples, depth, channels.
     pub render: RenderSettings,
+    /// How noise is removed from the images, if it is. The settings for rendering then have features.
+    pub denoise: Option<DenoiseSettings>,
     /// The surface.
     pub surface: SurfaceSettings,
+    /// Attributes with channels, in the order of their floats in the film.
+    pub attributes: Vec<AttributeChannel>,
+    /// The next frame, if there is a channel for motion.
+    pub step: Option<FrameStep>,
     /// Options of the EXR; the camera is added for each frame.
     pub exr: ExrOptions,
     /// Options of the PNG; [`Setup::preview_from`] adds the background.
@@ -127,7 +157,7 @@ pub struct RunSettings {
 }
 
 impl Setup {
-    /// The camera of `frame`.
+    /// The camera of `frame`, without its lens.
     ///
     /// # Errors
     /// The view is invalid; [`crate::resolve::check_views`] detects that in advance.
@@ -139,13 +169,32 @@ impl Setup {
         )
     }
 
-    /// The scene of `frame`: only the camera moves, lights and everything else are fixed.
+    /// The scene of `frame`: only the camera moves, lights and everything else are fixed. `focus` is the position of
+    /// the particle in focus, relative to the origin.
     ///
     /// # Errors
-    /// Same as [`Self::camera_at`].
-    pub fn scene_at(&self, frame: i64) -> Result<Scene, CameraError> {
+    /// Same as [`Self::camera_at`], or the focus is not in front of the camera.
+    pub fn scene_at(&self, frame: i64, focus: Option<Vec3>) -> Result<Scene, CameraError> {
+        let mut camera = self.camera_at(frame)?;
+        if let Some(lens) = self.picture.lens {
+            let view = self.picture.path.view(frame);
+            let point = focus.map(|point| self.picture.origin + point.as_dvec3());
+            camera = camera.with_lens(lens.lens(&view, self.picture.aspect, point)?);
+        }
+        let next_frame = match self.picture.step {
+            Some(step) => {
+                // Only views of frames in the sequence are checked in advance
+                let next = self.camera_at(frame.saturating_add(step.numbers));
+                Some(NextFrame {
+                    camera: next.or_else(|_| self.camera_at(frame))?,
+                    time: step.time,
+                })
+            }
+            None => None,
+        };
         Ok(Scene {
-            camera: self.camera_at(frame)?,
+            camera,
+            next_frame,
             ..self.picture.scene.clone()
         })
     }
@@ -164,7 +213,7 @@ impl Setup {
         let channels = self.picture.render.channels;
         let structure = self.structure_for(particles);
         BuildSettings {
-            keep_indices: channels.id || channels.velocity || has_values,
+            keep_indices: channels.needs_particles() || has_values,
             bvh: self.run.bvh,
             sbvh: self.run.sbvh,
             ..BuildSettings::new(structure)
@@ -182,20 +231,28 @@ impl Setup {
         let structure = self.stored_structure();
         if matches!(structure, Structure::Bvh | Structure::Sbvh) {
             return Some(format!(
-                "{structure} builds over a copy of them, 12 bytes a particle and more; lbvh and kdtree do not"
+                "{structure} builds over a copy of them, 12 bytes per particle and more; lbvh and kdtree do not"
             ));
+        }
+        if self.focused_particle().is_some() {
+            return Some("camera.focus searches for a particle in a copy of them".to_owned());
         }
         let why = match self.picture.surface {
             SurfaceSettings {
                 kind: SurfaceKind::Smooth,
                 ..
-            } => "a smooth surface sorts a copy of them, 12 bytes a particle and more",
+            } => "a smooth surface sorts a copy of them, 12 bytes per particle and more",
             SurfaceSettings { spray: true, .. } => {
-                "spray is parted from them, for 12 bytes a particle and more"
+                "spray is parted from them, for 12 bytes per particle and more"
             }
             _ => return None,
         };
         Some(why.to_owned())
+    }
+
+    /// The id of the particle in focus.
+    pub(super) fn focused_particle(&self) -> Option<u32> {
+        self.picture.lens.as_ref().and_then(LensSettings::particle)
     }
 
     /// The structure to report for a native frame in place: its order is that of k-d cells.
@@ -206,7 +263,8 @@ impl Setup {
     fn structure_for(&self, particles: usize) -> Structure {
         self.run.accelerator.unwrap_or_else(|| {
             let threads = rayon::current_num_threads();
-            choose(particles, expected_rays(self), threads)
+            let rays = expected_rays(&self.picture.render, &self.picture.scene);
+            choose(particles, rays, threads)
         })
     }
 }

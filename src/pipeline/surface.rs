@@ -1,11 +1,13 @@
 //! The surfaces of a frame, as the setup requires: the spheres of its tree, or the additional structures that are
 //! built for other surfaces.
 
+use std::sync::Arc;
 use std::time::Instant;
 
 use spherule_formats::Radius;
 
 use super::decoded::DecodedFrame;
+use super::meshes::PictureMesh;
 use super::setup::Setup;
 use crate::accel::view::TreeView;
 use crate::accel::{BuildReport, BuildSettings, SphereRadius, Spheres, Structure, TreeBuilder};
@@ -14,6 +16,7 @@ use crate::metrics::memory::available;
 use crate::render::{Film, RayCounts, RenderError, ShadeSource, Stop, render_into};
 use crate::report::FrameReport;
 use crate::scene::Scene;
+use crate::surface::mesh::{MeshSurface, MeshTree};
 use crate::surface::smooth::{SmoothError, SmoothGrid, SmoothReport};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::spray::{DROP_RADIUS, spray_of};
@@ -83,7 +86,7 @@ impl SurfaceBuilder {
         let channels = setup.picture.render.channels;
         let is_colored = setup.picture.color.is_by_particle();
         // Keep the particles if attributes are looked up at points of the surface
-        let keep = channels.id || channels.velocity || is_colored;
+        let keep = channels.needs_particles() || is_colored;
         let left = memory_left(setup.run.memory_limit);
         let made = self
             .smooth
@@ -125,7 +128,7 @@ impl SurfaceBuilder {
         // Find the spray in the tree that is fastest to build; the result does not depend on the structure
         trees.build(&spheres(frame), &BuildSettings::new(Structure::Lbvh));
         let spray = spray_of(&trees.tree().view(), support(&setup.picture.surface));
-        let body = frame.move_to_end(&spray, setup.picture.render.channels.id);
+        let body = frame.move_to_end(&spray, setup.picture.render.channels.needs_ids());
         self.body = u32::try_from(body).unwrap_or(u32::MAX);
         // Build the tree of the drops
         let drops = match &frame.radius {
@@ -147,14 +150,19 @@ impl SurfaceBuilder {
         built
     }
 
-    /// Renders the surface that `setup` requires over the spheres of `tree` to `film`.
+    /// Renders the surface that `setup` requires over the spheres of `tree`, and `meshes`, to `film`.
     ///
     /// # Errors
     /// Same as [`render_into`].
+    #[expect(
+        clippy::too_many_arguments,
+        reason = "parts of a frame with different owners"
+    )]
     pub(super) fn draw(
         &self,
         setup: &Setup,
         tree: TreeView<'_>,
+        meshes: &[Arc<MeshTree>],
         scene: &Scene,
         source: &dyn ShadeSource,
         film: &mut Film,
@@ -171,8 +179,22 @@ impl SurfaceBuilder {
         if !self.spray.tree().view().is_empty() {
             shapes.push(&spray);
         }
+        let meshes: Vec<MeshSurface<'_>> = mesh_surfaces(&setup.picture.meshes, meshes).collect();
+        shapes.extend(meshes.iter().map(|mesh| mesh as &dyn Shape));
         render_into(film, &shapes, scene, source, &setup.picture.render, stop)
     }
+}
+
+/// The shapes of `trees`, which are `meshes` of a picture.
+fn mesh_surfaces<'a>(
+    meshes: &'a [PictureMesh],
+    trees: &'a [Arc<MeshTree>],
+) -> impl Iterator<Item = MeshSurface<'a>> {
+    let meshes = meshes.iter().zip(trees).enumerate();
+    meshes.filter_map(|(index, (mesh, tree))| {
+        let material = MaterialId::of_mesh(index)?;
+        Some(MeshSurface::new(tree, mesh.settings.faces, material))
+    })
 }
 
 /// The spheres of a frame as the input of a builder.
@@ -204,7 +226,7 @@ fn median_radius(radii: &[f32], notes: &mut Vec<String>) -> f32 {
         .any(|radius| (radius - median).abs() > RADIUS_TOLERANCE * median)
     {
         notes.push(format!(
-            "radii differ; a smooth surface has one for all, here their median {median} (--radius gives another)"
+            "radii differ; a smooth surface has one for all, here their median {median} (input.radius sets another)"
         ));
     }
     median

@@ -10,7 +10,7 @@ use spherule_formats::{ParticleFrame, SequenceInput, sequence::Sequence};
 use super::*;
 use crate::manifest::{Manifest, RadiusSetting};
 use crate::pipeline::{CpuRenderer, FrameRenderer, ImageTask, LoadedParticles, load_frame};
-use crate::render::Channels;
+use crate::render::{Channels, IntegratorKind};
 
 /// A wavy block with drops above it.
 fn particles() -> Vec<Vec3> {
@@ -31,10 +31,12 @@ fn particles() -> Vec<Vec3> {
 fn opened(file: &Path) -> (Setup, Sequence) {
     let mut manifest = Manifest::new("in");
     manifest.input.radius = RadiusSetting::Length(0.12);
+    // Highlights show the normals of clear spheres
+    manifest.render.integrator = Some(IntegratorKind::Whitted);
     let sequence = Sequence::open(&SequenceInput::from_path(file)).expect("a frame");
     let question = crate::resolve::question(&manifest);
     let survey = crate::survey::Survey::of(&sequence, question).expect("readable");
-    let mut setup = crate::resolve::setup(&manifest, &survey).expect("pictures");
+    let mut setup = crate::resolve::setup(&manifest, &survey, None).expect("pictures");
     setup.picture.render.width = 48;
     setup.picture.render.height = 27;
     setup.picture.render.samples = 1;
@@ -57,6 +59,7 @@ fn drawn(setup: &Setup, sequence: &Sequence, tracer: &mut CpuRenderer) -> Drawn 
         index: 0,
         image: PathBuf::new(),
         preview: None,
+        meshes: Vec::new(),
         refused: None,
     };
     let loaded = load_frame(setup, sequence, &task).expect("readable");

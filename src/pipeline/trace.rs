@@ -5,12 +5,15 @@ use std::time::{Duration, Instant};
 use super::decoded::{DecodedFrame, DecodedShading};
 use super::in_place::StoredFrame;
 use super::load::{LoadedFrame, LoadedParticles};
+use super::mattes;
 use super::renderer::{BuiltFrame, BuiltParticles, FrameRenderer, TraceError, TracedFrame};
 use super::setup::{ColorRule, Setup};
 use super::surface::{SurfaceBuilder, spheres};
 use crate::accel::stored::{StoredSettings, StoredTree};
 use crate::accel::{BuildReport, TreeBuilder};
+use crate::denoise::{DenoiseError, DenoiseInput, denoise};
 use crate::metrics::MemoryUse;
+use crate::output::TextAttribute;
 use crate::render::{Colors, Film, ParticleShading, RayCounts, RendererKind, Stop};
 use crate::report::FrameReport;
 use crate::report::frame::FileBytes;
@@ -66,7 +69,9 @@ impl FrameRenderer for CpuRenderer {
         Ok(BuiltFrame {
             task: frame.task,
             particles,
+            meshes: frame.meshes,
             time: frame.time,
+            focus: frame.focus,
             report,
             notes,
         })
@@ -92,6 +97,7 @@ impl FrameRenderer for CpuRenderer {
         let mut film = std::mem::take(&mut self.film);
         let rays = self.draw(setup, &frame, &mut film, stop)?;
         let memory = MemoryUse::now();
+        let texts = matte_attributes(setup, &frame);
         let BuiltFrame {
             task,
             time,
@@ -99,11 +105,13 @@ impl FrameRenderer for CpuRenderer {
             ..
         } = frame;
         report.seconds.trace = seconds(start.elapsed());
+        report.seconds.denoise = denoise_film(setup, &mut film)?;
         report.rays = rays.into();
         Ok(TracedFrame {
             camera: setup.camera_at(task.frame)?,
             task,
             film,
+            texts,
             time,
             report,
             memory,
@@ -157,25 +165,70 @@ impl CpuRenderer {
         film: &mut Film,
         stop: &dyn Stop,
     ) -> Result<RayCounts, TraceError> {
-        let scene = setup.scene_at(frame.task.frame)?;
-        let surface = &self.surface;
+        let scene = setup.scene_at(frame.task.frame, frame.focus)?;
+        let (surface, meshes) = (&self.surface, &frame.meshes);
         match &frame.particles {
             BuiltParticles::Decoded(shading) => {
                 let source = particle_shading(&setup.picture.color, shading);
                 let tree = self.builder.tree().view();
-                Ok(surface.draw(setup, tree, &scene, &source, film, stop)?)
+                Ok(surface.draw(setup, tree, meshes, &scene, &source, film, stop)?)
             }
             BuiltParticles::Stored(stored) => {
                 let leaves = stored.leaves()?;
                 let source = stored.shading(&setup.picture.color, DEFAULT_COLOR);
                 let tree = self.stored.view(&leaves);
-                let rays = surface.draw(setup, tree, &scene, &source, film, stop)?;
+                let rays = surface.draw(setup, tree, meshes, &scene, &source, film, stop)?;
                 // Reject the image if the file has changed meanwhile.
                 stored.check()?;
                 Ok(rays)
             }
         }
     }
+}
+
+/// The attributes of the Cryptomatte layers of `frame`.
+fn matte_attributes(setup: &Setup, frame: &BuiltFrame) -> Vec<TextAttribute> {
+    if setup.picture.render.channels.layers.mattes.is_empty() {
+        return Vec::new();
+    }
+    let (count, color) = (frame.report.particles, &setup.picture.color);
+    match &frame.particles {
+        BuiltParticles::Decoded(shading) => {
+            mattes::attributes(setup, &particle_shading(color, shading), count)
+        }
+        BuiltParticles::Stored(stored) => {
+            mattes::attributes(setup, &stored.shading(color, DEFAULT_COLOR), count)
+        }
+    }
+}
+
+/// Denoises `film` if the setup says so. Returns the time, seconds.
+fn denoise_film(setup: &Setup, film: &mut Film) -> Result<f64, DenoiseError> {
+    let (Some(settings), Some(odd), Some(albedo), Some(normal), Some(depth)) = (
+        &setup.picture.denoise,
+        &film.odd,
+        &film.albedo,
+        &film.normal,
+        &film.depth,
+    ) else {
+        return Ok(0.0);
+    };
+    let start = Instant::now();
+    let input = DenoiseInput {
+        width: film.width,
+        height: film.height,
+        samples: setup.picture.render.samples,
+        color: &film.color,
+        odd,
+        albedo,
+        normal,
+        depth,
+    };
+    let filtered = denoise(&input, settings)?;
+    for (color, filtered) in film.color.iter_mut().zip(filtered) {
+        [color[0], color[1], color[2]] = filtered.to_array();
+    }
+    Ok(seconds(start.elapsed()))
 }
 
 fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> ParticleShading<'a> {
@@ -191,6 +244,11 @@ fn particle_shading<'a>(color: &'a ColorRule, shading: &'a DecodedShading) -> Pa
         colors,
         ids: shading.ids.as_deref(),
         velocities: shading.velocities.as_deref(),
+        parts: shading
+            .parts
+            .as_ref()
+            .map(|(name, parts)| (name.as_str(), &parts[..])),
+        attributes: &shading.attributes,
     }
 }
 

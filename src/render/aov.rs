@@ -23,6 +23,10 @@ pub struct DataSample {
     pub albedo: Vec3,
     /// The id of the particle, or [`NO_ID`].
     pub id: u32,
+    /// Index of the particle in the frame, if it was looked up for a channel.
+    pub particle: Option<u32>,
+    /// Motion on the film to the next frame, pixels; x to the right, y up.
+    pub motion: [f32; 2],
 }
 
 impl DataSample {
@@ -34,6 +38,8 @@ impl DataSample {
         velocity: Vec3::ZERO,
         albedo: Vec3::ZERO,
         id: NO_ID,
+        particle: None,
+        motion: [0.0; 2],
     };
 
     /// Replaces the sample by the result of `other`, at distance `z` along the view axis, if that is nearer.

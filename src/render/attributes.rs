@@ -5,7 +5,10 @@ use glam::Vec3;
 use super::{
     aov::{DataSample, NO_ID},
     context::RenderContext,
-    film::Channels,
+    cryptomatte::{self, ObjectName},
+    film::{Channels, FilmTile},
+    layers::MatteKind,
+    sample_layers::SampleLayers,
     scratch::{PacketScratch, Pixel},
     shading::depths,
 };
@@ -58,22 +61,30 @@ impl RenderContext<'_> {
         self.source.blended_color(blend)
     }
 
-    /// Base colour of the ground or of spray.
+    /// Base colour of the ground, of a mesh or of spray.
     fn fixed_color(&self, hits: &Intersections, lane: usize) -> Vec3 {
+        if let Some(mesh) = self.mesh(hits.material[lane]) {
+            return mesh.color;
+        }
         match (hits.material[lane], &self.scene.ground) {
             (MaterialId::GROUND, Some(ground)) => ground.color_at(lane3(&hits.point, lane)),
             _ => SPRAY,
         }
     }
 
-    /// Fraction of each sample that surfaces cover. A ground that fades out still covers all of it, unless the
-    /// background is transparent.
-    pub(super) fn coverage(&self, hits: &Intersections) -> Lanes {
+    /// Fraction of each sample that surfaces cover, or `otherwise` without a surface. A ground that fades out still
+    /// covers all of it, unless the background is transparent. Holdouts cover nothing.
+    pub(super) fn coverage(&self, hits: &Intersections, otherwise: &Lanes) -> Lanes {
         std::array::from_fn(|lane| match hits.mask >> lane & 1 {
-            0 => 0.0,
+            0 => otherwise[lane],
+            _ if self.is_holdout(hits.material[lane]) => 0.0,
             _ if self.settings.transparent_background => hits.opacity[lane],
             _ => 1.0,
         })
+    }
+
+    fn is_holdout(&self, material: MaterialId) -> bool {
+        self.mesh(material).is_some_and(|mesh| mesh.is_holdout)
     }
 
     /// Stores the data of the nearest sample of each pixel, the first in a tie. The rays belong to the samples from
@@ -85,9 +96,11 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
         pixels: &mut [Pixel],
     ) {
-        if self.settings.channels == Channels::COLOR || packet.hits.mask == 0 {
+        if self.settings.planes() == Channels::COLOR || packet.hits.mask == 0 {
             return;
         }
+        // The data of reflections at panes are of what is behind
+        self.restore_behind(packet);
         // Compute the depths of all samples
         let mut z = splat(f32::INFINITY);
         depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
@@ -104,11 +117,92 @@ impl RenderContext<'_> {
         }
     }
 
+    /// Stores the layers of `pixels` that come from their nearest sample.
+    pub(super) fn store_nearest(&self, pixels: &[Pixel], tile: &mut FilmTile<'_>) {
+        let layers = &self.settings.channels.layers;
+        let (attributes, motion) = (layers.attributes_at(), layers.motion_at());
+        if attributes.is_empty() && motion.is_empty() {
+            return;
+        }
+        for pixel in pixels {
+            let floats = tile.layers_mut(pixel.column, pixel.row);
+            match pixel.data.particle {
+                Some(particle) => {
+                    let values = &mut floats[attributes.clone()];
+                    self.source.attributes(particle, values);
+                }
+                None => floats[attributes.clone()].fill(0.0),
+            }
+            floats[motion.clone()].copy_from_slice(&pixel.data.motion[..motion.len()]);
+        }
+    }
+
+    /// Stores the objects of the samples of packet `number`.
+    pub(super) fn gather_objects(
+        &self,
+        hits: &Intersections,
+        number: usize,
+        layers: &mut SampleLayers,
+    ) {
+        for kind in layers.layers.mattes.iter() {
+            for lane in lanes_in(hits.mask) {
+                layers.set_object(kind, number, lane, self.object(kind, hits, lane));
+            }
+        }
+    }
+
+    /// The object of `kind` at the intersection in `lane`.
+    fn object(&self, kind: MatteKind, hits: &Intersections, lane: usize) -> u32 {
+        let material = hits.material[lane];
+        let object = |name: ObjectName| cryptomatte::object_of(name.as_bytes());
+        if material.is_of_particles() {
+            let particle = || self.particle_at(hits, lane);
+            match kind {
+                MatteKind::Particle => {
+                    return object(ObjectName::of_particle(self.source.id(particle())));
+                }
+                MatteKind::Part => {
+                    let part = self.source.part(particle());
+                    return part.map_or(object_of_name(cryptomatte::PARTICLES), |(name, value)| {
+                        object(ObjectName::of_part(name, value))
+                    });
+                }
+                MatteKind::Material => {}
+            }
+        }
+        object_of_name(match material {
+            MaterialId::PARTICLES => cryptomatte::PARTICLES,
+            MaterialId::SPRAY => cryptomatte::SPRAY,
+            MaterialId::GROUND => cryptomatte::GROUND,
+            _ => {
+                return object(ObjectName::of_mesh(
+                    material.mesh_index().unwrap_or_default(),
+                ));
+            }
+        })
+    }
+
     /// The particle of the intersection in `lane`.
     fn particle_at(&self, hits: &Intersections, lane: usize) -> u32 {
         match (hits.material[lane], self.particles) {
             (MaterialId::PARTICLES, Some(particles)) => particles.particle_at(&hits.get(lane)),
             _ => hits.particle[lane],
+        }
+    }
+
+    /// Motion on the film of a point with this `velocity`, from this frame to the next, pixels; zero if it is or gets
+    /// behind the camera.
+    fn motion(&self, point: Vec3, velocity: Vec3) -> [f32; 2] {
+        let Some((next, time)) = &self.next_frame else {
+            return [0.0; 2];
+        };
+        let (from, to) = (
+            self.camera.pixel_of(point),
+            next.pixel_of(point + *time * velocity),
+        );
+        match (from, to) {
+            (Some(from), Some(to)) => [to[0] - from[0], from[1] - to[1]],
+            _ => [0.0; 2],
         }
     }
 
@@ -121,10 +215,10 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
     ) -> DataSample {
         let PacketScratch { hits, blend, .. } = packet;
-        let channels = self.settings.channels;
+        let channels = self.settings.planes();
         let is_particle = hits.material[lane].is_of_particles();
         // Look up the particle only if a channel needs it
-        let needs_particle = is_particle && (channels.id || channels.velocity);
+        let needs_particle = is_particle && channels.needs_nearest_particle();
         let particle = needs_particle.then(|| self.particle_at(hits, lane));
         let normal = lane3(&hits.normal, lane);
         let direction = lane3(&rays.direction, lane);
@@ -132,7 +226,12 @@ impl RenderContext<'_> {
             MaterialId::PARTICLES => self.particle_color(hits, lane, blend),
             _ => self.fixed_color(hits, lane),
         };
-        let point = lane3(&hits.point, lane).as_dvec3();
+        let point = lane3(&hits.point, lane);
+        let velocity = particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle));
+        let motion = match channels.layers.motion {
+            true => self.motion(point, velocity),
+            false => [0.0; 2],
+        };
         DataSample {
             z,
             normal: if direction.dot(normal) < 0.0 {
@@ -140,14 +239,20 @@ impl RenderContext<'_> {
             } else {
                 -normal
             },
-            position: (self.scene.origin + point).as_vec3(),
-            velocity: particle.map_or(Vec3::ZERO, |particle| self.source.velocity(particle)),
+            position: (self.scene.origin + point.as_dvec3()).as_vec3(),
+            velocity,
             albedo: if channels.albedo {
                 albedo(blend)
             } else {
                 Vec3::ZERO
             },
             id: particle.map_or(NO_ID, |particle| self.source.id(particle)),
+            particle,
+            motion,
         }
     }
+}
+
+fn object_of_name(name: &str) -> u32 {
+    cryptomatte::object_of(name.as_bytes())
 }

@@ -13,7 +13,7 @@ use super::{
 };
 use crate::ray::Ray;
 use crate::scene::{
-    Background, Camera, CameraView, Checker, Fresnel, Ground, Light, Material, ground,
+    Background, Camera, CameraView, Fresnel, Ground, Light, Material, ground,
     material::{dielectric, extinction},
 };
 use crate::surface::{Intersection, MaterialId, Side};
@@ -39,13 +39,9 @@ fn scene(eye: DVec3, look_at: DVec3, material: Material) -> Scene {
         fov: 20.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
-        ambient_light: Vec3::ONE,
         material,
         background: Background::Constant(Vec3::ONE),
-        ground: None,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 
@@ -74,7 +70,9 @@ fn floor(height: f32) -> Ground {
         center: Vec3::Z * height,
         fade_start: 1e4,
         fade_end: 2e4,
-        checker: None,
+        pattern: ground::Pattern::Plain,
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
+        shadow_catcher: None,
     }
 }
 
@@ -128,9 +126,9 @@ impl Shape for Drops {
 }
 
 #[track_caller]
-fn assert_within(limit: f32, value: Vec3, wanted: Vec3) {
-    let error = (value - wanted).abs().max_element();
-    assert!(error < limit, "{value} is not {wanted}");
+fn assert_within(limit: f32, value: Vec3, expected: Vec3) {
+    let error = (value - expected).abs().max_element();
+    assert!(error < limit, "{value} is not {expected}");
 }
 
 fn film(solid: &Solid, scene: &Scene, settings: &RenderSettings) -> Film {
@@ -164,15 +162,15 @@ fn a_glass_ball_refracts_at_the_known_angles() {
         let r = f64::from(dielectric(a.cos() as f32, 1.0 / 1.5));
         let out = sky(2.0 * (a - b));
         let back = sky((a - b) + PI - 2.0 * b);
-        let wanted = r * sky(PI - 2.0 * a) + (1.0 - r) * ((1.0 - r) * out + r * back);
+        let expected = r * sky(PI - 2.0 * a) + (1.0 - r) * ((1.0 - r) * out + r * back);
         let value = middle(&Solid::ball(1.0), &scene, 2);
         // The offset from the surface shifts the path by the same length.
-        assert_within(5e-4, value, Vec3::splat(wanted as f32));
+        assert_within(5e-4, value, Vec3::splat(expected as f32));
     }
 }
 
 #[test]
-fn energy_is_kept_and_absorbed_never_made() {
+fn energy_is_never_created() {
     let solids = [Solid::ball(1.0), Solid::slab(-0.3, 0.8)];
     let eye = DVec3::new(0.4, -6.0, 3.0);
     for (samples, solid) in [1, 16].iter().flat_map(|s| solids.iter().map(|b| (*s, b))) {
@@ -203,7 +201,7 @@ fn energy_is_kept_and_absorbed_never_made() {
 }
 
 #[test]
-fn a_slab_absorbs_along_the_way_through_it() {
+fn slab_absorbs_along_the_path_through_it() {
     let solid = Solid::slab(-2.0, 0.0);
     // Without refraction, at normal incidence and at 60 degrees, the paths inside have lengths 2 and 4.
     let tinted = Material {
@@ -217,16 +215,16 @@ fn a_slab_absorbs_along_the_way_through_it() {
     assert_within(1e-5, aslant, Vec3::new(0.25, 0.0625, 1.0));
     // With refraction, the internal reflections form a geometric series.
     let glass = with_loss(Vec3::new(0.5, 0.25, 1.0), 2.0);
-    let wanted = [0.5_f32, 0.25, 1.0].map(|kept| {
+    let expected = [0.5_f32, 0.25, 1.0].map(|kept| {
         let inside = kept * (1.0 - R) / (1.0 - R * kept);
         R + (1.0 - R) * inside
     });
     let value = middle(&solid, &from_above(5.0, glass), 20);
-    assert_within(1e-5, value, Vec3::from_array(wanted));
+    assert_within(1e-5, value, Vec3::from_array(expected));
 }
 
 #[test]
-fn roulette_has_the_mean_of_splitting() {
+fn roulette_and_splitting_have_the_same_mean() {
     let eye = DVec3::new(0.4, -6.0, 3.0);
     let mut scene = scene(eye, DVec3::ZERO, with_loss(Vec3::new(0.7, 0.9, 1.0), 1.0));
     scene.background = Background::Gradient {
@@ -260,7 +258,7 @@ fn roulette_has_the_mean_of_splitting() {
 }
 
 #[test]
-fn more_samples_draw_sooner() {
+fn more_samples_use_roulette_earlier() {
     let scene = from_above(5.0, CLEAR);
     let source = ParticleShading::constant(Vec3::ONE);
     let solid = Solid::ball(1.0);
@@ -278,7 +276,7 @@ fn more_samples_draw_sooner() {
 }
 
 #[test]
-fn an_eye_inside_sees_total_reflection_and_a_wet_floor() {
+fn camera_inside_has_total_reflection_and_wet_ground() {
     // From the middle of a slab, up at 60 degrees from the normal: total internal reflection to the ground inside the
     // slab, 0.5 below the eye. The path has length 2 * (1 + 1 + 0.5).
     let solid = Solid::slab(-3.0, 1.0);
@@ -302,7 +300,7 @@ fn an_eye_inside_sees_total_reflection_and_a_wet_floor() {
 }
 
 #[test]
-fn the_floor_is_seen_bent_through_a_slab() {
+fn ground_is_refracted_through_a_slab() {
     // At 45 degrees into a slab of height 1: sin b = sin 45 / 1.5, so the ray hits the ground tan b = 0.5345 beyond
     // the entry at 0; without refraction it would be 1.
     let solid = Solid::slab(-5.0, 1.0);
@@ -313,7 +311,9 @@ fn the_floor_is_seen_bent_through_a_slab() {
     let light = (1.0 - r) * 0.5 * ground::AMBIENT;
     for (tile, is_light) in [(0.54, true), (0.53, false)] {
         scene.ground = Some(Ground {
-            checker: Some(Checker { tile }),
+            pattern: ground::Pattern::Checker { tile },
+            particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
+            shadow_catcher: None,
             // The corner of four squares; the camera looks along y.
             center: Vec3::new(-0.1, 0.0, 0.0),
             ..floor(0.0)
@@ -339,7 +339,7 @@ fn under_a_slab(material: Material, spray: Vec<Ball>) -> f32 {
 }
 
 #[test]
-fn shadows_are_dimmed_by_crossings_and_by_the_way_inside() {
+fn shadows_are_attenuated_by_interfaces_and_absorption() {
     let bare = 0.5 * ground::DIFFUSE;
     let air = Material { ior: 1.0, ..CLEAR };
     assert!((under_a_slab(air, Vec::new()) - bare).abs() < 1e-6);
@@ -381,9 +381,9 @@ fn spray_is_white_and_stops_light() {
     let mut scene = from_above(5.0, half);
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     let lit = ground::AMBIENT + ground::DIFFUSE * 0.5 * (1.0 - R);
-    let wanted = 0.9 * lit * 0.5 * (1.0 - R);
+    let expected = 0.9 * lit * 0.5 * (1.0 - R);
     let (value, _) = middle_of(&[&solid, &drops], &scene, 4);
-    assert_within(1e-4, value, Vec3::splat(wanted));
+    assert_within(1e-4, value, Vec3::splat(expected));
 }
 
 #[test]

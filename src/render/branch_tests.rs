@@ -14,7 +14,7 @@ use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use crate::ray::Ray;
 use crate::scene::{
     Background, Camera, CameraView,
-    material::{reflect, refract},
+    material::{reflect, refract, schlick},
 };
 use crate::surface::{Shape, spheres::SphereSurface};
 
@@ -43,9 +43,6 @@ fn glass_scene() -> Scene {
         fov: 20.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
         ambient_light: Vec3::splat(AMBIENT),
         material: Material {
             ambient: 1.0,
@@ -58,7 +55,7 @@ fn glass_scene() -> Scene {
             top: Vec3::ONE,
             up: Vec3::new(0.6, 0.0, 0.8),
         },
-        ground: None,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 
@@ -92,14 +89,12 @@ fn equation_4_1(surface: &Balls, scene: &Scene, ray: &Ray, levels: u32) -> Vec3 
     let Some(onward) = refract(ray.direction, normal, ratio) else {
         return AMBIENT + mirrored;
     };
-    let r = scene
-        .material
-        .fresnel_reflectance(-ray.direction.dot(normal), ratio);
+    let r = schlick(scene.material.r0(), -ray.direction.dot(normal));
     AMBIENT + r * mirrored + (1.0 - r) * below(hit.anchor - step, onward)
 }
 
 #[test]
-fn min_weight_0_is_equation_4_1_to_the_letter() {
+fn min_weight_0_is_equation_4_1() {
     let balls = Balls(heap(40));
     let scene = glass_scene();
     let settings = RenderSettings {
@@ -111,14 +106,16 @@ fn min_weight_0_is_equation_4_1_to_the_letter() {
     for (pixel, color) in film.color.iter().enumerate() {
         let (x, y) = (pixel % 12, pixel / 12);
         let place = Vec2::new(x as f32 + 0.5, y as f32 + 0.5) / 12.0;
-        let wanted = equation_4_1(&balls, &scene, &scene.camera.ray(place), 6);
-        let error = (Vec3::from_slice(&color[..3]) - wanted).abs().max_element();
-        assert!(error < 1e-5, "{pixel}: {color:?} {wanted}");
+        let expected = equation_4_1(&balls, &scene, &scene.camera.ray(place), 6);
+        let error = (Vec3::from_slice(&color[..3]) - expected)
+            .abs()
+            .max_element();
+        assert!(error < 1e-5, "{pixel}: {color:?} {expected}");
     }
 }
 
 #[test]
-fn one_branch_in_place_of_both_has_the_same_mean() {
+fn one_random_branch_has_the_mean_of_both() {
     let balls = heap(60);
     let centers: Vec<Vec3> = balls.iter().map(|ball| ball.center).collect();
     let mut builder = TreeBuilder::new();
@@ -198,7 +195,7 @@ fn opaque_spheres_do_not_depend_on_the_weight() {
 }
 
 #[test]
-fn what_would_never_end_is_refused() {
+fn unbounded_settings_are_rejected() {
     let balls = Balls(heap(2));
     let source = ParticleShading::constant(Vec3::ONE);
     let refused = |scene: &Scene, max_depth: u32, min_weight: f32| {
@@ -228,7 +225,7 @@ fn what_would_never_end_is_refused() {
 }
 
 #[test]
-fn radiance_does_not_depend_on_what_shares_a_packet() {
+fn radiance_does_not_depend_on_packet_neighbours() {
     let balls = Balls(heap(60));
     let solid = Solid::ball(1.0);
     let shapes: [&dyn Shape; 2] = [&balls, &solid];

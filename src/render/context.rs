@@ -15,13 +15,17 @@ use super::{
 };
 use crate::accel::Coherence;
 use crate::math::Supported;
-use crate::scene::{self, Scene};
+use crate::scene::{self, MeshMaterial, Scene};
 use crate::surface::{MaterialId, Shape, Side};
 
 /// A scene ready to be rendered.
 pub(super) struct RenderContext<'a> {
-    /// All shapes; the ground comes first, because it is the cheapest.
+    /// All shapes but panes; the ground comes first, because it is the cheapest.
     pub(super) shapes: Vec<&'a dyn Shape>,
+    /// Meshes that rays pass.
+    pub(super) panes: Vec<&'a dyn Shape>,
+    /// Whether there are meshes that only hide what is behind them.
+    pub(super) has_holdouts: bool,
     /// The particles, opaque or transmissive; all other shapes are opaque.
     pub(super) particles: Option<&'a dyn Shape>,
     pub(super) source: &'a dyn ShadeSource,
@@ -29,6 +33,8 @@ pub(super) struct RenderContext<'a> {
     pub(super) settings: &'a RenderSettings,
     pub(super) simd: Supported,
     pub(super) camera: CameraLanes,
+    /// The camera of the next frame, and the time until then.
+    pub(super) next_frame: Option<(CameraLanes, f32)>,
     pub(super) background: BackgroundLanes,
     pub(super) lights: Vec<Box<dyn Light>>,
     /// Base colour of all particles, if they share one.
@@ -66,6 +72,13 @@ impl Interior {
     }
 }
 
+/// Whether `shape` is a pane in `scene`.
+fn is_pane(scene: &Scene, shape: &dyn Shape) -> bool {
+    let mesh = shape.material().mesh_index();
+    mesh.and_then(|index| scene.meshes.get(index))
+        .is_some_and(MeshMaterial::is_pane)
+}
+
 impl<'a> RenderContext<'a> {
     pub(super) fn new(
         shapes: Vec<&'a dyn Shape>,
@@ -73,6 +86,8 @@ impl<'a> RenderContext<'a> {
         source: &'a dyn ShadeSource,
         settings: &'a RenderSettings,
     ) -> Self {
+        let is_opaque = |shape: &&dyn Shape| !is_pane(scene, *shape);
+        let (shapes, panes): (Vec<_>, Vec<_>) = shapes.into_iter().partition(is_opaque);
         // Find the particles and the kind of their interior
         let is_particles = |shape: &&&dyn Shape| shape.material() == MaterialId::PARTICLES;
         let particles = shapes.iter().find(is_particles).copied();
@@ -80,25 +95,35 @@ impl<'a> RenderContext<'a> {
         let interior = Interior::of(&scene.material, is_connected);
         // Prepare camera, background and lights for packets
         let eye = scene.camera.eye();
-        let [width, height] = settings.full_size();
+        let [width, height] = settings.data_window().image;
         let contains_eye = |shape: &dyn Shape| shape.side_of(eye) == Side::Inside;
         Self {
             is_camera_inside: interior == Interior::Body && particles.is_some_and(contains_eye),
             shapes,
+            panes,
+            has_holdouts: scene.meshes.iter().any(|mesh| mesh.is_holdout),
             particles,
             source,
             scene,
             settings,
             simd: Supported::default(),
             camera: CameraLanes::new(&scene.camera, width, height),
+            next_frame: (scene.next_frame.as_ref())
+                .map(|next| (CameraLanes::new(&next.camera, width, height), next.time)),
             background: BackgroundLanes::from(&scene.background),
             lights: scene.lights.iter().map(light_of).collect(),
             color: source.constant_color(),
             interior,
             boundary: Dielectric::new(&scene.material),
-            sampler: FilmSampler::new(settings.samples),
+            sampler: FilmSampler::with_filter(settings.samples, settings.filter),
             max_segments: SEGMENTS,
         }
+    }
+
+    /// The material of the mesh that `material` belongs to.
+    #[inline(always)]
+    pub(super) fn mesh(&self, material: MaterialId) -> Option<&MeshMaterial> {
+        self.scene.meshes.get(material.mesh_index()?)
     }
 
     /// The particles, if they bound one connected body.
@@ -106,10 +131,17 @@ impl<'a> RenderContext<'a> {
         self.particles.filter(|shape| shape.is_connected())
     }
 
-    /// The coherence of a packet at `depth`.
-    pub(super) fn coherence(depth: u32) -> Coherence {
+    /// Whether camera rays see nothing but shadows on the ground.
+    pub(super) fn catches_shadows(&self) -> bool {
+        let ground = self.scene.ground.as_ref();
+        ground.is_some_and(|ground| ground.shadow_catcher.is_some())
+    }
+
+    /// The coherence of a packet at `depth`. Camera rays from a lens have no common origin, so beams around them are
+    /// wide.
+    pub(super) const fn coherence(&self, depth: u32) -> Coherence {
         match depth {
-            1 => Coherence::Coherent,
+            1 if !self.camera.has_lens() => Coherence::Coherent,
             _ => Coherence::Incoherent,
         }
     }

@@ -5,6 +5,7 @@ use glam::Vec3;
 use thiserror::Error;
 
 use super::aov::{DataSample, NO_ID};
+use super::layers::{Layers, MatteKind};
 
 /// The planes of a film in addition to `R G B A`, which it always has.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
@@ -21,11 +22,17 @@ pub struct Channels {
     pub albedo: bool,
     /// `id`: the particle's id.
     pub id: bool,
+    /// Planes for compositing.
+    pub layers: Layers,
 }
 
 /// An unknown channel name.
 #[derive(Debug, Clone, PartialEq, Eq, Error)]
-#[error("no channel is called {name:?}, the known ones are RGBA, Z, N, P, V, albedo and id")]
+#[error(
+    "no channel is called {name:?}, the known ones are RGBA, Z, N, P, V, albedo, id, lights, diffuse, specular, \
+     reflection, refraction, emission, background, noisy, shadow, motion, cryptomatte, crypto_particle, \
+     crypto_material and crypto_part"
+)]
 pub struct UnknownChannel {
     /// The name.
     pub name: String,
@@ -40,9 +47,10 @@ impl Channels {
         velocity: false,
         albedo: false,
         id: false,
+        layers: Layers::NONE,
     };
 
-    /// All channels.
+    /// Colour and all data channels, without [`Layers`].
     pub const ALL: Self = Self {
         depth: true,
         normal: true,
@@ -50,9 +58,46 @@ impl Channels {
         velocity: true,
         albedo: true,
         id: true,
+        layers: Layers::NONE,
     };
 
-    /// Channels by their names in a manifest; `RGBA` is allowed, and always included.
+    /// Whether a channel depends on the ids of particles.
+    pub const fn needs_ids(&self) -> bool {
+        self.id || self.layers.mattes.contains(MatteKind::Particle)
+    }
+
+    /// Whether a channel depends on the velocities of particles.
+    pub const fn needs_velocities(&self) -> bool {
+        self.velocity || self.layers.motion
+    }
+
+    /// Whether a channel depends on the parts of particles.
+    pub const fn needs_parts(&self) -> bool {
+        self.layers.mattes.contains(MatteKind::Part)
+    }
+
+    /// Whether the nearest sample of a pixel needs the index of its particle.
+    pub const fn needs_nearest_particle(&self) -> bool {
+        self.id || self.needs_velocities() || self.layers.attributes > 0
+    }
+
+    /// Whether a channel depends on the attributes of single particles, so that their indices are needed.
+    pub const fn needs_particles(&self) -> bool {
+        self.needs_nearest_particle() || self.needs_ids() || self.needs_parts()
+    }
+
+    /// These and, if `has_features`, those that are features for denoising.
+    #[must_use]
+    pub(super) const fn with_features(self, has_features: bool) -> Self {
+        Self {
+            depth: self.depth || has_features,
+            normal: self.normal || has_features,
+            albedo: self.albedo || has_features,
+            ..self
+        }
+    }
+
+    /// Channels by their names in a manifest; `RGBA` is allowed, and always included. Attributes have no fixed names.
     ///
     /// # Errors
     /// If a name is unknown.
@@ -69,11 +114,9 @@ impl Channels {
                 "V" => channels.velocity = true,
                 "albedo" => channels.albedo = true,
                 "id" => channels.id = true,
-                _ => {
-                    return Err(UnknownChannel {
-                        name: name.to_owned(),
-                    });
-                }
+                _ => channels.layers.insert(name).ok_or_else(|| UnknownChannel {
+                    name: name.to_owned(),
+                })?,
             }
         }
         Ok(channels)
@@ -102,6 +145,12 @@ pub struct Film {
     pub albedo: Option<Vec<Vec3>>,
     /// See [`DataSample::id`].
     pub id: Option<Vec<u32>>,
+    /// The floats of [`Channels::layers`], pixel by pixel.
+    pub layers: Option<Vec<f32>>,
+    /// Mean of the samples 1, 3, 5 and so on of a film for [denoising](crate::denoise), linear RGB. Not a channel.
+    pub odd: Option<Vec<Vec3>>,
+    /// The channels; the film may have other planes as features for denoising.
+    pub channels: Channels,
 }
 
 impl Film {
@@ -119,49 +168,61 @@ impl Film {
             velocity: vectors(channels.velocity),
             albedo: vectors(channels.albedo),
             id: channels.id.then(|| vec![NO_ID; count]),
+            layers: layers(channels).map(|floats| vec![0.0; count * floats]),
+            odd: None,
+            channels,
         }
     }
 
     /// A film of zeros. Its pages are allocated when they are first written.
-    fn zeroed(width: u32, height: u32, channels: Channels) -> Self {
+    fn zeroed(width: u32, height: u32, channels: Channels, has_features: bool) -> Self {
         let count = width as usize * height as usize;
-        let vectors = |wanted: bool| wanted.then(|| zeroed_vec::<Vec3>(count));
+        let planes = channels.with_features(has_features);
+        let vectors = |is_stored: bool| is_stored.then(|| zeroed_vec::<Vec3>(count));
         Self {
             width,
             height,
             color: zeroed_vec(count),
-            depth: channels.depth.then(|| zeroed_vec(count)),
-            normal: vectors(channels.normal),
-            position: vectors(channels.position),
-            velocity: vectors(channels.velocity),
-            albedo: vectors(channels.albedo),
-            id: channels.id.then(|| zeroed_vec(count)),
+            depth: planes.depth.then(|| zeroed_vec(count)),
+            normal: vectors(planes.normal),
+            position: vectors(planes.position),
+            velocity: vectors(planes.velocity),
+            albedo: vectors(planes.albedo),
+            id: planes.id.then(|| zeroed_vec(count)),
+            layers: layers(channels).map(|floats| zeroed_vec(count * floats)),
+            odd: vectors(has_features),
+            channels,
         }
     }
 
-    /// Makes this a film of that size with these planes. If it is one already, its memory and content stay; the
+    /// Makes this a film of that size with these channels, and with the features for denoising if `has_features`. If it is one already, its memory and content stay; the
     /// renderer sets every pixel. New planes are not written here, so that the page faults of their first use are
     /// shared by all tracing threads.
-    pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels) {
-        let is_fit = (self.width, self.height) == (width, height) && self.channels() == channels;
+    pub(super) fn fit(&mut self, width: u32, height: u32, channels: Channels, has_features: bool) {
+        let is_fit = (self.width, self.height) == (width, height)
+            && self.channels == channels
+            && self.odd.is_some() == has_features;
         if !is_fit {
             // Release the old planes before the new ones are allocated.
             *self = Self::default();
-            *self = Self::zeroed(width, height, channels);
+            *self = Self::zeroed(width, height, channels, has_features);
         }
     }
 
-    /// Memory of all planes of an image, bytes.
-    pub fn bytes_for(width: u32, height: u32, channels: Channels) -> u64 {
+    /// Memory of all planes of an image, bytes. `has_features`: it will be denoised.
+    pub fn bytes_for(width: u32, height: u32, channels: Channels, has_features: bool) -> u64 {
+        let channels = channels.with_features(has_features);
         let scalars = [channels.depth, channels.id];
         let vectors = [
             channels.normal,
             channels.position,
             channels.velocity,
             channels.albedo,
+            has_features,
         ];
         let count = |is_present: &[bool]| is_present.iter().filter(|w| **w).count() as u64;
-        let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors);
+        let layers = 4 * channels.layers.floats() as u64;
+        let pixel = 16 + 4 * count(&scalars) + 12 * count(&vectors) + layers;
         u64::from(width) * u64::from(height) * pixel
     }
 
@@ -174,6 +235,9 @@ impl Film {
         let mut velocity = chunks(&mut self.velocity, length);
         let mut albedo = chunks(&mut self.albedo, length);
         let mut id = chunks(&mut self.id, length);
+        let floats = self.channels.layers.floats();
+        let mut layers = chunks(&mut self.layers, length * floats);
+        let mut odd = chunks(&mut self.odd, length);
         // Combine the chunks of all planes into bands
         let top_rows = (0..self.height).step_by(rows as usize);
         let color = self.color.chunks_mut(length);
@@ -190,9 +254,17 @@ impl Film {
                 velocity: next(&mut velocity),
                 albedo: next(&mut albedo),
                 id: next(&mut id),
+                layers: next(&mut layers),
+                floats,
+                odd: next(&mut odd),
             })
             .collect()
     }
+}
+
+/// Number of floats of a pixel, if there are layers.
+fn layers(channels: Channels) -> Option<usize> {
+    Some(channels.layers.floats()).filter(|floats| *floats > 0)
 }
 
 type Chunks<'a, T> = Option<std::slice::ChunksMut<'a, T>>;
@@ -218,6 +290,10 @@ pub(super) struct Band<'a> {
     velocity: Option<&'a mut [Vec3]>,
     albedo: Option<&'a mut [Vec3]>,
     id: Option<&'a mut [u32]>,
+    layers: Option<&'a mut [f32]>,
+    /// Number of floats of a pixel in `layers`.
+    floats: usize,
+    odd: Option<&'a mut [Vec3]>,
 }
 
 impl Band<'_> {
@@ -231,6 +307,9 @@ impl Band<'_> {
         let mut velocity = planes(&mut self.velocity, width, columns);
         let mut albedo = planes(&mut self.albedo, width, columns);
         let mut id = planes(&mut self.id, width, columns);
+        let floats = self.floats;
+        let mut layers = planes(&mut self.layers, width * floats, columns * floats);
+        let mut odd = planes(&mut self.odd, width, columns);
         // Combine the rows of all planes into tiles
         let tile = |left: u32| FilmTile {
             left,
@@ -244,6 +323,9 @@ impl Band<'_> {
             velocity: next(&mut velocity),
             albedo: next(&mut albedo),
             id: next(&mut id),
+            layers: next(&mut layers),
+            floats,
+            odd: next(&mut odd),
         };
         (0..self.width).step_by(columns).map(tile).collect()
     }
@@ -288,12 +370,35 @@ pub(super) struct FilmTile<'a> {
     velocity: Option<Rows<'a, Vec3>>,
     albedo: Option<Rows<'a, Vec3>>,
     id: Option<Rows<'a, u32>>,
+    layers: Option<Rows<'a, f32>>,
+    /// Number of floats of a pixel in `layers`.
+    floats: usize,
+    odd: Option<Rows<'a, Vec3>>,
 }
 
 impl FilmTile<'_> {
     /// Stores the colour of the pixel in `column` and `row` of the tile.
     pub(super) fn set_color(&mut self, column: u32, row: u32, color: [f32; 4]) {
         self.color[row as usize][column as usize] = color;
+    }
+
+    /// Whether the film has the mean of odd samples.
+    pub(super) const fn has_odd(&self) -> bool {
+        self.odd.is_some()
+    }
+
+    /// Stores the mean of the odd samples of the pixel in `column` and `row` of the tile, linear RGB.
+    pub(super) fn set_odd(&mut self, column: u32, row: u32, mean: Vec3) {
+        set_pixel(&mut self.odd, (column as usize, row as usize), mean);
+    }
+
+    /// The floats of the layers of the pixel in `column` and `row` of the tile; none without layers.
+    pub(super) fn layers_mut(&mut self, column: u32, row: u32) -> &mut [f32] {
+        let Some(rows) = &mut self.layers else {
+            return &mut [];
+        };
+        let start = column as usize * self.floats;
+        &mut rows[row as usize][start..start + self.floats]
     }
 
     /// Stores the data of the pixel in `column` and `row` of the tile in all planes that exist.
@@ -330,7 +435,12 @@ mod tests {
         assert_eq!(film.depth.as_ref().unwrap().len(), 6);
         assert_eq!(film.id.as_ref().unwrap()[5], NO_ID);
         assert!(film.normal.is_none());
-        assert_eq!(Film::bytes_for(3, 2, channels), 6 * 24);
+        assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * 24);
+        assert_eq!(Film::bytes_for(3, 2, channels, true), 6 * (24 + 3 * 12));
+        let channels = Channels::from_names(["lights", "shadow", "crypto_part"]).unwrap();
+        assert_eq!(channels.layers.floats(), 18 + 1 + 12);
+        assert_eq!(Film::new(3, 2, channels).layers.unwrap().len(), 6 * 31);
+        assert_eq!(Film::bytes_for(3, 2, channels, false), 6 * (16 + 4 * 31));
         let error = Channels::from_names(["depth"]).unwrap_err();
         assert!(error.to_string().contains("\"depth\""));
     }

@@ -27,6 +27,10 @@ pub struct FilmRows<'a> {
     pub albedo: Option<&'a [Vec3]>,
     /// See [`Film::id`].
     pub id: Option<&'a [u32]>,
+    /// See [`Film::layers`].
+    pub layers: Option<&'a [f32]>,
+    /// Number of floats of a pixel in `layers`.
+    pub floats: usize,
 }
 
 impl<'a> FilmRows<'a> {
@@ -50,7 +54,11 @@ impl<'a> FilmRows<'a> {
             position: self.position.map(|plane| &plane[range.clone()]),
             velocity: self.velocity.map(|plane| &plane[range.clone()]),
             albedo: self.albedo.map(|plane| &plane[range.clone()]),
-            id: self.id.map(|plane| &plane[range]),
+            id: self.id.map(|plane| &plane[range.clone()]),
+            layers: self
+                .layers
+                .map(|plane| &plane[range.start * self.floats..range.end * self.floats]),
+            floats: self.floats,
         }
     }
 }
@@ -58,30 +66,26 @@ impl<'a> FilmRows<'a> {
 impl Film {
     /// All rows.
     pub fn rows(&self) -> FilmRows<'_> {
+        let channels = self.channels;
         FilmRows {
             top: 0,
             height: self.height,
             width: self.width,
             color: &self.color,
-            depth: self.depth.as_deref(),
-            normal: self.normal.as_deref(),
+            depth: self.depth.as_deref().filter(|_| channels.depth),
+            normal: self.normal.as_deref().filter(|_| channels.normal),
             position: self.position.as_deref(),
             velocity: self.velocity.as_deref(),
-            albedo: self.albedo.as_deref(),
+            albedo: self.albedo.as_deref().filter(|_| channels.albedo),
             id: self.id.as_deref(),
+            layers: self.layers.as_deref(),
+            floats: channels.layers.floats(),
         }
     }
 
-    /// The planes in addition to colour.
+    /// The channels in addition to colour.
     pub const fn channels(&self) -> Channels {
-        Channels {
-            depth: self.depth.is_some(),
-            normal: self.normal.is_some(),
-            position: self.position.is_some(),
-            velocity: self.velocity.is_some(),
-            albedo: self.albedo.is_some(),
-            id: self.id.is_some(),
-        }
+        self.channels
     }
 }
 
@@ -90,7 +94,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn parts_lie_where_they_lay() {
+    fn parts_keep_their_position() {
         let mut film = Film::new(3, 10, Channels::ALL);
         for (at, id) in (0..).zip(film.id.iter_mut().flatten()) {
             *id = at;

@@ -5,9 +5,9 @@ use std::sync::atomic::AtomicBool;
 use glam::{DVec3, Vec3};
 
 use super::super::brute::Balls;
-use super::super::{ParticleShading, RenderSettings, render_into};
+use super::super::{IntegratorKind, ParticleShading, RenderSettings, render_into};
 use super::{Channels, Film};
-use crate::scene::{Background, Bounds, Camera, Framing, Ground, Material, Scene, default_lights};
+use crate::scene::{Background, Bounds, Camera, Framing, Ground, Scene, default_lights};
 
 /// Bits that no renderer makes: of a float, a NaN with a payload.
 const POISON: u32 = 0x7fad_beef;
@@ -21,6 +21,9 @@ fn poisoned(width: u32, height: u32, channels: Channels) -> Film {
     }
     if let Some(plane) = &mut film.id {
         plane.fill(POISON);
+    }
+    if let Some(plane) = &mut film.layers {
+        plane.fill(poison);
     }
     let vectors = [
         &mut film.normal,
@@ -44,6 +47,7 @@ fn bits(film: &Film) -> Vec<u32> {
         .flatten()
         .chain(film.depth.iter().flatten());
     let floats = floats.copied().chain(vectors.flat_map(|v| v.to_array()));
+    let floats = floats.chain(film.layers.iter().flatten().copied());
     let floats = floats.map(f32::to_bits);
     floats.chain(film.id.iter().flatten().copied()).collect()
 }
@@ -56,13 +60,10 @@ fn scene(has_ground: bool) -> Scene {
     };
     let view = Camera::framing(&bounds, &Framing::three_quarter(DVec3::Z, 1.5));
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.5, DVec3::ZERO).unwrap(),
         lights: default_lights(&bounds, DVec3::Z, &view),
-        ambient_light: Vec3::ONE,
-        material: Material::DEFAULT,
         background: Background::default_for(Vec3::Z),
         ground: has_ground.then(|| Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+        ..Scene::new(Camera::new(&view, 1.5, DVec3::ZERO).unwrap())
     }
 }
 
@@ -99,12 +100,62 @@ fn every_set_of_planes_is_written_whole() {
                 velocity: bits & 8 != 0,
                 albedo: bits & 16 != 0,
                 id: bits & 32 != 0,
+                ..Channels::COLOR
             },
             ..RenderSettings::new(19, 18)
         };
         check(&settings, &scene(bits % 3 == 0));
     }
 }
+
+#[test]
+fn every_layer_is_written_whole() {
+    for names in [&["lights"][..], &["shadow", "crypto_part"], &LAYERS] {
+        for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
+            let mut channels = Channels::from_names(names.iter().copied()).unwrap();
+            channels.layers.attributes = 2;
+            let settings = RenderSettings {
+                channels,
+                integrator,
+                samples: 3,
+                ..RenderSettings::new(19, 18)
+            };
+            check(&settings, &scene(true));
+            check(&settings, &scene(false));
+        }
+    }
+}
+
+#[test]
+fn light_channels_add_up_to_the_color() {
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    let never = AtomicBool::new(false);
+    for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
+        for (has_ground, transmission) in [(false, 0.0), (true, 0.0), (true, 0.7)] {
+            let mut scene = scene(has_ground);
+            scene.material.transmission = transmission;
+            scene.material.reflection = 0.5;
+            let settings = RenderSettings {
+                channels: Channels::from_names(["lights"]).unwrap(),
+                integrator,
+                samples: 5,
+                ..RenderSettings::new(40, 30)
+            };
+            let ball = Balls::one(Vec3::ZERO, 1.0);
+            let mut film = Film::default();
+            render_into(&mut film, &[&ball], &scene, &source, &settings, &never).unwrap();
+            for (lights, color) in film.layers.unwrap().chunks(18).zip(&film.color) {
+                for (axis, expected) in color[..3].iter().enumerate() {
+                    let sum: f32 = lights.iter().skip(axis).step_by(3).sum();
+                    let limit = 1e-5 * expected.max(1.0);
+                    assert!((sum - expected).abs() < limit, "{sum} of {expected}");
+                }
+            }
+        }
+    }
+}
+
+const LAYERS: [&str; 5] = ["lights", "noisy", "shadow", "motion", "cryptomatte"];
 
 #[test]
 fn tiles_of_every_shape_are_written_whole() {

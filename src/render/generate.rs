@@ -2,16 +2,19 @@
 
 use super::{
     aov::DataSample,
-    context::RenderContext,
+    context::{Interior, RenderContext},
+    dimensions::{CAMERA, LENS},
     film::FilmTile,
     sampler::PathSeed,
     scratch::{Pixel, SampleGroup},
     settings::RenderSettings,
-    shading::camera_rays,
+    shading::{camera_rays, lens_rays},
     stream::SegmentPacket,
     tile::mosaic_start,
 };
-use crate::math::{LANES, first_lanes, splat};
+use crate::math::{LANES, Lanes, first_lanes, lane3, lanes_in, splat};
+use crate::ray::RayPacket;
+use crate::surface::Side;
 
 impl RenderContext<'_> {
     /// Generates the samples of `pixels` (columns and rows of `tile`).
@@ -22,29 +25,38 @@ impl RenderContext<'_> {
         group: &mut SampleGroup,
     ) {
         group.clear();
+        group.layers.layers = self.settings.channels.layers;
         let [left, top] = self.first_pixel(tile);
         for (column, row) in pixels {
-            let (x, y) = (left + column, top + row);
+            let (x, y) = (left + column.cast_signed(), top + row.cast_signed());
+            // Numbers of pixels beyond the left or top border wrap around; they only select random numbers
+            let [column_number, row_number] = [x, y].map(i32::cast_unsigned);
             group.pixels.push(Pixel {
                 column,
                 row,
-                path: PathSeed::of_pixel(x, y),
+                path: PathSeed::of_pixel(column_number, row_number),
                 data: DataSample::MISS,
             });
-            group.push_pixel(x as f32, y as f32, self.sampler.points(x, y));
+            let points = self.sampler.points(column_number, row_number);
+            group.push_pixel(x as f32, y as f32, points);
         }
     }
 
     /// The first pixel of `tile` in the image of the camera.
-    fn first_pixel(&self, tile: &FilmTile<'_>) -> [u32; 2] {
+    fn first_pixel(&self, tile: &FilmTile<'_>) -> [i32; 2] {
         let RenderSettings { width, height, .. } = *self.settings;
-        match self.settings.mosaic_of {
+        let [left, top] = match self.settings.mosaic_of {
             None => [tile.left, tile.top],
             Some([full_width, full_height]) => [
                 mosaic_start(tile.left, width, full_width),
                 mosaic_start(tile.top, height, full_height),
             ],
-        }
+        };
+        let window = self.settings.data_window();
+        [
+            left.cast_signed() + window.left,
+            top.cast_signed() + window.top,
+        ]
     }
 
     /// Generates the camera rays of packet `number` of a group, and the seeds of their paths if `seeds` is set.
@@ -61,21 +73,49 @@ impl RenderContext<'_> {
         let first = number * LANES;
         let len = LANES.min(group.len - first);
         segments.rays.set_len(len);
+        if self.camera.has_lens() {
+            let u = self.lens_samples(group, first, len);
+            lens_rays(self.simd, &self.camera, &u, &mut segments.rays);
+        }
         // Initialise their path state
         segments.throughput = [splat(1.0); 3];
+        segments.pdf = splat(f32::INFINITY);
+        segments.bounces = [0; LANES];
         #[expect(clippy::cast_possible_truncation, reason = "groups are small")]
         let sample = std::array::from_fn(|lane| (first + lane) as u32);
         segments.sample = sample;
-        segments.inside = if self.is_camera_inside {
-            first_lanes(len)
-        } else {
-            0
-        };
+        segments.inside = self.lanes_inside(&segments.rays);
         if seeds {
             let samples = self.settings.samples as usize;
             for (lane, path) in segments.path.iter_mut().enumerate().take(len) {
                 *path = group.pixels[(first + lane) / samples].path;
             }
+        }
+    }
+
+    /// Points in the unit square for the lens, of the `len` samples of `group` from `first` on.
+    fn lens_samples(&self, group: &SampleGroup, first: usize, len: usize) -> [Lanes; 2] {
+        let samples = self.settings.samples as usize;
+        let mut u = [splat(0.5); 2];
+        for number in first..first + len {
+            let lane = number - first;
+            let seed = group.pixels[number / samples].path.child(CAMERA);
+            #[expect(clippy::cast_possible_truncation, reason = "at most 4096 samples")]
+            let sample = (number % samples) as u32;
+            [u[0][lane], u[1][lane]] = seed.get_2d(LENS, sample);
+        }
+        u
+    }
+
+    /// Lanes of the camera rays that start inside a connected body.
+    fn lanes_inside(&self, rays: &RayPacket) -> u32 {
+        let lanes = first_lanes(rays.len());
+        match (self.camera.has_lens(), self.particles) {
+            (true, Some(body)) if self.interior == Interior::Body => lanes_in(lanes)
+                .filter(|lane| body.side_of(lane3(&rays.origin, *lane)) == Side::Inside)
+                .fold(0, |inside, lane| inside | 1 << lane),
+            _ if self.is_camera_inside => lanes,
+            _ => 0,
         }
     }
 }

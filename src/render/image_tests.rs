@@ -38,16 +38,14 @@ fn heap_scene(transmission: f32) -> Scene {
     let framing = Framing::three_quarter(DVec3::Z, 1.5);
     let view = Camera::framing(&bounds, &framing);
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.5, DVec3::ZERO).unwrap(),
         lights: default_lights(&bounds, DVec3::Z, &view),
-        ambient_light: Vec3::ONE,
         material: Material {
             transmission,
             ..Material::DEFAULT
         },
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+        ..Scene::new(Camera::new(&view, 1.5, DVec3::ZERO).unwrap())
     }
 }
 
@@ -102,6 +100,52 @@ fn a_mosaic_has_tiles_of_the_whole_image() {
 }
 
 #[test]
+fn a_part_of_the_image_has_the_pixels_of_the_whole() {
+    let heap = heap(60);
+    let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
+    let scene = heap_scene(0.8);
+    for integrator in [IntegratorKind::Whitted, IntegratorKind::Path] {
+        let image = |left: i32, top: i32, width: u32, height: u32| {
+            let never = AtomicBool::new(false);
+            let settings = RenderSettings {
+                width,
+                height,
+                integrator,
+                window: Some(DataWindow {
+                    left,
+                    top,
+                    image: [75, 50],
+                }),
+                ..settings()
+            };
+            let rendered = render(&[&heap], &scene, &source, &settings, &never);
+            rendered.unwrap().0
+        };
+        // The whole, a part that no tile begins with, and the whole with margins
+        let whole = image(0, 0, 75, 50);
+        let plain = RenderSettings {
+            integrator,
+            ..settings()
+        };
+        let never = AtomicBool::new(false);
+        let (film, _) = render(&[&heap], &scene, &source, &plain, &never).unwrap();
+        assert!(film == whole);
+        let (part, wide) = (image(13, 7, 37, 30), image(-9, -5, 75 + 18, 50 + 10));
+        for (x, y) in (0..50).flat_map(|y| (0..75).map(move |x| (x, y))) {
+            let at = 75 * y + x;
+            let in_wide = 93 * (y + 5) + x + 9;
+            assert_eq!(wide.color[in_wide], whole.color[at], "{x} {y}");
+            if (13..50).contains(&x) && (7..37).contains(&y) {
+                let in_part = 37 * (y - 7) + x - 13;
+                assert_eq!(part.color[in_part], whole.color[at], "{x} {y}");
+                let depths = [&part, &whole].map(|film| film.depth.as_ref().unwrap());
+                assert_eq!(depths[0][in_part], depths[1][at], "{x} {y}");
+            }
+        }
+    }
+}
+
+#[test]
 fn the_same_film_on_any_number_of_threads() {
     let heap = heap(60);
     let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
@@ -124,7 +168,7 @@ fn the_same_film_on_any_number_of_threads() {
 }
 
 #[test]
-fn nothing_is_left_of_what_was_in_a_film() {
+fn reused_film_is_cleared() {
     let source = ParticleShading::constant(Vec3::new(0.3, 0.5, 0.8));
     let never = AtomicBool::new(false);
     let scene = heap_scene(0.0);
@@ -206,8 +250,8 @@ fn data_planes_hold_the_nearest_sample() {
     let middle = 16 * 33 + 16;
     assert!((film.depth.as_ref().unwrap()[middle] - 4.0).abs() < 1e-5);
     assert!((film.normal.as_ref().unwrap()[middle] - Vec3::NEG_Z).length() < 1e-5);
-    let wanted = Vec3::new(100.0, 200.0, -1.0);
-    assert!((film.position.as_ref().unwrap()[middle] - wanted).length() < 1e-4);
+    let expected = Vec3::new(100.0, 200.0, -1.0);
+    assert!((film.position.as_ref().unwrap()[middle] - expected).length() < 1e-4);
     assert_eq!(film.velocity.as_ref().unwrap()[middle], velocities[0]);
     assert_eq!(film.albedo.as_ref().unwrap()[middle].z, 0.3);
     assert_eq!(film.id.as_ref().unwrap()[middle], 77);

@@ -10,10 +10,12 @@
 use std::ops::Range;
 
 use super::{
-    context::RenderContext,
+    context::{Interior, RenderContext},
     film::FilmTile,
     ray_counts::RayCounts,
+    roulette::SplitRule,
     scratch::{GROUP, PacketScratch, Scratch, batch_len},
+    settings::{IntegratorKind, RenderSettings},
     stop::Stop,
     stream::{RayStreams, SegmentPacket},
     tile::pixels_of,
@@ -26,7 +28,15 @@ pub(super) trait Integrator: Sync {
     fn context(&self) -> &RenderContext<'_>;
 
     /// Maximum number of path segments of one sample at any depth.
-    fn max_paths(&self) -> usize;
+    fn max_paths(&self) -> usize {
+        let context = self.context();
+        max_paths(context.settings, context.interior)
+    }
+
+    /// Maximum number of path segments one after the other.
+    fn max_depth(&self) -> u32 {
+        max_depth(self.context().settings)
+    }
 
     /// Whether paths use random numbers, so that segments need a [`PathSeed`](super::sampler::PathSeed).
     fn is_stochastic(&self) -> bool;
@@ -59,9 +69,25 @@ pub(super) trait Integrator: Sync {
             let group = pixels.by_ref().take(group_len);
             context.place_samples(tile, group, &mut scratch.group);
             trace_group(self, stop, scratch)?;
-            scratch.group.accumulate(samples, tile);
+            let is_bounded = context.catches_shadows();
+            scratch.group.accumulate(samples, is_bounded, tile);
+            context.store_nearest(&scratch.group.pixels, tile);
         }
         Some(scratch.packet.counts)
+    }
+}
+
+/// Maximum number of path segments of one sample at any depth.
+pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize {
+    SplitRule::new(settings, interior).max_paths(max_depth(settings))
+}
+
+/// Maximum number of path segments one after the other: reflections and refractions, and diffuse reflections with the
+/// last segment to the environment.
+pub(super) fn max_depth(settings: &RenderSettings) -> u32 {
+    match settings.integrator {
+        IntegratorKind::Whitted => settings.max_depth,
+        IntegratorKind::Path => settings.max_depth + settings.bounces + 1,
     }
 }
 
@@ -71,16 +97,29 @@ fn trace_group<I: Integrator + ?Sized>(
     stop: &dyn Stop,
     scratch: &mut Scratch,
 ) -> Option<()> {
+    trace_batches(integrator, stop, scratch, &|packets, scratch| {
+        trace_camera_rays(integrator, packets, stop, scratch)
+    })
+}
+
+/// Traces all samples of a group, batch by batch. `start` traces the segments of depth 1 of the packets that it is
+/// given.
+pub(super) fn trace_batches<I: Integrator + ?Sized>(
+    integrator: &I,
+    stop: &dyn Stop,
+    scratch: &mut Scratch,
+    start: &dyn Fn(Range<usize>, &mut Scratch) -> Option<()>,
+) -> Option<()> {
     let context = integrator.context();
     let packets = scratch.group.film.len();
     // Trace batches with a bounded number of path segments
     let step = batch_len(context.max_segments, integrator.max_paths()) / LANES;
     for first in (0..packets).step_by(step) {
-        // Trace the camera rays of the batch
+        // Trace the first segments of the batch
         scratch.next.clear();
-        trace_camera_rays(integrator, first..packets.min(first + step), stop, scratch)?;
+        start(first..packets.min(first + step), scratch)?;
         // Trace depth by depth, until no rays are left
-        for depth in 2..=context.settings.max_depth {
+        for depth in 2..=integrator.max_depth() {
             std::mem::swap(&mut scratch.current, &mut scratch.next);
             if scratch.current.is_empty() {
                 break;
@@ -108,8 +147,10 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         trace_packet(integrator, segments, 1, stop, packet, &mut scratch.next)?;
         // Store radiance, coverage and data channels of the samples
         group.radiance[number] = packet.radiance;
-        group.coverage[number] = context.coverage(&packet.hits);
+        group.coverage[number] = context.coverage(&packet.hits, &packet.coverage);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
+        group.layers.store(number, &packet.split);
+        context.gather_objects(&packet.hits, number, &mut group.layers);
     }
     Some(())
 }
@@ -129,6 +170,7 @@ fn trace_depth<I: Integrator + ?Sized>(
     for segments in current.packets_mut() {
         trace_packet(integrator, segments, depth, stop, packet, next)?;
         scratch.group.add(segments, &packet.radiance);
+        scratch.group.layers.add(segments, &packet.radiance);
     }
     Some(())
 }
@@ -147,6 +189,9 @@ fn trace_packet<I: Integrator + ?Sized>(
     }
     integrator.context().intersect(segments, depth, packet);
     packet.radiance = [splat(0.0); 3];
+    packet.coverage = splat(0.0);
+    let layers = &integrator.context().settings.channels.layers;
+    packet.split.start(layers, depth);
     integrator.shade(segments, depth, packet, next);
     Some(())
 }

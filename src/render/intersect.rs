@@ -6,9 +6,10 @@ use super::{
     context::{Interior, RenderContext},
     materials::{attenuate, leaving},
     scratch::PacketScratch,
-    shading::{add_background, scale},
+    shading::{add_backdrop, add_background, scale},
     stream::SegmentPacket,
 };
+use crate::scene::Background;
 use crate::surface::MaterialId;
 
 impl RenderContext<'_> {
@@ -21,11 +22,12 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
     ) {
         packet.hits.clear();
-        let (coherence, inside) = (Self::coherence(depth), segments.inside);
+        let (coherence, inside) = (self.coherence(depth), segments.inside);
         for shape in &self.shapes {
             shape.intersect(&mut segments.rays, coherence, inside, &mut packet.hits);
         }
         packet.throughput = segments.throughput;
+        self.pass_panes(segments, packet);
         self.absorb(segments, packet);
     }
 
@@ -58,13 +60,21 @@ impl RenderContext<'_> {
         depth > 1 || !self.settings.transparent_background
     }
 
-    /// Adds the background for rays without an intersection, and behind surfaces that are not fully opaque.
-    pub(super) fn add_background(&self, segments: &SegmentPacket, packet: &mut PacketScratch) {
+    /// Adds the background for rays of `lanes` at `depth` without an intersection, and behind surfaces that are not
+    /// fully opaque.
+    pub(super) fn add_background(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        lanes: u32,
+        packet: &mut PacketScratch,
+    ) {
         let hits = &packet.hits;
-        let lanes = segments.lanes() & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
+        let lanes = lanes & (!hits.mask | hits.lanes_of(MaterialId::GROUND));
         if lanes == 0 {
             return;
         }
+        // Weight the background by the part of the light that the surface does not cover
         let background_part = std::array::from_fn(|lane| match hits.mask >> lane & 1 {
             0 => 1.0,
             _ => 1.0 - hits.opacity[lane],
@@ -75,12 +85,16 @@ impl RenderContext<'_> {
             &background_part,
             &mut packet.weight,
         );
-        let direction = &segments.rays.direction;
+        let rays = &segments.rays;
         let (weight, radiance) = (&packet.weight, &mut packet.radiance);
+        if depth == 1 && matches!(self.scene.background, Background::Studio { .. }) {
+            add_backdrop(self.simd, &self.camera, rays, weight, lanes, radiance);
+            return;
+        }
         add_background(
             self.simd,
             &self.background,
-            direction,
+            &rays.direction,
             weight,
             lanes,
             radiance,

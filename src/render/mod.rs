@@ -19,33 +19,55 @@ mod aov;
 mod attributes;
 #[cfg(test)]
 pub(crate) mod brute;
+mod bsdf;
 mod context;
+pub mod cryptomatte;
+mod dimensions;
 mod film;
 mod film_rows;
 mod generate;
 mod integrator;
 mod intersect;
+pub mod layers;
+mod light_split;
 mod lights;
 mod materials;
+mod panes;
+mod path;
 mod ray_counts;
 mod roulette;
+mod sample_layers;
 mod sampler;
 mod scratch;
 mod settings;
 mod shading;
 mod source;
+mod specular;
 mod stop;
 mod stream;
 mod tile;
 mod visibility;
 mod whitted;
+mod window;
 
 #[cfg(test)]
 mod body_tests;
 #[cfg(test)]
 mod branch_tests;
 #[cfg(test)]
+mod catcher_tests;
+#[cfg(test)]
+mod filter_tests;
+#[cfg(test)]
+mod floor_tests;
+#[cfg(test)]
 mod image_tests;
+#[cfg(test)]
+mod lens_tests;
+#[cfg(test)]
+mod panes_tests;
+#[cfg(test)]
+mod path_tests;
 #[cfg(test)]
 mod poison_tests;
 #[cfg(test)]
@@ -57,17 +79,20 @@ pub use aov::{DataSample, NO_ID};
 pub use film::{Channels, Film, UnknownChannel};
 pub use film_rows::FilmRows;
 pub use ray_counts::RayCounts;
-pub use sampler::{FilmSampler, MultiJitter, PathSeed};
+pub use sampler::{FilmSampler, FilterKind, MAX_FILTER_WIDTH, MultiJitter, PathSeed, PixelFilter};
 pub use settings::{
-    DEFAULT_MIN_WEIGHT, MAX_DEPTH, MAX_LITERAL_DEPTH, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS,
-    RenderError, RenderSettings,
+    DEFAULT_BOUNCES, DEFAULT_MIN_WEIGHT, DEFAULT_PHOTONS, IntegratorKind, MAX_BOUNCES, MAX_DEPTH,
+    MAX_LITERAL_DEPTH, MAX_PHOTONS, MAX_SAMPLES, MAX_SIDE, MIN_WEIGHTS, RenderError,
+    RenderSettings,
 };
 pub(crate) use source::mean;
 pub use source::{Colors, ParticleShading, ShadeSource};
 pub use stop::{Deadline, Stop};
+pub use window::DataWindow;
 
 use context::{Interior, RenderContext};
 use integrator::Integrator;
+use path::PathIntegrator;
 use whitted::WhittedIntegrator;
 
 /// The available renderers. Images depend on the renderer.
@@ -90,15 +115,26 @@ impl RendererKind {
 /// Upper bound of the memory that each thread needs during rendering, without the film, in bytes. `is_body`: the
 /// particles form one connected body.
 pub fn scratch_bytes(settings: &RenderSettings, material: &Material, is_body: bool) -> u64 {
-    let max_paths = whitted::max_paths(settings, Interior::of(material, is_body));
-    scratch::scratch_bytes(settings, max_paths)
+    let max_paths = integrator::max_paths(settings, Interior::of(material, is_body));
+    let max_depth = integrator::max_depth(settings);
+    scratch::scratch_bytes(
+        settings.samples,
+        max_depth,
+        max_paths,
+        &settings.channels.layers,
+    )
+}
+
+/// Upper bound of the memory for the light on the ground around transmissive particles, in bytes.
+pub fn floor_light_bytes(scene: &Scene, settings: &RenderSettings) -> u64 {
+    path::floor::bytes(scene, settings)
 }
 
 /// Renders one image on the current rayon pool.
 ///
-/// The aspect ratio of the camera should be `settings.width / settings.height`. No light is created: `reflection` and
-/// `transmission` are at most 1, which is checked, so the background never contributes more to a ray than its
-/// brightest colour.
+/// The aspect ratio of the camera should be that of the image, `settings.width / settings.height` without a window. No
+/// light is created: `reflection` and `transmission` are at most 1, which is checked, so the background never contributes
+/// more to a ray than its brightest colour.
 ///
 /// # Errors
 /// If `stop` is raised (checked for each packet of samples), or if a setting is out of range.
@@ -134,12 +170,28 @@ pub fn render_into(
         settings.validate_branches(&scene.material)?;
     }
     // Prepare film, shapes and integrator
-    film.fit(settings.width, settings.height, settings.channels);
+    let RenderSettings {
+        width,
+        height,
+        channels,
+        has_features,
+        ..
+    } = *settings;
+    film.fit(width, height, channels, has_features);
     let plane = scene.ground.as_ref().map(Plane::new);
     let floor = plane.iter().map(|plane| plane as &dyn Shape);
     let shapes = floor.chain(shapes.iter().copied()).collect();
     let context = RenderContext::new(shapes, scene, source, settings);
-    let integrator: &dyn Integrator = &WhittedIntegrator::new(context);
+    let mut before = RayCounts::default();
+    let integrator: Box<dyn Integrator> = match settings.integrator {
+        IntegratorKind::Whitted => Box::new(WhittedIntegrator::new(context)),
+        IntegratorKind::Path => {
+            let integrator = PathIntegrator::new(context).with_floor_light(stop);
+            let (integrator, traced) = integrator.ok_or(RenderError::Interrupted)?;
+            before = traced;
+            Box::new(integrator)
+        }
+    };
     let scratch = Mutex::new(Vec::new());
     let render_tile = |tile: &mut film::FilmTile<'_>| {
         // Reuse scratch memory: there is one per thread, and all are released at the end of the image
@@ -149,7 +201,8 @@ pub fn render_into(
         counts.ok_or(RenderError::Interrupted)
     };
     // Render bands and their tiles in parallel, so that a slow corner of the image keeps all threads busy
-    film.bands_mut(tile::SIDE)
+    let counts = film
+        .bands_mut(tile::SIDE)
         .into_par_iter()
         .map(|mut band| {
             let tiles = band.tiles(tile::SIDE).into_par_iter();
@@ -157,7 +210,8 @@ pub fn render_into(
                 .map(|mut tile| render_tile(&mut tile))
                 .try_reduce(RayCounts::default, |a, b| Ok(a + b))
         })
-        .try_reduce(RayCounts::default, |a, b| Ok(a + b))
+        .try_reduce(RayCounts::default, |a, b| Ok(a + b))?;
+    Ok(before + counts)
 }
 
 fn lock<T>(shared: &Mutex<T>) -> MutexGuard<'_, T> {

@@ -1,5 +1,7 @@
 //! Infinite and NaN values do not affect other lanes.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 
 use super::{
@@ -13,7 +15,10 @@ use crate::accel::Coherence;
 use crate::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use crate::math::{LANES, lane3, set_lane3};
 use crate::ray::{Ray, RayPacket};
-use crate::scene::{Background, Bounds, Camera, CameraView, Falloff, Fresnel, Ground, Light};
+use crate::scene::environment::studio;
+use crate::scene::{
+    Background, Bounds, Camera, CameraView, EnvironmentAxes, Falloff, Fresnel, Ground, Light,
+};
 use crate::surface::spheres::SphereSurface;
 use crate::surface::{Intersection, Intersections, Side};
 
@@ -32,14 +37,12 @@ fn scene(transmission: f32) -> Scene {
     };
     let lamp = DVec3::new(3.0, -2.0, 4.0);
     let falloff = Falloff::InverseSquare;
+    let axes = EnvironmentAxes::of_view(DVec3::Y, DVec3::Z, 0.0);
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
         lights: vec![
             Light::directional(Vec3::new(1.0, 0.5, -1.0), Vec3::ONE).unwrap(),
             Light::point_with(lamp, DVec3::ZERO, Vec3::splat(20.0), falloff),
         ],
-        ambient_light: Vec3::ONE,
         material: Material {
             transmission,
             fresnel: Fresnel::Exact,
@@ -48,6 +51,8 @@ fn scene(transmission: f32) -> Scene {
         },
         background: Background::default_for(Vec3::Z),
         ground: Some(Ground::under(&bounds, Vec3::Z, DVec3::ZERO)),
+        environment: Some(Arc::new(studio(axes, Vec3::ONE))),
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 
@@ -64,11 +69,7 @@ fn segments(scene: &Scene) -> SegmentPacket {
 }
 
 /// All results of a packet except those of `poisoned` lanes, as bits, with coherent and with incoherent rays.
-fn left(
-    integrator: &WhittedIntegrator<'_>,
-    segments: &SegmentPacket,
-    poisoned: usize,
-) -> Vec<[u32; 3]> {
+fn left(integrator: &dyn Integrator, segments: &SegmentPacket, poisoned: usize) -> Vec<[u32; 3]> {
     let bits = |v: Vec3| v.to_array().map(f32::to_bits);
     let mut all = Vec::new();
     for depth in [1, 2] {
@@ -96,14 +97,19 @@ fn check(shape: &dyn Shape, transmission: f32) {
     let plane = scene.ground.as_ref().map(Plane::new);
     let mut shapes: Vec<&dyn Shape> = plane.iter().map(|plane| plane as &dyn Shape).collect();
     shapes.push(shape);
-    let integrator = WhittedIntegrator::new(RenderContext::new(shapes, &scene, &source, &settings));
-    let clean = segments(&scene);
+    let context = || RenderContext::new(shapes.clone(), &scene, &source, &settings);
+    check_integrator(&WhittedIntegrator::new(context()), &scene);
+    check_integrator(&PathIntegrator::new(context()), &scene);
+}
+
+fn check_integrator(integrator: &dyn Integrator, scene: &Scene) {
+    let clean = segments(scene);
     assert!(
-        left(&integrator, &clean, 0).len() > 40,
+        left(integrator, &clean, 0).len() > 40,
         "there is something to see"
     );
     for lane in [0, 5, 6, 15] {
-        let wanted = left(&integrator, &clean, lane);
+        let expected = left(integrator, &clean, lane);
         for poison in POISON {
             let bad = Vec3::new(1.0, poison, -0.5);
             let mut poisoned = [clean.clone(), clean.clone(), clean.clone()];
@@ -112,8 +118,8 @@ fn check(shape: &dyn Shape, transmission: f32) {
             set_lane3(&mut poisoned[2].throughput, lane, bad);
             for segments in poisoned {
                 assert_eq!(
-                    left(&integrator, &segments, lane),
-                    wanted,
+                    left(integrator, &segments, lane),
+                    expected,
                     "{lane} {poison}"
                 );
             }
@@ -134,7 +140,7 @@ fn heap() -> Vec<Ball> {
 }
 
 #[test]
-fn poisoned_rays_change_nothing_for_their_neighbours() {
+fn nan_rays_do_not_affect_other_rays() {
     let centers: Vec<Vec3> = heap().iter().map(|ball| ball.center).collect();
     let mut builder = TreeBuilder::new();
     let (centers, radius) = (&centers[..], SphereRadius::Common(0.6));
@@ -184,7 +190,7 @@ impl Shape for Poisoned<'_> {
 }
 
 #[test]
-fn poisoned_particles_change_nothing_for_rays_at_others() {
+fn nan_particles_do_not_affect_other_particles() {
     let (balls, solid) = (Balls(heap()), Solid::ball(1.0));
     let shapes: [&dyn Shape; 2] = [&balls, &solid];
     for (shape, transmission) in shapes.into_iter().flat_map(|s| [(s, 0.0), (s, 0.8)]) {

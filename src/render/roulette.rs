@@ -7,6 +7,7 @@
 
 use super::{
     context::Interior,
+    dimensions::BRANCH,
     sampler::PathSeed,
     settings::{MAX_DEPTH, RenderSettings},
 };
@@ -23,13 +24,6 @@ const MIN_SPLIT_WEIGHT: f32 = 0.02;
 /// weight equals the splitting threshold; proportional to the weight below that. Directly visible surfaces get more
 /// rays, because noise is most visible there.
 const FIRST_CHANCE: f32 = 2.0;
-
-/// Continuations of a path.
-pub(super) const REFLECTED: u32 = 0;
-pub(super) const REFRACTED: u32 = 1;
-
-/// The dimension of a path for the choice between rays.
-const BRANCH: u32 = 0;
 
 /// Decides from which path weight both rays are traced.
 #[derive(Debug, Clone, Copy)]

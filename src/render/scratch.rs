@@ -3,11 +3,14 @@
 
 use super::{
     aov::DataSample,
+    bsdf::{BsdfSamples, BsdfValues, SurfacePoints},
+    layers::{Layers, LightClass},
+    light_split::LightSplit,
     lights::LightSamples,
     materials::ShadingPoints,
     ray_counts::RayCounts,
+    sample_layers::SampleLayers,
     sampler::PathSeed,
-    settings::RenderSettings,
     stream::{RayStreams, SegmentPacket},
     tile::SIDE,
 };
@@ -44,6 +47,8 @@ pub(super) struct SampleGroup {
     pub(super) radiance: Vec<Lanes3>,
     /// Fraction of each sample that surfaces cover.
     pub(super) coverage: Vec<Lanes>,
+    /// Contributions to the layers of the film.
+    pub(super) layers: SampleLayers,
 }
 
 /// A pixel of a group, and its data.
@@ -61,19 +66,44 @@ pub(super) struct PacketScratch {
     pub(super) hits: Intersections,
     /// Path throughput from the samples to the intersections.
     pub(super) throughput: Lanes3,
+    /// Distance of each ray to the first pane that it passes or that reflects it; only set if there are panes.
+    pub(super) first_pane: Lanes,
+    /// Intersections behind panes that reflect rays.
+    pub(super) behind: Intersections,
     /// Radiance that arrives at the samples, the result.
     pub(super) radiance: Lanes3,
     /// Base colours of the surfaces.
     pub(super) base: Lanes3,
     pub(super) points: ShadingPoints,
+    /// Points on opaque surfaces, for path tracing.
+    pub(super) surface: SurfacePoints,
+    pub(super) bsdf: BsdfValues,
+    pub(super) bounce: BsdfSamples,
     pub(super) light: LightSamples,
     /// Intersections of shadow rays with transmissive surfaces.
     pub(super) crossings: Intersections,
     pub(super) weight: Lanes3,
+    /// Coverage of samples by what leaves no intersection: visible lights, and shadows on a transparent background.
+    pub(super) coverage: Lanes,
     /// Particles that contribute to the colour of a point, with weights.
     pub(super) blend: Vec<(u32, f32)>,
+    /// Light by its first interaction.
+    pub(super) split: LightSplit,
     /// Rays traced for the tile.
     pub(super) counts: RayCounts,
+}
+
+impl PacketScratch {
+    /// Counts what was added to the radiance since the last call as light of `class`.
+    pub(super) fn take_light(&mut self, class: LightClass) {
+        self.split.take(class, &self.radiance);
+    }
+
+    /// The light samples before their shadow rays are traced, if shadows are measured.
+    pub(super) fn unoccluded(&self) -> Option<(u32, Lanes3)> {
+        let has_shadow = self.split.has_shadow;
+        has_shadow.then_some((self.light.lanes, self.light.radiance))
+    }
 }
 
 impl SampleGroup {
@@ -84,6 +114,7 @@ impl SampleGroup {
         self.film.clear();
         self.radiance.clear();
         self.coverage.clear();
+        self.layers.clear();
     }
 
     /// Adds samples at the given offsets, in x and y, from the corner of a pixel.
@@ -108,6 +139,7 @@ impl SampleGroup {
         self.film.push(film);
         self.radiance.push([splat(0.0); 3]);
         self.coverage.push(splat(0.0));
+        self.layers.push_packet();
     }
 
     /// Adds a sample at a position on the film, in pixels.
@@ -143,15 +175,22 @@ pub(super) fn batch_len(segments: usize, max_paths: usize) -> usize {
 }
 
 /// Bytes of the [`Scratch`] of one thread, rounded up, if each sample has up to `max_paths` path segments at one depth.
-pub(super) fn scratch_bytes(settings: &RenderSettings, max_paths: usize) -> u64 {
-    let tile = (SIDE * SIDE) as usize * settings.samples as usize;
-    let sample_count = tile.min(GROUP.max(settings.samples) as usize);
-    let rays = match settings.max_depth {
+/// `samples` is the number per pixel, `layers` are those of the film.
+pub(super) fn scratch_bytes(
+    samples: u32,
+    max_depth: u32,
+    max_paths: usize,
+    layers: &Layers,
+) -> u64 {
+    let tile = (SIDE * SIDE) as usize * samples as usize;
+    let sample_count = tile.min(GROUP.max(samples) as usize);
+    let rays = match max_depth {
         1 => 0,
         _ => batch_len(SEGMENTS, max_paths).min(sample_count) * max_paths,
     };
     let samples = sample_count.div_ceil(LANES) * 6 * size_of::<Lanes>();
     let segments = (rays.div_ceil(LANES) + 4) * 2 * size_of::<SegmentPacket>();
     let packet = size_of::<PacketScratch>() + size_of::<SegmentPacket>();
-    (samples + segments + packet) as u64 + 32_768
+    let layers = SampleLayers::bytes(layers, sample_count);
+    (samples + segments + packet + layers) as u64 + 32_768
 }

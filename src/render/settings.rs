@@ -3,6 +3,8 @@
 use thiserror::Error;
 
 use super::film::Channels;
+use super::sampler::{MAX_FILTER_WIDTH, PixelFilter};
+use super::window::DataWindow;
 use crate::scene::{Material, MaterialError};
 
 /// Maximum number of samples per pixel: more than any picture needs, and few enough for counts in f32.
@@ -21,18 +23,48 @@ pub const DEFAULT_MIN_WEIGHT: f32 = 1.0 / 1024.0;
 /// Valid path weights apart from 0. A sample has at most `1 / min_weight` paths.
 pub const MIN_WEIGHTS: std::ops::RangeInclusive<f32> = 1e-5..=1.0;
 
+/// Maximum number of diffuse reflections of a path.
+pub const MAX_BOUNCES: u32 = 1000;
+
+/// Default number of diffuse reflections of a path. Russian roulette ends most paths earlier.
+pub const DEFAULT_BOUNCES: u32 = 6;
+
+/// Maximum number of photons.
+pub const MAX_PHOTONS: u32 = 1_000_000_000;
+
+/// Default number of photons.
+pub const DEFAULT_PHOTONS: u32 = 500_000;
+
 /// Longest side of an image in pixels.
 pub const MAX_SIDE: u32 = 65_536;
+
+/// Methods to compute the radiance along rays.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
+pub enum IntegratorKind {
+    /// Whitted ray tracing: ambient light, lights without extent, and specular rays.
+    #[default]
+    Whitted,
+    /// Path tracing: light of the environment, and light that diffuse surfaces reflect.
+    Path,
+}
 
 /// Settings of an image.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RenderSettings {
-    /// Width in pixels.
+    /// Width of the film in pixels.
     pub width: u32,
-    /// Height in pixels.
+    /// Height of the film in pixels.
     pub height: u32,
     /// Samples per pixel; a single one is exactly at the centre of the pixel.
     pub samples: u32,
+    /// How the samples are distributed around the centre of the pixel.
+    pub filter: PixelFilter,
+    /// The light transport.
+    pub integrator: IntegratorKind,
+    /// Path tracing: maximum number of diffuse reflections before the last one; 0 is direct light only.
+    pub bounces: u32,
+    /// Path tracing: number of photons for caustics on the ground; 0 follows paths from the ground instead.
+    pub photons: u32,
     /// Maximum depth: 1 is direct light only; each further level adds one level of reflections and refractions. Rays
     /// beyond the last level see the background.
     pub max_depth: u32,
@@ -46,29 +78,50 @@ pub struct RenderSettings {
     pub transparent_background: bool,
     /// Planes to fill.
     pub channels: Channels,
-    /// If given, the image is a mosaic: its tiles of 16x16 pixels are tiles of an image with this width and height,
-    /// evenly distributed over it. The cost per pixel of a mosaic is an estimate for the whole image.
+    /// Also fills the planes that [denoising](crate::denoise) needs.
+    pub has_features: bool,
+    /// The part of the image that the film is; by default the whole image.
+    pub window: Option<DataWindow>,
+    /// If given, the film is a mosaic: its tiles of 16x16 pixels are tiles of a film with this width and height, evenly
+    /// distributed over it. The cost per pixel of a mosaic is an estimate for the whole film.
     pub mosaic_of: Option<[u32; 2]>,
 }
 
 impl RenderSettings {
-    /// Depth 3 as in the thesis, one sample per pixel, colour only.
+    /// Whitted ray tracing with depth 3 as in the thesis, one sample per pixel, colour only.
     pub const fn new(width: u32, height: u32) -> Self {
         Self {
             width,
             height,
             samples: 1,
+            filter: PixelFilter::BOX,
+            integrator: IntegratorKind::Whitted,
+            bounces: DEFAULT_BOUNCES,
+            photons: 0,
             max_depth: 3,
             min_weight: DEFAULT_MIN_WEIGHT,
             transparent_background: false,
             channels: Channels::COLOR,
+            has_features: false,
+            window: None,
             mosaic_of: None,
         }
     }
 
-    /// Width and height in pixels of the image that the camera sees.
-    pub(super) fn full_size(&self) -> [u32; 2] {
+    /// Width and height in pixels of the film, or of the film that it is a mosaic of.
+    fn full_size(&self) -> [u32; 2] {
         self.mosaic_of.unwrap_or([self.width, self.height])
+    }
+
+    /// The position of the film in the image of the camera.
+    pub(super) fn data_window(&self) -> DataWindow {
+        let [width, height] = self.full_size();
+        self.window.unwrap_or(DataWindow::whole(width, height))
+    }
+
+    /// The channels of the film, with those that are features for denoising.
+    pub(super) const fn planes(&self) -> Channels {
+        self.channels.with_features(self.has_features)
     }
 
     pub(super) fn validate(&self) -> Result<(), RenderError> {
@@ -84,6 +137,19 @@ impl RenderSettings {
             if !(1..=max).contains(&value) {
                 return Err(RenderError::OutOfRange { name, value, max });
             }
+        }
+        let DataWindow { left, top, image } = self.data_window();
+        let is_near = |at: &i32| at.unsigned_abs() <= MAX_SIDE;
+        let is_side = |side: &u32| (1..=MAX_SIDE).contains(side);
+        if !([left, top].iter().all(is_near) && image.iter().all(is_side)) {
+            return Err(RenderError::Window);
+        }
+        let width = self.filter.width;
+        if !(width > 0.0 && width <= MAX_FILTER_WIDTH) {
+            return Err(RenderError::FilterWidth(width));
+        }
+        if self.bounces > MAX_BOUNCES {
+            return Err(RenderError::TooManyBounces(self.bounces));
         }
         if self.min_weight != 0.0 && !MIN_WEIGHTS.contains(&self.min_weight) {
             return Err(RenderError::MinWeight(self.min_weight));
@@ -108,7 +174,7 @@ pub enum RenderError {
     #[error("rendering was interrupted")]
     Interrupted,
     /// A setting is out of range.
-    #[error("{name} = {value} is out of range, it must lie in 1 to {max}")]
+    #[error("{name} = {value} is out of range; it must be from 1 to {max}")]
     OutOfRange {
         /// The setting.
         name: &'static str,
@@ -117,8 +183,21 @@ pub enum RenderError {
         /// Its maximum.
         max: u32,
     },
+    /// The position of the film in the image is out of range.
+    #[error(
+        "the window of the film is out of range; its sides and coordinates must be at most {MAX_SIDE} pixels"
+    )]
+    Window,
+    /// The width of the filter is out of range.
+    #[error(
+        "filter_width = {0} is out of range, it must be above 0 and at most {MAX_FILTER_WIDTH}"
+    )]
+    FilterWidth(f32),
+    /// `bounces` is out of range.
+    #[error("bounces = {0} is out of range, it must be at most {MAX_BOUNCES}")]
+    TooManyBounces(u32),
     /// `min_weight` is out of range.
-    #[error("min_weight = {0} is out of range, it must be 0 or lie in {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
+    #[error("min_weight = {0} is out of range; it must be 0, or from {low:e} to {high}", low = MIN_WEIGHTS.start(), high = MIN_WEIGHTS.end())]
     MinWeight(f32),
     /// Both branches would be traced for too many levels.
     #[error(

@@ -34,6 +34,10 @@ impl Solid {
         })
     }
 
+    pub(crate) const fn ball_at(center: Vec3, radius: f32) -> Self {
+        Self::of(Body::Ball { center, radius })
+    }
+
     pub(crate) const fn slab(low: f32, high: f32) -> Self {
         Self::of(Body::Slab { low, high })
     }

@@ -29,6 +29,18 @@ pub trait ShadeSource: Sync {
 
     /// Velocity in world units per time; zero if it is unknown.
     fn velocity(&self, index: u32) -> Vec3;
+
+    /// The attribute that divides particles into parts, and the part of the particle.
+    fn part(&self, index: u32) -> Option<(&str, i32)> {
+        let _ = index;
+        None
+    }
+
+    /// Stores the values of the attribute channels in `floats`, as many as [`super::layers::Layers::attributes`].
+    fn attributes(&self, index: u32, floats: &mut [f32]) {
+        let _ = index;
+        floats.fill(0.0);
+    }
 }
 
 /// The weighted mean of `of` over `parts`, in their order.
@@ -66,6 +78,10 @@ pub struct ParticleShading<'a> {
     pub ids: Option<&'a [u32]>,
     /// Velocities; zero by default.
     pub velocities: Option<&'a [Vec3]>,
+    /// Name of the attribute with the parts of particles, and the parts.
+    pub parts: Option<(&'a str, &'a [i32])>,
+    /// The floats of attribute channels, one plane for each.
+    pub attributes: &'a [Vec<f32>],
 }
 
 impl ParticleShading<'_> {
@@ -75,6 +91,8 @@ impl ParticleShading<'_> {
             colors: Colors::Constant(color),
             ids: None,
             velocities: None,
+            parts: None,
+            attributes: &[],
         }
     }
 }
@@ -116,5 +134,18 @@ impl ShadeSource for ParticleShading<'_> {
     fn velocity(&self, index: u32) -> Vec3 {
         let velocities = self.velocities.unwrap_or_default();
         velocities.get(index as usize).copied().unwrap_or_default()
+    }
+
+    fn part(&self, index: u32) -> Option<(&str, i32)> {
+        let (name, parts) = self.parts?;
+        Some((name, *parts.get(index as usize)?))
+    }
+
+    fn attributes(&self, index: u32, floats: &mut [f32]) {
+        for (number, float) in floats.iter_mut().enumerate() {
+            let plane = self.attributes.get(number);
+            let value = plane.and_then(|plane| plane.get(index as usize));
+            *float = value.copied().unwrap_or_default();
+        }
     }
 }

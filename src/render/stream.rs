@@ -1,5 +1,7 @@
 //! Streams of path segments, in packets of 16.
 
+use super::dimensions::BOUNCED;
+use super::light_split::FirstInteraction;
 use super::sampler::PathSeed;
 use crate::math::{LANES, Lanes, Lanes3, first_lanes, lanes_in, splat};
 use crate::ray::RayPacket;
@@ -12,6 +14,11 @@ const GROWTH: usize = 32;
 #[repr(C, align(64))]
 pub(super) struct SegmentPacket {
     pub(super) rays: RayPacket,
+    /// Probability density with which the direction of each ray was sampled, per steradian; infinite for camera rays
+    /// and specular rays.
+    pub(super) pdf: Lanes,
+    /// Number of diffuse reflections of the path before each ray.
+    pub(super) bounces: [u32; LANES],
     /// Path throughput from the sample to the origin of each ray, linear RGB.
     pub(super) throughput: Lanes3,
     /// The sample that each ray belongs to, within its batch.
@@ -20,16 +27,21 @@ pub(super) struct SegmentPacket {
     pub(super) path: [PathSeed; LANES],
     /// Lanes of rays that start inside a connected body.
     pub(super) inside: u32,
+    /// The first interaction of each path.
+    pub(super) first: [FirstInteraction; LANES],
 }
 
 impl Default for SegmentPacket {
     fn default() -> Self {
         Self {
             rays: RayPacket::default(),
+            pdf: splat(f32::INFINITY),
+            bounces: [0; LANES],
             throughput: [splat(1.0); 3],
             sample: [0; LANES],
             path: [PathSeed::default(); LANES],
             inside: 0,
+            first: [FirstInteraction::default(); LANES],
         }
     }
 }
@@ -43,7 +55,7 @@ impl SegmentPacket {
 }
 
 /// Rays that leave the surfaces of a packet, one per lane.
-#[derive(Debug, Clone, Default)]
+#[derive(Debug, Clone)]
 #[repr(C, align(64))]
 pub(super) struct ScatteredRays {
     pub(super) origin: Lanes3,
@@ -52,6 +64,20 @@ pub(super) struct ScatteredRays {
     pub(super) weight: Lanes,
     /// The weight times the throughput of the packet.
     pub(super) throughput: Lanes3,
+    /// Probability density of each direction, per steradian; infinite for specular rays.
+    pub(super) pdf: Lanes,
+}
+
+impl Default for ScatteredRays {
+    fn default() -> Self {
+        Self {
+            origin: [splat(0.0); 3],
+            direction: [splat(0.0); 3],
+            weight: splat(0.0),
+            throughput: [splat(0.0); 3],
+            pdf: splat(f32::INFINITY),
+        }
+    }
 }
 
 /// Path segments of one depth, stored without gaps. Its memory is kept when it is cleared.
@@ -83,7 +109,8 @@ impl RayStream {
     }
 
     /// Appends the rays in `lanes`, in order, which leave the intersections of `parents`; those in `inside` start
-    /// inside a connected body. They are continuation `branch` of the paths.
+    /// inside a connected body. They are continuation `branch` of the paths; one that is [`BOUNCED`] counts as a
+    /// diffuse reflection.
     pub(super) fn push(
         &mut self,
         lanes: u32,
@@ -113,8 +140,11 @@ impl RayStream {
                 segment.rays.direction[axis][to] = rays.direction[axis][lane];
                 segment.throughput[axis][to] = rays.throughput[axis][lane];
             }
+            segment.pdf[to] = rays.pdf[lane];
+            segment.bounces[to] = parents.bounces[lane] + u32::from(branch == BOUNCED);
             segment.sample[to] = parents.sample[lane];
             segment.path[to] = parents.path[lane].child(branch);
+            segment.first[to] = parents.first[lane].continued(branch);
             segment.inside |= (inside >> lane & 1) << to;
             segment.rays.set_len(to + 1);
             self.len += 1;
@@ -157,7 +187,7 @@ mod tests {
         let mut stream = RayStream::default();
         for round in 0..2 {
             stream.clear();
-            let mut wanted = Vec::new();
+            let mut expected = Vec::new();
             for first in [0_u32, 100, 200, 300] {
                 let mut rays = ScatteredRays::default();
                 let mut next = first;
@@ -174,19 +204,19 @@ mod tests {
                 let lanes = (0b1010_1100_0000_0111 << (first / 100 % 2)) & 0xffff;
                 let odd = 0b1010_1010_1010_1010;
                 stream.push(lanes, &rays, &parents, odd, 1);
-                wanted.extend(lanes_in(lanes).map(|lane| sample[lane]));
+                expected.extend(lanes_in(lanes).map(|lane| sample[lane]));
             }
-            assert_eq!(stream.len(), wanted.len(), "{round}");
+            assert_eq!(stream.len(), expected.len(), "{round}");
             let packets = stream.packets();
             let found: Vec<u32> = packets
                 .iter()
                 .flat_map(|p| p.sample[..p.rays.len()].to_vec())
                 .collect();
-            assert_eq!(found, wanted);
+            assert_eq!(found, expected);
             let origins = packets
                 .iter()
                 .flat_map(|p| p.rays.rays().map(|r| r.origin.x));
-            assert!(origins.eq(wanted.iter().map(|s| *s as f32)));
+            assert!(origins.eq(expected.iter().map(|s| *s as f32)));
             for packet in packets {
                 for lane in 0..packet.rays.len() {
                     let sample = packet.sample[lane];

@@ -49,7 +49,7 @@ mod tests {
     }
 
     #[test]
-    fn sixteen_places_are_a_square() {
+    fn sixteen_positions_form_a_square() {
         let places: Vec<_> = z_order().collect();
         for packet in places.chunks(PACKET_SIZE) {
             let (x, y) = packet[0];

@@ -3,7 +3,7 @@
 //! Shadow rays pass straight through transmissive bodies, so there are no caustics. Each crossing of a surface
 //! multiplies their transmittance by `transmission*(1-r)`. `r` is for the angle outside on both sides of the surface
 //! (a refracted ray would have come from such an angle, and is never totally reflected). The medium of a connected
-//! body attenuates them as well.
+//! body attenuates them as well. Panes attenuate all shadow rays (`panes.rs`).
 
 use super::{
     context::{Interior, RenderContext},
@@ -37,16 +37,13 @@ impl RenderContext<'_> {
     ) -> u32 {
         samples.rays.set_len(segments.rays.len());
         counts.shadow += u64::from(samples.lanes.count_ones());
-        let coherence = Self::coherence(depth);
+        let coherence = self.coherence(depth);
 
         // Trace opaque shapes first: occluded rays need no further tests
-        for shape in &self.shapes {
-            let is_opaque =
-                self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES;
-            if is_opaque && samples.lanes != 0 {
-                samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
-            }
-        }
+        self.occlude(coherence, samples, |shape| {
+            self.interior == Interior::Opaque || shape.material() != MaterialId::PARTICLES
+        });
+        self.attenuate_by_panes(samples);
         let Some(particles) = self.particles.filter(|_| self.interior != Interior::Opaque) else {
             return samples.lanes;
         };
@@ -80,6 +77,36 @@ impl RenderContext<'_> {
             &mut samples.radiance,
         );
         reached
+    }
+
+    /// Traces shadow rays that no shape but a pane lets through, not even a transmissive one. Multiplies the radiance
+    /// of `samples` by the transmittance of panes. Returns the lanes that arrive.
+    pub(super) fn unoccluded(
+        &self,
+        segments: &SegmentPacket,
+        depth: u32,
+        samples: &mut LightSamples,
+        counts: &mut RayCounts,
+    ) -> u32 {
+        samples.rays.set_len(segments.rays.len());
+        counts.shadow += u64::from(samples.lanes.count_ones());
+        self.occlude(self.coherence(depth), samples, |_| true);
+        self.attenuate_by_panes(samples);
+        samples.lanes
+    }
+
+    /// Removes the lanes of `samples` that shapes for which `is_opaque` occlude.
+    fn occlude(
+        &self,
+        coherence: Coherence,
+        samples: &mut LightSamples,
+        is_opaque: impl Fn(&dyn Shape) -> bool,
+    ) {
+        for shape in &self.shapes {
+            if samples.lanes != 0 && is_opaque(*shape) {
+                samples.lanes &= !shape.occluded(&samples.rays, coherence, samples.lanes);
+            }
+        }
     }
 
     /// The transmittance of spheres that are separate bodies. Returns the lanes in which it is not 0.

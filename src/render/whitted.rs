@@ -9,21 +9,23 @@ use glam::Vec3;
 use super::{
     context::{Interior, RenderContext},
     integrator::Integrator,
-    materials::{Material, WhittedMaterial, materials_of},
-    roulette::{REFLECTED, REFRACTED, SplitRule},
+    layers::LightClass,
+    light_split::ratio,
+    materials::{Material, WhittedMaterial, materials_of, reflect_lights},
+    roulette::SplitRule,
     scratch::PacketScratch,
-    settings::RenderSettings,
     shading::{add, add_background, product, scale},
+    specular::SpecularHits,
     stream::{RayStreams, SegmentPacket},
 };
-use crate::math::{lane3, lanes_in, splat};
+use crate::math::splat;
 use crate::surface::MaterialId;
 
 /// Traces reflected and refracted rays, and samples every light at each intersection.
 pub(super) struct WhittedIntegrator<'a> {
     pub(super) context: RenderContext<'a>,
     /// The materials by [`MaterialId`].
-    materials: [Box<dyn Material>; MaterialId::COUNT],
+    materials: Vec<Box<dyn Material>>,
     /// Decides which of two rays are traced.
     pub(super) split: SplitRule,
 }
@@ -43,18 +45,9 @@ impl<'a> WhittedIntegrator<'a> {
     }
 }
 
-/// Maximum number of path segments of one sample at any depth.
-pub(super) fn max_paths(settings: &RenderSettings, interior: Interior) -> usize {
-    SplitRule::new(settings, interior).max_paths(settings.max_depth)
-}
-
 impl Integrator for WhittedIntegrator<'_> {
     fn context(&self) -> &RenderContext<'_> {
         &self.context
-    }
-
-    fn max_paths(&self) -> usize {
-        self.split.max_paths(self.context.settings.max_depth)
     }
 
     fn is_stochastic(&self) -> bool {
@@ -69,18 +62,21 @@ impl Integrator for WhittedIntegrator<'_> {
         next: &mut RayStreams,
     ) {
         let context = &self.context;
+        let held_out = context.holdout_lanes(depth, &packet.hits);
         // Add the background for rays that leave the scene
         if context.sees_background(depth) {
-            context.add_background(segments, packet);
+            let lanes = segments.lanes() & !held_out;
+            context.add_background(segments, depth, lanes, packet);
+            packet.take_light(LightClass::Background);
         }
-        if packet.hits.mask == 0 {
+        if packet.hits.mask & !held_out == 0 {
             return;
         }
         context.base_colors(self.particle_constants().has_color(), packet);
         // Shade the intersections of each material
         for (number, material) in (0..).zip(&self.materials) {
             let id = MaterialId(number);
-            let lanes = packet.hits.lanes_of(id);
+            let lanes = packet.hits.lanes_of(id) & !held_out;
             if lanes == 0 {
                 continue;
             }
@@ -89,7 +85,32 @@ impl Integrator for WhittedIntegrator<'_> {
             let lit = material.lit_lanes(lanes, inside);
             self.add_direct_light(segments, &**material, lit, depth, packet);
             if material.constants().sends_rays() {
-                self.scatter(segments, material.constants(), lanes, depth, packet, next);
+                // At the last depth, rays see the background
+                let is_last = depth >= context.settings.max_depth;
+                let hits = SpecularHits {
+                    segments,
+                    depth,
+                    lanes,
+                    last: if is_last { lanes } else { 0 },
+                };
+                let (constants, split) = (material.constants(), &self.split);
+                context.scatter(
+                    constants,
+                    split,
+                    hits,
+                    packet,
+                    next,
+                    &|along, weight, lanes, sum| {
+                        add_background(
+                            context.simd,
+                            &context.background,
+                            along,
+                            weight,
+                            lanes,
+                            sum,
+                        );
+                    },
+                );
             }
         }
     }
@@ -119,6 +140,7 @@ impl WhittedIntegrator<'_> {
             crossings,
             weight,
             counts,
+            split,
             ..
         } = packet;
 
@@ -127,18 +149,34 @@ impl WhittedIntegrator<'_> {
         let mut colored = [splat(0.0); 3];
         product(simd, base, weight, &mut colored);
         add(simd, &colored, &constants.ambient, lanes, radiance);
+        split.take(LightClass::Diffuse, radiance);
 
         // Add the light of each visible light source
         if !constants.scatters() {
             return;
         }
         for light in &self.context.lights {
-            light.sample_li(simd, &points.start, samples);
+            light.sample_li(simd, &points.start, &[splat(0.0); 2], samples);
             let rays = &segments.rays;
+            let arriving = split.is_active.then(|| samples.clone());
             material.reflect(simd, rays, points, base, weight, lanes, samples);
             if samples.lanes == 0 {
                 continue;
             }
+            if let Some(mut matte) = arriving {
+                // Reflect the light without the highlight
+                let constants = &WhittedMaterial {
+                    specular: 0.0,
+                    ..*constants
+                };
+                reflect_lights(
+                    simd, constants, rays, points, base, weight, lanes, &mut matte,
+                );
+                split.diffuse = ratio(&matte.radiance, &samples.radiance);
+            }
+            let unoccluded = split
+                .has_shadow
+                .then_some((samples.lanes, samples.radiance));
             let visible = if light.casts_shadow() {
                 let context = &self.context;
                 context.trace_shadow_rays(segments, depth, samples, crossings, counts)
@@ -146,85 +184,10 @@ impl WhittedIntegrator<'_> {
                 samples.lanes
             };
             add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
-        }
-    }
-
-    /// Appends the rays that leave the shading points of `lanes` to `next`. At the last depth, they see the background.
-    fn scatter(
-        &self,
-        segments: &SegmentPacket,
-        material: &WhittedMaterial,
-        lanes: u32,
-        depth: u32,
-        packet: &mut PacketScratch,
-        next: &mut RayStreams,
-    ) {
-        let context = &self.context;
-        // Choose which rays to trace
-        let is_last = depth >= context.settings.max_depth;
-        if self.is_stochastic() && !is_last {
-            self.split_weights(segments, lanes, depth, packet);
-        }
-        let PacketScratch {
-            points,
-            throughput,
-            radiance,
-            ..
-        } = packet;
-        // Describe both rays: weight, stream, side and branch of the path
-        let (inside, other_side) = match context.interior {
-            Interior::Opaque | Interior::Spheres => (0, 0),
-            Interior::Body => (segments.inside, !segments.inside),
-        };
-        let reflected = (
-            material.reflection,
-            &mut points.reflected,
-            &mut next.reflected,
-            inside,
-            REFLECTED,
-        );
-        let refracted = (
-            material.dielectric.transmission,
-            &mut points.refracted,
-            &mut next.refracted,
-            other_side,
-            REFRACTED,
-        );
-        for (weight, rays, stream, inside, branch) in [reflected, refracted] {
-            if weight <= 0.0 {
-                continue;
+            split.take_reflected(radiance);
+            if let Some((lanes, unoccluded)) = unoccluded {
+                split.add_direct(lanes, &unoccluded, visible, &samples.radiance);
             }
-            // Append the rays with a weight to their stream
-            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
-            let lanes = lanes_in(lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
-            scale(context.simd, throughput, &rays.weight, &mut rays.throughput);
-            if is_last {
-                let (direction, weight) = (&rays.direction, &rays.throughput);
-                let background = &context.background;
-                add_background(context.simd, background, direction, weight, lanes, radiance);
-            } else {
-                stream.push(lanes, rays, segments, inside, branch);
-            }
-        }
-    }
-
-    /// Chooses which of the two rays that leave the shading points of `lanes` are traced, and their weights.
-    fn split_weights(
-        &self,
-        segments: &SegmentPacket,
-        lanes: u32,
-        depth: u32,
-        packet: &mut PacketScratch,
-    ) {
-        let points = &mut packet.points;
-        let (reflected, refracted) = (&mut points.reflected.weight, &mut points.refracted.weight);
-        for lane in lanes_in(lanes) {
-            let arriving = lane3(&packet.throughput, lane).max_element();
-            let (path, sample) = (segments.path[lane], segments.sample[lane]);
-            let sample = sample % self.context.settings.samples;
-            let weights = [reflected[lane], refracted[lane]];
-            let weights = self.split.weights(weights, arriving, depth, path, sample);
-            [reflected[lane], refracted[lane]] = weights;
         }
     }
 }

@@ -23,13 +23,10 @@ fn scene(material: Material) -> Scene {
         fov: 20.0,
     };
     Scene {
-        origin: DVec3::ZERO,
-        camera: Camera::new(&view, 1.0, DVec3::ZERO).unwrap(),
-        lights: Vec::new(),
         ambient_light: Vec3::ZERO,
         material,
         background: Background::Constant(Vec3::ONE),
-        ground: None,
+        ..Scene::new(Camera::new(&view, 1.0, DVec3::ZERO).unwrap())
     }
 }
 
@@ -69,14 +66,14 @@ fn image(surface: &Balls, scene: &Scene, settings: &RenderSettings) -> Film {
 }
 
 #[track_caller]
-fn assert_near(value: Vec3, wanted: f32) {
-    assert_within(1e-5, value, wanted);
+fn assert_near(value: Vec3, expected: f32) {
+    assert_within(1e-5, value, expected);
 }
 
 #[track_caller]
-fn assert_within(limit: f32, value: Vec3, wanted: f32) {
-    let error = (value - wanted).abs().max_element();
-    assert!(error < limit, "{value} is not {wanted}");
+fn assert_within(limit: f32, value: Vec3, expected: f32) {
+    let error = (value - expected).abs().max_element();
+    assert!(error < limit, "{value} is not {expected}");
 }
 
 /// A background that is `front` along +y and `back` along -y.
@@ -184,7 +181,7 @@ fn total_internal_reflection_keeps_everything_inside() {
 }
 
 #[test]
-fn shadows_are_full_or_dimmed_by_every_crossing() {
+fn shadows_are_opaque_or_attenuated_per_interface() {
     let up_front = [Ball {
         center: Vec3::new(0.0, -5.0, 5.0),
         radius: 0.5,
@@ -385,7 +382,7 @@ fn a_glass_ball_has_no_acne_inside() {
 }
 
 #[test]
-fn the_ground_takes_shadows_and_stops_light_from_below() {
+fn ground_receives_shadows_and_blocks_light_from_below() {
     let mut scene = scene(Material::DEFAULT);
     let view = CameraView {
         eye: DVec3::new(0.0, -10.0, 5.0),
@@ -401,7 +398,9 @@ fn the_ground_takes_shadows_and_stops_light_from_below() {
         center: Vec3::new(0.0, 0.0, -1.0),
         fade_start: 100.0,
         fade_end: 200.0,
-        checker: None,
+        pattern: crate::scene::ground::Pattern::Plain,
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
+        shadow_catcher: None,
     });
     scene.lights = vec![Light::directional(Vec3::NEG_Z, Vec3::ONE).unwrap()];
     // The ball is above the point that the camera looks at, outside the picture.

@@ -34,13 +34,16 @@ pub struct FrameReport {
 /// Wall-clock seconds of the stages, from the moment that they have a thread; neighbouring frames overlap.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub struct StageSeconds {
     pub read: f64,
     pub build: f64,
     /// Building the surface, without the tree.
     pub surface: f64,
     pub trace: f64,
+    /// Removing noise; 0 in reports of older versions.
+    #[serde(default)]
+    pub denoise: f64,
     pub encode: f64,
     /// From the previous image, or the start of the run, to this image. The sum is the time that the user waits for
     /// the frames.
@@ -99,7 +102,7 @@ pub struct FileBytes {
 /// Rays by purpose.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub struct RaySummary {
     pub primary: u64,
     pub shadow: u64,
@@ -189,6 +192,7 @@ impl FrameReport {
         self.seconds.build += frame.seconds.build;
         self.seconds.surface += frame.seconds.surface;
         self.seconds.trace += frame.seconds.trace;
+        self.seconds.denoise += frame.seconds.denoise;
         self.seconds.encode += frame.seconds.encode;
         self.seconds.wall += frame.seconds.wall;
         add(&mut self.rays.primary, frame.rays.primary);
@@ -295,7 +299,7 @@ mod tests {
         assert_eq!((bytes.file.positions, bytes.file.structure), (400, 50));
         assert_eq!((bytes.held(), bytes.anonymous()), (1260, 810));
         assert_eq!((bytes.scratch, bytes.build_peak), (10, 470));
-        // A built tree after one in place.
+        // A built tree, after a tree in place.
         report.set_build(&built(0));
         assert_eq!(report.bytes.file, FileBytes::default());
         assert_eq!(report.bytes.anonymous(), 1260);

@@ -233,7 +233,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_comes_from_outside_is_escaped() {
+    fn external_text_is_escaped() {
         let hostile = "<script>alert('a&b')</script>\"\u{202e}\u{0}\u{7f}";
         assert_eq!(
             escaped(hostile),
@@ -254,20 +254,20 @@ mod tests {
         page.end_fold();
         let html = page.html();
         assert!(!html.contains("<script") && !html.contains('\u{202e}') && !html.contains('\u{0}'));
-        // Nowhere does it close an attribute.
+        // The text does not end an attribute anywhere.
         assert!(!html.contains("script>\"") && !html.contains("alert('"));
         assert_eq!(html.matches("&lt;script&gt;").count(), 15);
     }
 
     #[test]
-    fn nothing_is_fetched() {
+    fn pages_load_no_external_resources() {
         let html = Page::new("a page").html();
         assert!(!html.contains("http://") && !html.contains("https://"));
         assert!(!html.contains("<script") && !html.contains("@import") && !html.contains("url("));
     }
 
     #[test]
-    fn columns_of_numbers_stand_to_the_right() {
+    fn columns_of_numbers_are_right_aligned() {
         let mut table = Table::new("t", &["name", "count"]);
         table.row(["a".to_owned(), "1 000".to_owned()]);
         table.row(["b".to_owned()]);

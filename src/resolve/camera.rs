@@ -1,14 +1,17 @@
-//! The camera path, and whether every view along it is possible.
+//! The camera path, and checks that every view along it is valid.
 
 use glam::DVec3;
 
 use super::ResolveError;
-use crate::manifest::{self, CameraMode, Manifest};
+use crate::manifest::{self, CameraMode, FocusSetting, Manifest};
 use crate::pipeline::Setup;
 use crate::scene::camera::{DEFAULT_AZIMUTH, DEFAULT_ELEVATION};
-use crate::scene::{Bounds, Camera, CameraKey, CameraPath, CameraView, Framing, KeyedPath};
+use crate::scene::{
+    Aperture, Bounds, Camera, CameraKey, CameraPath, CameraView, Focus, Framing, KeyedPath,
+    LensSettings,
+};
 
-/// The path that the manifest asks for; `up` is the scene's.
+/// The path that the manifest describes; `up` is the default upward direction.
 pub(super) fn path(
     manifest: &Manifest,
     bounds: &Bounds,
@@ -40,7 +43,7 @@ pub(super) fn path(
     })
 }
 
-/// `key` with what it leaves to the camera.
+/// Converts `key`, with defaults for the missing values.
 fn keyed(key: &manifest::CameraKey, up: DVec3, fov: f64) -> CameraKey {
     CameraKey {
         frame: key.frame,
@@ -53,7 +56,7 @@ fn keyed(key: &manifest::CameraKey, up: DVec3, fov: f64) -> CameraKey {
     }
 }
 
-/// The camera at the start of `path`. Of a path through keys each key is tried.
+/// The camera at the start of `path`. All keys of a path are checked.
 pub(super) fn at_start(
     path: &CameraPath,
     aspect: f64,
@@ -70,10 +73,35 @@ pub(super) fn at_start(
     Ok(Camera::new(&path.start(), aspect, origin)?)
 }
 
-/// Checks that the camera's view at each of `frames` is possible.
+/// The lens that the manifest describes, if its aperture is not 0.
+pub(super) fn lens(
+    manifest: &Manifest,
+    path: &CameraPath,
+    aspect: f64,
+) -> Result<Option<LensSettings>, ResolveError> {
+    let camera = &manifest.camera;
+    let aperture = match (camera.aperture, camera.f_stop) {
+        (Some(diameter), _) if diameter > 0.0 => Aperture::Diameter(diameter),
+        (None, f_stop) if f_stop > 0.0 => Aperture::FStop {
+            f_stop,
+            sensor_width: camera.sensor_width,
+        },
+        _ => return Ok(None),
+    };
+    let focus = match camera.focus {
+        FocusSetting::Auto => Focus::Target,
+        FocusSetting::Distance(distance) => Focus::Distance(distance),
+        FocusSetting::Particle(id) => Focus::Particle(id),
+    };
+    let settings = LensSettings { aperture, focus };
+    settings.lens(&path.start(), aspect, None)?;
+    Ok(Some(settings))
+}
+
+/// Checks that the camera's view is valid at each of `frames`.
 ///
 /// # Errors
-/// [`ResolveError::View`] for the first frame where it is not, with its number and the keys around it.
+/// [`ResolveError::View`] for the first invalid view, with its frame number and the keys around it.
 pub fn check_views(
     setup: &Setup,
     frames: impl IntoIterator<Item = i64>,
@@ -92,6 +120,7 @@ pub fn check_views(
     Ok(())
 }
 
+/// Describes the position of `frame` in the path, for messages.
 fn place(path: &CameraPath, frame: i64) -> String {
     let around = match path {
         CameraPath::Keys(keys) => KeyedPath::around(keys, frame),

@@ -1,6 +1,7 @@
 use super::*;
 use crate::manifest::{CameraKey as Key, RadiusSetting};
 use crate::pipeline::Setup;
+use crate::render::IntegratorKind;
 use crate::survey::Survey;
 
 pub(in crate::resolve) fn survey() -> Survey {
@@ -8,6 +9,7 @@ pub(in crate::resolve) fn survey() -> Survey {
         origin: DVec3::ZERO,
         min: DVec3::splat(-1.0),
         max: DVec3::splat(1.0),
+        layers: None,
         radius: None,
         packed_radius: None,
         has_radii: false,
@@ -15,6 +17,9 @@ pub(in crate::resolve) fn survey() -> Survey {
         color: None,
         rgb: None,
         up: DVec3::Z,
+        components: Vec::new(),
+        frame_time: None,
+        frame_numbers: None,
         attributes: Vec::new(),
         most_particles: 8,
         frames: 1,
@@ -34,11 +39,12 @@ fn key(frame: i64, eye: [f64; 3]) -> Key {
 
 fn setup(change: impl FnOnce(&mut manifest::Camera)) -> Result<Setup, ResolveError> {
     let mut manifest = Manifest::new("in");
+    manifest.render.integrator = Some(IntegratorKind::Whitted);
     manifest.input.radius = RadiusSetting::Length(0.1);
     (manifest.image.width, manifest.image.height) = (64, 36);
     manifest.output.transparent = true;
     change(&mut manifest.camera);
-    super::super::setup(&manifest, &survey())
+    super::super::setup(&manifest, &survey(), None)
 }
 
 fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {
@@ -49,7 +55,7 @@ fn keyed_setup(keys: impl Into<Vec<Key>>) -> Result<Setup, ResolveError> {
 }
 
 #[test]
-fn keys_take_from_the_camera_what_they_leave_out() {
+fn keys_inherit_missing_values_from_the_camera() {
     let setup = setup(|camera| {
         camera.mode = CameraMode::Keys;
         camera.up = Some(3.0 * DVec3::Y);
@@ -71,12 +77,12 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
     });
     let setup = setup.unwrap();
     check_views(&setup, [0, 1, 2, i64::MAX]).unwrap();
-    let scenes = [0, 1].map(|frame| setup.scene_at(frame).unwrap());
+    let scenes = [0, 1].map(|frame| setup.scene_at(frame, None).unwrap());
     assert_eq!(scenes[0].camera, setup.picture.scene.camera);
     assert_ne!(scenes[1].camera, setup.picture.scene.camera);
     assert_eq!(scenes[1].camera, setup.camera_at(1).unwrap());
     assert_eq!(scenes[0].lights, scenes[1].lights);
-    // The default lights come from where frame 0 is seen from.
+    // The default lights depend on the camera of frame 0.
     let crate::scene::LightKind::Directional { to_light } = scenes[0].lights[0].kind else {
         panic!("the key light is directional");
     };
@@ -85,7 +91,7 @@ fn each_frame_has_its_camera_and_all_have_the_same_light() {
 }
 
 #[test]
-fn what_lies_behind_a_preview_is_what_its_camera_looks_at() {
+fn preview_backdrop_follows_the_camera() {
     let keys = [key(1, [5.0, 0.0, -4.0]), key(2, [5.0, 0.0, 4.0])];
     let setup = keyed_setup(keys).unwrap();
     let behind = |frame| {
@@ -101,25 +107,25 @@ fn what_lies_behind_a_preview_is_what_its_camera_looks_at() {
 }
 
 #[test]
-fn a_key_without_a_picture_is_named() {
-    let told = |keys: [Key; 2]| keyed_setup(keys).unwrap_err().to_string();
+fn invalid_key_view_is_named() {
+    let message = |keys: [Key; 2]| keyed_setup(keys).unwrap_err().to_string();
     assert_eq!(
-        told([key(1, [5.0, 0.0, 0.0]), key(-7, [0.0, 0.0, 5.0])]),
+        message([key(1, [5.0, 0.0, 0.0]), key(-7, [0.0, 0.0, 5.0])]),
         "camera.key: the key of frame -7: up is zero or points along the view; choose another camera.up"
     );
     assert_eq!(
-        told([key(1, [5.0, 0.0, 0.0]), key(1, [6.0, 0.0, 5.0])]),
+        message([key(1, [5.0, 0.0, 0.0]), key(1, [6.0, 0.0, 5.0])]),
         "camera.key: two keys have frame 1; a frame has one view"
     );
     let mut over = [key(1, [5.0, 0.0, 0.0]), key(9, [5.0, 0.0, 0.0])];
     over[1].up = Some(DVec3::NEG_Z);
-    let error = told(over);
+    let error = message(over);
     assert!(error.starts_with("camera.key: up turns upside down from frame 1 to frame 9"));
 }
 
 #[test]
-fn a_frame_without_a_picture_is_named() {
-    // Through what is looked at, and over its head.
+fn invalid_frame_view_is_named() {
+    // Paths through the point that the camera looks at, and vertically above it.
     for (eyes, what) in [
         (
             [[5.0, 0.0, 0.0], [-5.0, 0.0, 0.0]],

@@ -1,4 +1,4 @@
-//! Surface and material, and which settings contradict each other.
+//! Surface and material, with checks for settings that contradict each other.
 
 use super::{ResolveError, narrow};
 use crate::manifest::Manifest;
@@ -6,24 +6,25 @@ use crate::scene::{Bounds, Fresnel, Material, material};
 use crate::surface::{NormalKind, SurfaceKind, SurfaceSettings};
 use crate::survey::Survey;
 
-/// Part of the bounds' diagonal that light goes through a body to take the colour of its absorption:
-/// a pool seen from above has a tint, a drop has none. Tuned on dam breaks.
+/// Default distance at which light takes the colour of absorption, as a fraction of the diagonal of the bounds: a pool
+/// seen from above is tinted, a drop is not. Tuned on dam breaks.
 const ABSORPTION: f64 = 0.25;
 
 /// Radius of the spheres of a union, in particle radii. Spheres that only touch leave gaps between them, and light
 /// passes through a sponge of beads; these spheres overlap enough to close the gaps.
 const OVERLAP: f32 = 1.8;
 
-/// The surface as asked for.
+/// The surface that the manifest describes.
 ///
 /// # Errors
-/// Settings that contradict each other.
+/// The settings contradict each other.
 pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveError> {
     let surface = manifest.surface;
     let unsupported = |key, what: &str| {
         let what = what.to_owned();
         Err(ResolveError::Unsupported { key, what })
     };
+    // Reject normals and options that the surface does not support
     match (surface.kind, surface.normals) {
         (SurfaceKind::Spheres, NormalKind::Field) => {
             return unsupported(
@@ -57,8 +58,8 @@ pub(super) fn settings(manifest: &Manifest) -> Result<SurfaceSettings, ResolveEr
     Ok(surface)
 }
 
-/// The radius of particles that bring none. A job that was begun before there was one for bodies has that of
-/// spheres.
+/// Default radius of particles, for frames without radii. Jobs from before the estimate for bodies (`packed_radius`)
+/// use the estimate for spheres.
 pub(super) fn radius(kind: SurfaceKind, survey: &Survey) -> Option<f32> {
     let packed = match kind {
         SurfaceKind::Spheres => None,
@@ -68,7 +69,7 @@ pub(super) fn radius(kind: SurfaceKind, survey: &Survey) -> Option<f32> {
     packed.or(survey.radius)
 }
 
-/// The material.
+/// The material that the manifest describes, with defaults that depend on the size of the scene.
 pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
     let m = &manifest.material;
     let length = match m.absorption_length {
@@ -80,18 +81,17 @@ pub(super) fn material(manifest: &Manifest, bounds: &Bounds) -> Material {
         SurfaceKind::Union | SurfaceKind::Smooth => Fresnel::Exact,
     };
     Material {
-        fresnel: m.fresnel.unwrap_or(usual),
         extinction: material::extinction(m.absorption, length),
-        ..m.constants
+        ..m.resolved(usual)
     }
 }
 
-/// The larger over the smaller.
+/// The larger of two values divided by the smaller.
 fn ratio(a: f64, b: f64) -> f64 {
     (a / b).max(b / a)
 }
 
-/// About `length`: the nearest of 1, 2 and 5 times a power of ten; 1 of what has no extent.
+/// Rounds `length` to the nearest of 1, 2 and 5 times a power of ten; 1 if it is not positive.
 pub(super) fn round(length: f64) -> f32 {
     let power = libm::exp10(libm::log10(length).floor());
     let nearest = [1.0, 2.0, 5.0, 10.0]

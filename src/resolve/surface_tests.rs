@@ -8,29 +8,29 @@ fn manifest(text: &str) -> Manifest {
 }
 
 #[track_caller]
-fn refused(text: &str, told: &str) {
+fn refused(text: &str, message: &str) {
     let error = settings(&manifest(text)).unwrap_err().to_string();
-    assert!(error.contains(told), "{error}");
+    assert!(error.contains(message), "{error}");
 }
 
 #[test]
 fn settings_come_from_the_manifest() {
     assert_eq!(settings(&manifest("")).unwrap(), SurfaceSettings::DEFAULT);
-    let asked = settings(&manifest(
+    let found = settings(&manifest(
         "render.surface = \"smooth\"\n[surface]\nsmoothing = 0.25\nvoxel = 0.5\nspray = true",
     ));
-    let wanted = SurfaceSettings {
+    let expected = SurfaceSettings {
         kind: SurfaceKind::Smooth,
         smoothing: 0.25,
         voxel: 0.5,
         spray: true,
         ..SurfaceSettings::DEFAULT
     };
-    assert_eq!(asked.unwrap(), wanted);
+    assert_eq!(found.unwrap(), expected);
 }
 
 #[test]
-fn each_surface_has_a_radius_of_its_own() {
+fn each_surface_has_its_own_radius() {
     let found = Survey {
         radius: Some(0.4),
         packed_radius: Some(0.5),
@@ -49,7 +49,7 @@ fn each_surface_has_a_radius_of_its_own() {
 }
 
 #[test]
-fn what_makes_no_sense_together_is_refused() {
+fn contradictory_settings_are_rejected() {
     refused("surface.normals = \"field\"", "surface.normals: \"field\"");
     refused("surface.exact = true", "surface.exact: is for the smooth");
     refused(
@@ -83,7 +83,7 @@ fn one_body_has_exact_fresnel_and_absorption() {
     assert_eq!(of(""), Material::DEFAULT);
     let smooth = "render.surface = \"smooth\"\nmaterial.absorption = [0.5, 1, 1]\n";
     assert_eq!(of(smooth).fresnel, Fresnel::Exact);
-    // A quarter of the diagonal of 7.
+    // A quarter of the diagonal, which is 7.
     let loss = of(smooth).extinction;
     assert!((loss.x - 2.0_f32.ln() / 1.75).abs() < 1e-5);
     assert_eq!([loss.y, loss.z], [0.0; 2]);
@@ -95,15 +95,15 @@ fn one_body_has_exact_fresnel_and_absorption() {
 }
 
 #[test]
-fn lengths_are_rounded_to_what_people_count_by() {
-    for (length, wanted) in [
+fn lengths_are_rounded_to_1_2_5() {
+    for (length, expected) in [
         (0.9, 1.0),
         (1.3, 1.0),
         (0.017, 0.02),
         (3.3, 5.0),
         (80.0, 100.0),
     ] {
-        assert_eq!(round(length), wanted, "{length}");
+        assert_eq!(round(length), expected, "{length}");
     }
     for nothing in [0.0, f64::NAN, f64::INFINITY, 1e-320] {
         assert_eq!(round(nothing), 1.0, "{nothing}");

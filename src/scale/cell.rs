@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use super::measure::{Builds, Measured, render_settings, trace};
 use super::peaks::Peaks;
-use super::{CellRequest, Particles, stored};
+use super::{CellError, CellRequest, Particles, stored};
 use crate::accel::{BuildSettings, TreeBuilder};
 use crate::metrics::memory;
 use crate::render::Film;
@@ -19,7 +19,7 @@ use crate::scale::report::CellMeasurement;
 ///
 /// # Errors
 /// Describes why the settings are invalid, the cell does not fit into memory, or the file cannot be traced.
-pub fn measure(request: &CellRequest, file: Option<&Path>) -> Result<CellMeasurement, String> {
+pub fn measure(request: &CellRequest, file: Option<&Path>) -> Result<CellMeasurement, CellError> {
     check_image(request)?;
     let measured = match file {
         None => build_and_trace(request)?,
@@ -28,7 +28,7 @@ pub fn measure(request: &CellRequest, file: Option<&Path>) -> Result<CellMeasure
     Ok(measured.report())
 }
 
-fn build_and_trace(request: &CellRequest) -> Result<Measured, String> {
+fn build_and_trace(request: &CellRequest) -> Result<Measured, CellError> {
     let peaks = Peaks::default();
     let start = Instant::now();
     let particles = peaks.during(|| Particles::of(request))?;
@@ -55,17 +55,16 @@ fn build_and_trace(request: &CellRequest) -> Result<Measured, String> {
 }
 
 /// Rejects an image that cannot fit into memory, before the system kills the process.
-fn check_image(request: &CellRequest) -> Result<(), String> {
+fn check_image(request: &CellRequest) -> Result<(), CellError> {
     let settings = render_settings(request);
-    let need = Film::bytes_for(settings.width, settings.height, settings.channels);
+    let need = Film::bytes_for(settings.width, settings.height, settings.channels, false);
     match memory::available() {
-        Some(free) if need > free => Err(format!(
-            "out of memory: an image of {}x{} needs {} MiB, {} MiB are free",
-            settings.width,
-            settings.height,
-            need >> 20,
-            free >> 20
-        )),
+        Some(free) if need > free => Err(CellError::ImageTooLarge {
+            width: settings.width,
+            height: settings.height,
+            need: need >> 20,
+            free: free >> 20,
+        }),
         _ => Ok(()),
     }
 }
@@ -74,7 +73,7 @@ fn check_image(request: &CellRequest) -> Result<(), String> {
 mod tests {
     use super::*;
     use crate::accel::Structure;
-    use crate::scale::measure::LEAST_IMAGES;
+    use crate::scale::measure::MIN_IMAGES;
     use crate::scale::{Budget, Motion, Representation, Source, Stage, convert};
 
     fn request(particles: usize, structure: Structure) -> CellRequest {
@@ -96,7 +95,7 @@ mod tests {
     }
 
     #[test]
-    fn any_count_can_be_measured() {
+    fn measures_any_particle_count() {
         for particles in [0, 1, 2, 500] {
             let cell = measure(&request(particles, Structure::default()), None).unwrap();
             assert_eq!(cell.images, 3);
@@ -114,7 +113,7 @@ mod tests {
         assert!(rays[0].reflection > 0);
     }
 
-    /// The cell of the same particles in a native frame.
+    /// Measures the same cell in a native frame.
     fn in_place(request: &CellRequest, representation: Representation) -> CellMeasurement {
         let request = CellRequest {
             representation,
@@ -132,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn frames_in_place_trace_as_in_memory() {
+    fn tracing_in_place_matches_tracing_in_memory() {
         for particles in [0, 1, 2000] {
             let request = request(particles, Structure::Kdtree);
             let memory = measure(&request, None).unwrap();
@@ -146,7 +145,7 @@ mod tests {
                 assert!(coded.rays.shadow.abs_diff(memory.rays.shadow) <= near);
                 assert!(coded.bytes.positions <= exact.bytes.positions);
                 assert_eq!(coded.bytes.file.positions, coded.bytes.positions);
-                // All that lies in memory is what was built above the stored nodes.
+                // Only the levels built above the stored nodes are in memory.
                 let built = coded.bytes.structure - coded.bytes.file.structure;
                 assert_eq!(coded.bytes.anonymous(), built);
             }
@@ -154,26 +153,27 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_is_no_frame_is_told() {
+    fn error_names_a_file_that_is_not_a_frame() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("particles.spf");
         std::fs::write(&path, "no frame").unwrap();
-        let told = measure(&request(10, Structure::Kdtree), Some(&path)).unwrap_err();
-        assert!(told.contains("particles.spf"), "{told}");
+        let result = measure(&request(10, Structure::Kdtree), Some(&path));
+        let message = result.unwrap_err().to_string();
+        assert!(message.contains("particles.spf"), "{message}");
     }
 
     #[test]
-    fn time_ends_a_cell_after_a_few_images_at_least() {
+    fn short_budget_gives_the_minimum_number_of_images() {
         let mut request = request(10, Structure::default());
         request.budget = Budget::Seconds(1e-9);
         assert_eq!(
             measure(&request, None).unwrap().images,
-            u64::from(LEAST_IMAGES)
+            u64::from(MIN_IMAGES)
         );
     }
 
     #[test]
-    fn requests_survive_the_way_to_another_process() {
+    fn requests_round_trip_as_json() {
         let request = request(10, Structure::default());
         let text = serde_json::to_string(&request).unwrap();
         assert_eq!(serde_json::from_str::<CellRequest>(&text).unwrap(), request);

@@ -8,7 +8,7 @@ use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{self, Bound, StoreSettings};
 
 use super::peaks::Peaks;
-use super::{CellRequest, Particles};
+use super::{CellError, CellRequest, Particles};
 use crate::scale::report::Conversion;
 
 /// Maximum error of compact positions, equal to the default of `convert`.
@@ -18,7 +18,7 @@ const BOUND: Bound = Bound::OfRadius(0.02);
 ///
 /// # Errors
 /// Describes why they do not fit into memory, cannot be read, or the file cannot be written.
-pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String> {
+pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, CellError> {
     let settings = StoreSettings {
         encoding: request.representation.encoding(),
         bound: BOUND,
@@ -30,11 +30,16 @@ pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String>
     let load_seconds = start.elapsed().as_secs_f64();
     let frame = frame_of(particles, request);
     let start = Instant::now();
-    let index = peaks
-        .during(|| native::store(path, &frame, None, &settings))
-        .map_err(|e| e.to_string())?;
+    let index = peaks.during(|| native::store(path, &frame, None, &settings))?;
     let seconds = start.elapsed().as_secs_f64();
-    let meta = path.metadata();
+    let length = path
+        .metadata()
+        .map_err(|source| CellError::Io {
+            path: path.to_owned(),
+            source,
+        })?
+        .len();
+    // The maximum error is also given relative to the smallest radius
     let smallest = match index.radius {
         RadiusIndex::None => 0.0,
         RadiusIndex::Common(radius) => f64::from(radius),
@@ -43,7 +48,7 @@ pub fn convert(request: &CellRequest, path: &Path) -> Result<Conversion, String>
     Ok(Conversion {
         load_seconds,
         seconds,
-        file_bytes: meta.map_err(|e| format!("{}: {e}", path.display()))?.len(),
+        file_bytes: length,
         max_error: index.max_error,
         max_error_of_radius: (smallest > 0.0).then(|| index.max_error / smallest),
         rss: peaks.summary(),

@@ -3,9 +3,9 @@
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 
-use super::motion::spread_place;
+use super::motion::path_position;
 use super::peaks::Peaks;
-use super::{Budget, CellRequest};
+use super::{Budget, CellError, CellRequest};
 use crate::accel::BuildReport;
 use crate::accel::view::TreeView;
 use crate::render::{ParticleShading, RayCounts, RenderSettings, render};
@@ -17,12 +17,12 @@ use crate::surface::spheres::SphereSurface;
 /// Maximum number of builds of a cell; an odd number has a median.
 const BUILDS: usize = 11;
 /// Time for repeated builds as a fraction of the time for images.
-const BUILD_PART: f64 = 0.25;
+const BUILD_TIME_FRACTION: f64 = 0.25;
 /// Time for repeated builds if the number of images is given, seconds.
 const BUILD_SECONDS: f64 = 2.0;
 /// Minimum number of images if their time is given: they are a quarter of the path apart, so a slow cell also covers
 /// all directions.
-pub(super) const LEAST_IMAGES: u32 = 4;
+pub(super) const MIN_IMAGES: u32 = 4;
 
 /// Measurements of a cell.
 pub(super) struct Measured {
@@ -79,10 +79,10 @@ impl Builds {
     /// The first error of `build`.
     pub(super) fn repeat(
         budget: Budget,
-        mut build: impl FnMut() -> Result<BuildReport, String>,
-    ) -> Result<Self, String> {
+        mut build: impl FnMut() -> Result<BuildReport, CellError>,
+    ) -> Result<Self, CellError> {
         let allowed = match budget {
-            Budget::Seconds(seconds) => BUILD_PART * seconds,
+            Budget::Seconds(seconds) => BUILD_TIME_FRACTION * seconds,
             Budget::Images(_) => BUILD_SECONDS,
         };
         let mut report = build()?;
@@ -113,7 +113,7 @@ pub(super) fn trace(
     tree: TreeView<'_>,
     request: &CellRequest,
     peaks: &Peaks,
-) -> Result<Images, String> {
+) -> Result<Images, CellError> {
     let settings = render_settings(request);
     let aspect = f64::from(request.width) / f64::from(request.height);
     let surface = SphereSurface::new(tree);
@@ -125,21 +125,19 @@ pub(super) fn trace(
     };
     let mut spent = 0.0;
     for index in 0.. {
-        let place = match request.budget {
+        // Stop if the budget is spent, otherwise choose a position on the path
+        let t = match request.budget {
             Budget::Images(count) if index == count => break,
             Budget::Images(count) => f64::from(index) / f64::from(count),
-            Budget::Seconds(allowed) if spent >= allowed && index >= LEAST_IMAGES => break,
-            Budget::Seconds(_) => spread_place(index),
+            Budget::Seconds(allowed) if spent >= allowed && index >= MIN_IMAGES => break,
+            Budget::Seconds(_) => path_position(index),
         };
-        let scene = request
-            .stage
-            .scene(request.motion, place, aspect)
-            .map_err(|e| format!("camera: {e}"))?;
+        let scene = request.stage.scene(request.motion, t, aspect)?;
+        // Trace one image, and measure its time without preparation or release
         let start = Instant::now();
-        let (film, rays) =
-            render(&[&surface], &scene, &shading, &settings, &never).map_err(|e| e.to_string())?;
+        let (film, rays) = render(&[&surface], &scene, &shading, &settings, &never)?;
         let seconds = start.elapsed().as_secs_f64();
-        peaks.look();
+        peaks.sample();
         drop(film);
         spent += seconds;
         images.seconds.push(seconds);

@@ -18,6 +18,7 @@ use crate::accel::Structure;
 
 pub mod cell;
 pub mod convert;
+mod error;
 mod measure;
 mod motion;
 mod particles;
@@ -26,6 +27,7 @@ pub mod report;
 mod stage;
 mod stored;
 
+pub use error::CellError;
 pub use motion::Motion;
 pub use particles::{FrameSurvey, Particles};
 pub use stage::{Lighting, Stage};

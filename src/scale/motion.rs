@@ -74,7 +74,7 @@ fn shifted(view: &CameraView, t: f64) -> CameraView {
 
 /// Position on the path of image `index` in a run with a time limit: the van der Corput sequence, so that any number
 /// of images is evenly distributed over the path, and fast and slow machines use the same positions.
-pub(super) fn spread_place(index: u32) -> f64 {
+pub(super) fn path_position(index: u32) -> f64 {
     f64::from(index.reverse_bits()) / 2_f64.powi(32)
 }
 
@@ -96,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn rotation_goes_around_once_and_keeps_its_distance() {
+    fn rotation_is_one_turn_at_constant_distance() {
         let at = |t| Motion::Rotation.view_at(t, &START, CENTER);
         assert_eq!(at(0.0), START);
         close(at(0.5).eye, DVec3::new(10.0, 13.0, 0.0));
@@ -108,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn translation_passes_the_still_view_and_the_point() {
+    fn translation_passes_the_still_view_and_the_target() {
         let at = |t| Motion::Translation.view_at(t, &START, CENTER);
         close(at(0.0).eye, DVec3::new(-5.0, -5.0, 0.0));
         close(at(1.0 / 3.0).eye, START.eye);
@@ -117,17 +117,17 @@ mod tests {
     }
 
     #[test]
-    fn both_is_the_one_after_the_other() {
+    fn both_is_translation_then_rotation() {
         let view = Motion::Both.view_at(0.5, &START, CENTER);
-        // The eye has gone half of (5, 5, 0), then half a turn about the middle.
+        // The camera has moved by half of (5, 5, 0), then half a turn around the centre.
         close(view.eye, 2.0 * CENTER - DVec3::new(2.5, 2.5, 0.0));
     }
 
     #[test]
-    fn any_number_of_places_is_spread() {
-        let places: Vec<f64> = (0..4).map(spread_place).collect();
+    fn path_positions_are_evenly_distributed() {
+        let places: Vec<f64> = (0..4).map(path_position).collect();
         assert_eq!(places, [0.0, 0.5, 0.25, 0.75]);
-        let mut many: Vec<f64> = (0..48).map(spread_place).collect();
+        let mut many: Vec<f64> = (0..48).map(path_position).collect();
         many.sort_unstable_by(f64::total_cmp);
         assert!(many.windows(2).all(|w| w[1] - w[0] <= 1.0 / 32.0));
     }

@@ -5,7 +5,7 @@ use spherule_formats::generate::{BoxSettings, fill_box, splitmix64};
 use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_formats::{ParticleFrame, Radius, is_radius};
 
-use super::{CellRequest, FrameSource, Source, Stage};
+use super::{CellError, CellRequest, FrameSource, Source, Stage};
 use crate::accel::{SphereRadius, Spheres};
 use crate::metrics::memory;
 use crate::reading::read_budget;
@@ -13,12 +13,12 @@ use crate::scene::Bounds;
 use crate::survey::{ColorQuestion, Question, RadiusQuestion, Survey};
 
 /// Minimum radius as a fraction of the diagonal of the bounds; smaller ones would be invisible in f32.
-const LEAST_RADIUS: f64 = 1e-6;
+const MIN_RADIUS: f64 = 1e-6;
 /// Radius if there is no estimate (a single particle, or all in one place), as a fraction of the distance of the
 /// framing camera.
-const LONE_RADIUS: f64 = 0.1;
+const SINGLE_RADIUS: f64 = 0.1;
 /// Minimum memory per particle during the build, in bytes: the positions of the input, and those in the tree.
-const LEAST_BYTES: u64 = 24;
+const MIN_BYTES: u64 = 24;
 
 /// Spheres in memory.
 #[derive(Debug, Clone, PartialEq)]
@@ -34,17 +34,16 @@ impl Particles {
     ///
     /// # Errors
     /// They do not fit into memory, or the frame cannot be read.
-    pub fn of(request: &CellRequest) -> Result<Self, String> {
-        let need = LEAST_BYTES.saturating_mul(request.particles as u64);
+    pub fn of(request: &CellRequest) -> Result<Self, CellError> {
+        let need = MIN_BYTES.saturating_mul(request.particles as u64);
         if let Some(free) = memory::available()
             && need > free
         {
-            return Err(format!(
-                "out of memory: {} particles need at least {} MiB, {} MiB are free",
-                request.particles,
-                need >> 20,
-                free >> 20
-            ));
+            return Err(CellError::TooManyParticles {
+                particles: request.particles,
+                need: need >> 20,
+                free: free >> 20,
+            });
         }
         match &request.source {
             Source::Box => Ok(Self::in_box(request.particles, request.seed)),
@@ -62,19 +61,19 @@ impl Particles {
         }
     }
 
-    fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, String> {
+    fn in_frame(source: &FrameSource, count: usize, seed: u64) -> Result<Self, CellError> {
         // Find and read the frame
         let input = SequenceInput::from_path(&source.path);
-        let sequence =
-            Sequence::open_within(&input, read_budget(None, None)).map_err(|e| e.to_string())?;
+        let sequence = Sequence::open_within(&input, read_budget(None, None))?;
         let index = sequence
             .frames()
             .iter()
             .position(|f| f.number == source.frame)
-            .ok_or_else(|| format!("{}: no frame {}", source.path.display(), source.frame))?;
-        let frame = sequence
-            .load(index, source.origin)
-            .map_err(|e| e.to_string())?;
+            .ok_or_else(|| CellError::MissingFrame {
+                path: source.path.clone(),
+                frame: source.frame,
+            })?;
+        let frame = sequence.load(index, source.origin)?;
         let ParticleFrame {
             positions, radius, ..
         } = frame;
@@ -96,11 +95,11 @@ impl Particles {
             return;
         }
         let growth = narrow((all as f64 / count.max(1) as f64).cbrt());
-        retain_chosen(&mut self.centers, count, seed);
+        retain_random(&mut self.centers, count, seed);
         match &mut self.radius {
             Radius::Common(radius) => *radius *= growth,
             Radius::PerParticle(radii) => {
-                retain_chosen(radii, count, seed);
+                retain_random(radii, count, seed);
                 radii.iter_mut().for_each(|r| *r *= growth);
             }
         }
@@ -133,16 +132,16 @@ impl Particles {
 
 /// Keeps `count` of `items` in their order; all selections are equally likely (selection sampling, Knuth, The Art of
 /// Computer Programming 2, 3.4.2, algorithm S).
-fn retain_chosen<T>(items: &mut Vec<T>, count: usize, seed: u64) {
-    let mut left = items.len() as u64;
-    let mut wanted = count as u64;
+fn retain_random<T>(items: &mut Vec<T>, count: usize, seed: u64) {
+    let mut unvisited = items.len() as u64;
+    let mut remaining = count as u64;
     let mut draw = 0_u64;
     items.retain(|_| {
         draw += 1;
-        let below = (u128::from(splitmix64(seed, draw)) * u128::from(left)) >> 64;
-        left -= 1;
-        let chosen = below < u128::from(wanted);
-        wanted -= u64::from(chosen);
+        let below = (u128::from(splitmix64(seed, draw)) * u128::from(unvisited)) >> 64;
+        unvisited -= 1;
+        let chosen = below < u128::from(remaining);
+        remaining -= u64::from(chosen);
         chosen
     });
 }
@@ -168,19 +167,20 @@ impl FrameSurvey {
         path: &std::path::Path,
         index: usize,
         aspect: f64,
-    ) -> Result<Self, String> {
+    ) -> Result<Self, CellError> {
         let question = Question {
             color: ColorQuestion::None,
             radius: RadiusQuestion::Auto,
         };
-        let survey = Survey::of_frames(sequence, [index], question).map_err(|e| e.to_string())?;
+        let survey = Survey::of_frames(sequence, [index], question)?;
         let frame = sequence.frames()[index].number;
         if survey.most_particles == 0 {
-            return Err(format!(
-                "{}: frame {frame} has no particles, there is nothing to measure",
-                path.display()
-            ));
+            return Err(CellError::NoParticles {
+                path: path.to_owned(),
+                frame,
+            });
         }
+        // Frame the spheres, which extend beyond their centres
         let reach = f64::from(survey.radius.unwrap_or(0.0).max(survey.reach));
         let bounds = Bounds {
             min: survey.min - reach,
@@ -194,8 +194,8 @@ impl FrameSurvey {
                 path: path.to_owned(),
                 frame,
                 origin: survey.origin,
-                radius: survey.radius.unwrap_or(narrow(LONE_RADIUS * distance)),
-                least_radius: narrow(bounds.diagonal() * LEAST_RADIUS).max(f32::MIN_POSITIVE),
+                radius: survey.radius.unwrap_or(narrow(SINGLE_RADIUS * distance)),
+                least_radius: narrow(bounds.diagonal() * MIN_RADIUS).max(f32::MIN_POSITIVE),
             },
             stage,
         })
@@ -212,31 +212,31 @@ mod tests {
     use super::*;
 
     #[test]
-    fn exactly_as_many_are_kept_in_order() {
+    fn keeps_the_exact_count_in_order() {
         for (all, count) in [(0, 0), (1, 0), (1, 1), (10, 3), (1000, 999), (1000, 100)] {
             let mut items: Vec<usize> = (0..all).collect();
-            retain_chosen(&mut items, count, 7);
+            retain_random(&mut items, count, 7);
             assert_eq!(items.len(), count);
             assert!(items.is_sorted());
         }
     }
 
     #[test]
-    fn the_choice_is_even_and_seeded() {
+    fn selection_is_uniform_and_seeded() {
         let chosen = |seed| {
             let mut items: Vec<u32> = (0..100_000).collect();
-            retain_chosen(&mut items, 10_000, seed);
+            retain_random(&mut items, 10_000, seed);
             items
         };
         assert_eq!(chosen(1), chosen(1));
         assert_ne!(chosen(1), chosen(2));
-        // A tenth of the first half: 5000, standard deviation about 47.
+        // Expected in the first half: 5000, with a standard deviation of about 47.
         let first_half = chosen(1).iter().filter(|i| **i < 50_000).count();
         assert!((4700..5300).contains(&first_half), "{first_half}");
     }
 
     #[test]
-    fn what_is_left_fills_as_much_space() {
+    fn thinning_keeps_the_total_volume() {
         let mut particles = Particles {
             centers: (0..800_u16).map(|i| Vec3::splat(f32::from(i))).collect(),
             radius: Radius::PerParticle((0..800_u16).map(f32::from).collect()),

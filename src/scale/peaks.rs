@@ -22,7 +22,7 @@ pub(super) struct Peaks {
 
 impl Peaks {
     /// Takes one sample.
-    pub(super) fn look(&self) {
+    pub(super) fn sample(&self) {
         let now = MemoryUse::now();
         self.anonymous.fetch_max(now.anonymous, Ordering::Relaxed);
         self.file.fetch_max(now.file, Ordering::Relaxed);
@@ -34,7 +34,7 @@ impl Peaks {
         thread::scope(|scope| {
             let watcher = scope.spawn(|| {
                 while !self.done.load(Ordering::Relaxed) {
-                    self.look();
+                    self.sample();
                     thread::park_timeout(INTERVAL);
                 }
             });
@@ -45,7 +45,7 @@ impl Peaks {
 
     /// The largest samples, and the kernel's own peak of the total.
     pub(super) fn summary(&self) -> RssSummary {
-        self.look();
+        self.sample();
         let now = MemoryUse::now();
         RssSummary {
             anonymous: now.anonymous,
@@ -71,14 +71,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_peak_that_is_over_is_still_known() {
+    fn short_peak_is_recorded() {
         const SIZE: usize = 64 << 20;
         let peaks = Peaks::default();
-        peaks.look();
+        peaks.sample();
         let before = peaks.summary().anonymous_peak;
         peaks.during(|| {
             let block = std::hint::black_box(vec![1_u8; SIZE]);
-            peaks.look();
+            peaks.sample();
             drop(block);
         });
         let after = peaks.summary();

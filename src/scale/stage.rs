@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 use super::Motion;
 use crate::scene::{
     Background, Bounds, Camera, CameraError, CameraView, DEFAULT_AMBIENT_LIGHT, Framing, Light,
-    Material, Scene, camera, default_lights,
+    Scene, camera, default_lights,
 };
 
 /// The bounds that the camera moves around, and its still view.
@@ -77,12 +77,10 @@ impl Stage {
         };
         Ok(Scene {
             origin: self.origin,
-            camera: Camera::new(&view, aspect, self.origin)?,
             lights,
             ambient_light: DEFAULT_AMBIENT_LIGHT,
-            material: Material::DEFAULT,
             background: Background::default_for(up.as_vec3()),
-            ground: None,
+            ..Scene::new(Camera::new(&view, aspect, self.origin)?)
         })
     }
 }

@@ -6,21 +6,21 @@ use std::time::Instant;
 use spherule_formats::native::layout::RadiusIndex;
 use spherule_formats::native::{Access, NativeFile};
 
-use super::CellRequest;
 use super::measure::{Builds, Measured, trace};
 use super::peaks::Peaks;
+use super::{CellError, CellRequest};
 use crate::accel::stored::{StoredSettings, StoredTree};
 
 /// Maps the native frame at `path`, builds the levels above its nodes, and traces images.
 ///
 /// # Errors
 /// Describes why it cannot be opened or traced, or that it was changed in the meantime.
-pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measured, String> {
+pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measured, CellError> {
     let peaks = Peaks::default();
     let start = Instant::now();
-    let file = NativeFile::open(path, Access::Map).map_err(|e| e.to_string())?;
-    let frame = file.frame().map_err(|e| e.to_string())?;
-    let leaves = frame.leaves().map_err(|e| e.in_file(path).to_string())?;
+    let file = NativeFile::open(path, Access::Map)?;
+    let frame = file.frame()?;
+    let leaves = frame.leaves().map_err(|e| e.in_file(path))?;
     let load_seconds = start.elapsed().as_secs_f64();
     let settings = StoredSettings {
         structure: request.structure,
@@ -35,12 +35,15 @@ pub(super) fn trace_in_place(request: &CellRequest, path: &Path) -> Result<Measu
     let builds = peaks.during(|| {
         Builds::repeat(request.budget, || {
             let built = tree.build(&leaves, settings);
-            built.map_err(|fault| format!("{}: {fault}", path.display()))
+            built.map_err(|fault| CellError::Stored {
+                path: path.to_owned(),
+                fault,
+            })
         })
     })?;
     let images = trace(tree.view(&leaves), request, &peaks)?;
     // Pages lost in the meantime would be read as zeros.
-    file.check().map_err(|e| e.to_string())?;
+    file.check()?;
     Ok(Measured {
         particles: leaves.count,
         load_seconds,

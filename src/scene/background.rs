@@ -1,4 +1,4 @@
-//! The background for rays without an intersection: one colour, or a vertical gradient.
+//! The background for rays without an intersection: one colour, a vertical gradient, or the backdrop of a studio.
 
 use std::f32::consts::FRAC_1_PI;
 
@@ -13,6 +13,16 @@ pub const DEFAULT_BOTTOM: Vec3 = Vec3::new(0.45, 0.47, 0.50);
 /// Top of the default gradient (linear RGB): a lighter, cooler grey, like a sky.
 pub const DEFAULT_TOP: Vec3 = Vec3::new(0.75, 0.79, 0.85);
 
+/// Bottom of the backdrop of a studio (linear RGB), before its corners are darkened.
+pub const STUDIO_BOTTOM: Vec3 = Vec3::new(0.62, 0.64, 0.67);
+
+/// Top of the backdrop of a studio.
+pub const STUDIO_TOP: Vec3 = Vec3::new(0.80, 0.82, 0.85);
+
+/// The brightest point of the backdrop of a studio, on the film; (0, 0) is the top left corner, (1, 1) the bottom right
+/// one.
+pub const STUDIO_CENTER: [f32; 2] = [0.5, 0.45];
+
 /// Colour by direction, linear RGB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Background {
@@ -24,6 +34,12 @@ pub enum Background {
         bottom: Vec3,
         /// Colour along `up`.
         top: Vec3,
+        /// Unit vector.
+        up: Vec3,
+    },
+    /// As in a photo studio: for camera rays a vertical gradient over the image with darker corners, which does not
+    /// move with the camera; for all other rays a gradient along `up`.
+    Studio {
         /// Unit vector.
         up: Vec3,
     },
@@ -45,18 +61,19 @@ impl Background {
         match self {
             Self::Constant(_) => self,
             Self::Gradient { bottom, top, .. } => Self::Gradient { bottom, top, up },
+            Self::Studio { .. } => Self::Studio { up },
         }
     }
 
-    /// The colour in unit `direction`.
+    /// The colour in unit `direction`; for a camera ray, that of a studio depends on its position on the film instead.
     pub fn color(&self, direction: Vec3) -> Vec3 {
-        match *self {
-            Self::Constant(color) => color,
-            Self::Gradient { bottom, top, up } => {
-                let height = asin(direction.dot(up).clamp(-1.0, 1.0));
-                bottom.lerp(top, 0.5 + height * FRAC_1_PI)
-            }
-        }
+        let (bottom, top, up) = match *self {
+            Self::Constant(color) => return color,
+            Self::Gradient { bottom, top, up } => (bottom, top, up),
+            Self::Studio { up } => (STUDIO_BOTTOM, STUDIO_TOP, up),
+        };
+        let height = asin(direction.dot(up).clamp(-1.0, 1.0));
+        bottom.lerp(top, 0.5 + height * FRAC_1_PI)
     }
 }
 
@@ -74,8 +91,8 @@ mod tests {
         for (degrees, part) in [(-90.0_f32, 0.0), (-45.0, 0.25), (0.0, 0.5), (90.0, 1.0)] {
             let angle = degrees.to_radians();
             let color = sky.color(Vec3::new(angle.cos(), 0.0, angle.sin()));
-            let wanted = part * Vec3::new(1.0, 2.0, 4.0);
-            assert!((color - wanted).length() < 1e-3, "{degrees}: {color}");
+            let expected = part * Vec3::new(1.0, 2.0, 4.0);
+            assert!((color - expected).length() < 1e-3, "{degrees}: {color}");
         }
         // Rounding past one must not make NaN.
         assert!(sky.color(Vec3::new(0.0, 0.0, 1.000_001)).is_finite());

@@ -2,7 +2,7 @@
 //! the eye.
 //!
 //! It is set up in f64 world coordinates, and used in f32 relative to the origin of the sequence. Row 0 of the image
-//! is its top. [`super::path`] moves cameras. There is no depth of field.
+//! is its top. [`super::path`] moves cameras. [`super::lens`] adds depth of field.
 
 use glam::{DMat4, DVec2, DVec3, DVec4, Vec2, Vec3};
 use serde::{Deserialize, Serialize};
@@ -72,7 +72,7 @@ pub enum CameraError {
     #[error("a coordinate is not a finite number")]
     NotFinite,
     /// A coordinate exceeds the range of f32.
-    #[error("eye or look_at is too far away for single precision, whose numbers end at 3e38")]
+    #[error("eye or look_at is too far away for single precision (limit 3e38)")]
     TooFar,
     /// `eye` and `look_at` are the same point.
     #[error("eye and look_at are the same point; move one of them")]
@@ -81,11 +81,30 @@ pub enum CameraError {
     #[error("up is zero or points along the view; choose another camera.up")]
     NoUp,
     /// Field of view outside 0 to 180 degrees.
-    #[error("fov must lie above 0 and below 180 degrees")]
+    #[error("fov must be above 0 and below 180 degrees")]
     FieldOfView,
     /// The aspect ratio is zero, negative or not finite.
     #[error("image width over height must be above 0")]
     Aspect,
+    /// The focus is behind the camera, at the camera, or infinitely far away.
+    #[error(
+        "the focus is not in front of the camera; set camera.focus to a distance, or follow another particle"
+    )]
+    Focus,
+    /// The diameter of the aperture is out of range.
+    #[error(
+        "the aperture is too large for single precision; raise camera.f_stop, or lower camera.aperture"
+    )]
+    Aperture,
+}
+
+/// The lens of a camera for one image, in scene units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lens {
+    /// Radius of the aperture.
+    pub radius: f32,
+    /// Distance of the plane in focus, along the view axis.
+    pub focus: f32,
 }
 
 /// A camera that generates rays.
@@ -97,6 +116,8 @@ pub struct Camera {
     forward: Vec3,
     /// `tan(fov / 2)`, horizontal and vertical.
     half_extent: Vec2,
+    /// The lens; without one, the camera is a pinhole.
+    lens: Option<Lens>,
     /// World to camera space: x right, y up, z forward (left-handed, as in OpenEXR's `worldToCamera`).
     camera_from_world: DMat4,
 }
@@ -141,8 +162,16 @@ impl Camera {
             up: up.as_vec3(),
             forward: forward.as_vec3(),
             half_extent: DVec2::new(half_height * aspect, half_height).as_vec2(),
+            lens: None,
             camera_from_world: camera_from_world(view.eye, right, up, forward),
         })
+    }
+
+    /// The camera with a lens around its eye. An aperture of 0 is a pinhole.
+    #[must_use]
+    pub fn with_lens(self, lens: Lens) -> Self {
+        let lens = (lens.radius > 0.0).then_some(lens);
+        Self { lens, ..self }
     }
 
     /// The nearest view in the given direction with all corners of `bounds` in the image, with a margin of
@@ -174,16 +203,11 @@ impl Camera {
         }
     }
 
-    /// The ray through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
+    /// The ray through the eye and through `film`, in units of the image: (0, 0) is the top left corner, (1, 1) the bottom right one.
     pub fn ray(&self, film: Vec2) -> Ray {
         let d = Vec2::new(2.0 * film.x - 1.0, 1.0 - 2.0 * film.y) * self.half_extent;
         let direction = self.forward + d.x * self.right + d.y * self.up;
         Ray::new(self.eye, direction.normalize())
-    }
-
-    /// Distance along the view axis of the point at `t` on a ray of this camera.
-    pub fn depth(&self, ray: &Ray, t: f32) -> f32 {
-        t * ray.direction.dot(self.forward)
     }
 
     /// The view axis.
@@ -196,12 +220,17 @@ impl Camera {
         [self.right, self.up, self.forward]
     }
 
+    /// The lens, unless the camera is a pinhole.
+    pub(crate) const fn lens(&self) -> Option<Lens> {
+        self.lens
+    }
+
     /// Tangents of half the horizontal and vertical field of view.
     pub(crate) const fn half_extent(&self) -> Vec2 {
         self.half_extent
     }
 
-    /// The position of the pinhole, relative to the origin of the sequence.
+    /// The position of the pinhole, or of the centre of the lens, relative to the origin of the sequence.
     pub const fn eye(&self) -> Vec3 {
         self.eye
     }
@@ -242,7 +271,7 @@ pub(super) fn min_distance(bounds: &Bounds) -> f64 {
 }
 
 /// View direction of a camera at `azimuth` and `elevation` (degrees) about `up`.
-pub(super) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
+pub(crate) fn view_direction(up: DVec3, azimuth: f64, elevation: f64) -> DVec3 {
     // The up direction is undefined for a view straight down; one degree makes no visible difference.
     let elevation = elevation.clamp(-89.0, 89.0).to_radians();
     let azimuth = azimuth.to_radians();

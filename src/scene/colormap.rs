@@ -260,18 +260,18 @@ mod tests {
             (255.0, [122.0, 4.0, 3.0_f32]),
         ] {
             let color = map.color(entry).to_array();
-            for (got, wanted) in color.into_iter().zip(published) {
-                let step = |by: f32| linear_from_srgb((wanted + by).clamp(0.0, 255.0) / 255.0);
+            for (got, expected) in color.into_iter().zip(published) {
+                let step = |by: f32| linear_from_srgb((expected + by).clamp(0.0, 255.0) / 255.0);
                 assert!(
                     (step(-1.0)..=step(1.0)).contains(&got),
-                    "{entry}: {got} {wanted}"
+                    "{entry}: {got} {expected}"
                 );
             }
         }
     }
 
     #[test]
-    fn interpolates_and_turns_round() {
+    fn interpolates_and_reverses() {
         let map = ColorMap::new("greys", 0.0, 255.0).unwrap();
         let between = map.color(100.5);
         let mean = 0.5 * (map.color(100.0) + map.color(101.0));
@@ -290,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn every_name_works_and_a_wrong_one_is_helped() {
+    fn map_names_are_found_or_suggested() {
         for name in ColorMap::names() {
             let map = ColorMap::new(name, 0.0, 1.0).unwrap();
             assert!(map.color(0.3).is_finite());

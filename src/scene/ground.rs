@@ -6,7 +6,6 @@
 use glam::Vec3;
 
 use super::Bounds;
-use crate::ray::Ray;
 
 /// Default colour of the ground (linear RGB): a dark grey that shows shadows and does not distract from the particles.
 pub const DEFAULT_COLOR: Vec3 = Vec3::new(0.135, 0.140, 0.150);
@@ -21,11 +20,26 @@ pub const DIFFUSE: f32 = 0.7;
 /// Colour of the darker squares of a checkerboard, as a fraction of the colour of the ground.
 const DARKER_PART: f32 = 0.35;
 
+/// Greatest difference of the colour of sand from its mean, as a fraction of that.
+const SAND_CONTRAST: f32 = 0.4;
+
+/// Number of sizes of spots in sand; each is half of the one before.
+const SAND_SIZES: u32 = 8;
+
+/// Contrast of spots as a fraction of that of spots of twice the size.
+const SAND_GAIN: f32 = 0.85;
+
 /// Default distance from the centre at which the ground starts to fade, in diagonals of the bounds.
 const FADE_START: f32 = 1.5;
 
 /// Default distance at which it has faded out.
 const FADE_END: f32 = 6.0;
+
+/// The same two distances for a shadow catcher, whose horizon is not visible.
+const CATCHER_FADE: [f32; 2] = [2.0, 8.0];
+
+/// Colour in which a shadow catcher reflects light to the particles.
+const CATCHER_COLOR: Vec3 = Vec3::splat(0.55);
 
 /// A plane `dot(up, x) = height`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,21 +50,36 @@ pub struct Ground {
     pub height: f32,
     /// Diffuse colour, linear RGB.
     pub color: Vec3,
+    /// Corners of the box of the particles of all frames.
+    pub particles: [Vec3; 2],
     /// Centre of the fading.
     pub center: Vec3,
     /// Distance from `center` up to which the ground is opaque.
     pub fade_start: f32,
     /// Distance from which on only the background is visible.
     pub fade_end: f32,
-    /// Optional checkerboard.
-    pub checker: Option<Checker>,
+    /// Pattern of the colour.
+    pub pattern: Pattern,
+    /// Strength of the shadows, 0 to 1, if camera rays see nothing but shadows on the ground: a shadow catcher. Only
+    /// for path tracing.
+    pub shadow_catcher: Option<f32>,
 }
 
-/// A checkerboard on the ground. Four corners meet at the centre of the ground.
+/// A pattern on the ground. Lengths are positive.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Checker {
-    /// Edge of a square; positive.
-    pub tile: f32,
+pub enum Pattern {
+    /// One colour.
+    Plain,
+    /// A checkerboard. Four corners meet at the centre of the ground.
+    Checker {
+        /// Edge of a square.
+        tile: f32,
+    },
+    /// Sand: slightly lighter and darker spots of many sizes.
+    Sand {
+        /// Distance between the largest spots.
+        tile: f32,
+    },
 }
 
 impl Ground {
@@ -68,31 +97,52 @@ impl Ground {
             up,
             height,
             color: DEFAULT_COLOR,
+            particles: [bounds.min, bounds.max].map(|corner| (corner - origin).as_vec3()),
             center: center + (height - center.dot(up)) * up,
             fade_start: FADE_START * diagonal,
             fade_end: FADE_END * diagonal,
-            checker: None,
+            pattern: Pattern::Plain,
+            shadow_catcher: None,
+        }
+    }
+
+    /// A shadow catcher with shadows of a `strength` from 0 to 1, in place of this ground under `bounds`.
+    #[must_use]
+    pub fn into_shadow_catcher(self, bounds: &Bounds, strength: f32) -> Self {
+        let diagonal = (bounds.max - bounds.min).as_vec3().length();
+        let [fade_start, fade_end] = CATCHER_FADE.map(|distance| distance * diagonal);
+        Self {
+            color: CATCHER_COLOR,
+            fade_start,
+            fade_end,
+            pattern: Pattern::Plain,
+            shadow_catcher: Some(strength),
+            ..self
         }
     }
 
     /// The colour at a `point` of the ground.
     #[inline]
     pub fn color_at(&self, point: Vec3) -> Vec3 {
-        let Some(checker) = self.checker else {
-            return self.color;
+        let place = |tile: f32| {
+            let from_middle = (point - self.center) / tile;
+            self.axes().map(|axis| from_middle.dot(axis))
         };
-        let [across, along] = self.axes();
-        let from_middle = (point - self.center) / checker.tile;
-        let square = floor(from_middle.dot(across)) ^ floor(from_middle.dot(along));
-        if square & 1 == 0 {
-            self.color
-        } else {
-            DARKER_PART * self.color
+        match self.pattern {
+            Pattern::Plain => self.color,
+            Pattern::Checker { tile } => {
+                let [x, y] = place(tile).map(floor);
+                match (x ^ y) & 1 {
+                    0 => self.color,
+                    _ => DARKER_PART * self.color,
+                }
+            }
+            Pattern::Sand { tile } => (1.0 + SAND_CONTRAST * sand(place(tile))) * self.color,
         }
     }
 
     /// Two perpendicular directions of the plane; coordinate axes if `up` is one.
-    fn axes(&self) -> [Vec3; 2] {
+    pub fn axes(&self) -> [Vec3; 2] {
         let size = self.up.abs();
         let other_axis = if size.x >= size.y && size.x >= size.z {
             Vec3::Y
@@ -110,31 +160,48 @@ impl Ground {
         self.center += by * self.up;
         self.height += by;
     }
+}
 
-    /// Distance at which `ray` hits the plane from above, if it is in the range of the ray.
-    pub fn hit(&self, ray: &Ray) -> Option<f32> {
-        let slope = ray.direction.dot(self.up);
-        if slope >= 0.0 {
-            return None;
-        }
-        let t = (self.height - ray.origin.dot(self.up)) / slope;
-        (t >= ray.t_min && t < ray.t_max && t.is_finite()).then_some(t)
+/// Noise from -1 to 1 with spots of many sizes: a sum of value noises (Perlin and Hoffert, "Hypertexture", 1989).
+fn sand([mut x, mut y]: [f32; 2]) -> f32 {
+    let (mut sum, mut whole, mut part) = (0.0, 0.0, 1.0);
+    for _ in 0..SAND_SIZES {
+        sum += part * value_noise(x, y);
+        whole += part;
+        part *= SAND_GAIN;
+        // Turned by 37 degrees, so that the lattices do not coincide
+        (x, y) = (
+            2.0 * (0.8 * x - 0.6 * y) + 0.37,
+            2.0 * (0.6 * x + 0.8 * y) + 0.71,
+        );
     }
+    sum / whole
+}
 
-    /// Opacity of the ground at `point`: 1 near the centre, 0 far away, with a smooth transition.
-    pub fn opacity(&self, point: Vec3) -> f32 {
-        let distance = point.distance(self.center);
-        let span = (self.fade_end - self.fade_start).max(f32::MIN_POSITIVE);
-        let x = ((self.fade_end - distance) / span).clamp(0.0, 1.0);
-        x * x * (3.0 - 2.0 * x)
-    }
+/// Random values from -1 to 1 at integers, interpolated smoothly.
+fn value_noise(x: f32, y: f32) -> f32 {
+    let (left, below) = (floor(x), floor(y));
+    let smooth = |t: f32| t * t * (3.0 - 2.0 * t);
+    let (u, v) = (
+        smooth((x - left as f32).clamp(0.0, 1.0)),
+        smooth((y - below as f32).clamp(0.0, 1.0)),
+    );
+    let row = |row: i32| {
+        let ends = [left, left.wrapping_add(1)].map(|column| lattice_value(column, row));
+        ends[0] + u * (ends[1] - ends[0])
+    };
+    let (low, high) = (row(below), row(below.wrapping_add(1)));
+    low + v * (high - low)
+}
 
-    /// Length to step off the plane at `point` so that the next ray does not hit it again: a few ulps of the numbers
-    /// that determine the point.
-    pub fn offset(&self, point: Vec3, t: f32) -> f32 {
-        let scale = point.abs().max_element().max(t).max(self.height.abs());
-        (8.0 * f32::EPSILON * scale).max(f32::MIN_POSITIVE)
-    }
+/// A random value from -1 to 1 for a point with integer coordinates (hash by Wellons, "lowbias32", 2018).
+fn lattice_value(x: i32, y: i32) -> f32 {
+    let mut bits =
+        x.cast_unsigned().wrapping_mul(0x9e37_79b9) ^ y.cast_unsigned().wrapping_mul(0x85eb_ca6b);
+    bits = (bits ^ bits >> 16).wrapping_mul(0x7feb_352d);
+    bits = (bits ^ bits >> 15).wrapping_mul(0x846c_a68b);
+    bits ^= bits >> 16;
+    (bits >> 8) as f32 / (1 << 23) as f32 - 1.0
 }
 
 /// The largest integer not above `value`; saturates. It avoids the function call that `floor` needs on machines
@@ -163,21 +230,37 @@ mod tests {
     }
 
     #[test]
-    fn lies_under_the_box_relative_to_the_origin() {
+    fn ground_is_below_the_box() {
         let floor = floor();
         assert!((floor.height - 1.0).abs() < 1e-6);
         assert!((floor.center - Vec3::new(0.0, 0.0, 1.0)).length() < 1e-6);
     }
 
     #[test]
-    fn is_met_from_above_only_and_within_range() {
-        let floor = floor();
-        let down = Ray::new(Vec3::new(3.0, 4.0, 11.0), Vec3::NEG_Z);
-        assert_eq!(floor.hit(&down), Some(10.0));
-        assert_eq!(floor.hit(&Ray { t_max: 9.9, ..down }), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::ZERO, Vec3::NEG_Z)), None);
-        assert_eq!(floor.hit(&Ray::new(Vec3::splat(5.0), Vec3::X)), None);
+    fn sand_varies_around_its_colour() {
+        let ground = Ground {
+            pattern: Pattern::Sand { tile: 0.7 },
+            ..floor()
+        };
+        let shade = |i: i32, j: i32| {
+            let point = ground.center + 0.013 * Vec3::new(i as f32, j as f32, 0.0);
+            ground.color_at(point).x / ground.color.x
+        };
+        let shades: Vec<f32> = (0..10_000)
+            .map(|i| shade(i / 100 - 50, i % 100 - 50))
+            .collect();
+        let mean = shades.iter().sum::<f32>() / 1e4;
+        let largest = shades
+            .iter()
+            .fold(0.0_f32, |most, shade| most.max((shade - 1.0).abs()));
+        assert!((mean - 1.0).abs() < 0.05, "{mean}");
+        assert!((0.05..=SAND_CONTRAST).contains(&largest), "{largest}");
+        // Neighbours are alike, even far from the centre
+        let far = ground.color_at(ground.center + 1e7 * Vec3::X);
+        assert!(far.is_finite());
+        assert!(
+            (shade(0, 0) - ground.color_at(ground.center + 1e-5).x / ground.color.x).abs() < 1e-2
+        );
     }
 
     #[test]
@@ -191,7 +274,7 @@ mod tests {
         ] {
             let mut floor = Ground { up, ..floor() };
             assert_eq!(floor.color_at(floor.center), floor.color);
-            floor.checker = Some(Checker { tile: 0.5 });
+            floor.pattern = Pattern::Checker { tile: 0.5 };
             let [across, along] = floor.axes();
             let at = |x: f32, y: f32| floor.color_at(floor.center + x * across + y * along);
             let [light, dark] = [floor.color, DARKER_PART * floor.color];
@@ -200,15 +283,5 @@ mod tests {
             assert_eq!(at(0.6, 0.7), light);
             assert!(across.dot(along).abs() < 1e-6 && across.dot(up).abs() < 1e-6);
         }
-    }
-
-    #[test]
-    fn fades_smoothly() {
-        let floor = floor();
-        assert_eq!(floor.opacity(floor.center), 1.0);
-        let far = floor.center + Vec3::X * (floor.fade_end * 1.01);
-        assert_eq!(floor.opacity(far), 0.0);
-        let middle = 0.5 * (floor.fade_start + floor.fade_end);
-        assert!((floor.opacity(floor.center + Vec3::Y * middle) - 0.5).abs() < 1e-4);
     }
 }

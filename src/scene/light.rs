@@ -1,4 +1,5 @@
-//! Point and directional lights.
+//! Light sources: without extent (point, directional), and with an extent, for path tracing (sun, sphere, rectangle,
+//! disc).
 
 use glam::{DVec3, Vec3};
 
@@ -42,6 +43,45 @@ pub enum LightKind {
         /// Unit vector from the scene to the light.
         to_light: Vec3,
     },
+    /// A light at infinite distance with an angular size.
+    Sun {
+        /// Unit vector from the scene to the centre of the light.
+        to_light: Vec3,
+        /// Half the apparent diameter, radians.
+        half_angle: f64,
+    },
+    /// A sphere.
+    Sphere {
+        /// Its centre, relative to the origin of the sequence.
+        center: Vec3,
+        /// Its radius.
+        radius: f32,
+    },
+    /// A rectangle that shines to one side.
+    Rectangle {
+        /// Its centre, relative to the origin of the sequence.
+        center: Vec3,
+        /// Unit vectors along its width and height, and in the direction that it shines.
+        axes: [Vec3; 3],
+        /// Half its width and half its height.
+        half: [f32; 2],
+    },
+    /// A disc that shines to one side.
+    Disc {
+        /// Its centre, relative to the origin of the sequence.
+        center: Vec3,
+        /// Unit vector in the direction that it shines.
+        normal: Vec3,
+        /// Its radius.
+        radius: f32,
+    },
+}
+
+impl LightKind {
+    /// Whether the light has an extent, so that only path tracing can use it.
+    pub const fn has_extent(&self) -> bool {
+        !matches!(self, Self::Point { .. } | Self::Directional { .. })
+    }
 }
 
 /// A light.
@@ -49,10 +89,14 @@ pub enum LightKind {
 pub struct Light {
     /// The kind of light and its position or direction.
     pub kind: LightKind,
-    /// Colour times intensity, linear RGB.
+    /// Colour times intensity, linear RGB. In path tracing, that is radiant intensity (W/sr) for a point light with
+    /// falloff, irradiance on a surface that faces it (W/m2) for a point light without falloff, a directional light and
+    /// a sun, and radiance (W/m2/sr) for all others.
     pub radiance: Vec3,
     /// Whether other objects occlude it. A light without shadows needs no shadow rays.
     pub casts_shadow: bool,
+    /// Whether the camera sees a light with an extent.
+    pub is_visible: bool,
 }
 
 impl Light {
@@ -70,6 +114,7 @@ impl Light {
             },
             radiance,
             casts_shadow: true,
+            is_visible: false,
         }
     }
 
@@ -81,6 +126,7 @@ impl Light {
             },
             radiance,
             casts_shadow: true,
+            is_visible: false,
         })
     }
 }
@@ -124,6 +170,7 @@ impl LightKind {
             kind: self,
             radiance,
             casts_shadow: true,
+            is_visible: false,
         }
     }
 }
@@ -135,7 +182,7 @@ mod tests {
     fn to_light(light: &Light) -> Vec3 {
         match light.kind {
             LightKind::Directional { to_light } => to_light,
-            LightKind::Point { .. } => panic!("a point light"),
+            _ => panic!("not a directional light"),
         }
     }
 

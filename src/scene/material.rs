@@ -34,6 +34,26 @@ pub struct Material {
     /// Extinction coefficient of the medium inside, per length: light is attenuated by `exp(-extinction * length)`
     /// (Beer-Lambert law). Not negative. Shadows of separate spheres ignore it.
     pub extinction: Vec3,
+    /// The opaque surface for path tracing.
+    pub finish: Finish,
+}
+
+/// How path tracing reflects light at opaque particles. The base colour is that of the particle.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum Finish {
+    /// Light leaves in all directions alike.
+    #[default]
+    Matte,
+    /// A matte base under a clear coat.
+    Plastic {
+        /// Roughness of the coat, 0 to 1.
+        roughness: f32,
+    },
+    /// A mirror in the base colour.
+    Metal {
+        /// Roughness, 0 to 1.
+        roughness: f32,
+    },
 }
 
 /// Formulas for the Fresnel reflectance.
@@ -60,6 +80,7 @@ impl Material {
         transmission: 0.0,
         fresnel: Fresnel::Schlick,
         extinction: Vec3::ZERO,
+        finish: Finish::Matte,
     };
 
     /// Whether two rays leave a surface: reflected and refracted.
@@ -107,15 +128,6 @@ impl Material {
     pub fn r0(&self) -> f32 {
         let root = (1.0 - self.ior) / (1.0 + self.ior);
         root * root
-    }
-
-    /// The Fresnel reflectance at the absolute `cosine` between ray and normal. `ratio` is the index of refraction on
-    /// the side of the ray over that on the other side. 1 under total internal reflection.
-    pub fn fresnel_reflectance(&self, cosine: f32, ratio: f32) -> f32 {
-        match self.fresnel {
-            Fresnel::Schlick => schlick(self.r0(), cosine),
-            Fresnel::Exact => dielectric(cosine, ratio),
-        }
     }
 }
 
@@ -201,7 +213,7 @@ mod tests {
     fn schlick_at_known_angles() {
         // By hand: R0 = (0.33/2.33)^2 = 0.0200593, (0.5/2.5)^2 = 0.04.
         // (1-cos)^5: 45 deg 0.2928932^5 = 0.00215548, 60 deg 1/32, 80 deg 0.8263518^5 = 0.385316.
-        for (ior, degrees, wanted) in [
+        for (ior, degrees, expected) in [
             (1.33, 0.0_f32, 0.020_059_3),
             (1.33, 45.0, 0.022_171_5),
             (1.33, 60.0, 0.050_682_4),
@@ -212,7 +224,10 @@ mod tests {
             (1.5, 80.0, 0.409_910),
         ] {
             let r = schlick(with_ior(ior).r0(), degrees.to_radians().cos());
-            assert!((r - wanted).abs() < 2e-6, "{ior} {degrees}: {r} {wanted}");
+            assert!(
+                (r - expected).abs() < 2e-6,
+                "{ior} {degrees}: {r} {expected}"
+            );
         }
         assert!((schlick(0.04, 0.0) - 1.0).abs() < 1e-6);
         assert_eq!(schlick(0.04, 1.000_001), 0.04);
@@ -225,7 +240,7 @@ mod tests {
         // that. 60 degrees: cos_out = 0.816497, s (0.5 - 1.224745) / 1.724745 = -0.420204, p (0.75 -
         // 0.816497) / 1.566497 = -0.042449.
         let brewster = 1.5_f32.atan().cos();
-        for (cosine, ratio, wanted) in [
+        for (cosine, ratio, expected) in [
             (1.0, 1.0 / 1.5, 0.04),
             (1.0, 1.5, 0.04),
             (brewster, 1.0 / 1.5, 0.073_964_5),
@@ -235,7 +250,10 @@ mod tests {
             (0.3, 1.0, 0.0),
         ] {
             let r = dielectric(cosine, ratio);
-            assert!((r - wanted).abs() < 2e-6, "{cosine} {ratio}: {r} {wanted}");
+            assert!(
+                (r - expected).abs() < 2e-6,
+                "{cosine} {ratio}: {r} {expected}"
+            );
         }
         // The same on the same path in reverse.
         let inside = (1.0 - 0.75_f32 / 2.25).sqrt();
@@ -243,7 +261,7 @@ mod tests {
     }
 
     #[test]
-    fn absorption_is_what_it_leaves_behind() {
+    fn absorption_is_the_colour_after_its_length() {
         let loss = extinction(Vec3::new(0.5, 1.0, 0.0), 2.0);
         let left = (-3.0 * loss).exp();
         assert!((left.x - 0.5_f32.powf(1.5)).abs() < 1e-6);

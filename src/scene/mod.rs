@@ -4,24 +4,32 @@
 //! Coordinates are in scene units relative to [`Scene::origin`] (see DESIGN section 4), so that f32 is sufficient
 //! wherever the domain of the simulation is. Colours are linear RGB.
 
+use std::sync::Arc;
+
 use glam::{DVec3, Vec3};
 use serde::{Deserialize, Serialize};
 
 pub mod background;
 pub mod camera;
 pub mod colormap;
+pub mod environment;
 pub mod ground;
+pub mod lens;
 pub mod light;
 pub mod material;
+pub mod mesh;
 pub mod path;
 pub mod rgb;
 
 pub use background::Background;
-pub use camera::{Camera, CameraError, CameraView, Framing};
+pub use camera::{Camera, CameraError, CameraView, Framing, Lens};
 pub use colormap::{ColorMap, UnknownColorMap};
-pub use ground::{Checker, Ground};
+pub use environment::{Environment, EnvironmentAxes, RadianceMap};
+pub use ground::Ground;
+pub use lens::{Aperture, Focus, LensSettings};
 pub use light::{Falloff, Light, LightKind, default_lights};
-pub use material::{Fresnel, Material, MaterialError};
+pub use material::{Finish, Fresnel, Material, MaterialError};
+pub use mesh::{MeshFinish, MeshMaterial};
 pub use path::{CameraKey, CameraPath, KeyedPath, PathError, Turntable};
 pub use rgb::{RgbEncoding, is_rgb};
 
@@ -78,6 +86,42 @@ pub struct Scene {
     pub background: Background,
     /// Optional ground.
     pub ground: Option<Ground>,
+    /// The materials of meshes, by the index of each mesh.
+    pub meshes: Vec<MeshMaterial>,
+    /// Light from infinitely far away, for path tracing.
+    pub environment: Option<Arc<Environment>>,
+    /// Whether camera rays without an intersection see the environment instead of the background.
+    pub is_environment_visible: bool,
+    /// The next frame, for motion on the film.
+    pub next_frame: Option<NextFrame>,
+}
+
+/// Where things are in the next frame.
+#[derive(Debug, Clone, Copy)]
+pub struct NextFrame {
+    /// Its camera.
+    pub camera: Camera,
+    /// Time until then, in the unit of the velocities.
+    pub time: f32,
+}
+
+impl Scene {
+    /// Nothing but the default material and white ambient light, in front of black, at the origin of the world.
+    pub const fn new(camera: Camera) -> Self {
+        Self {
+            origin: DVec3::ZERO,
+            camera,
+            lights: Vec::new(),
+            ambient_light: Vec3::ONE,
+            material: Material::DEFAULT,
+            background: Background::Constant(Vec3::ZERO),
+            ground: None,
+            meshes: Vec::new(),
+            environment: None,
+            is_environment_visible: false,
+            next_frame: None,
+        }
+    }
 }
 
 #[cfg(test)]
@@ -85,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn corners_are_all_there() {
+    fn box_has_eight_corners() {
         let bounds = Bounds {
             min: DVec3::new(-1.0, 2.0, 3.0),
             max: DVec3::new(4.0, 5.0, 6.0),

@@ -88,7 +88,7 @@ mod tests {
     }
 
     #[test]
-    fn colours_are_known_by_name_or_as_bytes() {
+    fn colours_are_recognised_by_name_or_type() {
         let floats = |n: usize| AttributeData::F32(vec![0.5; n]);
         let bytes = |n: usize| AttributeData::U8(vec![7; n]);
         for (name, components, data, expected) in [

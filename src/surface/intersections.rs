@@ -16,8 +16,24 @@ impl MaterialId {
     pub const SPRAY: Self = Self(1);
     /// The floor.
     pub const GROUND: Self = Self(2);
-    /// Number of materials.
-    pub const COUNT: usize = 3;
+    /// Number of materials apart from those of meshes.
+    const FIXED: u8 = 3;
+    /// Greatest number of meshes.
+    pub const MAX_MESHES: usize = 200;
+
+    /// The material of the mesh `index`; None from [`Self::MAX_MESHES`] on.
+    pub fn of_mesh(index: usize) -> Option<Self> {
+        let index = u8::try_from(index)
+            .ok()
+            .filter(|i| usize::from(*i) < Self::MAX_MESHES)?;
+        Some(Self(Self::FIXED + index))
+    }
+
+    /// The index of the mesh that has this material.
+    #[inline(always)]
+    pub fn mesh_index(self) -> Option<usize> {
+        self.0.checked_sub(Self::FIXED).map(usize::from)
+    }
 
     /// Whether surfaces of this material belong to particles, which have attributes.
     pub fn is_of_particles(self) -> bool {
@@ -152,7 +168,8 @@ impl Intersections {
     }
 
     /// The intersections of the first `count` rays.
-    pub fn all(&self, count: usize) -> Vec<Option<Intersection>> {
+    #[cfg(test)]
+    pub(crate) fn all(&self, count: usize) -> Vec<Option<Intersection>> {
         let found = |lane| (self.mask >> lane & 1 == 1).then(|| self.get(lane));
         (0..count).map(found).collect()
     }

@@ -4,6 +4,7 @@
 pub mod field;
 mod gradient;
 mod intersections;
+pub mod mesh;
 mod neighbours;
 mod normals;
 mod pca;

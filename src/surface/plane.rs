@@ -146,3 +146,55 @@ fn occluded_by_plane_body(ground: &Ground, rays: &RayPacket) -> u32 {
 lane_kernel! {
     fn occluded_by_plane(ground: &Ground, rays: &RayPacket) -> u32 = occluded_by_plane_body;
 }
+
+#[cfg(test)]
+mod tests {
+    use glam::{DVec3, Vec3};
+
+    use super::*;
+    use crate::scene::Bounds;
+
+    fn ground() -> Ground {
+        let bounds = Bounds {
+            min: DVec3::new(-1.0, -1.0, 1.0),
+            max: DVec3::new(1.0, 1.0, 3.0),
+        };
+        Ground::under(&bounds, Vec3::Z, DVec3::ZERO)
+    }
+
+    #[test]
+    fn is_hit_only_from_above_and_within_range() {
+        let ground = ground();
+        let distance = |ray: &Ray| {
+            let mut packet = RayPacket::default();
+            packet.push(ray);
+            let hit = Plane::new(&ground).crossing(ray, Side::Outside);
+            let occluded = Plane::new(&ground).occluded(&packet, Coherence::Coherent, 1);
+            assert_eq!(occluded == 1, hit.is_some());
+            hit.map(|hit| hit.t)
+        };
+        let down = Ray::new(Vec3::new(3.0, 4.0, 11.0), Vec3::NEG_Z);
+        assert_eq!(distance(&down), Some(10.0));
+        assert_eq!(distance(&Ray { t_max: 9.9, ..down }), None);
+        assert_eq!(distance(&Ray::new(Vec3::ZERO, Vec3::Z)), None);
+        assert_eq!(distance(&Ray::new(Vec3::ZERO, Vec3::NEG_Z)), None);
+        assert_eq!(distance(&Ray::new(Vec3::splat(5.0), Vec3::X)), None);
+    }
+
+    #[test]
+    fn fades_smoothly() {
+        let ground = ground();
+        let opacity = |distance: f32| {
+            let mut packet = RayPacket::default();
+            let above = ground.center + Vec3::new(0.0, distance, 1.0);
+            packet.push(&Ray::new(above, Vec3::NEG_Z));
+            let mut hits = Intersections::default();
+            Plane::new(&ground).intersect(&mut packet, Coherence::Coherent, 0, &mut hits);
+            (hits.mask == 1).then(|| hits.opacity[0])
+        };
+        assert_eq!(opacity(0.0), Some(1.0));
+        let middle = 0.5 * (ground.fade_start + ground.fade_end);
+        assert!((opacity(middle).expect("half of it") - 0.5).abs() < 1e-4);
+        assert_eq!(opacity(1.01 * ground.fade_end), None);
+    }
+}

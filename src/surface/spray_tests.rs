@@ -68,7 +68,7 @@ fn spray_has_few_neighbours_in_every_structure() {
 }
 
 #[test]
-fn drops_are_met_beside_and_before_a_body() {
+fn spray_is_hit_beside_and_before_a_body() {
     let body = built(&[Vec3::ZERO, Vec3::X], 1.0, &BuildSettings::default());
     let drops = [
         Vec3::new(-4.0, 0.0, 0.0),
@@ -100,8 +100,8 @@ fn drops_are_met_beside_and_before_a_body() {
             assert_eq!(ahead.t_max[..4], hits.t[..4]);
         }
     }
-    let met = drops.occluded(&rays, Coherence::Incoherent, 0b1111);
-    assert_eq!(met, 0b1101);
+    let occluded = drops.occluded(&rays, Coherence::Incoherent, 0b1111);
+    assert_eq!(occluded, 0b1101);
     assert_eq!(drops.occluded(&rays, Coherence::Coherent, 0b0110), 0b0100);
     assert_eq!(medium.side_of(Vec3::ZERO), Side::Inside);
 }

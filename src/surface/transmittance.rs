@@ -55,7 +55,7 @@ mod tests {
     }
 
     #[test]
-    fn is_the_product_in_any_order() {
+    fn transmittance_does_not_depend_on_the_order() {
         let factors: Vec<f32> = (1..40).map(|i| 1.0 - i as f32 / 100.0).collect();
         let forwards = product(factors.iter().copied());
         let exact: f64 = factors.iter().map(|f| f64::from(*f)).product();
@@ -67,7 +67,7 @@ mod tests {
     }
 
     #[test]
-    fn ends_in_the_dark() {
+    fn traversal_ends_at_zero_transmittance() {
         assert_eq!(product(std::iter::empty()), 1.0);
         assert_eq!(product([1.0, 1.0].into_iter()), 1.0);
         assert_eq!(product([0.5, 0.0].into_iter()), 0.0);

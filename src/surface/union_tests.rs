@@ -38,18 +38,18 @@ fn each_structure(centers: &[Vec3], radius: SphereRadius, check: impl Fn(UnionSu
 }
 
 #[test]
-fn what_lies_inside_is_not_met() {
+fn spheres_inside_the_union_are_not_hit() {
     let centers = [Vec3::ZERO, Vec3::X, 2.0 * Vec3::X, 9.0 * Vec3::X];
     each_structure(&centers, SphereRadius::Common(1.0), |body| {
         let mut ray = Ray::new(Vec3::new(-5.0, 0.0, 0.0), Vec3::X);
         let mut side = Side::Outside;
-        let met = [
+        let expected = [
             (4.0, 0, -1.0),
             (8.0, 2, 1.0),
             (13.0, 3, -1.0),
             (15.0, 3, 1.0),
         ];
-        for (t, particle, x) in met {
+        for (t, particle, x) in expected {
             let hit = body.crossing(&ray, side).expect("a crossing");
             assert_eq!((hit.t, hit.particle, hit.normal.x), (t, particle, x));
             ray.t_min = hit.t;
@@ -61,7 +61,7 @@ fn what_lies_inside_is_not_met() {
 
 /// Rays are refracted at every crossing, and each starts at the origin that the previous hit provides.
 #[test]
-fn bent_rays_come_out_again() {
+fn refracted_rays_leave_the_union() {
     let (centers, radii) = body(600);
     each_structure(&centers, SphereRadius::Each(&radii), |body| {
         let mut random = Random(9);
@@ -120,7 +120,7 @@ fn rays_on_the_wrong_side_cross_at_once() {
 }
 
 #[test]
-fn packets_meet_what_single_rays_meet() {
+fn packets_match_single_rays() {
     let (centers, radii) = body(600);
     each_structure(&centers, SphereRadius::Each(&radii), |body| {
         let mut random = Random(13);

@@ -4,25 +4,30 @@
 //! It uses percentiles and not extremes, so that a single outlier neither shrinks the picture nor reduces the
 //! contrast of colours. The result is stored with the job, so that all frames, runs and machines use the same values.
 
-use std::collections::BTreeSet;
+use std::collections::BTreeMap;
 
 use glam::DVec3;
 use serde::{Deserialize, Serialize};
-use spherule_formats::native::AttributeView;
 use spherule_formats::sequence::Sequence;
-use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin, names};
+use spherule_formats::{Attribute, FrameError, ParticleFrame, Radius, choose_origin};
 
-use crate::scene::{Bounds, RgbEncoding, is_rgb};
+use crate::scene::{RgbEncoding, is_rgb};
 
-mod look;
+mod attributes;
+mod moments;
 mod packing;
 mod robust;
+mod sample;
 mod stream;
 
-use look::Look;
+pub use attributes::{Named, id_of, part_of, velocity_of};
+use moments::Moments;
 use packing::Spacing;
 use packing::narrow;
-use robust::{estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range};
+use robust::{
+    RobustBounds, estimate_packed, estimate_radius, robust_bounds, robust_largest, robust_range,
+};
+use sample::FrameSample;
 
 /// Maximum number of frames to sample; evenly distributed, including the first and the last one.
 const FRAMES: usize = 24;
@@ -36,6 +41,10 @@ pub struct Survey {
     pub min: DVec3,
     /// Upper corner of that box.
     pub max: DVec3,
+    /// The lowest layers of particles on each axis over the sequence, and the highest. Jobs of earlier versions lack
+    /// them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub layers: Option<(DVec3, DVec3)>,
     /// Radius for frames without radii: half the median distance of neighbours.
     pub radius: Option<f32>,
     /// The same for the particles of one body: half the edge of the cube that each particle occupies inside, slightly
@@ -57,6 +66,15 @@ pub struct Survey {
     pub up: DVec3,
     /// Names of all attributes in the sampled frames.
     pub attributes: Vec<String>,
+    /// Components per particle of each of [`Self::attributes`]. Jobs of earlier versions lack them.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub components: Vec<usize>,
+    /// Mean time between consecutive frames, if the files contain times.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_time: Option<f64>,
+    /// Mean difference of the numbers of consecutive frames, if there are several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub frame_numbers: Option<i64>,
     /// Largest particle count of the sampled frames.
     pub most_particles: usize,
     /// Number of sampled frames.
@@ -115,8 +133,8 @@ pub struct RgbAttribute {
 impl RgbAttribute {
     /// The first of `attributes` that contains colours; with a `name`, only the attribute of that name.
     fn of(attributes: &[Attribute], name: Option<&str>) -> Option<Self> {
-        let is_wanted = |a: &&Attribute| name.is_none_or(|name| a.name.eq_ignore_ascii_case(name));
-        let found = attributes.iter().filter(is_wanted).find(|a| is_rgb(a))?;
+        let has_name = |a: &&Attribute| name.is_none_or(|name| a.name.eq_ignore_ascii_case(name));
+        let found = attributes.iter().filter(has_name).find(|a| is_rgb(a))?;
         Some(Self {
             attribute: found.name.clone(),
             encoding: RgbEncoding::of(found.data.scalar_type()),
@@ -169,7 +187,7 @@ pub enum ColorQuestion<'a> {
 
 /// Running totals over the frames.
 struct Totals {
-    bounds: Option<(DVec3, DVec3)>,
+    bounds: Option<RobustBounds>,
     radius: Option<(usize, Spacing)>,
     has_radii: bool,
     reach: f32,
@@ -177,11 +195,12 @@ struct Totals {
     color: Option<String>,
     velocity: Option<String>,
     rgb: Option<RgbAttribute>,
-    attributes: BTreeSet<String>,
+    attributes: BTreeMap<String, usize>,
     most_particles: usize,
     frames: usize,
     weight: Option<FrameWeight>,
     origin: Origins,
+    moments: Moments,
 }
 
 /// Origins of the coordinates in native frames.
@@ -205,7 +224,23 @@ impl Origins {
     }
 }
 
+/// Fraction of the extent along an axis within which the outermost layer of particles lies if they rest on a floor: a
+/// ball has much less of its volume there, a box or a heap more.
+const FLOOR: f64 = 0.02;
+
 impl Survey {
+    /// Whether particles lie on a floor at the lower end of the axis `up` at some time: the lowest layer is at the
+    /// lower end.
+    pub fn rests_on_floor(&self, up: DVec3) -> bool {
+        let Some(layers) = self.layers else {
+            return false;
+        };
+        let lowest = |(min, max): (DVec3, DVec3)| (up * min).min(up * max).element_sum();
+        let floor = lowest((self.min, self.max));
+        let extent = (up * (self.max - self.min)).abs().element_sum();
+        lowest(layers) <= floor + FLOOR * extent
+    }
+
     /// Surveys `sequence`. Frames that cannot be read are skipped here, and reported when they are rendered.
     ///
     /// # Errors
@@ -232,21 +267,27 @@ impl Survey {
             color: None,
             velocity: None,
             rgb: None,
-            attributes: BTreeSet::new(),
+            attributes: BTreeMap::new(),
             most_particles: 0,
             frames: 0,
             weight: None,
             origin: Origins::None,
+            moments: Moments::default(),
         };
         let mut failure = None;
         for index in indices {
-            match Look::at(sequence, index, question.radius) {
-                Ok(look) => totals.take_in(look, question),
+            match FrameSample::of(sequence, index, question.radius) {
+                Ok(sample) => {
+                    let number = sequence.frames().get(index).map_or(0, |frame| frame.number);
+                    totals.moments.add(index, number, sample.particles.time);
+                    totals.add(sample, question);
+                }
                 Err(error) => {
                     failure.get_or_insert(error);
                 }
             }
         }
+        // Fail only if no frame was readable
         match failure {
             Some(error) if totals.frames == 0 => Err(error),
             _ => Ok(totals.finish(if sequence.is_y_up() {
@@ -256,73 +297,15 @@ impl Survey {
             })),
         }
     }
-
-    /// The box in the form that scenes use.
-    pub fn bounds(&self) -> Bounds {
-        Bounds {
-            min: self.min,
-            max: self.max,
-        }
-    }
-}
-
-/// An attribute by name and number of components, in memory or in a file.
-pub trait Named {
-    /// Its name.
-    fn name(&self) -> &str;
-    /// Components per particle.
-    fn components(&self) -> usize;
-}
-
-impl Named for Attribute {
-    fn name(&self) -> &str {
-        &self.name
-    }
-
-    fn components(&self) -> usize {
-        self.components
-    }
-}
-
-impl Named for AttributeView<'_> {
-    fn name(&self) -> &str {
-        self.name()
-    }
-
-    fn components(&self) -> usize {
-        self.components()
-    }
-}
-
-/// The attribute with velocities, if there is one.
-pub fn velocity_of<A: Named>(attributes: &[A]) -> Option<&A> {
-    names::VELOCITY.iter().find_map(|name| {
-        attributes
-            .iter()
-            .find(|a| a.components() == 3 && a.name().eq_ignore_ascii_case(name))
-    })
-}
-
-/// The attribute with ids, if there is one. An exact match of the name is preferred over one that ignores case.
-pub fn id_of<A: Named>(attributes: &[A]) -> Option<&A> {
-    names::ID.iter().find_map(|name| {
-        let exact = attributes.iter().find(|a| a.name() == *name);
-        let alike = || {
-            attributes
-                .iter()
-                .find(|a| a.name().eq_ignore_ascii_case(name))
-        };
-        exact.or_else(alike).filter(|a| a.components() == 1)
-    })
 }
 
 /// The spacing of neighbours in a frame.
-fn spacing_of(frame: &ParticleFrame, how_packed: bool) -> Option<Spacing> {
+fn spacing_of(frame: &ParticleFrame, needs_packed: bool) -> Option<Spacing> {
     let touching = estimate_radius(&frame.positions)?;
     let packed = || estimate_packed(&frame.positions, touching);
     Some(Spacing {
         touching,
-        packed: how_packed.then(packed).flatten(),
+        packed: needs_packed.then(packed).flatten(),
     })
 }
 
@@ -337,27 +320,28 @@ fn spread(count: usize) -> Vec<usize> {
 }
 
 impl Totals {
-    fn take_in(&mut self, look: Look, question: Question) {
+    fn add(&mut self, sample: FrameSample, question: Question) {
         self.frames += 1;
-        self.origin = self.origin.and(look.origin);
-        let Look {
+        self.origin = self.origin.and(sample.origin);
+        let FrameSample {
             particles: raw,
             count,
             extremes,
             spacing,
             mut weight,
             ..
-        } = look;
-        self.attributes
-            .extend(raw.attributes.iter().map(|a| a.name.clone()));
-        // Extend the bounds
-        if let Some((min, max)) = robust_bounds(&raw.positions, extremes) {
-            self.bounds = Some(match self.bounds {
-                Some((low, high)) => (low.min(min), high.max(max)),
-                None => (min, max),
-            });
+        } = sample;
+        for attribute in &raw.attributes {
+            let components = self.attributes.entry(attribute.name.clone()).or_insert(0);
+            *components = attribute.components.max(*components);
         }
-        // Look for velocity and colours
+        // Extend the bounds
+        let found = robust_bounds(&raw.positions, extremes);
+        self.bounds = match (self.bounds, found) {
+            (Some(before), Some(found)) => Some(before.and(found)),
+            (before, found) => before.or(found),
+        };
+        // Find velocity and colours
         if self.velocity.is_none() {
             self.velocity = velocity_of(&raw.attributes).map(|a| a.name.clone());
         }
@@ -368,14 +352,14 @@ impl Totals {
                 ColorQuestion::Attribute(name) => RgbAttribute::of(&raw.attributes, Some(name)),
             };
         }
-        let origin = self
-            .bounds
-            .map_or(DVec3::ZERO, |(min, max)| choose_origin(min, max));
+        let origin = self.bounds.map_or(DVec3::ZERO, |bounds| {
+            choose_origin(bounds.outer.0, bounds.outer.1)
+        });
         // Count particles, and remember the heaviest frame
-        let seen = raw.positions.len();
+        let sampled = raw.positions.len();
         let frame = ParticleFrame::from_raw(raw, origin);
         // In a sample, only the sampled particles are checked for being finite.
-        let count = count - (seen - frame.len());
+        let count = count - (sampled - frame.len());
         self.most_particles = self.most_particles.max(count);
         if !weight.in_place {
             weight.own_radii = matches!(frame.radius, Some(Radius::PerParticle(_)));
@@ -384,13 +368,13 @@ impl Totals {
             self.weight = Some(weight);
         }
         // Update the ranges of colour and radius
-        self.take_in_color(&frame, question.color);
+        self.add_color(&frame, question.color);
         match question.radius {
             RadiusQuestion::None => {}
             RadiusQuestion::Auto | RadiusQuestion::AutoOfBody => {
                 let estimate =
                     || spacing.or_else(|| spacing_of(&frame, question.radius.is_packed()));
-                self.take_in_radius(&frame, count, estimate);
+                self.add_radius(&frame, count, estimate);
             }
             RadiusQuestion::Attribute(name, scale) => {
                 if let Some(attribute) = frame.attribute(name) {
@@ -401,13 +385,13 @@ impl Totals {
         }
     }
 
-    fn take_in_color(&mut self, frame: &ParticleFrame, question: ColorQuestion) {
-        let wanted = match question {
+    fn add_color(&mut self, frame: &ParticleFrame, question: ColorQuestion) {
+        let name = match question {
             ColorQuestion::None => None,
             ColorQuestion::Speed => self.velocity.clone(),
             ColorQuestion::Attribute(name) => Some(name.to_owned()),
         };
-        let Some(name) = wanted else { return };
+        let Some(name) = name else { return };
         if let Some(attribute) = frame.attribute(&name)
             && let Some((low, high)) = robust_range(attribute)
         {
@@ -417,7 +401,7 @@ impl Totals {
         self.color = Some(name);
     }
 
-    fn take_in_radius(
+    fn add_radius(
         &mut self,
         frame: &ParticleFrame,
         count: usize,
@@ -434,8 +418,8 @@ impl Totals {
             }
             None => {
                 // The estimate is best in the frame with the most particles.
-                let fuller = self.radius.is_none_or(|(known, _)| count > known);
-                if fuller && let Some(spacing) = estimate() {
+                let is_fuller = self.radius.is_none_or(|(known, _)| count > known);
+                if is_fuller && let Some(spacing) = estimate() {
                     self.radius = Some((count, spacing));
                 }
             }
@@ -443,13 +427,12 @@ impl Totals {
     }
 
     fn finish(self, up: DVec3) -> Survey {
-        let (min, max) = self
-            .bounds
-            .unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
+        let bounds = self.bounds.map(|bounds| bounds.outer);
+        let (min, max) = bounds.unwrap_or((DVec3::splat(-0.5), DVec3::splat(0.5)));
         // Speed has precedence over colours.
         let rgb = self.rgb.filter(|rgb| {
-            let is_asked = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
-            self.color.as_ref().is_none_or(is_asked)
+            let is_colored_by = |color: &String| rgb.attribute.eq_ignore_ascii_case(color);
+            self.color.as_ref().is_none_or(is_colored_by)
         });
         let color = self.color.map(|attribute| {
             let (low, high) = self.range.unwrap_or((0.0, 1.0));
@@ -470,6 +453,7 @@ impl Totals {
             origin,
             min,
             max,
+            layers: self.bounds.map(|bounds| bounds.layers),
             radius: self.radius.map(|(_, spacing)| spacing.touching),
             packed_radius: self.radius.and_then(|(_, spacing)| spacing.packed),
             has_radii: self.has_radii,
@@ -477,7 +461,10 @@ impl Totals {
             color,
             rgb,
             up,
-            attributes: self.attributes.into_iter().collect(),
+            components: self.attributes.values().copied().collect(),
+            attributes: self.attributes.into_keys().collect(),
+            frame_time: self.moments.time_step(),
+            frame_numbers: self.moments.number_step(),
             most_particles: self.most_particles,
             frames: self.frames,
             weight,

@@ -75,7 +75,7 @@ mod tests {
         along().flat_map(plane).collect()
     }
 
-    /// A block of water of particles of radius 0.1.
+    /// A block of water, with particles of radius 0.1.
     fn block(count: u16) -> Vec<Vec3> {
         let source = BlockSource::new(BlockSettings {
             count: u64::from(count),
@@ -89,7 +89,7 @@ mod tests {
     }
 
     #[test]
-    fn order_and_disorder_have_the_same_radius() {
+    fn lattice_and_fluid_have_the_same_packed_radius() {
         for (positions, touching) in [(lattice(18), 0.1), (block(6000), 0.085)] {
             let half = estimate_radius(&positions).expect("some");
             assert!((half / touching - 1.0).abs() < 0.1, "{half}");
@@ -99,7 +99,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_body_does_not_swell() {
+    fn packed_radius_is_limited_outside_bodies() {
         assert_eq!(packed(&[]), None);
         assert_eq!(packed(&[Vec3::ONE]), None);
         assert_eq!(packed(&[Vec3::ONE; 100]), None);
@@ -111,10 +111,10 @@ mod tests {
     }
 
     #[test]
-    fn a_large_native_frame_tells_what_all_its_particles_tell() {
+    fn sampled_native_frame_gives_the_radius_of_all_particles() {
         let all = block(u16::MAX);
         let whole = packed(&all).expect("a radius");
-        // Three blocks far from one another: more than are looked at one by one.
+        // Three distant blocks, with more particles than the limit for inspecting each.
         let far = (0..3_u8).map(|i| 1e3 * f32::from(i) * Vec3::X);
         let all = far
             .flat_map(|offset| all.iter().map(move |p| *p + offset))
@@ -130,18 +130,18 @@ mod tests {
         let frame = ParticleFrame::from_raw(raw, DVec3::ZERO);
         native::write(&path, &frame, None).expect("a file");
         let sequence = Sequence::open(&SequenceInput::from_path(&path)).expect("a frame");
-        let look = |radius| {
+        let survey = |radius| {
             let color = ColorQuestion::None;
             Survey::of(&sequence, Question { color, radius }).expect("readable")
         };
-        let stored = look(RadiusQuestion::AutoOfBody);
-        let radius = stored.packed_radius.expect("asked for");
+        let stored = survey(RadiusQuestion::AutoOfBody);
+        let radius = stored.packed_radius.expect("requested");
         assert!((radius / whole - 1.0).abs() < 0.1, "{radius} {whole}");
-        let plain = look(RadiusQuestion::Auto);
+        let plain = survey(RadiusQuestion::Auto);
         assert_eq!(
             (plain.packed_radius, plain.radius),
             (None, stored.radius),
-            "spheres are as ever"
+            "the radius of spheres does not change"
         );
     }
 }

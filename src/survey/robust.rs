@@ -4,7 +4,7 @@ use glam::{DVec3, Vec3};
 use rayon::prelude::*;
 use spherule_formats::{Attribute, Positions};
 
-use super::packing::{self};
+use super::packing;
 
 /// Number of particles of a frame from which percentiles are computed.
 const SAMPLE: usize = 20_000;
@@ -15,6 +15,29 @@ pub(super) const NEIGHBOUR_QUERIES: usize = 512;
 /// Maximum number of distance computations of the estimate: half a second for a frame of 1e7.
 pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 
+/// Boxes of the particles of a frame.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct RobustBounds {
+    /// Corners of the box of the particles without outliers.
+    pub(super) outer: (DVec3, DVec3),
+    /// On each axis, the values with 1 / [`LAYER`] of the particles below, and above.
+    pub(super) layers: (DVec3, DVec3),
+}
+
+impl RobustBounds {
+    /// The boxes of two frames.
+    pub(super) fn and(self, other: Self) -> Self {
+        let enclose = |a: (DVec3, DVec3), b: (DVec3, DVec3)| (a.0.min(b.0), a.1.max(b.1));
+        Self {
+            outer: enclose(self.outer, other.outer),
+            layers: enclose(self.layers, other.layers),
+        }
+    }
+}
+
+/// A frame's lowest layer is one of this many parts of its particles.
+const LAYER: usize = 200;
+
 /// The box of the particles, limited on each axis to half the extent of the middle 98 % beyond them. None without
 /// finite particles. `extremes` is the box of all particles if `positions` are only a part of them.
 ///
@@ -24,7 +47,7 @@ pub(super) const NEIGHBOUR_BUDGET: usize = 1_000_000_000;
 pub(super) fn robust_bounds(
     positions: &Positions,
     extremes: Option<(DVec3, DVec3)>,
-) -> Option<(DVec3, DVec3)> {
+) -> Option<RobustBounds> {
     let count = positions.len();
     let finite = |i| Some(positions.get(i)).filter(|p: &DVec3| p.is_finite());
     let stride = count.div_ceil(SAMPLE).max(1);
@@ -40,13 +63,19 @@ pub(super) fn robust_bounds(
         0 => usize::from(sample.len() >= ESCAPE_MIN),
         percent => percent,
     };
-    // Find the middle of each axis
+    // Find the middle of each axis, and the outer layers
     let (mut first, mut last) = (min, max);
+    let mut layers = (min, max);
     for axis in 0..3 {
         sample.sort_unstable_by(|a, b| a[axis].total_cmp(&b[axis]));
         let above = (sample.len() - outside).saturating_sub(1);
         if let (Some(low), Some(high)) = (sample.get(outside), sample.get(above)) {
             (first[axis], last[axis]) = (low[axis], high[axis]);
+        }
+        let layer = sample.len() / LAYER;
+        if let (Some(low), Some(high)) = (sample.get(layer), sample.iter().nth_back(layer)) {
+            layers.0[axis] = low[axis];
+            layers.1[axis] = high[axis];
         }
     }
     // Limit the box to a margin around it
@@ -56,7 +85,10 @@ pub(super) fn robust_bounds(
     } else {
         0.5 * extent
     };
-    Some((min.max(first - margin), max.min(last + margin)))
+    Some(RobustBounds {
+        outer: (min.max(first - margin), max.min(last + margin)),
+        layers,
+    })
 }
 
 /// The 99th percentile of `count` radii; 0 without finite ones.
@@ -89,9 +121,9 @@ pub(super) fn robust_range(attribute: &Attribute) -> Option<(f64, f64)> {
 }
 
 /// An even selection of the particles, for queries.
-fn asked(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
-    let queries = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
-    let stride = positions.len().div_ceil(queries).max(1);
+fn queries(positions: &[Vec3]) -> impl Iterator<Item = &Vec3> {
+    let count = (NEIGHBOUR_BUDGET / positions.len().max(1)).clamp(16, NEIGHBOUR_QUERIES);
+    let stride = positions.len().div_ceil(count).max(1);
     positions.iter().step_by(stride)
 }
 
@@ -108,12 +140,12 @@ pub(super) fn estimate_packed(positions: &[Vec3], touching: f32) -> Option<f32> 
         };
         chunks.map(near).sum()
     };
-    packing::packed_radius(touching, asked(positions).map(count).collect())
+    packing::packed_radius(touching, queries(positions).map(count).collect())
 }
 
 /// Half the median distance to the nearest neighbour. None for fewer than two distinct particles.
 pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
-    let distances: Vec<f32> = asked(positions)
+    let distances: Vec<f32> = queries(positions)
         .filter_map(|from| {
             let nearest = positions
                 .par_chunks(64 * 1024)
@@ -128,11 +160,11 @@ pub(super) fn estimate_radius(positions: &[Vec3]) -> Option<f32> {
             nearest.is_finite().then(|| nearest.sqrt())
         })
         .collect();
-    middle(distances).map(|d| 0.5 * d)
+    median(distances).map(|d| 0.5 * d)
 }
 
 /// The median of `values`.
-pub(super) fn middle(mut values: Vec<f32>) -> Option<f32> {
+pub(super) fn median(mut values: Vec<f32>) -> Option<f32> {
     values.sort_unstable_by(f32::total_cmp);
     values.get(values.len() / 2).copied()
 }
@@ -141,18 +173,28 @@ pub(super) fn middle(mut values: Vec<f32>) -> Option<f32> {
 mod tests {
     use super::*;
 
-    /// `side` by `side` particles in the unit square of a plane, and one more.
+    /// Bounds of `side` by `side` particles in the unit square of a plane, and one other particle.
     fn plane_and(side: u8, other: DVec3) -> (DVec3, DVec3) {
         let step = |i: u8| f64::from(i) / f64::from(side - 1);
         let mut all: Vec<DVec3> = (0..side)
             .flat_map(|i| (0..side).map(move |j| DVec3::new(step(i), step(j), 0.0)))
             .collect();
         all.push(other);
-        robust_bounds(&Positions::F64(all), None).unwrap()
+        robust_bounds(&Positions::F64(all), None).unwrap().outer
     }
 
     #[test]
-    fn one_escaped_particle_is_left_out_of_many_and_of_few() {
+    fn layers_contain_half_a_percent() {
+        let line: Vec<DVec3> = (0..1000)
+            .map(|i| f64::from(i) * DVec3::new(1.0, -2.0, 0.0))
+            .collect();
+        let layers = robust_bounds(&Positions::F64(line), None).unwrap().layers;
+        assert_eq!(layers.0, DVec3::new(5.0, -1988.0, 0.0));
+        assert_eq!(layers.1, DVec3::new(994.0, -10.0, 0.0));
+    }
+
+    #[test]
+    fn bounds_exclude_a_single_outlier() {
         for side in [5, 20] {
             for escaped in [DVec3::X, DVec3::NEG_Y, DVec3::Z, DVec3::NEG_Z] {
                 let (min, max) = plane_and(side, 1e4 * escaped);
@@ -164,9 +206,9 @@ mod tests {
     }
 
     #[test]
-    fn one_of_few_that_lies_near_is_kept() {
+    fn bounds_include_a_near_particle_of_a_few() {
         assert_eq!(plane_and(5, DVec3::new(0.5, 0.5, 0.9)).1.z, 0.9);
-        // Of less than sixteen none is left out.
+        // Of fewer than sixteen particles, none is omitted.
         assert_eq!(plane_and(3, DVec3::new(0.5, 0.5, 1e4)).1.z, 1e4);
     }
 }

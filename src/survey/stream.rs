@@ -8,7 +8,7 @@ use spherule_formats::convert::{ParticleSource, SourceAttribute};
 use spherule_formats::{Attribute, Endian, FrameError, ParseError, Positions, RawParticles};
 
 use super::packing::{self, Spacing};
-use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, middle};
+use super::robust::{NEIGHBOUR_BUDGET, NEIGHBOUR_QUERIES, median};
 
 /// Particles per read.
 const RUN: usize = 1 << 16;
@@ -84,10 +84,10 @@ fn decoded(attribute: &SourceAttribute, values: &[u8]) -> Result<Attribute, Pars
 }
 
 /// An even selection of the `sample`, for queries.
-fn asked(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
+fn query_points(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
     let count = usize::try_from(source.count()).unwrap_or(usize::MAX);
-    let queries = (NEIGHBOUR_BUDGET / count.max(1)).clamp(LEAST_QUERIES, NEIGHBOUR_QUERIES);
-    let stride = sample.len().div_ceil(queries).max(1);
+    let query_count = (NEIGHBOUR_BUDGET / count.max(1)).clamp(LEAST_QUERIES, NEIGHBOUR_QUERIES);
+    let stride = sample.len().div_ceil(query_count).max(1);
     (0..sample.len())
         .step_by(stride)
         .map(|i| sample.get(i))
@@ -95,28 +95,28 @@ fn asked(source: &dyn ParticleSource, sample: &Positions) -> Vec<DVec3> {
         .collect()
 }
 
-/// The spacing of neighbours, from queries for some of the `sample` among all particles. `how_packed` requests the
+/// The spacing of neighbours, from queries for some of the `sample` among all particles. `needs_packed` requests the
 /// radius from the density as well.
 pub(super) fn spacing(
     source: &dyn ParticleSource,
     sample: &Positions,
-    how_packed: bool,
+    needs_packed: bool,
 ) -> Result<Option<Spacing>, FrameError> {
-    let asked = asked(source, sample);
-    let Some(touching) = half_nearest(source, &asked)? else {
+    let queries = query_points(source, sample);
+    let Some(touching) = half_nearest(source, &queries)? else {
         return Ok(None);
     };
-    let packed = match how_packed {
-        true => packing::packed_radius(touching, around(source, &asked, touching)?),
+    let packed = match needs_packed {
+        true => packing::packed_radius(touching, around(source, &queries, touching)?),
         false => None,
     };
     Ok(Some(Spacing { touching, packed }))
 }
 
-/// Number of particles around each of those `asked`.
+/// Number of particles around each of `queries`.
 fn around(
     source: &dyn ParticleSource,
-    asked: &[DVec3],
+    queries: &[DVec3],
     touching: f32,
 ) -> Result<Vec<u32>, FrameError> {
     let square = f64::from(packing::reach(touching)).powi(2);
@@ -127,34 +127,34 @@ fn around(
                 .filter(|to| from.distance_squared(**to) <= square);
             near.map(|_| 1_u32).sum::<u32>()
         };
-        asked.iter().map(count).collect::<Vec<u32>>()
+        queries.iter().map(count).collect::<Vec<u32>>()
     };
     let join = |mut a: Vec<u32>, b: Vec<u32>| {
         a.iter_mut().zip(&b).for_each(|(a, b)| *a += b);
         a
     };
-    each_run(source, of_run, || vec![0; asked.len()], join)
+    each_run(source, of_run, || vec![0; queries.len()], join)
 }
 
-/// Half the median distance from those `asked` to the nearest neighbour among all particles.
-fn half_nearest(source: &dyn ParticleSource, asked: &[DVec3]) -> Result<Option<f32>, FrameError> {
+/// Half the median distance from `queries` to the nearest neighbour among all particles.
+fn half_nearest(source: &dyn ParticleSource, queries: &[DVec3]) -> Result<Option<f32>, FrameError> {
     let of_run = |positions: &[DVec3]| {
         let nearest = |from: &DVec3| {
             let squares = positions.iter().map(|to| from.distance_squared(*to));
             squares.filter(|d| *d > 0.0).fold(f64::INFINITY, f64::min)
         };
-        asked.iter().map(nearest).collect::<Vec<f64>>()
+        queries.iter().map(nearest).collect::<Vec<f64>>()
     };
     let join = |mut a: Vec<f64>, b: Vec<f64>| {
         a.iter_mut().zip(&b).for_each(|(a, b)| *a = a.min(*b));
         a
     };
-    let far = || vec![f64::INFINITY; asked.len()];
+    let far = || vec![f64::INFINITY; queries.len()];
     let nearest = each_run(source, of_run, far, join)?;
     let finite = nearest.into_iter().filter(|d| d.is_finite());
     #[expect(clippy::cast_possible_truncation, reason = "radii are f32")]
     let distances = finite.map(|square| square.sqrt() as f32).collect();
-    Ok(middle(distances).map(|distance| 0.5 * distance))
+    Ok(median(distances).map(|distance| 0.5 * distance))
 }
 
 /// Reads all positions in runs, and combines the results of `of_run`.
@@ -190,7 +190,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn what_passes_through_tells_what_is_read_whole() {
+    fn streamed_survey_matches_a_survey_in_memory() {
         let source = BoxSource::new(BoxSettings::thesis(200_000, 3), None);
         let mut all = vec![DVec3::ZERO; 200_000];
         source.read_positions(0, &mut all).expect("there");
@@ -208,12 +208,12 @@ mod tests {
         let near = |a: f32, b: f32| assert!((a / b - 1.0).abs() < 0.1, "{a} {b}");
         near(streamed.touching, whole);
         let packed = estimate_packed(&single, whole).expect("some");
-        near(streamed.packed.expect("asked for"), packed);
-        // Of particles at random the nearest neighbour is near: this tells one from the other.
+        near(streamed.packed.expect("requested"), packed);
+        // Nearest neighbours of randomly placed particles are close, so the two estimates differ.
         assert!(packed > 1.5 * whole, "{packed} {whole}");
-        let asked_less = spacing(&source, &some.positions, false).expect("there");
+        let without_packed = spacing(&source, &some.positions, false).expect("there");
         assert_eq!(
-            asked_less,
+            without_packed,
             Some(Spacing {
                 packed: None,
                 ..streamed
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn nothing_and_what_is_no_number() {
+    fn nan_positions_have_no_extremes_and_no_spacing() {
         let raw = RawParticles {
             positions: Positions::F64(vec![DVec3::NAN; 3]),
             attributes: Vec::new(),

@@ -21,7 +21,10 @@ fn rust_files(path: &Path, found: &mut Vec<PathBuf>) {
             rust_files(&entry.expect("an entry").path(), found);
         }
     } else {
-        let name = path.to_string_lossy();
+        let source = path
+            .strip_prefix(env!("CARGO_MANIFEST_DIR"))
+            .expect("below the root");
+        let name = source.to_string_lossy();
         let is_test = name.ends_with("tests.rs") || name.contains("/tests/");
         // Test support.
         let is_oracle = name.ends_with("solid.rs") || name.ends_with("brute.rs");

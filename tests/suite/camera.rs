@@ -55,7 +55,7 @@ fn turned(a: f64, e: f64, vector: DVec3) -> DVec3 {
 }
 
 #[test]
-fn a_turntable_goes_around_at_one_distance() {
+fn turntable_has_a_constant_distance() {
     let workshop = workshop(
         "[camera]\nmode = \"turntable\"\ndegrees_per_frame = 52.0\nazimuth = 10.0\nelevation = 15.0\n",
     );
@@ -63,8 +63,8 @@ fn a_turntable_goes_around_at_one_distance() {
     let matrices = matrices(&workshop);
     // On the axis of the thesis's box; there the nearer lower rim is as far from the middle of the picture as
     // the farther upper one: a little lower than the middle of the box.
-    let told = &check(&workshop, &[])["camera"]["look_at"];
-    let look_at: [f64; 3] = std::array::from_fn(|i| told[i].as_f64().expect("a number"));
+    let messages = &check(&workshop, &[])["camera"]["look_at"];
+    let look_at: [f64; 3] = std::array::from_fn(|i| messages[i].as_f64().expect("a number"));
     let look_at = DVec3::from_array(look_at);
     assert!(
         look_at.distance(DVec3::new(5.0, 5.88, 0.0)) < 0.05,
@@ -111,14 +111,14 @@ fn a_turntable_goes_around_at_one_distance() {
 }
 
 #[test]
-fn keys_are_passed_softly_and_met() {
+fn keys_are_reached_smoothly() {
     let workshop = workshop(KEYS);
     workshop.run(&["render", "my.toml"]).expect(0);
     // 3t^2 - 2t^3 at quarters; beyond the keys the camera stands.
     let heights = [0.0, 0.0, 0.15625, 0.5, 0.84375, 1.0, 1.0];
     for (matrix, part) in matrices(&workshop).iter().zip(heights) {
         // It looks along -z with y up and x to the right.
-        let wanted = Mat4::from_cols_array(&[
+        let expected = Mat4::from_cols_array(&[
             1.0,
             0.0,
             0.0,
@@ -136,7 +136,7 @@ fn keys_are_passed_softly_and_met() {
             30.0,
             1.0,
         ]);
-        assert_eq!(*matrix, wanted);
+        assert_eq!(*matrix, expected);
     }
     // At the end it looks over the box: 20 degrees are 5.3 units up and down at a distance of 30.
     let covered = |frame| {
@@ -148,7 +148,7 @@ fn keys_are_passed_softly_and_met() {
 }
 
 #[test]
-fn moving_cameras_are_resumed_and_determined() {
+fn moving_cameras_resume_deterministically() {
     for camera in [KEYS, "[camera]\nmode = \"turntable\"\n"] {
         let workshop = workshop(camera);
         workshop
@@ -179,7 +179,7 @@ fn moving_cameras_are_resumed_and_determined() {
 }
 
 #[test]
-fn a_changed_key_is_refused_by_name() {
+fn changed_key_is_rejected_by_name() {
     let workshop = workshop(KEYS);
     workshop
         .run(&["render", "my.toml", "--frames", "2"])
@@ -187,7 +187,7 @@ fn a_changed_key_is_refused_by_name() {
     workshop
         .run(&["render", "my.toml", "--set", "camera.key.0.up=[1,0,0]"])
         .expect(2)
-        .tells("camera.key.1.up: (not set) -> [1.0, 0.0, 0.0]");
+        .prints("camera.key.1.up: (not set) -> [1.0, 0.0, 0.0]");
 }
 
 fn check(workshop: &Workshop, options: &[&str]) -> Value {
@@ -196,7 +196,7 @@ fn check(workshop: &Workshop, options: &[&str]) -> Value {
 }
 
 #[test]
-fn check_tells_what_moves() {
+fn check_reports_the_camera_path() {
     let workshop = workshop(KEYS);
     let camera = &check(&workshop, &["--frames", "3-9"])["camera"];
     assert_eq!(camera["mode"], "keys");
@@ -227,7 +227,7 @@ fn check_tells_what_moves() {
 }
 
 #[test]
-fn a_frame_without_a_picture_ends_the_job_before_it_begins() {
+fn invalid_frame_view_prevents_the_start() {
     let over = r#"
 [[camera.key]]
 frame = 2
@@ -241,15 +241,15 @@ look_at = [5.0, 6.5, 0.0]
     let workshop = workshop(over);
     let what = "error: camera.key: frame 4, between the keys of frames 2 and 6: up is zero or points \
                 along the view";
-    workshop.run(&["check", "my.toml"]).expect(2).tells(what);
-    // Whichever frames are wanted now.
+    workshop.run(&["check", "my.toml"]).expect(2).prints(what);
+    // Whichever frames are expected now.
     let arguments = ["render", "my.toml", "--frames", "1-3"];
-    workshop.run(&arguments).expect(2).tells(what);
+    workshop.run(&arguments).expect(2).prints(what);
     assert!(!workshop.join("out").exists());
 }
 
 #[test]
-fn init_shows_keys_and_keeps_them() {
+fn init_writes_camera_keys() {
     let workshop = workshop(KEYS);
     let text = workshop.run(&["init", "my.toml"]).expect(0).text();
     assert_eq!(text.matches("\n[[camera.key]]\n").count(), 2, "{text}");
@@ -257,4 +257,58 @@ fn init_shows_keys_and_keeps_them() {
     let arguments = [&["init", "in"][..], &SMALL].concat();
     let text = workshop.run(&arguments).expect(0).text();
     assert!(text.contains("# [[camera.key]]\n# frame = 1 "), "{text}");
+}
+
+#[test]
+fn focus_follows_a_particle_through_the_frames() {
+    let workshop = Workshop::new();
+    // Particle 1 moves away from the camera, which looks along +y
+    for (frame, distance) in [(1, 4), (2, 7)] {
+        let text = format!("x,y,z\n-0.5,9,0\n0,{distance},0\n0.5,2,0\n");
+        fs::create_dir_all(workshop.join("in")).expect("a directory");
+        fs::write(workshop.join(format!("in/f_{frame}.csv")), text).expect("a file");
+    }
+    let render = |out: &str, focus: &str| {
+        let output = format!("{out}/f.####.exr");
+        let focus = format!("camera.focus={focus}");
+        let mut options = vec![
+            "render",
+            "in",
+            "-o",
+            output.as_str(),
+            "--set",
+            focus.as_str(),
+        ];
+        for setting in [
+            "input.radius=0.4",
+            "image.width=64",
+            "image.height=36",
+            "image.samples=4",
+            "camera.eye=[0, 0, 0]",
+            "camera.look_at=[0, 1, 0]",
+            "camera.up=[0, 0, 1]",
+            "camera.aperture=0.2",
+        ] {
+            options.extend(["--set", setting]);
+        }
+        workshop.run(&options)
+    };
+    render("followed", "{ particle = 1 }").expect(0);
+    render("auto", "auto").expect(0);
+    let at = |name: &str| Picture::open(&workshop.join(name));
+    for (frame, distance) in [(1, "4"), (2, "7")] {
+        let out = format!("at{distance}");
+        render(&out, distance).expect(0);
+        let (followed, fixed) = (
+            at(&format!("followed/{}", image(frame))),
+            at(&format!("{out}/{}", image(frame))),
+        );
+        assert_eq!(followed.floats("R"), fixed.floats("R"));
+        // The target is at distance 1
+        let target = at(&format!("auto/{}", image(frame)));
+        assert_ne!(followed.floats("R"), target.floats("R"));
+    }
+    let ran = render("none", "{ particle = 3 }").expect(1);
+    let errors = ran.errors();
+    assert!(errors.contains("no particle has the id 3"), "{errors}");
 }

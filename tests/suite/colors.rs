@@ -1,4 +1,4 @@
-//! Attributes that hold colours are used as colours, and the user is told.
+//! Attributes with colours are used as colours, and a note says so.
 
 use std::fs;
 
@@ -46,16 +46,16 @@ fn assert_near(found: [f32; 3], expected: [f32; 3]) {
 fn colours_of_the_particles_are_used() {
     let shop = Workshop::new();
     table(&shop, "Cd[0],Cd[1],Cd[2]", "0.25,0.5,0.75");
-    render(&shop, "in", &[]).tells("colour by the RGB attribute `Cd` (linear)");
+    render(&shop, "in", &[]).prints("colour by the RGB attribute `Cd` (linear)");
     assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
     // Whoever names a map or a range means the length.
     for options in [&["--map", "greys"][..], &["--range", "0", "1"]] {
         let by = [&["--color-by", "cd"][..], options].concat();
-        render(&shop, "in", &by).tells("colour by `cd`, seen from");
+        render(&shop, "in", &by).prints("colour by `cd`, range");
     }
     // Bytes are sRGB: 188 of 255 is half the light.
     table(&shop, "red,green,blue", "188,0,255");
-    render(&shop, "in", &[]).tells("colour by the RGB attribute `color` (8-bit sRGB)");
+    render(&shop, "in", &[]).prints("colour by the RGB attribute `color` (8-bit sRGB)");
     assert_near(albedo(&shop), [0.5029, 0.0, 1.0]);
 }
 
@@ -65,22 +65,22 @@ fn bytes_of_vtk_and_ply_are_colours() {
     let vtk = "# vtk DataFile Version 3.0\n\nASCII\nDATASET POLYDATA\nPOINTS 2 float\n0 0 0 0 1 0\n\
                POINT_DATA 2\nCOLOR_SCALARS tint 3\n1 0.7373 0 1 0.7373 0\n";
     fs::write(shop.join("a.vtk"), vtk).expect("a file");
-    render(&shop, "a.vtk", &[]).tells("colour by the RGB attribute `tint` (8-bit sRGB)");
+    render(&shop, "a.vtk", &[]).prints("colour by the RGB attribute `tint` (8-bit sRGB)");
     assert_near(albedo(&shop), [1.0, 0.5029, 0.0]);
     let ply = "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\nproperty float z\n\
                property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n\
                0 0 0 0 188 255\n0 1 0 0 188 255\n";
     fs::write(shop.join("a.ply"), ply).expect("a file");
-    render(&shop, "a.ply", &[]).tells("colour by the RGB attribute `color`");
+    render(&shop, "a.ply", &[]).prints("colour by the RGB attribute `color`");
     assert_near(albedo(&shop), [0.0, 0.5029, 1.0]);
 }
 
 #[test]
-fn speed_goes_before_colours_unless_they_are_named() {
+fn speed_has_precedence_over_unnamed_colours() {
     let shop = Workshop::new();
     table(&shop, "vx,vy,vz,rgb_x,rgb_y,rgb_z", "1,2,3,0.25,0.5,0.75");
-    render(&shop, "in", &[]).tells("colour by `velocity`, seen from");
-    render(&shop, "in", &["--color-by", "RGB"]).tells("colour by the RGB attribute `RGB`");
+    render(&shop, "in", &[]).prints("colour by `velocity`, range");
+    render(&shop, "in", &["--color-by", "RGB"]).prints("colour by the RGB attribute `RGB`");
     assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
     render(&shop, "in", &["--set", "material.color=[0.1,0.2,0.3]"]);
     assert_near(albedo(&shop), [0.1, 0.2, 0.3]);
@@ -99,7 +99,7 @@ fn native_frames_show_the_same_colours() {
         ("native", "bvh"),
         ("native", "sbvh"),
     ] {
-        render(&shop, input, &["--accelerator", structure]).tells("RGB attribute `Cd`");
+        render(&shop, input, &["--accelerator", structure]).prints("RGB attribute `Cd`");
         assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
         let made = images(shop.path());
         assert_eq!(
@@ -109,6 +109,6 @@ fn native_frames_show_the_same_colours() {
         );
     }
     // A smooth surface blends them.
-    render(&shop, "native", &["--surface", "smooth"]).tells("RGB attribute `Cd`");
+    render(&shop, "native", &["--surface", "smooth"]).prints("RGB attribute `Cd`");
     assert_near(albedo(&shop), [0.25, 0.5, 0.75]);
 }

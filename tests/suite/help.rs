@@ -69,7 +69,7 @@ fn hidden_commands_are_neither_listed_nor_suggested() {
     }
 }
 
-/// Help and examples say what the program does.
+/// Help and examples match the program.
 #[test]
 fn the_manual_of_maps_is_complete() {
     let text = help(&["render", "--help"]);

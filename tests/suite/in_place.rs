@@ -27,7 +27,7 @@ fn same_as_decoded(shop: &Workshop, native: &str, options: &[&str]) {
 }
 
 /// The images of `native` are the same, to the byte, however its particles come to be traced; `is_decoded` says in
-/// which ways the user must be told that they are decoded.
+/// which ways the user must be messages that they are decoded.
 #[track_caller]
 fn same_in_all_ways(
     shop: &Workshop,
@@ -46,8 +46,8 @@ fn same_in_all_ways(
     ] {
         let out = format!("{native}-{way}");
         let ran = render(shop, native, &out, &[&options, how].concat()).expect(0);
-        let told = ran.errors().contains("decoded before they are traced");
-        assert_eq!(told, is_decoded(way), "{way}");
+        let is_reported = ran.errors().contains("decoded before they are traced");
+        assert_eq!(is_reported, is_decoded(way), "{way}");
         let made = images(&shop.join(&out));
         assert!(!made.is_empty());
         let expected = first.get_or_insert_with(|| made.clone());
@@ -89,7 +89,7 @@ fn bodies_and_smooth_normals_are_those_of_decoded_particles() {
 
 /// Radii over a hundredfold, so that boxes hold spheres; ids that are not the places in the file.
 #[test]
-fn radii_and_ids_of_their_own() {
+fn per_particle_radii_and_ids() {
     let shop = Workshop::new();
     let mut text = "x,y,z,radius,id\n".to_owned();
     for i in 0..3_000_u32 {
@@ -164,16 +164,16 @@ fn damage_costs_the_frame_and_is_named() {
     flip(&file(2), 4096 + 100);
     render(&shop, "native", "out", &[])
         .expect(1)
-        .tells("frame.0002.spf")
-        .tells("the positions are damaged")
-        .tells("convert again");
+        .prints("frame.0002.spf")
+        .prints("the positions are damaged")
+        .prints("convert again");
     assert_eq!(images(&shop.join("out")).len(), 2 * 2);
     // Cut off.
     let bytes = fs::read(file(3)).expect("readable");
     fs::write(file(3), &bytes[..bytes.len() / 2]).expect("writable");
     render(&shop, "native", "cut", &[])
         .expect(1)
-        .tells("frame.0003.spf");
+        .prints("frame.0003.spf");
     assert_eq!(images(&shop.join("cut")).len(), 2);
 }
 
@@ -211,7 +211,7 @@ fn far_from_zero() {
     }
     render(&shop, "apart", "apart-out", &[])
         .expect(0)
-        .tells("another origin");
+        .prints("another origin");
 }
 
 /// Memory for the program and the image, not for two million particles: as plain numbers they and a tree
@@ -229,7 +229,7 @@ fn memory_does_not_grow_with_the_particles() {
         .expect(0);
     let limited = |out: &str, how: &str| {
         let program = env!("CARGO_BIN_EXE_spherule");
-        let arguments = "--width 160 --height 90 --samples 1 --threads 2";
+        let arguments = "--width 160 --height 90 --samples 1 --threads 2 --look whitted";
         let command = format!(
             "ulimit -d {ALLOWED} && exec {program} render native -o {out}/f.#.exr {arguments} {how}"
         );

@@ -2,20 +2,25 @@
 
 mod harness;
 mod picture;
+mod simd;
 
 mod architecture;
 mod arithmetic;
 mod bad_input;
 mod camera;
+mod channels;
 mod colors;
 mod convert;
 mod corpus;
+mod crop;
 mod damaged;
+mod denoise;
 mod export;
 mod golden;
 mod help;
 mod in_place;
 mod memory;
+mod meshes;
 mod printing;
 mod progress;
 mod resume;

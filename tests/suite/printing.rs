@@ -22,12 +22,12 @@ fn clean(ran: &Ran) {
     }
 }
 
-/// Text that tells of [`HOSTILE`] all the same.
+/// The escaped form of [`HOSTILE`].
 const TOLD: &str = "\\nforged: b";
 
 #[cfg(unix)]
 #[test]
-fn names_from_outside_are_shown_escaped() {
+fn external_names_are_printed_escaped() {
     let workshop = Workshop::new();
     dam_break(&workshop.join(HOSTILE), 1..=3);
     let damaged = workshop.join(HOSTILE).join("f_2.bgeo");
@@ -75,7 +75,7 @@ fn names_from_outside_are_shown_escaped() {
 }
 
 #[test]
-fn attributes_are_shown_escaped() {
+fn attributes_are_printed_escaped() {
     let workshop = Workshop::new();
     // VTK files can spell any character.
     let spell = |c: char| {
@@ -94,13 +94,13 @@ fn attributes_are_shown_escaped() {
     assert!(ran.text().contains(TOLD), "{}", ran.text());
     let ran = workshop.run(&["inspect", "a.vtk", "--json"]).expect(0);
     clean(&ran);
-    let told: serde_json::Value = serde_json::from_str(&ran.text()).expect("JSON");
-    assert_eq!(told["attributes"][0]["name"], HOSTILE);
+    let json: serde_json::Value = serde_json::from_str(&ran.text()).expect("JSON");
+    assert_eq!(json["attributes"][0]["name"], HOSTILE);
     let render = ["render", "a.vtk", "-o", "out/f.exr"];
     let unknown = [&render[..], &SMALL, &["--color-by", "nosuch"]].concat();
-    clean(&workshop.run(&unknown).expect(2).tells(TOLD));
+    clean(&workshop.run(&unknown).expect(2).prints(TOLD));
     let known = [&render[..], &SMALL, &["--color-by", HOSTILE]].concat();
-    clean(&workshop.run(&known).expect(0).tells(TOLD));
+    clean(&workshop.run(&known).expect(0).prints(TOLD));
     for command in [&["check", "out/job.toml"][..], &["init", "out/job.toml"]] {
         clean(&workshop.run(command).expect(0));
     }
@@ -124,7 +124,7 @@ fn arguments_and_manifests_are_quoted_escaped() {
     for text in manifests {
         fs::write(workshop.join("hostile.toml"), &text).expect("a file");
         let ran = workshop.run(&["render", "hostile.toml"]).expect(2);
-        clean(&ran.tells("forged: b"));
+        clean(&ran.prints("forged: b"));
     }
     let flag = format!("--{HOSTILE}");
     let value = format!("--width={HOSTILE}");
@@ -185,6 +185,6 @@ fn a_result_that_cannot_be_written_is_an_error() {
         command.stdout(full.expect("/dev/full"));
         let ran = Ran(command.output().expect("the program starts"));
         assert_eq!(ran.code(), Some(2), "{arguments:?}: {}", ran.errors());
-        ran.tells("error: standard output: no space left");
+        ran.prints("error: standard output: no space left");
     }
 }

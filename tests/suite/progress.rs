@@ -1,4 +1,4 @@
-//! `--progress json`: standard output has events and nothing else, and every event is as `docs/progress.md` says.
+//! `--progress json`: standard output has only events, as documented in `docs/progress.md`.
 
 use std::fs;
 
@@ -65,7 +65,7 @@ fn a_render_from_start_to_end() {
     for options in [&[][..], &["--isolate"]] {
         let workshop = one_damaged();
         let ran = workshop.render(&[&["--progress", "json"], options].concat());
-        let ran = ran.expect(1).tells("error: frame 2: ");
+        let ran = ran.expect(1).prints("error: frame 2: ");
         let events = events(&ran);
         assert_eq!(
             kinds(&events),
@@ -87,14 +87,14 @@ fn a_render_from_start_to_end() {
 }
 
 #[test]
-fn notes_and_refusals() {
+fn notes_and_errors() {
     let workshop = one_damaged();
     // Frame 7 makes a gap, which is noted.
     fs::copy(workshop.join("in/f_3.bgeo"), workshop.join("in/f_7.bgeo")).expect("a file");
     let ran = workshop.render(&["--progress", "json", "--frames", "7", "--threads", "1000"]);
-    let seen = events(&ran.expect(0));
-    assert_eq!(kinds(&seen).iter().filter(|k| **k == "start").count(), 1);
-    let notes = seen.iter().filter(|e| e["event"] == "note");
+    let found = events(&ran.expect(0));
+    assert_eq!(kinds(&found).iter().filter(|k| **k == "start").count(), 1);
+    let notes = found.iter().filter(|e| e["event"] == "note");
     let notes: Vec<&str> = notes.filter_map(|e| e["text"].as_str()).collect();
     assert!(
         notes
@@ -111,7 +111,7 @@ fn notes_and_refusals() {
 }
 
 #[test]
-fn a_manifest_may_ask_for_events() {
+fn manifest_can_enable_events() {
     let workshop = one_damaged();
     let ran = workshop.render(&["--set", "job.progress=json", "--frames", "1,3"]);
     assert_eq!(
@@ -127,30 +127,30 @@ fn followed_frames() {
     fs::create_dir(workshop.join("out")).expect("a directory");
     fs::write(workshop.join("out/job.stop"), "").expect("a file");
     let options = ["--progress", "json", "--follow", "--settle", "0.1"];
-    let seen = events(&workshop.render(&options).expect(0));
-    assert_eq!(kinds(&seen), ["start", "frame_done", "frame_done", "end"]);
+    let found = events(&workshop.render(&options).expect(0));
+    assert_eq!(kinds(&found), ["start", "frame_done", "frame_done", "end"]);
 }
 
 #[test]
 fn a_conversion_and_an_experiment() {
     let workshop = one_damaged();
     let ran = workshop.run(&["convert", "in", "-o", "native", "--progress", "json"]);
-    let seen = events(&ran.expect(1));
+    let found = events(&ran.expect(1));
     let frames = ["frame_done", "frame_failed", "frame_done"];
-    let mut kinds_seen = kinds(&seen);
-    kinds_seen.retain(|kind| *kind != "note");
-    assert_eq!(kinds_seen, [&["start"], &frames[..], &["end"]].concat());
-    assert_eq!(seen[0]["command"], "convert");
+    let mut found_kinds = kinds(&found);
+    found_kinds.retain(|kind| *kind != "note");
+    assert_eq!(found_kinds, [&["start"], &frames[..], &["end"]].concat());
+    assert_eq!(found[0]["command"], "convert");
 
     let tiny = "scale --particles 100 --structures lbvh,kdtree --motions both --images 1 --width 16 --height 9";
     let arguments: Vec<&str> = tiny.split(' ').chain(["--progress", "json"]).collect();
     let ran = workshop
         .run(&arguments)
         .expect(0)
-        .tells("Images per second");
-    let seen = events(&ran);
-    assert_eq!(kinds(&seen), ["start", "cell_done", "cell_done", "end"]);
-    assert_eq!(seen[3]["done"], 2);
+        .prints("Images per second");
+    let found = events(&ran);
+    assert_eq!(kinds(&found), ["start", "cell_done", "cell_done", "end"]);
+    assert_eq!(found[3]["done"], 2);
 }
 
 #[cfg(target_os = "linux")]
@@ -163,6 +163,6 @@ fn events_that_cannot_be_written_do_not_end_a_job() {
     let mut command = workshop.command(&[&arguments[..], &SMALL].concat());
     command.stdout(full.expect("/dev/full"));
     let ran = Ran(command.output().expect("the program starts")).expect(0);
-    let told = "note: standard output: no space left";
-    assert_eq!(ran.errors().matches(told).count(), 1, "{}", ran.errors());
+    let note = "note: standard output: no space left";
+    assert_eq!(ran.errors().matches(note).count(), 1, "{}", ran.errors());
 }

@@ -32,11 +32,11 @@ fn report(workshop: &Workshop) -> Value {
     serde_json::from_slice(&text).expect("JSON")
 }
 
-/// Starts nothing, says why, leaves nothing.
+/// Checks that nothing starts, with this reason, and that no files remain.
 #[track_caller]
-fn refused(workshop: &Workshop, options: &[&str], wanted: &str) {
+fn refused(workshop: &Workshop, options: &[&str], expected: &str) {
     let before = files(workshop.path());
-    let ran = run(workshop, options).expect(2).tells(wanted);
+    let ran = run(workshop, options).expect(2).prints(expected);
     assert!(ran.text().is_empty(), "{}", ran.text());
     assert!(!ran.errors().contains("panicked"), "{}", ran.errors());
     assert!(!workshop.join("scale").exists());
@@ -105,15 +105,19 @@ fn tables_and_files_of_a_tiny_run() {
 }
 
 #[test]
-fn native_frames_are_traced_where_they_lie() {
+fn native_frames_are_traced_in_place() {
     let workshop = Workshop::new();
     let counts = ["--particles", "0,1,1e4"];
     let representations = ["--representations", "memory,f32,q16,q10"];
     let structures = ["--structures", "lbvh,kdtree"];
     let ran = run(&workshop, &[counts, representations, structures].concat()).expect(0);
-    let ran = ran.tells("native frames (f32, q16, q10) are traced where they lie");
-    for wanted in ["kdtree, q10 file", "Memory by part", "Native frames, made"] {
-        assert!(ran.text().contains(wanted), "{}", ran.text());
+    let ran = ran.prints("native frames (f32, q16, q10) are traced in place");
+    for expected in [
+        "kdtree, q10 file",
+        "Memory by part",
+        "Native frames: converted",
+    ] {
+        assert!(ran.text().contains(expected), "{}", ran.text());
     }
     let report = report(&workshop);
     let cells = report["cells"].as_array().expect("cells");
@@ -155,7 +159,7 @@ fn native_frames_are_traced_where_they_lie() {
 }
 
 #[test]
-fn frames_of_one_s_own_are_traced_where_they_lie() {
+fn user_frames_are_traced_in_place() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=1);
     // What a run that was killed has left goes.
@@ -186,15 +190,14 @@ fn representations_need_a_structure() {
             "--representations",
             "memory,q10",
         ],
-        "--representations q10: native frames lie in k-d order and are traced where they lie: add \
-         kdtree to --structures",
+        "--representations q10: native frames can only be traced with kdtree; add kdtree to --structures",
     );
 }
 
 /// A disk that is full costs the cells that need it.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_frame_that_cannot_be_written_is_told() {
+fn unwritable_frame_is_reported() {
     let workshop = Workshop::new();
     let program = env!("CARGO_BIN_EXE_spherule");
     // Files of at most 512 blocks: reports fit, a frame of 1e5 does not.
@@ -207,9 +210,9 @@ fn a_frame_that_cannot_be_written_is_told() {
         .current_dir(workshop.path())
         .output()
         .expect("a shell");
-    Ran(output)
-        .expect(1)
-        .tells("error: 100000 particles, kdtree in a q16 file, both: no native frame: ");
+    Ran(output).expect(1).prints(
+        "error: 100000 particles, kdtree in a q16 file, both: cannot make the native frame: ",
+    );
     let report = report(&workshop);
     assert_eq!(report["cells"][0]["status"], "done");
     assert_eq!(report["cells"][1]["status"], "failed");
@@ -217,7 +220,7 @@ fn a_frame_that_cannot_be_written_is_told() {
 }
 
 #[test]
-fn particles_of_one_s_own() {
+fn user_particles() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
     let ran = run(
@@ -232,7 +235,7 @@ fn particles_of_one_s_own() {
         ],
     );
     ran.expect(0)
-        .tells("all of them are measured, once, instead of 1000000, 10000000");
+        .prints("particles, which replace 1000000, 10000000");
     let report = report(&workshop);
     assert_eq!(report["settings"]["input"]["frame"], 2);
     let all = &report["settings"]["input"]["particles"];
@@ -242,16 +245,16 @@ fn particles_of_one_s_own() {
         assert_eq!(cell["status"], "done", "{cell}");
         assert!(
             cell["rays"]["shadow"].as_u64() > Some(0),
-            "nothing is seen: {cell}"
+            "no particle is visible: {cell}"
         );
     }
     run(&workshop, &["--input", "in", "--particles", "1"])
         .expect(0)
-        .tells("has 2 frames; frame 1 is measured, --frame chooses another");
+        .prints("has 2 frames; measuring frame 1 (--frame selects another)");
 }
 
 #[test]
-fn one_particle_and_all_in_one_place() {
+fn one_particle_and_coincident_particles() {
     for count in [1, 100] {
         let workshop = Workshop::new();
         npy(&workshop.join("one.npy"), &vec![[3.0, 4.0, 5.0]; count]);
@@ -263,7 +266,7 @@ fn one_particle_and_all_in_one_place() {
             assert_eq!(cell["particles"], count);
             assert!(
                 cell["rays"]["shadow"].as_u64() > Some(0),
-                "nothing is seen: {cell}"
+                "no particle is visible: {cell}"
             );
         }
     }
@@ -272,34 +275,42 @@ fn one_particle_and_all_in_one_place() {
 #[test]
 fn options_have_ranges() {
     let workshop = Workshop::new();
-    for (option, value, wanted) in [
-        ("--particles", "-5", "`-5` is no number of particles"),
+    for (option, value, expected) in [
+        (
+            "--particles",
+            "-5",
+            "expected a particle count, such as 100000 or 1e5, found \"-5\"",
+        ),
         (
             "--particles",
             "1e3,many",
-            "`many` is no number of particles",
+            "expected a particle count, such as 100000 or 1e5, found \"many\"",
         ),
-        ("--particles", "", "is no number of particles"),
-        (
-            "--particles",
-            "1e10",
-            "a tree holds fewer than 2^32 particles",
-        ),
+        ("--particles", "", "expected a particle count"),
+        ("--particles", "1e10", "expected fewer than 2^32 particles"),
         ("--structures", "lbhv", "did you mean lbvh?"),
         (
             "--motions",
             "rotate",
-            "wants one of rotation, translation, both",
+            "expected one of rotation, translation, both",
         ),
         (
             "--representations",
             "f16",
-            "wants one of memory, f32, q16, q10",
+            "expected one of memory, f32, q16, q10",
         ),
         ("--images", "0", "0 is not in 1.."),
         ("--images", "-1", "-1 is not in 1.."),
-        ("--width", "0", "0 is not in 1..=65536"),
-        ("--height", "-1", "-1 is not in 1..=65536"),
+        (
+            "--width",
+            "0",
+            "expected a number of pixels from 1 to 65536",
+        ),
+        (
+            "--height",
+            "-1",
+            "expected a number of pixels from 1 to 65536",
+        ),
         ("--samples", "0", "0 is not in 1..=4096"),
         ("--max-depth", "0", "0 is not in 1..=64"),
         ("--depth", "65", "65 is not in 1..=64"),
@@ -315,18 +326,18 @@ fn options_have_ranges() {
             .chain([option, value])
             .collect();
         let ran = workshop.run(&[&["scale"], &options[..]].concat());
-        ran.expect(2).tells(wanted);
+        ran.expect(2).prints(expected);
     }
     for seconds in ["0", "-1", "nan", "inf"] {
         let ran = workshop.run(&["scale", "--seconds", seconds]).expect(2);
-        ran.tells("wants seconds above 0");
+        ran.prints("expected seconds above 0");
     }
     refused(&workshop, &["--seconds", "1"], "cannot be used with");
     assert!(files(workshop.path()).is_empty());
 }
 
 #[test]
-fn inputs_that_have_nothing() {
+fn inputs_without_particles() {
     let workshop = Workshop::new();
     refused(&workshop, &["--input", "no.vtk"], "no.vtk");
     fs::create_dir(workshop.join("empty")).expect("a directory");
@@ -346,12 +357,12 @@ fn inputs_that_have_nothing() {
 }
 
 #[test]
-fn places_where_results_cannot_go() {
+fn unwritable_output_directories() {
     let workshop = Workshop::new();
     fs::write(workshop.join("file"), "mine").expect("a file");
     for place in ["file", "file/deeper"] {
-        let wanted = "file: is a file where a directory for the results should be";
-        refused(&workshop, &["-o", place], wanted);
+        let expected = "file: is a file, but a directory for the results is needed";
+        refused(&workshop, &["-o", place], expected);
     }
     if cfg!(target_os = "linux") {
         refused(
@@ -366,7 +377,7 @@ fn places_where_results_cannot_go() {
         refused(
             &workshop,
             &["-o", "theirs"],
-            &format!("{name}: is in the way"),
+            &format!("{name}: exists and was not written by `spherule scale`"),
         );
         fs::remove_file(workshop.join("theirs").join(name)).expect("a file");
     }
@@ -375,7 +386,7 @@ fn places_where_results_cannot_go() {
 /// A cell that the system gives no memory costs that cell alone.
 #[cfg(target_os = "linux")]
 #[test]
-fn a_cell_that_does_not_fit_is_shown_as_failed() {
+fn cell_beyond_memory_is_listed_as_failed() {
     let workshop = Workshop::new();
     let program = env!("CARGO_BIN_EXE_spherule");
     // 48 GB of positions in 8 GB of addresses.
@@ -390,7 +401,7 @@ fn a_cell_that_does_not_fit_is_shown_as_failed() {
         .expect("a shell");
     let ran = Ran(output)
         .expect(1)
-        .tells("error: 4000000000 particles, lbvh in memory, both: out of memory: ");
+        .prints("error: 4000000000 particles, lbvh in memory, both: out of memory: ");
     assert!(
         ran.text().contains("failed: 4000000000 particles"),
         "{}",
@@ -405,7 +416,7 @@ fn a_cell_that_does_not_fit_is_shown_as_failed() {
 
 #[cfg(unix)]
 #[test]
-fn interrupted_runs_keep_what_they_have() {
+fn interrupted_runs_keep_finished_cells() {
     let workshop = Workshop::new();
     let counts: Vec<String> = (10..40).map(|n| n.to_string()).collect();
     let arguments = [
@@ -417,11 +428,11 @@ fn interrupted_runs_keep_what_they_have() {
     let mut running = workshop.start(&arguments.concat());
     assert!(running.wait_for_line("[1/30] 10 particles, lbvh in memory, both: build "));
     running.signal("TERM");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(75), "{told}");
+    let (errors, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{errors}");
     assert!(
-        told.contains("stopping; what is measured is kept"),
-        "{told}"
+        errors.contains("stopping; finished cells are kept"),
+        "{errors}"
     );
     let report = report(&workshop);
     assert_eq!(report["planned"], 30);

@@ -9,7 +9,7 @@ const SNAPSHOT: &str = include_str!("../../docs/job.schema.json");
 const FIRST_LINE: &str = "#:schema ./job.schema.json\n";
 
 #[test]
-fn it_is_printed_and_lies_beside_the_manifest_that_refers_to_it() {
+fn schema_is_printed_and_stored_beside_the_manifest() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     assert_eq!(workshop.run(&["schema"]).expect(0).text(), SNAPSHOT);
@@ -27,7 +27,7 @@ fn it_is_printed_and_lies_beside_the_manifest_that_refers_to_it() {
 }
 
 #[test]
-fn how_the_work_is_gone_about_is_kept_and_may_change() {
+fn job_settings_are_kept_and_may_change() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
     let job = workshop.join("out/job.toml");
@@ -64,9 +64,9 @@ fn how_the_work_is_gone_about_is_kept_and_may_change() {
     workshop
         .render(&["--progress", "sideways"])
         .expect(2)
-        .tells("sideways");
+        .prints("sideways");
     workshop
         .render(&["--threads", "-3"])
         .expect(2)
-        .tells("--threads: job.threads: wants \"all\" or a whole number from 1");
+        .prints("--threads: job.threads: expected \"all\" or a whole number from 1");
 }

@@ -1,4 +1,4 @@
-//! `spherule status`: what is told of a job that runs, has failures, was killed, is done.
+//! `spherule status` for jobs that run, have failures, were killed, or are done.
 
 use std::fs;
 
@@ -12,38 +12,38 @@ fn status(workshop: &Workshop, code: i32) -> Value {
 }
 
 #[test]
-fn from_the_first_frame_to_the_last() {
+fn status_from_first_to_last_frame() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=6);
     workshop
         .run(&["status", "out"])
         .expect(2)
-        .tells("out: no job here");
+        .prints("out: no job here");
     let path = workshop.join("in/f_2.bgeo");
     let bytes = fs::read(&path).expect("a frame");
     fs::write(&path, &bytes[..bytes.len() / 2]).expect("a file");
     workshop.render(&["--frames", "1-3"]).expect(1);
-    let told = status(&workshop, 75);
-    assert_eq!(told["frames"], 6);
-    assert_eq!(told["done"], serde_json::json!([1, 3]));
-    assert_eq!(told["pending"], serde_json::json!([4, 5, 6]));
-    assert_eq!(told["failed"][0]["frame"], 2);
+    let json = status(&workshop, 75);
+    assert_eq!(json["frames"], 6);
+    assert_eq!(json["done"], serde_json::json!([1, 3]));
+    assert_eq!(json["pending"], serde_json::json!([4, 5, 6]));
+    assert_eq!(json["failed"][0]["frame"], 2);
     assert!(
-        told["failed"][0]["reason"]
+        json["failed"][0]["reason"]
             .as_str()
             .expect("a reason")
             .contains("f_2.bgeo")
     );
-    assert_eq!(told["workers"], serde_json::json!([]));
-    assert!(told["seconds_left"].is_null());
+    assert_eq!(json["workers"], serde_json::json!([]));
+    assert!(json["seconds_left"].is_null());
 
     workshop.render(&[]).expect(1);
     assert_eq!(status(&workshop, 1)["failed"][0]["frame"], 2);
     fs::write(&path, bytes).expect("a file");
     workshop.render(&[]).expect(0);
     fs::remove_file(workshop.join("out/f.0005.exr")).expect("an image");
-    let told = status(&workshop, 75);
-    assert_eq!(told["missing"], serde_json::json!([5]));
+    let json = status(&workshop, 75);
+    assert_eq!(json["missing"], serde_json::json!([5]));
     workshop.render(&[]).expect(0);
     // By its manifest, too; and nothing is touched.
     let before = crate::harness::stamps(&workshop.join("out"));
@@ -53,37 +53,37 @@ fn from_the_first_frame_to_the_last() {
 }
 
 #[test]
-fn who_is_at_work_and_who_has_died() {
+fn status_lists_live_and_dead_workers() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=4);
     let slow = ["--width", "640", "--height", "360", "--samples", "64"];
     let arguments = [&["render", "in", "-o", "out/f.####.exr"][..], &slow].concat();
     let mut running = workshop.start(&arguments);
     assert!(running.wait_for_line("] frame 1:"));
-    let told = status(&workshop, 75);
-    let worker = &told["workers"][0];
+    let json = status(&workshop, 75);
+    let worker = &json["workers"][0];
     assert_eq!(worker["pid"], running.id());
     assert_eq!(worker["has_ended"], false);
     assert!(
-        told["running"]
+        json["running"]
             .as_array()
             .is_some_and(|frames| !frames.is_empty()),
-        "{told}"
+        "{json}"
     );
     assert!(
-        told["frames_per_second"]
+        json["frames_per_second"]
             .as_f64()
             .is_some_and(|rate| rate > 0.0),
-        "{told}"
+        "{json}"
     );
     running.kill();
     running.end();
-    let told = status(&workshop, 75);
-    assert_eq!(told["workers"][0]["has_ended"], true, "{told}");
-    assert_eq!(told["running"], serde_json::json!([]));
+    let json = status(&workshop, 75);
+    assert_eq!(json["workers"][0]["has_ended"], true, "{json}");
+    assert_eq!(json["running"], serde_json::json!([]));
     let text = workshop.run(&["status", "out"]).expect(75).text();
     assert!(
-        text.contains("has died: whoever works next takes over"),
+        text.contains("has died; the next worker takes over"),
         "{text}"
     );
 }

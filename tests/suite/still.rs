@@ -16,7 +16,7 @@ fn still(workshop: &Workshop, options: &[&str]) -> Ran {
 }
 
 #[test]
-fn one_picture_and_nothing_else() {
+fn still_writes_only_the_image() {
     let workshop = workshop();
     let made = still(&workshop, &["-o", "looks/a.png"]).expect(0);
     // The frame in the middle.
@@ -37,7 +37,7 @@ fn one_picture_and_nothing_else() {
 }
 
 #[test]
-fn the_picture_is_that_of_a_job() {
+fn picture_equals_that_of_a_job() {
     let workshop = workshop();
     let look = [
         "--color-by",
@@ -82,7 +82,7 @@ fn the_picture_is_that_of_a_job() {
 }
 
 #[test]
-fn replaces_images_and_nothing_else() {
+fn only_images_are_replaced() {
     let workshop = workshop();
     still(&workshop, &["-o", "a.png"]).expect(0);
     let before = fs::read(workshop.join("a.png")).expect("a picture");
@@ -91,7 +91,7 @@ fn replaces_images_and_nothing_else() {
 
     fs::write(workshop.join("notes.png"), b"not a picture").expect("a file");
     let refused = |options: &[&str], why: &str| {
-        still(&workshop, options).expect(2).tells(why);
+        still(&workshop, options).expect(2).prints(why);
     };
     refused(
         &["-o", "notes.png"],
@@ -121,17 +121,17 @@ fn replaces_images_and_nothing_else() {
     std::os::unix::fs::symlink("../a.png", workshop.join("in/f_6.bgeo")).expect("a link");
     let ran = still(&workshop, &["--frame", "1", "-o", "a.png"]);
     ran.expect(2)
-        .tells("a.png: is an input and would be overwritten;");
+        .prints("a.png: is an input and would be overwritten;");
 }
 
 #[test]
-fn images_of_a_job_are_its_own() {
+fn images_of_a_job_are_not_replaced() {
     let workshop = workshop();
     workshop.render(&["--frames", "1-2"]).expect(0);
     for name in ["out/f.0001.exr", "out/f.0001.png", "out/f.0005.exr"] {
         still(&workshop, &["-o", name])
             .expect(2)
-            .tells("is an image of the job in that directory; choose another name");
+            .prints("is an image of the job in that directory; choose another name");
     }
     still(&workshop, &["-o", "out/look.png"]).expect(0);
     workshop.run(&["verify", "out"]).expect(0);
@@ -145,13 +145,13 @@ fn a_frame_that_cannot_be_read_has_failed() {
     fs::write(&file, &good[..good.len() / 2]).expect("a file");
     still(&workshop, &["--frame", "5", "-o", "a.png"])
         .expect(1)
-        .tells("error: frame 5: ");
+        .prints("error: frame 5: ");
     assert!(!workshop.join("a.png").exists());
     still(&workshop, &["--frame", "4", "-o", "a.png"]).expect(0);
 }
 
 #[test]
-fn help_has_examples_and_no_options_of_jobs() {
+fn help_has_examples_and_no_job_options() {
     let workshop = Workshop::new();
     let help = workshop.run(&["still", "--help"]).expect(0).text();
     for shown in [

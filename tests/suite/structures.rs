@@ -95,6 +95,12 @@ fn dam_break_of_pysph() {
 }
 
 #[test]
+fn dam_break_in_a_studio() {
+    let look = ["--look", "studio"];
+    same_on_sample("pysph/dam_break_3d_fluid_00100.vtu", &look);
+}
+
+#[test]
 fn molecules() {
     same_on_sample("lammps_drop/steps", ALL_CHANNELS);
 }
@@ -107,7 +113,7 @@ fn random_box() {
 }
 
 #[test]
-fn random_glass_far_out() {
+fn random_glass_far_from_the_origin() {
     let workshop = Workshop::new();
     npy(
         &workshop.join("box.npy"),
@@ -139,7 +145,7 @@ fn radii_of_their_own() {
 }
 
 #[test]
-fn water_of_one_body() {
+fn water_as_a_union() {
     for surface in ["union", "smooth"] {
         let water = ["--look", "water", "--spray", "--surface", surface];
         let file = "emitter_sph/ParticleData_Fluid_10.bgeo";

@@ -1,5 +1,5 @@
 //! Jobs of one body with spray: the same on any number of threads and when they are resumed, and what the
-//! surface took is told apart.
+//! surface is reported separately.
 
 use std::fs;
 
@@ -40,12 +40,18 @@ fn jobs_with_spray(surface: &str) {
     render("one", &["--threads", "1"]);
     render("many", &["--threads", "3"]);
     let expected = images(&shop.join("one"));
-    assert!(expected == images(&shop.join("many")), "threads tell");
+    assert!(
+        expected == images(&shop.join("many")),
+        "threads change the image"
+    );
 
     // What is lost is made again.
     fs::remove_file(shop.join("many/f.0007.exr")).expect("an image");
     render("many", &["--threads", "3"]);
-    assert!(expected == images(&shop.join("many")), "resuming tells");
+    assert!(
+        expected == images(&shop.join("many")),
+        "resuming changes the image"
+    );
 
     let report = fs::read_to_string(shop.join("one/report.json")).expect("a report");
     let report: Value = serde_json::from_str(&report).expect("JSON");

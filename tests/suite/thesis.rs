@@ -151,7 +151,7 @@ fn positions(path: &Path) -> Vec<[u32; 3]> {
 }
 
 #[test]
-fn every_format_holds_the_same_particles() {
+fn every_format_contains_the_same_particles() {
     let workshop = Workshop::new();
     let mut expected = box_by_hand(1000);
     for extension in ["npy", "vtk"] {

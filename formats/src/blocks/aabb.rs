@@ -18,7 +18,7 @@ impl Default for Aabb {
 }
 
 impl Aabb {
-    /// The box that holds nothing.
+    /// The empty box.
     pub const EMPTY: Self = Self {
         min: Vec3::INFINITY,
         max: Vec3::NEG_INFINITY,
@@ -30,7 +30,7 @@ impl Aabb {
         points.iter().fold(Self::EMPTY, |b, p| b.extend(*p))
     }
 
-    /// This box grown to hold `point`.
+    /// This box, extended to contain `point`.
     #[must_use]
     #[inline]
     pub fn extend(self, point: Vec3) -> Self {
@@ -40,7 +40,7 @@ impl Aabb {
         }
     }
 
-    /// The smallest box around both.
+    /// The smallest box around both boxes.
     #[must_use]
     #[inline]
     pub fn union(self, other: Self) -> Self {
@@ -50,7 +50,7 @@ impl Aabb {
         }
     }
 
-    /// What both have in common; empty if nothing.
+    /// The intersection of both boxes; empty if they are disjoint.
     #[must_use]
     #[inline]
     pub fn intersection(self, other: Self) -> Self {
@@ -70,8 +70,8 @@ impl Aabb {
         }
     }
 
-    /// This box with every face moved out by one step of f32: holds what it would have held without
-    /// rounding.
+    /// This box with every face moved outwards by one step of f32, so that it contains everything that the
+    /// unrounded box would contain.
     #[must_use]
     #[inline]
     pub fn rounded_outwards(self) -> Self {
@@ -81,7 +81,7 @@ impl Aabb {
         }
     }
 
-    /// True if it holds nothing.
+    /// True if the box is empty.
     #[inline]
     pub fn is_empty(&self) -> bool {
         self.min.cmpgt(self.max).any()
@@ -99,7 +99,7 @@ impl Aabb {
         self.min.cmple(other.min).all() && self.max.cmpge(other.max).all()
     }
 
-    /// Surface area in f64, so that sums over many boxes keep their digits.
+    /// Surface area in f64, so that sums over many boxes keep their precision.
     #[inline]
     pub fn area(&self) -> f64 {
         let s = self.size().as_dvec3();

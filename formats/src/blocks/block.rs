@@ -1,16 +1,14 @@
-//! Blocks of 16 particles: at once the unit of storage, the leaf of the tree and what one SIMD
-//! test takes.
+//! Blocks of 16 particles. A block is the unit of storage, a leaf of the tree, and the input of one SIMD test.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::Aabb;
 
-/// Particles in a block. 16 fills one AVX-512 register; 8 traced 15-22 % slower, 32 about equal.
+/// Particles in a block. 16 fills one AVX-512 register; with 8, tracing was 15-22 % slower, with 32 about equal.
 pub const BLOCK_SIZE: usize = 16;
 
-/// Centres of 16 particles, one array per axis. The unused lanes of a last block repeat its last
-/// particle.
+/// Centres of 16 particles, one array per axis. The unused lanes of a frame's last block repeat its last particle.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Block {
@@ -22,13 +20,13 @@ pub struct Block {
     pub z: [f32; BLOCK_SIZE],
 }
 
-/// Radii of the particles of a block, where they differ.
+/// Radii of the particles of a block, if radii differ.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct BlockRadii(pub [f32; BLOCK_SIZE]);
 
 impl Block {
-    /// Turns a block whose memory still holds 16 consecutive points into one array per axis.
+    /// Converts a block whose memory still contains 16 consecutive points to one array per axis.
     #[inline]
     pub fn transpose_points(&mut self) {
         let points: [Vec3; BLOCK_SIZE] = bytemuck::cast(*self);
@@ -45,19 +43,19 @@ impl Block {
         Vec3::new(self.x[lane], self.y[lane], self.z[lane])
     }
 
-    /// All centres, those included that fill a last block up.
+    /// All centres, including those of unused lanes.
     #[inline]
     pub fn centers(self) -> impl Iterator<Item = Vec3> {
         (0..BLOCK_SIZE).map(move |lane| self.center(lane))
     }
 
-    /// Puts the particle in `lane` to `center`.
+    /// Moves the particle in `lane` to `center`.
     #[inline]
     pub fn set_center(&mut self, lane: usize, center: Vec3) {
         (self.x[lane], self.y[lane], self.z[lane]) = (center.x, center.y, center.z);
     }
 
-    /// Box of the centres.
+    /// Bounding box of the centres.
     #[inline]
     pub fn bounds(&self) -> Aabb {
         let min = |v: &[f32; BLOCK_SIZE]| v.iter().fold(f32::INFINITY, |a, b| a.min(*b));
@@ -68,7 +66,7 @@ impl Block {
         }
     }
 
-    /// Box of the spheres.
+    /// Bounding box of the spheres.
     #[inline]
     pub fn sphere_bounds(&self, radii: &BlockRadii) -> Aabb {
         let rounded = (0..BLOCK_SIZE).fold(Aabb::EMPTY, |b, lane| {

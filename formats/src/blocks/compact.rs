@@ -1,29 +1,29 @@
-//! Blocks whose positions are whole numbers on a grid: 4 or 6 bytes a particle.
+//! Blocks whose positions are integers on a grid: 4 or 6 bytes per particle.
 //!
-//! The grid of a block spans the quantised box that its node holds for it anyway, so it costs no
-//! memory. A coordinate is `base + code * (extent / largest code)`, each operation rounded once to f32: the
-//! same to the bit in every kernel.
+//! The grid of a block spans the quantised box that its node stores anyway, so that it costs no memory. A
+//! coordinate is `base + code * (extent / largest code)`. Each operation is rounded once to f32, so that all
+//! kernels compute the same bits.
 //!
-//! A block whose positions would be too coarse is kept as f32 elsewhere, and here is only its number. That
-//! needs no flag: the lanes of a coded block are arranged so that z of the first is not above z of the
-//! last, and a reference has it the other way round.
+//! A block whose positions would be too coarse is stored as f32 elsewhere, and the coded block refers to it by
+//! its index. This needs no flag: the lanes of a coded block are arranged so that z of the first is not above z
+//! of the last, and a reference has them the other way round.
 
 use bytemuck::{Pod, Zeroable};
 use glam::Vec3;
 
 use super::{BLOCK_SIZE, Block, Node};
 
-/// The grid that the codes of a block count on.
+/// The grid of the codes of a block.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockFrame {
     /// Position of code 0 on each axis.
     pub base: [f32; 3],
-    /// Distance from there to the largest code.
+    /// Distance from `base` to the position of the largest code, on each axis.
     pub extent: [f32; 3],
 }
 
 impl Node {
-    /// The grid of the block that is child `slot`: from its lower to its upper planes.
+    /// The grid of the block in child `slot`: from its lower to its upper planes.
     #[inline(always)]
     pub fn child_frame(&self, slot: usize) -> BlockFrame {
         let mut frame = BlockFrame {
@@ -33,7 +33,7 @@ impl Node {
         for axis in 0..3 {
             let step = f32::from_bits(u32::from(self.exponent[axis]) << 23);
             let [lower, upper] = [0, 1].map(|side| self.planes[axis][side][slot & 7]);
-            // Products of eight bits and a power of two are exact: each value is rounded once.
+            // A product of eight bits and a power of two is exact, so that each value is rounded only once.
             frame.base[axis] = self.origin[axis] + f32::from(lower) * step;
             frame.extent[axis] = f32::from(upper.saturating_sub(lower)) * step;
         }
@@ -41,7 +41,7 @@ impl Node {
     }
 }
 
-/// A coded block: what the encodings have in common.
+/// A coded block: the interface of both encodings.
 pub trait CompactBlock: Pod {
     /// Largest code on each axis.
     const LARGEST: [u32; 3];
@@ -49,13 +49,13 @@ pub trait CompactBlock: Pod {
     /// The block with these codes, `[axis][lane]`, none above [`Self::LARGEST`].
     fn from_codes(codes: &[[u32; BLOCK_SIZE]; 3]) -> Self;
 
-    /// Codes of the particle in `lane`.
+    /// The codes of the particle in `lane`.
     fn codes(&self, lane: usize) -> [u32; 3];
 
-    /// A block that is kept as f32 under the number `index`.
+    /// A reference to the block that is stored as f32 at `index`.
     fn referring_to(index: u32) -> Self;
 
-    /// The number under which the block is kept as f32, if it is.
+    /// The index of the block stored as f32, if this block is a reference.
     fn wide_index(&self) -> Option<u32>;
 
     /// Length of a step of the grid on each axis.
@@ -64,7 +64,7 @@ pub trait CompactBlock: Pod {
         std::array::from_fn(|axis| frame.extent[axis] * (1.0 / Self::LARGEST[axis] as f32))
     }
 
-    /// The positions; those of a block that is kept elsewhere mean nothing.
+    /// The decoded positions; meaningless for a reference.
     #[inline(always)]
     fn decode(&self, frame: &BlockFrame) -> Block {
         let steps = Self::steps(frame);
@@ -78,7 +78,7 @@ pub trait CompactBlock: Pod {
         block
     }
 
-    /// The position of one particle, as [`Self::decode`] has it.
+    /// The position of one particle, the same as in [`Self::decode`].
     #[inline(always)]
     fn center(&self, frame: &BlockFrame, lane: usize) -> Vec3 {
         let (codes, steps) = (self.codes(lane), Self::steps(frame));
@@ -88,7 +88,7 @@ pub trait CompactBlock: Pod {
     }
 }
 
-/// 4 bytes a particle: 11 bits of x (the lowest), 11 of y, 10 of z.
+/// 4 bytes per particle: 11 bits of x (the lowest), 11 of y, 10 of z.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Q10Block(pub [u32; BLOCK_SIZE]);
@@ -122,7 +122,7 @@ impl CompactBlock for Q10Block {
     }
 }
 
-/// 6 bytes a particle: 16 bits an axis.
+/// 6 bytes per particle: 16 bits per axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C, align(32))]
 pub struct Q16Block {
@@ -188,13 +188,13 @@ mod tests {
 
     proptest! {
         #[test]
-        fn codes_come_back(words: [[u32; BLOCK_SIZE]; 3]) {
+        fn codes_round_trip(words: [[u32; BLOCK_SIZE]; 3]) {
             there_and_back::<Q10Block>(words);
             there_and_back::<Q16Block>(words);
         }
 
         #[test]
-        fn references_come_back(index: u32) {
+        fn references_round_trip(index: u32) {
             prop_assert_eq!(Q10Block::referring_to(index).wide_index(), Some(index));
             prop_assert_eq!(Q16Block::referring_to(index).wide_index(), Some(index));
         }

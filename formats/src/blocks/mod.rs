@@ -1,5 +1,5 @@
-//! Particles in blocks of 16, and nodes of eight of them: what a tree is made of in memory and in a
-//! native file, so that it can be traced in either.
+//! Particles in blocks of 16, and nodes of eight blocks: the parts of a tree. Their layout is the same in
+//! memory and in a native file, so that both can be traced.
 
 mod aabb;
 mod block;

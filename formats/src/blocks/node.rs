@@ -1,5 +1,5 @@
-//! The 64-byte node: eight child boxes in one cache line, quantised to 8 bits a plane in the frame
-//! of the node (after Ylitie, Karras & Laine 2017, without their child pointers).
+//! The 64-byte node: eight child boxes in one cache line, with planes quantised to 8 bits relative to the
+//! node's origin (after Ylitie, Karras & Laine 2017, without their child pointers).
 
 use bytemuck::{Pod, Zeroable};
 
@@ -8,32 +8,32 @@ use super::Aabb;
 /// Children of a node.
 pub const WIDTH: usize = 8;
 
-/// Planes of stored boxes are no farther out than this, scene units: then sums and differences of two of
-/// them are numbers.
+/// Largest absolute position of the planes of stored boxes, scene units: sums and differences of two planes
+/// stay finite.
 pub const FARTHEST_PLANE: f64 = f32::MAX as f64 / 4.0;
 
 /// Eight quantised child boxes. Plane `q` of axis `a` lies at `origin[a] + q * 2^(exponent[a]-127)`.
 #[derive(Debug, Clone, Copy, PartialEq, Pod, Zeroable)]
 #[repr(C, align(64))]
 pub struct Node {
-    /// Lower corner of the node's own box.
+    /// Lower corner of the node's box.
     pub origin: [f32; 3],
-    /// Biased power of two of the quantisation step, per axis.
+    /// Biased exponent of the quantisation step (a power of two), per axis.
     pub exponent: [u8; 3],
-    /// A bit for each child in use; they are the first ones.
+    /// A bit for each child in use; the children in use come first.
     pub child_mask: u8,
     /// Per axis: the eight lower planes, then the eight upper ones.
     pub planes: [[[u8; WIDTH]; 2]; 3],
 }
 
 impl Node {
-    /// Children in use.
+    /// Number of children in use.
     #[inline]
     pub fn child_count(&self) -> usize {
         self.child_mask.count_ones() as usize
     }
 
-    /// Encloses up to eight `children`; every quantised box holds its child.
+    /// A node around up to eight `children`; every quantised box contains its child.
     #[inline]
     pub fn enclosing(children: &[Aabb]) -> Self {
         debug_assert!(!children.is_empty() && children.len() <= WIDTH);
@@ -47,7 +47,7 @@ impl Node {
         for axis in 0..3 {
             let exponent = step_exponent(own.min[axis], own.max[axis]);
             node.exponent[axis] = exponent;
-            // A power of two: its inverse is exact.
+            // The step is a power of two, so that its inverse is exact.
             let step = decode_step(exponent);
             let inverse = 1.0 / step;
             for (slot, child) in children.iter().enumerate() {
@@ -59,14 +59,14 @@ impl Node {
         node
     }
 
-    /// Lower and upper plane of child `slot` on `axis`, exact.
+    /// Exact positions of the lower and the upper plane of child `slot` on `axis`.
     #[inline]
     pub fn interval(&self, slot: usize, axis: usize) -> [f64; 2] {
         let step = decode_step(self.exponent[axis]);
         [0, 1].map(|side| plane_at(self.origin[axis], step, self.planes[axis][side][slot]))
     }
 
-    /// Whether `bounds` lies inside the quantised box of child `slot`.
+    /// Whether `bounds` is inside the quantised box of child `slot`.
     #[inline]
     pub fn child_holds(&self, slot: usize, bounds: &Aabb) -> bool {
         (0..3).all(|axis| {
@@ -76,24 +76,24 @@ impl Node {
     }
 }
 
-/// The quantisation step that a stored exponent stands for.
+/// The quantisation step for a stored exponent.
 fn decode_step(exponent: u8) -> f64 {
     f64::from(f32::from_bits(u32::from(exponent) << 23))
 }
 
-/// Place of a plane. In f64, where it is exact for all but absurd spreads; rays, who see it in f32,
-/// allow for their rounding.
+/// The position of a plane. f64 is exact except for absurd extents; ray tests, which use f32, allow for their
+/// own rounding.
 fn plane_at(origin: f32, step: f64, plane: u8) -> f64 {
     f64::from(origin) + f64::from(plane) * step
 }
 
-/// Smallest power of two whose 255th multiple reaches from `min` to `max`.
+/// The exponent of the smallest power of two whose 255th multiple reaches from `min` to `max`.
 fn step_exponent(min: f32, max: f32) -> u8 {
     let step = (f64::from(max) - f64::from(min)) / 255.0;
     let bits = step.to_bits();
     let has_fraction = i64::from(bits & ((1 << 52) - 1) != 0);
     let biased = (bits >> 52) as i64 - 1023 + 127 + has_fraction;
-    // 1 is the smallest normal number, which also serves a box without extent.
+    // Exponent 1 is the smallest normal number, which also serves a box without extent.
     let mut exponent = biased.clamp(1, 254) as u8;
     while exponent < 254 && plane_at(min, decode_step(exponent), 255) < f64::from(max) {
         exponent += 1;
@@ -101,19 +101,19 @@ fn step_exponent(min: f32, max: f32) -> u8 {
     exponent
 }
 
-/// The highest plane at or below `value`, which is at or above `origin`.
+/// The highest plane at or below `value`; `value` must be at or above `origin`.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "truncation is the floor of a number that is not negative; saturates at 255"
 )]
 fn plane_below(origin: f32, step: f64, inverse_step: f64, value: f32) -> u8 {
     let plane = ((f64::from(value) - f64::from(origin)) * inverse_step) as u8;
-    // Of absurd spreads the difference is rounded.
+    // For absurd extents, the difference above is rounded.
     let is_above = plane_at(origin, step, plane) > f64::from(value);
     plane.saturating_sub(u8::from(is_above))
 }
 
-/// The lowest plane at or above `value`, which is at or above `origin`.
+/// The lowest plane at or above `value`; `value` must be at or above `origin`.
 fn plane_above(origin: f32, step: f64, inverse_step: f64, value: f32) -> u8 {
     let below = plane_below(origin, step, inverse_step, value);
     let is_below = plane_at(origin, step, below) < f64::from(value);
@@ -135,7 +135,7 @@ mod tests {
     }
 
     #[test]
-    fn children_without_extent_are_held_exactly() {
+    fn empty_extents_are_quantised_exactly() {
         let point = Aabb {
             min: Vec3::splat(1e4),
             max: Vec3::splat(1e4),
@@ -147,8 +147,8 @@ mod tests {
     }
 
     #[test]
-    fn boxes_of_absurd_spread_hold_their_children() {
-        // Differences of these are rounded in f64.
+    fn huge_boxes_contain_their_children() {
+        // The differences of these values are rounded in f64.
         let values = [
             -147_573_952_589_676_412_928.0,
             -8.27,
@@ -175,7 +175,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_quantised_box_holds_its_child(
+        fn every_quantised_box_contains_its_child(
             corners in prop::collection::vec(
                 (prop::array::uniform3(-1e4_f32..1e4), prop::array::uniform3(0.0_f32..100.0)),
                 1..=8,

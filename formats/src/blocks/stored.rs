@@ -1,4 +1,4 @@
-//! The leaves of a tree as a native frame has them: plain arrays in a file that is mapped.
+//! The leaves of a tree in a native frame: plain arrays in a mapped file.
 
 use glam::Vec3;
 
@@ -6,73 +6,73 @@ use super::{
     BLOCK_SIZE, Block, BlockFrame, BlockRadii, CompactBlock, Node, Q10Block, Q16Block, WIDTH,
 };
 
-/// Leaves in place. Lengths fit each other (`count` particles fill so many blocks, these so many
-/// nodes); the contents are those of a file and may be anything.
+/// The leaves, in place. The lengths match each other (blocks for `count` particles, nodes for these blocks).
+/// The contents come from a file and may be anything.
 #[derive(Debug, Clone, Copy)]
 pub struct StoredLeaves<'a> {
-    /// Particles.
+    /// Number of particles.
     pub count: u64,
-    /// One node for eight blocks: boxes of the centres, or of the spheres where radii differ.
+    /// One node for each eight blocks: boxes of the centres, or of the spheres if radii differ.
     pub nodes: &'a [Node],
-    /// Positions, [`BLOCK_SIZE`] in a block.
+    /// Positions, [`BLOCK_SIZE`] per block.
     pub blocks: StoredBlocks<'a>,
     /// Radii.
     pub radii: StoredRadii<'a>,
 }
 
-/// Positions by encoding.
+/// The positions in one of the encodings.
 #[derive(Debug, Clone, Copy)]
 pub enum StoredBlocks<'a> {
-    /// As they are.
+    /// Unchanged f32.
     F32(&'a [Block]),
-    /// 16 bits an axis.
+    /// 16 bits per axis.
     Q16(CompactBlocks<'a, Q16Block>),
     /// 11, 11 and 10 bits.
     Q10(CompactBlocks<'a, Q10Block>),
 }
 
-/// Coded blocks and those that could not be coded.
+/// Coded blocks, and the blocks that could not be coded.
 #[derive(Debug, Clone, Copy)]
 pub struct CompactBlocks<'a, B> {
-    /// All blocks, coded or referring.
+    /// All blocks: coded ones and references.
     pub blocks: &'a [B],
-    /// Those that are referred to.
+    /// The blocks that references point to.
     pub wide: &'a [Block],
 }
 
-/// Radii by encoding; `low + code * step` where they are coded.
+/// The radii in one of the encodings; coded radii are `low + code * step`.
 #[derive(Debug, Clone, Copy)]
 pub enum StoredRadii<'a> {
-    /// All alike, or unknown: none here.
+    /// All radii are equal or unknown; none are stored here.
     None,
-    /// As they are.
+    /// Unchanged f32.
     F32(&'a [BlockRadii]),
     /// 16 bits.
     U16 {
-        /// Codes, a block after the other.
+        /// Codes, block by block.
         codes: &'a [[u16; BLOCK_SIZE]],
         /// Radius of code 0.
         low: f32,
-        /// Radius between codes.
+        /// Difference of the radii of successive codes.
         step: f32,
     },
     /// 8 bits.
     U8 {
-        /// Codes, a block after the other.
+        /// Codes, block by block.
         codes: &'a [[u8; BLOCK_SIZE]],
         /// Radius of code 0.
         low: f32,
-        /// Radius between codes.
+        /// Difference of the radii of successive codes.
         step: f32,
     },
 }
 
 impl<B: CompactBlock> CompactBlocks<'_, B> {
-    /// The positions of block `index` in its grid `frame`. A reference to a block that is not
-    /// there, which only a damaged file has, gives the block decoded as if it were coded.
+    /// The positions of block `index`; `frame` is its grid. A reference to a missing block, which only a
+    /// damaged file contains, is decoded as if it were a coded block.
     ///
     /// # Panics
-    /// If there is no block `index`.
+    /// If block `index` does not exist.
     #[inline(always)]
     pub fn load(&self, index: usize, frame: &BlockFrame) -> Block {
         let block = &self.blocks[index];
@@ -84,10 +84,10 @@ impl<B: CompactBlock> CompactBlocks<'_, B> {
 }
 
 impl StoredRadii<'_> {
-    /// Radii of block `index`; `None` where they are not stored.
+    /// The radii of block `index`; `None` if no radii are stored.
     ///
     /// # Panics
-    /// If there is no block `index`.
+    /// If block `index` does not exist.
     #[inline(always)]
     pub fn load(&self, index: usize) -> Option<BlockRadii> {
         Some(match self {
@@ -107,7 +107,7 @@ impl StoredLeaves<'_> {
     /// The positions of block `index`.
     ///
     /// # Panics
-    /// If there is no block `index`.
+    /// If block `index` does not exist.
     pub fn block(&self, index: usize) -> Block {
         let frame = self.nodes[index / WIDTH].child_frame(index % WIDTH);
         match &self.blocks {
@@ -117,7 +117,7 @@ impl StoredLeaves<'_> {
         }
     }
 
-    /// Blocks.
+    /// Number of blocks.
     pub fn block_count(&self) -> usize {
         match &self.blocks {
             StoredBlocks::F32(blocks) => blocks.len(),
@@ -129,7 +129,7 @@ impl StoredLeaves<'_> {
     /// The position of particle `index`.
     ///
     /// # Panics
-    /// If there is no such particle.
+    /// If particle `index` does not exist.
     pub fn center(&self, index: usize) -> Vec3 {
         self.block(index / BLOCK_SIZE).center(index % BLOCK_SIZE)
     }

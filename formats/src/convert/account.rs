@@ -1,8 +1,8 @@
-//! What a conversion holds, counted.
+//! Counts the bytes that a conversion holds.
 
 use std::sync::atomic::{AtomicU64, Ordering};
 
-/// Bytes held now and at most.
+/// Bytes held now, and the largest number held at any time.
 #[derive(Debug, Default)]
 pub(super) struct MemoryAccount {
     now: AtomicU64,

@@ -1,4 +1,4 @@
-//! A few particles on their way out of the source: finite ones only, relative to the origin, with their rows.
+//! A batch of particles read from the source: the finite ones, relative to the origin, with their rows.
 
 use std::sync::Mutex;
 
@@ -8,17 +8,18 @@ use super::columns::{RadiusColumn, StoredColumns};
 use super::source::ParticleSource;
 use crate::{FrameError, is_near};
 
-/// Particles of one stretch of the source, and room to read them.
+/// The particles of one range of the source, and the buffers to read them.
 #[derive(Debug, Default)]
 pub(super) struct Batch {
-    /// Relative to the origin, finite.
+    /// Finite positions, relative to the origin.
     pub(super) positions: Vec<Vec3>,
-    /// A row for each of them.
+    /// One row for each position.
     pub(super) rows: Vec<u8>,
-    /// Where in the stretch they were; empty if all of it is finite.
+    /// Index in the range of each position; empty if all positions of the range are finite.
     kept: Vec<u32>,
-    /// In the order of the source.
+    /// World positions of the whole range, in the order of the source.
     pub(super) world: Vec<DVec3>,
+    /// Values of one attribute for the whole range.
     pub(super) values: Vec<u8>,
 }
 
@@ -30,7 +31,7 @@ pub(super) struct ParticleRange {
 }
 
 impl ParticleRange {
-    /// Stretch number `number` of those of `len` that `count` particles are cut into.
+    /// Range number `number` when `count` particles are cut into ranges of `len`.
     pub(super) fn nth(number: u64, len: usize, count: u64) -> Self {
         let first = number * len as u64;
         let left = usize::try_from(count - first).unwrap_or(usize::MAX);
@@ -86,8 +87,8 @@ impl Batch {
         source.read_values(attribute, stretch.first, &mut self.values)
     }
 
-    /// Reads the rows of the particles whose positions were read; `errors` grow to the largest error of each
-    /// attribute.
+    /// Reads the rows of the particles whose positions were read. Raises each of `errors` to the largest error
+    /// of its attribute.
     pub(super) fn read_rows(
         &mut self,
         source: &dyn ParticleSource,
@@ -95,6 +96,7 @@ impl Batch {
         stretch: ParticleRange,
         errors: &mut [f64],
     ) -> Result<(), FrameError> {
+        // Make room for the rows
         let width = columns.width();
         self.rows.resize(self.positions.len() * width, 0);
         if width == 0 {
@@ -102,6 +104,7 @@ impl Batch {
         }
         let mut rows = std::mem::take(&mut self.rows);
         let mut at = 0;
+        // Store the radii first
         if let Some(radius) = &columns.radius {
             let size = source.attributes()[radius.attribute].width();
             self.read_values(source, radius.attribute, size, stretch)?;
@@ -113,12 +116,15 @@ impl Batch {
             });
             at += RadiusColumn::WIDTH;
         }
+        // Store the attributes behind them
         for (column, error) in columns.attributes.iter().zip(errors) {
+            // Read the values, or number the particles
             let size = column.source_width();
             match column.attribute {
                 Some(attribute) => self.read_values(source, attribute, size, stretch)?,
                 None => self.fill_places(size, stretch),
             }
+            // Encode the value of each kept particle
             let own = at..at + column.width();
             let mut row = rows.chunks_exact_mut(width);
             self.for_each_place(|place| {
@@ -133,7 +139,7 @@ impl Batch {
         Ok(())
     }
 
-    /// The indices of the particles in the source as values of `size` bytes.
+    /// Fills `values` with the indices of the particles in the source, `size` bytes each.
     fn fill_places(&mut self, size: usize, stretch: ParticleRange) {
         self.values.clear();
         for place in stretch.first..stretch.first + stretch.len as u64 {
@@ -142,8 +148,7 @@ impl Batch {
     }
 }
 
-/// Buffers for reuse, as many as are in use at a time: a thread takes no new memory while another
-/// has let go.
+/// Buffers for reuse. The pool allocates only as many as are in use at the same time.
 #[derive(Debug, Default)]
 pub(super) struct BufferPool<T>(Mutex<Vec<T>>);
 

@@ -1,4 +1,4 @@
-//! Nodes are of one part only: what is too much for whole nodes goes on to the next part.
+//! Keeps each node within one part: particles that do not fill a whole node move to the next part.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -6,11 +6,10 @@ use rayon::prelude::*;
 use super::curve::Curve;
 use super::order::PartData;
 
-/// Particles that a task counts.
+/// Particles that one task counts.
 const TASK: usize = 1 << 16;
 
-/// Takes from `part` those particles beyond a multiple of `unit` that are last on `curve`: the next part begins
-/// where they are.
+/// Removes the particles of `part` beyond a multiple of `unit`, the last ones on `curve`. The next part begins there.
 pub(super) fn carry_last(
     part: &mut PartData,
     curve: &Curve,
@@ -23,7 +22,7 @@ pub(super) fn carry_last(
     part.take(&carried, width)
 }
 
-/// The numbers of the `count` particles that are last on the curve.
+/// The indices of the `count` particles that are last on the curve.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a part has fewer than 2^32 particles"
@@ -33,12 +32,13 @@ fn last_on(positions: &[Vec3], curve: &Curve, count: usize) -> Vec<u32> {
         return Vec::new();
     }
     let counts = count_cells(positions, curve);
-    // The cell that has the first of them; all particles of the cells behind it are among them.
+    // Find the cell of the first of these particles; all particles of later cells belong to them too
     let (mut cell, mut behind) = (counts.len() - 1, 0);
     while behind + counts[cell] < count {
         behind += counts[cell];
         cell -= 1;
     }
+    // Collect the particles of this cell and of later cells
     let is_among = |(number, position): (usize, &Vec3)| {
         (curve.cell(*position) >= cell).then_some(number as u32)
     };
@@ -47,15 +47,16 @@ fn last_on(positions: &[Vec3], curve: &Curve, count: usize) -> Vec<u32> {
     let cell_of = |number: &u32| curve.cell(positions[*number as usize]);
     let (mut last, mut own): (Vec<u32>, Vec<u32>) =
         among.into_iter().partition(|number| cell_of(number) > cell);
-    let wanted = count - behind;
-    let rest = own.len() - wanted;
+    // Sort the particles of the cell, unless there are too many
+    let needed = count - behind;
+    let rest = own.len() - needed;
     if rest > 0 && own.len() <= positions.len() / 8 {
         let place = |number: &u32| (curve.place(positions[*number as usize]), *number);
         let mut places: Vec<(u64, u32)> = own.par_iter().map(place).collect();
         places.select_nth_unstable(rest);
         own = places.into_iter().map(|(_, number)| number).collect();
     }
-    // Of a cell with very many any are taken: they are too close together to matter, and too many to sort.
+    // In a very full cell, any particles do: they are too close together to matter, and too many to sort.
     last.extend(&own[rest..]);
     last
 }
@@ -81,23 +82,23 @@ mod tests {
     use crate::generate::{BoxSettings, fill_box};
     use crate::native::tests::clustered;
 
-    /// Every particle of `all` is in one of `parts`, with its own row: its number.
+    /// Each particle of `all` is in exactly one of `parts`, with its own row, which holds its index.
     #[track_caller]
     fn assert_complete(all: &[Vec3], parts: [&PartData; 2]) {
-        let mut seen = vec![false; all.len()];
+        let mut visited = vec![false; all.len()];
         for part in parts {
             assert_eq!(part.rows.len(), 4 * part.len());
             for (position, row) in part.positions.iter().zip(part.rows.as_chunks().0) {
                 let number = u32::from_le_bytes(*row) as usize;
                 assert_eq!(all[number], *position);
-                assert!(!std::mem::replace(&mut seen[number], true));
+                assert!(!std::mem::replace(&mut visited[number], true));
             }
         }
-        assert!(seen.into_iter().all(|s| s));
+        assert!(visited.into_iter().all(|s| s));
     }
 
     #[test]
-    fn the_last_on_the_curve_go_on() {
+    fn samples_include_the_end_of_the_curve() {
         let coincident = vec![Vec3::splat(2.0); 3000];
         for all in [
             clustered(10_000),
@@ -107,7 +108,7 @@ mod tests {
         ] {
             let curve = Curve::over(&all);
             let (part, carried) = carried_of(&all, &curve);
-            // Of a cell with very many it does not matter which.
+            // In a very full cell, any particles may be carried.
             let cells = |part: &PartData| -> Vec<usize> {
                 part.positions.iter().map(|p| curve.cell(*p)).collect()
             };
@@ -123,7 +124,7 @@ mod tests {
         assert!(places(&part).iter().max() <= places(&carried).iter().min());
     }
 
-    /// What stays and what goes on.
+    /// The particles that stay and the particles that are carried.
     #[track_caller]
     fn carried_of(all: &[Vec3], curve: &Curve) -> (PartData, PartData) {
         let mut part = PartData {

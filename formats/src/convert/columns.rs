@@ -1,4 +1,4 @@
-//! What is stored of a particle beside its position: a row of bytes.
+//! The row of bytes that is stored for each particle beside its position.
 
 use std::path::Path;
 
@@ -10,18 +10,18 @@ use crate::names::{self, RADII, RADIUS};
 use crate::native::{AttributeSpec, StoredType};
 use crate::{ScalarType, is_radius};
 
-/// The rows of a conversion: the radius in f32 first where particles have their own, then attributes as they
-/// will be stored.
+/// The layout of the rows of a conversion: first the radius in f32 if particles have their own, then the
+/// attributes as they are stored.
 #[derive(Debug, Clone)]
 pub(super) struct StoredColumns {
     pub(super) radius: Option<RadiusColumn>,
     pub(super) attributes: Vec<StoredColumn>,
 }
 
-/// Radii of their own.
+/// The attribute that holds the radii.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct RadiusColumn {
-    /// Number of the attribute in the source.
+    /// Index of the attribute in the source.
     pub(super) attribute: usize,
     scalar: ScalarType,
     scale: f64,
@@ -30,20 +30,20 @@ pub(super) struct RadiusColumn {
 /// One attribute.
 #[derive(Debug, Clone)]
 pub(super) struct StoredColumn {
-    /// Number in the source; `None` for the particle's index.
+    /// Index in the source; `None` for the particle's index.
     pub(super) attribute: Option<usize>,
     pub(super) name: String,
     pub(super) components: usize,
     pub(super) scalar: ScalarType,
     pub(super) stored: StoredType,
-    /// Of each component, for [`StoredType::Ranged`].
+    /// Range of each component, for [`StoredType::Ranged`].
     pub(super) ranges: Vec<[f64; 2]>,
 }
 
 impl RadiusColumn {
     pub(super) const WIDTH: usize = size_of::<f32>();
 
-    /// Radii of particles whose values in the source are `values`.
+    /// The radii of particles; `values` are their values in the source.
     #[expect(
         clippy::cast_possible_truncation,
         reason = "radii are f32 in the renderer"
@@ -62,7 +62,7 @@ impl StoredColumn {
         self.components * self.scalar.size()
     }
 
-    /// Bytes of one particle as stored.
+    /// Stored bytes of one particle.
     pub(super) fn width(&self) -> usize {
         self.components * self.stored.size()
     }
@@ -70,10 +70,12 @@ impl StoredColumn {
     /// Stores the values of one particle; returns the largest error.
     #[inline]
     pub(super) fn store(&self, values: &[u8], to: &mut [u8]) -> f64 {
+        // Copy values that keep their type
         if self.stored == StoredType::Plain(self.scalar) {
             to.copy_from_slice(values);
             return 0.0;
         }
+        // Convert the others, and measure the largest error
         let plain = StoredType::Plain(self.scalar);
         let values = values.chunks_exact(self.scalar.size());
         let mut largest = 0.0_f64;
@@ -118,7 +120,7 @@ impl StoredColumn {
     }
 }
 
-/// Infinities and what is not a number are stored as such where they can be.
+/// The absolute error. Equal infinities have no error, nor has NaN that is stored as NaN.
 fn difference(value: f64, stored: f64) -> f64 {
     let is_same = value == stored || value.is_nan() && stored.is_nan();
     if is_same { 0.0 } else { (value - stored).abs() }
@@ -139,7 +141,7 @@ fn code_of(value: f64, range: [f64; 2]) -> u8 {
 }
 
 impl StoredColumns {
-    /// What `settings` keep of `source`.
+    /// The columns that `settings` select from `source`.
     pub(super) fn choose(
         source: &dyn ParticleSource,
         settings: &ConvertSettings,
@@ -147,6 +149,7 @@ impl StoredColumns {
     ) -> Result<Self, ConvertError> {
         let attributes = source.attributes();
         check(attributes, settings, path)?;
+        // Find out where the radii come from
         let radius = match settings.radius {
             RadiusRule::All(_) => None,
             RadiusRule::Source { .. } => radius_of(attributes),
@@ -157,6 +160,7 @@ impl StoredColumns {
                 radius.is_some() || source.common_radius().or(otherwise).is_some()
             }
         };
+        // Choose how to store each attribute
         let mut columns = Vec::new();
         for (number, attribute) in attributes.iter().enumerate() {
             let stored = match settings.choice(&attribute.name) {
@@ -166,7 +170,7 @@ impl StoredColumns {
                 AttributeChoice::Ranged => StoredType::Ranged,
                 AttributeChoice::LeaveOut => continue,
             };
-            // Radii are stored once.
+            // The radii are stored already.
             if has_radius && is_float(attribute) && attribute.name.eq_ignore_ascii_case(RADIUS) {
                 continue;
             }
@@ -179,6 +183,7 @@ impl StoredColumns {
                 ranges: Vec::new(),
             });
         }
+        // Add the particle indices
         let has_ids = attributes.iter().any(|a| a.name.eq_ignore_ascii_case("id"));
         if settings.keep_ids && !has_ids {
             columns.push(place_column(source.count()));
@@ -200,7 +205,7 @@ impl StoredColumns {
                 .sum::<usize>()
     }
 
-    /// Most bytes that one particle has for one attribute of the source.
+    /// The largest number of bytes that one particle has for one attribute of the source.
     pub(super) fn widest(&self) -> usize {
         let widths = self.attributes.iter().map(StoredColumn::source_width);
         widths.chain([8]).max().unwrap_or(8)
@@ -236,10 +241,10 @@ fn is_float(attribute: &SourceAttribute) -> bool {
     is_float && attribute.components == 1
 }
 
-/// Radii by the names that simulations and Houdini use.
+/// The attribute that holds radii, by the names that simulations and Houdini use.
 fn radius_of(attributes: &[SourceAttribute]) -> Option<RadiusColumn> {
-    let named = |(wanted, scale): (&str, f64)| {
-        let is_it = |a: &SourceAttribute| is_float(a) && a.name.eq_ignore_ascii_case(wanted);
+    let named = |(name, scale): (&str, f64)| {
+        let is_it = |a: &SourceAttribute| is_float(a) && a.name.eq_ignore_ascii_case(name);
         let attribute = attributes.iter().position(is_it)?;
         let scalar = attributes[attribute].scalar;
         Some(RadiusColumn {
@@ -256,6 +261,7 @@ fn check(
     settings: &ConvertSettings,
     path: &Path,
 ) -> Result<(), ConvertError> {
+    // Check that each named attribute exists
     for (name, _) in &settings.attributes {
         if !attributes.iter().any(|a| a.name == *name) {
             let there: Vec<&str> = attributes.iter().map(|a| a.name.as_str()).collect();
@@ -268,6 +274,7 @@ fn check(
             return Err(ConvertError::refused(path, what));
         }
     }
+    // Check that ids are stored without loss
     for attribute in attributes {
         let is_changed = !matches!(
             settings.choice(&attribute.name),
@@ -281,6 +288,7 @@ fn check(
             return Err(ConvertError::refused(path, what));
         }
     }
+    // Check the common radius
     if let RadiusRule::All(radius)
     | RadiusRule::Source {
         otherwise: Some(radius),

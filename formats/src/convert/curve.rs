@@ -1,4 +1,4 @@
-//! Where to cut a space-filling curve so that parts are of a wanted size, and where particles are on it.
+//! Cuts a space-filling curve into parts of a given size, and locates particles on it.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -8,7 +8,7 @@ use crate::order::curve::{AXIS_BITS, CurveState, Grid, TopCells, hilbert};
 /// Bits of a curve position below those of the top cells.
 const LOWER_BITS: u32 = 3 * (AXIS_BITS - TopCells::MAX_LEVELS);
 
-/// The curve over the bulk of some particles: those that escaped are at its border.
+/// A space-filling curve over the bulk of some particles. Particles outside the bulk are clamped to its border.
 #[derive(Debug)]
 pub(super) struct Curve {
     grid: Grid,
@@ -16,7 +16,7 @@ pub(super) struct Curve {
 }
 
 impl Curve {
-    /// Over the bulk of `sample`: from the 1st to the 99th percentile and half as much again.
+    /// The curve over the bulk of `sample`: the box from the 1st to the 99th percentile, enlarged by half.
     pub(super) fn over(sample: &[Vec3]) -> Self {
         let (min, max) = bulk(sample);
         let grid = Grid::new(min, max - min);
@@ -36,7 +36,7 @@ impl Curve {
         .0
     }
 
-    /// The highest bits of the curve position, at little cost.
+    /// The cell of `position`: the highest bits of its curve position, cheap to compute.
     #[inline]
     pub(super) fn cell(&self, position: Vec3) -> usize {
         self.top.cell_of(position)
@@ -48,11 +48,12 @@ impl Curve {
     }
 }
 
-/// The box of the bulk; of everything where the bulk is one point.
+/// The bounding box of the bulk, or of all particles if the bulk is one point.
 fn bulk(sample: &[Vec3]) -> (Vec3, Vec3) {
     let Some(last) = sample.len().checked_sub(1) else {
         return (Vec3::ZERO, Vec3::ZERO);
     };
+    // Compute the box without the `trimmed` smallest and largest values of each axis
     let ends = |trimmed: usize| {
         let of_axis = |axis: usize| {
             let mut values: Vec<f32> = sample.iter().map(|p| p[axis]).collect();
@@ -67,6 +68,7 @@ fn bulk(sample: &[Vec3]) -> (Vec3, Vec3) {
         let high = Vec3::new(x[1], y[1], z[1]);
         (low, high)
     };
+    // Enlarge the box between the percentiles
     let (low, high) = ends(sample.len() / 100);
     if low == high {
         return ends(0);
@@ -75,32 +77,35 @@ fn bulk(sample: &[Vec3]) -> (Vec3, Vec3) {
     (low - margin, high + margin)
 }
 
-/// Parts of a curve.
+/// A curve that is cut into parts.
 #[derive(Debug)]
 pub(super) struct Cuts {
     pub(super) curve: Curve,
-    /// Where each part but the first begins; increasing.
+    /// The first curve position of each part except the first, in increasing order.
     starts: Vec<u64>,
-    /// For each top cell the part that all of it is in, or [`MIXED`].
+    /// For each top cell, the part that contains the whole cell, or [`MIXED`].
     parts: Vec<u16>,
 }
 
-/// A top cell with several parts.
+/// Marks a top cell with several parts.
 const MIXED: u16 = u16::MAX;
 
 impl Cuts {
-    /// Cuts the curve over `sample` into up to `parts` parts with as many of the sample in each. There are fewer
-    /// where particles coincide.
+    /// Cuts the curve over `sample` into at most `parts` parts with equally many samples each. Coincident
+    /// particles can make the number of parts smaller.
     pub(super) fn quantiles(sample: &[Vec3], parts: usize) -> Self {
+        // Sort the samples along the curve
         let curve = Curve::over(sample);
         let mut places: Vec<u64> = sample.par_iter().map(|p| curve.place(*p)).collect();
         places.par_sort_unstable();
+        // Cut at the quantiles
         let mut starts: Vec<u64> = (1..parts)
             .filter_map(|part| places.get(part * places.len() / parts).copied())
             .collect();
         starts.dedup();
-        // Nothing is before the first of all.
+        // A cut at the first sample would make an empty part.
         starts.retain(|start| Some(start) > places.first());
+        // Find the cells that are in one part
         let part_of = |place: u64| starts.partition_point(|start| *start <= place);
         let of_cell = |cell: usize| {
             let first = (cell as u64) << LOWER_BITS;
@@ -116,12 +121,12 @@ impl Cuts {
         }
     }
 
-    /// Parts.
+    /// Number of parts.
     pub(super) fn len(&self) -> usize {
         self.starts.len() + 1
     }
 
-    /// The part that `position` is in.
+    /// The part that contains `position`.
     #[inline]
     pub(super) fn part(&self, position: Vec3) -> usize {
         let part = self.parts[self.curve.cell(position)];

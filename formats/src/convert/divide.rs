@@ -1,5 +1,5 @@
-//! Particles are brought into the parts of a curve: stretches of the source, or chunks of a part that is too
-//! large, are sorted by part one by one, many at a time, and then appended to their parts in their order.
+//! Distributes particles over the parts of a curve. Batches of the source, or chunks of a part that is too
+//! large, are sorted by part in parallel and then appended to their parts in order.
 
 use std::ops::Range;
 use std::sync::{Arc, Mutex};
@@ -15,14 +15,14 @@ use super::settings::{ConvertError, Phase};
 use super::store::{Chunk, ChunkStore, StoredChunk};
 use crate::FrameError;
 
-/// Particles of one section of the curve, not yet ordered.
+/// The particles of one section of the curve, not yet ordered.
 #[derive(Debug)]
 pub(super) struct UnorderedPart {
     pub(super) held: Vec<StoredChunk>,
     pub(super) len: usize,
-    /// The curve that it was cut from.
+    /// The cuts that made this part.
     pub(super) cuts: Arc<Cuts>,
-    /// How often it was divided from a larger one.
+    /// Number of divisions that led to this part.
     pub(super) depth: u32,
 }
 
@@ -39,30 +39,32 @@ struct Heap {
 struct PartitionedBatch {
     positions: Vec<Vec3>,
     rows: Vec<u8>,
-    /// Where each part begins, and the end.
+    /// Start of each part, and the end of the last one.
     starts: Vec<u32>,
-    /// Parts of the particles before they were sorted.
+    /// Part of each particle, in the order before the sort.
     parts: Vec<u16>,
 }
 
-/// All of the source in parts.
+/// Distributes the whole source over the parts of `cuts`.
 pub(super) fn divide_source(
     output: &mut FrameOutput,
     cuts: Cuts,
     limits: &Limits,
     store: &ChunkStore,
 ) -> Result<Vec<UnorderedPart>, ConvertError> {
-    let (asked, columns) = (output.asked, output.columns);
+    let (request, columns) = (output.request, output.columns);
     let width = columns.width();
-    let total = asked.source.count();
+    let total = request.source.count();
     let stretches = total.div_ceil(limits.batch_len as u64);
     let (batches, stages) = (
         BufferPool::<Batch>::default(),
         BufferPool::<PartitionedBatch>::default(),
     );
+    // Create an empty heap for each part
     let errors = Mutex::new(std::mem::take(&mut output.errors));
     let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
     let mut first = 0;
+    // Read, sort and append a window of batches at a time
     while first < stretches {
         let end = stretches.min(first + limits.window as u64);
         let staged = (first..end)
@@ -70,9 +72,10 @@ pub(super) fn divide_source(
             .map(|number| {
                 let (mut batch, mut staged) = (batches.take(), stages.take());
                 let stretch = ParticleRange::nth(number, limits.batch_len, total);
-                batch.read_positions(asked.source, asked.settings.origin, stretch)?;
+                batch.read_positions(request.source, request.settings.origin, stretch)?;
                 let mut own_errors = vec![0.0; columns.attributes.len()];
-                batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
+                batch.read_rows(request.source, columns, stretch, &mut own_errors)?;
+                // Raise the errors of the attributes
                 let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());
                 for (all, own) in errors.iter_mut().zip(own_errors) {
                     *all = f64::max(*all, own);
@@ -83,22 +86,24 @@ pub(super) fn divide_source(
                 Ok(staged)
             })
             .collect::<Result<Vec<PartitionedBatch>, ConvertError>>()?;
+        // Append the window in the order of the source
         append_all(&mut heaps, &staged, width, store)?;
         staged.into_iter().for_each(|s| stages.put(s));
         first = end;
         let done = total.min(first * limits.batch_len as u64);
-        asked.advance(Phase::Divide, done, total)?;
+        request.advance(Phase::Divide, done, total)?;
     }
+    // Check that the source still has the surveyed number of particles
     output.errors = errors.into_inner().unwrap_or_else(|e| e.into_inner());
     let piles = closed(heaps, cuts, 1, store)?;
     let found: u64 = piles.iter().map(|pile| pile.len as u64).sum();
     if found != output.survey.count {
-        return Err(asked.changed());
+        return Err(request.changed());
     }
     Ok(piles)
 }
 
-/// `pile` in smaller parts.
+/// Divides `pile` into smaller parts.
 pub(super) fn divide_pile(
     pile: UnorderedPart,
     cuts: Cuts,
@@ -110,6 +115,7 @@ pub(super) fn divide_pile(
     let mut heaps: Vec<Heap> = (0..cuts.len()).map(|_| Heap::default()).collect();
     let together = (limits.window * limits.batch_len / store.chunk_len()).max(1);
     let mut held = pile.held.into_iter();
+    // Sort and append a few chunks at a time
     loop {
         let some: Vec<StoredChunk> = held.by_ref().take(together).collect();
         if some.is_empty() {
@@ -171,7 +177,7 @@ fn closed(
 }
 
 impl Heap {
-    /// Takes in records `range` of `staged`.
+    /// Appends records `range` of `staged`.
     fn append(
         &mut self,
         staged: &PartitionedBatch,
@@ -181,6 +187,7 @@ impl Heap {
     ) -> Result<(), FrameError> {
         self.len += range.len();
         while !range.is_empty() {
+            // Fill the open chunk
             let mut open = match self.open.take() {
                 Some(open) => open,
                 None => store.take()?,
@@ -191,6 +198,7 @@ impl Heap {
             open.rows
                 .extend_from_slice(&staged.rows[own.start * width..own.end * width]);
             open.positions.extend_from_slice(&staged.positions[own]);
+            // Store the chunk when it is full
             if open.positions.len() == store.chunk_len() {
                 self.held.push(store.put(open)?);
             } else {
@@ -203,8 +211,9 @@ impl Heap {
 }
 
 impl PartitionedBatch {
-    /// Takes in records, in their order within each part.
+    /// Sorts the records by part; the order within each part stays.
     fn sort(&mut self, positions: &[Vec3], rows: &[u8], width: usize, cuts: &Cuts) {
+        // Count the particles of each part
         self.parts.clear();
         self.starts.clear();
         self.starts.resize(cuts.len() + 1, 0);
@@ -214,12 +223,13 @@ impl PartitionedBatch {
             self.parts.push(part as u16);
             self.starts[part + 1] += 1;
         }
+        // Turn the counts into starts
         for part in 0..cuts.len() {
             self.starts[part + 1] += self.starts[part];
         }
         self.positions.resize(positions.len(), Vec3::ZERO);
         self.rows.resize(rows.len(), 0);
-        // Each start moves to the end of its part, which is the next one's start.
+        // Scatter the records: each start moves to the end of its part, which is the start of the next one
         for (number, part) in self.parts.iter().enumerate() {
             let slot = &mut self.starts[usize::from(*part)];
             let to = *slot as usize;
@@ -229,6 +239,7 @@ impl PartitionedBatch {
                 self.rows[to * width..][..width].copy_from_slice(&rows[number * width..][..width]);
             }
         }
+        // Move the starts back
         self.starts.rotate_right(1);
         self.starts[0] = 0;
     }

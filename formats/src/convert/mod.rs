@@ -1,14 +1,14 @@
-//! Frames of any size become native frames.
+//! Converts frames of any size to native frames.
 //!
-//! A source ([`ParticleSource`]) is read twice: to survey it (`survey.rs`), and to bring every particle into
-//! tree order. What fits into the memory that the settings allow is ordered at once. A larger source is divided
-//! along a space-filling curve into parts that fit (`divide.rs`), whose particles are kept in chunks in memory
-//! or, beyond it, in a scratch file (`store.rs`). Parts are then ordered one after the other, while the next one
-//! is loaded and the last one written.
+//! A source ([`ParticleSource`]) is read twice: once to survey it (`survey.rs`), and once to bring every
+//! particle into tree order. A source that fits into the memory limit of the settings is ordered at once. A
+//! larger source is divided along a space-filling curve into parts that fit (`divide.rs`). Their particles are
+//! stored in chunks in memory and, when memory is full, in a scratch file (`store.rs`). The parts are then
+//! ordered one after the other; the next part is loaded and the last one is written at the same time.
 //!
-//! The bytes of a frame depend on source and settings, and with more than one part on how large these are,
-//! which follows from [`ConvertSettings::memory`] and the width of what is kept; never on threads or on what was
-//! put aside on disk.
+//! The bytes of a frame depend on the source and the settings. With more than one part, they also depend on the
+//! part size, which follows from [`ConvertSettings::memory`] and the width of the rows. They never depend on
+//! the number of threads or on what was spilled to disk.
 
 use std::path::Path;
 use std::time::Instant;
@@ -46,17 +46,17 @@ pub use settings::{
 pub use source::{ParticleSource, SourceAttribute};
 pub use sources::{BlockSettings, BlockSource, BoxSource, NativeSource, RawSource};
 
-/// Writes what `source` holds to `path` as a native frame.
+/// Writes the particles of `source` to `path` as a native frame.
 ///
 /// # Errors
-/// [`ConvertError`]; no file is left over then.
+/// [`ConvertError`]; in that case no file is left behind.
 pub fn convert(
     source: &dyn ParticleSource,
     path: &Path,
     settings: &ConvertSettings,
     progress: &dyn Progress,
 ) -> Result<ConvertReport, ConvertError> {
-    let asked = ConvertRequest {
+    let request = ConvertRequest {
         source,
         path,
         settings,
@@ -64,11 +64,11 @@ pub fn convert(
     };
     let columns = StoredColumns::choose(source, settings, path)?;
     let limits = Limits::of(settings, source.count(), columns.width(), columns.widest());
-    convert_within(asked, columns, limits)
+    convert_within(request, columns, limits)
 }
 
-/// [`convert`] of a source that is much too large for the memory: in the smallest parts, all of which go to disk.
-/// For fuzzing, since the memory that settings can ask for holds any source of a few megabytes.
+/// [`convert`] for a source that is much larger than the memory: with the smallest parts, all of them spilled to
+/// disk. Used for fuzzing, because the smallest memory that settings allow holds any source of a few megabytes.
 ///
 /// # Errors
 /// As [`convert`].
@@ -78,22 +78,23 @@ pub fn convert_in_parts(
     path: &Path,
     settings: &ConvertSettings,
 ) -> Result<ConvertReport, ConvertError> {
-    let asked = ConvertRequest {
+    let request = ConvertRequest {
         source,
         path,
         settings,
         progress: &(),
     };
     let columns = StoredColumns::choose(source, settings, path)?;
-    convert_within(asked, columns, Limits::SMALLEST)
+    convert_within(request, columns, Limits::SMALLEST)
 }
 
 /// Converts within `limits`.
 fn convert_within(
-    asked: ConvertRequest,
+    request: ConvertRequest,
     columns: StoredColumns,
     limits: Limits,
 ) -> Result<ConvertReport, ConvertError> {
+    // Survey the source
     let mut clock = Clock::new();
     let account = MemoryAccount::default();
     let reading = BatchSettings {
@@ -101,13 +102,15 @@ fn convert_within(
         sample_stride: if limits.is_whole {
             0
         } else {
-            asked.source.count().div_ceil(limits.sample_len).max(1)
+            request.source.count().div_ceil(limits.sample_len).max(1)
         },
     };
-    let survey = survey(asked, &columns, reading)?;
+    let survey = survey(request, &columns, reading)?;
     clock.lap(Phase::Survey);
-    let (columns, common) = survey.settled(asked.path, columns)?;
-    let mut output = FrameOutput::new(asked, &columns, &survey, common, limits.run_len);
+    // Choose the columns that are stored
+    let (columns, common) = survey.settled(request.path, columns)?;
+    let mut output = FrameOutput::new(request, &columns, &survey, common, limits.run_len);
+    // Order and write the particles
     let divided = if limits.is_whole {
         whole::convert(&mut output, &limits, &account)?;
         PartCounts {
@@ -118,6 +121,7 @@ fn convert_within(
         parts::convert(&mut output, &limits, &account, &mut clock)?
     };
     clock.lap(Phase::Order);
+    // Complete the file
     let index = output.finish()?;
     clock.lap(Phase::Finish);
     Ok(ConvertReport {
@@ -129,7 +133,7 @@ fn convert_within(
     })
 }
 
-/// Seconds of phases.
+/// Measures the seconds of each phase.
 struct Clock {
     last: Instant,
     seconds: Vec<(Phase, f64)>,
@@ -143,7 +147,7 @@ impl Clock {
         }
     }
 
-    /// `phase` ends now.
+    /// Ends `phase` now.
     fn lap(&mut self, phase: Phase) {
         let now = Instant::now();
         let seconds = now.duration_since(self.last).as_secs_f64();

@@ -1,4 +1,4 @@
-//! Particles of one part come into tree order and go to the file run by run.
+//! Brings the particles of one part into tree order and writes them run by run.
 
 use std::ops::Range;
 
@@ -40,7 +40,7 @@ impl PartData {
         self.rows.clear();
     }
 
-    /// Takes in all of `other`, before what is there: of coincident particles those that come from an earlier
+    /// Inserts all of `other` before the present particles: among coincident particles, those of an earlier
     /// part come first.
     pub(super) fn prepend(&mut self, other: &mut Self) {
         let (positions, rows) = (other.positions.len(), other.rows.len());
@@ -50,12 +50,13 @@ impl PartData {
         self.rows.rotate_right(rows);
     }
 
-    /// Takes out the particles with these numbers, which increase; those that stay keep their order.
+    /// Removes and returns the particles with these indices, which must increase. The others keep their order.
     pub(super) fn take(&mut self, numbers: &[u32], width: usize) -> Self {
         let mut taken = Self::default();
         let mut kept = 0;
         for (nth, number) in numbers.iter().enumerate() {
             let number = *number as usize;
+            // Take out the particle
             taken.positions.push(self.positions[number]);
             taken
                 .rows
@@ -64,6 +65,7 @@ impl PartData {
             if nth == 0 {
                 kept = number;
             }
+            // Close the gap up to the next one
             let staying = number + 1..next;
             self.positions.copy_within(staying.clone(), kept);
             self.rows
@@ -77,12 +79,12 @@ impl PartData {
     }
 }
 
-/// Buffers to order parts, reused for each.
+/// Buffers to order parts, reused for each part.
 #[derive(Debug, Default)]
 pub(super) struct OrderedPart {
-    /// In tree order.
+    /// Positions in tree order.
     pub(super) positions: Vec<Vec3>,
-    /// Where in the part each of them was; empty if there are no rows.
+    /// Index in the part of each position; empty if there are no rows.
     indices: Vec<u32>,
     /// Rows of a run.
     rows: Vec<u8>,
@@ -103,7 +105,7 @@ impl OrderedPart {
         }
     }
 
-    /// Takes in the order of `part`.
+    /// Computes the order of `part`.
     pub(super) fn order(&mut self, part: &PartData, account: &MemoryAccount) {
         let len = part.len();
         self.positions.resize(len, Vec3::ZERO);
@@ -122,7 +124,7 @@ impl OrderedPart {
         arrange(&mut self.positions, &mut self.indices);
     }
 
-    /// Gives particles `run` of `part`, which was ordered, to the file.
+    /// Writes particles `run` of `part`, which must be ordered already.
     pub(super) fn push(
         &mut self,
         part: &PartData,
@@ -145,6 +147,7 @@ impl OrderedPart {
         if width == 0 {
             return;
         }
+        // Gather the rows in tree order
         self.rows.resize(run.len() * width, 0);
         self.rows
             .par_chunks_mut(TASK * width)
@@ -154,6 +157,7 @@ impl OrderedPart {
                     row.copy_from_slice(&part.rows[*index as usize * width..][..width]);
                 }
             });
+        // Split off the radii
         let rows = &self.rows;
         let mut at = 0;
         if columns.radius.is_some() {
@@ -168,6 +172,7 @@ impl OrderedPart {
                 });
             at += RadiusColumn::WIDTH;
         }
+        // Split the rows into attributes
         for (column, values) in columns.attributes.iter().zip(&mut self.attributes) {
             let own = at..at + column.width();
             values.resize(run.len() * own.len(), 0);

@@ -1,4 +1,4 @@
-//! The frame that comes of a conversion, begun when the first part is in order.
+//! The output frame of a conversion, started when the first part is in order.
 
 use super::columns::StoredColumns;
 use super::order::{OrderedPart, PartData};
@@ -9,14 +9,14 @@ use crate::native::{
     FrameIndex, FrameSpec, FrameWriter, RadiusSpec, radius_range, smallest_encoding,
 };
 
-/// Writes ordered parts to the frame.
+/// Writes ordered parts to the output frame.
 pub(super) struct FrameOutput<'a> {
-    pub(super) asked: ConvertRequest<'a>,
+    pub(super) request: ConvertRequest<'a>,
     pub(super) columns: &'a StoredColumns,
     pub(super) survey: &'a Survey,
-    /// Largest error of each attribute; known before the first part comes.
+    /// Largest error of each attribute, known before the first part is written.
     pub(super) errors: Vec<f64>,
-    /// Radius of all particles that have radii of their own, if these are alike.
+    /// The radius of all particles, if they have radii of their own that are all equal.
     common: Option<f32>,
     run_len: usize,
     pushed: u64,
@@ -25,14 +25,14 @@ pub(super) struct FrameOutput<'a> {
 
 impl<'a> FrameOutput<'a> {
     pub(super) fn new(
-        asked: ConvertRequest<'a>,
+        request: ConvertRequest<'a>,
         columns: &'a StoredColumns,
         survey: &'a Survey,
         common: Option<f32>,
         run_len: usize,
     ) -> Self {
         Self {
-            asked,
+            request,
             columns,
             survey,
             errors: vec![0.0; columns.attributes.len()],
@@ -58,9 +58,9 @@ impl<'a> FrameOutput<'a> {
             let end = part.len().min(first + self.run_len);
             ordered
                 .push(part, self.columns, first..end, &mut writer)
-                .map_err(|e| FrameError::io(self.asked.path, e))?;
+                .map_err(|e| FrameError::io(self.request.path, e))?;
             self.pushed += (end - first) as u64;
-            self.asked
+            self.request
                 .advance(Phase::Order, self.pushed, self.survey.count)?;
             first = end;
         }
@@ -68,27 +68,28 @@ impl<'a> FrameOutput<'a> {
         Ok(())
     }
 
-    /// Completes the frame, if the source is what it was all the time.
+    /// Completes the frame, if the source did not change meanwhile.
     pub(super) fn finish(mut self) -> Result<FrameIndex, ConvertError> {
         let writer = match self.writer.take() {
             Some(writer) => writer,
             None => self.begin(&OrderedPart::default())?,
         };
-        self.asked.source.check()?;
+        self.request.source.check()?;
         let total = self.survey.count;
-        self.asked.advance(Phase::Finish, total, total)?;
+        self.request.advance(Phase::Finish, total, total)?;
         let finished = writer.finish();
-        Ok(finished.map_err(|e| FrameError::io(self.asked.path, e))?)
+        Ok(finished.map_err(|e| FrameError::io(self.request.path, e))?)
     }
 
-    /// Begins the frame, whose first particles are `ordered`.
+    /// Starts the frame; `ordered` are its first particles.
     fn begin(&self, ordered: &OrderedPart) -> Result<FrameWriter, ConvertError> {
         let ConvertRequest {
             source,
             settings,
             path,
             ..
-        } = self.asked;
+        } = self.request;
+        // Find the common radius
         let own = self.survey.radii.filter(|_| self.columns.radius.is_some());
         let common = match settings.radius {
             RadiusRule::All(radius) => Some(radius),
@@ -96,13 +97,15 @@ impl<'a> FrameOutput<'a> {
                 self.common.or(source.common_radius()).or(otherwise)
             }
         };
+        // Choose the encoding
         let smallest = own.map(|[low, _]| low).or(common);
         let encoding = settings
             .encoding
             .unwrap_or_else(|| smallest_encoding(&ordered.positions, settings.bound, smallest));
+        // Describe the frame
         let attributes = self.columns.attributes.iter().zip(&self.errors);
         let spec = FrameSpec {
-            is_y_up: self.asked.settings.is_y_up,
+            is_y_up: self.request.settings.is_y_up,
             count: self.survey.count,
             encoding,
             bound: settings.bound,

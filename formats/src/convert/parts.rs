@@ -1,4 +1,4 @@
-//! A source that does not fit into memory: part after part is ordered and written while the next is loaded.
+//! Converts a source that does not fit into memory: one part is ordered and written while the next one is loaded.
 
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -18,10 +18,11 @@ use super::settings::{ConvertError, Phase};
 use super::store::{ChunkStore, StoreSettings};
 use crate::FrameError;
 
-/// How often a part is divided again. Each time its curve is over its own particles alone; what is too large
-/// then is cut anywhere, because nearly all of its particles are at one position.
+/// Largest number of times that a part is divided. Each division spans its curve over the particles of this
+/// part alone. A part that is still too large is cut at any place, because nearly all of its particles are at
+/// one position.
 const MOST_DIVISIONS: u32 = 8;
-/// Particles of a pile that its quantiles are taken from.
+/// Sampled particles of a part that is divided again.
 const SAMPLE: usize = 1 << 14;
 
 /// Counts for the report.
@@ -30,13 +31,14 @@ pub(super) struct PartCounts {
     pub(super) spilled_bytes: u64,
 }
 
-/// Divides, orders and writes everything.
+/// Divides, orders and writes all particles.
 pub(super) fn convert(
     output: &mut FrameOutput,
     limits: &Limits,
     account: &MemoryAccount,
     clock: &mut Clock,
 ) -> Result<PartCounts, ConvertError> {
+    // Choose the cuts from the sample of the survey
     let width = output.columns.width();
     let count = usize::try_from(output.survey.count).unwrap_or(usize::MAX);
     let parts = count.div_ceil(limits.aimed_len()).clamp(1, limits.parts);
@@ -48,11 +50,13 @@ pub(super) fn convert(
         open: cuts.len(),
         dir: scratch_dir(output),
     };
+    // Divide the source into parts
     let store = ChunkStore::new(settings, account);
     account.hold(limits.window_bytes as u64);
     let mut piles = divide_source(output, cuts, limits, &store)?;
     account.let_go(limits.window_bytes as u64);
     clock.lap(Phase::Divide);
+    // Order and write the parts
     piles.reverse();
     let waiting = PartQueue {
         piles,
@@ -68,17 +72,17 @@ pub(super) fn convert(
 }
 
 fn scratch_dir(output: &FrameOutput) -> PathBuf {
-    let beside = || match output.asked.path.parent() {
+    let beside = || match output.request.path.parent() {
         Some(parent) if parent != Path::new("") => parent.to_owned(),
         _ => PathBuf::from("."),
     };
-    let wanted = output.asked.settings.scratch_dir.clone();
-    wanted.unwrap_or_else(beside)
+    let requested = output.request.settings.scratch_dir.clone();
+    requested.unwrap_or_else(beside)
 }
 
-/// Parts that are still to be ordered.
+/// Parts that wait to be ordered.
 struct PartQueue<'a> {
-    /// The next one is the last.
+    /// In reverse order: the next part is the last entry.
     piles: Vec<UnorderedPart>,
     width: usize,
     limits: &'a Limits,
@@ -94,6 +98,7 @@ fn order_all(
     let unit = waiting.limits.unit();
     let room = waiting.limits.part_len + unit;
     let width = waiting.width;
+    // Allocate two parts, to load one while the other is written
     let (mut part, mut spare) = (
         PartData::with_room(room, width),
         PartData::with_room(room, width),
@@ -102,16 +107,19 @@ fn order_all(
     let mut ordered = OrderedPart::with_room(room, width);
     let mut carried = PartData::default();
     let mut parts = 0;
+    // Load the first part
     let Some(mut pile) = waiting.next()? else {
         return Ok(0);
     };
     load(&mut pile, store, &mut part)?;
     loop {
+        // Hand particles beyond whole nodes on to the next part
         part.prepend(&mut carried);
         let next = waiting.next()?;
         if next.is_some() {
             carried = carry_last(&mut part, &pile.cuts.curve, width, unit);
         }
+        // Write this part while a thread loads the next one
         let loaded = thread::scope(|scope| {
             let loader = next.map(|mut next| {
                 let spare = &mut spare;
@@ -125,6 +133,7 @@ fn order_all(
             });
             written.and(Ok(loaded.transpose()?))
         })?;
+        // Go on with the loaded part
         parts += usize::from(part.len() > 0);
         match loaded {
             Some(next) => pile = next,
@@ -158,7 +167,7 @@ fn load(
 }
 
 impl PartQueue<'_> {
-    /// The next part, small enough to be ordered.
+    /// The next part that is small enough to be ordered.
     fn next(&mut self) -> Result<Option<UnorderedPart>, ConvertError> {
         while let Some(pile) = self.piles.pop() {
             if pile.len == 0 {
@@ -185,13 +194,13 @@ impl PartQueue<'_> {
         Ok(cut(pile, self.limits.part_len))
     }
 
-    /// Some of the positions of `pile`, spread evenly.
+    /// An evenly spread sample of the positions of `pile`.
     fn sample(&self, pile: &mut UnorderedPart) -> Result<Vec<Vec3>, ConvertError> {
         let each = (pile.len / SAMPLE).max(1);
         let mut sample = Vec::with_capacity(pile.len / each + pile.held.len());
-        // Chunks that are away are read for this; there are few such parts.
+        // This reads spilled chunks too; few parts need it.
         for held in &pile.held {
-            self.store.look(held, |chunk| {
+            self.store.peek(held, |chunk| {
                 sample.extend(chunk.positions.iter().step_by(each));
             })?;
         }
@@ -199,7 +208,7 @@ impl PartQueue<'_> {
     }
 }
 
-/// Pieces of `pile` of up to `most` particles, as it comes.
+/// Cuts `pile` into pieces of at most `most` particles, in the order of its chunks.
 fn cut(pile: UnorderedPart, most: usize) -> Vec<UnorderedPart> {
     let mut pieces: Vec<UnorderedPart> = Vec::new();
     for held in pile.held {

@@ -1,4 +1,4 @@
-//! A file without a name for what does not fit into memory: slots of one size, written by a thread of its own.
+//! An unnamed file for data that does not fit into memory. A thread writes it in slots of equal size.
 
 use std::fs::{self, File, OpenOptions};
 use std::io;
@@ -7,13 +7,13 @@ use std::sync::atomic::{AtomicU32, Ordering};
 
 use crate::FrameError;
 
-/// A file that is gone when it is dropped, and on Unix has no name from the start.
+/// A file that is deleted when it is dropped; on Unix its name is removed right after creation.
 #[derive(Debug)]
 pub(super) struct ScratchFile {
-    /// The directory, which errors name.
+    /// The directory that error messages name.
     dir: PathBuf,
     file: File,
-    /// Where the file still has a name.
+    /// The path, on systems where the file keeps its name.
     #[cfg(not(unix))]
     path: PathBuf,
 }
@@ -42,13 +42,13 @@ impl ScratchFile {
         })
     }
 
-    /// Writes `bytes` from byte `at` on.
+    /// Writes `bytes` at byte offset `at`.
     pub(super) fn write(&self, bytes: &[u8], at: u64) -> Result<(), FrameError> {
         self.write_at(bytes, at)
             .map_err(|e| FrameError::io(&self.dir, e))
     }
 
-    /// Reads what was written from byte `at` on.
+    /// Reads data that was written, from byte offset `at`.
     pub(super) fn read(&self, bytes: &mut [u8], at: u64) -> Result<(), FrameError> {
         self.read_at(bytes, at)
             .map_err(|e| FrameError::io(&self.dir, e))

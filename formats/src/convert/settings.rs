@@ -8,38 +8,38 @@ use glam::DVec3;
 use crate::FrameError;
 use crate::native::{Bound, Encoding, FrameIndex};
 
-/// How a source becomes a frame.
+/// How to convert a source to a frame.
 #[derive(Debug, Clone)]
 pub struct ConvertSettings {
-    /// How positions are stored; `None` takes what needs the fewest bytes within the bound. Of a frame that is
-    /// ordered part by part, the first part decides.
+    /// How positions are stored; `None` chooses the encoding that needs the fewest bytes within the bound. If a
+    /// frame is ordered in parts, the first part decides.
     pub encoding: Option<Encoding>,
-    /// How far stored positions may be from those of the source, and radii likewise.
+    /// Largest distance of stored positions from those of the source, and largest difference of stored radii.
     pub bound: Bound,
-    /// World position of the zero of the stored positions.
+    /// World position that stored positions are relative to.
     pub origin: DVec3,
     /// Whether y points up in the program that made the particles, so that viewers need no option for it.
     pub is_y_up: bool,
-    /// Whose radii.
+    /// The radii that the frame gets.
     pub radius: RadiusRule,
-    /// Memory that the conversion may hold, bytes; less than [`Self::LEAST_MEMORY`] is taken as that. What a
-    /// source holds itself is not counted, nor are the pages of files.
+    /// Memory that the conversion may hold, bytes; at least [`Self::LEAST_MEMORY`] is used. The memory of the
+    /// source itself is not counted, nor are the pages of mapped files.
     pub memory: u64,
-    /// How attributes are stored that are not named in `attributes`.
+    /// How to store attributes that `attributes` does not name.
     pub other_attributes: AttributeChoice,
-    /// How these attributes are stored. Names are those of the source, exactly.
+    /// How to store these attributes. The names must match those of the source exactly.
     pub attributes: Vec<(String, AttributeChoice)>,
-    /// Whether each particle's index in the source is kept, as an attribute `id` where there is none.
+    /// Whether to store each particle's index in the source, as an attribute `id` if the source has none.
     pub keep_ids: bool,
-    /// The directory of the nameless scratch file for what does not fit into memory; `None` is the directory of the
-    /// frame.
+    /// The directory of the unnamed scratch file for data that does not fit into memory; `None` is the
+    /// directory of the frame.
     pub scratch_dir: Option<PathBuf>,
 }
 
 impl ConvertSettings {
-    /// Default memory.
+    /// Default memory limit, bytes.
     pub const USUAL_MEMORY: u64 = 2 << 30;
-    /// What the smallest conversion may hold.
+    /// Smallest memory limit, bytes.
     pub const LEAST_MEMORY: u64 = 64 << 20;
 }
 
@@ -63,11 +63,12 @@ impl Default for ConvertSettings {
 /// Which radii a frame gets.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusRule {
-    /// This one for all particles, whatever the source has.
+    /// This radius for all particles, whatever the source has.
     All(f32),
-    /// Those of the source: an attribute named `radius`, `pscale` or half a `diameter`, else one for all.
+    /// The radii of the source: an attribute named `radius` or `pscale`, or half of a `diameter`; otherwise one
+    /// radius for all particles.
     Source {
-        /// For all particles if the source has none.
+        /// The radius of all particles if the source has none.
         otherwise: Option<f32>,
     },
 }
@@ -75,34 +76,34 @@ pub enum RadiusRule {
 /// How an attribute is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AttributeChoice {
-    /// In the type of the source.
+    /// The attribute is stored in the type of the source.
     #[default]
     AsIs,
-    /// In single precision.
+    /// The attribute is stored in single precision.
     Single,
-    /// In half precision: 11 bits, up to 65504.
+    /// The attribute is stored in half precision: 11 bits, up to 65504.
     Half,
-    /// In 8 bits over the range of the frame, each component in its own.
+    /// The attribute is stored in 8 bits over the range of the frame; each component has its own range.
     Ranged,
-    /// Not at all.
+    /// The attribute is not stored.
     LeaveOut,
 }
 
-/// A stretch of a conversion.
+/// A phase of a conversion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Phase {
-    /// Everything is read once: counts, ranges, a sample.
+    /// Reads everything once: counts, ranges and a sample.
     Survey,
-    /// Everything is read again and brought into its part.
+    /// Reads everything again and brings each particle into its part.
     Divide,
-    /// Parts are ordered, coded and written.
+    /// Orders, encodes and writes the parts.
     Order,
-    /// The file is completed and waits for the disk.
+    /// Completes the file and waits for the disk.
     Finish,
 }
 
 impl Phase {
-    /// Name in reports.
+    /// The name in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Survey => "survey",
@@ -113,35 +114,35 @@ impl Phase {
     }
 }
 
-/// Receives the progress of a conversion and may cancel it. Called from many threads, several times a second at least.
+/// Receives the progress of a conversion and may cancel it. Many threads call it, at least several times a second.
 pub trait Progress: Sync {
-    /// `done` of `total` particles have passed `phase`. Breaking ends the conversion with
+    /// `done` of `total` particles have passed `phase`. Returning `Break` cancels the conversion with
     /// [`ConvertError::Interrupted`].
     fn advanced(&self, phase: Phase, done: u64, total: u64) -> ControlFlow<()>;
 }
 
-/// Nobody looks.
+/// Ignores the progress.
 impl Progress for () {
     fn advanced(&self, _phase: Phase, _done: u64, _total: u64) -> ControlFlow<()> {
         ControlFlow::Continue(())
     }
 }
 
-/// Why there is no frame. No file is left over then, and what was at the path still is.
+/// Why a conversion failed. No file is left behind, and an earlier file at the path is unchanged.
 #[derive(Debug, thiserror::Error)]
 pub enum ConvertError {
-    /// The source, the frame or the scratch file, whichever the path names.
+    /// The source, the frame or the scratch file failed; the path names it.
     #[error(transparent)]
     Frame(#[from] FrameError),
     /// The particles cannot be stored with these settings.
     #[error("{}: {what}", path.display())]
     Refused {
-        /// The frame that was to be written.
+        /// The frame that was not written.
         path: PathBuf,
         /// The fact and the remedy.
         what: String,
     },
-    /// Whoever looked on wanted it to end.
+    /// The progress callback cancelled the conversion.
     #[error("interrupted")]
     Interrupted,
 }
@@ -155,17 +156,17 @@ impl ConvertError {
     }
 }
 
-/// What came of a conversion.
+/// The result of a conversion.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvertReport {
-    /// What the frame holds.
+    /// The contents of the frame.
     pub index: FrameIndex,
-    /// Seconds of each phase, in order; one that was not needed is not there.
+    /// Seconds of each phase, in order; phases that were not needed are missing.
     pub seconds: Vec<(Phase, f64)>,
-    /// Most bytes that records and the buffers to order them took at a time.
+    /// Peak bytes of records and of the buffers to order them.
     pub peak_bytes: u64,
-    /// Bytes that were put aside on disk.
+    /// Bytes that were spilled to disk.
     pub spilled_bytes: u64,
-    /// Parts that the frame was ordered in.
+    /// Number of parts in which the frame was ordered.
     pub parts: usize,
 }

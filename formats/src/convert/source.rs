@@ -1,20 +1,19 @@
-//! Sources of the particles of a frame: they provide ranges of particles, in any order and as often as
+//! Sources of the particles of a frame. A source provides ranges of particles, in any order and as often as
 //! needed, so that a frame need not fit into memory.
 
 use glam::DVec3;
 
 use crate::{FrameError, ScalarType};
 
-/// Particles of one frame, by their index in the source. Many threads read ranges at once.
+/// The particles of one frame, by their index in the source. Many threads read ranges at the same time.
 pub trait ParticleSource: Sync {
-    /// Particles.
+    /// Number of particles.
     fn count(&self) -> u64;
 
-    /// What else there is of each particle, in the order of [`Self::read_values`].
+    /// The attributes of the particles, in the order of [`Self::read_values`].
     fn attributes(&self) -> &[SourceAttribute];
 
-    /// The radius of all particles, scene units, if the source has one. Radii of their own are an
-    /// attribute.
+    /// The radius of all particles, scene units, if the source has one. Radii that differ are an attribute.
     fn common_radius(&self) -> Option<f32> {
         None
     }
@@ -29,37 +28,37 @@ pub trait ParticleSource: Sync {
         None
     }
 
-    /// World positions of the particles from index `first` on, which need not be finite. The same ones each
-    /// time, as precise as the source has them.
+    /// Reads the world positions of the particles from index `first`, with the precision of the source. They
+    /// need not be finite. Repeated calls give the same positions.
     ///
     /// # Errors
-    /// If there are no such particles, or what should be there is damaged.
+    /// If these particles do not exist, or their data is damaged.
     fn read_positions(&self, first: u64, to: &mut [DVec3]) -> Result<(), FrameError>;
 
-    /// The values of attribute number `attribute` of the particles from index `first` on: all components of
-    /// one particle, then of the next, little-endian.
+    /// Reads the values of attribute number `attribute` of the particles from index `first`: all components of
+    /// one particle, then those of the next, little-endian.
     ///
     /// # Errors
     /// As [`Self::read_positions`]; also if `to` does not hold whole particles.
     fn read_values(&self, attribute: usize, first: u64, to: &mut [u8]) -> Result<(), FrameError>;
 
-    /// Checks that everything that was read was there, before the result is published.
+    /// Checks that all data that was read was present, before the result is published.
     ///
     /// # Errors
-    /// [`FrameError::Malformed`] if a mapped file changed meanwhile.
+    /// [`FrameError::Malformed`] if a mapped file changed since it was opened.
     fn check(&self) -> Result<(), FrameError> {
         Ok(())
     }
 }
 
-/// Numbers that a source has for each particle.
+/// An attribute: numbers that a source has for each particle.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct SourceAttribute {
-    /// Name, as in the file.
+    /// The name, as in the file.
     pub name: String,
-    /// Numbers a particle, at least 1.
+    /// Numbers per particle, at least 1.
     pub components: usize,
-    /// Their type.
+    /// The type of the numbers.
     pub scalar: ScalarType,
 }
 

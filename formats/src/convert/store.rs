@@ -1,8 +1,8 @@
-//! Records in chunks of one size: in memory as long as there is room, beyond that in a scratch file.
+//! Stores records in chunks of equal size, in memory while there is room and then in a scratch file.
 //!
-//! Chunks are made once and used again; whoever wants one waits until there is one. Full chunks that find no
-//! more room in memory are written by a thread of their own, the others stay. Those that are being filled, one
-//! for each part, and some on their way to the disk always have room, so that nobody waits for ever.
+//! Chunks are allocated once and reused; a caller that needs a chunk waits until one is free. When memory is
+//! full, a thread writes further full chunks to the scratch file. Room is reserved for the chunks that are
+//! being filled (one for each part) and for some that are being written, so that no caller waits forever.
 
 use std::panic;
 use std::path::PathBuf;
@@ -17,10 +17,10 @@ use super::order::PartData;
 use super::scratch::ScratchFile;
 use crate::FrameError;
 
-/// Chunks on their way to the disk at most.
+/// Largest number of chunks that wait to be written.
 const ON_THE_WAY: usize = 8;
 
-/// Records in memory, one array each for positions and rows.
+/// Records in memory, with one array for positions and one for rows.
 #[derive(Debug, Default)]
 pub(super) struct Chunk {
     pub(super) positions: Vec<Vec3>,
@@ -31,7 +31,7 @@ pub(super) struct Chunk {
 #[derive(Debug)]
 pub(super) enum StoredChunk {
     Here(Chunk),
-    /// In a slot of the scratch file.
+    /// Records in a slot of the scratch file.
     Away {
         slot: u64,
         len: usize,
@@ -56,9 +56,9 @@ pub(super) struct StoreSettings {
     pub(super) width: usize,
     /// Chunks that may be in memory.
     pub(super) chunks: usize,
-    /// Chunks that are being filled at a time.
+    /// Chunks that are filled at the same time.
     pub(super) open: usize,
-    /// Where the scratch file is made.
+    /// The directory of the scratch file.
     pub(super) dir: PathBuf,
 }
 
@@ -74,7 +74,7 @@ pub(super) struct ChunkStore<'a> {
 struct SharedState {
     settings: StoreSettings,
     state: Mutex<ChunkState>,
-    /// A chunk is free, or there is a fault.
+    /// Signals that a chunk is free, or that an error occurred.
     freed: Condvar,
 }
 
@@ -85,7 +85,7 @@ struct ChunkState {
     made: usize,
     /// Chunks that stay in memory.
     kept: usize,
-    /// On their way to the disk.
+    /// Chunks that wait to be written.
     leaving: usize,
     free_slots: Vec<u64>,
     slots: u64,
@@ -102,7 +102,7 @@ struct Writer {
 
 impl<'a> ChunkStore<'a> {
     pub(super) fn new(mut settings: StoreSettings, account: &'a MemoryAccount) -> Self {
-        // Few, and never so small that nothing could move.
+        // Allow few chunks, but enough that the writer can always proceed.
         settings.chunks = settings.chunks.max(settings.open + ON_THE_WAY + 2);
         let shared = SharedState {
             settings,
@@ -125,20 +125,23 @@ impl<'a> ChunkStore<'a> {
         self.shared.state().spilled
     }
 
-    /// An empty chunk.
+    /// Returns an empty chunk; waits until one is free.
     ///
     /// # Errors
-    /// If something could not be put away.
+    /// If an earlier chunk could not be written.
     pub(super) fn take(&self) -> Result<Chunk, FrameError> {
         let settings = &self.shared.settings;
         let mut state = self.shared.state();
         loop {
+            // Report an error of the writer thread
             if let Some(fault) = state.fault.take() {
                 return Err(fault);
             }
+            // Reuse a chunk
             if let Some(chunk) = state.free.pop() {
                 return Ok(chunk);
             }
+            // Allocate a chunk; with none being written, waiting would never end
             if state.made < settings.chunks || state.leaving == 0 {
                 state.made += 1;
                 drop(state);
@@ -148,26 +151,30 @@ impl<'a> ChunkStore<'a> {
                     rows: Vec::with_capacity(settings.chunk_len * settings.width),
                 });
             }
+            // Wait for a chunk that is being written
             let freed = self.shared.freed.wait(state);
             state = freed.unwrap_or_else(|e| e.into_inner());
         }
     }
 
-    /// Puts a chunk away, to memory or to the scratch file.
+    /// Stores a chunk in memory or in the scratch file.
     ///
     /// # Errors
-    /// If there can be no scratch file, or something could not be put away.
+    /// If the scratch file cannot be created, or an earlier chunk could not be written.
     pub(super) fn put(&self, chunk: Chunk) -> Result<StoredChunk, FrameError> {
         let settings = &self.shared.settings;
         let mut state = self.shared.state();
+        // Keep the chunk in memory if there is room
         let is_full = chunk.positions.len() == settings.chunk_len;
         if !is_full || state.kept + settings.open + ON_THE_WAY < settings.chunks {
             state.kept += 1;
             return Ok(StoredChunk::Here(chunk));
         }
         drop(state);
-        // Before anything is counted as leaving: others would wait for it.
+        // Start the writer before the chunk counts as waiting: if the start failed, other threads would wait
+        // for it forever.
         let chunks = self.with_writer(|writer| writer.chunks.clone())?;
+        // Choose a slot of the scratch file
         let mut state = self.shared.state();
         state.leaving += 1;
         state.spilled += settings.bytes();
@@ -176,6 +183,7 @@ impl<'a> ChunkStore<'a> {
             state.slots - 1
         });
         drop(state);
+        // Send the chunk to the writer
         let len = chunk.positions.len();
         if chunks.send((chunk, slot)).is_err() {
             self.shared.left();
@@ -184,50 +192,50 @@ impl<'a> ChunkStore<'a> {
         Ok(StoredChunk::Away { slot, len })
     }
 
-    /// Calls `see` with the records of `held`, which is free then.
+    /// Calls `visit` with the records of `held`, then frees them.
     ///
     /// # Errors
-    /// If they cannot be read.
+    /// If the records cannot be read.
     pub(super) fn give_back<T>(
         &self,
         held: StoredChunk,
-        see: impl FnOnce(&Chunk) -> T,
+        visit: impl FnOnce(&Chunk) -> T,
     ) -> Result<T, FrameError> {
         match held {
             StoredChunk::Here(chunk) => {
-                let seen = see(&chunk);
+                let result = visit(&chunk);
                 self.shared.state().kept -= 1;
                 self.shared.free(chunk);
-                Ok(seen)
+                Ok(result)
             }
             StoredChunk::Away { slot, len } => {
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, slot, len);
-                let seen = read.map(|()| see(&chunk));
+                let result = read.map(|()| visit(&chunk));
                 self.shared.free(chunk);
                 self.shared.state().free_slots.push(slot);
-                seen
+                result
             }
         }
     }
 
-    /// Calls `see` with the records of `held`, which stay where they are.
+    /// Calls `visit` with the records of `held`, which stay stored.
     ///
     /// # Errors
-    /// If they cannot be read.
-    pub(super) fn look<T>(
+    /// If the records cannot be read.
+    pub(super) fn peek<T>(
         &self,
         held: &StoredChunk,
-        see: impl FnOnce(&Chunk) -> T,
+        visit: impl FnOnce(&Chunk) -> T,
     ) -> Result<T, FrameError> {
         match held {
-            StoredChunk::Here(chunk) => Ok(see(chunk)),
+            StoredChunk::Here(chunk) => Ok(visit(chunk)),
             StoredChunk::Away { slot, len } => {
                 let mut chunk = self.take()?;
                 let read = self.read(&mut chunk, *slot, *len);
-                let seen = read.map(|()| see(&chunk));
+                let result = read.map(|()| visit(&chunk));
                 self.shared.free(chunk);
-                seen
+                result
             }
         }
     }
@@ -235,7 +243,7 @@ impl<'a> ChunkStore<'a> {
     /// Appends the records of `held` to those of `part`.
     ///
     /// # Errors
-    /// If they cannot be read.
+    /// If the records cannot be read.
     pub(super) fn load(&self, held: StoredChunk, part: &mut PartData) -> Result<(), FrameError> {
         self.give_back(held, |chunk| {
             part.positions.extend_from_slice(&chunk.positions);
@@ -243,10 +251,10 @@ impl<'a> ChunkStore<'a> {
         })
     }
 
-    /// Waits until all chunks that left are on the disk.
+    /// Waits until all waiting chunks are on the disk.
     ///
     /// # Errors
-    /// If one could not be put there.
+    /// If a chunk could not be written.
     pub(super) fn settle(&self) -> Result<(), FrameError> {
         let mut state = self.shared.state();
         loop {
@@ -273,7 +281,7 @@ impl<'a> ChunkStore<'a> {
         scratch.read(&mut chunk.rows, rows_at)
     }
 
-    /// The scratch file and the way to it, made when they are first wanted.
+    /// The scratch file and its writer thread, both created on first use.
     fn with_writer<T>(&self, ask: impl FnOnce(&Writer) -> T) -> Result<T, FrameError> {
         let mut writer = self.writer.lock().unwrap_or_else(|e| e.into_inner());
         let writer = match &mut *writer {
@@ -299,15 +307,16 @@ impl<'a> ChunkStore<'a> {
         })
     }
 
-    /// For what cannot be.
+    /// The error for a writer thread that stopped early.
     fn lost(&self) -> FrameError {
-        let what = std::io::Error::other("an earlier part could not be put away");
+        let what =
+            std::io::Error::other("an earlier part could not be written to the temporary file");
         FrameError::io(&self.shared.settings.dir, what)
     }
 }
 
 impl Drop for ChunkStore<'_> {
-    /// The scratch file is gone when this returns.
+    /// The scratch file is deleted when this returns.
     fn drop(&mut self) {
         let writer = self.writer.get_mut().unwrap_or_else(|e| e.into_inner());
         if let Some(Writer { chunks, thread, .. }) = writer.take() {
@@ -333,7 +342,7 @@ impl SharedState {
         self.state.lock().unwrap_or_else(|e| e.into_inner())
     }
 
-    /// `chunk` can be used again.
+    /// Makes `chunk` available for reuse.
     fn free(&self, mut chunk: Chunk) {
         chunk.positions.clear();
         chunk.rows.clear();
@@ -341,13 +350,13 @@ impl SharedState {
         self.freed.notify_all();
     }
 
-    /// A chunk is no longer on its way.
+    /// Counts a waiting chunk as written, and wakes the threads that wait for one.
     fn left(&self) {
         self.state().leaving -= 1;
         self.freed.notify_all();
     }
 
-    /// Writes what comes until nothing does any more; after a fault it only takes in.
+    /// Writes the chunks that it receives until the channel closes. After an error it only frees them.
     fn write_all(&self, scratch: &ScratchFile, chunks: &Receiver<(Chunk, u64)>) {
         let mut is_sound = true;
         for (chunk, slot) in chunks {

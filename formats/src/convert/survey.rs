@@ -1,4 +1,4 @@
-//! The first reading: how many particles there are, what their values span, where the bulk of them is.
+//! The first pass over the source: number of particles, ranges of their values, and a sample of their positions.
 
 use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -13,20 +13,20 @@ use super::source::ParticleSource;
 use crate::native::StoredType;
 use crate::{is_near, is_radius};
 
-/// What is known of a source that was read once.
+/// The result of the first pass.
 #[derive(Debug)]
 pub(super) struct Survey {
     /// Particles with finite positions.
     pub(super) count: u64,
-    /// The same of each stretch.
+    /// The number of particles with finite positions in each batch.
     pub(super) kept: Vec<u32>,
-    /// How far positions move when they are rounded to f32 at most.
+    /// Largest distance that rounding to f32 moves a position, scene units.
     pub(super) rounding: f64,
-    /// Smallest and largest radius, of particles with radii of their own.
+    /// Smallest and largest radius, if particles have radii of their own.
     pub(super) radii: Option<[f32; 2]>,
-    /// Some of the positions, spread over the source.
+    /// A sample of the positions, spread over the source.
     pub(super) sample: Vec<Vec3>,
-    /// For each column the range of each component, where it is wanted.
+    /// The range of each component of each column, for columns that store ranges.
     ranges: Vec<Vec<[f64; 2]>>,
 }
 
@@ -35,11 +35,11 @@ pub(super) struct Survey {
 pub(super) struct BatchSettings {
     /// Particles of a batch.
     pub(super) batch_len: usize,
-    /// One of so many particles is in the sample; 0 for none.
+    /// One particle out of this many is in the sample; 0 for no sample.
     pub(super) sample_stride: u64,
 }
 
-/// Survey of one batch.
+/// The survey of one batch.
 #[derive(Debug, Default)]
 struct BatchSurvey {
     kept: u32,
@@ -60,7 +60,7 @@ pub(super) struct ConvertRequest<'a> {
 }
 
 impl ConvertRequest<'_> {
-    /// Tells how far it is.
+    /// Reports the progress.
     ///
     /// # Errors
     /// If the progress callback cancels the conversion.
@@ -71,22 +71,23 @@ impl ConvertRequest<'_> {
         Ok(())
     }
 
-    /// What the source gave is not what it gave before.
+    /// The error for a source that no longer returns the same data.
     pub(super) fn changed(&self) -> ConvertError {
-        let told = self.source.check().map_err(ConvertError::from);
+        let checked = self.source.check().map_err(ConvertError::from);
         let what = "the source changed while it was converted; convert again when it rests";
-        told.err()
+        checked
+            .err()
             .unwrap_or_else(|| ConvertError::refused(self.path, what))
     }
 }
 
-/// Reads everything once.
+/// Reads all particles once.
 pub(super) fn survey(
-    asked: ConvertRequest,
+    request: ConvertRequest,
     columns: &StoredColumns,
     reading: BatchSettings,
 ) -> Result<Survey, ConvertError> {
-    let total = asked.source.count();
+    let total = request.source.count();
     let stretches = total.div_ceil(reading.batch_len as u64);
     let (batches, done) = (BufferPool::<Batch>::default(), AtomicU64::new(0));
     let found: Vec<BatchSurvey> = (0..stretches)
@@ -94,29 +95,31 @@ pub(super) fn survey(
         .map(|number| {
             let stretch = ParticleRange::nth(number, reading.batch_len, total);
             let mut batch = batches.take();
-            let found = look(asked, columns, &mut batch, stretch, reading.sample_stride)?;
+            let found = survey_range(request, columns, &mut batch, stretch, reading.sample_stride)?;
             batches.put(batch);
             let now = done.fetch_add(stretch.len as u64, Ordering::Relaxed) + stretch.len as u64;
-            asked.advance(Phase::Survey, now, total)?;
+            request.advance(Phase::Survey, now, total)?;
             Ok(found)
         })
         .collect::<Result<_, ConvertError>>()?;
-    gathered(asked.path, columns, found)
+    gathered(request.path, columns, found)
 }
 
-fn look(
-    asked: ConvertRequest,
+fn survey_range(
+    request: ConvertRequest,
     columns: &StoredColumns,
     batch: &mut Batch,
     stretch: ParticleRange,
     stride: u64,
 ) -> Result<BatchSurvey, ConvertError> {
-    let origin = asked.settings.origin;
-    batch.read_positions(asked.source, origin, stretch)?;
+    let origin = request.settings.origin;
+    // Read the positions
+    batch.read_positions(request.source, origin, stretch)?;
     let mut found = BatchSurvey {
         kept: u32::try_from(batch.positions.len()).unwrap_or(u32::MAX),
         ..BatchSurvey::default()
     };
+    // Measure how far rounding moves them
     let mut kept = batch.positions.iter();
     batch.for_each_place(|place| {
         if let Some(position) = kept.next() {
@@ -124,10 +127,12 @@ fn look(
             found.rounding_squared = found.rounding_squared.max(moved);
         }
     });
+    // Take the sample
     found.sample = sample_of(batch, origin, stretch, stride);
+    // Find the range of the radii
     if let Some(radius) = &columns.radius {
-        let width = asked.source.attributes()[radius.attribute].width();
-        batch.read_values(asked.source, radius.attribute, width, stretch)?;
+        let width = request.source.attributes()[radius.attribute].width();
+        batch.read_values(request.source, radius.attribute, width, stretch)?;
         batch.for_each_place(|place| {
             for radius in radius.radii(&batch.values[place * width..][..width]) {
                 found.bad_radii |= !is_radius(radius);
@@ -136,17 +141,18 @@ fn look(
             }
         });
     }
+    // Find the ranges of the attributes
     for column in &columns.attributes {
         let mut ranges = Vec::new();
         if let (StoredType::Ranged, Some(attribute)) = (column.stored, column.attribute) {
             let (width, size) = (column.source_width(), column.scalar.size());
-            batch.read_values(asked.source, attribute, width, stretch)?;
+            batch.read_values(request.source, attribute, width, stretch)?;
             ranges = vec![[f64::INFINITY, f64::NEG_INFINITY]; column.components];
             batch.for_each_place(|place| {
                 let values = batch.values[place * width..][..width].chunks_exact(size);
                 for (value, [low, high]) in values.zip(&mut ranges) {
                     let value = StoredType::Plain(column.scalar).value(value, [0.0; 2]);
-                    // What is not a number must not pass unseen.
+                    // NaN must not be ignored: an infinite range is reported as an error.
                     let value = if value.is_nan() { f64::INFINITY } else { value };
                     (*low, *high) = (low.min(value), high.max(value));
                 }
@@ -157,8 +163,8 @@ fn look(
     Ok(found)
 }
 
-/// One particle of each run of `stride`, at a pseudo-random index: sources are often ordered. Which ones
-/// does not depend on how the source is cut.
+/// A sample with one particle of each run of `stride`, at a pseudo-random index, because sources are often
+/// ordered. The chosen particles do not depend on how the source is cut into batches.
 fn sample_of(batch: &Batch, origin: glam::DVec3, stretch: ParticleRange, stride: u64) -> Vec<Vec3> {
     let mut sample = Vec::new();
     if stride == 0 {
@@ -191,9 +197,10 @@ fn gathered(
         sample: Vec::new(),
         ranges: vec![Vec::new(); columns.attributes.len()],
     };
+    // Merge the surveys of the batches in order
     for one in found {
         if one.bad_radii {
-            let what = "a radius is negative or no number; give one for all (--radius)";
+            let what = "a radius is negative or not a number; give one radius for all particles";
             return Err(ConvertError::refused(path, what));
         }
         survey.count += u64::from(one.kept);
@@ -219,12 +226,14 @@ fn gathered(
 }
 
 impl Survey {
-    /// The columns with the ranges that were found, and without radii that are all alike; these come second.
+    /// The columns with the ranges found by the survey. If all radii are equal, the radius column is removed
+    /// and the common radius is returned as the second value.
     pub(super) fn settled(
         &self,
         path: &Path,
         mut columns: StoredColumns,
     ) -> Result<(StoredColumns, Option<f32>), ConvertError> {
+        // Check and set the ranges
         for (column, ranges) in columns.attributes.iter_mut().zip(&self.ranges) {
             if column.stored != StoredType::Ranged {
                 continue;
@@ -243,6 +252,7 @@ impl Survey {
                 vec![[0.0; 2]; column.components]
             };
         }
+        // Replace equal radii by a common one
         let common = self.radii.filter(|[low, high]| low == high);
         if common.is_some() || self.count == 0 {
             columns.radius = None;

@@ -1,4 +1,4 @@
-//! Every converted frame is compared with its source, particle by particle, whatever the memory was.
+//! Compares every converted frame with its source, particle by particle, for different memory limits.
 
 use std::collections::HashMap;
 use std::fs;
@@ -14,7 +14,7 @@ use crate::native::tests::clustered;
 use crate::native::{Access, Bound, Encoding, FrameIndex, NativeFile, StoredType};
 use crate::{Attribute, AttributeData, FrameError, Positions, RawParticles};
 
-/// Room for parts of `part_len` particles, `chunks` of 256 records in memory.
+/// Limits for parts of `part_len` particles and `chunks` chunks of 256 records in memory.
 fn tight(part_len: usize, chunks: usize) -> Limits {
     Limits {
         is_whole: false,
@@ -30,7 +30,7 @@ fn tight(part_len: usize, chunks: usize) -> Limits {
     }
 }
 
-/// Everything at once.
+/// Limits that order all particles at once.
 fn whole() -> Limits {
     Limits {
         is_whole: true,
@@ -70,7 +70,7 @@ fn settings() -> ConvertSettings {
     }
 }
 
-fn asked<'a>(
+fn request<'a>(
     source: &'a dyn ParticleSource,
     path: &'a Path,
     settings: &'a ConvertSettings,
@@ -91,7 +91,7 @@ fn convert_to(
     limits: Limits,
 ) -> Result<ConvertReport, ConvertError> {
     let columns = StoredColumns::choose(source, settings, path)?;
-    convert_within(asked(source, path, settings), columns, limits)
+    convert_within(request(source, path, settings), columns, limits)
 }
 
 /// Converts `raw` within `limits` and compares.
@@ -106,9 +106,11 @@ fn converted(raw: &RawParticles, settings: &ConvertSettings, limits: Limits) -> 
     report
 }
 
-/// Every finite particle of `raw` is in the frame once, as near as the frame says, with its own values.
+/// Every finite particle of `raw` is in the frame exactly once, within the error that the frame states, with
+/// its own values.
 #[track_caller]
 fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &FrameIndex) {
+    // Open the frame
     let file = NativeFile::open(path, Access::Map).expect("whole");
     assert_eq!(file.index(), index);
     let frame = file.frame().expect("unchanged");
@@ -116,19 +118,25 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
     let leaves = frame.leaves().expect("in place");
     let id = frame.attribute("id").expect("kept");
     let kept = |i: usize| crate::is_near(&(raw.positions.get(i) - settings.origin).as_vec3());
-    let mut seen: Vec<bool> = (0..raw.positions.len()).map(|i| !kept(i)).collect();
-    let dropped = seen.iter().filter(|s| **s).count();
+    // Mark the particles that the conversion drops
+    let mut visited: Vec<bool> = (0..raw.positions.len()).map(|i| !kept(i)).collect();
+    let dropped = visited.iter().filter(|s| **s).count();
     let mut largest = 0.0_f64;
     let mut last_at = HashMap::new();
+    // Compare each stored particle with its source
     for slot in 0..usize::try_from(index.count).expect("few") {
         let place = id.low_bits(slot).expect("an id") as usize;
-        assert!(!std::mem::replace(&mut seen[place], true), "{place} twice");
-        // Of coincident particles the first in the source is the first here.
+        assert!(
+            !std::mem::replace(&mut visited[place], true),
+            "{place} twice"
+        );
+        // Among coincident particles, the first in the source is the first here.
         let point = (raw.positions.get(place) - settings.origin).as_vec3() + Vec3::ZERO;
         let before = last_at.insert(point.to_array().map(f32::to_bits), place);
         assert!(before < Some(place), "{before:?} after {place}");
         let found = leaves.center(slot).as_dvec3() + settings.origin;
         largest = largest.max(found.distance(raw.positions.get(place)));
+        // Compare the attributes
         for attribute in &raw.attributes {
             let Some(view) = frame.attribute(&attribute.name) else {
                 continue;
@@ -146,6 +154,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
                 assert!(difference <= error, "{} {given}", attribute.name);
             }
         }
+        // Check the box of the leaf
         let node = &leaves.nodes[slot / 128];
         let own = leaves.radii.load(slot / 16).map(|r| r.0[slot % 16]);
         if own.is_none() {
@@ -157,7 +166,8 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
             assert!(node.child_holds(slot / 16 % 8, &point));
         }
     }
-    assert!(seen.into_iter().all(|s| s));
+    // Check the counts and the stated errors
+    assert!(visited.into_iter().all(|s| s));
     assert_eq!(index.dropped, dropped as u64);
     assert!(largest <= index.max_error, "{largest} {}", index.max_error);
     let radius = match index.radius {
@@ -170,7 +180,7 @@ fn compare(path: &Path, raw: &RawParticles, settings: &ConvertSettings, index: &
 }
 
 #[test]
-fn frames_are_their_sources_whatever_the_memory() {
+fn frames_do_not_depend_on_the_memory_limit() {
     for count in [0, 1, 15, 1023, 1024, 1025, 5000, 30_000] {
         let raw = raw(clustered(count));
         let one = converted(&raw, &settings(), whole());
@@ -184,7 +194,7 @@ fn frames_are_their_sources_whatever_the_memory() {
 }
 
 #[test]
-fn what_is_put_aside_does_not_change_the_bytes() {
+fn spilling_does_not_change_the_bytes() {
     let raw = raw(clustered(40_000));
     let source = RawSource::new(Path::new("raw"), &raw).expect("whole");
     let bytes = |threads: usize, chunks: usize, batch_len: usize| {
@@ -206,7 +216,7 @@ fn what_is_put_aside_does_not_change_the_bytes() {
 }
 
 #[test]
-fn parts_that_come_out_too_large_are_divided_again() {
+fn oversized_parts_are_divided_again() {
     // A sample this small misses the quantiles by far, and two parts are far too few.
     let limits = Limits {
         sample_len: 40,
@@ -218,7 +228,7 @@ fn parts_that_come_out_too_large_are_divided_again() {
 }
 
 #[test]
-fn particles_in_one_place_are_cut_anywhere() {
+fn coincident_particles_are_split_by_index() {
     let mut all = vec![Vec3::splat(0.3); 20_000];
     all.extend(clustered(500));
     for limits in [whole(), tight(2048, 0)] {
@@ -227,7 +237,7 @@ fn particles_in_one_place_are_cut_anywhere() {
     }
 }
 
-/// Few places for many particles, so that each is shared over blocks and parts; zeros of both signs.
+/// Few positions for many particles, so that blocks and parts share each position; zeros of both signs.
 #[test]
 fn coincident_particles_keep_the_order_of_the_source() {
     for places in [40, 700, 9000] {
@@ -251,7 +261,7 @@ fn coincident_particles_keep_the_order_of_the_source() {
 }
 
 #[test]
-fn what_is_not_finite_is_left_out() {
+fn non_finite_particles_are_dropped() {
     let mut all = clustered(20_000);
     for (i, position) in all.iter_mut().enumerate() {
         match i % 1000 {
@@ -259,14 +269,14 @@ fn what_is_not_finite_is_left_out() {
             8 => position.z = f32::NEG_INFINITY,
             9 => position.y = -1.01 * crate::FARTHEST,
             10 => position.x = crate::FARTHEST,
-            // Whole stretches of it.
+            // Whole ranges of the source.
             _ if (6000..6900).contains(&i) => position.y = f32::INFINITY,
             _ => {}
         }
     }
     for limits in [whole(), tight(4096, 0)] {
         let report = converted(&raw(all.clone()), &settings(), limits);
-        // One of the stretch is just near enough.
+        // One particle of the range is just near enough.
         assert_eq!(report.index.dropped, 899 + 3 * 19);
     }
     let none = vec![Vec3::NAN; 5000];
@@ -321,7 +331,7 @@ fn attributes_are_stored_as_chosen() {
     refused(&raw, &unknown, "velocity, place");
 }
 
-/// Nothing comes of it but a message with `text`.
+/// The conversion fails with a message that contains `text`, and leaves no file.
 #[track_caller]
 fn refused(raw: &RawParticles, settings: &ConvertSettings, text: &str) {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -345,7 +355,7 @@ fn with_radii(count: u32, radius: impl Fn(u32) -> f32) -> RawParticles {
 }
 
 #[test]
-fn radii_follow_their_particles() {
+fn radii_stay_with_their_particles() {
     let own = with_radii(9000, |i| 0.01 + (i % 97) as f32 * 1e-3);
     let from_source = ConvertSettings {
         radius: RadiusRule::Source { otherwise: None },
@@ -377,11 +387,11 @@ fn radii_follow_their_particles() {
         assert_eq!(report.index.radius, RadiusIndex::Common(0.01));
     }
     let bad = with_radii(3000, |i| if i == 2900 { -1.0 } else { 1.0 });
-    refused(&bad, &from_source, "--radius");
+    refused(&bad, &from_source, "one radius for all particles");
 }
 
 #[test]
-fn eight_bits_hold_no_infinity() {
+fn eight_bit_floats_have_no_infinity() {
     let mut raw = raw(clustered(3000));
     let AttributeData::F32(velocity) = &mut raw.attributes[0].data else {
         panic!("made so")
@@ -443,7 +453,7 @@ fn frames_are_converted_again() {
     assert!(fs::read(&second).expect("readable") == fs::read(&third).expect("readable"));
 }
 
-/// Ends the conversion after so many calls.
+/// Cancels the conversion after this many calls.
 struct Ends(AtomicU64);
 
 impl Progress for Ends {
@@ -459,7 +469,7 @@ impl Progress for Ends {
 }
 
 #[test]
-fn an_interrupted_conversion_leaves_nothing() {
+fn interrupted_conversion_leaves_no_files() {
     let raw = raw(clustered(12_000));
     let source = RawSource::new(Path::new("raw"), &raw).expect("whole");
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -469,11 +479,11 @@ fn an_interrupted_conversion_leaves_nothing() {
     let run = |calls: u64, limits: Limits| {
         let columns = StoredColumns::choose(&source, &settings, &path).expect("fit");
         let ends = Ends(AtomicU64::new(calls));
-        let asked = ConvertRequest {
+        let request = ConvertRequest {
             progress: &ends,
-            ..asked(&source, &path, &settings)
+            ..request(&source, &path, &settings)
         };
-        convert_within(asked, columns, limits)
+        convert_within(request, columns, limits)
     };
     for limits in [whole(), tight(4096, 0)] {
         let mut calls = 0;
@@ -489,7 +499,7 @@ fn an_interrupted_conversion_leaves_nothing() {
 }
 
 #[test]
-fn no_room_to_put_aside_is_told() {
+fn full_spill_disk_is_an_error() {
     let raw = raw(clustered(30_000));
     let source = RawSource::new(Path::new("raw"), &raw).expect("whole");
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -502,11 +512,11 @@ fn no_room_to_put_aside_is_told() {
     assert!(matches!(error, ConvertError::Frame(FrameError::Io { .. })));
     assert!(error.to_string().contains("none"), "{error}");
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 0);
-    // Where nothing has to be put aside, no file is asked for.
+    // If nothing is spilled, no scratch file is created.
     convert_to(&path, &source, &settings, tight(4096, 10_000)).expect("converted");
 }
 
-/// A source that is another one when it is read again.
+/// A source that returns different particles when it is read again.
 struct Changing(RawParticles, AtomicU64);
 
 impl ParticleSource for Changing {
@@ -540,7 +550,7 @@ impl ParticleSource for Changing {
 }
 
 #[test]
-fn a_source_that_changes_is_found_out() {
+fn changed_source_is_detected() {
     for limits in [whole(), tight(2048, 0)] {
         let source = Changing(raw(clustered(5000)), AtomicU64::new(0));
         let dir = tempfile::tempdir().expect("a temporary directory");
@@ -552,7 +562,7 @@ fn a_source_that_changes_is_found_out() {
 }
 
 #[test]
-fn budgets_are_shared_out_within_the_memory() {
+fn budgets_add_up_to_the_memory_limit() {
     let gib = 1_u64 << 30;
     for (count, memory, width) in [
         (1_000_000_000, 12 * gib, 0),
@@ -574,7 +584,7 @@ fn budgets_are_shared_out_within_the_memory() {
     }
     let small = Limits::of(&ConvertSettings::default(), 10_000_000, 12, 12);
     assert!(small.is_whole);
-    // The show case keeps everything in memory.
+    // The showcase keeps all particles in memory.
     let settings = ConvertSettings {
         memory: 12 * gib,
         ..ConvertSettings::default()

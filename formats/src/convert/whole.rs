@@ -1,4 +1,4 @@
-//! A source that fits into memory: one part.
+//! Converts a source that fits into memory as one part.
 
 use std::sync::Mutex;
 
@@ -12,7 +12,7 @@ use super::order::{OrderedPart, PartData};
 use super::output::FrameOutput;
 use super::settings::ConvertError;
 
-/// Reads everything, orders and writes it.
+/// Reads, orders and writes all particles.
 pub(super) fn convert(
     output: &mut FrameOutput,
     limits: &Limits,
@@ -27,14 +27,16 @@ pub(super) fn convert(
 
 /// All finite particles in the order of the source.
 fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertError> {
-    let (asked, columns) = (output.asked, output.columns);
+    let (request, columns) = (output.request, output.columns);
     let kept = &output.survey.kept;
     let (count, width) = (output.survey.count, columns.width());
     let count = usize::try_from(count).unwrap_or(usize::MAX);
+    // Allocate the particles
     let mut part = PartData {
         positions: vec![Vec3::ZERO; count],
         rows: vec![0; count * width],
     };
+    // Give each batch its own range of them
     let (mut positions, mut rows) = (&mut part.positions[..], &mut part.rows[..]);
     let mut places = Vec::with_capacity(kept.len());
     for (number, kept) in (0..).zip(kept) {
@@ -48,17 +50,20 @@ fn load(output: &mut FrameOutput, limits: &Limits) -> Result<PartData, ConvertEr
         BufferPool::<Batch>::default(),
         Mutex::new(&mut output.errors),
     );
+    // Read the batches in parallel
     places
         .into_par_iter()
         .try_for_each(|(number, positions, rows)| {
             let mut batch = batches.take();
-            let stretch = ParticleRange::nth(number, limits.batch_len, asked.source.count());
-            batch.read_positions(asked.source, asked.settings.origin, stretch)?;
+            let stretch = ParticleRange::nth(number, limits.batch_len, request.source.count());
+            batch.read_positions(request.source, request.settings.origin, stretch)?;
+            // Check that the source has not changed since the survey
             if batch.positions.len() != positions.len() {
-                return Err(asked.changed());
+                return Err(request.changed());
             }
+            // Store the rows and the errors of the attributes
             let mut own_errors = vec![0.0; columns.attributes.len()];
-            batch.read_rows(asked.source, columns, stretch, &mut own_errors)?;
+            batch.read_rows(request.source, columns, stretch, &mut own_errors)?;
             positions.copy_from_slice(&batch.positions);
             rows.copy_from_slice(&batch.rows);
             let mut errors = errors.lock().unwrap_or_else(|e| e.into_inner());

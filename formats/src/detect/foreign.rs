@@ -137,7 +137,7 @@ const PDB: &str = "a PDB particle file, which is not read; convert to .bgeo with
 const UTF16: &str = "UTF-16 text, which is not read; save as UTF-8";
 const LAMMPS_BINARY: &str =
     "a LAMMPS binary dump, which is not read; run `binary2txt` on it, or dump to a text file";
-const XDMF: &str = "an XDMF index, whose numbers are in other files; save as .vtu with ParaView";
+const XDMF: &str = "an XDMF index, which keeps its data in other files; save as .vtu with ParaView";
 const HOUDINI_JSON: &str = "the newer Houdini bgeo in JSON, which is not read; save as .bhclassic";
 
 /// Refuses what is known by its first bytes (magics of `shortest` bytes and more), or failing

@@ -62,24 +62,24 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn says(content: &[u8], words: &str) {
+    fn suggests(content: &[u8], hint: &str) {
         for before in [0, 512] {
             let bytes = [&vec![b' '; before], SIGNATURE, content].concat();
             let what = what(&bytes).expect("HDF5");
-            assert!(what.contains(words), "{what}");
+            assert!(what.contains(hint), "{what}");
         }
     }
 
     #[test]
-    fn files_are_known_by_the_names_in_them() {
-        says(b"\0\0Header\0PartType0\0", "Gadget");
-        says(b"\0h5md\0particles\0", "H5MD");
-        says(b"\0\0Step#0\0", "H5Part");
-        says(b"\0openPMD\0", "openPMD");
-        says(b"\0VTKHDF\0", "ParaView");
-        says(b"\0particles\0solver_data\0", "pysph dump_vtk");
-        says(b"\0something\0", "h5py");
-        says(
+    fn formats_are_recognised_by_column_names() {
+        suggests(b"\0\0Header\0PartType0\0", "Gadget");
+        suggests(b"\0h5md\0particles\0", "H5MD");
+        suggests(b"\0\0Step#0\0", "H5Part");
+        suggests(b"\0openPMD\0", "openPMD");
+        suggests(b"\0VTKHDF\0", "ParaView");
+        suggests(b"\0particles\0solver_data\0", "pysph dump_vtk");
+        suggests(b"\0something\0", "h5py");
+        suggests(
             &[&[0; PREFIX][..], b"PartType0"].concat(),
             "with the program that made it",
         );

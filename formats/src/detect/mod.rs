@@ -120,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn content_goes_before_the_name() {
+    fn content_has_precedence_over_the_name() {
         assert_eq!(
             detect("a.ply", b"# vtk DataFile Version 4.2\nx\n"),
             vtk::FORMAT
@@ -158,14 +158,14 @@ mod tests {
     }
 
     #[test]
-    fn a_name_that_lies_is_told() {
+    fn wrong_extension_is_reported() {
         refused("a.bgeo", b"hello world", "named like a bgeo file");
         refused("a.vtk", b"", "still being written");
         refused("a.csv", &[0, 159, 146], "named like a csv file");
     }
 
     #[test]
-    fn known_foreign_files_say_what_to_do() {
+    fn known_unsupported_formats_have_a_remedy() {
         let collection = b"<VTKFile type=\"Collection\" version=\"0.1\">";
         refused("a.pvd", collection, "give those files");
         refused(
@@ -180,7 +180,7 @@ mod tests {
         );
         refused("a.vti", b"<VTKFile type=\"ImageData\">", "ImageData");
         let odd = b"<VTKFile type=\"a\n\x1b[2J\">";
-        refused("a.vti", odd, r"type a\n\u{1b}[2J holds");
+        refused("a.vti", odd, r"type a\n\u{1b}[2J is not read");
         refused("a.h5", b"\x89HDF\r\n\x1a\n", "HDF5");
         refused(
             "a.csv",

@@ -98,42 +98,42 @@ mod tests {
     use super::*;
 
     #[track_caller]
-    fn says(text: &str, words: &str) {
+    fn suggests(text: &str, hint: &str) {
         let what = what(text.as_bytes()).expect("known");
-        assert!(what.contains(words), "{what}");
+        assert!(what.contains(hint), "{what}");
         let crlf = text.replace('\n', "\r\n");
         assert_eq!(super::what(crlf.as_bytes()), Some(what));
     }
 
     #[test]
-    fn files_are_known_by_their_lines() {
-        says(
+    fn formats_are_recognised_by_their_lines() {
+        suggests(
             "LAMMPS data file via write_data, version 2 Aug 2023\n\n3 atoms\n1 atom types\n\n\
              0 1 xlo xhi\n0 1 ylo yhi\n0 1 zlo zhi\n\nAtoms # atomic\n\n1 1 0 0 0\n",
             "write_dump",
         );
-        says(
+        suggests(
             "# made by hand\n\n  3  atoms # all\n-1 1.5 xlo xhi\n",
             "LAMMPS data",
         );
-        says(
+        suggests(
             "MD of 2 waters, t= 0.0\n    6\n    1WATER  OW1    1   0.126   1.624   1.679  0.1227 -0.0580  0.0434\n",
             "GROMACS",
         );
-        says(
+        suggests(
             "CRYST1   10.000   10.000   10.000  90.00  90.00  90.00 P 1           1\n\
              ATOM      1  N   ALA A   1      11.104   6.134  -6.504  1.00  0.00           N\n",
             "Protein Data Bank",
         );
-        says(
+        suggests(
             "HEADER    HYDROLASE                               09-MAY-83   1LYZ\n",
             "Protein Data Bank",
         );
-        says("data_1ABC\n#\n_entry.id 1ABC\n", "CIF");
+        suggests("data_1ABC\n#\n_entry.id 1ABC\n", "CIF");
     }
 
     #[test]
-    fn particle_text_is_not_taken_for_them() {
+    fn particle_text_is_not_misrecognised() {
         for text in [
             "x,y,z\n0,1,2\n",
             "3\n\nH 0 0 0\n",

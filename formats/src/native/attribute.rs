@@ -1,4 +1,4 @@
-//! An attribute of a native frame in place: values are decoded on access.
+//! An attribute of a native frame, accessed in place: values are decoded on access.
 
 use std::ops::Range;
 
@@ -6,7 +6,7 @@ use super::layout::AttributeIndex;
 use super::stored::StoredType;
 use crate::{Attribute, AttributeData, Endian, ParseError, ScalarType};
 
-/// The values of an attribute in place.
+/// The values of an attribute, in place.
 #[derive(Debug, Clone, Copy)]
 pub struct AttributeView<'a> {
     index: &'a AttributeIndex,
@@ -37,12 +37,12 @@ impl<'a> AttributeView<'a> {
         self.stored
     }
 
-    /// Numbers a particle.
+    /// Numbers per particle.
     pub const fn components(&self) -> usize {
         self.index.components as usize
     }
 
-    /// Component `component` of particle `index`; NaN if there is none.
+    /// Component `component` of particle `index`; NaN if it does not exist.
     #[inline]
     pub fn get(&self, index: usize, component: usize) -> f64 {
         let range = self.index.ranges.get(component).copied();
@@ -51,7 +51,7 @@ impl<'a> AttributeView<'a> {
         })
     }
 
-    /// The value of particle `index`, of vectors the length, as [`Attribute::magnitude`] has it.
+    /// The value of particle `index`; the Euclidean length of a vector, as in [`Attribute::magnitude`].
     #[inline]
     pub fn magnitude(&self, index: usize) -> f64 {
         if self.components() == 1 {
@@ -64,8 +64,8 @@ impl<'a> AttributeView<'a> {
         squares.sum::<f64>().sqrt()
     }
 
-    /// The low 32 bits of a whole number, as ids are shown; `None` if there is no such particle or its
-    /// value is not a whole number.
+    /// The low 32 bits of an integer, for the display of ids; `None` if the particle does not exist or its
+    /// value is not an integer.
     pub fn low_bits(&self, index: usize) -> Option<u32> {
         let bytes = self.bytes_of(index, 0)?;
         let StoredType::Plain(kind) = self.stored else {
@@ -83,8 +83,8 @@ impl<'a> AttributeView<'a> {
         Some(u32::from_le_bytes(std::array::from_fn(byte)))
     }
 
-    /// Copies the values of the particles `places` as [`Self::to_attribute`] has them, little-endian; `None`
-    /// if there are too few.
+    /// Copies the values of the particles `places`, little-endian, in the types of [`Self::to_attribute`];
+    /// `None` if there are too few values.
     pub(crate) fn copy_to(&self, places: Range<usize>, to: &mut [u8]) -> Option<()> {
         let width = self.components().checked_mul(self.stored.size())?;
         let bytes = places.start.checked_mul(width)?..places.end.checked_mul(width)?;
@@ -100,7 +100,7 @@ impl<'a> AttributeView<'a> {
         Some(())
     }
 
-    /// A copy of all values: in the type they are stored in, codes of fewer bits as f32.
+    /// A copy of all values in their stored type; half-precision values and 8-bit codes become f32.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] if there are too few bytes.

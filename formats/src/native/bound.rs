@@ -1,19 +1,19 @@
-//! How far a stored position may be from the true one.
+//! The allowed distance of a stored position from the true one.
 
-/// The largest distance that is allowed.
+/// The largest allowed distance.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Bound {
-    /// Any.
+    /// Any distance is allowed.
     #[default]
     None,
     /// A length in scene units.
     Length(f64),
-    /// A fraction of the radius; of the smallest in a block where radii differ.
+    /// A fraction of the radius. If radii differ, the smallest radius of the block is used.
     OfRadius(f64),
 }
 
 impl Bound {
-    /// The length for spheres of this radius. Without a radius a fraction of it allows nothing.
+    /// The length in scene units for spheres of this radius. Without a radius, a fraction gives 0.
     pub fn length(self, radius: Option<f32>) -> f64 {
         match self {
             Self::None => f64::INFINITY,

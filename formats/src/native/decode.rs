@@ -1,4 +1,4 @@
-//! Native frames decoded to plain particles, where they are not traced in place.
+//! Decodes native frames to plain particles, for uses other than tracing in place.
 
 use glam::{DVec3, Vec3};
 use rayon::prelude::*;
@@ -10,10 +10,10 @@ use crate::names::RADIUS;
 use crate::{Attribute, AttributeData, ParseError, Positions, RawParticles};
 
 impl NativeFrame<'_> {
-    /// Everything, in the order of the file, in world coordinates: f32 where the origin is zero, else f64.
+    /// All particles in the order of the file, in world coordinates: f32 if the origin is zero, else f64.
     ///
     /// # Errors
-    /// [`ParseError::Malformed`] if a section is not what the index says, [`ParseError::Unsupported`] as
+    /// [`ParseError::Malformed`] if a section does not match the index, [`ParseError::Unsupported`] as
     /// [`Self::leaves`].
     pub fn to_raw(&self) -> Result<RawParticles, ParseError> {
         let leaves = self.leaves()?;
@@ -30,14 +30,15 @@ impl NativeFrame<'_> {
         })
     }
 
-    /// Every so many particles, at most `most` and whole blocks of them, in world coordinates, with their
-    /// attributes and radii: enough for percentiles without reading all of a large frame.
+    /// An evenly spaced sample of whole blocks, at most `most` particles, in world coordinates and with
+    /// attributes and radii. It gives percentiles without reading all of a large frame.
     ///
     /// # Errors
     /// As [`Self::to_raw`].
     pub fn sample(&self, most: usize) -> Result<RawParticles, ParseError> {
         let leaves = self.leaves()?;
         let count = self.len()?;
+        // Choose whole blocks at equal distances
         let blocks = count.div_ceil(BLOCK_SIZE);
         let stride = blocks.div_ceil((most / BLOCK_SIZE).max(1)).max(1);
         let chosen: Vec<usize> = (0..blocks)
@@ -46,6 +47,7 @@ impl NativeFrame<'_> {
             .collect();
         let origin = DVec3::from_array(self.index().origin);
         let position = |i: &usize| leaves.center(*i).as_dvec3() + origin;
+        // Copy their attributes
         let mut attributes: Vec<Attribute> = Vec::new();
         for view in self.attributes() {
             let components = view.components();
@@ -57,6 +59,7 @@ impl NativeFrame<'_> {
                 data: AttributeData::F64(values.map(|(i, c)| view.get(i, c)).collect()),
             });
         }
+        // Add the radii
         if wants_radius(&attributes)
             && let Some(radius) = self.radius_of(&leaves)
         {
@@ -70,9 +73,9 @@ impl NativeFrame<'_> {
         })
     }
 
-    /// Distances from `queries` particles, evenly spread, to the nearest other particle that is not in the same
-    /// place, among those around them in the file: in tree order a neighbour is seldom farther away, so
-    /// that few of these distances are too long.
+    /// Distances from `queries` evenly spread particles to their nearest particle at another position, among
+    /// the particles around them in the file. In tree order, the nearest neighbour is seldom outside of this
+    /// window, so that few of the distances are too long.
     ///
     /// # Errors
     /// As [`Self::to_raw`].
@@ -85,8 +88,9 @@ impl NativeFrame<'_> {
         Ok(distances.into_iter().flatten().collect())
     }
 
-    /// How many particles lie within `reach` of `queries` particles, themselves included, among those around
-    /// them in the file: of some at the edge of a cell of the order too few, of others all.
+    /// The number of particles within `reach` of `queries` particles, themselves included, among the particles
+    /// around them in the file. The count is too low for some particles at the edge of a cell of the order and
+    /// exact for the others.
     ///
     /// # Errors
     /// As [`Self::to_raw`].
@@ -98,13 +102,13 @@ impl NativeFrame<'_> {
         self.around_some(queries, count)
     }
 
-    /// The result of `tell` for the squared distances from some particles to those around them in the file.
+    /// The results of `reduce` for the squared distances from some particles to the particles around them in the file.
     fn around_some<T: Send>(
         &self,
         queries: usize,
-        tell: impl Fn(&mut dyn Iterator<Item = f32>) -> T + Sync,
+        reduce: impl Fn(&mut dyn Iterator<Item = f32>) -> T + Sync,
     ) -> Result<Vec<T>, ParseError> {
-        /// Particles on either side of the given one: a cell of the order and half the next.
+        /// Particles on either side of the given one: one cell of the order and half of the next.
         const AROUND: usize = 1536;
         let leaves = self.leaves()?;
         let count = self.len()?;
@@ -114,13 +118,13 @@ impl NativeFrame<'_> {
             let blocks =
                 i.saturating_sub(AROUND) / BLOCK_SIZE..(i + AROUND).min(count).div_ceil(BLOCK_SIZE);
             let others = blocks.flat_map(|block| leaves.block(block).centers());
-            tell(&mut others.map(|to| from.distance_squared(to)))
+            reduce(&mut others.map(|to| from.distance_squared(to)))
         };
-        let asked: Vec<usize> = (0..count).step_by(stride).collect();
-        Ok(asked.into_par_iter().map(of).collect())
+        let indices: Vec<usize> = (0..count).step_by(stride).collect();
+        Ok(indices.into_par_iter().map(of).collect())
     }
 
-    /// Particles, as many as fit the memory.
+    /// The number of particles, if it fits `usize`.
     fn len(&self) -> Result<usize, ParseError> {
         let count = usize::try_from(self.index().count);
         count.map_err(|_| ParseError::unsupported("more particles than this machine can count"))
@@ -161,7 +165,7 @@ impl NativeFrame<'_> {
         })
     }
 
-    /// Radii that no attribute of the name carries, as the attribute that readers look for.
+    /// The radii as the attribute that readers look for, if no attribute has its name.
     fn radius_attribute(
         &self,
         attributes: &[Attribute],

@@ -1,4 +1,4 @@
-//! A frame in memory becomes a native file in one go.
+//! Writes a frame in memory to a native file.
 
 use std::io;
 use std::path::Path;
@@ -18,16 +18,16 @@ use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Radius, is_near
 /// How a frame is stored.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct StoreSettings {
-    /// How positions are stored; `None` takes what needs the fewest bytes within the bound.
+    /// How positions are stored; `None` chooses the encoding that needs the fewest bytes within the bound.
     pub encoding: Option<Encoding>,
-    /// How far stored positions may be from those of the frame, and radii likewise.
+    /// Largest distance of stored positions from those of the frame, and largest difference of stored radii.
     pub bound: Bound,
-    /// How far those of the frame are from the true ones ([`crate::Positions::rounding`]).
+    /// Distance of the frame's positions from the true ones ([`crate::Positions::rounding`]), scene units.
     pub rounding: f64,
 }
 
 impl StoreSettings {
-    /// Everything as it is.
+    /// Stores positions and radii without loss.
     pub const EXACT: Self = Self {
         encoding: Some(Encoding::F32),
         bound: Bound::None,
@@ -35,7 +35,7 @@ impl StoreSettings {
     };
 }
 
-/// Writes `frame` to `path` in tree order, everything as it is.
+/// Writes `frame` to `path` in tree order, without loss.
 ///
 /// # Errors
 /// As [`store`].
@@ -46,8 +46,8 @@ pub fn write(path: &Path, frame: &ParticleFrame, step: Option<i64>) -> Result<()
 /// Writes `frame` to `path` in tree order.
 ///
 /// # Errors
-/// [`FrameError::Io`] if attributes or radii do not fit the particles, one of them is not finite, or the
-/// file cannot be written; no file is left over then.
+/// [`FrameError::Io`] if attributes or radii do not match the particles, if one of them is not finite, or if
+/// the file cannot be written. No file is left behind in these cases.
 pub fn store(
     path: &Path,
     frame: &ParticleFrame,
@@ -65,18 +65,21 @@ fn store_checked(
     step: Option<i64>,
     settings: &StoreSettings,
 ) -> io::Result<FrameIndex> {
+    // Choose the attributes and radii to store
     let is_kept = |a: &&Attribute| frame.radius.is_none() || !holds_radii(a);
     let kept: Vec<&Attribute> = frame.attributes.iter().filter(is_kept).collect();
     let own_radii = match &frame.radius {
         Some(Radius::PerParticle(radii)) => Some(&radii[..]),
         _ => None,
     };
+    // Bring the particles into tree order
     let mut positions = vec![Vec3::ZERO; frame.len()];
     let is_followed = own_radii.is_some() || !kept.is_empty();
     let mut indices = vec![0; if is_followed { frame.len() } else { 0 }];
     kd::order_into(&frame.positions, &mut positions, &mut indices, |_| ());
     arrange(&mut positions, &mut indices);
 
+    // Choose the encoding
     let radii: Option<Vec<f32>> = own_radii.map(|radii| gather(radii, 1, &indices));
     let common = match &frame.radius {
         Some(Radius::Common(radius)) => Some(*radius),
@@ -85,6 +88,7 @@ fn store_checked(
     let encoding = settings
         .encoding
         .unwrap_or_else(|| smallest_encoding(&positions, settings.bound, common));
+    // Describe the frame
     let spec = FrameSpec {
         is_y_up: false,
         count: frame.len() as u64,
@@ -106,6 +110,7 @@ fn store_checked(
         step,
         dropped: frame.dropped,
     };
+    // Write it
     let values: Vec<Vec<u8>> = kept.iter().map(|a| in_order(a, &indices)).collect();
     let mut writer = FrameWriter::create(path, spec)?;
     writer.push(&Run {
@@ -116,7 +121,7 @@ fn store_checked(
     writer.finish()
 }
 
-/// The encoding with the fewest bytes, blocks over the bound counted as they will be kept.
+/// The encoding with the fewest bytes. Blocks that exceed the bound count with their size in f32.
 pub fn smallest_encoding(positions: &[Vec3], bound: Bound, radius: Option<f32>) -> Encoding {
     let blocks = positions.len().div_ceil(crate::blocks::BLOCK_SIZE);
     let bytes = |encoding: &Encoding| {
@@ -127,7 +132,7 @@ pub fn smallest_encoding(positions: &[Vec3], bound: Bound, radius: Option<f32>) 
     best.unwrap_or_default()
 }
 
-/// The code of radii between the two of `ends`: they are coded where positions are.
+/// The code for radii within `ends`. If positions are stored as f32, radii are stored without loss.
 pub(crate) fn radius_range(ends: [f32; 2], encoding: Encoding, bound: Bound) -> RadiusRange {
     let [low, high] = ends;
     let bound = match (encoding, bound) {
@@ -143,7 +148,7 @@ fn smallest(radii: &[f32]) -> f32 {
     if low.is_finite() { low } else { 0.0 }
 }
 
-/// Whether radii are read from this attribute first, so that it need not be stored beside them.
+/// Whether readers take radii from this attribute first, so that the radii need not be stored again.
 fn holds_radii(attribute: &Attribute) -> bool {
     let is_float = matches!(
         attribute.data,
@@ -171,7 +176,7 @@ fn in_order(attribute: &Attribute, indices: &[u32]) -> Vec<u8> {
     })
 }
 
-/// The values of the particles with these indices, one after the other.
+/// The values of the particles with these indices, in the order of the indices.
 fn gather<T: Pod + Send + Sync>(values: &[T], components: usize, indices: &[u32]) -> Vec<T> {
     let mut ordered = vec![T::zeroed(); values.len()];
     ordered
@@ -186,6 +191,7 @@ fn gather<T: Pod + Send + Sync>(values: &[T], components: usize, indices: &[u32]
 
 fn check(frame: &ParticleFrame) -> io::Result<()> {
     let bad = |what: String| Err(io::Error::new(io::ErrorKind::InvalidInput, what));
+    // Check the attributes
     for a in &frame.attributes {
         if a.components == 0 || frame.len().checked_mul(a.components) != Some(a.data.len()) {
             return bad(format!(
@@ -197,6 +203,7 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
             ));
         }
     }
+    // Check the radii
     if let Some(Radius::PerParticle(radii)) = &frame.radius {
         if radii.len() != frame.len() {
             let (radii, particles) = (radii.len(), frame.len());
@@ -204,11 +211,12 @@ fn check(frame: &ParticleFrame) -> io::Result<()> {
         }
         if !radii.iter().all(|r| is_radius(*r)) {
             return bad(
-                "a radius is negative, no number or too large; give one for all (--radius)"
+                "a radius is negative, not a number or too large; give one radius for all particles"
                     .to_owned(),
             );
         }
     }
+    // Check the positions
     if !frame.positions.par_iter().all(is_near) {
         return bad("a position is not a number or too far away".to_owned());
     }

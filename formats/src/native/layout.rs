@@ -10,8 +10,8 @@
 //!      index (rkyv), last, up to the end of the file
 //! ```
 //!
-//! Opening looks at header and index only, whatever the particle count. Nothing here trusts a
-//! number: lengths follow from counts by checked arithmetic and must fit before the index.
+//! Opening reads only the header and the index, whatever the particle count. No number in a file is trusted:
+//! lengths follow from counts by checked arithmetic, and each section must end before the index.
 
 use std::fmt;
 use std::str::FromStr;
@@ -21,37 +21,37 @@ use rkyv::util::AlignedVec;
 use xxhash_rust::xxh3::xxh3_64;
 
 use super::stored::{RadiusCode, StoredType};
-use crate::ParseError;
 use crate::blocks::{BLOCK_SIZE, Block, Node, Q10Block, Q16Block, WIDTH};
+use crate::{ParseError, ValueError};
 
 /// The first bytes of every native frame.
 pub const MAGIC: &[u8; 8] = b"SPHERULE";
-/// Version that is written and read.
+/// Version that this program reads and writes.
 pub const VERSION: u32 = 2;
 /// Length of the header in bytes.
 pub const HEADER_LEN: usize = 64;
-/// Numbers that an attribute may have for a particle: far more than any has.
+/// Largest number of components of an attribute: far more than any attribute has.
 const MOST_COMPONENTS: u32 = 4096;
-/// Alignment of sections: a cache line, and an AVX-512 vector.
+/// Alignment of sections, bytes: a cache line, and an AVX-512 vector.
 pub const ALIGN: u64 = 64;
 
 /// How positions are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Default)]
 pub enum Encoding {
-    /// As they are, 12 bytes a particle.
+    /// Unchanged f32, 12 bytes per particle.
     #[default]
     F32,
-    /// 16 bits an axis in the box of their block, 6 bytes.
+    /// 16 bits per axis within the box of the block, 6 bytes per particle.
     Q16,
-    /// 11, 11 and 10 bits in the box of their block, 4 bytes.
+    /// 11, 11 and 10 bits within the box of the block, 4 bytes per particle.
     Q10,
 }
 
 impl Encoding {
-    /// All there are, the most exact first.
+    /// All encodings, the most exact first.
     pub const ALL: [Self; 3] = [Self::F32, Self::Q16, Self::Q10];
 
-    /// Its name on the command line and in reports.
+    /// The name on the command line and in reports.
     pub const fn name(self) -> &'static str {
         match self {
             Self::F32 => "f32",
@@ -69,12 +69,12 @@ impl Encoding {
         }
     }
 
-    /// The number that stands for it in the index.
+    /// The code of the encoding in the index.
     pub const fn code(self) -> u32 {
         self as u32
     }
 
-    /// What the number of an index stands for.
+    /// The encoding with this code; `None` for unknown codes.
     pub fn of_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|e| e.code() == code)
     }
@@ -87,100 +87,97 @@ impl fmt::Display for Encoding {
 }
 
 impl FromStr for Encoding {
-    type Err = String;
+    type Err = ValueError;
 
-    fn from_str(name: &str) -> Result<Self, String> {
+    fn from_str(name: &str) -> Result<Self, ValueError> {
         let found = Self::ALL.into_iter().find(|e| e.name() == name);
-        found.ok_or_else(|| {
-            let names = Self::ALL.map(Self::name).join(", ");
-            format!("no encoding {name:?}; there are {names}")
-        })
+        found.ok_or_else(|| ValueError::one_of(&Self::ALL.map(Self::name), name))
     }
 }
 
-/// Where a section is, and the xxh3 of its bytes.
+/// The place of a section and the xxh3 of its bytes.
 #[derive(
     Debug, Clone, Copy, PartialEq, Eq, Default, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize,
 )]
 pub struct Section {
-    /// From the start of the file.
+    /// Offset from the start of the file, bytes.
     pub offset: u64,
-    /// Bytes.
+    /// Length, bytes.
     pub len: u64,
-    /// Of exactly these bytes.
+    /// The xxh3 of these bytes.
     pub xxh3: u64,
 }
 
 /// Radii of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub enum RadiusIndex {
-    /// Unknown.
+    /// The radii are unknown.
     None,
-    /// All particles alike.
+    /// All particles have this radius.
     Common(f32),
-    /// One a particle.
+    /// Each particle has its own radius.
     PerParticle(RadiiIndex),
 }
 
-/// Radii that differ, in blocks of 16 like the positions: f32, or `low + code * step` where `step` is
+/// Radii that differ, in blocks of 16 like the positions: f32, or `low + code * step`, where `step` is
 /// `(high - low)` divided by the largest code.
 #[derive(Debug, Clone, Copy, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct RadiiIndex {
-    /// How they are stored, see [`RadiusCode`].
+    /// The code of the stored type, see [`RadiusCode`].
     pub code: u32,
-    /// The smallest.
+    /// The smallest radius.
     pub low: f32,
-    /// The largest.
+    /// The largest radius.
     pub high: f32,
     /// Largest difference of a stored radius from the true one.
     pub max_error: f32,
-    /// The numbers.
+    /// The section with the radii.
     pub section: Section,
 }
 
-/// One attribute: values interleaved as in memory, in the order of the positions.
+/// One attribute: interleaved values in the order of the positions.
 #[derive(Debug, Clone, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct AttributeIndex {
     /// Name.
     pub name: String,
     /// Code of the type, see [`StoredType`].
     pub stored: u32,
-    /// Numbers a particle.
+    /// Numbers per particle.
     pub components: u32,
-    /// For each component the values of code 0 and of code 255; empty but for 8-bit codes.
+    /// For each component, the values of code 0 and of code 255; empty except for 8-bit codes.
     pub ranges: Vec<[f64; 2]>,
-    /// Largest difference of a stored value from the true one; 0 where they are stored as they were.
+    /// Largest difference of a stored value from the true one; 0 for values that are stored without loss.
     pub max_error: f64,
-    /// The numbers.
+    /// The section with the values.
     pub section: Section,
 }
 
-/// What a native frame holds and where.
+/// The index: the contents of a native frame and their places.
 #[derive(Debug, Clone, PartialEq, rkyv::Archive, rkyv::Serialize, rkyv::Deserialize)]
 pub struct FrameIndex {
-    /// Particles.
+    /// Number of particles.
     pub count: u64,
     /// Particles in a position block, 16.
     pub block: u32,
     /// How positions are stored, the code of an [`Encoding`].
     pub encoding: u32,
-    /// How particles are ordered, [`ORDER_KD`].
+    /// The order of the particles, [`ORDER_KD`].
     pub order: u32,
     /// Which axis points up in the program that made the particles: 0 if unknown, or [`UP_Y`].
     pub up: u32,
-    /// World position of the zero of the stored positions.
+    /// World position that stored positions are relative to.
     pub origin: [f64; 3],
     /// Smallest stored position; infinity if there are no particles.
     pub min: [f32; 3],
     /// Largest stored position; minus infinity if there are no particles.
     pub max: [f32; 3],
-    /// No stored position is farther than this from the true one, scene units.
+    /// Largest distance of a stored position from the true one, scene units.
     pub max_error: f64,
-    /// Position blocks.
+    /// The position blocks.
     pub positions: Section,
-    /// Blocks that are kept as f32 because they would be too coarse; none with f32.
+    /// Blocks that are stored as f32 because the encoding would be too coarse; empty for f32.
     pub wide: Section,
-    /// A node of the tree for each eight blocks.
+    /// The nodes of the tree, one for each eight blocks.
     pub nodes: Section,
     /// Radii.
     pub radius: RadiusIndex,
@@ -190,14 +187,14 @@ pub struct FrameIndex {
     pub time: Option<f64>,
     /// Step number of the simulation.
     pub step: Option<i64>,
-    /// Particles that were left out on conversion because they were not finite.
+    /// Particles that the conversion dropped because they were not finite.
     pub dropped: u64,
 }
 
 /// Order code: k-d cuts inside runs of a space-filling curve, at whole nodes.
 pub const ORDER_KD: u32 = 1;
 
-/// Up code: y, as for users of Houdini.
+/// Up code: the y axis, as in Houdini.
 pub const UP_Y: u32 = 2;
 
 impl FrameIndex {
@@ -209,7 +206,7 @@ impl FrameIndex {
         Encoding::of_code(self.encoding).expect("checked when the index was read")
     }
 
-    /// All sections and what they hold.
+    /// All sections with their names.
     pub fn sections(&self) -> Vec<(String, &Section)> {
         let mut sections = self.tree_sections();
         for attribute in &self.attributes {
@@ -218,7 +215,7 @@ impl FrameIndex {
         sections
     }
 
-    /// The sections of positions, nodes and radii.
+    /// The sections of positions, nodes and radii, with their names.
     pub fn tree_sections(&self) -> Vec<(String, &Section)> {
         let mut sections = vec![
             ("the positions".to_owned(), &self.positions),
@@ -248,7 +245,7 @@ pub const fn blocks_of(count: u64) -> u64 {
     count.div_ceil(BLOCK_SIZE as u64)
 }
 
-/// The header in front of `file_len` bytes that end in `index`.
+/// The header of a file of `file_len` bytes that ends in `index`.
 pub fn header(file_len: u64, index_offset: u64, index: &[u8]) -> [u8; HEADER_LEN] {
     let mut header = [0; HEADER_LEN];
     header[0..8].copy_from_slice(MAGIC);
@@ -263,15 +260,15 @@ pub fn header(file_len: u64, index_offset: u64, index: &[u8]) -> [u8; HEADER_LEN
     header
 }
 
-/// Reads and checks header and index of the whole file `bytes`: all that opening does.
+/// Reads and checks the header and the index of `bytes`, a whole file. Opening a file needs no more.
 ///
 /// # Errors
-/// [`ParseError::Malformed`] for anything damaged or cut off, [`ParseError::Unsupported`] for a
-/// newer version or encoding.
+/// [`ParseError::Malformed`] for a damaged or truncated file, [`ParseError::Unsupported`] for another version
+/// or encoding.
 pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     let index = index_range(bytes)?;
     let (offset, index) = (index.start, &bytes[index]);
-    // rkyv wants its alignment, which a slice does not promise; the index is small.
+    // rkyv needs an alignment that a slice does not guarantee; the index is small enough to copy.
     let mut aligned = AlignedVec::<16>::with_capacity(index.len());
     aligned.extend_from_slice(index);
     let damaged = |e: rancor::Error| {
@@ -282,7 +279,7 @@ pub fn parse(bytes: &[u8]) -> Result<FrameIndex, ParseError> {
     };
     let archived = rkyv::access::<ArchivedFrameIndex, rancor::Error>(&aligned).map_err(damaged)?;
     let index = rkyv::deserialize::<FrameIndex, rancor::Error>(archived).map_err(damaged)?;
-    let again = |error: ParseError| error.retold(|what| format!("{what}; convert it again"));
+    let again = |error: ParseError| error.map_message(|what| format!("{what}; convert it again"));
     check_index(&index, offset).map_err(again)?;
     Ok(index)
 }
@@ -296,6 +293,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
         );
         ParseError::malformed(bytes.len(), what)
     };
+    // Check the magic bytes and the checksum
     let header: &[u8; HEADER_LEN] = bytes.first_chunk().ok_or_else(short)?;
     if !header.starts_with(MAGIC) {
         return Err(ParseError::malformed(
@@ -310,12 +308,14 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
             "the header is damaged: its checksum differs; copy or convert it again",
         ));
     }
+    // Check the version
     let version = u32::from_le_bytes(std::array::from_fn(|i| header[8 + i]));
     if version != VERSION {
         return Err(ParseError::unsupported(format!(
             "a native frame of version {version}, this program reads {VERSION}; convert again"
         )));
     }
+    // Check the length of the file
     let (file_len, offset, len) = (word(16), word(24), word(32));
     if file_len != bytes.len() as u64 {
         return Err(ParseError::malformed(
@@ -328,6 +328,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
             ),
         ));
     }
+    // Find the index and check its checksum
     let index = usize::try_from(offset)
         .ok()
         .zip(
@@ -351,6 +352,7 @@ fn index_range(bytes: &[u8]) -> Result<std::ops::Range<usize>, ParseError> {
 
 /// Checks every section against the particle count and the bytes before the index at `end`.
 fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
+    // Check that this version can read the encoding and the order
     let encoding = Encoding::of_code(index.encoding)
         .filter(|_| index.block as usize == BLOCK_SIZE && index.order == ORDER_KD)
         .ok_or_else(|| {
@@ -360,6 +362,7 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
                 index.encoding, index.order, index.block
             ))
         })?;
+    // Check the sections of the tree
     let check = SectionCheck {
         count: index.count,
         end,
@@ -378,6 +381,7 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
         &index.wide,
         is_whole.then_some(index.wide.len),
     )?;
+    // Check the origin and the bounds
     let numbers = index.origin.iter().chain([&index.max_error]);
     let is_box = |i: usize| index.min[i].is_finite() && index.min[i] <= index.max[i];
     if numbers.into_iter().any(|n| !n.is_finite()) || index.count > 0 && !(0..3).all(is_box) {
@@ -387,13 +391,14 @@ fn check_index(index: &FrameIndex, end: usize) -> Result<(), ParseError> {
         ));
     }
     check_radius(index, check)?;
-    // Overlapping sections would be read into more memory than the file has bytes.
+    // Check the sum of the sections: overlapping ones would need more memory than the file has bytes
     let lens = index.sections().into_iter().map(|(_, section)| section.len);
     let sum = lens.fold(0, u64::saturating_add);
     if sum > end as u64 {
         let what = format!("the sections have {sum} bytes, more than the file");
         return Err(ParseError::malformed(end, what));
     }
+    // Check the attributes
     index
         .attributes
         .iter()
@@ -434,10 +439,12 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
         let what = format!("attribute {} {what}", attribute.name);
         Err(ParseError::malformed(check.end, what))
     };
+    // Check the number of components
     let width = u64::from(attribute.components) * stored.size() as u64;
     if width == 0 || attribute.components > MOST_COMPONENTS {
         return bad("has no components, or absurdly many");
     }
+    // Check the ranges
     let ranges = match stored {
         StoredType::Ranged => attribute.components as usize,
         _ => 0,
@@ -446,21 +453,22 @@ fn check_attribute(attribute: &AttributeIndex, check: SectionCheck) -> Result<()
     if attribute.ranges.len() != ranges || !is_finite {
         return bad("has ranges that do not fit its type");
     }
+    // Check the section
     let what = format!("attribute {}", attribute.name);
     check.length(&what, &attribute.section, check.count.checked_mul(width))
 }
 
-/// Checks the ranges of sections.
+/// Checks the places of sections.
 #[derive(Clone, Copy)]
 struct SectionCheck {
-    /// Particles.
+    /// Number of particles.
     count: u64,
-    /// Where the index begins.
+    /// Offset of the index.
     end: usize,
 }
 
 impl SectionCheck {
-    /// `section` must have the `expected` bytes (none fit if that could not be computed).
+    /// Checks that `section` has `expected` bytes; `None` means that the length overflowed, and always fails.
     fn length(
         &self,
         what: &str,

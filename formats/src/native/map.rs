@@ -1,8 +1,8 @@
 //! Memory-mapped files: the only module of the crate with a memory map.
 //!
-//! Somebody may cut a file short while it is mapped; touching pages that are gone then raises a signal that
-//! ends a process. Here such pages become zeros and the file is marked as lost, so that whoever used it
-//! finds out afterwards, and one frame fails instead of the whole job.
+//! Another process may truncate a file while it is mapped; an access to a missing page then raises a signal
+//! that ends the process. This module replaces such pages with zeros and marks the file as lost. The caller
+//! detects the loss afterwards, and one frame fails instead of the whole job.
 #![expect(
     unsafe_code,
     reason = "mapping has no safe form; every block says why it is sound"
@@ -21,13 +21,13 @@ use super::layout::{FrameIndex, parse};
 use crate::regular::regular_len;
 use crate::{FrameError, ParseError};
 
-/// How the bytes of a native frame come into memory.
+/// How to access the bytes of a native frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Access {
-    /// Mapped: opening is O(1), pages come as they are touched.
+    /// Map the file: opening is O(1), and pages are loaded on first access.
     #[default]
     Map,
-    /// Read as a whole: for file systems where a file may be cut short while it is used.
+    /// Read the whole file: for file systems where a file may be truncated while it is in use.
     Read,
 }
 
@@ -37,7 +37,7 @@ pub struct MappedFile {
     path: PathBuf,
     file: File,
     modified: Option<SystemTime>,
-    // Before the map, so that it is let go first.
+    // Declared before the map, so that it is dropped first.
     guard: guard::Guard,
     map: Mmap,
 }
@@ -49,7 +49,7 @@ impl MappedFile {
     /// [`FrameError`] if it cannot be opened or is not a regular file.
     pub fn open(path: &Path) -> Result<Self, FrameError> {
         let io = |e| FrameError::io(path, e);
-        // Opening a pipe would wait for a writer.
+        // Opening a pipe would block until it has a writer.
         regular_len(path)?;
         let file = File::open(path).map_err(io)?;
         let meta = file.metadata().map_err(io)?;
@@ -66,29 +66,29 @@ impl MappedFile {
         })
     }
 
-    /// Path of the file.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The bytes. Some may be zeros that were not in the file if it is cut short: ask
-    /// [`Self::check`] afterwards.
+    /// The bytes. If the file was truncated, some of them may be zeros that were never in the file: call
+    /// [`Self::check`] after use.
     pub fn bytes(&self) -> &[u8] {
         &self.map
     }
 
-    /// Says that the bytes will be read from front to back, so that the system reads ahead and lets go of
-    /// pages already read. Only advice: it changes nothing but speed.
+    /// Announces sequential access, so that the system reads ahead and releases pages that were read. This is
+    /// only a hint, which affects nothing but speed.
     pub(crate) fn advise_sequential(&self) {
         #[cfg(unix)]
         let _ = self.map.advise(memmap2::Advice::Sequential);
     }
 
-    /// Whether the file is still what it was when it was mapped. Ask before use, and after it before
-    /// anything that came of it is believed.
+    /// Checks that the file is still the one that was mapped. Call it before use, and again after use before
+    /// relying on the results.
     ///
     /// # Errors
-    /// [`FrameError::Malformed`] if its length or time of change differs, or bytes were lost.
+    /// [`FrameError::Malformed`] if the length or the modification time differs, or if bytes were lost.
     pub fn check(&self) -> Result<(), FrameError> {
         let meta = self.file.metadata();
         let meta = meta.map_err(|e| FrameError::io(&self.path, e))?;
@@ -102,7 +102,8 @@ impl MappedFile {
         } else {
             return Ok(());
         };
-        let what = format!("{what}; leave it alone, or read it instead of mapping (--no-mmap)");
+        let what =
+            format!("{what}; do not change it during the run, or read it instead of mapping it");
         Err(ParseError::malformed(0, what).in_file(&self.path))
     }
 }
@@ -118,15 +119,15 @@ pub struct NativeFile {
 #[derive(Debug)]
 enum FileBytes {
     Mapped(MappedFile),
-    /// Aligned as sections are, see [`super::layout::ALIGN`].
+    /// Aligned like sections, see [`super::layout::ALIGN`].
     Read(AlignedVec<64>),
 }
 
 impl NativeFile {
-    /// Opens the native frame at `path` and checks its header and index, not its sections.
+    /// Opens the native frame at `path`. Checks the header and the index, not the sections.
     ///
     /// # Errors
-    /// [`FrameError`] if it cannot be read, or is damaged, cut off, or of another version.
+    /// [`FrameError`] if the file cannot be read, is damaged or truncated, or has another version.
     pub fn open(path: &Path, access: Access) -> Result<Self, FrameError> {
         let bytes = match access {
             Access::Map => FileBytes::Mapped(MappedFile::open(path)?),
@@ -140,28 +141,27 @@ impl NativeFile {
         })
     }
 
-    /// Path of the file.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 
-    /// What the file holds.
+    /// The index of the file.
     pub const fn index(&self) -> &FrameIndex {
         &self.index
     }
 
-    /// Bytes of the file.
+    /// Length of the file, bytes.
     pub fn byte_len(&self) -> u64 {
         self.bytes.as_slice().len() as u64
     }
 
-    /// Whether the bytes are those of the file itself.
+    /// Whether the file is mapped, and not read into memory.
     pub const fn is_mapped(&self) -> bool {
         matches!(self.bytes, FileBytes::Mapped(_))
     }
 
-    /// The particles in place. Take it anew for every use: it looks again whether a mapped file is still
-    /// what it was.
+    /// The particles, in place. Call it for every use: it checks again that a mapped file has not changed.
     ///
     /// # Errors
     /// As [`Self::check`].
@@ -170,15 +170,15 @@ impl NativeFile {
         Ok(self.frame_unchecked())
     }
 
-    /// [`Self::frame`] without looking at the file again: for short looks between two checks.
+    /// [`Self::frame`] without the check, for short accesses between two checks.
     pub fn frame_unchecked(&self) -> NativeFrame<'_> {
         NativeFrame::with_index(self.bytes.as_slice(), &self.index)
     }
 
-    /// Whether a mapped file is still what it was, see [`MappedFile::check`].
+    /// Checks that a mapped file has not changed, see [`MappedFile::check`].
     ///
     /// # Errors
-    /// [`FrameError::Malformed`] if it is not.
+    /// [`FrameError::Malformed`] if the file changed.
     pub fn check(&self) -> Result<(), FrameError> {
         match &self.bytes {
             FileBytes::Mapped(file) => file.check(),
@@ -196,7 +196,7 @@ impl FileBytes {
     }
 }
 
-/// The whole file, aligned as its sections are.
+/// Reads the whole file into memory that is aligned like its sections.
 ///
 /// # Errors
 /// [`FrameError`] if it cannot be read or is not a regular file.
@@ -216,32 +216,32 @@ pub(crate) fn read(path: &Path) -> Result<AlignedVec<64>, FrameError> {
     Ok(bytes)
 }
 
-/// Maps `file`, which nobody may change while the map lives.
+/// Maps `file`, which must not change while the map lives.
 ///
-/// Native frames are published by rename and never written in place, so only somebody outside can do
-/// that. [`MappedFile::check`] compares length and time of change; what is cut off reads as zeros (see
-/// `guard`). Contents are plain numbers, valid for any bit pattern, and never used as indices
-/// unchecked, so that a change between two looks is a wrong picture that is found out, at worst a fault
-/// that costs the frame.
+/// Native frames are published by rename and never written in place, so that only another program can change
+/// one. [`MappedFile::check`] compares the length and the modification time; missing pages read as zeros (see
+/// `guard`). The contents are plain numbers, which are valid for any bit pattern and are never used as
+/// unchecked indices. A change between two reads therefore gives a wrong picture, which the check detects, or
+/// at worst an error that fails the frame.
 fn map(file: &File) -> io::Result<Mmap> {
-    // SAFETY: `Mmap::map` needs the file not to be changed while mapped; what is done about that, and why
-    // a change cannot break more than numbers, stands above.
+    // SAFETY: `Mmap::map` needs the file not to change while it is mapped. The doc comment above states what
+    // guards against a change, and why a change affects nothing but numbers.
     unsafe { Mmap::map(file) }
 }
 
 #[cfg(all(target_os = "linux", not(miri)))]
 mod guard {
-    //! Pages of a mapped file that is cut short: the kernel raises SIGBUS where one is touched. The
-    //! handler here puts a page of zeros there and remembers the loss.
+    //! Handles accesses to missing pages of a truncated file: the kernel raises SIGBUS for such a page. The
+    //! handler maps a page of zeros in its place and records the loss.
 
     use std::sync::OnceLock;
     use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 
-    /// Maps that can be watched at a time; more than the stages of a pipeline hold.
+    /// Largest number of maps that are watched at a time; the stages of a pipeline hold fewer.
     const REGIONS: usize = 64;
 
     struct Region {
-        /// First address; 0 if the entry is free, 1 while it is taken.
+        /// First address; 0 if the entry is free, 1 while it is being claimed.
         start: AtomicUsize,
         end: AtomicUsize,
         lost: AtomicBool,
@@ -262,7 +262,7 @@ mod guard {
 
     static INSTALLED: OnceLock<Option<Installed>> = OnceLock::new();
 
-    /// Watches a map as long as it lives.
+    /// Watches a map for as long as the map lives.
     #[derive(Debug)]
     pub(super) struct Guard {
         place: Option<usize>,
@@ -273,6 +273,7 @@ mod guard {
             if map.is_empty() || INSTALLED.get_or_init(install).is_none() {
                 return Self { place: None };
             }
+            // Claim a free entry
             let start = map.as_ptr() as usize;
             let free = REGION.iter().position(|region| {
                 let taken =
@@ -281,6 +282,7 @@ mod guard {
                         .compare_exchange(0, 1, Ordering::AcqRel, Ordering::Relaxed);
                 taken.is_ok()
             });
+            // Publish the addresses; the handler reads them once `start` is set
             if let Some(place) = free {
                 let region = &REGION[place];
                 region.lost.store(false, Ordering::Relaxed);
@@ -290,7 +292,7 @@ mod guard {
             Self { place: free }
         }
 
-        /// Whether zeros stand for bytes that are gone.
+        /// Whether zeros replaced missing bytes.
         pub(super) fn has_lost(&self) -> bool {
             self.place
                 .is_some_and(|place| REGION[place].lost.load(Ordering::Acquire))
@@ -306,9 +308,8 @@ mod guard {
     }
 
     fn install() -> Option<Installed> {
-        // SAFETY: `sysconf` takes any number; a sigaction of zeros is valid and filled in below; both
-        // pointers given to `sigaction` are to live values, and the handler has the signature that
-        // SA_SIGINFO asks for.
+        // SAFETY: `sysconf` accepts any number. A zeroed sigaction is valid and is filled in below. Both pointers
+        // that `sigaction` gets are to live values, and the handler has the signature that SA_SIGINFO requires.
         unsafe {
             let page = usize::try_from(libc::sysconf(libc::_SC_PAGESIZE)).ok()?;
             let mut action: libc::sigaction = std::mem::zeroed();
@@ -322,24 +323,25 @@ mod guard {
         }
     }
 
-    /// Only reads atomics and calls the kernel, as a signal handler may.
+    /// Only reads atomics and calls the kernel, as signal handlers must.
     extern "C" fn on_bus_error(
         _signal: libc::c_int,
         info: *mut libc::siginfo_t,
         _context: *mut libc::c_void,
     ) {
-        // SAFETY: the kernel gives a valid `info` to a handler that was installed with SA_SIGINFO, and for
-        // SIGBUS its address is set.
+        // SAFETY: the kernel passes a valid `info` to a handler that was installed with SA_SIGINFO, and sets
+        // its address for SIGBUS.
         let address = unsafe { (*info).si_addr() } as usize;
         let Some(Some(installed)) = INSTALLED.get() else {
             return;
         };
+        // Find the map that contains the address
         for region in &REGION {
             let start = region.start.load(Ordering::Acquire);
             if start > 1 && address >= start && address < region.end.load(Ordering::Relaxed) {
                 let page = address & !(installed.page - 1);
-                // SAFETY: the page belongs to a map that is still held (it was just touched) and whose
-                // file has no such bytes; zeros take its place, readable as before, until the map goes.
+                // SAFETY: the page belongs to a live map (it was just accessed), and the file has no bytes for
+                // it. Zeros replace it, readable as before, until the map is dropped.
                 let zeros = unsafe {
                     libc::mmap(
                         page as *mut libc::c_void,
@@ -356,8 +358,9 @@ mod guard {
                 }
             }
         }
-        // Not ours: whoever was there before gets it, as the fault happens again.
-        // SAFETY: `before` is what the kernel gave for this signal.
+        // The address is in no watched map: restore the earlier handler, which gets the signal when the access
+        // is repeated.
+        // SAFETY: `before` is the action that the kernel returned for this signal.
         unsafe {
             libc::sigaction(
                 libc::SIGBUS,
@@ -370,7 +373,7 @@ mod guard {
 
 #[cfg(any(not(target_os = "linux"), miri))]
 mod guard {
-    //! Elsewhere a file must not be cut short while it is mapped.
+    //! On other systems a file must not be truncated while it is mapped.
 
     #[derive(Debug)]
     pub(super) struct Guard;

@@ -1,7 +1,7 @@
 //! The native frame file `.spf`: particles in tree order, in blocks that are traced in place.
 //!
-//! [`layout`] has the bytes, [`FrameWriter`] makes files, [`NativeFile`] maps them. All parsing works on
-//! `&[u8]`. Files written by other programs are [`crate::read`]'s.
+//! [`layout`] defines the bytes, [`FrameWriter`] writes files, [`NativeFile`] maps them. All parsing works on
+//! `&[u8]`. [`crate::read`] reads the files of other programs.
 
 use rkyv::util::AlignedVec;
 
@@ -83,7 +83,7 @@ impl Reader for Spf {
     }
 }
 
-/// Checks everything in the native frame `bytes`.
+/// Checks all contents of the native frame `bytes`.
 ///
 /// # Errors
 /// As [`layout::parse`] and [`NativeFrame::verify_all`].
@@ -91,10 +91,10 @@ pub fn verify(bytes: &[u8]) -> Result<(), ParseError> {
     with_frame(bytes, |frame| frame.verify_all())
 }
 
-/// Looks at the native frame `bytes`, or at a copy of them if they are not aligned as sections are.
+/// Calls the function with the native frame `bytes`, or with an aligned copy if they are not aligned like sections.
 fn with_frame<T>(
     bytes: &[u8],
-    look: impl FnOnce(&NativeFrame) -> Result<T, ParseError>,
+    visit: impl FnOnce(&NativeFrame) -> Result<T, ParseError>,
 ) -> Result<T, ParseError> {
     let index = layout::parse(bytes)?;
     let mut aligned = AlignedVec::<64>::new();
@@ -104,10 +104,10 @@ fn with_frame<T>(
         aligned.extend_from_slice(bytes);
         &aligned
     };
-    look(&NativeFrame::with_index(bytes, &index))
+    visit(&NativeFrame::with_index(bytes, &index))
 }
 
-/// The bytes of a section of a file of `bytes`.
+/// The bytes of a section; `bytes` is the whole file.
 fn section_of<'a>(bytes: &'a [u8], section: &Section) -> Result<&'a [u8], ParseError> {
     let end = section.offset.checked_add(section.len);
     usize::try_from(section.offset)

@@ -1,9 +1,9 @@
-//! Positions in tree order become the stored leaves of a tree: nodes, coded blocks, and those blocks as
-//! they are that codes would make too coarse.
+//! Encodes positions in tree order as the stored leaves of a tree: nodes, coded blocks, and uncoded blocks
+//! where codes would be too coarse.
 //!
-//! The grid of a block follows from its node, and the node from its blocks' boxes, so eight blocks are
-//! done together. A decoded position never leaves the box that its node holds, whatever was rounded:
-//! codes at the border move inwards, and the error that is stored is measured after that.
+//! The grid of a block follows from its node, and the node from the boxes of its blocks, so that eight blocks
+//! are encoded together. A decoded position never leaves the box that its node stores: codes at the border are
+//! rounded inwards. The stored error is measured after that.
 
 use bytemuck::Zeroable;
 use glam::{DVec3, Vec3};
@@ -16,21 +16,21 @@ use crate::order::index_u32;
 
 /// Particles under one node.
 pub(super) const GROUP: usize = WIDTH * BLOCK_SIZE;
-/// Groups that a task takes.
+/// Groups per task.
 const TASK: usize = 64;
 
-/// Leaves over a run of particles.
+/// The leaves over a run of particles.
 #[derive(Debug, Default)]
 pub(super) struct EncodedLeaves<B> {
-    /// A node for each eight blocks.
+    /// One node for each eight blocks.
     pub(super) nodes: Vec<Node>,
-    /// Blocks, coded or referring to `wide` (counted from the run's first).
+    /// Blocks that hold codes or refer to `wide` (counted from the first block of the run).
     pub(super) blocks: Vec<B>,
-    /// Blocks as they are.
+    /// Uncoded blocks.
     pub(super) wide: Vec<Block>,
     /// Largest distance of a stored position from the given one.
     pub(super) max_error: f64,
-    /// Box of the stored positions.
+    /// Bounding box of the stored positions.
     pub(super) bounds: Aabb,
 }
 
@@ -39,31 +39,31 @@ pub(super) struct EncodedLeaves<B> {
 pub(super) struct EncodeLimits {
     /// The largest error of a position.
     pub(super) bound: Bound,
-    /// The radius of all particles, if they have one.
+    /// The common radius of all particles, if there is one.
     pub(super) radius: Option<f32>,
 }
 
-/// A block as it will be stored.
+/// A block in its stored form.
 pub(super) trait StoredBlock: Copy + Send + Sync + bytemuck::Pod {
-    /// Whether every block is stored as it is.
+    /// Whether all blocks are stored without loss.
     const IS_EXACT: bool;
 
-    /// `block` in the grid `frame`, with its largest error; none if a position would leave the grid's box or
-    /// the block cannot be distinguished from a reference.
+    /// `block` in the grid of its node, with its largest error; `None` if a position would leave the box of the
+    /// grid or the coded block would look like a reference.
     fn encode(block: &Block, node: &Node, slot: usize) -> Option<(Self, f64)>;
 
-    /// A reference to a block that is kept as it is; `None` if this encoding keeps all of them so.
+    /// A reference to an uncoded block; `None` if this encoding has no references.
     fn reference(index: u32) -> Option<Self>;
 
-    /// The block's positions as they will be read, where they were coded.
+    /// The decoded positions of a coded block.
     fn stored(&self, frame: &BlockFrame) -> Block;
 
-    /// Itself, or a reference to a wide block at index `by`.
+    /// The same block; a reference points `by` blocks further.
     #[must_use]
     fn shifted(self, by: u32) -> Self;
 
-    /// Half a step of the grid as a part of its extent, on each axis: how far a coded position can be from
-    /// the true one.
+    /// Half a grid step as a fraction of the grid's extent, on each axis: the largest distance of a coded
+    /// position from the true one.
     fn half_steps() -> Vec3;
 }
 
@@ -112,7 +112,7 @@ impl<B: CompactBlock + Send + Sync> StoredBlock for B {
         }
         let coded = Self::from_codes(&codes);
         if coded.wide_index().is_some() {
-            // The particles are not arranged as a coded block's are.
+            // The block is not arranged as coded blocks must be.
             return None;
         }
         let error = largest_distance(&coded.decode(&frame), block);
@@ -144,13 +144,13 @@ struct CodeGrid {
     base: f32,
     step: f32,
     largest: u32,
-    /// The planes of the block's box.
+    /// The planes of the block's box on the axis.
     planes: [f64; 2],
 }
 
 impl CodeGrid {
-    /// The code nearest to `value` whose position is inside the box; the next ones inwards are tried
-    /// where rounding leads outside.
+    /// The code nearest to `value` whose position is inside the box. If rounding leads outside, the next codes
+    /// inwards are tried.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -158,7 +158,7 @@ impl CodeGrid {
     )]
     fn code(&self, value: f32) -> Option<u32> {
         let exact = (f64::from(value) - f64::from(self.base)) / f64::from(self.step);
-        // Not by `round`, which is a call on machines without an instruction for it.
+        // `round` would be a function call on machines without an instruction for it.
         let nearest = ((exact + 0.5) as u32).min(self.largest);
         let lower = (nearest + 1).min(self.largest);
         [nearest, nearest.saturating_sub(1), lower]
@@ -179,12 +179,13 @@ fn largest_distance(a: &Block, b: &Block) -> f64 {
     largest.sqrt()
 }
 
-/// The leaves over `positions`, which are in tree order; all groups but the last of a frame are full.
+/// Encodes `positions`, which are in tree order. All groups except the last one of a frame are full.
 pub(super) fn encode<B: StoredBlock>(
     positions: &[Vec3],
     radii: Option<&CodedRadii>,
     allowed: EncodeLimits,
 ) -> EncodedLeaves<B> {
+    // Encode groups in parallel
     let parts: Vec<EncodedLeaves<B>> = positions
         .par_chunks(TASK * GROUP)
         .enumerate()
@@ -193,6 +194,7 @@ pub(super) fn encode<B: StoredBlock>(
             encode_task(positions, radii, allowed)
         })
         .collect();
+    // Join the results in order
     let mut all = EncodedLeaves {
         nodes: Vec::with_capacity(positions.len().div_ceil(GROUP)),
         blocks: Vec::with_capacity(positions.len().div_ceil(BLOCK_SIZE)),
@@ -228,13 +230,14 @@ impl<B: StoredBlock> EncodedLeaves<B> {
         }
     }
 
-    /// Takes in up to eight blocks under one node.
+    /// Encodes up to eight blocks under one node.
     fn push_group(
         &mut self,
         positions: &[Vec3],
         radii: Option<&[BlockRadii]>,
         allowed: EncodeLimits,
     ) {
+        // Compute the boxes of the blocks
         let mut blocks = [Block::zeroed(); WIDTH];
         let mut boxes = [Aabb::EMPTY; WIDTH];
         let chunks = positions.chunks(BLOCK_SIZE);
@@ -246,6 +249,7 @@ impl<B: StoredBlock> EncodedLeaves<B> {
                 Some(radii) => room_for_spheres::<B>(&blocks[slot], &radii[slot]),
             };
         }
+        // Encode the blocks within the boxes that the node stores
         let node = Node::enclosing(&boxes[..used]);
         for (slot, block) in blocks[..used].iter().enumerate() {
             let own = radii.map(|radii| &radii[slot]);
@@ -262,6 +266,7 @@ impl<B: StoredBlock> EncodedLeaves<B> {
         radii: Option<&BlockRadii>,
         allowed: EncodeLimits,
     ) {
+        // Encode the block, if its error and its spheres are within the limits
         let smallest = |r: &BlockRadii| r.0.iter().copied().fold(f32::INFINITY, f32::min);
         let radius = radii.map(smallest).or(allowed.radius);
         let most = allowed.bound.length(radius);
@@ -278,15 +283,16 @@ impl<B: StoredBlock> EncodedLeaves<B> {
             self.blocks.push(coded);
             return;
         }
+        // Otherwise store it uncoded, and refer to it
         self.bounds = self.bounds.union(block.bounds());
         let reference = B::reference(index_u32(self.wide.len()));
-        // What is stored as it is was never refused.
+        // Encodings without loss accept every block, so that this encoding has references.
         self.blocks
             .push(reference.expect("only coded blocks are refused"));
         self.wide.push(*block);
     }
 
-    /// Takes in what comes after.
+    /// Appends the leaves of the following particles.
     fn append(&mut self, next: Self) {
         let first = index_u32(self.wide.len());
         let has_references = first > 0 && !next.wide.is_empty();
@@ -302,7 +308,7 @@ impl<B: StoredBlock> EncodedLeaves<B> {
         self.bounds = self.bounds.union(next.bounds);
     }
 
-    /// Counts references from the first of `before` blocks that are kept already.
+    /// Adds `before`, the number of earlier uncoded blocks, to all references.
     pub(super) fn shift(&mut self, before: u32) {
         if before > 0 && !self.wide.is_empty() {
             let blocks = self.blocks.par_iter_mut();
@@ -311,10 +317,10 @@ impl<B: StoredBlock> EncodedLeaves<B> {
     }
 }
 
-/// The box of the spheres, wherever in its reach a code puts them.
+/// The bounding box of the spheres, for any position that coding can give them.
 fn room_for_spheres<B: StoredBlock>(block: &Block, radii: &BlockRadii) -> Aabb {
     let spheres = block.sphere_bounds(radii);
-    // The box that the node will hold is larger by up to two of its planes' steps, and so is the grid.
+    // The stored box of the node exceeds this one by up to two steps of its planes, and so does the grid.
     let reach = 1.25 * B::half_steps() * spheres.size();
     Aabb {
         min: spheres.min - reach,
@@ -322,7 +328,7 @@ fn room_for_spheres<B: StoredBlock>(block: &Block, radii: &BlockRadii) -> Aabb {
     }
 }
 
-/// Up to 16 positions; lanes that are left repeat the last one.
+/// A block of up to 16 positions; the remaining lanes repeat the last one.
 fn block_of(positions: &[Vec3]) -> Block {
     let mut block = Block::zeroed();
     for lane in 0..BLOCK_SIZE {
@@ -331,9 +337,9 @@ fn block_of(positions: &[Vec3]) -> Block {
     block
 }
 
-/// Brings each block of `positions` into the arrangement that coded blocks need (z of the first particle
-/// not above that of the last), and `indices` likewise unless that is empty. Before attributes follow by the
-/// indices. Coincident particles keep their order: it decides which of them a ray meets first.
+/// Arranges each block of `positions` as coded blocks require (z of the first particle not above z of the
+/// last), and `indices` in the same way unless it is empty. Call it before attributes are gathered by the indices.
+/// Coincident particles keep their order, because it decides which of them a ray hits first.
 pub fn arrange(positions: &mut [Vec3], indices: &mut [u32]) {
     if indices.is_empty() {
         positions
@@ -360,14 +366,15 @@ fn arrange_block(positions: &mut [Vec3], indices: &mut [u32]) {
             indices.swap(a, b);
         }
     };
+    // Exchange the first and the last particle
     swap(positions, 0, last);
-    // The particle that came from the front passes to the first place of those it coincides with
+    // Move the former first particle to the first position among its coincident particles
     for slot in 1..last {
         if positions[slot] == positions[last] {
             swap(positions, slot, last);
         }
     }
-    // The one that came from the end passes to their last place
+    // Move the former last particle to the last position among its coincident particles
     for slot in (1..last).rev() {
         if positions[slot] == positions[0] {
             swap(positions, slot, 0);

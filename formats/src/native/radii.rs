@@ -1,18 +1,18 @@
-//! Radii that differ, coded.
+//! Encodes radii that differ.
 
 use rayon::prelude::*;
 
 use super::RadiusCode;
 use crate::blocks::{BLOCK_SIZE, BlockRadii};
 
-/// Radii of a run of particles.
+/// The radii of a run of particles.
 #[derive(Debug)]
 pub(super) struct CodedRadii {
-    /// As they will be read, in blocks; unused lanes of the last repeat its last one.
+    /// The decoded radii, in blocks; unused lanes of the last block repeat its last radius.
     pub(super) blocks: Vec<BlockRadii>,
-    /// As they are stored.
+    /// The stored bytes.
     pub(super) bytes: Vec<u8>,
-    /// Largest difference between the two and what was given.
+    /// Largest difference of a decoded radius from the given one.
     pub(super) max_error: f32,
 }
 
@@ -23,7 +23,7 @@ pub struct RadiusRange {
     pub code: RadiusCode,
     /// The smallest radius of the frame.
     pub low: f32,
-    /// The largest.
+    /// The largest radius of the frame.
     pub high: f32,
 }
 
@@ -39,7 +39,7 @@ impl RadiusRange {
         }
     }
 
-    /// The code of `radius`, and what it stands for.
+    /// The code of `radius`, and its decoded value.
     #[expect(
         clippy::cast_possible_truncation,
         clippy::cast_sign_loss,
@@ -61,7 +61,7 @@ impl RadiusRange {
         (code, self.low + f32::from(code) * step)
     }
 
-    /// Codes `radii`.
+    /// Encodes `radii`.
     pub(super) fn coded(&self, radii: &[f32]) -> CodedRadii {
         let blocks: Vec<BlockRadii> = radii
             .par_chunks(BLOCK_SIZE)
@@ -99,7 +99,7 @@ impl RadiusRange {
     }
 }
 
-/// Up to 16 radii, the last one repeated.
+/// Up to 16 radii; the remaining lanes repeat the last one.
 fn lanes_of(radii: &[f32]) -> [f32; BLOCK_SIZE] {
     std::array::from_fn(|lane| radii[lane.min(radii.len() - 1)])
 }

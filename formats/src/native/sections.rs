@@ -1,25 +1,25 @@
-//! The sections of a frame that is being written: filled and summed by a thread of its own, so that what
-//! makes the bytes never waits for them to be copied or for the disk, but for a few pieces at most.
+//! The sections of a frame that is being written. A separate thread writes and checksums them, so that the
+//! encoder waits neither for copies nor for the disk unless too many pieces are pending.
 
 use std::fmt;
-use std::io;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::panic;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::{self, JoinHandle};
 
 use bytemuck::Pod;
+use spherule_publish::Publisher;
 use xxhash_rust::xxh3::Xxh3;
 
 use super::layout::{ALIGN, Section};
-use crate::write::atomic::Unpublished;
 
-/// Pieces that may wait to be written.
+/// Largest number of pieces that wait to be written.
 const WAITING: usize = 4;
 
-/// Bytes that go to the end of a section.
+/// Bytes to append to a section.
 pub(super) type Piece = Box<dyn AsRef<[u8]> + Send>;
 
-/// Plain numbers as a piece.
+/// Wraps plain numbers as a piece.
 pub(super) fn piece<T: Pod + Send>(numbers: Vec<T>) -> Piece {
     struct Numbers<T>(Vec<T>);
     impl<T: Pod> AsRef<[u8]> for Numbers<T> {
@@ -32,12 +32,12 @@ pub(super) fn piece<T: Pod + Send>(numbers: Vec<T>) -> Piece {
 
 /// Assigns offsets to sections, one after the other.
 pub(super) struct SectionOffsets {
-    /// Where the next one begins.
+    /// Offset of the next section.
     pub(super) next: u64,
 }
 
 impl SectionOffsets {
-    /// A section of `len` bytes; none if that is beyond 64 bits.
+    /// A section of `len` bytes; `None` if its end exceeds 64 bits.
     pub(super) fn section(&mut self, len: u64) -> Option<SectionProgress> {
         let offset = self.next;
         self.next = offset.checked_add(len)?.checked_next_multiple_of(ALIGN)?;
@@ -63,14 +63,15 @@ impl fmt::Debug for SectionProgress {
 }
 
 impl SectionProgress {
-    fn append(&mut self, file: &Unpublished, bytes: &[u8]) -> io::Result<()> {
-        file.write_all_at(bytes, self.offset + self.filled)?;
+    fn append(&mut self, file: &mut Publisher, bytes: &[u8]) -> io::Result<()> {
+        file.seek(SeekFrom::Start(self.offset + self.filled))?;
+        file.write_all(bytes)?;
         self.filled += bytes.len() as u64;
         self.hash.update(bytes);
         Ok(())
     }
 
-    /// Where it is, what it holds now.
+    /// The place and the checksum of the bytes written so far.
     pub(super) fn done(&self) -> Section {
         Section {
             offset: self.offset,
@@ -80,7 +81,7 @@ impl SectionProgress {
     }
 }
 
-/// Writes sections to a file on a thread of its own.
+/// Writes sections to a file on a separate thread.
 #[derive(Debug)]
 pub(super) struct SectionWriter {
     /// `None` once the thread has ended.
@@ -96,18 +97,18 @@ struct WriterThread {
 /// The result of the thread.
 #[derive(Debug)]
 pub(super) struct WrittenSections {
-    /// The file, not yet published.
-    pub(super) file: Unpublished,
-    /// Its sections in the order they were given.
+    /// The file, which is not published yet.
+    pub(super) file: Publisher,
+    /// The sections, in the order in which they were passed to [`SectionWriter::begin`].
     pub(super) sections: Vec<SectionProgress>,
 }
 
 impl SectionWriter {
-    /// Begins to fill `sections` of `file`.
+    /// Starts to write `sections` of `file`.
     ///
     /// # Errors
-    /// If no thread can be started.
-    pub(super) fn begin(file: Unpublished, sections: Vec<SectionProgress>) -> io::Result<Self> {
+    /// If the thread cannot be started.
+    pub(super) fn begin(file: Publisher, sections: Vec<SectionProgress>) -> io::Result<Self> {
         let (pieces, to_write) = sync_channel(WAITING);
         let filled = WrittenSections { file, sections };
         let thread = thread::Builder::new()
@@ -122,21 +123,21 @@ impl SectionWriter {
     /// Appends `piece` to section number `section`.
     ///
     /// # Errors
-    /// The system's reason why this or an earlier piece cannot be written.
+    /// The system's error if this piece or an earlier one cannot be written.
     pub(super) fn append(&mut self, section: usize, piece: Piece) -> io::Result<()> {
         let at_work = self.at_work.as_ref();
         if at_work.is_some_and(|w| w.pieces.send((section, piece)).is_ok()) {
             return Ok(());
         }
-        // The thread ends early only for a reason.
+        // The thread only ends early because of an error.
         self.end()?;
         Err(io::Error::other("an earlier part could not be written"))
     }
 
-    /// Waits until everything is written.
+    /// Waits until all pieces are written.
     ///
     /// # Errors
-    /// The system's reason why something cannot be written.
+    /// The system's error if a piece cannot be written.
     pub(super) fn finish(mut self) -> io::Result<WrittenSections> {
         self.end()?
             .ok_or_else(|| io::Error::other("an earlier part could not be written"))
@@ -155,7 +156,7 @@ impl SectionWriter {
 }
 
 impl Drop for SectionWriter {
-    /// The file is gone when this returns.
+    /// The file is removed when this returns.
     fn drop(&mut self) {
         if let Some(WriterThread { pieces, thread }) = self.at_work.take() {
             drop(pieces);
@@ -170,7 +171,7 @@ fn fill(
     pieces: &Receiver<(usize, Piece)>,
 ) -> io::Result<WrittenSections> {
     for (section, piece) in pieces {
-        filled.sections[section].append(&filled.file, (*piece).as_ref())?;
+        filled.sections[section].append(&mut filled.file, (*piece).as_ref())?;
     }
     Ok(filled)
 }

@@ -1,4 +1,4 @@
-//! Numbers as a native frame stores them: types of attributes and radii.
+//! The stored types of attributes and radii in a native frame.
 
 use half::f16;
 
@@ -7,11 +7,11 @@ use crate::ScalarType;
 /// How the values of an attribute are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StoredType {
-    /// As they were.
+    /// The unchanged type of the source.
     Plain(ScalarType),
     /// Half precision: 11 bits, up to 65504.
     Half,
-    /// 8 bits over a range of its own for each component: `low + code * (high - low) / 255`.
+    /// 8 bits over a range for each component: `low + code * (high - low) / 255`.
     Ranged,
 }
 
@@ -19,7 +19,7 @@ impl StoredType {
     const HALF: u32 = 11;
     const RANGED: u32 = 12;
 
-    /// The number that stands for it in the index.
+    /// The code of the type in the index.
     pub const fn code(self) -> u32 {
         match self {
             Self::Plain(ScalarType::I8) => 1,
@@ -37,7 +37,7 @@ impl StoredType {
         }
     }
 
-    /// What the number of an index stands for.
+    /// The type with this code; `None` for unknown codes.
     pub const fn of_code(code: u32) -> Option<Self> {
         Some(Self::Plain(match code {
             1 => ScalarType::I8,
@@ -56,7 +56,7 @@ impl StoredType {
         }))
     }
 
-    /// Bytes of a value.
+    /// Bytes per value.
     pub const fn size(self) -> usize {
         match self {
             Self::Plain(kind) => kind.size(),
@@ -65,7 +65,7 @@ impl StoredType {
         }
     }
 
-    /// Name in listings.
+    /// The name in listings.
     pub const fn name(self) -> &'static str {
         match self {
             Self::Plain(kind) => kind.name(),
@@ -74,13 +74,13 @@ impl StoredType {
         }
     }
 
-    /// The value of code 0 and the step between codes of `range`.
+    /// The value of code 0 and the step between codes, for `range`.
     pub(crate) fn ranged(range: [f64; 2]) -> (f64, f64) {
         let [low, high] = range;
         (low, (high - low) / 255.0)
     }
 
-    /// A value in the lowest bytes of a stored number; `range` for [`Self::Ranged`].
+    /// Decodes a value from the lowest bytes of `bytes`; `range` is used for [`Self::Ranged`].
     ///
     /// # Panics
     /// If there are fewer bytes than [`Self::size`].
@@ -116,19 +116,19 @@ impl StoredType {
 /// How radii that differ are stored.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub enum RadiusCode {
-    /// 8 bits over the frame's range.
+    /// 8 bits over the range of the frame.
     U8,
-    /// 16 bits over the frame's range.
+    /// 16 bits over the range of the frame.
     U16,
-    /// As they were.
+    /// Unchanged f32.
     F32,
 }
 
 impl RadiusCode {
-    /// All there are, the smallest first.
+    /// All types, the smallest first.
     pub const ALL: [Self; 3] = [Self::U8, Self::U16, Self::F32];
 
-    /// The number that stands for it in the index: that of the type of the codes.
+    /// The code of the type in the index, which is the code of the scalar type that holds it.
     pub const fn code(self) -> u32 {
         match self {
             Self::U8 => StoredType::Plain(ScalarType::U8).code(),
@@ -137,12 +137,12 @@ impl RadiusCode {
         }
     }
 
-    /// What the number of an index stands for.
+    /// The type with this code; `None` for unknown codes.
     pub fn of_code(code: u32) -> Option<Self> {
         Self::ALL.into_iter().find(|c| c.code() == code)
     }
 
-    /// Bytes of a radius.
+    /// Bytes per radius.
     pub const fn size(self) -> usize {
         match self {
             Self::U8 => 1,
@@ -151,7 +151,7 @@ impl RadiusCode {
         }
     }
 
-    /// Radius between codes over a range; 0 for radii that are stored as they are.
+    /// Difference of the radii of successive codes; 0 for radii that are stored as f32.
     pub fn step(self, low: f32, high: f32) -> f32 {
         match self {
             Self::U8 => (high - low) / 255.0,

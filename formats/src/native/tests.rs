@@ -1,4 +1,4 @@
-//! There and back, and every way to damage a file.
+//! Round trips, and every kind of damage to a file.
 
 use std::fs;
 use std::path::PathBuf;
@@ -10,7 +10,7 @@ use super::layout::{RadiiIndex, RadiusIndex};
 use super::*;
 use crate::{Attribute, AttributeData, FrameError, ParticleFrame, Positions, Radius, RawParticles};
 
-/// Under an interpreter not every byte can be tried.
+/// Miri is too slow to try every byte.
 const STRIDE: usize = if cfg!(miri) { 37 } else { 1 };
 
 fn frame(count: u8, origin: DVec3) -> ParticleFrame {
@@ -61,7 +61,7 @@ fn read_back(bytes: &[u8]) -> Result<RawParticles, ParseError> {
     FORMAT.read(bytes, &steps[0])
 }
 
-/// Positions and velocities of the particles by their ids, which count down from the largest.
+/// Positions and velocities of the particles in the order of their ids, which count down from the largest.
 fn by_id(raw: &RawParticles, count: usize) -> Vec<(DVec3, [f64; 3])> {
     let named = |name: &str| {
         let found = raw.attributes.iter().find(|a| a.name == name);
@@ -84,7 +84,7 @@ fn by_id(raw: &RawParticles, count: usize) -> Vec<(DVec3, [f64; 3])> {
 }
 
 #[test]
-fn frames_come_back_in_another_order() {
+fn frames_round_trip_in_tree_order() {
     for count in [0, 1, 15, 16, 17, 100] {
         let frame = frame(count, DVec3::ZERO);
         let raw = read_back(&bytes(&frame)).expect("whole");
@@ -107,7 +107,7 @@ fn the_origin_is_added_again() {
 }
 
 #[test]
-fn radii_come_back() {
+fn radii_round_trip() {
     let mut common = frame(3, DVec3::ZERO);
     common.radius = Some(Radius::Common(0.5));
     let raw = read_back(&bytes(&common)).expect("whole");
@@ -122,14 +122,14 @@ fn radii_come_back() {
     let Some(Radius::PerParticle(found)) = &again.radius else {
         panic!("radii of their own")
     };
-    // x is the number of the particle.
+    // x is the index of the particle.
     for (position, radius) in again.positions.iter().zip(found) {
         assert_eq!(*radius, position.x + 1.0);
     }
 }
 
 #[test]
-fn radii_that_an_attribute_has_are_stored_once() {
+fn radii_of_an_attribute_are_stored_once() {
     let mut frame = frame(64, DVec3::ZERO);
     let radii: Vec<f32> = (1..=64u8).map(f32::from).collect();
     frame.attributes.push(Attribute {
@@ -170,7 +170,7 @@ fn mapped_and_read_files_give_leaves_in_place() {
 
 #[test]
 #[cfg_attr(miri, ignore = "maps a file")]
-fn a_file_cut_short_under_the_map_is_noticed() {
+fn truncation_of_a_mapped_file_is_detected() {
     let written = written(&frame(100, DVec3::ZERO));
     let file = NativeFile::open(&written.path, Access::Map).expect("whole");
     let handle = fs::OpenOptions::new().write(true).open(&written.path);
@@ -205,13 +205,13 @@ fn every_flipped_byte_is_an_error_or_padding() {
         match read_back(&damaged) {
             Err(ParseError::Malformed { .. }) => {}
             Err(other) => panic!("byte {at}: {other}"),
-            // Zeros between sections mean nothing.
+            // Damaged zeros between sections have no effect.
             Ok(raw) => assert!(at >= layout::HEADER_LEN && raw == expected, "byte {at}"),
         }
     }
 }
 
-/// An index that lies, under valid checksums.
+/// A false index with correct checksums.
 #[track_caller]
 fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
     static WHOLE: LazyLock<Vec<u8>> = LazyLock::new(|| bytes(&frame(17, DVec3::ZERO)));
@@ -220,7 +220,7 @@ fn forged(change: impl FnOnce(&mut FrameIndex)) -> ParseError {
     forge(&WHOLE, &index).expect_err("a lie")
 }
 
-/// `whole` with another index under valid checksums, read.
+/// Reads `whole` with another index and correct checksums.
 fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
     let index = rkyv::to_bytes::<rkyv::rancor::Error>(index).expect("memory");
     let offset = 24..32;
@@ -233,7 +233,7 @@ fn forge(whole: &[u8], index: &FrameIndex) -> Result<RawParticles, ParseError> {
 }
 
 #[test]
-fn an_index_that_lies_is_an_error() {
+fn inconsistent_index_is_an_error() {
     let malformed = |e: ParseError| assert!(matches!(e, ParseError::Malformed { .. }), "{e}");
     malformed(forged(|i| i.count = u64::MAX));
     malformed(forged(|i| i.count = 1 << 60));
@@ -281,7 +281,7 @@ fn frames_that_do_not_fit_together_are_not_written() {
     assert_eq!(fs::read_dir(dir.path()).expect("readable").count(), 0);
 }
 
-/// Particles in a few clusters, some of them flat, and far outliers.
+/// Particles in a few clusters, some of them flat, and distant outliers.
 pub(crate) fn clustered(count: u32) -> Vec<Vec3> {
     let unit = |i: u32, k: u32| {
         let hash = (i * 3 + k).wrapping_mul(0x9e37_79b9).rotate_left(13);
@@ -299,12 +299,13 @@ pub(crate) fn clustered(count: u32) -> Vec<Vec3> {
     (0..count).map(place).collect()
 }
 
-/// Stores `positions` with ids and reads them back; they must be as near as the file says.
+/// Stores `positions` with ids and reads them back. Checks that they are within the error that the file states.
 fn stored_within(
     positions: Vec<Vec3>,
     radius: Option<Radius>,
     settings: StoreSettings,
 ) -> FrameIndex {
+    // Store the frame
     let ids = (0..positions.len() as u64).collect();
     let frame = ParticleFrame {
         attributes: vec![Attribute {
@@ -322,6 +323,7 @@ fn stored_within(
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let index = store(&path, &frame, None, &settings).expect("writable");
+    // Read it back
     let access = if cfg!(miri) {
         Access::Read
     } else {
@@ -336,14 +338,16 @@ fn stored_within(
     let AttributeData::U64(ids) = &raw.attributes[0].data else {
         panic!("ids changed their type")
     };
-    let mut seen = vec![false; frame.len()];
+    // Compare each particle with the given one
+    let mut visited = vec![false; frame.len()];
     let mut largest = 0.0_f64;
     for (slot, id) in ids.iter().enumerate() {
         let id = usize::try_from(*id).expect("an id of ours");
-        assert!(!std::mem::replace(&mut seen[id], true));
+        assert!(!std::mem::replace(&mut visited[id], true));
         let found = raw.positions.get(slot);
         assert_eq!(found, leaves.center(slot).as_dvec3());
         largest = largest.max(found.distance(frame.positions[id].as_dvec3()));
+        // Check the box of the leaf
         let (node, block) = (slot / 128, slot / 16);
         let center = leaves.center(slot);
         let own = leaves.radii.load(block).map_or(0.0, |r| r.0[slot % 16]);
@@ -358,6 +362,7 @@ fn stored_within(
             sphere
         };
         assert!(leaves.nodes[node].child_holds(block % 8, &sphere), "{slot}");
+        // Check the radius
         if let Some(Radius::PerParticle(radii)) = &frame.radius {
             let RadiusIndex::PerParticle(coded) = index.radius else {
                 panic!("radii of their own")
@@ -365,14 +370,14 @@ fn stored_within(
             assert!((own - radii[id]).abs() <= coded.max_error);
         }
     }
-    assert!(seen.into_iter().all(|s| s));
+    assert!(visited.into_iter().all(|s| s));
     assert!(largest <= index.max_error, "{largest} {}", index.max_error);
     index
 }
 
 #[test]
 #[cfg_attr(miri, ignore = "too many particles for an interpreter")]
-fn no_particle_is_farther_than_the_file_says() {
+fn position_errors_are_within_the_stored_maximum() {
     for encoding in Encoding::ALL {
         for count in [0, 1, 2, 15, 16, 17, 127, 128, 129, 1025, 20_000] {
             for bound in [Bound::None, Bound::Length(1e-4), Bound::OfRadius(0.02)] {
@@ -392,7 +397,7 @@ fn no_particle_is_farther_than_the_file_says() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many particles for an interpreter")]
-fn radii_of_their_own_are_held_and_bounded() {
+fn per_particle_radii_are_stored_within_the_bound() {
     let radii = |count: u32| (0..count).map(|i| 0.001 * 100_f32.powf((i % 97) as f32 / 97.0));
     for encoding in Encoding::ALL {
         for bound in [Bound::None, Bound::OfRadius(0.1), Bound::OfRadius(0.001)] {
@@ -438,7 +443,7 @@ fn flat_and_coincident_particles_are_stored() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many particles for an interpreter")]
-fn the_smallest_encoding_within_the_bound_is_taken() {
+fn smallest_encoding_within_the_bound_is_chosen() {
     let even = crate::generate::fill_box(&crate::generate::BoxSettings::thesis(50_000, 1));
     let taken = |bound: Bound| {
         let settings = StoreSettings {
@@ -479,10 +484,10 @@ fn a_file_does_not_depend_on_threads() {
     assert!(bytes(1) == bytes(3));
 }
 
-/// A file cut while it is mapped: what is gone reads as zeros, and is found out.
+/// A file that is truncated while it is mapped: missing bytes read as zeros, and the check detects it.
 #[cfg(all(target_os = "linux", not(miri)))]
 #[test]
-fn pages_that_are_gone_are_zeros_and_told() {
+fn lost_pages_read_as_zeros_and_are_reported() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let mut frame = frame(0, DVec3::ZERO);
@@ -500,7 +505,7 @@ fn pages_that_are_gone_are_zeros_and_told() {
 }
 
 #[test]
-fn an_empty_frame_cannot_ask_for_memory() {
+fn empty_frame_cannot_request_memory() {
     let whole = bytes(&frame(0, DVec3::ZERO));
     let mut index = layout::parse(&whole).expect("whole");
     index.attributes[0].components = u32::MAX;

@@ -1,8 +1,9 @@
-//! Whether a native frame is whole: checksums, and beyond them whether its numbers can be what a frame has.
+//! Verifies native frames: checksums, and whether the numbers can belong to a frame.
 //!
-//! Opening checks header and index. Reading all of a frame compares checksums, which finds damage on the
-//! disk or the way. What a faulty writer made, or somebody forged, has good checksums: here its nodes,
-//! positions, radii and padding are looked at too. The first fault is reported, the same for any number of threads.
+//! Opening checks the header and the index. Reading a whole frame compares checksums, which detects damage on
+//! the disk or in transfer. A file from a faulty writer, or a forged file, has correct checksums; the full
+//! check therefore also examines nodes, positions, radii and padding. It reports the first fault, the same for
+//! any number of threads.
 
 use rayon::prelude::*;
 use xxhash_rust::xxh3::xxh3_64;
@@ -16,13 +17,13 @@ use crate::blocks::{
     StoredLeaves, WIDTH,
 };
 
-/// Header bytes that are kept for later, zero today.
+/// Reserved header bytes, zero in this version.
 const RESERVED: std::ops::Range<usize> = 48..56;
-/// Nodes that a task looks at.
+/// Nodes that one task checks.
 const TASK: usize = 64;
 
 impl NativeFrame<'_> {
-    /// Compares every section with its checksum, which opening does not do.
+    /// Compares every section with its checksum; opening does not.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] at the first section that differs.
@@ -35,7 +36,7 @@ impl NativeFrame<'_> {
         fault.map_or(Ok(()), Err)
     }
 
-    /// Compares the nodes with their checksum: all of a frame that is read before rays are traced.
+    /// Compares the nodes with their checksum. No other section is read before rays are traced.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] if they differ.
@@ -43,11 +44,11 @@ impl NativeFrame<'_> {
         verify_section(self.bytes(), "the nodes", &self.index().nodes)
     }
 
-    /// Compares what is used of a frame with its checksums: all that tracing reads, and the attributes of
-    /// these names.
+    /// Compares the sections that rendering uses with their checksums: those that tracing reads, and the
+    /// attributes of these names.
     ///
     /// # Errors
-    /// [`ParseError::Malformed`] at the first section, in the order of the file, that differs.
+    /// [`ParseError::Malformed`] at the first section, in file order, that differs.
     pub fn verify_used(&self, attributes: &[&str]) -> Result<(), ParseError> {
         let sections = self.used(attributes);
         let all = sections.par_iter();
@@ -69,8 +70,8 @@ impl NativeFrame<'_> {
         sections
     }
 
-    /// Checks everything: checksums, zeros between sections, children and planes of nodes, and that
-    /// positions and radii are numbers inside the boxes of their nodes and the bounds of the frame.
+    /// Checks everything: checksums, zeros between sections, the children and planes of nodes, and that
+    /// positions and radii are numbers within the boxes of their nodes and the bounds of the frame.
     ///
     /// # Errors
     /// [`ParseError::Malformed`] with the first fault, [`ParseError::Unsupported`] as [`Self::leaves`].
@@ -84,9 +85,10 @@ impl NativeFrame<'_> {
         contents.verify()
     }
 
-    /// Sections do not overlap, and between them is nothing.
+    /// Checks that sections do not overlap and that all bytes between them are zero.
     fn verify_padding(&self) -> Result<(), ParseError> {
         let (bytes, index) = (self.bytes(), self.index());
+        // Check the reserved bytes of the header
         if bytes
             .get(RESERVED)
             .is_none_or(|b| b.iter().any(|b| *b != 0))
@@ -96,6 +98,7 @@ impl NativeFrame<'_> {
                 "the header has numbers where zeros belong",
             ));
         }
+        // Check the gaps between sections in file order
         let mut sections = index.sections();
         sections.retain(|(_, section)| section.len > 0);
         sections.sort_by_key(|(_, section)| section.offset);
@@ -111,7 +114,7 @@ impl NativeFrame<'_> {
         self.verify_zeros(end, end.next_multiple_of(super::layout::ALIGN))
     }
 
-    /// Bytes from `start` to `end` are zero.
+    /// Checks that the bytes from `start` to `end` are zero.
     fn verify_zeros(&self, start: u64, end: u64) -> Result<(), ParseError> {
         let gap = Section {
             offset: start,
@@ -138,7 +141,7 @@ fn verify_section(bytes: &[u8], what: &str, section: &Section) -> Result<(), Par
     Err(fault(section.offset, &what))
 }
 
-/// A fault at byte `at`, with what helps against all of them.
+/// The error for a fault at byte `at`, with the remedy that helps against all of them.
 fn fault(at: u64, what: &str) -> ParseError {
     ParseError::Malformed {
         at,
@@ -146,7 +149,7 @@ fn fault(at: u64, what: &str) -> ParseError {
     }
 }
 
-/// What is in the sections of a frame.
+/// The contents of the sections of a frame.
 struct Contents<'a> {
     index: &'a FrameIndex,
     leaves: StoredLeaves<'a>,
@@ -168,7 +171,7 @@ impl Contents<'_> {
         }
     }
 
-    /// Stored errors are numbers.
+    /// Checks that the stored errors are numbers.
     fn verify_errors(&self) -> Result<(), ParseError> {
         let is_error = |error: f64| error.is_finite() && error >= 0.0;
         let radii = match &self.index.radius {
@@ -180,13 +183,13 @@ impl Contents<'_> {
         if errors.all(is_error) {
             return Ok(());
         }
-        // The offset in the index is not known: the index follows all sections.
+        // The offset within the index is unknown; report the end of the sections, where the index begins.
         let ends = self.index.sections().into_iter();
         let end = ends.map(|(_, s)| s.offset + s.len).max().unwrap_or(0);
         Err(fault(end, "the index: a largest error is not a number"))
     }
 
-    /// Every wide block is referred to, as often as there are.
+    /// Checks that the number of references equals the number of wide blocks.
     fn verify_references(&self) -> Result<(), ParseError> {
         let wide = self.index.wide.len / size_of::<Block>() as u64;
         let blocks = (0..self.leaves.block_count()).into_par_iter();
@@ -198,7 +201,7 @@ impl Contents<'_> {
         Err(fault(self.index.wide.offset, &what))
     }
 
-    /// What is wrong with node `node` over so many blocks.
+    /// The fault of node `node`, if it has one; `blocks` is its number of blocks.
     fn node_fault(&self, node: usize, blocks: usize) -> Option<ParseError> {
         let at = self.index.nodes.offset + (node * size_of::<Node>()) as u64;
         let stored = &self.leaves.nodes[node];
@@ -210,7 +213,7 @@ impl Contents<'_> {
         }
         let is_box = |(slot, axis): (usize, usize)| {
             let [lower, upper] = stored.interval(slot, axis);
-            // Said so that NaN is none.
+            // Written this way so that NaN fails.
             -FARTHEST_PLANE <= lower && lower <= upper && upper <= FARTHEST_PLANE
         };
         let mut boxes = (0..blocks).flat_map(|slot| (0..3).map(move |axis| (slot, axis)));
@@ -219,7 +222,7 @@ impl Contents<'_> {
         Some(fault(at, &what))
     }
 
-    /// What is wrong with block `block`, whose node is good.
+    /// The fault of block `block`, if it has one; its node must be valid.
     fn block_fault(&self, block: usize) -> Option<ParseError> {
         let wide = self.wide_index(block);
         let here = |what: &str| {
@@ -234,6 +237,7 @@ impl Contents<'_> {
             let what = format!("the positions: block {block} {what}");
             Some(fault(section.offset + (place * len) as u64, &what))
         };
+        // Check the reference to a wide block
         let count = self.index.wide.len / size_of::<Block>() as u64;
         if let Some(wide) = wide.filter(|wide| *wide as u64 >= count) {
             let at = self.index.encoding().block_len() * block;
@@ -241,24 +245,29 @@ impl Contents<'_> {
                 format!("the positions: block {block} refers to wide block {wide} of {count}");
             return Some(fault(self.index.positions.offset + at as u64, &what));
         }
+        // Check that the positions are finite
         let stored = self.leaves.block(block);
         if !(0..BLOCK_SIZE).all(|lane| stored.center(lane).is_finite()) {
             return here("has a position that is not finite");
         }
+        // Check that unused lanes repeat the last particle
         let last = self.last_lane(block);
         if (last..BLOCK_SIZE).any(|lane| stored.center(lane) != stored.center(last)) {
             return here("has particles beyond the last one");
         }
+        // Check the radii
         let radii = self.leaves.radii.load(block);
         if let Some(fault) = radii.as_ref().and_then(|r| self.radii_fault(block, r)) {
             return Some(fault);
         }
+        // Check the box in the node
         let node = &self.leaves.nodes[block / WIDTH];
         let bounds = stored.bounds();
         let spheres = radii.map_or(bounds, |radii| stored.sphere_bounds(&radii));
         if !node.child_holds(block % WIDTH, &spheres) {
             return here("has a particle outside its box");
         }
+        // Check the bounds of the frame
         let all = Aabb {
             min: self.index.min.into(),
             max: self.index.max.into(),
@@ -287,14 +296,14 @@ impl Contents<'_> {
         Some(fault(radii.section.offset + block as u64 * len, &what))
     }
 
-    /// The last lane of `block` that has a particle of its own.
+    /// The last lane of `block` with a particle of its own.
     fn last_lane(&self, block: usize) -> usize {
         let left = self.index.count - block as u64 * BLOCK_SIZE as u64;
         let used = usize::try_from(left).map_or(BLOCK_SIZE, |left| left.min(BLOCK_SIZE));
         used.saturating_sub(1)
     }
 
-    /// The number under which `block` is kept as it is, if it is coded elsewhere.
+    /// The index of the wide block that `block` refers to, if it is a reference.
     fn wide_index(&self, block: usize) -> Option<usize> {
         let index = match &self.leaves.blocks {
             StoredBlocks::F32(_) => None,

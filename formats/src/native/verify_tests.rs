@@ -1,4 +1,4 @@
-//! Frames with good checksums whose numbers are those of no frame.
+//! Frames with correct checksums whose numbers cannot belong to a frame.
 
 use glam::{DVec3, Vec3};
 
@@ -7,8 +7,9 @@ use super::super::*;
 use super::*;
 use crate::{Attribute, AttributeData, ParticleFrame, Radius};
 
-/// 300 particles of two sizes of block, so that tight bounds keep some as they are.
+/// 300 particles in blocks of two different sizes, so that tight bounds store some blocks as f32.
 fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
+    // Make positions, a few of them far away
     let positions: Vec<Vec3> = (0..300_u16)
         .map(|i| {
             let far = if i % 50 == 0 { 40.0 } else { 1.0 };
@@ -38,6 +39,7 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
         dropped: 0,
         file_index: None,
     };
+    // Store the frame and read its bytes
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let settings = StoreSettings {
@@ -49,11 +51,12 @@ fn stored(encoding: Encoding, own_radii: bool) -> Vec<u8> {
     std::fs::read(path).expect("readable")
 }
 
-/// `bytes` after `harm`, under checksums that fit.
+/// `bytes` after `harm` changed them, with correct checksums.
 fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8> {
     let mut bytes = bytes.to_vec();
     let mut index = layout::parse(&bytes).expect("whole");
     harm(&mut index, &mut bytes);
+    // Update the checksums of the sections
     let sum = |section: &mut Section| {
         let found = section_of(&bytes, section).expect("inside");
         section.xxh3 = xxh3_64(found);
@@ -67,6 +70,7 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     for attribute in &mut index.attributes {
         sum(&mut attribute.section);
     }
+    // Replace the index and the header
     let packed = rkyv::to_bytes::<rkyv::rancor::Error>(&index).expect("memory");
     let offset = u64::from_le_bytes(bytes[24..32].try_into().expect("8 bytes"));
     bytes.truncate(usize::try_from(offset).expect("small"));
@@ -76,9 +80,9 @@ fn forged(bytes: &[u8], harm: impl FnOnce(&mut FrameIndex, &mut [u8])) -> Vec<u8
     bytes
 }
 
-/// Harm is told with these words and this place.
+/// Checks that the fault that `harm` makes is reported with this message at this place.
 #[track_caller]
-fn told(
+fn fails_with(
     bytes: &[u8],
     words: &str,
     place: impl Fn(&FrameIndex) -> u64,
@@ -103,7 +107,7 @@ fn at(section: &Section, by: usize) -> usize {
 }
 
 #[test]
-fn whole_frames_are_found_whole() {
+fn intact_frames_pass_verification() {
     for encoding in Encoding::ALL {
         for own_radii in [false, true] {
             let bytes = stored(encoding, own_radii);
@@ -115,7 +119,7 @@ fn whole_frames_are_found_whole() {
 }
 
 #[test]
-fn every_flipped_byte_of_a_frame_is_found() {
+fn every_flipped_byte_of_a_frame_is_detected() {
     let whole = stored(Encoding::Q10, true);
     let offset = u64::from_le_bytes(whole[24..32].try_into().expect("8 bytes"));
     let mut aligned = AlignedVec::<64>::new();
@@ -133,10 +137,10 @@ fn every_flipped_byte_of_a_frame_is_found() {
 }
 
 #[test]
-fn nodes_that_lead_astray() {
+fn invalid_node_links() {
     let bytes = stored(Encoding::F32, false);
     let second = |i: &FrameIndex| i.nodes.offset + 64;
-    told(
+    fails_with(
         &bytes,
         "node 1 has children 01111111 for 8 blocks",
         second,
@@ -144,14 +148,14 @@ fn nodes_that_lead_astray() {
             b[at(&i.nodes, 64 + 15)] = 0x7f;
         },
     );
-    told(&bytes, "child 0 of node 1 has no box", second, |i, b| {
+    fails_with(&bytes, "child 0 of node 1 has no box", second, |i, b| {
         b[at(&i.nodes, 64)..][..4].copy_from_slice(&f32::NAN.to_le_bytes());
     });
-    told(&bytes, "child 0 of node 1 has no box", second, |i, b| {
+    fails_with(&bytes, "child 0 of node 1 has no box", second, |i, b| {
         b[at(&i.nodes, 64 + 12)] = 255;
     });
-    told(&bytes, "child 3 of node 1 has no box", second, |i, b| {
-        // Lower above upper plane on the last axis.
+    fails_with(&bytes, "child 3 of node 1 has no box", second, |i, b| {
+        // The lower plane is above the upper plane on the last axis.
         let planes = at(&i.nodes, 64 + 16 + 2 * 16);
         b[planes + 3] = 200;
         b[planes + 8 + 3] = 100;
@@ -159,7 +163,8 @@ fn nodes_that_lead_astray() {
 }
 
 #[test]
-fn positions_that_cannot_be() {
+fn invalid_positions() {
+    // Positions that are not finite, or outside the box of the node
     let bytes = stored(Encoding::F32, false);
     let third = |i: &FrameIndex| i.positions.offset + 2 * 192;
     let set = |value: f32| {
@@ -167,26 +172,27 @@ fn positions_that_cannot_be() {
             b[at(&i.positions, 2 * 192 + 4)..][..4].copy_from_slice(&value.to_le_bytes());
         }
     };
-    told(
+    fails_with(
         &bytes,
         "block 2 has a position that is not finite",
         third,
         set(f32::NAN),
     );
-    told(
+    fails_with(
         &bytes,
         "block 2 has a position that is not finite",
         third,
         set(f32::INFINITY),
     );
-    told(
+    fails_with(
         &bytes,
         "block 2 has a particle outside its box",
         third,
         set(1e6),
     );
+    // Positions outside the bounds of the frame
     let first = |i: &FrameIndex| i.positions.offset;
-    told(
+    fails_with(
         &bytes,
         "block 0 has a particle outside the bounds",
         first,
@@ -194,9 +200,9 @@ fn positions_that_cannot_be() {
             i.max = i.min;
         },
     );
-    // 300 particles: the last block has 12 and four copies of the last.
+    // Of the 300 particles, 12 are in the last block, followed by four copies of the last one.
     let last = |i: &FrameIndex| i.positions.offset + 18 * 192;
-    told(
+    fails_with(
         &bytes,
         "block 18 has particles beyond the last one",
         last,
@@ -209,7 +215,7 @@ fn positions_that_cannot_be() {
 }
 
 #[test]
-fn references_to_nowhere() {
+fn dangling_references() {
     let bytes = stored(Encoding::Q10, false);
     let index = layout::parse(&bytes).expect("whole");
     let wide = index.wide.len / 192;
@@ -227,13 +233,13 @@ fn references_to_nowhere() {
         })
         .expect("a reference");
     let place = |i: &FrameIndex| i.positions.offset + 64 * reference as u64;
-    told(&bytes, "refers to wide block 4096", place, |i, b| {
+    fails_with(&bytes, "refers to wide block 4096", place, |i, b| {
         b[at(&i.positions, 64 * reference + 4)..][..4].copy_from_slice(&4096_u32.to_le_bytes());
     });
 }
 
 #[test]
-fn radii_that_cannot_be() {
+fn invalid_radii() {
     let bytes = stored(Encoding::F32, true);
     let section = |i: &FrameIndex| match &i.radius {
         RadiusIndex::PerParticle(radii) => radii.section,
@@ -247,12 +253,12 @@ fn radii_that_cannot_be() {
         ),
         (-1.0, "block 1 has a radius that is negative or no number"),
     ] {
-        told(&bytes, words, second, |i, b| {
+        fails_with(&bytes, words, second, |i, b| {
             b[at(&section(i), 64)..][..4].copy_from_slice(&value.to_le_bytes());
         });
     }
     let positions = |i: &FrameIndex| i.positions.offset + 192;
-    told(
+    fails_with(
         &bytes,
         "block 1 has a particle outside its box",
         positions,
@@ -263,13 +269,13 @@ fn radii_that_cannot_be() {
 }
 
 #[test]
-fn numbers_where_zeros_belong() {
+fn non_zero_padding() {
     let bytes = stored(Encoding::F32, false);
     let end = |i: &FrameIndex| i.attributes[0].section.offset + i.attributes[0].section.len;
-    told(&bytes, "between the sections", end, |i, b| {
+    fails_with(&bytes, "between the sections", end, |i, b| {
         b[at(&i.attributes[0].section, 300)] = 1;
     });
-    told(
+    fails_with(
         &bytes,
         "attribute id overlap the section before",
         |i| i.positions.offset,
@@ -281,7 +287,7 @@ fn numbers_where_zeros_belong() {
         let ends = i.sections().into_iter().map(|(_, s)| s.offset + s.len);
         ends.max().expect("sections")
     };
-    told(&bytes, "a largest error is not a number", last, |i, _| {
+    fails_with(&bytes, "a largest error is not a number", last, |i, _| {
         i.attributes[0].max_error = -1.0;
     });
 }

@@ -1,4 +1,4 @@
-//! A checked view of the bytes of a native frame: its parts in place.
+//! A checked view of the bytes of a native frame, with access to its parts in place.
 
 use bytemuck::Pod;
 
@@ -17,25 +17,25 @@ pub struct NativeFrame<'a> {
 }
 
 impl<'a> NativeFrame<'a> {
-    /// A view of `bytes`, from which `index` was parsed by [`super::layout::parse`].
+    /// A view of `bytes`; `index` was parsed from them by [`super::layout::parse`].
     pub(super) const fn with_index(bytes: &'a [u8], index: &'a FrameIndex) -> Self {
         Self { bytes, index }
     }
 
-    /// The whole file.
+    /// The bytes of the whole file.
     pub(super) const fn bytes(&self) -> &'a [u8] {
         self.bytes
     }
 
-    /// What the frame holds.
+    /// The index of the frame.
     pub const fn index(&self) -> &'a FrameIndex {
         self.index
     }
 
-    /// The particles in place. Only lengths are checked, not what is in the sections.
+    /// The particles, in place. Only the lengths of the sections are checked, not their contents.
     ///
     /// # Errors
-    /// [`ParseError::Unsupported`] on a big-endian machine, or for bytes that are not aligned to 64 (those
+    /// [`ParseError::Unsupported`] on a big-endian machine, or for bytes that are not aligned to 64 (the bytes
     /// of a [`super::NativeFile`] are).
     pub fn leaves(&self) -> Result<StoredLeaves<'a>, ParseError> {
         let index = self.index;
@@ -54,7 +54,7 @@ impl<'a> NativeFrame<'a> {
         })
     }
 
-    /// The attribute `name` in place, exactly or failing that without regard to case.
+    /// The attribute `name`, in place: an exact match, else one that ignores case.
     pub fn attribute(&self, name: &str) -> Option<AttributeView<'a>> {
         let attributes = &self.index.attributes;
         let exact = attributes.iter().find(|a| a.name == name);
@@ -66,7 +66,7 @@ impl<'a> NativeFrame<'a> {
         self.view(exact.or_else(alike)?).ok()
     }
 
-    /// All attributes in place, as listed in the index.
+    /// All attributes, in place, in the order of the index.
     pub fn attributes(&self) -> Vec<AttributeView<'a>> {
         let views = self.index.attributes.iter().map(|a| self.view(a));
         views.filter_map(Result::ok).collect()

@@ -1,12 +1,13 @@
-//! Writes native frames: sections at offsets known beforehand, filled run by run in tree order, so that a
-//! frame of any size passes through in pieces.
+//! Writes native frames. The offsets of the sections are known in advance, and the sections are filled run by
+//! run in tree order, so that a frame of any size can be written in pieces.
 
-use std::io;
+use std::io::{self, Seek, SeekFrom, Write};
 use std::path::Path;
 
 use glam::DVec3;
 use glam::Vec3;
 use rkyv::rancor;
+use spherule_publish::Publisher;
 
 use super::layout::{
     ALIGN, AttributeIndex, Encoding, FrameIndex, HEADER_LEN, ORDER_KD, RadiiIndex, RadiusIndex,
@@ -18,22 +19,21 @@ use super::sections::{SectionOffsets, SectionProgress, SectionWriter, piece};
 use super::{Bound, RadiusRange, StoredType};
 use crate::blocks::{Aabb, BLOCK_SIZE, Block, Q10Block, Q16Block};
 use crate::order::index_u32;
-use crate::write::atomic::Unpublished;
 
-/// What a native frame will hold.
+/// Describes a native frame that will be written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrameSpec {
-    /// Particles, fewer than 2^36 (blocks are counted in 32 bits).
+    /// Number of particles, fewer than 2^36 (blocks are counted in 32 bits).
     pub count: u64,
     /// How positions are stored.
     pub encoding: Encoding,
-    /// How far they may be from the true ones; blocks beyond are stored as they are.
+    /// Largest distance of positions from the true ones; blocks that exceed it are stored as f32.
     pub bound: Bound,
-    /// Whether y points up in the program that made the particles; else unknown.
+    /// Whether y points up in the program that made the particles; otherwise the axis is unknown.
     pub is_y_up: bool,
-    /// World position of the zero of the positions.
+    /// World position that stored positions are relative to.
     pub origin: DVec3,
-    /// How far the positions that are pushed are from the true ones already, scene units.
+    /// Distance of the pushed positions from the true ones before encoding, scene units.
     pub rounding: f64,
     /// Radii.
     pub radius: RadiusSpec,
@@ -43,67 +43,67 @@ pub struct FrameSpec {
     pub time: Option<f64>,
     /// Step number of the simulation.
     pub step: Option<i64>,
-    /// Particles that were left out because they were not finite.
+    /// Particles that were dropped because they were not finite.
     pub dropped: u64,
 }
 
-/// Radii of a frame that is to be written.
+/// The radii of a frame that will be written.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum RadiusSpec {
-    /// Unknown.
+    /// The radii are unknown.
     None,
-    /// All alike.
+    /// All particles have this radius.
     Common(f32),
-    /// One each, coded so.
+    /// Each particle has its own radius, coded in this way.
     PerParticle(RadiusRange),
 }
 
-/// An attribute of a frame that is to be written.
+/// An attribute of a frame that will be written.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AttributeSpec {
     /// Name.
     pub name: String,
-    /// Numbers a particle.
+    /// Numbers per particle.
     pub components: u32,
-    /// Their type.
+    /// The stored type of the numbers.
     pub stored: StoredType,
-    /// Range of each component for [`StoredType::Ranged`], else empty.
+    /// The range of each component for [`StoredType::Ranged`], else empty.
     pub ranges: Vec<[f64; 2]>,
     /// Largest difference of a stored value from the true one.
     pub max_error: f64,
 }
 
-/// Particles that follow one another in tree order.
+/// Successive particles in tree order.
 #[derive(Debug, Clone)]
 pub struct Run<'a> {
-    /// Positions relative to the frame's origin, finite; arranged by [`super::arrange`].
+    /// Finite positions relative to the frame's origin, arranged by [`super::arrange`].
     pub positions: &'a [Vec3],
     /// Radii, for [`RadiusSpec::PerParticle`].
     pub radii: Option<&'a [f32]>,
-    /// For each attribute its values as they are stored, little-endian.
+    /// For each attribute, its values in their stored form, little-endian.
     pub attributes: &'a [&'a [u8]],
 }
 
-/// Particles that are coded at once: enough for many threads, so few that codes are still in the cache when they
-/// are written.
+/// Particles that are encoded at once: enough for many threads, and few enough that the codes are still in the
+/// cache when they are written.
 const CODED_LEN: usize = 1 << 18;
 
-/// Numbers of the sections in the order of the file; attributes follow, and what is kept as it is comes last,
-/// because its length is not known before.
+/// Numbers of the sections in file order. Attributes follow, and the wide blocks are the last section, because
+/// their length is not known in advance.
 const POSITIONS: usize = 0;
 const NODES: usize = 1;
 const RADII: usize = 2;
 const ATTRIBUTES: usize = 3;
 
-/// Writes one native frame. Nothing is at its path before [`FrameWriter::finish`], and what there was stays
-/// until then.
+/// Writes one native frame. [`FrameWriter::finish`] creates or replaces the file at its path; before that, an
+/// earlier file stays unchanged.
 #[derive(Debug)]
 pub struct FrameWriter {
     sections: SectionWriter,
     spec: FrameSpec,
-    /// Particles that were pushed.
+    /// Number of particles that were pushed.
     pushed: u64,
-    /// Blocks that are kept as they are.
+    /// Number of blocks that are stored as f32.
     wide: u64,
     max_error: f64,
     radius_error: f32,
@@ -111,21 +111,21 @@ pub struct FrameWriter {
 }
 
 impl FrameWriter {
-    /// Begins the frame `path`.
+    /// Starts the frame `path`.
     ///
     /// # Errors
-    /// If there are too many particles, the machine is big-endian, or the temporary file beside `path` cannot be made.
+    /// If there are too many particles, if the machine is big-endian, or if the temporary file beside `path`
+    /// cannot be created.
     pub fn create(path: &Path, spec: FrameSpec) -> io::Result<Self> {
         if cfg!(target_endian = "big") {
-            let what =
-                "native frames are written as they lie in the memory of little-endian machines";
+            let what = "native frames can only be written on little-endian machines";
             return Err(io::Error::new(io::ErrorKind::Unsupported, what));
         }
         let sections = sections_of(&spec)
             .filter(|_| u32::try_from(blocks_of(spec.count)).is_ok())
             .ok_or_else(|| invalid(format!("{} particles are too many for a frame", spec.count)))?;
         Ok(Self {
-            sections: SectionWriter::begin(Unpublished::create(path)?, sections)?,
+            sections: SectionWriter::begin(Publisher::create(path)?, sections)?,
             pushed: 0,
             wide: 0,
             max_error: 0.0,
@@ -135,10 +135,11 @@ impl FrameWriter {
         })
     }
 
-    /// Adds the next particles. All runs but the last have a multiple of 128.
+    /// Adds the next particles. The length of every run except the last must be a multiple of 128.
     ///
     /// # Errors
-    /// A run that does not fit the frame, or the system's reason why it or an earlier one cannot be written.
+    /// If the run does not fit the frame, or the system's error if this run or an earlier one cannot be
+    /// written.
     pub fn push(&mut self, run: &Run) -> io::Result<()> {
         self.check(run)?;
         let mut first = 0;
@@ -157,11 +158,12 @@ impl FrameWriter {
         Ok(())
     }
 
-    /// Completes the file and gives it its name.
+    /// Completes the file and renames it to its path.
     ///
     /// # Errors
     /// If particles are missing, or the file cannot be written.
     pub fn finish(self) -> io::Result<FrameIndex> {
+        // Check that all particles were written
         let Self { pushed, .. } = self;
         if pushed != self.spec.count {
             let count = self.spec.count;
@@ -169,23 +171,28 @@ impl FrameWriter {
                 "{pushed} of {count} particles were written"
             )));
         }
-        let filled = self.sections.finish()?;
+        // Wait for the sections
+        let mut filled = self.sections.finish()?;
         let sections: Vec<Section> = filled.sections.iter().map(SectionProgress::done).collect();
         let measured = FrameSummary {
             max_error: self.max_error,
             radius_error: self.radius_error,
             bounds: self.bounds,
         };
+        // Write the index behind them
         let index = index_of(&self.spec, &measured, &sections);
         let bytes = rkyv::to_bytes::<rancor::Error>(&index).map_err(io::Error::other)?;
         let end = index.wide.offset + index.wide.len;
         let offset = end.next_multiple_of(ALIGN);
-        // Sections end where the next begins but for zeros, which a hole in the file reads as.
-        filled.file.write_all_at(&bytes, offset)?;
+        // The gap between the sections and the index is a hole in the file, which reads as zeros.
+        filled.file.seek(SeekFrom::Start(offset))?;
+        filled.file.write_all(&bytes)?;
+        // Write the header and publish the file
         let file_len = offset + bytes.len() as u64;
         let header = header(file_len, offset, &bytes);
-        filled.file.write_all_at(&header, 0)?;
-        filled.file.publish()?;
+        filled.file.rewind()?;
+        filled.file.write_all(&header)?;
+        filled.file.commit()?;
         Ok(index)
     }
 
@@ -211,6 +218,7 @@ impl FrameWriter {
         positions: &[Vec3],
         radii: Option<&CodedRadii>,
     ) -> io::Result<()> {
+        // Encode the leaves
         let allowed = EncodeLimits {
             bound: self.spec.bound,
             radius: match self.spec.radius {
@@ -219,11 +227,13 @@ impl FrameWriter {
             },
         };
         let mut leaves: EncodedLeaves<B> = encode(positions, radii, allowed);
-        // Fewer than blocks, which were counted in 32 bits.
+        // There are fewer wide blocks than blocks, which are counted in 32 bits.
         leaves.shift(u32::try_from(self.wide).map_err(io::Error::other)?);
+        // Update the summary of the frame
         self.wide += leaves.wide.len() as u64;
         self.max_error = self.max_error.max(leaves.max_error);
         self.bounds = self.bounds.union(leaves.bounds);
+        // Append the sections
         self.sections.append(POSITIONS, piece(leaves.blocks))?;
         self.sections.append(NODES, piece(leaves.nodes))?;
         if !leaves.wide.is_empty() {
@@ -256,7 +266,7 @@ impl FrameWriter {
     }
 }
 
-/// The offsets of all sections; none if the file would be too long.
+/// The sections at their offsets; `None` if the file would be too long.
 fn sections_of(spec: &FrameSpec) -> Option<Vec<SectionProgress>> {
     let mut places = SectionOffsets {
         next: HEADER_LEN as u64,
@@ -279,7 +289,7 @@ fn sections_of(spec: &FrameSpec) -> Option<Vec<SectionProgress>> {
     Some(sections)
 }
 
-/// Values that are known after all runs are written.
+/// Values that are known when all runs are written.
 struct FrameSummary {
     max_error: f64,
     radius_error: f32,
@@ -328,8 +338,8 @@ fn index_of(spec: &FrameSpec, measured: &FrameSummary, sections: &[Section]) -> 
     }
 }
 
-/// Blocks of `positions` (in tree order, arranged) that `encoding` would have to keep as they are, under
-/// `bound` for spheres of the common `radius`.
+/// The number of blocks of `positions` (in tree order, arranged) that `encoding` would have to store as f32
+/// under `bound`, for spheres of the common `radius`.
 pub fn wide_blocks(
     positions: &[Vec3],
     encoding: Encoding,
@@ -346,7 +356,7 @@ pub fn wide_blocks(
     .sum()
 }
 
-/// Bytes of an attribute's values for one particle.
+/// Bytes per particle of an attribute's values.
 fn width(attribute: &AttributeSpec) -> u64 {
     u64::from(attribute.components) * attribute.stored.size() as u64
 }

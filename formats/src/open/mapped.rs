@@ -131,7 +131,7 @@ mod tests {
     }
 
     #[test]
-    fn a_step_must_fit_into_the_budget_and_the_file_need_not() {
+    fn budget_limits_the_step_not_the_file() {
         let (_dir, path) = written(&array(FRAMES));
         let open = |bytes| FrameFile::open_within(&path, MemoryBudget::new(bytes, "get more"));
         let step = (COUNT * 12) as u64;
@@ -143,7 +143,7 @@ mod tests {
     }
 
     #[test]
-    fn a_file_that_changes_between_steps_is_noticed() {
+    fn change_between_steps_is_detected() {
         let (_dir, path) = written(&array(FRAMES));
         let file = FrameFile::open(&path).expect("a good file");
         assert!(file.read(0).is_ok());

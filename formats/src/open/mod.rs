@@ -22,10 +22,12 @@ use crate::{FrameError, MemoryBudget, ParseError, RawParticles};
 mod head;
 mod mapped;
 mod streamed;
+mod whole;
 
 pub use crate::gzip::unpacked_len;
 pub(crate) use head::head;
 pub use head::{detect_file, is_native, remarks};
+pub(crate) use whole::read_whole;
 
 use mapped::SteppedFile;
 use streamed::{StreamedFile, decompressor};
@@ -357,7 +359,7 @@ mod tests {
     }
 
     #[test]
-    fn bytes_after_the_stream_are_told() {
+    fn bytes_after_the_stream_are_reported() {
         let zeros = open([gz(TEXT), vec![0; 512]].concat()).expect("padding");
         assert!(zeros.bytes() == TEXT && zeros.notes().is_empty());
         let other = open([gz(TEXT), b"junk".to_vec()].concat()).expect("ignored");
@@ -366,7 +368,7 @@ mod tests {
 
     #[test]
     #[cfg_attr(miri, ignore = "unpacks too often for an interpreter")]
-    fn every_truncation_of_gzip_is_noticed() {
+    fn every_truncation_of_gzip_is_detected() {
         let packed = [gz(&TEXT[..9]), gz(&TEXT[9..])].concat();
         let first = gz(&TEXT[..9]).len();
         for len in (3..packed.len()).filter(|l| *l != first) {
@@ -375,7 +377,7 @@ mod tests {
     }
 
     #[test]
-    fn damaged_gzip_is_noticed() {
+    fn damaged_gzip_is_detected() {
         let mut packed = gz(TEXT);
         let crc = packed.len() - 8;
         packed[crc] ^= 1;

@@ -1,26 +1,26 @@
-//! The Hilbert curve in three dimensions by table.
+//! The three-dimensional Hilbert curve, computed with tables.
 //!
-//! States and transitions follow Hamilton, "Compact Hilbert Indices" (2006): a state is the entry
-//! corner and the direction of the curve in a cell. Tables take two levels (six bits) at a time,
-//! about a fifth of the cost of computing the curve bit by bit. Hilbert order traces 10-15 %
-//! faster than Morton order, because consecutive particles are always neighbours.
+//! States and transitions follow Hamilton, "Compact Hilbert Indices" (2006): a state is the entry corner and
+//! the direction of the curve in a cell. The tables handle two levels (six bits) at a time, at about a fifth of
+//! the cost of computing the curve bit by bit. Hilbert order traces 10-15 % faster than Morton order, because
+//! consecutive particles are always neighbours.
 
 use glam::Vec3;
 
-/// Bits an axis of the grid that keys are taken on.
+/// Bits per axis of the grid for the keys.
 pub const AXIS_BITS: u32 = 21;
 
-/// Entry corners (8) times directions (3); only 12 are reached.
+/// Entry corners (8) times directions (3); only 12 states are reached.
 const STATES: usize = 24;
 
-/// Where a curve stands inside a cell: how its eight octants are visited.
+/// The state of the curve inside a cell: the order in which it visits the eight octants.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub struct CurveState(u8);
 
-/// `[state][octant]`: the octant's position on the curve in the low three bits, the state inside it
-/// above.
+/// `[state][octant]`: the octant's position on the curve in the low three bits, and the state inside the octant
+/// above them.
 const ONE_LEVEL: [[u8; 8]; STATES] = one_level();
-/// `[state][two octants]`: six bits of curve, the state inside above them.
+/// `[state][two octants]`: six bits of curve position, and the state inside above them.
 const TWO_LEVELS: [[u16; 64]; STATES] = two_levels();
 
 const fn rotate_right(value: u8, by: u32) -> u8 {
@@ -93,7 +93,7 @@ const fn two_levels() -> [[u16; 64]; STATES] {
     table
 }
 
-/// The grid of cubic cells that positions are put on.
+/// A grid of cubic cells for positions.
 #[derive(Debug, Clone, Copy)]
 pub struct Grid {
     min: Vec3,
@@ -101,7 +101,7 @@ pub struct Grid {
 }
 
 impl Grid {
-    /// A grid of 2^21 cells along the longest of `size`, from `min`; what is outside goes to the
+    /// A grid of 2^21 cells along the longest axis of `size`, from `min`. Points outside are clamped to the
     /// border cells.
     pub fn new(min: Vec3, size: Vec3) -> Self {
         let cells = (1_u32 << AXIS_BITS) as f32;
@@ -109,7 +109,7 @@ impl Grid {
         let cells_per_length = cells / longest;
         Self {
             min,
-            // Coincident particles, or a size too small to divide by: everything in cell 0.
+            // Coincident particles, or a size too small to divide by: all points are in cell 0.
             cells_per_length: if cells_per_length.is_finite() {
                 cells_per_length
             } else {
@@ -118,7 +118,7 @@ impl Grid {
         }
     }
 
-    /// The cell of `point` on each axis.
+    /// The cell coordinates of `point`.
     #[inline]
     fn cell(&self, point: Vec3) -> [u32; 3] {
         let cell = (point - self.min) * self.cells_per_length;
@@ -130,7 +130,7 @@ impl Grid {
             .map(|v| (v as u32).min((1 << AXIS_BITS) - 1))
     }
 
-    /// The three cell coordinates of `point` interleaved (Morton order), 63 bits, x highest.
+    /// The interleaved cell coordinates of `point` (Morton order), 63 bits, x highest.
     #[inline]
     pub fn morton(&self, point: Vec3) -> u64 {
         let [x, y, z] = self.cell(point).map(|v| spread_bits(u64::from(v)));
@@ -138,17 +138,17 @@ impl Grid {
     }
 }
 
-/// The cells of the top levels of the curve, numbered along it: one look-up a point.
+/// The cells of the top levels of the curve, numbered along the curve: one look-up per point.
 #[derive(Debug)]
 pub struct TopCells {
     grid: Grid,
     levels: u32,
-    /// Place on the curve by Morton code.
+    /// Position on the curve by Morton code.
     places: Vec<u16>,
 }
 
 impl TopCells {
-    /// Levels at most: 8^4 cells.
+    /// Largest number of levels: 8^4 cells.
     pub const MAX_LEVELS: u32 = 4;
 
     /// The cells of the top `levels` levels over `grid`.
@@ -175,12 +175,12 @@ impl TopCells {
         self.places.len()
     }
 
-    /// Never true: without levels there is one cell.
+    /// Never true: there is one cell even without levels.
     pub fn is_empty(&self) -> bool {
         self.places.is_empty()
     }
 
-    /// Curve levels that the cells stand for.
+    /// Number of curve levels.
     pub fn levels(&self) -> u32 {
         self.levels
     }
@@ -218,19 +218,21 @@ const fn low_bits(value: u64, mask: u64) -> usize {
     (value & mask) as usize
 }
 
-/// Follows the curve from `state` through `levels` levels of `morton`, of which `skip` levels from
-/// the top are passed over. Returns the curve position (`3 * levels` bits) and the state there.
+/// Follows the curve from `state` through `levels` levels of `morton`, after the top `skip` levels. Returns the
+/// curve position (`3 * levels` bits) and the final state.
 #[inline]
 pub fn hilbert(morton: u64, skip: u32, levels: u32, state: CurveState) -> (u64, CurveState) {
     debug_assert!(skip + levels <= AXIS_BITS);
     let mut shift = 3 * (AXIS_BITS - skip);
     let (mut place, mut state) = (0_u64, state.0);
+    // Look up the odd level
     if levels % 2 == 1 {
         shift -= 3;
         let found = ONE_LEVEL[state as usize][low_bits(morton >> shift, 7)];
         place = u64::from(found & 7);
         state = found >> 3;
     }
+    // Look up two levels at a time
     for _ in 0..levels / 2 {
         shift -= 6;
         let found = TWO_LEVELS[state as usize][low_bits(morton >> shift, 63)];
@@ -247,7 +249,7 @@ pub fn hilbert(morton: u64, skip: u32, levels: u32, state: CurveState) -> (u64, 
 mod tests {
     use super::*;
 
-    /// Cell coordinates (4 bits an axis) to a Morton code in the highest levels.
+    /// The Morton code, in the highest levels, of cell coordinates with 4 bits per axis.
     fn morton_of(x: u64, y: u64, z: u64) -> u64 {
         ((spread_bits(x) << 2) | (spread_bits(y) << 1) | spread_bits(z)) << (3 * (AXIS_BITS - 4))
     }
@@ -273,7 +275,7 @@ mod tests {
     }
 
     #[test]
-    fn levels_can_be_taken_in_pieces() {
+    fn levels_can_be_computed_in_pieces() {
         let morton = 0x1234_5678_9abc_def0 & ((1 << 63) - 1);
         let (whole, _) = hilbert(morton, 0, 21, CurveState::default());
         for split in 0..=21 {
@@ -288,7 +290,7 @@ mod tests {
     }
 
     #[test]
-    fn points_outside_go_to_the_border() {
+    fn points_outside_are_clamped_to_the_border() {
         let grid = Grid::new(Vec3::ZERO, Vec3::ONE);
         assert_eq!(grid.morton(Vec3::splat(-5.0)), 0);
         assert_eq!(grid.morton(Vec3::splat(1e30)), (1 << 63) - 1);

@@ -1,10 +1,10 @@
-//! Orders that bring near particles near each other: along a space-filling curve, and by k-d cuts.
+//! Orders that place neighbouring particles near each other: along a space-filling curve, and by k-d cuts.
 
 pub mod curve;
 pub mod kd;
 pub mod partition;
 
-/// A particle index as stored.
+/// Converts a particle index to its stored type.
 ///
 /// # Panics
 /// If a frame holds 2^32 particles or more.

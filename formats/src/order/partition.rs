@@ -1,8 +1,8 @@
-//! First half of every sort: a parallel, stable scatter of the particles into cells (one pass of a
+//! The first half of every sort: a parallel, stable scatter of the particles into cells (one pass of a
 //! most-significant-digit radix sort).
 //!
-//! The only large memory is the destination. Stable means that the result does not depend on how
-//! many threads took part.
+//! Apart from small tables, it needs no memory but the destination. The scatter is stable, so that the result
+//! does not depend on the number of threads.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -10,10 +10,10 @@ use rayon::prelude::*;
 use super::curve::TopCells;
 use super::index_u32;
 
-/// Wanted particles a cell: large enough to amortise the cell, small enough for the L2 cache.
+/// Target number of particles per cell: large enough to amortise the cell, small enough for the L2 cache.
 const CELL_TARGET: usize = 4096;
 
-/// Where the particles of each cell are.
+/// The ranges of particles of the cells.
 #[derive(Debug, Default)]
 pub struct Cells {
     /// First particle of each cell, and the particle count at the end.
@@ -21,7 +21,7 @@ pub struct Cells {
 }
 
 impl Cells {
-    /// Levels for `count` particles: the fewest that bring an even spread near the target.
+    /// The number of levels for `count` particles: the fewest for which an even distribution is near the target.
     pub fn levels_for(count: usize) -> u32 {
         let mut levels = 0;
         while levels < TopCells::MAX_LEVELS && (count >> (3 * levels)) > 8 * CELL_TARGET {
@@ -30,7 +30,7 @@ impl Cells {
         levels
     }
 
-    /// The memory of each cell: its points, and its indices unless there are none at all.
+    /// The points and the indices of each cell; the index slices are empty if `indices` is empty.
     pub fn slices_of<'a>(
         &self,
         mut points: &'a mut [Vec3],
@@ -49,15 +49,14 @@ impl Cells {
     }
 }
 
-/// Particles that a task of the scatter takes.
+/// Particles per task of the scatter.
 fn chunk_len(count: usize) -> usize {
     count
         .div_ceil(4 * rayon::current_num_threads())
         .max(16 * 1024)
 }
 
-/// Bytes of the tables that scattering `count` particles makes: for each chunk and cell a count and
-/// two slices.
+/// Bytes of the tables for a scatter of `count` particles: a count and two slices for each chunk and cell.
 pub fn table_bytes(count: u64) -> u64 {
     let count = usize::try_from(count).unwrap_or(usize::MAX);
     let cells = 1_u64 << (3 * Cells::levels_for(count));
@@ -65,8 +64,8 @@ pub fn table_bytes(count: u64) -> u64 {
     chunks * cells * (size_of::<u32>() + size_of::<usize>() + 2 * size_of::<&[u32]>()) as u64
 }
 
-/// Scatters `centers` into `points`, and their indices into `indices` unless that is empty.
-/// `cell_of` returns the cell of the particle with an index and position, below `cell_count`.
+/// Scatters `centers` into `points`, and their indices into `indices` unless that is empty. `cell_of` returns
+/// the cell of the particle with this index and position, below `cell_count`.
 ///
 /// # Panics
 /// If `points` (or a non-empty `indices`) is shorter than `centers`.
@@ -77,6 +76,7 @@ pub fn scatter(
     points: &mut [Vec3],
     indices: &mut [u32],
 ) -> Cells {
+    // Count the particles of each cell in each chunk
     let chunk_len = chunk_len(centers.len());
     let counts: Vec<Vec<u32>> = centers
         .par_chunks(chunk_len)
@@ -89,6 +89,7 @@ pub fn scatter(
             counts
         })
         .collect();
+    // Give each chunk its own slice of each cell
     let starts = cell_starts(&counts, cell_count);
     let point_parts = split_by_cell(&mut points[..centers.len()], &counts, cell_count);
     let index_parts = if indices.is_empty() {
@@ -96,6 +97,7 @@ pub fn scatter(
     } else {
         split_by_cell(&mut indices[..centers.len()], &counts, cell_count)
     };
+    // Move the particles of each chunk into its slices
     centers
         .par_chunks(chunk_len)
         .zip(point_parts)
@@ -128,8 +130,8 @@ fn cell_starts(counts: &[Vec<u32>], cell_count: usize) -> Vec<usize> {
     starts
 }
 
-/// Cuts `whole`, which is ordered by cell and within a cell by chunk, into one slice per chunk and
-/// cell, and hands each chunk its slices.
+/// Cuts `whole`, which is ordered by cell and then by chunk, into one slice per chunk and cell, and returns the
+/// slices of each chunk.
 fn split_by_cell<'a, T>(
     mut whole: &'a mut [T],
     counts: &[Vec<u32>],

@@ -117,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn other_names_have_numbers_of_their_own() {
+    fn unknown_names_have_distinct_numbers() {
         let names = ["water", "wall", "Ow", "X", "C1", "", "7", "\u{e4}"];
         let mut codes: Vec<i64> = names.iter().map(|name| code(name.as_bytes())).collect();
         assert!(codes.iter().all(|c| (1000..16_001_000).contains(c)));

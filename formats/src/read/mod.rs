@@ -1,4 +1,4 @@
-//! Readers of foreign formats, one file each: implementations of [`crate::reader::Reader`].
+//! Readers of foreign formats, one file each: implementations of `Reader`.
 //!
 //! Readers of binary formats work on the whole uncompressed file (`&[u8]`), readers of text on a `TextInput`, which
 //! holds a window of the file in memory. They trust none of it: they check every count against the bytes that are
@@ -21,7 +21,7 @@ mod remarks;
 pub(crate) mod sniff;
 mod source;
 mod table;
-mod text;
+pub(crate) mod text;
 #[cfg(test)]
 mod text_samples;
 pub mod vtk;

@@ -11,11 +11,11 @@ use memchr::memchr;
 
 /// One line without its line end.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) struct Line<'a> {
+pub(crate) struct Line<'a> {
     /// Offset of the first byte from the start of the file.
-    pub(super) at: usize,
+    pub(crate) at: usize,
     /// The bytes, without `\n` or `\r\n`.
-    pub(super) text: &'a [u8],
+    pub(crate) text: &'a [u8],
 }
 
 impl Line<'_> {
@@ -27,7 +27,7 @@ impl Line<'_> {
 
 /// Walks over the lines of a part of a file.
 #[derive(Debug, Clone)]
-pub(super) struct Lines<'a> {
+pub(crate) struct Lines<'a> {
     bytes: &'a [u8],
     at: usize,
     end: usize,
@@ -35,7 +35,7 @@ pub(super) struct Lines<'a> {
 
 impl<'a> Lines<'a> {
     /// The lines in `span` of the file `bytes`; a span beyond the file is cut.
-    pub(super) fn new(bytes: &'a [u8], span: Range<usize>) -> Self {
+    pub(crate) fn new(bytes: &'a [u8], span: Range<usize>) -> Self {
         let end = span.end.min(bytes.len());
         let at = span.start.min(end);
         Self { bytes, at, end }
@@ -82,7 +82,7 @@ impl<'a> Iterator for Lines<'a> {
 }
 
 /// The parts of `text` between blanks and tabs.
-pub(super) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
+pub(crate) fn words(text: &[u8]) -> impl Iterator<Item = &[u8]> {
     text.split(u8::is_ascii_whitespace)
         .filter(|word| !word.is_empty())
 }
@@ -102,7 +102,7 @@ pub(super) fn same_length(bytes: &[u8]) -> Cow<'_, str> {
 }
 
 /// Bytes of a file as a message can show them: quoted, lossy, at most 24 characters.
-pub(super) fn shown(bytes: &[u8]) -> String {
+pub(crate) fn shown(bytes: &[u8]) -> String {
     let text = String::from_utf8_lossy(bytes.get(..96).unwrap_or(bytes));
     let text = text.trim();
     match text.char_indices().nth(24) {
@@ -112,7 +112,7 @@ pub(super) fn shown(bytes: &[u8]) -> String {
 }
 
 /// `token` as a decimal integer with an optional sign. `-0` is none: only a float has it.
-pub(super) fn integer(token: &[u8]) -> Option<i64> {
+pub(crate) fn integer(token: &[u8]) -> Option<i64> {
     let (negative, digits) = match token {
         [b'-', digits @ ..] => (true, digits),
         [b'+', digits @ ..] => (false, digits),
@@ -143,7 +143,7 @@ pub(super) fn integer(token: &[u8]) -> Option<i64> {
 ///
 /// `fast_float2` takes nearly all of them: 13 ns for a number of a LAMMPS dump, where `str::parse`
 /// needs 18 ns and UTF-8 (one core of the development machine).
-pub(super) fn number(token: &[u8]) -> Option<f64> {
+pub(crate) fn number(token: &[u8]) -> Option<f64> {
     match fast_float2::parse(token) {
         Ok(value) => Some(value),
         Err(_) => unusual_number(token),
@@ -199,8 +199,8 @@ fn microsoft_number(before: &[u8], after: &[u8], negative: bool) -> Option<f64> 
         return None;
     }
     let name = after.to_ascii_uppercase();
-    let is = |wanted: &[u8]| {
-        name.strip_prefix(wanted)
+    let is = |keyword: &[u8]| {
+        name.strip_prefix(keyword)
             .is_some_and(|rest| rest.iter().all(u8::is_ascii_digit))
     };
     // The short forms come from rounding `INF` and `QNAN` to few digits as if they were some.
@@ -247,7 +247,7 @@ mod tests {
     use proptest::prelude::*;
 
     #[test]
-    fn numbers_in_every_spelling() {
+    fn parses_numbers_in_every_notation() {
         let cases: [(&str, f64); 20] = [
             ("1", 1.0),
             ("+1.5", 1.5),
@@ -296,7 +296,7 @@ mod tests {
     }
 
     #[test]
-    fn what_is_no_number() {
+    fn rejects_text_that_is_not_a_number() {
         for text in [
             "", "-", "+", ".", "e5", "d5", "H", "In", "Na", "Nd", "D", "1.0x", "1,5", "--1", "+-1",
             "1-", "1.0e", "1.#XYZ", "2.#INF", "nanx", "0x10", "1 2", "-d", "1e5-3", "é",
@@ -325,7 +325,7 @@ mod tests {
     }
 
     #[test]
-    fn lines_know_their_offset() {
+    fn lines_have_their_offset() {
         let bytes = b"ab\r\n\n c\nlast";
         let found: Vec<_> = Lines::new(bytes, 0..bytes.len())
             .map(|l| (l.at, l.text))
@@ -336,7 +336,7 @@ mod tests {
     }
 
     #[test]
-    fn long_words_are_shown_short() {
+    fn long_tokens_are_shortened() {
         assert_eq!(shown(b" ab\x01 "), "\"ab\\u{1}\"");
         assert!(shown(&[b'x'; 1000]).len() < 40);
     }
@@ -345,7 +345,7 @@ mod tests {
         #![proptest_config(crate::read::text_samples::config())]
 
         #[test]
-        fn printed_numbers_come_back(value: f64) {
+        fn printed_numbers_round_trip(value: f64) {
             for text in [format!("{value}"), format!("{value:e}"), format!("{value:E}").replace('E', "D")] {
                 let found = number(text.as_bytes()).expect("a printed number");
                 prop_assert!(found.to_bits() == value.to_bits() || value.is_nan() && found.is_nan());
@@ -353,7 +353,7 @@ mod tests {
         }
 
         #[test]
-        fn any_bytes_are_no_panic(bytes in prop::collection::vec(prop::sample::select(b"0123456789+-.,eEdDqnaif#IND()* ".to_vec()), 0..80)) {
+        fn arbitrary_bytes_do_not_panic(bytes in prop::collection::vec(prop::sample::select(b"0123456789+-.,eEdDqnaif#IND()* ".to_vec()), 0..80)) {
             let _ = (number(&bytes), number_with_comma(&bytes), integer(&bytes), shown(&bytes));
         }
     }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write as _;
 use std::io;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Why no sequence could be made of an input. None of these is about the content of a frame:
 /// damaged files are reported when they are loaded.
@@ -81,16 +81,6 @@ pub enum SequenceError {
         /// The operating system's reason.
         source: io::Error,
     },
-}
-
-impl SequenceError {
-    /// That the file `path` is not there, with names in its directory that come close.
-    pub fn missing(path: &Path) -> Self {
-        Self::Missing {
-            path: path.to_owned(),
-            hint: super::scan::hint_for(path),
-        }
-    }
 }
 
 /// One of several sequences in a directory.

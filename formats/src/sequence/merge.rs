@@ -263,7 +263,7 @@ mod tests {
     }
 
     #[test]
-    fn an_empty_part_takes_no_attribute_away() {
+    fn empty_part_removes_no_attribute() {
         let full = particles(1, vec![attribute("id", 1, AttributeData::U8(vec![7]))]);
         let mut notes = Vec::new();
         let merged = merge(vec![(0, particles(0, vec![])), (1, full)], &mut notes);

@@ -176,9 +176,9 @@ impl Sequence {
         Ok(())
     }
 
-    /// Keeps only the frames that are `wanted`.
-    pub fn keep_frames(&mut self, wanted: impl FnMut(&SequenceFrame) -> bool) {
-        self.frames.retain(wanted);
+    /// Keeps only the frames for which `keep` is true.
+    pub fn keep_frames(&mut self, keep: impl FnMut(&SequenceFrame) -> bool) {
+        self.frames.retain(keep);
     }
 
     /// Notes for the user: gaps, files left out, missing parts.
@@ -225,7 +225,7 @@ impl Sequence {
 
 /// Indices of the `parts` that match `name`, see [`Sequence::keep_parts`].
 fn parts_meant(parts: &[String], name: &str) -> Vec<u32> {
-    let wanted = name.to_lowercase();
+    let lower = name.to_lowercase();
     let matching = |fits: &dyn Fn(&str) -> bool| -> Vec<u32> {
         let named = (0..).zip(parts);
         let found = named.filter(|(_, part)| fits(&part.to_lowercase()));
@@ -234,12 +234,12 @@ fn parts_meant(parts: &[String], name: &str) -> Vec<u32> {
     // An exact match wins over names that differ in case only.
     let as_written = (0..).zip(parts).filter(|(_, part)| *part == name);
     let as_written: Vec<u32> = as_written.map(|(index, _)| index).collect();
-    let whole = matching(&|part| part == wanted);
+    let whole = matching(&|part| part == lower);
     match (as_written.is_empty(), whole.is_empty()) {
         (false, _) => as_written,
         (true, false) => whole,
-        (true, true) if parts.len() < 2 || wanted.is_empty() => Vec::new(),
-        (true, true) => matching(&|part| part.contains(&wanted)),
+        (true, true) if parts.len() < 2 || lower.is_empty() => Vec::new(),
+        (true, true) => matching(&|part| part.contains(&lower)),
     }
 }
 

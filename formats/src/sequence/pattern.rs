@@ -216,7 +216,7 @@ mod tests {
     }
 
     #[test]
-    fn many_wildcards_take_no_longer() {
+    fn many_wildcards_match_in_linear_time() {
         let name = "a".repeat(250);
         let pattern = "*a?".repeat(80);
         assert_eq!(number(&(pattern.clone() + "b"), &name), None);
@@ -229,7 +229,7 @@ mod tests {
     }
 
     #[test]
-    fn useless_patterns_are_refused() {
+    fn useless_patterns_are_rejected() {
         let error = |text: &str| {
             Pattern::parse(Path::new(text))
                 .expect_err("no pattern")

@@ -61,15 +61,21 @@ pub(super) fn fitting(pattern: &Pattern, text: &Path) -> Result<Vec<FileName>, S
     Ok(names)
 }
 
-/// A remedy for a file that is not there: names in its directory that come close.
-pub(super) fn hint_for(path: &Path) -> String {
-    let directory = match path.parent() {
-        Some(parent) if parent != Path::new("") => parent,
-        _ => Path::new("."),
-    };
-    match list(directory) {
-        Ok(files) if !files.is_empty() => format!("; {}", closest(path, directory, &files)),
-        _ => String::new(),
+impl SequenceError {
+    /// The file `path` does not exist. The error names similar files in its directory.
+    pub fn missing(path: &Path) -> Self {
+        let directory = match path.parent() {
+            Some(parent) if parent != Path::new("") => parent,
+            _ => Path::new("."),
+        };
+        let hint = match list(directory) {
+            Ok(files) if !files.is_empty() => format!("; {}", closest(path, directory, &files)),
+            _ => String::new(),
+        };
+        Self::Missing {
+            path: path.to_owned(),
+            hint,
+        }
     }
 }
 
@@ -136,8 +142,8 @@ fn what_is_there(path: &Path, files: &[PathBuf]) -> String {
     format!("it has {}", texts.join(", "))
 }
 
-/// The three names of `files` most like `wanted`, as a clause.
-fn closest(wanted: &Path, directory: &Path, files: &[PathBuf]) -> String {
+/// The three names of `files` most similar to `missing`, as a clause.
+fn closest(missing: &Path, directory: &Path, files: &[PathBuf]) -> String {
     if files.is_empty() {
         return format!("`{}` has no files", directory.display());
     }
@@ -145,10 +151,13 @@ fn closest(wanted: &Path, directory: &Path, files: &[PathBuf]) -> String {
         let name = p.file_name().unwrap_or_default();
         name.to_string_lossy().into_owned()
     };
-    let wanted = name_of(wanted);
+    let missing = name_of(missing);
     let likeness = |name: &str| {
-        let start = name.chars().zip(wanted.chars()).take_while(|(a, b)| a == b);
-        let end = name.chars().rev().zip(wanted.chars().rev());
+        let start = name
+            .chars()
+            .zip(missing.chars())
+            .take_while(|(a, b)| a == b);
+        let end = name.chars().rev().zip(missing.chars().rev());
         start.count() + end.take_while(|(a, b)| a == b).count()
     };
     let mut names: Vec<String> = files.iter().map(|f| name_of(f)).collect();
@@ -174,7 +183,7 @@ pub(super) struct NumberedStep {
 ///
 /// Files with one step each keep the number of their name. Then not all are opened, which on a
 /// long sequence would mean reading all of it: only the first, the last, and those half as large
-/// again as any seen to hold one step. Loading checks the rest.
+/// again as any scanned to hold one step. Loading checks the rest.
 pub(super) fn number_steps(
     files: Vec<GroupFile>,
     budget: MemoryBudget,
@@ -189,7 +198,7 @@ pub(super) fn number_steps(
         may_hold_many(&f.path) && scan.is_suspect(&files, i) && scan.steps(i, &f.path).len() > 1
     });
     if !several {
-        let own = |index: usize| match scan.seen.get(&index).map(Vec::as_slice) {
+        let own = |index: usize| match scan.scanned.get(&index).map(Vec::as_slice) {
             Some([step]) if lone => step.number,
             _ => None,
         };
@@ -254,7 +263,7 @@ fn may_hold_many(path: &Path) -> bool {
 
 #[derive(Default)]
 struct StepScan {
-    seen: BTreeMap<usize, Vec<Step>>,
+    scanned: BTreeMap<usize, Vec<Step>>,
     /// Largest file that holds one step, so far.
     single: u64,
     /// The file opened last: the caller may want it next.
@@ -270,7 +279,7 @@ impl StepScan {
 
     /// The steps of a file; one that cannot be read counts as one, and fails when it is loaded.
     fn steps(&mut self, index: usize, path: &Path) -> &[Step] {
-        if !self.seen.contains_key(&index) {
+        if !self.scanned.contains_key(&index) {
             let mut steps = Vec::new();
             // Before the next is opened, so that only one is in memory.
             self.last = None;
@@ -284,9 +293,9 @@ impl StepScan {
             if steps.is_empty() {
                 steps.push(Step::whole(0));
             }
-            self.seen.insert(index, steps);
+            self.scanned.insert(index, steps);
         }
-        self.seen.get(&index).map_or(&[], Vec::as_slice)
+        self.scanned.get(&index).map_or(&[], Vec::as_slice)
     }
 }
 

@@ -73,7 +73,7 @@ fn a_directory_of_frames() {
 }
 
 #[test]
-fn parts_are_named_in_any_case_and_in_part() {
+fn part_names_match_fragments_in_any_case() {
     let parts = ["Fluid", "Boundary_0", "Boundary_1", "Oil", "OilRig"].map(str::to_owned);
     let meant = |name: &str| parts_meant(&parts, name);
     assert_eq!(meant("fluid"), [0]);
@@ -138,7 +138,7 @@ fn lammps_names() {
 }
 
 #[test]
-fn parts_and_gaps_are_told() {
+fn parts_and_gaps_are_reported() {
     let mut names = series(9, |i| format!("ParticleData_Fluid_{i}.vtk"));
     names.extend((6..=8).map(|i| format!("ParticleData_Oil_{i}.vtk")));
     names.retain(|n| n != "ParticleData_Fluid_4.vtk");
@@ -154,7 +154,7 @@ fn parts_and_gaps_are_told() {
 }
 
 #[test]
-fn what_is_not_there_is_told_with_a_remedy() {
+fn missing_inputs_are_reported_with_a_remedy() {
     let dir = Dir::with(&owned(&["x_1.vtk", "y.png"]));
     let text = dir.error("x_#.vtu");
     assert!(
@@ -194,7 +194,7 @@ fn lists_may_have_patterns() {
 }
 
 #[test]
-fn ranges_are_short() {
+fn ranges_are_formatted_compactly() {
     assert_eq!(ranges(&[]), "");
     assert_eq!(ranges(&[1, 2, 3, 7, 9, 10]), "1-3, 7, 9-10");
     assert!(ranges(&(0..99).map(|i| i * 2).collect::<Vec<_>>()).ends_with(", ..."));
@@ -309,7 +309,7 @@ fn steps_of_one_file_are_frames() {
 }
 
 #[test]
-fn steps_of_several_files_are_counted_on() {
+fn steps_are_numbered_across_files() {
     let dir = Dir::with(&[]);
     for (name, steps, from) in [("a_1.npy", 1, 0), ("a_2.npy", 1, 1), ("a_10.npy", 1, 8)] {
         write_steps(&dir.path(name), steps, from);
@@ -326,7 +326,7 @@ fn steps_of_several_files_are_counted_on() {
 }
 
 #[test]
-fn a_file_that_gained_steps_is_told() {
+fn file_that_gained_steps_is_reported() {
     let dir = Dir::with(&[]);
     for i in 1..=3 {
         write_steps(&dir.path(&format!("a_{i}.npy")), 1, i);

@@ -1,9 +1,5 @@
-//! Writers of foreign formats, for particles to be compared in other programs. Files appear whole
-//! or not at all. Native frames are [`crate::native`]'s.
-
-pub(crate) mod atomic;
-
-pub use atomic::own_temporaries;
+//! Writers of foreign formats, to compare particles in other programs. Files appear complete or not at all.
+//! [`crate::native`] writes native frames.
 
 pub mod npy;
 pub mod vtk;

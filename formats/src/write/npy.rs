@@ -4,25 +4,26 @@ use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
+use spherule_publish::publish_with;
 
-use super::atomic::publish;
 use super::stream::{publish_stream, write_positions};
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Progress};
 
-/// Writes `positions` to `path`, whole or not at all.
+/// Writes `positions` to `path`. The file appears complete or not at all.
 ///
 /// # Errors
 /// [`FrameError::Io`].
 pub fn write(path: &Path, positions: &[Vec3]) -> Result<(), FrameError> {
-    publish(path, |file| fill(file, positions)).map_err(|e| FrameError::io(path, e))
+    let written = publish_with(path, |file| fill(file, positions));
+    written.map(|_| ()).map_err(|e| FrameError::io(path, e))
 }
 
-/// Writes the positions of `source` to `path` in its order, rounded to f32, whole or not at all; attributes have
-/// no equivalent in the format.
+/// Writes the positions of `source` to `path` in source order, rounded to f32. The file appears complete or not
+/// at all. The format has no equivalent for attributes.
 ///
 /// # Errors
-/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` wants that.
+/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` cancels.
 pub fn stream(
     path: &Path,
     source: &dyn ParticleSource,
@@ -46,7 +47,7 @@ fn fill(file: &mut impl Write, positions: &[Vec3]) -> io::Result<()> {
 
 fn fill_header(file: &mut impl Write, count: u64) -> io::Result<()> {
     let dict = format!("{{'descr': '<f4', 'fortran_order': False, 'shape': ({count}, 3), }}");
-    // Magic, version and length take 10 bytes; data begin at a multiple of 64, after a newline.
+    // Magic, version and length take 10 bytes. The data begins at a multiple of 64, after a newline.
     let header_len = (10 + dict.len() + 1).next_multiple_of(64) - 10;
     let length = u16::try_from(header_len).map_err(io::Error::other)?;
     file.write_all(b"\x93NUMPY\x01\x00")?;
@@ -61,7 +62,7 @@ mod tests {
     use crate::generate::{BoxSettings, fill_box};
 
     #[test]
-    fn the_file_is_what_numpy_writes() {
+    fn output_equals_that_of_numpy() {
         for count in [0usize, 1, 1000] {
             let mut bytes = Vec::new();
             fill(&mut bytes, &vec![Vec3::new(1.0, 2.0, -3.0); count]).expect("memory");

@@ -1,27 +1,27 @@
-//! Particles from a source to a file in pieces: read and brought into the file's form by all threads, written in
-//! order.
+//! Writes particles from a source to a file in pieces: all threads read and convert pieces, which are written
+//! in order.
 
-use std::io::{self, BufWriter, Write};
+use std::io::{self, Write};
 use std::ops::ControlFlow;
 use std::path::Path;
 
 use glam::DVec3;
 use rayon::prelude::*;
+use spherule_publish::{Publisher, publish_with};
 
-use super::atomic::publish;
 use crate::FrameError;
 use crate::convert::{ConvertError, ParticleSource, Phase, Progress};
 
-/// Particles of a piece.
+/// Particles per piece.
 const PIECE: usize = 1 << 14;
-/// Pieces that are made at once.
+/// Pieces that are converted at the same time.
 const TOGETHER: usize = 32;
 
-/// Why writing a file ended early.
+/// The reason why writing ended early.
 pub(super) enum WriteError {
-    /// An error of the file.
+    /// An I/O error of the file.
     Io(io::Error),
-    /// Any other error.
+    /// Any other error, ready to return.
     Told(ConvertError),
 }
 
@@ -37,18 +37,19 @@ impl From<FrameError> for WriteError {
     }
 }
 
-/// Fills the file `path` by `fill`, whole or not at all.
+/// Writes the file `path` with `fill`. The file appears complete or not at all.
 pub(super) fn publish_stream(
     path: &Path,
-    fill: impl FnOnce(&mut BufWriter<&std::fs::File>) -> Result<(), WriteError>,
+    fill: impl FnOnce(&mut Publisher) -> Result<(), WriteError>,
 ) -> Result<(), ConvertError> {
-    publish(path, fill).map_err(|ended| match ended {
-        WriteError::Io(error) => FrameError::io(path, error).into(),
-        WriteError::Told(error) => error,
-    })
+    match publish_with(path, fill) {
+        Ok(_) => Ok(()),
+        Err(WriteError::Io(error)) => Err(FrameError::io(path, error).into()),
+        Err(WriteError::Told(error)) => Err(error),
+    }
 }
 
-/// Writes what `make` appends to `bytes` for each range of particles, in order.
+/// Writes the bytes that `make` appends for each range of particles, in order.
 fn write_pieces(
     file: &mut impl Write,
     count: u64,
@@ -60,6 +61,7 @@ fn write_pieces(
     for first in (0..pieces).step_by(TOGETHER) {
         let end = pieces.min(first + TOGETHER as u64);
         let used = usize::try_from(end - first).map_or(TOGETHER, |used| used.min(TOGETHER));
+        // Convert the pieces in parallel
         let together = made[..used].par_iter_mut().enumerate();
         together.try_for_each(|(number, bytes)| {
             let place = (first + number as u64) * PIECE as u64;
@@ -67,9 +69,11 @@ fn write_pieces(
             bytes.clear();
             make(place, len, bytes)
         })?;
+        // Write them in order
         made[..used]
             .iter()
             .try_for_each(|bytes| file.write_all(bytes))?;
+        // Report the progress
         let done = count.min(end * PIECE as u64);
         if let ControlFlow::Break(()) = progress.advanced(Phase::Finish, done, count) {
             return Err(WriteError::Told(ConvertError::Interrupted));
@@ -78,7 +82,7 @@ fn write_pieces(
     Ok(())
 }
 
-/// Writes all positions as f32 in bytes by `to_bytes`.
+/// Writes all positions as f32, converted by `to_bytes`.
 pub(super) fn write_positions(
     file: &mut impl Write,
     source: &dyn ParticleSource,
@@ -97,7 +101,7 @@ pub(super) fn write_positions(
     })
 }
 
-/// Writes all values of an attribute, the highest byte of each first.
+/// Writes all values of an attribute, big-endian.
 pub(super) fn write_values(
     file: &mut impl Write,
     source: &dyn ParticleSource,
@@ -114,7 +118,7 @@ pub(super) fn write_values(
     })
 }
 
-/// Writes what `bytes_of` has for each number below `count`.
+/// Writes the result of `bytes_of` for each number below `count`.
 pub(super) fn write_numbers<const N: usize>(
     file: &mut impl Write,
     count: u64,

@@ -1,32 +1,33 @@
-//! Legacy VTK, binary POLYDATA: a vertex a particle, attributes as field arrays. Version 4.2; 5.1, whose cells
-//! are counted in 64 bits, for more particles than 4.2 can number.
+//! Legacy VTK, binary POLYDATA: one vertex per particle, attributes as field arrays. The version is 4.2, or 5.1
+//! (whose cells are counted in 64 bits) for more particles than 4.2 can number.
 
 use std::io::{self, Write};
 use std::path::Path;
 
 use glam::Vec3;
+use spherule_publish::publish_with;
 
-use super::atomic::publish;
 use super::stream::{WriteError, publish_stream, write_numbers, write_positions, write_values};
 use crate::attribute::with_values;
 use crate::convert::{ConvertError, ParticleSource, Progress};
 use crate::{Attribute, FrameError, ScalarType};
 
-/// Writes `positions` and `attributes` (each one value group a particle) to `path`, whole or not
-/// at all. Blanks in names become `_`, as the format wants it.
+/// Writes `positions` and `attributes` (each with one value group per particle) to `path`. The file appears
+/// complete or not at all. Blanks in names become `_`, as the format requires.
 ///
 /// # Errors
-/// [`FrameError::Io`]; also for attributes of another count, and for more particles than VTK's
-/// 32-bit cells can count.
+/// [`FrameError::Io`], also if an attribute has another count, or if there are more particles than VTK's 32-bit
+/// cells can count.
 pub fn write(path: &Path, positions: &[Vec3], attributes: &[Attribute]) -> Result<(), FrameError> {
-    publish(path, |file| fill(file, positions, attributes)).map_err(|e| FrameError::io(path, e))
+    let written = publish_with(path, |file| fill(file, positions, attributes));
+    written.map(|_| ()).map_err(|e| FrameError::io(path, e))
 }
 
-/// Writes what `source` has to `path` in its order, positions rounded to f32, whole or not at all. Blanks in
-/// names become `_`, as the format wants it.
+/// Writes the particles of `source` to `path` in source order, with positions rounded to f32. The file appears
+/// complete or not at all. Blanks in names become `_`, as the format requires.
 ///
 /// # Errors
-/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` wants that.
+/// [`ConvertError::Frame`], or [`ConvertError::Interrupted`] if `progress` cancels.
 pub fn stream(
     path: &Path,
     source: &dyn ParticleSource,
@@ -40,15 +41,15 @@ pub fn stream(
     publish_stream(path, |file| fill_from(file, source, progress, cells))
 }
 
-/// Particles that version 4.2 can number: the list of cells has two i32 a particle and its length is an i32.
+/// Largest number of particles for version 4.2: the list of cells has two i32 per particle, and its length is an i32.
 const MOST_SHORT: u64 = (i32::MAX / 2) as u64;
 
-/// How cells are written.
+/// The format of the cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum CellFormat {
-    /// Version 4.2: in each cell its length and its particle, 32 bits.
+    /// Version 4.2: for each cell its length and its particle, 32 bits each.
     Short,
-    /// Version 5.1: where each cell ends, and the particles, 64 bits.
+    /// Version 5.1: the end of each cell, then the particles, 64 bits each.
     Long,
 }
 
@@ -58,6 +59,7 @@ fn fill_from(
     progress: &dyn Progress,
     cells: CellFormat,
 ) -> Result<(), WriteError> {
+    // Write the header and the positions
     let count = source.count();
     let version = match cells {
         CellFormat::Short => "4.2",
@@ -68,10 +70,11 @@ fn fill_from(
         "# vtk DataFile Version {version}\nparticles\nBINARY\nDATASET POLYDATA\nPOINTS {count} float\n"
     )?;
     write_positions(file, source, progress, f32::to_be_bytes)?;
+    // Write one vertex cell for each particle
     match cells {
         CellFormat::Short => {
             write!(file, "\nVERTICES {count} {}\n", 2 * count)?;
-            // Both halves of the number: one particle, and which.
+            // The upper half is the cell's length, 1; the lower half is the particle's index.
             write_numbers(file, count, progress, |i| ((1 << 32) | i).to_be_bytes())?;
         }
         CellFormat::Long => {
@@ -86,6 +89,7 @@ fn fill_from(
         }
     }
     writeln!(file)?;
+    // Write the attributes
     let attributes = source.attributes();
     if attributes.is_empty() {
         return Ok(());
@@ -101,7 +105,7 @@ fn fill_from(
     Ok(())
 }
 
-/// A name without blanks.
+/// `name` with its blanks replaced.
 fn word(name: &str) -> String {
     let blank_free = |c: char| if c.is_whitespace() { '_' } else { c };
     name.chars().map(blank_free).collect()
@@ -110,11 +114,12 @@ fn word(name: &str) -> String {
 fn fill(file: &mut impl Write, positions: &[Vec3], attributes: &[Attribute]) -> io::Result<()> {
     let invalid = |what: String| io::Error::new(io::ErrorKind::InvalidInput, what);
     let count = positions.len();
-    // The list of cells has two i32 a particle and its length is an i32 too.
+    // The list of cells has two i32 per particle, and its length is an i32 too.
     let cells = i32::try_from(count)
         .ok()
         .filter(|count| count.checked_mul(2).is_some())
         .ok_or_else(|| invalid(format!("{count} particles are too many for legacy VTK")))?;
+    // Write the header and the positions
     write!(
         file,
         "# vtk DataFile Version 4.2\nparticles\nBINARY\nDATASET POLYDATA\nPOINTS {count} float\n"
@@ -124,12 +129,14 @@ fn fill(file: &mut impl Write, positions: &[Vec3], attributes: &[Attribute]) -> 
             file.write_all(&value.to_be_bytes())?;
         }
     }
+    // Write one vertex cell for each particle
     write!(file, "\nVERTICES {count} {}\n", 2 * cells)?;
     for index in 0..cells {
         file.write_all(&1i32.to_be_bytes())?;
         file.write_all(&index.to_be_bytes())?;
     }
     writeln!(file)?;
+    // Write the attributes
     if attributes.is_empty() {
         return Ok(());
     }
@@ -162,7 +169,7 @@ const fn type_name(kind: ScalarType) -> &'static str {
         ScalarType::U16 => "unsigned_short",
         ScalarType::I32 => "int",
         ScalarType::U32 => "unsigned_int",
-        // `long` has 4 bytes on Windows, these have 8 everywhere.
+        // `long` has 4 bytes on Windows; this type has 8 bytes everywhere.
         ScalarType::I64 => "vtktypeint64",
         ScalarType::U64 => "vtktypeuint64",
         ScalarType::F32 => "float",
@@ -204,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn attributes_that_do_not_fit_are_refused() {
+    fn oversized_attributes_are_rejected() {
         let dir = tempfile::tempdir().expect("a temporary directory");
         let path = dir.path().join("a.vtk");
         let error = write(&path, &[Vec3::ZERO], &[attribute(vec![])]).expect_err("no value");
@@ -214,7 +221,7 @@ mod tests {
     }
 
     #[test]
-    fn streams_hold_what_their_source_has() {
+    fn streams_contain_their_source() {
         let source = BlockSource::new(BlockSettings {
             count: 40_000,
             seed: 2,

@@ -1,4 +1,4 @@
-//! Small frames of every encoding, their bytes, and ways to change them.
+//! Small frames of every encoding, their bytes, and functions to change them.
 
 use std::fs;
 use std::ops::Range;
@@ -25,12 +25,12 @@ impl Stored {
         Self { name, bytes, index }
     }
 
-    /// The bytes of the index.
+    /// The range of the index in the bytes.
     pub(crate) fn index_range(&self) -> Range<usize> {
         word(&self.bytes, 24)..self.bytes.len()
     }
 
-    /// What lies at a byte: the name of its section and where that begins; `None` between sections.
+    /// The name and the start of the section that contains byte `at`; `None` between sections.
     pub(crate) fn section_at(&self, at: usize) -> Option<(String, u64)> {
         let at = at as u64;
         let holds = |s: &layout::Section| s.offset <= at && at < s.offset + s.len;
@@ -39,13 +39,13 @@ impl Stored {
         found.next().map(|(what, section)| (what, section.offset))
     }
 
-    /// The same sections under another index, all checksums of header and index right.
+    /// The same sections with another index; all checksums of header and index are correct.
     pub(crate) fn under(&self, index: &FrameIndex) -> Vec<u8> {
         let index = rkyv::to_bytes::<rkyv::rancor::Error>(index).expect("memory");
         self.under_bytes(&index)
     }
 
-    /// The same under any bytes as the index.
+    /// The same sections with any bytes as the index.
     pub(crate) fn under_bytes(&self, index: &[u8]) -> Vec<u8> {
         let start = self.index_range().start;
         let mut bytes = self.bytes[..start].to_vec();
@@ -61,7 +61,7 @@ fn word(bytes: &[u8], at: usize) -> usize {
     usize::try_from(u64::from_le_bytes(*word)).expect("small")
 }
 
-/// Every encoding, with what goes with it: wide blocks, radii of each type, attributes, an origin.
+/// Frames in every encoding with all features: wide blocks, radii of each type, attributes, an origin.
 pub(crate) fn all() -> Vec<Stored> {
     let coded = |encoding| StoreSettings {
         encoding: Some(encoding),
@@ -95,7 +95,7 @@ pub(crate) fn all() -> Vec<Stored> {
     frames
 }
 
-/// The frames are as different as they should be.
+/// Checks that the frames differ in the intended ways.
 fn check_kinds(frames: &[Stored]) {
     let with = |name: &str| {
         let mut found = frames.iter().filter(|f| f.name == name);
@@ -115,7 +115,7 @@ fn check_kinds(frames: &[Stored]) {
     assert_eq!(code("q10, radii"), Some(RadiusCode::U8));
 }
 
-/// 150 particles: two nodes, the second one not full; a few far off, whose blocks are wide.
+/// 150 particles in two nodes, the second one not full. A few particles are far away, so that their blocks are wide.
 fn frame(radius: Option<Radius>, origin: DVec3) -> ParticleFrame {
     let mut numbers = Numbers(1);
     let mut unit = || numbers.below(1 << 16) as f32 / 65_536.0;
@@ -150,7 +150,7 @@ fn radius(particle: u8, spread: f32) -> f32 {
     0.01 + spread * f32::from(particle) / 150.0
 }
 
-/// Numbers that look random and are the same in every run (splitmix64).
+/// Pseudo-random numbers that are the same in every run (splitmix64).
 pub(crate) struct Numbers(pub(crate) u64);
 
 impl Numbers {

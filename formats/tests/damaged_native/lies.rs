@@ -1,9 +1,9 @@
-//! Indices and headers that lie under checksums that are right.
+//! Indices and headers with false numbers and correct checksums.
 
 use super::*;
 use layout::{RadiusIndex, Section};
 
-/// Sizes that overflow when they are added, multiplied, aligned or made a signed number.
+/// Sizes that overflow in additions, multiplications, alignment or conversion to a signed number.
 const HUGE: [u64; 10] = [
     u64::MAX,
     u64::MAX - 1,
@@ -17,7 +17,7 @@ const HUGE: [u64; 10] = [
     1 << 40,
 ];
 
-/// One of the numbers of an index that a file could lie with.
+/// A number of an index that a file could state falsely.
 type Field = fn(&mut FrameIndex) -> Option<&mut u64>;
 
 fn radii(index: &mut FrameIndex) -> Option<&mut Section> {
@@ -44,7 +44,7 @@ const FIELDS: [Field; 13] = [
 ];
 
 #[test]
-fn sizes_that_overflow_are_told() {
+fn overflowing_sizes_are_rejected() {
     for stored in frames::all() {
         for field in FIELDS {
             for huge in HUGE {
@@ -61,9 +61,9 @@ fn sizes_that_overflow_are_told() {
     }
 }
 
-/// All lengths follow the count, as far as they can be computed at all.
+/// All lengths match the count, as far as they can be computed.
 #[test]
-fn counts_that_agree_with_their_sections_are_told() {
+fn inconsistent_counts_are_rejected() {
     for stored in frames::all() {
         for count in HUGE
             .into_iter()
@@ -84,14 +84,14 @@ fn counts_that_agree_with_their_sections_are_told() {
             }
             let bytes = stored.under(&index);
             let len = bytes.len();
-            // Fewer particles fit, but then the sections are not what was written.
+            // Fewer particles fit into the file, but the sections then differ from the ones written.
             check_error(&read(bytes).expect_err("another count"), len);
         }
     }
 }
 
 #[test]
-fn headers_that_lie_are_told() {
+fn inconsistent_headers_are_rejected() {
     let stored = &frames::all()[0];
     let index = stored.index_range();
     for lie in HUGE
@@ -115,9 +115,9 @@ fn headers_that_lie_are_told() {
     assert!(matches!(error, FrameError::Unsupported { .. }), "{error}");
 }
 
-/// Whatever passes as an index can be looked at, and what is read after verifying is what was written.
+/// Any index that passes the checks can be accessed, and verified data equals the data that was written.
 #[test]
-fn random_changes_of_an_index_under_right_checksums_never_panic() {
+fn changed_index_with_valid_checksum_never_panics() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     let all = frames::all();
@@ -140,6 +140,6 @@ fn random_changes_of_an_index_under_right_checksums_never_panic() {
         let file = NativeFile::open(&path, Access::Read).expect("it was parsed");
         touch(file.frame().expect("unchanged"));
     }
-    // Else nothing was looked at.
+    // With fewer opened files, the test would check nothing.
     assert!(opened > 400, "{opened}");
 }

@@ -1,4 +1,4 @@
-//! Damage to native frames, place by place: it is a named error, or it changes nothing.
+//! Damages native frames at every place: reading gives an error that names the file, or the damage has no effect.
 
 use std::fs;
 use std::hint::black_box;
@@ -13,15 +13,15 @@ mod shrinking;
 
 use frames::{Numbers, Stored};
 
-/// What is done to a byte: each bit alone, a few together, all.
+/// Changes to a byte: each bit alone, several bits, all bits.
 const FLIPS: [u8; 11] = [1, 2, 4, 8, 16, 32, 64, 128, 0x81, 0x3c, 0xff];
 
-/// Reads a whole file from memory, every section verified.
+/// Reads a whole file from memory and verifies every section.
 fn read(bytes: Vec<u8>) -> Result<RawParticles, FrameError> {
     FrameFile::from_bytes(Path::new("a.spf"), bytes)?.read(0)
 }
 
-/// The error names the file, a place in it, and what to do.
+/// Checks that the error names the file, a place in it, and a remedy.
 #[track_caller]
 fn check_error(error: &FrameError, len: usize) {
     let FrameError::Malformed { path, at, what } = error else {
@@ -33,7 +33,7 @@ fn check_error(error: &FrameError, len: usize) {
     assert!(remedies.iter().any(|r| what.contains(r)), "{error}");
 }
 
-/// Looks at everything that a view can show, none of it verified.
+/// Accesses everything in a view without verification.
 fn touch(frame: NativeFrame<'_>) {
     let _ = black_box((frame.verify(), frame.verify_nodes()));
     let leaves = frame.leaves().expect("lengths were checked");
@@ -67,7 +67,7 @@ fn every_byte_of_header_and_index_is_covered() {
     }
 }
 
-/// Reads `damaged`, which differs from `stored` at `places` of its sections.
+/// Reads `damaged`, which differs from `stored` at `places` in its sections.
 #[track_caller]
 fn named_or_same(stored: &Stored, damaged: &[u8], places: &[usize]) {
     let whole = FORMAT
@@ -92,7 +92,7 @@ fn named_or_same(stored: &Stored, damaged: &[u8], places: &[usize]) {
 }
 
 #[test]
-fn every_byte_of_a_section_is_told_under_its_name() {
+fn every_flipped_byte_names_its_section() {
     for stored in frames::all() {
         for at in layout::HEADER_LEN..stored.index_range().start {
             let mut damaged = stored.bytes.clone();
@@ -103,7 +103,7 @@ fn every_byte_of_a_section_is_told_under_its_name() {
 }
 
 #[test]
-fn many_random_flips_are_told_under_the_name_of_a_section() {
+fn random_flips_name_a_section() {
     let all = frames::all();
     let mut numbers = Numbers(0x5eed);
     for round in 0..10_000 {
@@ -140,7 +140,7 @@ fn nodes_are_verified_alone() {
 }
 
 #[test]
-fn every_truncation_is_told() {
+fn every_truncation_is_rejected() {
     for stored in frames::all() {
         for len in 0..stored.bytes.len() {
             let error = read(stored.bytes[..len].to_vec()).expect_err("cut short");
@@ -154,7 +154,7 @@ fn every_truncation_is_told() {
 }
 
 #[test]
-fn cuts_at_sections_are_told_of_files() {
+fn truncation_at_section_borders_is_rejected() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("a.spf");
     for stored in frames::all() {

@@ -3,7 +3,7 @@
 use std::io::Cursor;
 
 use spherule::output::{ImageFault, ImageShape, verify_exr, verify_preview};
-use spherule::render::Channels;
+use spherule::render::{Channels, DataWindow};
 
 /// What the seeds are, and what no file of theirs can be. The first byte picks one.
 const SHAPES: [ImageShape; 4] = [
@@ -17,18 +17,20 @@ const fn shape(width: u32, height: u32, channels: Channels) -> ImageShape {
     ImageShape {
         width,
         height,
+        window: DataWindow::whole(width, height),
         channels,
+        attributes: Vec::new(),
     }
 }
 
 /// An OpenEXR file.
 pub fn exr(bytes: &[u8]) -> usize {
-    verified(bytes, |file, wanted| verify_exr(file, wanted))
+    verified(bytes, |file, expected| verify_exr(file, expected))
 }
 
 /// A preview.
 pub fn png(bytes: &[u8]) -> usize {
-    verified(bytes, |file, wanted| verify_preview(file, wanted))
+    verified(bytes, |file, expected| verify_preview(file, expected))
 }
 
 fn verified(
@@ -38,8 +40,8 @@ fn verified(
     let Some((choice, bytes)) = bytes.split_first() else {
         return 0;
     };
-    let wanted = &SHAPES[usize::from(*choice) % SHAPES.len()];
-    match verify(Cursor::new(bytes), wanted) {
+    let expected = &SHAPES[usize::from(*choice) % SHAPES.len()];
+    match verify(Cursor::new(bytes), expected) {
         Ok(()) => 1,
         Err(fault) => {
             assert!(!fault.to_string().is_empty());

@@ -1,4 +1,4 @@
-//! What a job keeps on disk: plan, ledgers, and in `job.work` cards and claims.
+//! The files of a job: plan, ledgers, and in `job.work` worker records and claims.
 
 use std::convert::Infallible;
 use std::fs;
@@ -13,22 +13,23 @@ use spherule::report::job::JobReport;
 use spherule::resolve::{check_views, setup};
 use spherule::survey::Survey;
 use spherule_jobs::{
-    Claimed, FrameRequest, Job, JobRequest, JobState, Mode, PLAN_FILE, Plan, settings_hash,
+    ClaimOutcome, FrameRequest, Job, JobRequest, JobState, PLAN_FILE, Plan, ResumeMode,
+    settings_hash,
 };
 use tempfile::TempDir;
 
-/// A job's directory beside a file that is none of its business.
-struct Place {
+/// The directory of a job, and a file outside of it.
+struct JobDir {
     dir: TempDir,
 }
 
-impl Place {
+impl JobDir {
     fn new() -> Self {
         let dir = tempfile::tempdir().expect("a temporary directory");
-        let place = Self { dir };
-        fs::create_dir_all(place.work()).expect("writable");
-        fs::write(place.bystander(), "").expect("writable");
-        place
+        let job_dir = Self { dir };
+        fs::create_dir_all(job_dir.work()).expect("writable");
+        fs::write(job_dir.bystander(), "").expect("writable");
+        job_dir
     }
 
     fn job(&self) -> PathBuf {
@@ -39,7 +40,7 @@ impl Place {
         self.job().join("job.work")
     }
 
-    /// Named like a card, for names that lead out of the directory: `../../a`.
+    /// Named like a worker record, for names that lead out of the directory: `../../a`.
     fn bystander(&self) -> PathBuf {
         self.dir.path().join("a.worker")
     }
@@ -54,6 +55,7 @@ fn request(dir: &Path) -> JobRequest {
     let frame = |number: i64| FrameRequest {
         number,
         inputs: vec![PathBuf::from(format!("in/f.{number}.vtk"))],
+        companions: Vec::new(),
         outputs: vec![dir.join(format!("f.{number}.exr"))],
     };
     JobRequest {
@@ -61,8 +63,8 @@ fn request(dir: &Path) -> JobRequest {
         frames: [1, 2, 40].map(frame).to_vec(),
         extra_outputs: Vec::new(),
         selection: None,
-        mode: Mode::Resume,
-        patience: Duration::ZERO,
+        mode: ResumeMode::Resume,
+        takeover_after: Duration::ZERO,
     }
 }
 
@@ -71,14 +73,14 @@ fn open(dir: &Path) -> Result<Job, String> {
     Job::open(dir, request(dir), settled).map_err(|error| error.to_string())
 }
 
-/// The plan of the job that is asked for.
+/// The plan of the requested job.
 static PLAN: LazyLock<Vec<u8>> = LazyLock::new(|| {
-    let place = Place::new();
-    open(&place.job()).expect("a new job");
-    fs::read(place.job().join(PLAN_FILE)).expect("a plan")
+    let job_dir = JobDir::new();
+    open(&job_dir.job()).expect("a new job");
+    fs::read(job_dir.job().join(PLAN_FILE)).expect("a plan")
 });
 
-/// A plan: as it is, and with the checksum put right that mutation would never hit.
+/// A plan: unchanged, and with a correct checksum, which mutation would never find.
 pub fn plan(bytes: &[u8]) -> usize {
     let repaired = repaired(bytes).map_or(0, |bytes| read_plan(&bytes));
     read_plan(bytes) + repaired
@@ -89,8 +91,8 @@ fn repaired(bytes: &[u8]) -> Option<Vec<u8>> {
     if let Some(plan) = file.get("plan") {
         let text = plan.to_string();
         let (version, sum) = (file.get("version")?, blake3::hash(text.as_bytes()).to_hex());
-        let sealed = format!(r#"{{"version":{version},"blake3":"{sum}","plan":{text}}}"#);
-        return Some(sealed.into_bytes());
+        let checksummed = format!(r#"{{"version":{version},"blake3":"{sum}","plan":{text}}}"#);
+        return Some(checksummed.into_bytes());
     }
     let settings = serde_json::from_value::<Vec<(String, String)>>(file.get("settings")?.clone());
     *file.get_mut("settings_blake3")? = settings_hash(&settings.ok()?).into();
@@ -98,32 +100,33 @@ fn repaired(bytes: &[u8]) -> Option<Vec<u8>> {
 }
 
 fn read_plan(bytes: &[u8]) -> usize {
-    let place = Place::new();
-    place.write(PLAN_FILE, bytes);
-    match Job::peek(&place.job()) {
-        Ok(plan) => look_at(&plan.expect("there is a file")),
+    let job_dir = JobDir::new();
+    job_dir.write(PLAN_FILE, bytes);
+    match Job::read_plan(&job_dir.job()) {
+        Ok(plan) => check_plan(&plan.expect("there is a file")),
         Err(error) => {
             assert!(!error.to_string().is_empty());
             return 0;
         }
     }
-    let state = Job::read(&place.job())
+    let state = Job::read(&job_dir.job())
         .expect("as it was")
         .expect("as it was");
     report(&state);
-    // Whether it goes on or refuses.
-    let _ = open(&place.job());
+    // The job is resumed or refused
+    let _ = open(&job_dir.job());
     state.plan().frames().len()
 }
 
-/// What was settled when the job began, as `render` and `convert` take it.
-fn look_at(plan: &Plan) {
+/// Uses the resolved settings of a plan as `render` and `convert` do.
+fn check_plan(plan: &Plan) {
     let numbers = plan.frames().iter().map(|frame| frame.number);
     assert!(numbers.clone().all(|number| plan.frame(number).is_some()));
     let Ok(survey) = serde_json::from_value::<Survey>(plan.resolved().clone()) else {
         return;
     };
-    let _ = setup(&Manifest::new("in"), &survey).map(|setup| check_views(&setup, numbers).is_ok());
+    let _ = setup(&Manifest::new("in"), &survey, None)
+        .map(|setup| check_views(&setup, numbers).is_ok());
     let _ = Conversion::new(conversion(), &survey);
 }
 
@@ -148,14 +151,14 @@ fn report(state: &JobState) {
     assert!(html.contains("</html>"));
 }
 
-/// A ledger. Images that it tells of are there if they are named like those of the plan, without a byte.
+/// A ledger. The images of the plan exist as empty files.
 pub fn ledger(bytes: &[u8]) -> usize {
-    let place = Place::new();
-    place.write(PLAN_FILE, &PLAN);
-    place.write("job.ledger.a.jsonl", bytes);
-    place.write("f.1.exr", b"");
-    place.write("f.2.exr", b"");
-    match Job::read(&place.job()) {
+    let job_dir = JobDir::new();
+    job_dir.write(PLAN_FILE, &PLAN);
+    job_dir.write("job.ledger.a.jsonl", bytes);
+    job_dir.write("f.1.exr", b"");
+    job_dir.write("f.2.exr", b"");
+    match Job::read(&job_dir.job()) {
         Ok(state) => {
             let state = state.expect("there is a plan");
             report(&state);
@@ -169,44 +172,47 @@ pub fn ledger(bytes: &[u8]) -> usize {
     }
 }
 
-/// A card.
-pub fn card(bytes: &[u8]) -> usize {
-    let place = Place::new();
-    fs::write(place.work().join("a.worker"), bytes).expect("writable");
-    let workers = Job::workers(&place.job()).expect("a readable directory");
+/// A worker record.
+pub fn worker(bytes: &[u8]) -> usize {
+    let job_dir = JobDir::new();
+    fs::write(job_dir.work().join("a.worker"), bytes).expect("writable");
+    let workers = Job::workers(&job_dir.job()).expect("a readable directory");
     workers.len()
 }
 
-/// Lines: a card, a claim of the first frame, one that follows it, and one of the second. A job is opened, which
-/// clears away what the dead have left, and its frames are claimed, since all others are silent.
+/// Lines: a worker record, a claim of the first frame, its next generation, and a claim of the second frame. The job
+/// is opened, which removes files of dead workers, and its frames are claimed, since no other worker is alive.
 pub fn claim(bytes: &[u8]) -> usize {
-    let place = Place::new();
-    place.write(PLAN_FILE, &PLAN);
+    let job_dir = JobDir::new();
+    job_dir.write(PLAN_FILE, &PLAN);
     let write = |names: &[&str]| {
         for (name, line) in names.iter().zip(bytes.split(|b| *b == b'\n')) {
-            fs::write(place.work().join(name), line).expect("writable");
+            fs::write(job_dir.work().join(name), line).expect("writable");
         }
     };
     write(&["a.worker", "frame.1.0", "frame.1.1", "frame.2.0"]);
-    let seen = Job::workers(&place.job())
+    let found = Job::workers(&job_dir.job())
         .expect("a readable directory")
         .len();
-    if let Ok(job) = open(&place.job()) {
+    if let Ok(job) = open(&job_dir.job()) {
         write(&["b.worker", "frame.1.0", "frame.1.1", "frame.2.0"]);
-        take(&job);
+        claim_all(&job);
     }
-    assert!(place.bystander().exists(), "a file outside the job is gone");
-    assert!(place.job().join(PLAN_FILE).exists());
-    seen
+    assert!(
+        job_dir.bystander().exists(),
+        "a file outside the job is gone"
+    );
+    assert!(job_dir.job().join(PLAN_FILE).exists());
+    found
 }
 
-fn take(job: &Job) {
+fn claim_all(job: &Job) {
     let claims = job.claims();
     for frame in [1, 2] {
-        match claims.take(frame) {
-            Ok(Claimed::Mine(claim)) => claim.end(),
-            Ok(Claimed::Held(who)) => assert!(!who.is_empty()),
-            Ok(Claimed::Ended(_)) => panic!("nobody has"),
+        match claims.claim(frame) {
+            Ok(ClaimOutcome::Acquired(claim)) => claim.complete(),
+            Ok(ClaimOutcome::Held(who)) => assert!(!who.is_empty()),
+            Ok(ClaimOutcome::Finished(_)) => panic!("nobody has"),
             Err(error) => assert!(!error.to_string().is_empty()),
         }
     }

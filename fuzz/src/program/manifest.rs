@@ -16,7 +16,7 @@ pub fn manifest(bytes: &[u8]) -> usize {
         let (assignment, after) = line.split_once('\n').unwrap_or((line, ""));
         match Override::parse(assignment) {
             Ok(set) => overrides.push(set),
-            Err(what) => assert!(!what.is_empty()),
+            Err(error) => assert!(!error.to_string().is_empty()),
         }
         rest = after;
     }

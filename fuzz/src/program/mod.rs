@@ -11,7 +11,7 @@ mod text;
 mod trace;
 
 pub use image::{exr, png};
-pub use job::{card, claim, ledger, plan};
+pub use job::{claim, ledger, plan, worker};
 pub use manifest::manifest;
 pub use text::{output, range};
 pub use trace::trace;
@@ -23,7 +23,7 @@ pub const TARGETS: [(&str, Target); 10] = [
     ("output", output),
     ("plan", plan),
     ("ledger", ledger),
-    ("card", card),
+    ("worker", worker),
     ("claim", claim),
     ("exr", exr),
     ("png", png),

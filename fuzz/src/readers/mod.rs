@@ -1,4 +1,4 @@
-//! Targets of `spherule-formats`. Each returns how many steps gave particles, or how many frames there are.
+//! Targets of `spherule-formats`. Each returns how many steps gave particles or meshes, or how many frames there are.
 
 use spherule_formats::detect::Format;
 use spherule_formats::read;
@@ -6,11 +6,13 @@ use spherule_formats::stats::FrameStats;
 use spherule_formats::{ParseError, ParticleFrame, RawParticles, choose_origin};
 
 mod convert;
+mod mesh;
 mod names;
 mod native;
 mod packed;
 
 pub use convert::convert;
+pub use mesh::mesh;
 pub use names::names;
 pub use native::native;
 pub use packed::{npz, open};
@@ -19,7 +21,7 @@ pub use packed::{npz, open};
 pub type Target = fn(&[u8]) -> usize;
 
 /// Every target by the name of its folder in `corpus`.
-pub const TARGETS: [(&str, Target); 14] = [
+pub const TARGETS: [(&str, Target); 15] = [
     ("vtk", vtk),
     ("vtk_xml", vtk_xml),
     ("bgeo", bgeo),
@@ -34,6 +36,7 @@ pub const TARGETS: [(&str, Target); 14] = [
     ("native", native),
     ("convert", convert),
     ("names", names),
+    ("mesh", mesh),
 ];
 
 /// Steps read of one input: the rest goes the same way.

@@ -20,7 +20,7 @@ const DEFLATED: u8 = 0x10;
 const NUMPY: &[u8] = b"\x93NUMPY";
 
 /// An NPZ: the bytes as they are if they begin like a zip archive, else the arrays among them,
-/// each with a byte before it that tells name and compression.
+/// each with a byte before it with name and compression.
 pub fn npz(bytes: &[u8]) -> usize {
     if bytes.starts_with(b"PK") {
         return read_all(read::npy::NPZ, bytes, DEFLATE_RATIO);

@@ -1,4 +1,4 @@
-//! Frames in chunks: what one task of an engine does.
+//! Divides frames into chunks, one per task.
 
 use std::fmt;
 use std::num::NonZeroUsize;
@@ -6,61 +6,61 @@ use std::num::NonZeroUsize;
 use super::ExportError;
 use crate::range::FrameRange;
 
-/// Tasks where nothing is known of how long a frame takes: enough to fill a small cluster, few enough
-/// that starting them is no burden.
-const USUAL_TASKS: usize = 100;
+/// Number of tasks by default: enough to fill a small cluster, few enough that the cost of starting them does not
+/// matter.
+const DEFAULT_TASKS: usize = 100;
 
 /// The frames of each task, in order.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Chunks {
-    /// What each task does; never empty.
+    /// The frames of each task; never empty.
     pub ranges: Vec<FrameRange>,
-    /// Frames in each but the last, which may have fewer.
+    /// Frames per task. The last task may have fewer.
     pub size: usize,
-    /// How the size came about.
+    /// Why this size was chosen.
     pub choice: ChunkChoice,
 }
 
-/// How many frames a task has, and why.
+/// Why a task has its number of frames.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ChunkChoice {
-    /// The user said so.
-    Asked,
-    /// About a hundred tasks.
-    Usual,
-    /// What was asked for would have made too many tasks.
+    /// The user chose the size.
+    Requested,
+    /// Default: about a hundred tasks.
+    Default,
+    /// The requested size would have given too many tasks.
     Enlarged {
-        /// Frames a task that were asked for.
-        asked: usize,
-        /// Tasks that this would have made.
+        /// Requested frames per task.
+        requested: usize,
+        /// Number of tasks with that size.
         tasks: usize,
-        /// Tasks that there may be.
-        most: usize,
+        /// Largest number of tasks.
+        max_tasks: usize,
     },
 }
 
 impl Chunks {
-    /// Chunks of `asked` frames, or such that there are about a hundred of them, of `frames` in their
-    /// order. Larger ones if there would be more than `most_tasks`.
+    /// Divides `frames`, in their order, into chunks of `requested` frames, or into about a hundred chunks. Uses
+    /// larger chunks if there would be more than `max_tasks`.
     ///
     /// # Errors
     /// There are no frames.
     pub fn of(
         frames: &[i64],
-        asked: Option<NonZeroUsize>,
-        most_tasks: NonZeroUsize,
+        requested: Option<NonZeroUsize>,
+        max_tasks: NonZeroUsize,
     ) -> Result<Self, ExportError> {
-        let usual = frames.len().div_ceil(USUAL_TASKS).max(1);
-        let wanted = asked.map_or(usual, NonZeroUsize::get);
-        let size = wanted.max(frames.len().div_ceil(most_tasks.get()));
-        let choice = match asked {
-            Some(asked) if asked.get() < size => ChunkChoice::Enlarged {
-                asked: asked.get(),
-                tasks: frames.len().div_ceil(asked.get()),
-                most: most_tasks.get(),
+        let default = frames.len().div_ceil(DEFAULT_TASKS).max(1);
+        let preferred = requested.map_or(default, NonZeroUsize::get);
+        let size = preferred.max(frames.len().div_ceil(max_tasks.get()));
+        let choice = match requested {
+            Some(requested) if requested.get() < size => ChunkChoice::Enlarged {
+                requested: requested.get(),
+                tasks: frames.len().div_ceil(requested.get()),
+                max_tasks: max_tasks.get(),
             },
-            Some(_) => ChunkChoice::Asked,
-            None => ChunkChoice::Usual,
+            Some(_) => ChunkChoice::Requested,
+            None => ChunkChoice::Default,
         };
         let ranges: Vec<FrameRange> = frames
             .chunks(size.max(1))
@@ -78,7 +78,7 @@ impl Chunks {
 }
 
 impl fmt::Display for Chunks {
-    /// `25 tasks of 10 frames, as asked for`.
+    /// `25 tasks of 10 frames, as requested`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (tasks, frames) = (
             counted(self.ranges.len(), "task"),
@@ -95,17 +95,18 @@ pub(super) fn counted(count: usize, what: &str) -> String {
 }
 
 impl fmt::Display for ChunkChoice {
-    /// The reason, to follow `3 frames a task`.
+    /// The reason, as it follows `3 frames per task`.
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Asked => write!(f, "as asked for"),
-            Self::Usual => write!(
+            Self::Requested => write!(f, "as requested"),
+            Self::Default => write!(f, "the default, for at most {DEFAULT_TASKS} tasks"),
+            Self::Enlarged {
+                requested,
+                tasks,
+                max_tasks,
+            } => write!(
                 f,
-                "for about {USUAL_TASKS} tasks at the most, as it is not known how long a frame takes"
-            ),
-            Self::Enlarged { asked, tasks, most } => write!(
-                f,
-                "as {asked} would make {tasks} tasks, and arrays usually may have {most}"
+                "because {requested} would give {tasks} tasks, and arrays are usually limited to {max_tasks}"
             ),
         }
     }
@@ -116,9 +117,9 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    fn chunks(frames: &[i64], asked: usize, most: usize) -> Chunks {
-        let most = NonZeroUsize::new(most).unwrap();
-        Chunks::of(frames, NonZeroUsize::new(asked), most).unwrap()
+    fn chunks(frames: &[i64], requested: usize, max_tasks: usize) -> Chunks {
+        let max_tasks = NonZeroUsize::new(max_tasks).unwrap();
+        Chunks::of(frames, NonZeroUsize::new(requested), max_tasks).unwrap()
     }
 
     fn texts(chunks: &Chunks) -> Vec<String> {
@@ -130,11 +131,11 @@ mod tests {
         let frames: Vec<i64> = (-2..=5).collect();
         let found = chunks(&frames, 3, 1000);
         assert_eq!(texts(&found), ["-2-0", "1-3", "4-5"]);
-        assert_eq!((found.size, found.choice), (3, ChunkChoice::Asked));
+        assert_eq!((found.size, found.choice), (3, ChunkChoice::Requested));
     }
 
     #[test]
-    fn gaps_and_the_order_asked_for_stay() {
+    fn gaps_and_order_are_kept() {
         assert_eq!(
             texts(&chunks(&[1, 3, 5, 100, 7, 2], 3, 1000)),
             ["1-5x2", "2,7,100"]
@@ -143,7 +144,7 @@ mod tests {
     }
 
     #[test]
-    fn about_a_hundred_tasks_are_usual() {
+    fn about_a_hundred_tasks_by_default() {
         for (count, size, tasks) in [(1, 1, 1), (100, 1, 100), (101, 2, 51), (25_000, 250, 100)] {
             let frames: Vec<i64> = (0..count).collect();
             let found = chunks(&frames, 0, 1000);
@@ -152,26 +153,26 @@ mod tests {
                 (size, tasks),
                 "{count} frames"
             );
-            assert_eq!(found.choice, ChunkChoice::Usual);
+            assert_eq!(found.choice, ChunkChoice::Default);
         }
     }
 
     #[test]
-    fn there_are_no_more_tasks_than_may_be() {
+    fn the_number_of_tasks_is_limited() {
         let frames: Vec<i64> = (0..2500).collect();
         let found = chunks(&frames, 2, 1000);
         assert_eq!((found.size, found.ranges.len()), (3, 834));
         assert_eq!(
             found.choice.to_string(),
-            "as 2 would make 1250 tasks, and arrays usually may have 1000"
+            "because 2 would give 1250 tasks, and arrays are usually limited to 1000"
         );
         assert_eq!(chunks(&frames, 2, 2000).ranges.len(), 1250);
-        // Also of those that nobody asked for.
+        // The limit also applies to the default
         assert_eq!(chunks(&frames, 0, 10).ranges.len(), 10);
     }
 
     #[test]
-    fn no_frames_are_no_work() {
+    fn no_frames_are_an_error() {
         let one = NonZeroUsize::MIN;
         assert_eq!(Chunks::of(&[], None, one), Err(ExportError::NoFrames));
     }
@@ -180,14 +181,14 @@ mod tests {
         #[test]
         fn every_frame_is_in_one_chunk(
             frames in prop::collection::btree_set(-500i64..500, 1..200),
-            asked in 0usize..20,
-            most in 1usize..50,
+            requested in 0usize..20,
+            max_tasks in 1usize..50,
         ) {
             let frames: Vec<i64> = frames.into_iter().collect();
-            let found = chunks(&frames, asked, most);
+            let found = chunks(&frames, requested, max_tasks);
             let all: Vec<i64> = found.ranges.iter().flat_map(FrameRange::iter).collect();
             prop_assert_eq!(all, frames);
-            prop_assert!(found.ranges.len() <= most);
+            prop_assert!(found.ranges.len() <= max_tasks);
             prop_assert!(found.ranges.iter().all(|r| r.iter().count() <= found.size));
         }
     }

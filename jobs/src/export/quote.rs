@@ -1,12 +1,12 @@
-//! Texts inside texts: words of a shell, and what no engine's text can hold.
+//! Quotes texts for scripts and templates, and rejects what they cannot contain.
 
 use std::borrow::Cow;
 
 use super::ExportError;
 
-/// Refuses what would end a line: a path with it could become a command or a key of its own.
+/// Rejects line breaks: a path with one could become a command or a key of its own.
 pub(super) fn one_line<'a>(what: &'static str, text: &'a str) -> Result<&'a str, ExportError> {
-    // YAML takes the separators of lines and paragraphs as line breaks, too.
+    // In YAML the Unicode line and paragraph separators are line breaks too
     let breaks = |c: char| c.is_control() || matches!(c, '\u{2028}' | '\u{2029}' | '\u{feff}');
     match text.chars().find(|c| breaks(*c)) {
         None => Ok(text),
@@ -18,14 +18,14 @@ pub(super) fn one_line<'a>(what: &'static str, text: &'a str) -> Result<&'a str,
     }
 }
 
-/// `text` as one word of a POSIX shell, which takes nothing in it for anything else.
+/// Quotes `text` as one word of a POSIX shell.
 pub(super) fn shell_word<'a>(
     what: &'static str,
     text: &'a str,
 ) -> Result<Cow<'a, str>, ExportError> {
     let text = one_line(what, text)?;
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "/._-+,:@%=".contains(c);
-    // `=` before a command's name would make it an assignment.
+    // A leading `=` would make the word an assignment
     if !text.is_empty() && !text.starts_with('=') && text.chars().all(is_plain) {
         return Ok(Cow::Borrowed(text));
     }
@@ -48,7 +48,7 @@ mod tests {
     }
 
     #[test]
-    fn line_breaks_are_refused() {
+    fn line_breaks_are_rejected() {
         for text in [
             "a\nb",
             "a\rb",

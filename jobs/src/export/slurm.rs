@@ -1,75 +1,75 @@
-//! A script that Slurm runs as an array of tasks, each with a chunk of the frames.
+//! A script for a Slurm job array. Each task of the array processes a chunk of the frames.
 //!
-//! Sources: the manual pages of `sbatch` and `scontrol`, and what Slurm 22.05 was seen to do.
+//! Sources: the manual pages of `sbatch` and `scontrol`, and experiments with Slurm 22.05.
 
 use super::chunks::counted;
 use super::quote::{one_line, shell_word};
 use super::{ChunkChoice, Chunks, ExportError, TimeLimit};
 use crate::range::FrameRange;
 
-/// Tasks that an array may have where nobody has set `MaxArraySize` (1001, and numbers begin at 0).
-pub const MOST_TASKS: usize = 1000;
+/// Largest number of tasks of an array with the default `MaxArraySize` (1001; indices start at 0).
+pub const MAX_TASKS: usize = 1000;
 
-/// Seconds by which Slurm can be told to signal ahead of the time limit.
-const MOST_AHEAD: u32 = 65_535;
+/// Longest time between signal and time limit that Slurm accepts, seconds.
+const MAX_SIGNAL_AHEAD: u32 = 65_535;
 
-/// How often a task may be put back without having made a frame: to make room for others, say.
+/// How often a task may be requeued without having finished a frame, for example because it was preempted.
 const SPARE_RESTARTS: usize = 20;
 
-/// An array of tasks that call one program.
+/// A job array whose tasks run one program.
 #[derive(Debug, Clone)]
 pub struct ArrayScript<'a> {
-    /// The job's name in the queue; what is no letter, digit, `.`, `_` or `-` becomes `-`.
+    /// Name of the job in the queue. Characters other than letters, digits, `.`, `_` and `-` become `-`.
     pub name: &'a str,
-    /// What is done, for the first line: `Renders out/job.toml`.
+    /// Description for the first line: `Renders out/job.toml`.
     pub title: &'a str,
-    /// What each task runs.
+    /// The command of each task.
     pub command: FrameCommand<'a>,
     /// The frames of the tasks.
     pub chunks: &'a Chunks,
-    /// What each task gets of a node.
+    /// Resources of each task.
     pub resources: Resources<'a>,
-    /// Seconds before the time limit at which a task is told to finish.
+    /// Time between the signal to finish and the time limit, seconds.
     pub signal_ahead: u32,
-    /// Where logs go, absolute. Slurm does not make it.
+    /// Directory of the logs, absolute. Slurm does not create it.
     pub log_dir: &'a str,
 }
 
-/// A program that does some frames, all in one directory, and ends with 75 when TERM has stopped it.
+/// A program that processes some frames. It exits with 75 if TERM stopped it.
 #[derive(Debug, Clone)]
 pub struct FrameCommand<'a> {
-    /// Its path.
+    /// Path of the program.
     pub program: &'a str,
-    /// The environment variable that names another one.
+    /// Environment variable that overrides the path.
     pub variable: &'a str,
-    /// What comes first; then `--frames RANGE --threads N` and perhaps `--memory-limit SIZE`.
+    /// First arguments. `--frames RANGE --threads N` and possibly `--memory-limit SIZE` follow.
     pub arguments: &'a [&'a str],
-    /// Whether the program is told what memory Slurm gives the task.
+    /// Whether to pass the memory limit of the task to the program.
     pub limit_memory: bool,
 }
 
-/// What a task asks of the cluster; what is not said is up to the cluster.
+/// Resources of a task. The cluster decides everything that is not set.
 #[derive(Debug, Clone, Default)]
 pub struct Resources<'a> {
-    /// Processors.
+    /// Number of processors.
     pub cpus: u16,
-    /// Bytes of memory.
+    /// Memory, bytes.
     pub memory: Option<u64>,
-    /// Time for one chunk.
+    /// Time limit of a task.
     pub time: Option<TimeLimit>,
-    /// Tasks that may run at once.
+    /// Largest number of tasks that run at the same time.
     pub concurrent: Option<u32>,
-    /// Partitions, with commas.
+    /// Partitions, comma-separated.
     pub partition: Option<&'a str>,
-    /// Whom to charge.
+    /// Account to charge.
     pub account: Option<&'a str>,
 }
 
 impl ArrayScript<'_> {
-    /// The script.
+    /// The text of the script.
     ///
     /// # Errors
-    /// A path or name that it cannot hold, or a time limit that leaves no time to work.
+    /// A path or name that a script cannot contain, or a time limit that leaves no time to work.
     pub fn text(&self) -> Result<String, ExportError> {
         self.check_times()?;
         let parts = [
@@ -85,15 +85,17 @@ impl ArrayScript<'_> {
 
     fn check_times(&self) -> Result<(), ExportError> {
         let ahead = self.signal_ahead;
-        if !(1..=MOST_AHEAD).contains(&ahead) {
-            return Err(ExportError::Settings(format!(
-                "the signal can come 1 to {MOST_AHEAD} seconds ahead of the time limit, not {ahead}"
-            )));
+        if !(1..=MAX_SIGNAL_AHEAD).contains(&ahead) {
+            return Err(ExportError::SignalAhead {
+                seconds: ahead,
+                max: MAX_SIGNAL_AHEAD,
+            });
         }
         match self.resources.time {
-            Some(time) if time.seconds <= u64::from(ahead) => Err(ExportError::Settings(format!(
-                "a time limit of {time} leaves no time to work with a signal {ahead} s ahead of it"
-            ))),
+            Some(time) if time.seconds <= u64::from(ahead) => Err(ExportError::NoTimeToWork {
+                limit: time,
+                signal_ahead: ahead,
+            }),
             _ => Ok(()),
         }
     }
@@ -103,16 +105,16 @@ impl ArrayScript<'_> {
         let mut text = format!(
             "#!/bin/bash\n\
              # {}\n\
-             # as a Slurm array of {}; submit this file with sbatch. Submitted again, it does what is\n\
-             # missing: finished frames are kept.\n\
-             # {} a task, {}.\n",
+             # as a Slurm array of {}. Submit this file with sbatch. If it is submitted again, finished\n\
+             # frames are kept.\n\
+             # {} per task, {}.\n",
             one_line("title", self.title)?,
             counted(chunks.ranges.len(), "task"),
             counted(chunks.size, "frame"),
             chunks.choice
         );
-        if chunks.choice != ChunkChoice::Asked {
-            text += "# Five to thirty minutes a task suit most clusters: --chunk sets the frames of a task.\n";
+        if chunks.choice != ChunkChoice::Requested {
+            text += "# Five to thirty minutes per task suit most clusters. --chunk sets the number of frames per task.\n";
         }
         Ok(text)
     }
@@ -145,11 +147,11 @@ impl ArrayScript<'_> {
         let all: Vec<String> = all.iter().map(|d| format!("#SBATCH --{d}\n")).collect();
         Ok(format!(
             "{}\
-             # Ahead of the time limit, TERM: the frame in hand is finished, and the task put back.\n\
+             # TERM before the time limit: the frame in progress is finished, and the task is requeued.\n\
              #SBATCH --signal=B:TERM@{}\n\
              #SBATCH --requeue\n\
              #SBATCH --open-mode=append\n\
-             # Slurm does not make this directory, and without it tasks fail and leave no word.\n\
+             # Slurm does not create this directory. Without it tasks fail without a message.\n\
              #SBATCH --output=\"{}/%A_%a.log\"\n",
             all.concat(),
             self.signal_ahead,
@@ -161,15 +163,15 @@ impl ArrayScript<'_> {
         let variable = self.command.variable;
         Ok(format!(
             "\n\
-             # The program; {variable} in the environment names another one.\n\
+             # The program; the environment variable {variable} overrides it.\n\
              program=${variable}\n\
              [ -n \"$program\" ] || program={}\n\
              # The frames of each task.\n\
              chunks=(\n{})\n\
-             # A run makes a frame at least, if nothing disturbs it: put back more often, a task gets nowhere.\n\
-             most_restarts={}\n",
+             # Each run finishes at least one frame unless it is preempted. More restarts are of no use.\n\
+             max_restarts={}\n",
             shell_word("program", self.command.program)?,
-            columns(&self.chunks.ranges),
+            wrapped_words(&self.chunks.ranges),
             self.chunks.size + SPARE_RESTARTS
         ))
     }
@@ -192,17 +194,17 @@ impl ArrayScript<'_> {
     }
 }
 
-/// Has the program keep within what Slurm gives the task.
-const LIMIT_MEMORY: &str = r#"# A tenth is left to what is not counted.
+/// Passes the memory limit of the task to the program.
+const LIMIT_MEMORY: &str = r#"# Reserve a tenth for memory that the program does not count.
 if [ -n "$SLURM_MEM_PER_NODE" ]; then
   set -- "$@" --memory-limit "$((SLURM_MEM_PER_NODE * 9 / 10))MiB"
 fi
 "#;
 
-/// From the task's number to its frames, and what to do on TERM.
+/// Finds the frames of the task, and handles TERM.
 const TASK: &str = r#"
 if [ -z "$SLURM_ARRAY_TASK_ID" ]; then
-  echo "submit this script with sbatch: it is an array of tasks" >&2
+  echo "submit this script with sbatch: it is a job array" >&2
   exit 2
 fi
 task=${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID
@@ -214,21 +216,21 @@ fi
 restarts=${SLURM_RESTART_COUNT:-0}
 echo "$(date '+%F %T') $HOSTNAME: task $task, frames $frames, restarts $restarts"
 
-# TERM reaches this shell alone, which passes it on.
+# TERM reaches only this shell, which forwards it.
 child=
 terms=0
 # shellcheck disable=SC2317 # called by the trap
-pass_on() {
+forward_term() {
   terms=$((terms + 1))
   [ -z "$child" ] || kill -TERM "$child" 2>/dev/null
 }
-trap pass_on TERM
+trap forward_term TERM
 "#;
 
-/// Waiting for the program, and putting the task back if it was stopped.
+/// Waits for the program, and requeues the task if the program was stopped.
 const WAIT: &str = r#"child=$!
 [ "$terms" -eq 0 ] || kill -TERM "$child" 2>/dev/null
-# A signal cuts the waiting short.
+# A signal interrupts wait.
 while
   before=$terms
   wait "$child"
@@ -236,16 +238,16 @@ while
   [ "$terms" -gt "$before" ]
 do :; done
 
-# 143: stopped before it could listen.
+# 143: stopped before its signal handler was installed.
 if [ "$code" -eq 75 ] || { [ "$code" -eq 143 ] && [ "$terms" -gt 0 ]; }; then
-  # A task that was cancelled is not put back. By array and number: the plain id of an array's last
-  # task means the whole array.
+  # Do not requeue a cancelled task. Use array and index: the plain id of the last task of an array
+  # means the whole array.
   case $(squeue --noheader --jobs="$task" --format='%T %r') in
     RUNNING*|*TimeLimit*)
-      if [ "$restarts" -lt "$most_restarts" ]; then
+      if [ "$restarts" -lt "$max_restarts" ]; then
         scontrol requeue "$task"
       else
-        echo "task $task: put back $restarts times already: allow more --time or fewer frames" >&2
+        echo "task $task: already requeued $restarts times: allow more --time or fewer frames" >&2
       fi
       ;;
   esac
@@ -253,8 +255,8 @@ fi
 exit "$code"
 "#;
 
-/// Ranges as words, in lines of a length that people can read.
-fn columns(ranges: &[FrameRange]) -> String {
+/// Ranges as shell words, wrapped at 100 columns.
+fn wrapped_words(ranges: &[FrameRange]) -> String {
     let mut text = String::new();
     let mut column = 0;
     for range in ranges {
@@ -270,7 +272,7 @@ fn columns(ranges: &[FrameRange]) -> String {
     text + "\n"
 }
 
-/// `name` with nothing in it that means something to Slurm.
+/// `name` without characters that have a meaning for Slurm.
 fn job_name(name: &str) -> String {
     let plain = |c: char| match c {
         c if c.is_ascii_alphanumeric() || "._-".contains(c) => c,
@@ -283,22 +285,21 @@ fn job_name(name: &str) -> String {
     }
 }
 
-/// A partition or an account.
+/// Checks the name of a partition or an account.
 fn slurm_name<'a>(what: &'static str, name: &'a str) -> Result<&'a str, ExportError> {
     let plain = |c: char| c.is_ascii_alphanumeric() || "._-,:@+/".contains(c);
     if name.is_empty() || !name.chars().all(plain) {
-        let why = "is not a name that Slurm knows: letters, digits and ._-,:@+/ are";
+        let why = "is not a valid Slurm name; allowed are letters, digits and ._-,:@+/";
         return Err(ExportError::text(what, name, why));
     }
     Ok(name)
 }
 
-/// A directory inside the double quotes of `--output`, where `%` begins a placeholder.
+/// Escapes a directory for the double quotes of `--output`, where `%` starts a placeholder.
 fn log_dir(dir: &str) -> Result<String, ExportError> {
     let dir = one_line("log directory", dir)?;
     if dir.contains(['"', '\\']) {
-        let why =
-            "has a quote or a backslash, which Slurm takes for something else; choose another";
+        let why = "contains a quote or a backslash, which have a meaning for Slurm; choose another";
         return Err(ExportError::text("log directory", dir, why));
     }
     Ok(dir.replace('%', "%%"))

@@ -1,35 +1,43 @@
-//! Time limits as Slurm writes them.
+//! Time limits in the notation of Slurm.
 
 use std::fmt;
 use std::str::FromStr;
 
-/// How long a task may take: `90` (minutes), `90:00`, `02:00:00`, `1-12`, `1-12:30`, `1-12:30:00`.
+/// Longest time of a task: `90` (minutes), `90:00`, `02:00:00`, `1-12`, `1-12:30`, `1-12:30:00`.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 pub struct TimeLimit {
-    /// Seconds; more than none.
+    /// Seconds, at least one.
     pub seconds: u64,
 }
 
 const MINUTE: u64 = 60;
 const HOUR: u64 = 60 * MINUTE;
 const DAY: u64 = 24 * HOUR;
-/// Slurm counts minutes in 32 bits; nobody waits for a hundred years.
-const MOST: u64 = 36_500 * DAY;
+/// Slurm stores minutes in 32 bits. A hundred years are enough.
+const MAX_SECONDS: u64 = 36_500 * DAY;
+
+/// The text is not a time limit.
+#[derive(Debug, Clone, PartialEq, Eq, thiserror::Error)]
+#[error(
+    "invalid time limit {text:?} (examples: 02:00:00 for hours, minutes and seconds, 1-12:00:00 with days, 90 for \
+     minutes)"
+)]
+pub struct TimeLimitError {
+    /// The text.
+    pub text: String,
+}
 
 impl FromStr for TimeLimit {
-    type Err = String;
+    type Err = TimeLimitError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || {
-            format!(
-                "{text:?} is no time limit; write it as 02:00:00 (hours, minutes, seconds), \
-                 1-12:00:00 (with days) or 90 (minutes)"
-            )
+    fn from_str(text: &str) -> Result<Self, TimeLimitError> {
+        let invalid = || TimeLimitError {
+            text: text.to_owned(),
         };
         let number = |part: &str| {
             let digits = !part.is_empty() && part.bytes().all(|b| b.is_ascii_digit());
             let value = part.parse::<u64>().ok().filter(|_| digits);
-            value.filter(|n| *n <= MOST).ok_or_else(wrong)
+            value.filter(|n| *n <= MAX_SECONDS).ok_or_else(invalid)
         };
         let (days, clock) = match text.split_once('-') {
             Some((days, clock)) => (Some(number(days)?), clock),
@@ -47,10 +55,10 @@ impl FromStr for TimeLimit {
             (days, [hours, minutes, seconds]) => {
                 days.unwrap_or(0) * DAY + hours * HOUR + minutes * MINUTE + seconds
             }
-            _ => return Err(wrong()),
+            _ => return Err(invalid()),
         };
-        if seconds == 0 || seconds > MOST {
-            return Err(wrong());
+        if seconds == 0 || seconds > MAX_SECONDS {
+            return Err(invalid());
         }
         Ok(Self { seconds })
     }
@@ -88,7 +96,7 @@ mod tests {
     }
 
     #[test]
-    fn other_texts_are_refused() {
+    fn other_texts_are_rejected() {
         for text in [
             "",
             "0",
@@ -105,7 +113,7 @@ mod tests {
             "18446744073709551615-0",
             "2\n",
         ] {
-            let error = text.parse::<TimeLimit>().unwrap_err();
+            let error = text.parse::<TimeLimit>().unwrap_err().to_string();
             assert!(error.contains("02:00:00"), "{text}: {error}");
         }
     }

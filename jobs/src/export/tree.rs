@@ -1,87 +1,87 @@
-//! Trees of keys and values, written as YAML for people or as JSON.
+//! Trees of keys and values, written as YAML with comments or as JSON.
 
 use serde::{Serialize, Serializer, ser::SerializeMap};
 
 /// A value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) enum Node {
+pub(super) enum YamlNode {
     Text(String),
     Number(u64),
-    /// On one line.
-    List(Vec<Node>),
-    /// An item a line, or more.
-    Items(Vec<Node>),
-    Map(Vec<Entry>),
+    /// A list on one line.
+    FlowList(Vec<YamlNode>),
+    /// A list with one item per line.
+    BlockList(Vec<YamlNode>),
+    Map(Vec<Field>),
 }
 
 /// A key with its value.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub(super) struct Entry {
+pub(super) struct Field {
     pub(super) key: &'static str,
-    pub(super) value: Node,
-    /// For people: a line above.
+    pub(super) value: YamlNode,
+    /// A comment line above the key; YAML only.
     pub(super) comment: Option<&'static str>,
 }
 
 /// `key: value`.
-pub(super) fn entry(key: &'static str, value: impl Into<Node>) -> Entry {
-    Entry {
+pub(super) fn field(key: &'static str, value: impl Into<YamlNode>) -> Field {
+    Field {
         key,
         value: value.into(),
         comment: None,
     }
 }
 
-impl Entry {
-    /// With a line above; JSON has none.
-    pub(super) const fn told(mut self, comment: &'static str) -> Self {
+impl Field {
+    /// Adds a comment line above the key. JSON has no comments.
+    pub(super) const fn with_comment(mut self, comment: &'static str) -> Self {
         self.comment = Some(comment);
         self
     }
 }
 
-impl From<&str> for Node {
+impl From<&str> for YamlNode {
     fn from(text: &str) -> Self {
         Self::Text(text.to_owned())
     }
 }
 
-impl From<String> for Node {
+impl From<String> for YamlNode {
     fn from(text: String) -> Self {
         Self::Text(text)
     }
 }
 
-impl From<u64> for Node {
+impl From<u64> for YamlNode {
     fn from(number: u64) -> Self {
         Self::Number(number)
     }
 }
 
-impl Node {
-    /// As YAML, by lines.
+impl YamlNode {
+    /// The tree as YAML.
     pub(super) fn to_yaml(&self) -> String {
         let mut out = String::new();
         self.block(0, &mut out);
         out
     }
 
-    /// The lines of a map or of items, `indent` spaces in; something else on a line of its own.
+    /// Writes a map or a block list, indented by `indent` spaces. Anything else is written as one line.
     fn block(&self, indent: usize, out: &mut String) {
         let space = " ".repeat(indent);
         match self {
-            Self::Map(entries) => {
-                for entry in entries {
-                    if let Some(comment) = entry.comment {
+            Self::Map(fields) => {
+                for field in fields {
+                    if let Some(comment) = field.comment {
                         *out += &format!("{space}# {comment}\n");
                     }
-                    *out += &format!("{space}{}:", entry.key);
-                    entry.value.after_key(indent, out);
+                    *out += &format!("{space}{}:", field.key);
+                    field.value.after_key(indent, out);
                 }
             }
-            Self::Items(items) => {
+            Self::BlockList(items) => {
                 for item in items {
-                    // A map's first key stands behind the dash.
+                    // The first key of a map follows the dash
                     let mut lines = String::new();
                     item.block(indent + 2, &mut lines);
                     *out += &format!("{space}- {}", lines.trim_start());
@@ -93,7 +93,7 @@ impl Node {
 
     fn after_key(&self, indent: usize, out: &mut String) {
         match self {
-            Self::Map(_) | Self::Items(_) => {
+            Self::Map(_) | Self::BlockList(_) => {
                 *out += "\n";
                 self.block(indent + 2, out);
             }
@@ -105,44 +105,44 @@ impl Node {
         match self {
             Self::Text(text) => yaml_text(text),
             Self::Number(number) => number.to_string(),
-            Self::List(nodes) | Self::Items(nodes) => {
+            Self::FlowList(nodes) | Self::BlockList(nodes) => {
                 let all: Vec<String> = nodes.iter().map(Self::flow).collect();
                 format!("[{}]", all.join(", "))
             }
-            Self::Map(entries) => {
-                let pair = |e: &Entry| format!("{}: {}", e.key, e.value.flow());
-                let all: Vec<String> = entries.iter().map(pair).collect();
+            Self::Map(fields) => {
+                let pair = |f: &Field| format!("{}: {}", f.key, f.value.flow());
+                let all: Vec<String> = fields.iter().map(pair).collect();
                 format!("{{{}}}", all.join(", "))
             }
         }
     }
 }
 
-/// Words stand as they are. All else is quoted: YAML reads JSON's strings.
+/// Plain words are not quoted. Everything else is quoted as a JSON string, which is valid YAML.
 fn yaml_text(text: &str) -> String {
     let is_word = text.starts_with(|c: char| c.is_ascii_alphabetic())
         && text
             .chars()
             .all(|c| c.is_ascii_alphanumeric() || "_-".contains(c));
-    // Words that are no text in some version of YAML.
-    let means = |word: &&str| word.eq_ignore_ascii_case(text);
-    let taken = ["true", "false", "yes", "no", "on", "off", "null", "y", "n"];
-    if is_word && !taken.iter().any(means) {
+    // Words that are not strings in some version of YAML
+    let is_same = |word: &&str| word.eq_ignore_ascii_case(text);
+    let reserved = ["true", "false", "yes", "no", "on", "off", "null", "y", "n"];
+    if is_word && !reserved.iter().any(is_same) {
         return text.to_owned();
     }
     serde_json::Value::from(text).to_string()
 }
 
-impl Serialize for Node {
+impl Serialize for YamlNode {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
         match self {
             Self::Text(text) => serializer.serialize_str(text),
             Self::Number(number) => serializer.serialize_u64(*number),
-            Self::List(nodes) | Self::Items(nodes) => nodes.serialize(serializer),
-            Self::Map(entries) => {
-                let mut map = serializer.serialize_map(Some(entries.len()))?;
-                for entry in entries {
-                    map.serialize_entry(entry.key, &entry.value)?;
+            Self::FlowList(nodes) | Self::BlockList(nodes) => nodes.serialize(serializer),
+            Self::Map(fields) => {
+                let mut map = serializer.serialize_map(Some(fields.len()))?;
+                for field in fields {
+                    map.serialize_entry(field.key, &field.value)?;
                 }
                 map.end()
             }
@@ -155,19 +155,20 @@ mod tests {
     use super::*;
 
     #[test]
-    fn both_spellings() {
-        let list = |words: &[&str]| Node::List(words.iter().map(|w| Node::from(*w)).collect());
-        let tree = Node::Map(vec![
-            entry("name", "dam-break"),
-            entry("range", "1-5").told("What to do."),
-            entry(
+    fn yaml_and_json() {
+        let list =
+            |words: &[&str]| YamlNode::FlowList(words.iter().map(|w| YamlNode::from(*w)).collect());
+        let tree = YamlNode::Map(vec![
+            field("name", "dam-break"),
+            field("range", "1-5").with_comment("What to do."),
+            field(
                 "items",
-                Node::Items(vec![
-                    Node::Map(vec![entry("a", "CHUNK[INT]"), entry("b", 7_u64)]),
-                    Node::Map(vec![entry("c", Node::Map(vec![entry("d", "No")]))]),
+                YamlNode::BlockList(vec![
+                    YamlNode::Map(vec![field("a", "CHUNK[INT]"), field("b", 7_u64)]),
+                    YamlNode::Map(vec![field("c", YamlNode::Map(vec![field("d", "No")]))]),
                 ]),
             ),
-            entry("args", list(&["render", "{{x}}", "it's \"so\""])),
+            field("args", list(&["render", "{{x}}", "it's \"so\""])),
         ]);
         assert_eq!(
             tree.to_yaml(),

@@ -8,48 +8,52 @@ use serde_json::Value;
 use serde_json::value::RawValue;
 
 use crate::process::now_ms;
+use crate::{EntryError, FailureKind};
 
-/// How a frame ended.
+/// The result of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Status {
-    /// All its outputs are in place.
+pub enum EntryStatus {
+    /// All outputs exist.
     Done,
-    /// It could not be made; the reason is in the entry.
+    /// The frame failed; the entry has the reason.
     Failed,
 }
 
-/// An output as it was when its frame was done.
+/// An output of a finished frame.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OutputFile {
-    /// Relative paths are in the job's directory.
+    /// Path; relative ones are in the job's directory.
     pub path: String,
     /// Length, bytes.
     pub len: u64,
 }
 
-/// One line.
+/// One line of a ledger.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-pub struct Entry {
-    /// Larger than that of every line its writer knew of, in any file.
+pub struct LedgerEntry {
+    /// Sequence number: larger than that of any entry that its writer knew.
     pub seq: u64,
-    /// When, milliseconds since 1970. For rates; the order is by `seq`.
+    /// Time, milliseconds since 1970. Used for rates; `seq` defines the order.
     pub time_ms: u64,
-    /// The frame's number.
+    /// Frame number.
     pub frame: i64,
-    /// How it ended.
-    pub status: Status,
-    /// What was written, if done.
+    /// The result.
+    pub status: EntryStatus,
+    /// The files that were written, if done.
     #[serde(default)]
     pub outputs: Vec<OutputFile>,
-    /// Why it failed.
+    /// Why the frame failed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub reason: Option<String>,
-    /// Whether the frame was set back, to be made anew by whoever comes to it, also in runs that are under
-    /// way. Such an entry is a failed one.
-    #[serde(default, skip_serializing_if = "is_false")]
-    pub set_back: bool,
-    /// Means something to the caller only: timings, counts.
+    /// The kind of the failure, if it failed. Entries of spherule 0.1.0 have none.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub failure: Option<FailureKind>,
+    /// Whether the frame was requeued: any worker repeats it, also in runs in progress. The status of such an
+    /// entry is failed.
+    #[serde(default, rename = "set_back", skip_serializing_if = "is_false")]
+    pub is_requeued: bool,
+    /// Data of the caller: times, counts.
     #[serde(default)]
     pub details: Details,
 }
@@ -59,39 +63,39 @@ const fn is_false(value: &bool) -> bool {
     !*value
 }
 
-/// JSON that means something to the caller only. Kept as text: as a tree of values it would take
-/// several times the memory, for every frame of the job.
+/// JSON of the caller. Stored as text: a tree of values would need several times the memory, for every frame of
+/// the job.
 #[derive(Debug, Clone, Serialize)]
 #[serde(transparent)]
 pub struct Details(Box<RawValue>);
 
 impl Details {
-    /// As a tree; null for what is nested deeper than can be read back.
+    /// The parsed value; null if it is nested deeper than the parser allows.
     pub fn value(&self) -> Value {
         serde_json::from_str(self.0.get()).unwrap_or_default()
     }
 }
 
 impl<'de> Deserialize<'de> for Details {
-    /// Text kept for later is not looked into by the parser: numbers beyond f64, half characters and deep
-    /// nesting would be found only when it is used.
+    /// Parses the text completely. `RawValue` alone accepts numbers beyond f64, lone surrogates and deep nesting,
+    /// which would be found only when the value is used.
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         let text = Box::<RawValue>::deserialize(deserializer)?;
-        serde_json::from_str::<Readable>(text.get()).map_err(D::Error::custom)?;
+        serde_json::from_str::<ValidJson>(text.get()).map_err(D::Error::custom)?;
         Ok(Self(text))
     }
 }
 
-/// JSON that can be read as a [`Value`]; none is made.
-struct Readable;
+/// Checks that JSON can be parsed as a [`Value`] without creating one.
+struct ValidJson;
 
-impl<'de> Deserialize<'de> for Readable {
+impl<'de> Deserialize<'de> for ValidJson {
     fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
         deserializer.deserialize_any(Self)
     }
 }
 
-impl<'de> Visitor<'de> for Readable {
+impl<'de> Visitor<'de> for ValidJson {
     type Value = Self;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -142,7 +146,7 @@ impl Default for Details {
 impl From<&Value> for Details {
     fn from(value: &Value) -> Self {
         let text = value.to_string();
-        Self(RawValue::from_string(text).expect("a value is written as JSON"))
+        Self(RawValue::from_string(text).expect("values serialise to JSON"))
     }
 }
 
@@ -152,9 +156,9 @@ impl PartialEq for Details {
     }
 }
 
-impl Entry {
-    /// An entry of this moment, to come after all before `seq`.
-    pub(crate) fn new(seq: u64, frame: i64, status: Status, details: &Value) -> Self {
+impl LedgerEntry {
+    /// An entry with the current time.
+    pub(crate) fn new(seq: u64, frame: i64, status: EntryStatus, details: &Value) -> Self {
         Self {
             seq,
             time_ms: now_ms(),
@@ -162,25 +166,26 @@ impl Entry {
             status,
             outputs: Vec::new(),
             reason: None,
-            set_back: false,
+            failure: None,
+            is_requeued: false,
             details: details.into(),
         }
     }
 
-    /// That `frame` is to be made anew, and why.
-    pub(crate) fn set_back(seq: u64, frame: i64, reason: String) -> Self {
+    /// An entry that requeues `frame`.
+    pub(crate) fn requeued(seq: u64, frame: i64, reason: String) -> Self {
         Self {
             reason: Some(reason),
-            set_back: true,
-            ..Self::new(seq, frame, Status::Failed, &Value::Null)
+            is_requeued: true,
+            ..Self::new(seq, frame, EntryStatus::Failed, &Value::Null)
         }
     }
 
-    /// Reads a line of a ledger.
+    /// Parses a line of a ledger.
     ///
     /// # Errors
-    /// It is not an entry.
-    pub(crate) fn parse(line: &[u8]) -> Result<Self, String> {
-        serde_json::from_slice(line).map_err(|e| format!("not a ledger entry ({e})"))
+    /// The line is not an entry.
+    pub(crate) fn parse(line: &[u8]) -> Result<Self, EntryError> {
+        Ok(serde_json::from_slice(line)?)
     }
 }

@@ -1,33 +1,33 @@
-//! The files of the ledgers.
+//! Finds and reads ledger files.
 
 use std::fs::{self, File};
 use std::io::{self, BufRead, BufReader, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 
-use super::Entry;
-use crate::{JobError, open_regular};
+use super::LedgerEntry;
+use crate::{EntryError, JobError, open_regular};
 
-/// What the ledger is called that takes in those of workers that have ended.
-pub(crate) const ENDED: &str = "ended";
+/// The worker name in the file name of the compacted ledger.
+pub(crate) const COMPACTED: &str = "ended";
 
-/// Where the ledger of `worker` is.
+/// The path of the ledger of `worker`.
 pub(crate) fn ledger_path(dir: &Path, worker: &str) -> PathBuf {
     dir.join(format!("job.ledger.{worker}.jsonl"))
 }
 
-/// Whose ledger has this name.
+/// The worker whose ledger has this file name.
 fn worker_of(name: &str) -> Option<&str> {
     let worker = name.strip_prefix("job.ledger.")?.strip_suffix(".jsonl")?;
     (!worker.is_empty()).then_some(worker)
 }
 
-/// A ledger that is there.
+/// An existing ledger.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub(crate) struct LedgerFile {
     pub(crate) path: PathBuf,
-    /// Whose it is.
+    /// The worker that writes it.
     pub(crate) worker: String,
-    /// Bytes.
+    /// Length, bytes.
     pub(crate) length: u64,
 }
 
@@ -41,7 +41,7 @@ pub(crate) fn ledger_files(dir: &Path) -> Result<Vec<LedgerFile>, JobError> {
             if let Some(worker) = name.to_str().and_then(worker_of) {
                 let length = match entry.metadata() {
                     Ok(metadata) => metadata.len(),
-                    // Taken into another one meanwhile.
+                    // Another worker has compacted it meanwhile
                     Err(e) if e.kind() == io::ErrorKind::NotFound => continue,
                     Err(e) => return Err(e),
                 };
@@ -55,118 +55,111 @@ pub(crate) fn ledger_files(dir: &Path) -> Result<Vec<LedgerFile>, JobError> {
         found.sort();
         Ok(found)
     };
-    list().map_err(|e| JobError::io(dir, "looking for ledgers", e))
+    list().map_err(|e| JobError::io(dir, "listing ledgers", e))
 }
 
 /// How far a ledger has been read.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub(crate) struct Mark {
-    /// Which file it was: one that took in others has replaced that of its name.
+pub(crate) struct ReadPosition {
+    /// Identifies the file: a compacted ledger replaces the previous one.
     file: u64,
     bytes: u64,
     lines: usize,
 }
 
-/// Longer lines are none of ours: a reason of a kilobyte is a long one.
+/// Bytes of the longest line that is accepted. Lines with a long reason have a few kilobytes.
 const MAX_LINE: u64 = 16 << 20;
 
-/// Reads the whole lines of the ledger at `path` that come after `mark`, and moves it; another ledger of
-/// the same name is read from its beginning. False if it is gone.
+/// Reads the complete lines of the ledger at `path` after `position`, and advances it. If the file was replaced,
+/// reads it from the beginning. Returns false if the file does not exist.
 pub(crate) fn read_entries(
     path: &Path,
-    mark: &mut Mark,
-    take: impl FnMut(Entry),
+    position: &mut ReadPosition,
+    add: impl FnMut(LedgerEntry),
 ) -> Result<bool, JobError> {
     let failed = |e| JobError::io(path, "reading the ledger", e);
-    let mut reader = match open_at(path, mark) {
+    let mut reader = match open_at(path, position) {
         Ok(reader) => reader,
         Err(e) if e.kind() == io::ErrorKind::NotFound => return Ok(false),
         Err(e) => return Err(failed(e)),
     };
-    read_lines(&mut reader, mark, take).map_err(|fault| match fault {
-        LineFault::Io(e) => failed(e),
-        LineFault::Damaged(line, what) => JobError::LedgerDamaged {
+    read_lines(&mut reader, position, add).map_err(|(line, error)| match error {
+        EntryError::Io(e) => failed(e),
+        source => JobError::LedgerDamaged {
             path: path.to_owned(),
             line,
-            what,
+            source,
         },
     })?;
     Ok(true)
 }
 
-/// Why lines cannot be read.
-enum LineFault {
-    Io(io::Error),
-    /// The line, from 1, and why.
-    Damaged(usize, String),
-}
-
-/// The same of what is in memory.
-pub(crate) fn parse_lines(mut bytes: &[u8]) -> Result<Vec<Entry>, (usize, String)> {
+/// Parses the complete lines of a ledger in memory.
+pub(crate) fn parse_lines(mut bytes: &[u8]) -> Result<Vec<LedgerEntry>, (usize, EntryError)> {
     let mut entries = Vec::new();
-    match read_lines(&mut bytes, &mut Mark::default(), |e| entries.push(e)) {
-        Ok(()) => Ok(entries),
-        Err(LineFault::Damaged(line, what)) => Err((line, what)),
-        Err(LineFault::Io(e)) => Err((0, e.to_string())),
-    }
+    read_lines(&mut bytes, &mut ReadPosition::default(), |entry| {
+        entries.push(entry);
+    })?;
+    Ok(entries)
 }
 
-/// Reads whole lines; what follows the last one was never finished.
+/// Reads complete lines. An incomplete last line was never finished. The error has the line number, from 1.
 fn read_lines(
     reader: &mut impl BufRead,
-    mark: &mut Mark,
-    mut take: impl FnMut(Entry),
-) -> Result<(), LineFault> {
+    position: &mut ReadPosition,
+    mut add: impl FnMut(LedgerEntry),
+) -> Result<(), (usize, EntryError)> {
     let mut line = Vec::new();
     loop {
+        let at_line = |error| (position.lines + 1, error);
         line.clear();
         let mut limited = Read::by_ref(reader).take(MAX_LINE);
         let read = limited.read_until(b'\n', &mut line);
-        let length = read.map_err(LineFault::Io)? as u64;
+        let length = read.map_err(|e| at_line(e.into()))? as u64;
         if !line.ends_with(b"\n") && length < MAX_LINE {
             return Ok(());
         }
         let entry = if length < MAX_LINE {
-            Entry::parse(&line)
+            LedgerEntry::parse(&line)
         } else {
-            Err(format!("not a ledger entry (longer than {MAX_LINE} bytes)"))
+            Err(EntryError::TooLong { max: MAX_LINE })
         };
-        take(entry.map_err(|what| LineFault::Damaged(mark.lines + 1, what))?);
-        mark.lines += 1;
-        mark.bytes += length;
+        add(entry.map_err(at_line)?);
+        position.lines += 1;
+        position.bytes += length;
     }
 }
 
-/// All outputs that the ledger at `path` says were made, as they stand there.
-pub(crate) fn outputs_of(path: &Path) -> Result<Vec<String>, JobError> {
+/// Reads the paths of all outputs in the ledger at `path`.
+pub(crate) fn read_outputs(path: &Path) -> Result<Vec<String>, JobError> {
     let mut outputs = Vec::new();
-    read_entries(path, &mut Mark::default(), |entry| {
+    read_entries(path, &mut ReadPosition::default(), |entry| {
         outputs.extend(entry.outputs.into_iter().map(|file| file.path));
     })?;
     Ok(outputs)
 }
 
-/// The ledger at `path` from `mark` on, which is set to the beginning of another file of that name.
-fn open_at(path: &Path, mark: &mut Mark) -> io::Result<BufReader<File>> {
+/// Opens the ledger at `path` at `position`. Resets the position if the file was replaced.
+fn open_at(path: &Path, position: &mut ReadPosition) -> io::Result<BufReader<File>> {
     let (mut file, metadata) = open_regular(path)?;
     let number = file_number(&metadata);
-    if number != mark.file || metadata.len() < mark.bytes {
-        *mark = Mark {
+    if number != position.file || metadata.len() < position.bytes {
+        *position = ReadPosition {
             file: number,
-            ..Mark::default()
+            ..ReadPosition::default()
         };
     }
-    file.seek(SeekFrom::Start(mark.bytes))?;
+    file.seek(SeekFrom::Start(position.bytes))?;
     Ok(BufReader::with_capacity(1 << 16, file))
 }
 
-/// The same for the same file only.
+/// Identifies a file on its file system.
 #[cfg(unix)]
 fn file_number(metadata: &fs::Metadata) -> u64 {
     std::os::unix::fs::MetadataExt::ino(metadata)
 }
 
-/// Not known here.
+/// Not available on this system.
 #[cfg(not(unix))]
 fn file_number(_metadata: &fs::Metadata) -> u64 {
     0

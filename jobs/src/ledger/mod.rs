@@ -1,8 +1,8 @@
-//! The ledger: one JSON line for each frame that was finished or failed, only ever appended, one file a
-//! worker so that workers never share one. Readers merge the files; the last word on a frame counts.
+//! The ledger: one JSON line per finished or failed frame. Lines are only appended, and each worker has a file of
+//! its own. Readers merge the files; the latest entry of a frame counts.
 //!
-//! A torn last line is what a kill leaves, and is dropped. Anything else that cannot be read is
-//! an error: silently starting over would throw finished work away.
+//! A kill may leave an incomplete last line, which is ignored. Anything else that cannot be read is an error:
+//! to start over silently would discard finished work.
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -11,28 +11,28 @@ use crate::JobError;
 
 mod entry;
 mod files;
-mod news;
 #[cfg(test)]
 mod tests;
+mod watcher;
 mod writer;
 
-pub use entry::{Details, Entry, OutputFile, Status};
-pub(crate) use files::{ENDED, LedgerFile, ledger_files, outputs_of, parse_lines};
-use files::{Mark, read_entries};
-pub(crate) use news::News;
-pub(crate) use writer::{LedgerWriter, fold, remove};
+pub use entry::{Details, EntryStatus, LedgerEntry, OutputFile};
+pub(crate) use files::{COMPACTED, LedgerFile, ledger_files, parse_lines, read_outputs};
+use files::{ReadPosition, read_entries};
+pub(crate) use watcher::LedgerWatcher;
+pub(crate) use writer::{LedgerWriter, compact, remove};
 
-/// The last word on every frame, merged from all workers.
+/// The latest entry of each frame, merged from all workers.
 #[derive(Debug, Clone, Default)]
 pub struct Ledger {
-    last: BTreeMap<i64, Entry>,
+    latest: BTreeMap<i64, LedgerEntry>,
     next_seq: u64,
     /// How far each file was read.
-    read: BTreeMap<PathBuf, Mark>,
+    positions: BTreeMap<PathBuf, ReadPosition>,
 }
 
-/// Times that reading begins again because a ledger was taken into another one meanwhile.
-const RETRIES: u32 = 20;
+/// Attempts to read all ledgers; an attempt fails if another worker compacts ledgers meanwhile.
+const MAX_ATTEMPTS: u32 = 20;
 
 impl Ledger {
     /// Reads and merges all ledgers in `dir`.
@@ -40,50 +40,50 @@ impl Ledger {
     /// # Errors
     /// [`JobError::LedgerDamaged`] for a whole line that is not an entry.
     pub fn read(dir: &Path) -> Result<Self, JobError> {
-        for _ in 0..RETRIES {
+        for _ in 0..MAX_ATTEMPTS {
             if let Some(ledger) = Self::read_all(dir)? {
                 return Ok(ledger);
             }
         }
-        let gone = std::io::ErrorKind::NotFound.into();
+        let not_found = std::io::ErrorKind::NotFound.into();
         Err(JobError::io(
             dir,
-            "reading ledgers, which keep vanishing",
-            gone,
+            "reading ledgers, which are being removed",
+            not_found,
         ))
     }
 
-    /// None if a file went away.
+    /// None if a file was removed meanwhile.
     fn read_all(dir: &Path) -> Result<Option<Self>, JobError> {
         let mut ledger = Self::default();
         for LedgerFile { path, .. } in ledger_files(dir)? {
-            let mut mark = Mark::default();
-            if !read_entries(&path, &mut mark, |entry| ledger.take_in(entry))? {
+            let mut position = ReadPosition::default();
+            if !read_entries(&path, &mut position, |entry| ledger.merge(entry))? {
                 return Ok(None);
             }
-            ledger.read.insert(path, mark);
+            ledger.positions.insert(path, position);
         }
         Ok(Some(ledger))
     }
 
-    /// The last word on `frame`.
-    pub fn entry(&self, frame: i64) -> Option<&Entry> {
-        self.last.get(&frame)
+    /// The latest entry of `frame`.
+    pub fn entry(&self, frame: i64) -> Option<&LedgerEntry> {
+        self.latest.get(&frame)
     }
 
-    /// The last word on every frame that has one, ascending by frame.
-    pub fn entries(&self) -> impl Iterator<Item = &Entry> {
-        self.last.values()
+    /// The latest entries, ascending by frame.
+    pub fn entries(&self) -> impl Iterator<Item = &LedgerEntry> {
+        self.latest.values()
     }
 
-    /// Of two words that did not know of each other, one that a frame is done counts, or else that of the
-    /// file read later; files are read by name.
-    pub(crate) fn take_in(&mut self, entry: Entry) {
+    /// Adds an entry if it supersedes the known one of its frame. Of two entries with the same sequence number
+    /// the one that says "done" counts.
+    pub(crate) fn merge(&mut self, entry: LedgerEntry) {
         self.next_seq = self.next_seq.max(entry.seq.saturating_add(1));
-        let known = self.last.get(&entry.frame);
-        let word = (entry.seq, entry.status);
-        if known.is_none_or(|known| news::supersedes(word, (known.seq, known.status))) {
-            self.last.insert(entry.frame, entry);
+        let known = self.latest.get(&entry.frame);
+        let new = (entry.seq, entry.status);
+        if known.is_none_or(|known| watcher::supersedes(new, (known.seq, known.status))) {
+            self.latest.insert(entry.frame, entry);
         }
     }
 }

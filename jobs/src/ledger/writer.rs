@@ -1,63 +1,67 @@
-//! Writing a ledger.
+//! Writes ledgers.
 
 use std::fs::{self, File, OpenOptions};
 use std::io::{self, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
-use super::files::{ENDED, LedgerFile, ledger_path};
-use super::{Entry, Ledger};
+use super::files::{COMPACTED, LedgerFile, ledger_path};
+use super::{Ledger, LedgerEntry};
 use crate::{JobError, publish_with};
 
-/// Appends to the ledger of one worker, which nobody else writes.
+/// Appends to the ledger of one worker. No other worker writes to it.
 #[derive(Debug)]
 pub(crate) struct LedgerWriter {
     path: PathBuf,
     /// None before the first line.
     file: Option<File>,
-    /// Length up to the last whole line.
+    /// Length up to the last complete line.
     length: u64,
-    /// When the file was last synced, and whether nothing has been added since.
-    synced: Option<Instant>,
+    /// When the file was last synced.
+    last_sync: Option<Instant>,
+    /// Whether all entries are synced.
     is_synced: bool,
 }
 
-/// Lines that come faster than this share a sync: a power cut then costs the frames of this long, which is
-/// less than most frames take.
-const SYNC: Duration = Duration::from_millis(100);
+/// Shortest time between two syncs. A power cut loses the entries of this time, which is less than most frames
+/// take.
+const SYNC_INTERVAL: Duration = Duration::from_millis(100);
 
 impl LedgerWriter {
-    /// For the ledger of `worker`, which is made with its first line.
+    /// A writer for the ledger of `worker`. The file is created with its first line.
     pub(crate) fn new(dir: &Path, worker: &str) -> Self {
         Self {
             path: ledger_path(dir, worker),
             file: None,
             length: 0,
-            synced: None,
+            last_sync: None,
             is_synced: true,
         }
     }
 
-    /// The entry is in the file when this returns: a killed process leaves it. It is on the disk, too, and
-    /// seen by other machines, if it `matters` at once, or if the last sync was a while ago. After an error
-    /// the ledger is as before.
-    pub(crate) fn append(&mut self, entry: &Entry, matters: bool) -> Result<(), JobError> {
-        let line = line(entry)?;
+    /// Appends the entry, which then survives a kill of this process. The file is synced, which makes the entry
+    /// visible to other machines, if `sync_now` is set or if the last sync is long ago. After an error the ledger
+    /// is unchanged.
+    pub(crate) fn append(&mut self, entry: &LedgerEntry, sync_now: bool) -> Result<(), JobError> {
+        let line = to_line(&self.path, entry)?;
         let failed = |e| JobError::io(&self.path, "writing the ledger", e);
         let file = match &mut self.file {
             Some(file) => file,
             None => self.file.insert(create(&self.path).map_err(failed)?),
         };
-        // Cuts first what a failed append may have left: lines must not be glued together.
+        // Truncate what a failed append may have left, so that lines are not joined
         let written = file
             .set_len(self.length)
             .and_then(|()| file.seek(SeekFrom::Start(self.length)))
             .and_then(|_| file.write_all(&line));
-        let is_due = matters || self.synced.is_none_or(|at| at.elapsed() >= SYNC);
+        let is_due = sync_now
+            || self
+                .last_sync
+                .is_none_or(|at| at.elapsed() >= SYNC_INTERVAL);
         self.is_synced = is_due;
         let written = written.and_then(|()| if is_due { file.sync_data() } else { Ok(()) });
         if is_due {
-            self.synced = Some(Instant::now());
+            self.last_sync = Some(Instant::now());
         }
         if let Err(error) = written {
             let _ = file.set_len(self.length);
@@ -67,7 +71,7 @@ impl LedgerWriter {
         Ok(())
     }
 
-    /// All entries are on the disk when this returns.
+    /// Syncs all entries to disk.
     pub(crate) fn sync(&mut self) -> Result<(), JobError> {
         if let (Some(file), false) = (&self.file, self.is_synced) {
             let synced = file.sync_data();
@@ -79,33 +83,35 @@ impl LedgerWriter {
 }
 
 impl Drop for LedgerWriter {
-    /// What cannot be synced now the system writes a little later.
+    /// If the sync fails, the operating system still writes the entries later.
     fn drop(&mut self) {
         let _ = self.sync();
     }
 }
 
-/// A worker's name is its own for ever, so nothing of that name can be there.
+/// Worker names are never reused, so the file cannot exist.
 fn create(path: &Path) -> io::Result<File> {
     OpenOptions::new().write(true).create_new(true).open(path)
 }
 
-fn line(entry: &Entry) -> Result<Vec<u8>, JobError> {
-    let mut line = serde_json::to_vec(entry)
-        .map_err(|e| JobError::Request(format!("the entry cannot be written as JSON: {e}")))?;
+fn to_line(path: &Path, entry: &LedgerEntry) -> Result<Vec<u8>, JobError> {
+    let mut line = serde_json::to_vec(entry).map_err(|source| JobError::Serialize {
+        path: path.to_owned(),
+        source,
+    })?;
     line.push(b'\n');
     Ok(line)
 }
 
-/// Brings the ledgers `files`, whose workers have ended, together in one; `ledger` is what they say. A
-/// worker that only seems to have ended loses no more than its last words: its frame is made again.
-pub(crate) fn fold(dir: &Path, ledger: &Ledger, files: &[LedgerFile]) -> Result<(), JobError> {
-    let path = ledger_path(dir, ENDED);
-    let mut entries: Vec<&Entry> = ledger.entries().collect();
+/// Compacts the ledgers `files` of ended workers into one; `ledger` has their entries. A worker that only seems
+/// to have ended loses at most its last entries: their frames are repeated.
+pub(crate) fn compact(dir: &Path, ledger: &Ledger, files: &[LedgerFile]) -> Result<(), JobError> {
+    let path = ledger_path(dir, COMPACTED);
+    let mut entries: Vec<&LedgerEntry> = ledger.entries().collect();
     entries.sort_by_key(|entry| (entry.seq, entry.frame));
     let written = publish_with(&path, |file| {
         entries.into_iter().try_for_each(|entry| {
-            let line = line(entry).map_err(|e| io::Error::other(e.to_string()))?;
+            let line = to_line(&path, entry).map_err(io::Error::other)?;
             file.write_all(&line)
         })
     });

@@ -31,15 +31,15 @@ fn forms() {
 }
 
 #[test]
-fn errors_name_the_place() {
+fn errors_name_the_position() {
     refused("", 1, "missing");
     refused("1-", 3, "missing");
     refused("1-5,", 5, "missing");
     refused("1-10z2", 5, "`z`");
-    refused("1-10x0", 6, "never");
+    refused("1-10x0", 6, "must not be 0");
     refused("1-10x-3", 6, "away");
     refused("1-10y1", 6, "no frame");
-    refused("a", 1, "not `a`");
+    refused("a", 1, "found `a`");
     refused("1-99999999999999999999", 3, "64 bits");
     refused("1 0", 3, "`0`");
     refused("--3", 1, "frame number");
@@ -60,7 +60,7 @@ fn huge_ranges_stay_small() {
 }
 
 #[test]
-fn select_keeps_the_order_asked_for() {
+fn select_keeps_the_order_of_the_range() {
     let range: FrameRange = "20,10-1x-3".parse().unwrap();
     assert_eq!(range.select(&[1, 2, 4, 10, 20, 30]), [20, 10, 4, 1]);
 }
@@ -82,7 +82,7 @@ fn frames_become_a_short_range() {
     assert_eq!(FrameRange::from_frames([]), None);
 }
 
-/// A part as people and engines write it, with frames near `around`.
+/// A random part in one of the valid forms, with frames near `around`.
 fn any_part(around: i64) -> impl Strategy<Value = String> {
     let near = move || (-60i64..60).prop_map(move |n| around.saturating_add(n));
     let blank = prop_oneof![Just(""), Just(" ")];

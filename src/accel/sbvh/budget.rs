@@ -43,7 +43,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn room_is_bounded() {
+    fn reserved_space_is_bounded() {
         assert_eq!(capacity(1000, 0.0), 1000);
         assert_eq!(capacity(1000, 0.25), 1250);
         assert_eq!(capacity(1000, f32::NAN), 1000);

@@ -13,8 +13,6 @@
 //! costs 2 s of one core per million particles (4.5 s if many are cut), which is 40 to 70 times `lbvh`, and 1.5 times
 //! the memory, or more than twice if many are cut.
 
-use std::ops::RangeInclusive;
-
 use rayon::prelude::*;
 
 use super::binary::{BinaryNode, BinaryTree};
@@ -38,34 +36,6 @@ mod spatial;
 mod split;
 mod sweep;
 mod unsplit;
-
-/// Settings of `sbvh`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct SbvhSettings {
-    /// A spatial split is searched if the children of the best object split overlap by more than this fraction of the
-    /// surface area of the whole scene.
-    pub alpha: f32,
-    /// References that spatial splits may add, as a fraction of the particle count; 0 disables such splits.
-    pub budget: f32,
-}
-
-impl SbvhSettings {
-    /// The alpha of the paper, and at most one additional reference per particle.
-    pub const DEFAULT: Self = Self {
-        alpha: 1e-5,
-        budget: 1.0,
-    };
-    /// Valid values of `alpha`.
-    pub const ALPHAS: RangeInclusive<f32> = 0.0..=1.0;
-    /// Valid values of `budget`; a larger one would only cost memory.
-    pub const BUDGETS: RangeInclusive<f32> = 0.0..=8.0;
-}
-
-impl Default for SbvhSettings {
-    fn default() -> Self {
-        Self::DEFAULT
-    }
-}
 
 /// References per task if all threads work on one set. It is fixed, so that results do not depend on the number of
 /// threads.

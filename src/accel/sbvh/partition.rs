@@ -103,7 +103,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_large_set_is_parted_whole() {
+    fn large_set_is_partitioned_completely() {
         let count = 5 * CHUNK + 17;
         for modulus in [1, 2, 3, 1000, usize::MAX] {
             let bounds = Bounds {
@@ -118,10 +118,10 @@ mod tests {
                 let i = r.particle as usize;
                 i.is_multiple_of(modulus) || i > 4 * CHUNK
             };
-            let wanted = references.iter().filter(|r| is_first(r)).count();
-            assert_eq!(partition(&mut references, is_first), wanted);
-            assert!(references[..wanted].iter().all(is_first));
-            assert!(!references[wanted..].iter().any(is_first));
+            let count = references.iter().filter(|r| is_first(r)).count();
+            assert_eq!(partition(&mut references, is_first), count);
+            assert!(references[..count].iter().all(is_first));
+            assert!(!references[count..].iter().any(is_first));
             let mut particles: Vec<u32> = references.iter().map(|r| r.particle).collect();
             particles.sort_unstable();
             assert!(particles.iter().enumerate().all(|(i, p)| i == *p as usize));

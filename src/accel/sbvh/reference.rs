@@ -277,7 +277,7 @@ mod tests {
     }
 
     #[test]
-    fn a_cap_is_smaller_than_the_cut_of_the_box() {
+    fn clipped_cap_is_smaller_than_the_clipped_box() {
         let (sphere, mut cap) = unit_sphere();
         // The cap from 0.6 of the radius on: its rim has radius 0.8.
         cap.min.x = 1.6;
@@ -287,7 +287,7 @@ mod tests {
     }
 
     #[test]
-    fn the_half_with_the_centre_keeps_its_width() {
+    fn half_with_the_centre_has_the_full_width() {
         let (sphere, mut half) = unit_sphere();
         half.min.x = 0.5;
         let tight = sphere.clip(half);
@@ -297,7 +297,7 @@ mod tests {
     proptest! {
         /// Points of the sphere in the cell are in its part after any number of cuts.
         #[test]
-        fn parts_hold_what_of_the_sphere_is_in_their_cells(
+        fn parts_contain_the_sphere_inside_their_cells(
             center in prop::array::uniform3(-1e3_f32..1e3),
             radius in prop::sample::select(vec![1e-3_f32, 1.0, 100.0]),
             cuts in prop::collection::vec((0_usize..3, -1.0_f32..1.0, any::<bool>()), 1..6),

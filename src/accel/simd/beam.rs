@@ -237,7 +237,7 @@ mod tests {
     }
 
     #[test]
-    fn lanes_near_are_those_that_meet_the_box() {
+    fn near_lanes_intersect_the_box() {
         let bounds = Aabb {
             min: Vec3::splat(2.0),
             max: Vec3::splat(3.0),

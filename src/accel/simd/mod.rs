@@ -194,3 +194,8 @@ impl ArrayLanes {
         self.0.run(OnArrays(task))
     }
 }
+
+#[cfg(test)]
+pub(crate) mod tested_levels;
+#[cfg(test)]
+mod tests;

@@ -39,19 +39,15 @@ fn packet_of(rays: impl IntoIterator<Item = Ray>) -> RayPacket {
     packet
 }
 
-fn levels() -> impl Iterator<Item = SimdLevel> {
-    SimdLevel::ALL.into_iter().filter(|l| l.is_supported())
-}
-
 /// All lanes, poisoned or not, find what they find alone.
 #[test]
-fn poisoned_rays_do_not_change_their_neighbours() {
+fn nan_rays_do_not_affect_other_lanes() {
     let structures = [Structure::Kdtree, Structure::Bvh];
     for scene in awkward_scenes() {
         for structure in structures {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &BuildSettings::new(structure));
-            for level in levels() {
+            for level in tested_levels() {
                 builder.tree_mut().set_simd(level);
                 let view = builder.tree().view();
                 let mut random = Random(23);
@@ -77,7 +73,7 @@ fn poisoned_rays_do_not_change_their_neighbours() {
 }
 
 #[test]
-fn rays_that_end_before_they_begin_hit_nothing() {
+fn empty_ray_intervals_hit_nothing() {
     let scene = Scene::common("cloud", random_points(3000, 1), 0.05);
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());
@@ -92,7 +88,7 @@ fn rays_that_end_before_they_begin_hit_nothing() {
 
 /// Spheres of radius 0, in trees of one block and of many: rays that aim at their centres hit some.
 #[test]
-fn points_are_found_as_by_single_rays() {
+fn points_are_hit_as_by_single_rays() {
     for count in [1, 16, 17, 3000] {
         for radii in [vec![0.0], vec![0.0; count]] {
             let centers = random_points(count, 2);
@@ -106,7 +102,7 @@ fn points_are_found_as_by_single_rays() {
             for settings in all_settings() {
                 let mut builder = TreeBuilder::new();
                 builder.build(&scene.spheres(), &settings);
-                for level in levels() {
+                for level in tested_levels() {
                     builder.tree_mut().set_simd(level);
                     let mut random = Random(3);
                     for _ in 0..10 {
@@ -133,7 +129,7 @@ fn incoherent_packets_match_brute_force() {
         for settings in all_settings() {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &settings);
-            for level in levels() {
+            for level in tested_levels() {
                 builder.tree_mut().set_simd(level);
                 let view = builder.tree().view();
                 let mut judged = 0;

@@ -144,7 +144,7 @@ fn unions_match_intervals_merged_in_f64() {
             let mut builder = TreeBuilder::new();
             builder.build(&scene.spheres(), &settings);
             let mut judged = 0;
-            for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+            for level in tested_levels() {
                 builder.tree_mut().set_simd(level);
                 let view = builder.tree().view();
                 judged += rays.iter().filter(|ray| judge(&scene, &view, ray)).count();
@@ -174,8 +174,7 @@ fn structures_and_kernels_agree_on_unions_to_the_bit() {
             });
             found.collect::<Vec<_>>()
         };
-        let fused = [SimdLevel::Neon, SimdLevel::Avx2, SimdLevel::Avx512];
-        let fused: Vec<_> = fused.into_iter().filter(|l| l.is_supported()).collect();
+        let fused = tested_fused_levels();
         for levels in [&[SimdLevel::Portable][..], &fused] {
             let mut first = None;
             for settings in all_settings() {
@@ -190,7 +189,7 @@ fn structures_and_kernels_agree_on_unions_to_the_bit() {
 }
 
 #[test]
-fn stored_spheres_unite_as_they_are_stored() {
+fn stored_spheres_form_a_union_as_stored() {
     let common = Scene::common("body", random_points(3000, 37), 0.1);
     for scene in [common, nested()] {
         let radius = (scene.radii.len() == 1).then(|| scene.radii[0]);
@@ -237,7 +236,7 @@ fn spheres_that_end_together_go_to_the_lower_index() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
     #[test]
-    fn any_spheres_on_a_line_unite(
+    fn spheres_on_a_line_form_a_union(
         spheres in prop::collection::vec((0_u8..60, 1_u8..20, -3_i8..4), 1..40),
         start in 0_u8..60,
     ) {

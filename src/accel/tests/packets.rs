@@ -139,7 +139,7 @@ fn linked(tree: &WideTree) -> Vec<Link> {
 }
 
 #[test]
-fn packets_find_what_single_rays_find() {
+fn packets_match_single_rays() {
     for scene in awkward_scenes() {
         for settings in all_settings() {
             for keep_indices in [true, false] {
@@ -164,7 +164,7 @@ fn packets_find_what_single_rays_find() {
 #[track_caller]
 fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
     let mut hits = 0;
-    for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+    for level in tested_levels() {
         tree.set_simd(level);
         for shape in SHAPES {
             let mut random = Random(17);
@@ -179,7 +179,7 @@ fn check_shapes(scene: &Scene, tree: &mut WideTree) -> usize {
 }
 
 #[test]
-fn an_empty_packet_finds_nothing() {
+fn empty_packet_hits_nothing() {
     let scene = Scene::common("one", vec![Vec3::ZERO], 1.0);
     let mut builder = TreeBuilder::new();
     builder.build(&scene.spheres(), &BuildSettings::default());
@@ -207,7 +207,7 @@ fn ties_in_a_packet_go_to_the_lower_index() {
             (aim + Vec3::X * 5.0).normalize(),
         ));
     }
-    for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+    for level in tested_levels() {
         builder.tree_mut().set_simd(level);
         let view = builder.tree().view();
         for coherence in [Coherence::Coherent, Coherence::Incoherent] {

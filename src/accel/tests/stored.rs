@@ -75,7 +75,7 @@ fn check_stored(owned: &OwnedLeaves, name: &'static str, radius: Option<f32>) ->
         let report = tree.build(&leaves, settings).expect(name);
         assert_eq!(report.particles, owned.count);
         assert!(report.sah_cost >= 1.0 && report.file_bytes <= report.peak_bytes);
-        for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+        for level in tested_levels() {
             tree.set_simd(level);
             let view = tree.view(&leaves);
             for ray in rays(&scene, ray_count, 11) {
@@ -159,7 +159,7 @@ fn spheres_of_slots_are_those_stored() {
             let stored = owned.scene("stored", None);
             let mut tree = StoredTree::new();
             tree.build(&owned.leaves(), settings(None)).expect("sound");
-            for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+            for level in tested_levels() {
                 tree.set_simd(level);
                 let loaded = tree.view(&owned.leaves()).run(LoadAll(65));
                 for (index, block) in loaded.iter().enumerate() {
@@ -183,7 +183,7 @@ fn spheres_of_slots_are_those_stored() {
 
 /// The upper levels are built from planes and not from particles, and rays find the same hits.
 #[test]
-fn stored_and_built_trees_find_the_same() {
+fn stored_and_built_trees_agree() {
     let scene = Scene::common("cloud", random_points(20_000, 5), 0.02);
     let owned = OwnedLeaves::encode(&scene, Positions::F32, Radii::None);
     let mut tree = StoredTree::new();
@@ -196,12 +196,12 @@ fn stored_and_built_trees_find_the_same() {
     let built = builder.tree().view();
     let mut hits = 0;
     for ray in rays(&stored, 2000, 6) {
-        let told = |view: &TreeView| {
+        let nearest = |view: &TreeView| {
             let hit = view.nearest(&ray)?;
             Some((hit.t.to_bits(), view.particle(hit.slot)))
         };
-        assert_eq!(told(&view), told(&built), "{ray:?}");
-        hits += usize::from(told(&view).is_some());
+        assert_eq!(nearest(&view), nearest(&built), "{ray:?}");
+        hits += usize::from(nearest(&view).is_some());
     }
     assert!(hits > 1000, "{hits}");
 }
@@ -213,7 +213,7 @@ fn sound() -> OwnedLeaves {
 }
 
 #[test]
-fn the_lowest_faulty_node_is_told_whatever_the_threads() {
+fn lowest_faulty_node_is_reported_for_any_threads() {
     let mut owned = sound();
     let good = owned.nodes.clone();
     owned.nodes[2500].child_mask = 0;
@@ -241,7 +241,7 @@ fn the_lowest_faulty_node_is_told_whatever_the_threads() {
 }
 
 #[test]
-fn every_fault_has_its_name() {
+fn every_fault_has_its_message() {
     let scene = Scene {
         name: "cloud",
         centers: random_points(1025, 2),
@@ -281,11 +281,11 @@ fn every_fault_has_its_name() {
     );
     assert_eq!(
         fault_of(&|owned| owned.nodes[8].child_mask = 3),
-        "node 8 does not have the blocks that lie below it"
+        "node 8 does not have the blocks below it"
     );
     assert_eq!(
         fault_of(&|owned| owned.nodes[7] = bytemuck::Zeroable::zeroed()),
-        "node 7 does not have the blocks that lie below it"
+        "node 7 does not have the blocks below it"
     );
     for (origin, exponent) in [(f32::INFINITY, 100), (1e38, 100), (0.0, 255), (0.0, 254)] {
         let fault = fault_of(&|owned| {
@@ -324,7 +324,7 @@ fn trace_anything(owned: &OwnedLeaves, radius: Option<f32>) {
     }
     let aims = Scene::common("aims", random_points(50, 4), 0.3);
     let mut crossings = Vec::new();
-    for level in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
+    for level in tested_levels() {
         tree.set_simd(level);
         let view = tree.view(&leaves);
         for ray in rays(&aims, 30, 2) {

@@ -1,4 +1,4 @@
-//! Where the camera is, and how it moves.
+//! The position and motion of the camera.
 
 use serde_json::{Value, json};
 
@@ -6,16 +6,16 @@ use crate::manifest::CameraMode;
 use crate::pipeline::Setup;
 use crate::scene::{CameraPath, CameraView};
 
-/// The camera over some frames.
-pub(super) struct Seen<'a> {
+/// The camera over a range of frames.
+pub(super) struct CameraSummary<'a> {
     path: &'a CameraPath,
     mode: CameraMode,
-    /// Of these frames, ascending.
+    /// First frame.
     first: Option<i64>,
     last: Option<i64>,
 }
 
-impl<'a> Seen<'a> {
+impl<'a> CameraSummary<'a> {
     pub(super) fn new(setup: &'a Setup, mode: CameraMode, frames: &[i64]) -> Self {
         Self {
             path: &setup.picture.path,
@@ -30,19 +30,19 @@ impl<'a> Seen<'a> {
     }
 
     pub(super) fn to_lines(&self) -> Vec<String> {
-        let first_view = told(&self.view(self.first));
+        let first_view = description(&self.view(self.first));
         let mut lines = vec![format!("camera     {} {first_view}", self.mode.name())];
         let moving = self.path.moving();
         if let (Some(first), Some(last), [_, ..]) = (self.first, self.last, &moving[..]) {
             lines[0] += &format!(" at frame {first}");
-            let last_view = told(&self.view(Some(last)));
+            let last_view = description(&self.view(Some(last)));
             lines.push(format!("           {last_view} at frame {last}"));
             lines.push(format!("           {}", self.motion(&moving)));
         }
         lines
     }
 
-    /// What moves, and how.
+    /// Describes the motion.
     fn motion(&self, moving: &[&str]) -> String {
         let verb = if moving.len() == 1 { "moves" } else { "move" };
         let what = format!("{} {verb}", moving.join(", "));
@@ -50,7 +50,7 @@ impl<'a> Seen<'a> {
             CameraPath::Still(_) => what,
             CameraPath::Turntable(turntable) => {
                 let degrees = turntable.degrees_per_frame();
-                format!("{what} around up, {degrees} degrees a frame")
+                format!("{what} around up, {degrees} degrees per frame")
             }
             CameraPath::Keys(path) => {
                 let keys = path.keys();
@@ -63,11 +63,11 @@ impl<'a> Seen<'a> {
 
     pub(super) fn to_json(&self) -> Value {
         let moving = self.path.moving();
-        let mut all = placed(&self.view(self.first));
+        let mut all = view_json(&self.view(self.first));
         all["mode"] = json!(self.mode.name());
         if !moving.is_empty() {
             all["frame"] = json!(self.first);
-            all["last"] = placed(&self.view(self.last));
+            all["last"] = view_json(&self.view(self.last));
             all["last"]["frame"] = json!(self.last);
         }
         all["moves"] = json!(moving);
@@ -75,7 +75,7 @@ impl<'a> Seen<'a> {
     }
 }
 
-fn told(view: &CameraView) -> String {
+fn description(view: &CameraView) -> String {
     let CameraView {
         eye,
         look_at,
@@ -85,7 +85,7 @@ fn told(view: &CameraView) -> String {
     format!("from {eye:.4} to {look_at:.4}, up {up:.4}, {fov} degrees")
 }
 
-fn placed(view: &CameraView) -> Value {
+fn view_json(view: &CameraView) -> Value {
     json!({
         "eye": view.eye.to_array(),
         "look_at": view.look_at.to_array(),

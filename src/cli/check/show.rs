@@ -1,30 +1,31 @@
-//! What `check` has found, for people and for scripts.
+//! The results of `check` as text and as JSON.
 
 use serde_json::{Map, Value, json};
 use spherule_jobs::FrameState;
 
-use super::camera::Seen;
+use super::camera::CameraSummary;
 use super::{Check, whole};
 use crate::accel::Structure;
+use crate::cli::job::list;
 use crate::cli::progress::duration;
 use crate::cli::render::radius_text;
-use crate::cli::work::list;
+use crate::manifest::Channel;
 use crate::metrics::Bytes;
 use crate::pipeline::{Overlap, Probe, RadiusRule, Setup};
 use crate::survey::Survey;
 
 impl Check<'_> {
     pub(super) fn to_json(&self) -> Value {
-        let manifest = &self.plan.manifest;
+        let manifest = self.render_job.manifest();
         let mut all = Map::new();
         let mut put = |key: &str, value: Value| all.insert(key.to_owned(), value);
         put("problems", json!(self.problems));
         put(
             "frames",
             json!({
-                "all": self.plan.selected(self.sequence),
-                "done": self.standing(FrameState::Done),
-                "failed": self.standing(FrameState::Failed),
+                "all": self.render_job.selected(self.sequence),
+                "done": self.in_state(FrameState::Done),
+                "failed": self.in_state(FrameState::Failed),
                 "to_do": self.tasks.iter().map(|t| t.frame).collect::<Vec<_>>(),
                 "too_large": self.too_large(),
             }),
@@ -33,18 +34,19 @@ impl Check<'_> {
             "images",
             self.tasks.iter().map(|t| json!(t.image)).collect(),
         );
-        put("directory", json!(self.plan.dir));
-        put(
-            "image",
-            json!({
-                "width": manifest.image.width,
-                "height": manifest.image.height,
-                "samples": manifest.image.samples,
-                "channels": manifest.output.channels.iter().map(|c| c.name()).collect::<Vec<_>>(),
-                "preview": manifest.output.preview,
-            }),
-        );
-        if let Some((survey, setup)) = &self.pictures {
+        put("directory", json!(self.render_job.dir()));
+        let mut image = json!({
+            "width": manifest.image.width,
+            "height": manifest.image.height,
+            "samples": manifest.image.samples,
+            "channels": manifest.output.channels.iter().map(Channel::name).collect::<Vec<_>>(),
+            "preview": manifest.output.preview,
+        });
+        if let Some(part) = manifest.image.part() {
+            image["data_window"] = json!(part);
+        }
+        put("image", image);
+        if let Some((survey, setup)) = &self.setup {
             put("structure", json!(structure(survey, setup).name()));
             put("most_particles", json!(survey.most_particles));
             put("radius", radius_json(setup, survey));
@@ -80,13 +82,18 @@ impl Check<'_> {
 
     pub(super) fn to_lines(&self) -> Vec<String> {
         let mut lines = vec![self.frames_line()];
-        let manifest = &self.plan.manifest;
-        let names: Vec<&str> = manifest.output.channels.iter().map(|c| c.name()).collect();
+        let manifest = self.render_job.manifest();
+        let names: Vec<_> = manifest.output.channels.iter().map(Channel::name).collect();
         lines.push(format!(
-            "images     {}: {}x{}, {} samples a pixel, {}{}",
-            self.plan.shown_output.display(),
+            "images     {}: {}x{}{}, {} samples per pixel, {}{}",
+            self.render_job.shown_output().display(),
             manifest.image.width,
             manifest.image.height,
+            manifest
+                .image
+                .part()
+                .map(|part| format!(", part {part:?}"))
+                .unwrap_or_default(),
             manifest.image.samples,
             names.join(" "),
             if manifest.output.preview {
@@ -95,9 +102,9 @@ impl Check<'_> {
                 ""
             }
         ));
-        if let Some((survey, setup)) = &self.pictures {
+        if let Some((survey, setup)) = &self.setup {
             lines.push(format!(
-                "particles  {} at most in the frames looked at, {}",
+                "particles  {} at most in the surveyed frames, {}",
                 survey.most_particles,
                 radius_text(setup, survey)
             ));
@@ -110,18 +117,18 @@ impl Check<'_> {
         lines
     }
 
-    fn camera<'a>(&self, setup: &'a Setup) -> Seen<'a> {
-        let mode = self.plan.manifest.camera.mode;
-        Seen::new(setup, mode, &self.plan.selected(self.sequence))
+    fn camera<'a>(&self, setup: &'a Setup) -> CameraSummary<'a> {
+        let mode = self.render_job.manifest().camera.mode;
+        CameraSummary::new(setup, mode, &self.render_job.selected(self.sequence))
     }
 
     fn frames_line(&self) -> String {
-        let all = self.plan.selected(self.sequence);
+        let all = self.render_job.selected(self.sequence);
         let mut line = format!("frames     {} ({})", all.len(), list(&all));
         let pending: Vec<i64> = self.tasks.iter().map(|t| t.frame).collect();
         for (what, frames) in [
-            ("done", self.standing(FrameState::Done)),
-            ("failed before", self.standing(FrameState::Failed)),
+            ("done", self.in_state(FrameState::Done)),
+            ("failed before", self.in_state(FrameState::Failed)),
             ("too large", self.too_large()),
             ("to do", pending),
         ] {
@@ -137,7 +144,7 @@ impl Check<'_> {
             return Vec::new();
         };
         let mut line = format!("memory     about {}", Bytes(schedule.need.total()));
-        if let Some(limit) = self.plan.manifest.render.memory_limit {
+        if let Some(limit) = self.render_job.manifest().render.memory_limit {
             line += &format!(", the limit is {limit}");
         }
         if let Some(free) = self.free_memory {
@@ -162,7 +169,7 @@ impl Check<'_> {
         if probe.is_lower_bound {
             return Some(format!(
                 "time       more than {}, a lower bound: frame {} read in {:.3} s and built in {:.3} s just now; \
-                 tracing a few tiles of it took longer than {:.0} s and was given up",
+                 tracing a few of its tiles took longer than {:.0} s and was stopped",
                 duration(self.seconds()?),
                 probe.frame,
                 probe.read,
@@ -186,7 +193,7 @@ impl Check<'_> {
     }
 }
 
-/// For the largest frame that was looked at; the others may have another.
+/// The structure for the largest surveyed frame. Other frames may have another.
 fn structure(survey: &Survey, setup: &Setup) -> Structure {
     let has_values = setup.picture.color.is_by_particle();
     setup

@@ -5,14 +5,14 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use spherule_jobs::export::openjd::{
-    FRAMES, HostRequirements, JobTemplate, NOTIFY_SECONDS, PathParameter, Spelling, literal,
+    FRAMES, HostRequirements, JobTemplate, NOTIFY_SECONDS, PathParameter, TemplateFormat, literal,
     parameter,
 };
 
 use super::super::paths::absolute;
 use super::super::{CliError, Outcome};
-use super::place::inside;
-use super::{CommonArgs, Work, deliver, grace, text, tidy};
+use super::paths::inside;
+use super::{CommonArgs, ExportJob, grace, normalized, text, write_output};
 use crate::manifest::OutputPattern;
 
 #[derive(Debug, Args)]
@@ -26,52 +26,52 @@ pub(super) struct OpenjdArgs {
 
 pub(super) fn run(args: &OpenjdArgs) -> Result<Outcome, CliError> {
     let output = args.common.output.as_deref();
-    let spelling = spelling(output)?;
-    // Engines have no usual limit.
-    let work = Work::read(&args.common, NonZeroUsize::MAX)?;
-    let home = match output {
+    let format = template_format(output)?;
+    // Engines have no common limit on the number of tasks
+    let export_job = ExportJob::read(&args.common, NonZeroUsize::MAX)?;
+    let template_dir = match output {
         Some(path) => absolute(path)?,
-        None => work.manifest_file.clone(),
+        None => export_job.manifest_file.clone(),
     };
-    let home = tidy(home.parent().unwrap_or(Path::new("/")));
-    let places = places(&work, &home)?;
-    let template = template(args, &work, &places)?;
-    deliver(&args.common, &template.text(spelling)?)?;
-    tell(args, &work, &home, &places);
+    let template_dir = normalized(template_dir.parent().unwrap_or(Path::new("/")));
+    let paths = job_paths(&export_job, &template_dir)?;
+    let template = template(args, &export_job, &paths)?;
+    write_output(&args.common, &template.text(format)?)?;
+    print_usage(args, &export_job, &template_dir, &paths);
     Ok(Outcome::Done)
 }
 
-/// What to do with the template.
-fn tell(args: &OpenjdArgs, work: &Work, home: &Path, places: &[Place]) {
-    say!("{}", work.chunks);
-    if work.input_dir.is_none() {
+/// Prints how to use the template.
+fn print_usage(args: &OpenjdArgs, export_job: &ExportJob, template_dir: &Path, paths: &[JobPath]) {
+    message!("{}", export_job.chunks);
+    if export_job.input_dir.is_none() {
         note!("the particles have no directory in common, so none is declared as input");
     }
-    let given: Vec<String> = places.iter().filter_map(Place::option).collect();
-    if !given.is_empty() {
-        note!("engines take no default for what is not below the template's directory");
+    let options: Vec<String> = paths.iter().filter_map(JobPath::option).collect();
+    if !options.is_empty() {
+        note!("engines accept no default for a path outside the template's directory");
     }
     let file = args.common.output.as_deref();
     if file.is_none() {
-        note!("relative paths in it begin at {}", home.display());
+        note!("its paths are relative to {}", template_dir.display());
     }
     let file = file.unwrap_or(Path::new("FILE"));
-    say!(
+    message!(
         "try it with: openjd run {}{}",
         file.display(),
-        given.concat()
+        options.concat()
     );
 }
 
-/// A path of the job, as the template is to have it.
-struct Place {
+/// A path of the job, and its parameter in the template.
+struct JobPath {
     parameter: PathParameter,
     /// Absolute.
     path: PathBuf,
 }
 
-impl Place {
-    /// What has to be said where there is no default.
+impl JobPath {
+    /// The option that sets the path if it has no default.
     fn option(&self) -> Option<String> {
         let name = self.parameter.name;
         let option = || format!(" -p '{name}={}'", self.path.display());
@@ -79,11 +79,11 @@ impl Place {
     }
 }
 
-/// The paths of the job, for a template in the directory `home`.
-fn places(work: &Work, home: &Path) -> Result<Vec<Place>, CliError> {
-    let place = |name, description, path: &Path, is_directory, is_output| {
-        let default = inside(path, home).map(|p| text(&p).map(str::to_owned));
-        Ok::<_, CliError>(Place {
+/// The paths of the job, for a template in `template_dir`.
+fn job_paths(export_job: &ExportJob, template_dir: &Path) -> Result<Vec<JobPath>, CliError> {
+    let job_path = |name, description, path: &Path, is_directory, is_output| {
+        let default = inside(path, template_dir).map(|p| text(&p).map(str::to_owned));
+        Ok::<_, CliError>(JobPath {
             parameter: PathParameter {
                 name,
                 description,
@@ -94,35 +94,35 @@ fn places(work: &Work, home: &Path) -> Result<Vec<Place>, CliError> {
             path: path.to_owned(),
         })
     };
-    let manifest = "What is rendered, and how.";
-    let mut all = vec![place(
+    let manifest = "The manifest of the job.";
+    let mut all = vec![job_path(
         "Manifest",
         manifest,
-        &work.manifest_file,
+        &export_job.manifest_file,
         false,
         false,
     )?];
-    if let Some(dir) = &work.input_dir {
-        let input = "Where the particles are. The manifest says where hosts look for them; farms that \
-                     copy files copy this directory.";
-        all.push(place("InputDir", input, dir, true, false)?);
+    if let Some(dir) = &export_job.input_dir {
+        let input = "Directory of the particles. Hosts read them from the path in the manifest. Farms that copy \
+                     files copy this directory.";
+        all.push(job_path("InputDir", input, dir, true, false)?);
     }
-    let output = "Where the images go, and the job's record of them.";
-    all.push(place("OutDir", output, &work.out_dir, true, true)?);
+    let output = "Directory of the images and of the job's records.";
+    all.push(job_path("OutDir", output, &export_job.out_dir, true, true)?);
     Ok(all)
 }
 
-/// Engines go by the name.
-fn spelling(output: Option<&Path>) -> Result<Spelling, CliError> {
+/// The file format of the output's extension. Engines recognise templates by it.
+fn template_format(output: Option<&Path>) -> Result<TemplateFormat, CliError> {
     let Some(path) = output else {
-        return Ok(Spelling::Yaml);
+        return Ok(TemplateFormat::Yaml);
     };
     let extension = path.extension().map(|e| e.to_ascii_lowercase());
     match extension.as_ref().and_then(|e| e.to_str()) {
-        Some("yaml" | "yml") => Ok(Spelling::Yaml),
-        Some("json") => Ok(Spelling::Json),
+        Some("yaml" | "yml") => Ok(TemplateFormat::Yaml),
+        Some("json") => Ok(TemplateFormat::Json),
         _ => Err(CliError::other(format!(
-            "{}: engines know a template by its name; end it in .template.yaml or .template.json",
+            "{}: engines recognise a template by its name, which must end in .template.yaml or .template.json",
             path.display()
         ))),
     }
@@ -130,12 +130,12 @@ fn spelling(output: Option<&Path>) -> Result<Spelling, CliError> {
 
 fn template<'a>(
     args: &OpenjdArgs,
-    work: &'a Work,
-    places: &[Place],
+    export_job: &'a ExportJob,
+    paths: &[JobPath],
 ) -> Result<JobTemplate<'a>, CliError> {
-    let image = literal("image name", &work.image_name)?;
-    // The directory's name becomes part of --output.
-    let output = format!("{}/{image}", text(&work.out_dir)?);
+    let image = literal("image name", &export_job.image_name)?;
+    // The name of the directory becomes part of --output
+    let output = format!("{}/{image}", text(&export_job.out_dir)?);
     OutputPattern::parse(&output)
         .map_err(|e| CliError::other(format!("{output}: {e}; rename the directory")))?;
     let arguments = [
@@ -151,21 +151,25 @@ fn template<'a>(
         &grace(NOTIFY_SECONDS),
     ];
     Ok(JobTemplate {
-        name: &work.name,
-        description: work.title(),
+        name: &export_job.name,
+        description: export_job.title(),
         step: "Render",
-        program: ("Spherule", text(&work.program)?),
-        paths: places.iter().map(|p| p.parameter.clone()).collect(),
+        program: ("Spherule", text(&export_job.program)?),
+        paths: paths.iter().map(|p| p.parameter.clone()).collect(),
         arguments: arguments.map(str::to_owned).to_vec(),
-        frames: &work.frames,
-        chunks: &work.chunks,
+        frames: &export_job.frames,
+        chunks: &export_job.chunks,
         host: HostRequirements {
             system: match std::env::consts::OS {
                 known @ ("linux" | "macos" | "windows") => Some(known),
                 _ => None,
             },
             cpus: args.cpus,
-            memory: args.common.mem.or(work.memory_limit).map(|size| size.0),
+            memory: args
+                .common
+                .mem
+                .or(export_job.memory_limit)
+                .map(|size| size.0),
         },
     })
 }

@@ -6,11 +6,11 @@ use std::path::PathBuf;
 
 use clap::Args;
 use spherule_jobs::export::TimeLimit;
-use spherule_jobs::export::slurm::{ArrayScript, FrameCommand, MOST_TASKS, Resources};
+use spherule_jobs::export::slurm::{ArrayScript, FrameCommand, MAX_TASKS, Resources};
 
 use super::super::paths::absolute;
 use super::super::{CliError, Outcome};
-use super::{CommonArgs, Work, deliver, grace, text, tidy};
+use super::{CommonArgs, ExportJob, grace, normalized, text, write_output};
 use crate::manifest::MAX_THREADS;
 use crate::metrics::Bytes;
 
@@ -18,13 +18,13 @@ use crate::metrics::Bytes;
 pub(super) struct SlurmArgs {
     #[command(flatten)]
     common: CommonArgs,
-    /// Processors for a task, and threads of it.
+    /// Processors per task, and its number of threads.
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=i64::from(MAX_THREADS)))]
     cpus: u16,
-    /// Time for a task: 02:00:00, 1-12:00:00, or minutes [default: the partition's]
+    /// Time limit of a task: 02:00:00, 1-12:00:00, or minutes [default: the partition's]
     #[arg(long, value_name = "TIME")]
     time: Option<TimeLimit>,
-    /// Tasks that may run at once.
+    /// Maximum number of tasks that run at the same time.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..))]
     concurrent: Option<u32>,
     /// Partition to run in.
@@ -33,64 +33,69 @@ pub(super) struct SlurmArgs {
     /// Account to charge.
     #[arg(long, value_name = "NAME")]
     account: Option<String>,
-    /// Seconds before the time limit at which a task is told to finish its frame.
+    /// Seconds before the time limit at which a task receives the signal to finish its frame.
     ///
-    /// Longer than a frame takes.
+    /// Choose a longer time than one frame takes.
     #[arg(long, value_name = "SECONDS", default_value_t = 120)]
     signal_ahead: u32,
-    /// Directory for the tasks' logs [default: slurm-logs beside the manifest]
+    /// Directory for the tasks' logs [default: slurm-logs next to the manifest]
     #[arg(long, value_name = "DIR")]
     logs: Option<PathBuf>,
-    /// Tasks that an array may have at this cluster: its MaxArraySize less 1.
+    /// Maximum number of tasks in an array on this cluster: its MaxArraySize minus 1.
     ///
-    /// With more, tasks get more frames.
-    #[arg(long, value_name = "N", default_value_t = usual_most())]
+    /// If there would be more tasks, each task gets more frames.
+    #[arg(long, value_name = "N", default_value_t = default_max_tasks())]
     max_tasks: NonZeroUsize,
 }
 
-const fn usual_most() -> NonZeroUsize {
-    NonZeroUsize::new(MOST_TASKS).expect("arrays may have tasks")
+const fn default_max_tasks() -> NonZeroUsize {
+    NonZeroUsize::new(MAX_TASKS).expect("the limit is above 0")
 }
 
 pub(super) fn run(args: &SlurmArgs) -> Result<Outcome, CliError> {
-    let work = Work::read(&args.common, args.max_tasks)?;
-    let beside = || work.manifest_file.with_file_name("slurm-logs");
+    let export_job = ExportJob::read(&args.common, args.max_tasks)?;
+    let default = || export_job.manifest_file.with_file_name("slurm-logs");
     let logs = args.logs.as_deref().map(absolute).transpose()?;
-    let logs = logs.map_or_else(beside, |dir| tidy(&dir));
-    let script = script(args, &work, text(&logs)?)?;
+    let logs = logs.map_or_else(default, |dir| normalized(&dir));
+    let script = script(args, &export_job, text(&logs)?)?;
     match &args.common.output {
-        // A script whose logs have no place fails without a word.
+        // Without the directory the tasks fail without a message
         Some(_) => fs::create_dir_all(&logs).map_err(CliError::io(&logs))?,
-        None => say!(
-            "note: before it is submitted: mkdir -p '{}'",
+        None => message!(
+            "note: before you submit the script: mkdir -p '{}'",
             logs.display()
         ),
     }
-    deliver(&args.common, &script)?;
-    say!("{}", work.chunks);
+    write_output(&args.common, &script)?;
+    message!("{}", export_job.chunks);
     if let Some(path) = &args.common.output {
-        say!("submit with: sbatch {}", path.display());
-        say!("logs: {}", logs.display());
+        message!("submit with: sbatch {}", path.display());
+        message!("logs: {}", logs.display());
     }
     Ok(Outcome::Done)
 }
 
-fn script(args: &SlurmArgs, work: &Work, logs: &str) -> Result<String, CliError> {
-    let (asked, limit) = (args.common.mem, work.memory_limit);
-    // Without --mem what the manifest allows, and a tenth for what its limit does not count.
-    let memory = asked.or(limit.map(|l| Bytes(l.0.saturating_add(l.0 / 9))));
+fn script(args: &SlurmArgs, export_job: &ExportJob, logs: &str) -> Result<String, CliError> {
+    let (requested, limit) = (args.common.mem, export_job.memory_limit);
+    // Without --mem: the limit of the manifest, plus a tenth for memory that the limit does not count
+    let memory = requested.or(limit.map(|l| Bytes(l.0.saturating_add(l.0 / 9))));
     let grace = grace(args.signal_ahead.into());
     let script = ArrayScript {
-        name: &work.name,
-        title: &work.title(),
+        name: &export_job.name,
+        title: &export_job.title(),
         command: FrameCommand {
-            program: text(&work.program)?,
+            program: text(&export_job.program)?,
             variable: "SPHERULE",
-            arguments: &["render", text(&work.manifest_file)?, "--grace", &grace],
-            // The manifest's own limit holds unless it is the larger one.
-            limit_memory: limit.is_none_or(|limit| asked.is_some_and(|asked| asked <= limit)),
+            arguments: &[
+                "render",
+                text(&export_job.manifest_file)?,
+                "--grace",
+                &grace,
+            ],
+            // Use the smaller one of both limits
+            limit_memory: limit.is_none_or(|limit| requested.is_some_and(|size| size <= limit)),
         },
-        chunks: &work.chunks,
+        chunks: &export_job.chunks,
         resources: Resources {
             cpus: args.cpus,
             memory: memory.map(|size| size.0),

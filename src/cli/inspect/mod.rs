@@ -1,4 +1,4 @@
-//! `spherule inspect`: what is in particle files, for people and (`--json`) for scripts.
+//! `spherule inspect`: the content of particle files as text or JSON.
 
 use std::collections::HashSet;
 use std::path::{Path, PathBuf};
@@ -26,9 +26,9 @@ Examples:
   spherule inspect run1/frame_0001.vtk
       Counts, bounds and attributes of one file
   spherule inspect --json run1
-      The same of all frames of a directory, for scripts
+      The same for all frames of a directory, as JSON
   spherule inspect --verify run1-native
-      Whether all of them are sound";
+      Check all frames for damage";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -36,7 +36,7 @@ pub(super) struct InspectArgs {
     /// Files, directories or patterns.
     #[arg(required = true)]
     files: Vec<PathBuf>,
-    /// One JSON object a particle frame, one a line.
+    /// One JSON object per frame, one per line.
     #[arg(long)]
     json: bool,
     /// Check everything: all sections of native frames, every number of other files.
@@ -53,13 +53,13 @@ struct Inspected<'a> {
     /// How positions are stored.
     encoding: &'static str,
     stats: FrameStats,
-    /// Bytes of the file for each particle; none without particles.
+    /// Bytes of the file per particle; None without particles.
     bytes_per_particle: Option<f64>,
-    /// What a native frame says of itself.
+    /// Summary of a native frame.
     native: Option<NativeFacts>,
-    /// What the file says that is not in its particles.
+    /// Metadata of the file that is not per particle.
     notes: Vec<String>,
-    /// Whether everything was checked because it was asked for.
+    /// Whether a full verification was requested and done.
     verified: bool,
 }
 
@@ -80,7 +80,7 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
                     let shown = file.display().to_string();
                     print::json(&json!({"file": shown, "error": error}))
                 } else {
-                    say!("error: {error}");
+                    message!("error: {error}");
                     Ok(Reader::Listening)
                 }
             }
@@ -92,15 +92,15 @@ pub(super) fn run(args: &InspectArgs) -> Result<Outcome, CliError> {
     Ok(outcome)
 }
 
-/// What an argument stands for.
+/// The file that an argument refers to.
 enum Meant {
-    /// A file, with the frame number that its name tells where it is one of a sequence.
+    /// A file, with the frame number from its name if it belongs to a sequence.
     File(PathBuf, Option<i64>),
-    /// No file, and why.
+    /// An error.
     Nothing(PathBuf, String),
 }
 
-/// All that is meant; an argument that means nothing does not hinder the others.
+/// The files of all arguments. An invalid argument does not affect the others.
 fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
     let mut all = Vec::new();
     let mut known = HashSet::new();
@@ -117,7 +117,7 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
                 Err(error) => all.push(Meant::Nothing(argument.clone(), error.to_string())),
                 Ok(sequence) => {
                     if let Some(parts) = parts_text(&sequence) {
-                        say!("{}: {parts}", argument.display());
+                        message!("{}: {parts}", argument.display());
                     }
                     for frame in sequence.frames() {
                         // A file with many steps is in many frames.
@@ -134,7 +134,7 @@ fn expand(arguments: &[PathBuf]) -> Vec<Meant> {
     all
 }
 
-/// Looks at one file; the outer error is the file's, the inner one the output's.
+/// Inspects one file. The outer error is of the file, the inner one of the output.
 fn inspect(
     path: &Path,
     number: Option<i64>,
@@ -145,7 +145,7 @@ fn inspect(
         return Ok(inspected.print(args.json));
     }
     let file = FrameFile::open_within(path, read_budget(None, None))?;
-    // Of many steps the first one says what holds for all.
+    // For several steps, the metadata come from the first one.
     let mut remarks = remarks(path);
     for index in 0..file.steps().len() {
         let mut inspected = read(&file, index, number)?;

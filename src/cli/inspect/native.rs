@@ -1,5 +1,4 @@
-//! What a native frame says of itself: index, sections, bytes for each particle. Large frames are not read
-//! for that.
+//! The index of a native frame: sections, sizes, bytes per particle. Large frames are not read completely.
 
 use std::path::Path;
 
@@ -13,21 +12,21 @@ use spherule_formats::{FrameError, ScalarType};
 use super::Inspected;
 use crate::report::THESIS_BYTES_PER_PARTICLE;
 
-/// Particles up to which a frame is read whole; of larger ones a sample is.
+/// Maximum number of particles for which a frame is read completely; larger ones are sampled.
 const LARGEST_READ: u64 = 4_000_000;
-/// Particles of the sample: pages of a file that is not in memory come at some 20 µs each.
+/// Number of sampled particles: reading a page that is not in memory takes about 20 µs.
 const SAMPLE: usize = 32_768;
 
-/// What a native frame says of itself.
+/// Summary of a native frame.
 pub(super) struct NativeFacts {
     pub(super) index: FrameIndex,
-    /// Of the file.
+    /// Length of the file.
     bytes: u64,
-    /// Particles that values of attributes were taken from, if not from all.
+    /// Number of sampled particles, if the frame was sampled.
     pub(super) sample: Option<usize>,
 }
 
-/// Looks at the native frame at `path`.
+/// Inspects the native frame at `path`.
 ///
 /// # Errors
 /// [`FrameError`] if it is damaged, as far as it is read.
@@ -37,10 +36,10 @@ pub(super) fn inspect(
     verify: bool,
 ) -> Result<Inspected<'_>, FrameError> {
     let file = NativeFile::open(path, Access::Map)?;
-    let looked = look(&file, verify);
+    let summary = summarise(&file, verify);
     // That the file was changed explains whatever was found.
     file.check()?;
-    let (stats, sample) = looked?;
+    let (stats, sample) = summary?;
     let index = file.index().clone();
     let bytes = file.byte_len();
     Ok(Inspected {
@@ -57,8 +56,8 @@ pub(super) fn inspect(
     })
 }
 
-/// Numbers of the frame, and of how many particles if it is a sample.
-fn look(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usize>), FrameError> {
+/// Statistics of the frame, and the number of particles if it was sampled.
+fn summarise(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usize>), FrameError> {
     let frame = file.frame()?;
     let index = file.index();
     let is_large = index.count > LARGEST_READ;
@@ -83,7 +82,7 @@ fn look(file: &NativeFile, verify: bool) -> Result<(FrameStats, Option<usize>), 
     Ok((stats, is_large.then(|| raw.positions.len())))
 }
 
-/// What the index knows better than a sample.
+/// Replaces statistics of a sample by exact values from the index.
 fn complete(stats: &mut FrameStats, index: &FrameIndex) {
     stats.count = index.count;
     let origin = glam::DVec3::from_array(index.origin);
@@ -104,7 +103,7 @@ fn complete(stats: &mut FrameStats, index: &FrameIndex) {
     }
 }
 
-/// Bytes of a file by what they are for.
+/// Bytes of a file by purpose.
 struct Parts {
     positions: u64,
     radii: u64,
@@ -152,7 +151,7 @@ impl NativeFacts {
         ]
     }
 
-    /// A number of bytes for each particle.
+    /// `bytes` per particle.
     fn each(&self, bytes: u64) -> Option<f64> {
         (self.index.count > 0).then(|| bytes as f64 / self.index.count as f64)
     }

@@ -1,4 +1,4 @@
-//! What `inspect` prints of a frame.
+//! Prints the result of `inspect`.
 
 use serde_json::{Value, json};
 use spherule_formats::stats::{AttributeStats, Number};
@@ -100,7 +100,7 @@ impl Inspected<'_> {
         line
     }
 
-    /// One value a component.
+    /// One value per component.
     fn attribute_json(&self, attribute: &AttributeStats) -> Value {
         let mut object = attribute_json(attribute);
         // That of a sample means nothing.

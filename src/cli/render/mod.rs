@@ -2,28 +2,36 @@
 
 use clap::Args;
 
-use super::plan::RunArgs;
-use super::work::use_threads;
+use super::job::{JobArgs, use_threads};
+use super::manifest_args::ManifestArgs;
 use super::{CliError, Outcome, events, signals};
 use crate::manifest::ProgressMode;
 
-mod arrivals;
 mod follow;
 pub(super) mod isolate;
 mod run;
-mod show;
+mod summary;
 
 use run::Run;
-pub(super) use show::{parts_text, radius_text, tell};
+pub(super) use summary::{parts_text, print_summary, radius_text};
 
 const EXAMPLES: &str = "\
 Examples:
   spherule render run1 -o out/frame.####.exr
-      All frames of a directory; the same command goes on where it was stopped
+      All frames of a directory; the same command continues after a stop
   spherule render run1 --frames 1-10x3 --width 640 --height 360 --samples 4
-      Every third of the first ten frames, small and quick
+      Every third of the first ten frames, in a small size
   spherule render run1 --color-by density --map turbo --set camera.mode=turntable
       Coloured by an attribute, from a camera that goes around";
+
+/// Arguments of `render` and `check`.
+#[derive(Debug, Args)]
+pub(super) struct RunArgs {
+    #[command(flatten)]
+    pub(super) manifest: ManifestArgs,
+    #[command(flatten)]
+    pub(super) job: JobArgs,
+}
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
@@ -32,29 +40,28 @@ pub(super) struct RenderArgs {
     run: RunArgs,
 }
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping after the frame in hand; once more stops at once",
-    at_once: "stopped; the same command goes on from here",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping after the frames in progress; a second signal stops at once",
+    stopped: "stopped; the same command continues",
 };
 
 pub(super) fn run(args: &RenderArgs) -> Result<Outcome, CliError> {
-    let signals = signals::listen(WORDS)?;
-    let asked = args.run.manifest.manifest()?;
-    if asked.manifest.job.progress == ProgressMode::Json {
-        events::begin();
+    let signals = signals::listen(SIGNAL_MESSAGES)?;
+    let requested = args.run.manifest.manifest()?;
+    let settings = requested.manifest.job.clone();
+    if settings.progress == ProgressMode::Json {
+        events::start();
     }
-    use_threads(asked.manifest.job.threads)?;
-    if asked.manifest.job.follow {
-        return follow::run(&args.run.work, asked, &signals);
+    use_threads(settings.threads)?;
+    if settings.follow {
+        return follow::run(&args.run.job, requested, &signals);
     }
-    let grace = asked.manifest.job.grace;
-    let sequence = asked.sequence()?;
+    let sequence = requested.open_sequence()?;
     for note in sequence.notes() {
         note!("{note}");
     }
-    let mut run = Run::begin(&args.run.work, asked, sequence)?;
-    run.tell_kept();
-    let interrupt = signals.at_work_within(grace);
-    let result = run.make_pending(interrupt);
+    let mut run = Run::start(&args.run.job, requested, sequence)?;
+    let interrupt = signals.start_work_with_grace(settings.grace);
+    let result = run.render_pending(interrupt);
     Ok(run.end(result, interrupt))
 }

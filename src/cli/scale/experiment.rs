@@ -9,17 +9,17 @@ use spherule_formats::sequence::{Sequence, SequenceInput};
 use super::ScaleArgs;
 use crate::accel::Structure;
 use crate::cli::CliError;
+use crate::cli::job::useful_threads;
 use crate::cli::paths::absolute;
-use crate::cli::work::useful_threads;
 use crate::scale::report::{InputSummary, ScaleSettings};
 use crate::scale::{Budget, CellRequest, FrameSurvey, Motion, Representation, Source, Stage};
 
-/// Seconds a cell where nothing else is said: the thesis's minute.
+/// Default seconds per cell, as in the thesis.
 const SECONDS: f64 = 60.0;
 
-/// Everything that is settled before the first cell runs.
+/// The settings and the survey of an experiment.
 pub(super) struct Experiment {
-    /// As the report has it.
+    /// As in the report.
     pub(super) settings: ScaleSettings,
     structures: Vec<Structure>,
     source: Source,
@@ -27,7 +27,7 @@ pub(super) struct Experiment {
 }
 
 impl Experiment {
-    /// Looks at the input, if there is one.
+    /// Checks the arguments, and surveys the input if there is one.
     pub(super) fn settle(args: &ScaleArgs) -> Result<Self, CliError> {
         let structures = each_once(&args.structures, &Structure::ALL);
         let mut settings = ScaleSettings {
@@ -54,7 +54,7 @@ impl Experiment {
         let mut source = Source::Box;
         let mut stage = Stage::THESIS;
         if let Some(path) = &args.input {
-            let survey = look_at(path, args)?;
+            let survey = survey_input(path, args)?;
             settings.input = Some(InputSummary {
                 path: path.display().to_string(),
                 frame: survey.source.frame,
@@ -72,7 +72,7 @@ impl Experiment {
         })
     }
 
-    /// In the order in which they run: what takes long comes last.
+    /// The cells in the order in which they run: the slowest ones last.
     pub(super) fn cells(&self) -> Vec<CellRequest> {
         let s = &self.settings;
         let mut cells = Vec::new();
@@ -104,7 +104,7 @@ impl Experiment {
     }
 }
 
-/// Sees that every representation has a structure to go with, and tells where not all do.
+/// Checks that every representation has a structure, and reports combinations that are skipped.
 fn check_pairs(
     structures: &[Structure],
     representations: &[Representation],
@@ -121,23 +121,23 @@ fn check_pairs(
     }
     if !structures.contains(&Structure::Kdtree) {
         return Err(CliError::other(format!(
-            "--representations {names}: native frames lie in k-d order and are traced where they lie: \
-             add kdtree to --structures, or measure these structures in memory"
+            "--representations {names}: native frames can only be traced with kdtree; add kdtree to \
+             --structures, or use --representations memory"
         )));
     }
-    note!("native frames ({names}) are traced where they lie, in k-d order: with kdtree alone");
+    note!("native frames ({names}) are traced in place, with kdtree only");
     Ok(())
 }
 
-/// What was asked for, once each; all there is if nothing was.
-fn each_once<T: Copy + Eq + Hash>(asked: &[T], all: &[T]) -> Vec<T> {
-    let mut seen = HashSet::new();
-    let wanted = if asked.is_empty() { all } else { asked };
-    wanted.iter().copied().filter(|t| seen.insert(*t)).collect()
+/// The requested items without duplicates; all items if none were requested.
+fn each_once<T: Copy + Eq + Hash>(requested: &[T], all: &[T]) -> Vec<T> {
+    let mut known = HashSet::new();
+    let items = if requested.is_empty() { all } else { requested };
+    items.iter().copied().filter(|t| known.insert(*t)).collect()
 }
 
-fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
-    // Cells may be started from elsewhere.
+fn survey_input(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
+    // The processes of cells may have another working directory.
     let path = absolute(path)?;
     let sequence = Sequence::open(&SequenceInput::from_path(&path))?;
     for note in sequence.notes() {
@@ -148,7 +148,7 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
         None => 0,
         Some(frame) => numbers.iter().position(|n| *n == frame).ok_or_else(|| {
             CliError::other(format!(
-                "--frame {frame}: {} has no such frame; there are {}",
+                "--frame {frame}: {} has no such frame; it has {}",
                 path.display(),
                 spherule_jobs::FrameRange::from_frames(numbers.iter().copied())
                     .map_or_else(String::new, |r| r.to_string())
@@ -157,27 +157,28 @@ fn look_at(path: &Path, args: &ScaleArgs) -> Result<FrameSurvey, CliError> {
     };
     if args.frame.is_none() && numbers.len() > 1 {
         note!(
-            "{} has {} frames; frame {} is measured, --frame chooses another",
+            "{} has {} frames; measuring frame {} (--frame selects another)",
             path.display(),
             numbers.len(),
             numbers[index]
         );
     }
     let aspect = f64::from(args.width) / f64::from(args.height);
-    FrameSurvey::of(&sequence, &path, index, aspect).map_err(CliError::Other)
+    FrameSurvey::of(&sequence, &path, index, aspect).map_err(|e| CliError::other(e.to_string()))
 }
 
-/// The `asked` counts that there are particles for; in place of those above, all `there` are, once.
-fn at_most(there: usize, asked: &[usize]) -> Vec<usize> {
-    let (mut fit, above): (Vec<_>, Vec<_>) = asked.iter().partition(|count| **count <= there);
+/// The `requested` counts up to `available`; larger ones are replaced by one cell with all particles.
+fn at_most(available: usize, requested: &[usize]) -> Vec<usize> {
+    let (mut fit, above): (Vec<_>, Vec<_>) =
+        requested.iter().partition(|count| **count <= available);
     if !above.is_empty() {
         let above: Vec<String> = above.iter().map(usize::to_string).collect();
         note!(
-            "the input has {there} particles; all of them are measured, once, instead of {}",
+            "the input has {available} particles, which replace {}",
             above.join(", ")
         );
-        if !fit.contains(&there) {
-            fit.push(there);
+        if !fit.contains(&available) {
+            fit.push(available);
         }
     }
     fit

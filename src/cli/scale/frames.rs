@@ -1,6 +1,5 @@
-//! Native frames for cells that trace in place: made once for all cells of a particle count and an
-//! encoding, one at a time, in a directory of ours beside the results, which is gone in the end. What a run
-//! that was killed has left of it goes with the next run.
+//! Native frames for cells that trace in place: one frame for all cells of a particle count and an encoding. There is
+//! one frame at a time, in a temporary directory next to the results. The next run removes what a killed run left.
 
 use std::fs;
 use std::io;
@@ -8,8 +7,8 @@ use std::path::{Path, PathBuf};
 
 use spherule_jobs::Interrupt;
 
-use super::measure::COMMAND;
-use crate::cli::child::{self, Ended};
+use super::measure::run_child;
+use crate::job::ChildResult;
 use crate::scale::report::Conversion;
 use crate::scale::{CellRequest, Representation, Task};
 
@@ -18,10 +17,10 @@ const DIR: &str = ".scale-frames";
 /// Name of the frame in it.
 const FILE: &str = "particles.spf";
 
-/// A native frame, and how it was made; or why there is none.
+/// A native frame and the measurements of its conversion, or the error message of its process.
 pub(super) type Made = Result<(PathBuf, Conversion), String>;
 
-/// The frame that is there now.
+/// The current frame.
 pub(super) struct Frames {
     dir: PathBuf,
     now: Option<Now>,
@@ -34,49 +33,55 @@ struct Now {
 }
 
 impl Frames {
-    /// Clears away what an earlier run has left in `output`.
+    /// Removes the temporary directory of an earlier run in `output`.
     pub(super) fn in_dir(output: &Path) -> Self {
         let dir = output.join(DIR);
         remove(&dir);
         Self { dir, now: None }
     }
 
-    /// That of the cell of `request`, whose representation has one.
-    pub(super) fn of(&mut self, request: &CellRequest, interrupt: &Interrupt) -> Ended<&Made> {
+    /// The frame for `request`, whose representation must have one.
+    pub(super) fn of(
+        &mut self,
+        request: &CellRequest,
+        interrupt: &Interrupt,
+    ) -> ChildResult<&Made> {
         let key = (request.particles, request.representation);
         let now = match self.now.take() {
             Some(now) if now.key == key => now,
             _ => {
-                // First, so that there is never room for two needed.
+                // Remove the previous frame first, so that there is never more than one on the disk.
                 remove(&self.dir);
                 match self.make(request, interrupt) {
-                    Ended::Told(made) => Now { key, made },
-                    Ended::Died(reason) => Now {
+                    ChildResult::Completed(made) => Now { key, made },
+                    ChildResult::Crashed(crash) => Now {
                         key,
-                        made: Err(reason),
+                        made: Err(crash.to_string()),
                     },
-                    Ended::Interrupted => return Ended::Interrupted,
+                    ChildResult::Interrupted => return ChildResult::Interrupted,
                 }
             }
         };
-        Ended::Told(&self.now.insert(now).made)
+        ChildResult::Completed(&self.now.insert(now).made)
     }
 
-    fn make(&self, request: &CellRequest, interrupt: &Interrupt) -> Ended<Made> {
+    fn make(&self, request: &CellRequest, interrupt: &Interrupt) -> ChildResult<Made> {
         if let Err(e) = fs::create_dir(&self.dir) {
             let dir = self.dir.display();
-            return Ended::Told(Err(format!("{dir}: {e}")));
+            return ChildResult::Completed(Err(format!("{dir}: {e}")));
         }
         let path = self.dir.join(FILE);
         let task = Task::Convert {
             request: request.clone(),
             path: path.clone(),
         };
-        let ended: Ended<Result<_, String>> = child::run(COMMAND, &task, || interrupt.is_raised());
+        let ended: ChildResult<Result<_, String>> = run_child(&task, || interrupt.is_raised());
         match ended {
-            Ended::Told(made) => Ended::Told(made.map(|conversion| (path, conversion))),
-            Ended::Died(reason) => Ended::Told(Err(reason)),
-            Ended::Interrupted => Ended::Interrupted,
+            ChildResult::Completed(made) => {
+                ChildResult::Completed(made.map(|conversion| (path, conversion)))
+            }
+            ChildResult::Crashed(crash) => ChildResult::Completed(Err(crash.to_string())),
+            ChildResult::Interrupted => ChildResult::Interrupted,
         }
     }
 }
@@ -87,7 +92,7 @@ impl Drop for Frames {
     }
 }
 
-/// Removes `dir` with all that is in it, if it is there.
+/// Removes `dir` and its content, if it exists.
 fn remove(dir: &Path) {
     match fs::remove_dir_all(dir) {
         Err(e) if e.kind() != io::ErrorKind::NotFound => {

@@ -12,7 +12,7 @@ use super::numbers::pixels_to;
 use super::progress::{duration, openjd};
 use super::{CliError, Outcome, events, print, signals};
 use crate::accel::Structure;
-use crate::cli::child::{self, Ended};
+use crate::job::ChildResult;
 use crate::manifest::{MAX_THREADS, ProgressMode};
 use crate::render::{MAX_DEPTH, MAX_SAMPLES, MAX_SIDE};
 use crate::report::machine::Machine;
@@ -24,7 +24,7 @@ use crate::scale::{Budget, CellRequest, Motion, Representation, Task};
 mod experiment;
 mod frames;
 pub(super) mod measure;
-mod words;
+mod values;
 
 use experiment::Experiment;
 use frames::Frames;
@@ -34,32 +34,32 @@ Examples:
   spherule scale -o scale
       The whole experiment: 36 cells of a minute each
   spherule scale --particles 1e5,1e6 --structures lbvh,kdtree --seconds 10
-      Two structures, quickly
+      Two structures, in short
   spherule scale --input run1 --frame 100 --images 20
-      Particles of your own";
+      Your own particles";
 
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES)]
 pub(super) struct ScaleArgs {
-    /// Particle counts; 1e6 is understood.
+    /// Particle counts, such as 1e6.
     #[arg(long, value_name = "LIST", value_delimiter = ',', default_value = "1e5,1e6,1e7",
-        value_parser = words::particles, allow_hyphen_values = true, help_heading = "Experiment")]
+        value_parser = values::particles, allow_hyphen_values = true, help_heading = "Experiment")]
     particles: Vec<usize>,
     /// Acceleration structures: lbvh, kdtree, bvh, sbvh [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::structure, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::structure, help_heading = "Experiment")]
     structures: Vec<Structure>,
     /// Camera motions: rotation, translation, both [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::motion, help_heading = "Experiment")]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::motion, help_heading = "Experiment")]
     motions: Vec<Motion>,
-    /// Where positions are: memory, f32, q16, q10 [default: memory]
+    /// Where positions are stored: memory, f32, q16, q10 [default: memory]
     ///
-    /// All but memory are a mapped native frame of that encoding, traced where it lies (kdtree alone).
-    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = words::representation, help_heading = "Experiment")]
+    /// All except memory use a memory-mapped native frame of that encoding, traced in place (kdtree only).
+    #[arg(long, value_name = "LIST", value_delimiter = ',', value_parser = values::representation, help_heading = "Experiment")]
     representations: Vec<Representation>,
-    /// Seconds that the images of a cell are traced for [default: 60]
-    #[arg(long, value_parser = words::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
+    /// Tracing time per cell, in seconds [default: 60]
+    #[arg(long, value_parser = values::seconds, conflicts_with = "images", allow_hyphen_values = true, help_heading = "Experiment")]
     seconds: Option<f64>,
-    /// Images of a cell, instead of a time.
+    /// Number of images per cell, instead of a time.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..), allow_hyphen_values = true, help_heading = "Experiment")]
     images: Option<u32>,
     /// Image width in pixels.
@@ -70,7 +70,7 @@ pub(super) struct ScaleArgs {
     #[arg(long, default_value_t = 1080, allow_hyphen_values = true,
         value_parser = pixels_to(MAX_SIDE), help_heading = "Image")]
     height: u32,
-    /// Reflections and refractions followed; 1 is direct light only.
+    /// Maximum depth of reflections and refractions; 1 is direct light only.
     #[arg(long, visible_alias = "depth", default_value_t = 3, allow_hyphen_values = true,
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_DEPTH)), help_heading = "Image")]
     max_depth: u32,
@@ -78,13 +78,13 @@ pub(super) struct ScaleArgs {
     #[arg(long, default_value_t = 1, allow_hyphen_values = true,
         value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_SAMPLES)), help_heading = "Image")]
     samples: u32,
-    /// Seed of the box, or of the choice among the input's particles.
+    /// Seed of the box, or of the selection of input particles.
     #[arg(long, default_value_t = 1, help_heading = "Input")]
     seed: u64,
-    /// Particles of your own instead of the box: a file, a pattern or a directory.
+    /// Your own particles instead of the box: a file, a pattern or a directory.
     #[arg(long, value_name = "PATH", help_heading = "Input")]
     input: Option<PathBuf>,
-    /// Which frame of the input [default: the first]
+    /// Frame of the input [default: the first]
     #[arg(
         long,
         value_name = "NUMBER",
@@ -102,7 +102,7 @@ pub(super) struct ScaleArgs {
         help_heading = "Output"
     )]
     output: PathBuf,
-    /// Threads to use [default: all]; at most 4 for each processor are used.
+    /// Threads to use [default: all]; at most 4 per processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)), help_heading = "Job")]
     threads: Option<u32>,
     /// How progress is shown.
@@ -110,15 +110,15 @@ pub(super) struct ScaleArgs {
     progress: ProgressMode,
 }
 
-const WORDS: signals::Words = signals::Words {
-    asked: "stopping; what is measured is kept",
-    at_once: "stopped",
+const SIGNAL_MESSAGES: signals::SignalMessages = signals::SignalMessages {
+    stopping: "stopping; finished cells are kept",
+    stopped: "stopped",
 };
 
 pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
-    let signals = signals::listen(WORDS)?;
+    let signals = signals::listen(SIGNAL_MESSAGES)?;
     if args.progress == ProgressMode::Json {
-        events::begin();
+        events::start();
     }
     let experiment = Experiment::settle(args)?;
     prepare(&args.output)?;
@@ -130,13 +130,13 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         settings: experiment.settings,
         cells: Vec::with_capacity(cells.len()),
     };
-    say!("{}", table::subject(&report));
+    message!("{}", table::subject(&report));
     let output = args.output.display().to_string();
     events::send(
         "start",
         json!({"command": "scale", "total": cells.len(), "output": output}),
     );
-    let ended = measure_all(&cells, &mut report, args, signals.at_work());
+    let ended = measure_all(&cells, &mut report, args, signals.start_work());
     if report.cells.is_empty() {
         return Ok(Outcome::Interrupted);
     }
@@ -144,7 +144,7 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
         .failed()
         .map(|(cell, _)| table::cell_name(cell))
         .collect();
-    events::at_end(json!({
+    events::add_to_end(json!({
         "done": report.cells.len() - failed.len(),
         "total": report.planned,
         "failed": failed,
@@ -152,12 +152,12 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     show_tables(&report, args.progress)?;
     if let Some((path, source)) = ended.unwritten {
         let error = CliError::Io { path, source };
-        say!("error: {error}");
-        events::at_end(json!({"errors": [error.to_string()]}));
+        message!("error: {error}");
+        events::add_to_end(json!({"errors": [error.to_string()]}));
         return Ok(Outcome::SomeFailed);
     }
     let [json, csv, html] = [JSON, CSV, HTML];
-    say!("{json}, {csv} and {html} are in {}", args.output.display());
+    message!("{json}, {csv} and {html} are in {}", args.output.display());
     Ok(if ended.interrupted {
         Outcome::Interrupted
     } else if report.failed().next().is_some() {
@@ -167,15 +167,15 @@ pub(super) fn run(args: &ScaleArgs) -> Result<Outcome, CliError> {
     })
 }
 
-/// What came of the run as a whole.
+/// How the run ended.
 #[derive(Default)]
 struct EndOfRun {
     interrupted: bool,
-    /// What the last try to write results met.
+    /// The error of the last attempt to write the results.
     unwritten: Option<(PathBuf, io::Error)>,
 }
 
-/// Runs `cells` one after the other and puts what they tell into `report` and the files.
+/// Runs `cells` one after the other, and adds their results to `report` and the files.
 fn measure_all(
     cells: &[CellRequest],
     report: &mut ScaleReport,
@@ -191,14 +191,14 @@ fn measure_all(
     let mut ended = EndOfRun::default();
     let mut frames = Frames::in_dir(&args.output);
     for request in cells {
-        let Ended::Told(outcome) = measure_one(request, &mut frames, interrupt) else {
+        let ChildResult::Completed(outcome) = measure_one(request, &mut frames, interrupt) else {
             ended.interrupted = true;
             break;
         };
         report.cells.push(cell_report(request, outcome));
         progress.show(report);
-        // After every cell: a long run that is killed has not run for nothing. One that finds the
-        // disk full goes on, in the hope of room and for its tables.
+        // Write after every cell, so that a killed run keeps its results. If the disk is full, continue: there may be
+        // space later, and the tables are printed in any case.
         ended.unwritten = files::write(&args.output, report).err();
     }
     ended
@@ -209,16 +209,19 @@ fn measure_one(
     request: &CellRequest,
     frames: &mut Frames,
     interrupt: &Interrupt,
-) -> Ended<CellOutcome> {
+) -> ChildResult<CellOutcome> {
     let mut made = None;
     if request.representation.encoding().is_some() {
         match frames.of(request, interrupt) {
-            Ended::Interrupted => return Ended::Interrupted,
-            Ended::Died(reason) => return Ended::Told(CellOutcome::Failed { reason }),
-            Ended::Told(Ok(frame)) => made = Some(frame),
-            Ended::Told(Err(reason)) => {
-                let reason = format!("no native frame: {reason}");
-                return Ended::Told(CellOutcome::Failed { reason });
+            ChildResult::Interrupted => return ChildResult::Interrupted,
+            ChildResult::Crashed(crash) => {
+                let reason = crash.to_string();
+                return ChildResult::Completed(CellOutcome::Failed { reason });
+            }
+            ChildResult::Completed(Ok(frame)) => made = Some(frame),
+            ChildResult::Completed(Err(reason)) => {
+                let reason = format!("cannot make the native frame: {reason}");
+                return ChildResult::Completed(CellOutcome::Failed { reason });
             }
         }
     }
@@ -227,13 +230,12 @@ fn measure_one(
         file: made.map(|(path, _)| path.clone()),
     };
     let stop = || interrupt.is_raised();
-    let measured: Result<CellMeasurement, String> = match child::run(measure::COMMAND, &task, stop)
-    {
-        Ended::Interrupted => return Ended::Interrupted,
-        Ended::Told(measured) => measured,
-        Ended::Died(reason) => Err(reason),
+    let measured: Result<CellMeasurement, String> = match measure::run_child(&task, stop) {
+        ChildResult::Interrupted => return ChildResult::Interrupted,
+        ChildResult::Completed(measured) => measured,
+        ChildResult::Crashed(crash) => Err(crash.to_string()),
     };
-    Ended::Told(match measured {
+    ChildResult::Completed(match measured {
         Err(reason) => CellOutcome::Failed { reason },
         Ok(measured) => CellOutcome::Done(Box::new(CellMeasurement {
             conversion: made.map(|(_, conversion)| *conversion),
@@ -252,17 +254,17 @@ fn cell_report(request: &CellRequest, outcome: CellOutcome) -> CellReport {
     }
 }
 
-/// Sees that results can be written, before hours are spent on them.
+/// Checks that results can be written, before hours are spent on them.
 fn prepare(dir: &Path) -> Result<(), CliError> {
     if let Some(file) = dir.ancestors().find(|p| p.exists() && !p.is_dir()) {
         return Err(CliError::other(format!(
-            "{}: is a file where a directory for the results should be; choose another with -o",
+            "{}: is a file, but a directory for the results is needed; choose another with -o",
             file.display()
         )));
     }
     if let Some(path) = files::foreign(dir) {
         return Err(CliError::other(format!(
-            "{}: is in the way and not of `{MADE_BY}`; move it or choose another directory with -o",
+            "{}: exists and was not written by `{MADE_BY}`; move it or choose another directory with -o",
             path.display()
         )));
     }
@@ -274,7 +276,7 @@ fn prepare(dir: &Path) -> Result<(), CliError> {
     })
 }
 
-/// Prints the result, beside the events if standard output is theirs.
+/// Prints the tables; to standard error if standard output has the events.
 fn show_tables(report: &ScaleReport, mode: ProgressMode) -> Result<(), CliError> {
     let text = table::text(report);
     if mode == ProgressMode::Json {
@@ -285,7 +287,7 @@ fn show_tables(report: &ScaleReport, mode: ProgressMode) -> Result<(), CliError>
     Ok(())
 }
 
-/// Tells one cell after the other.
+/// Reports each finished cell.
 struct Progress {
     mode: ProgressMode,
     total: usize,
@@ -309,25 +311,25 @@ impl Progress {
             event,
             json!({"cell": cell, "done": done, "total": self.total}),
         );
-        let told = match &cell.outcome {
+        let summary = match &cell.outcome {
             CellOutcome::Done(measured) => table::line(measured),
             CellOutcome::Failed { reason } => {
-                say!("error: {name}: {reason}");
+                message!("error: {name}: {reason}");
                 "failed".to_owned()
             }
         };
         match self.mode {
-            ProgressMode::Auto | ProgressMode::Plain => say!(
-                "[{done}/{}] {name}: {told}, {} left",
+            ProgressMode::Auto | ProgressMode::Plain => message!(
+                "[{done}/{}] {name}: {summary}, {} left",
                 self.total,
                 self.remaining(done)
             ),
-            ProgressMode::Openjd => openjd(done, self.total, &format!("{name}: {told}")),
+            ProgressMode::Openjd => openjd(done, self.total, &format!("{name}: {summary}")),
             ProgressMode::Json | ProgressMode::None => {}
         }
     }
 
-    /// Cells that are still to come are larger, but take their time at least.
+    /// Estimate from the mean so far; a cell takes at least its time budget.
     fn remaining(&self, done: usize) -> String {
         let mean = self.start.elapsed().as_secs_f64() / done.max(1) as f64;
         let each = match self.budget {

@@ -1,4 +1,4 @@
-//! `spherule status`: how a job stands, and who is at it.
+//! `spherule status`: prints the state of a job and its workers.
 
 use std::io::{self, IsTerminal};
 use std::path::{Path, PathBuf};
@@ -6,10 +6,10 @@ use std::thread;
 use std::time::Duration;
 
 use clap::Args;
-use spherule_jobs::{FrameState, Job, JobState, Status, Summary, WorkerView};
+use spherule_jobs::{EntryStatus, FrameState, Job, JobState, JobSummary, WorkerStatus};
 
+use super::job::{job_directory, no_job};
 use super::print::{self, Reader};
-use super::work::{job_directory, no_job};
 use super::{CliError, Outcome};
 
 mod show;
@@ -21,49 +21,50 @@ pub(super) struct StatusArgs {
     /// One JSON object.
     #[arg(long)]
     json: bool,
-    /// Tell again every two seconds, until all frames are done or nobody is at work.
+    /// Repeat every two seconds until all frames are done or no worker is active.
     #[arg(long)]
     watch: bool,
 }
 
-/// Between two looks.
-const PAUSE: Duration = Duration::from_secs(2);
+/// Time between updates.
+const WATCH_INTERVAL: Duration = Duration::from_secs(2);
 
-/// Frames whose ends the rate is taken from.
-const RECENT: usize = 50;
+/// Number of recent frames from which the rate is computed.
+const MAX_RATE_FRAMES: usize = 50;
 
-/// A job at one moment.
-struct Standing {
+/// The state of a job at one moment.
+struct JobSnapshot {
     dir: PathBuf,
     state: JobState,
-    summary: Summary,
-    workers: Vec<WorkerView>,
+    summary: JobSummary,
+    workers: Vec<WorkerStatus>,
 }
 
 pub(super) fn run(args: &StatusArgs) -> Result<Outcome, CliError> {
     let dir = job_directory(&args.job)?;
     let clears = args.watch && !args.json && io::stdout().is_terminal();
     loop {
-        let standing = Standing::now(&dir)?;
+        let snapshot = JobSnapshot::now(&dir)?;
         let reader = if args.json {
-            print::json(&standing.to_json())?
+            print::json(&snapshot.to_json())?
         } else if clears {
-            print::lines_afresh(standing.to_lines())?
+            print::lines_afresh(snapshot.to_lines())?
         } else {
-            print::lines(standing.to_lines())?
+            print::lines(snapshot.to_lines())?
         };
-        let is_over =
-            !args.watch || standing.summary.pending == 0 || standing.living().next().is_none();
+        let is_over = !args.watch
+            || snapshot.summary.pending == 0
+            || snapshot.living_workers().next().is_none();
         if is_over || reader == Reader::Gone {
-            return Ok(standing.outcome());
+            return Ok(snapshot.outcome());
         }
-        thread::sleep(PAUSE);
+        thread::sleep(WATCH_INTERVAL);
     }
 }
 
-impl Standing {
+impl JobSnapshot {
     fn now(dir: &Path) -> Result<Self, CliError> {
-        // First: what a worker has in hand now may be done in a moment, but not the other way around.
+        // Read workers before the ledger: a frame in progress may become done in between, but not the reverse
         let workers = Job::workers(dir)?;
         let Some(state) = Job::read(dir)? else {
             return Err(no_job(dir));
@@ -77,11 +78,11 @@ impl Standing {
     }
 
     /// Workers that have not certainly ended.
-    fn living(&self) -> impl Iterator<Item = &WorkerView> {
+    fn living_workers(&self) -> impl Iterator<Item = &WorkerStatus> {
         self.workers.iter().filter(|worker| !worker.has_ended)
     }
 
-    /// Frames of the plan that stand so.
+    /// Frames of the plan in this state.
     fn frames(&self, state: FrameState) -> Vec<i64> {
         let numbers = self.state.plan().frames().iter().map(|f| f.number);
         numbers
@@ -89,35 +90,38 @@ impl Standing {
             .collect()
     }
 
-    /// Frames in the hands of living workers, ascending.
+    /// Frames that living workers are working on, ascending.
     fn running(&self) -> Vec<i64> {
-        let mut frames: Vec<i64> = self.living().flat_map(|w| w.frames.clone()).collect();
+        let mut frames: Vec<i64> = self
+            .living_workers()
+            .flat_map(|w| w.frames.clone())
+            .collect();
         frames.retain(|frame| self.state.frame_state(*frame) != Some(FrameState::Done));
         frames.sort_unstable();
         frames
     }
 
-    /// Frames a second of late, if somebody is at work and enough is known.
+    /// Frames per second recently, if a worker is active and enough frames are done.
     fn rate(&self) -> Option<f64> {
-        let begun = self.living().map(|worker| worker.since_ms).min()?;
+        let started = self.living_workers().map(|worker| worker.since_ms).min()?;
         let entries = self.state.ledger().entries();
-        let done = entries.filter(|e| e.status == Status::Done && e.time_ms >= begun);
+        let done = entries.filter(|e| e.status == EntryStatus::Done && e.time_ms >= started);
         let mut times: Vec<u64> = done.map(|entry| entry.time_ms).collect();
-        // Counts the frames that ended after it.
-        times.push(begun);
+        // The start of the first interval
+        times.push(started);
         times.sort_unstable();
-        let recent = &times[times.len().saturating_sub(RECENT + 1)..];
+        let recent = &times[times.len().saturating_sub(MAX_RATE_FRAMES + 1)..];
         let (first, last) = (recent.first()?, recent.last()?);
         let seconds = (last - first) as f64 / 1000.0;
         (seconds > 0.0).then(|| (recent.len() - 1) as f64 / seconds)
     }
 
-    /// Seconds left at that rate.
+    /// Remaining seconds at that rate.
     fn seconds_left(&self) -> Option<f64> {
         Some(self.summary.pending as f64 / self.rate()?)
     }
 
-    /// For scripts: whether it is done, has failures, or is to be gone on with.
+    /// The exit status: all done, some failed, or not finished.
     fn outcome(&self) -> Outcome {
         if self.summary.done == self.summary.total {
             Outcome::Done

@@ -1,16 +1,16 @@
-//! How a job stands, for people and for scripts.
+//! The state of a job as text and as JSON.
 
 use serde_json::{Value, json};
-use spherule_jobs::{FrameState, WorkerView};
+use spherule_jobs::{FrameState, WorkerStatus};
 
-use super::Standing;
+use super::JobSnapshot;
+use crate::cli::job::list;
 use crate::cli::progress::duration;
-use crate::cli::work::list;
 
-/// Failed frames that are told with their reasons.
-const MOST_REASONS: usize = 20;
+/// Number of failed frames that are printed with their reasons.
+const MAX_REASONS: usize = 20;
 
-impl Standing {
+impl JobSnapshot {
     pub(super) fn to_lines(&self) -> Vec<String> {
         let mut lines = Vec::new();
         let mut line = |name: &str, what: &str| lines.push(format!("{name:<9} {what}"));
@@ -24,24 +24,24 @@ impl Standing {
         let running = self.running();
         frames("done", &self.frames(FrameState::Done));
         frames("running", &running);
-        frames("to do", &self.pending_but(&running));
+        frames("to do", &self.pending_without(&running));
         frames("missing", &self.summary.lost);
         frames("failed", &self.summary.failed);
         for worker in &self.workers {
-            line("worker", &told(worker));
+            line("worker", &worker_line(worker));
         }
         if let (Some(rate), Some(left)) = (self.rate(), self.seconds_left()) {
-            let each = format!("{rate:.2} frames a second");
+            let each = format!("{rate:.2} frames per second");
             line("rate", &format!("{each}, {} left", duration(left)));
         }
-        for (frame, reason) in self.reasons().take(MOST_REASONS) {
+        for (frame, reason) in self.reasons().take(MAX_REASONS) {
             line("failure", &format!("frame {frame}: {reason}"));
         }
         lines
     }
 
-    /// Frames not tried yet that nobody has in hand.
-    fn pending_but(&self, running: &[i64]) -> Vec<i64> {
+    /// Frames that were not tried yet and that no worker is working on.
+    fn pending_without(&self, running: &[i64]) -> Vec<i64> {
         let mut pending = self.frames(FrameState::Pending);
         pending.retain(|frame| running.binary_search(frame).is_err());
         pending
@@ -51,7 +51,7 @@ impl Standing {
     fn reasons(&self) -> impl Iterator<Item = (i64, &str)> {
         self.summary.failed.iter().filter_map(|frame| {
             let entry = self.state.ledger().entry(*frame)?;
-            Some((*frame, entry.reason.as_deref().unwrap_or("not told")))
+            Some((*frame, entry.reason.as_deref().unwrap_or("unknown")))
         })
     }
 
@@ -67,7 +67,7 @@ impl Standing {
             "frames": self.summary.total,
             "done": self.frames(FrameState::Done),
             "running": running,
-            "pending": self.pending_but(&running),
+            "pending": self.pending_without(&running),
             "missing": self.summary.lost,
             "failed": failed,
             "workers": workers,
@@ -77,29 +77,31 @@ impl Standing {
     }
 }
 
-fn told(worker: &WorkerView) -> String {
-    let who = format!("process {} on {}", worker.pid, worker.host);
-    let hands = match worker.frames.as_slice() {
-        [] => "no frame in hand".to_owned(),
-        frames => format!("frame {} in hand", list(frames)),
+fn worker_line(worker: &WorkerStatus) -> String {
+    let process = format!("process {} on {}", worker.pid, worker.host);
+    let work = match worker.frames.as_slice() {
+        [] => "no frame".to_owned(),
+        frames => format!("working on frame {}", list(frames)),
     };
-    let standing = if worker.has_ended {
-        "has died: whoever works next takes over".to_owned()
+    let liveness = if worker.has_ended {
+        "has died; the next worker takes over".to_owned()
     } else {
-        let silent = worker.silent_for.map_or(0.0, |time| time.as_secs_f64());
-        format!("last sign of life {} ago", duration(silent))
+        let seconds = worker
+            .since_heartbeat
+            .map_or(0.0, |time| time.as_secs_f64());
+        format!("last heartbeat {} ago", duration(seconds))
     };
-    format!("{who}: {hands}, {standing}")
+    format!("{process}: {work}, {liveness}")
 }
 
-fn worker_json(worker: &WorkerView) -> Value {
+fn worker_json(worker: &WorkerStatus) -> Value {
     json!({
         "worker": worker.worker,
         "host": worker.host,
         "pid": worker.pid,
         "since_ms": worker.since_ms,
         "has_ended": worker.has_ended,
-        "silent_seconds": worker.silent_for.map(|time| time.as_secs_f64()),
+        "silent_seconds": worker.since_heartbeat.map(|time| time.as_secs_f64()),
         "frames": worker.frames,
     })
 }

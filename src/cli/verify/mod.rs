@@ -1,4 +1,4 @@
-//! `spherule verify`: opens and decodes everything that a job has finished.
+//! `spherule verify`: opens and decodes all finished outputs of a job.
 
 use std::fs::{self, File};
 use std::io::{self, BufReader};
@@ -6,75 +6,78 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use rayon::prelude::*;
+use spherule_formats::FrameError;
 use spherule_formats::native::{Access, NativeFile};
-use spherule_jobs::{Entry, FrameRange, Job, JobState, PLAN_FILE, PlannedFrame, Status};
+use spherule_jobs::{
+    EntryStatus, FrameRange, Job, JobState, LedgerEntry, PLAN_FILE, Panic, PlannedFrame,
+    catch_panic,
+};
 
+use super::job::{job_directory, list, no_job, use_threads};
 use super::print::{self, Reader};
-use super::work::{job_directory, list, no_job, use_threads};
 use super::{CliError, Outcome};
 use crate::manifest::MAX_THREADS;
-use crate::mishap::guarded;
-use crate::output::{verify_exr, verify_preview};
-use made::Made;
+use crate::output::{ImageFault, verify_exr, verify_preview};
+use expected::ExpectedOutput;
 
-mod made;
+mod expected;
 mod show;
 
 #[derive(Debug, Args)]
 pub(super) struct VerifyArgs {
     /// A job: the directory of its images or native frames, or its manifest (job.toml).
     job: PathBuf,
-    /// Frames to look at: 7 | 1-10 | 1-10x2 | 1-5,8.
+    /// Frames to check: 7 | 1-10 | 1-10x2 | 1-5,8.
     #[arg(long, value_name = "RANGE", allow_hyphen_values = true)]
     frames: Option<FrameRange>,
-    /// One JSON object a frame, one a line.
+    /// One JSON object per frame and line.
     #[arg(long)]
     json: bool,
-    /// Set damaged frames back, so that the next run of the job makes them anew. Deletes nothing; what is
-    /// missing or of another length is made anew in any case.
+    /// Requeue damaged frames, so that the next run of the job repeats them. Deletes nothing. Missing outputs and
+    /// those of another length are repeated in any case.
     #[arg(long)]
     requeue_bad: bool,
-    /// Threads to use [default: all]; at most 4 for each processor are used.
+    /// Threads to use [default: all]; at most 4 per processor are used.
     #[arg(long, value_parser = clap::value_parser!(u32).range(1..=i64::from(MAX_THREADS)))]
     threads: Option<u32>,
 }
 
-/// How a file, or a frame by the worst of its files, stands. From good to bad.
+/// The result for a file, or for a frame by the worst of its files. From good to bad.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
 enum Verdict {
-    /// All of it can be read.
+    /// Readable.
     Sound,
     /// Not tried yet.
     Pending,
-    /// Tried without success.
+    /// Failed.
     Failed,
-    /// Not as long as it was when it was finished.
+    /// Not of the recorded length.
     Length,
-    /// Not there.
+    /// Does not exist.
     Missing,
-    /// Cannot be read, or is something else.
+    /// Cannot be read, or is another kind of file.
     Damaged,
 }
 
-/// One file of a finished frame.
-struct Verified {
+/// The result for one file of a finished frame.
+struct FileVerdict {
     path: String,
     verdict: Verdict,
-    /// What is wrong with it.
+    /// What is wrong with the file.
     reason: Option<String>,
 }
 
-/// One frame of the plan.
+/// The result for one frame of the plan.
 struct FrameVerdict {
     frame: i64,
     verdict: Verdict,
-    /// Why it failed, if it did.
+    /// Why the frame failed, if it did.
     reason: Option<String>,
-    files: Vec<Verified>,
+    files: Vec<FileVerdict>,
 }
 
 impl FrameVerdict {
-    /// The frame and what its first damaged file suffers from.
+    /// The frame and the damage of its first damaged file.
     fn damage(&self) -> Option<(i64, String)> {
         let mut files = self.files.iter();
         let file = files.find(|f| f.verdict == Verdict::Damaged)?;
@@ -83,8 +86,8 @@ impl FrameVerdict {
     }
 }
 
-/// Frames looked at between two looks at the output, for each thread.
-const AT_ONCE: usize = 4;
+/// Frames per thread between two writes to the output.
+const FRAMES_PER_THREAD: usize = 4;
 
 pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     use_threads(args.threads)?;
@@ -92,17 +95,19 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     let Some(state) = Job::read(&dir)? else {
         return Err(no_job(&dir));
     };
-    let made = Made::of(state.plan())
-        .map_err(|what| CliError::other(format!("{}: {what}", dir.join(PLAN_FILE).display())))?;
-    let frames = chosen(&state, args.frames.as_ref())?;
+    let expected = ExpectedOutput::of(state.plan())
+        .map_err(|e| CliError::other(format!("{}: {e}", dir.join(PLAN_FILE).display())))?;
+    let frames = selected(&state, args.frames.as_ref())?;
     let mut verdicts = Vec::with_capacity(frames.len());
     let mut damaged = Vec::new();
-    for some in frames.chunks(AT_ONCE * rayon::current_num_threads()) {
-        let looked = some.par_iter().map(|frame| look(&state, frame, made));
-        let looked: Vec<FrameVerdict> = looked.collect();
-        let reader = print::lines(looked.iter().flat_map(|f| f.lines(args.json)))?;
-        damaged.extend(looked.iter().filter_map(FrameVerdict::damage));
-        verdicts.extend(looked.iter().map(|f| (f.frame, f.verdict)));
+    for chunk in frames.chunks(FRAMES_PER_THREAD * rayon::current_num_threads()) {
+        let checked = chunk
+            .par_iter()
+            .map(|frame| check_frame(&state, frame, &expected));
+        let checked: Vec<FrameVerdict> = checked.collect();
+        let reader = print::lines(checked.iter().flat_map(|f| f.lines(args.json)))?;
+        damaged.extend(checked.iter().filter_map(FrameVerdict::damage));
+        verdicts.extend(checked.iter().map(|f| (f.frame, f.verdict)));
         if reader == Reader::Gone {
             break;
         }
@@ -113,7 +118,7 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     if args.requeue_bad
         && let Err(error) = requeue(&state, &damaged)
     {
-        say!("error: {error}");
+        message!("error: {error}");
     }
     let is_bad = |(_, verdict): &(i64, Verdict)| *verdict >= Verdict::Length;
     Ok(if verdicts.iter().any(is_bad) {
@@ -123,22 +128,22 @@ pub(super) fn run(args: &VerifyArgs) -> Result<Outcome, CliError> {
     })
 }
 
-/// Sets frames back with what is wrong with them.
+/// Requeues damaged frames.
 fn requeue(state: &JobState, damaged: &[(i64, String)]) -> Result<(), CliError> {
     if damaged.is_empty() {
         return Ok(());
     }
-    let set_back = Job::requeue(state, damaged)?;
-    if !set_back.is_empty() {
-        say!(
-            "set back: {}; the next run of the job makes them anew",
-            list(&set_back)
+    let requeued = Job::requeue(state, damaged)?;
+    if !requeued.is_empty() {
+        message!(
+            "requeued: {}; the next run of the job repeats them",
+            list(&requeued)
         );
     }
     Ok(())
 }
 
-fn chosen<'a>(
+fn selected<'a>(
     state: &'a JobState,
     range: Option<&FrameRange>,
 ) -> Result<Vec<&'a PlannedFrame>, CliError> {
@@ -147,74 +152,83 @@ fn chosen<'a>(
         return Ok(plan.frames().iter().collect());
     };
     let numbers: Vec<i64> = plan.frames().iter().map(|f| f.number).collect();
-    let chosen = range.select(&numbers);
-    if chosen.is_empty() {
+    let selected = range.select(&numbers);
+    if selected.is_empty() {
         return Err(CliError::other(format!(
-            "--frames: {range} has none of the job's frames: {}",
+            "--frames: {range} contains none of the job's frames: {}",
             list(&numbers)
         )));
     }
-    Ok(chosen.iter().filter_map(|n| plan.frame(*n)).collect())
+    Ok(selected.iter().filter_map(|n| plan.frame(*n)).collect())
 }
 
-fn look(state: &JobState, planned: &PlannedFrame, made: Made) -> FrameVerdict {
-    let open = |verdict, reason| FrameVerdict {
+fn check_frame(
+    state: &JobState,
+    planned: &PlannedFrame,
+    expected: &ExpectedOutput,
+) -> FrameVerdict {
+    let without_files = |verdict, reason| FrameVerdict {
         frame: planned.number,
         verdict,
         reason,
         files: Vec::new(),
     };
     match state.ledger().entry(planned.number) {
-        None => open(Verdict::Pending, None),
-        Some(entry) if entry.status == Status::Failed => {
-            open(Verdict::Failed, entry.reason.clone())
+        None => without_files(Verdict::Pending, None),
+        Some(entry) if entry.status == EntryStatus::Failed => {
+            without_files(Verdict::Failed, entry.reason.clone())
         }
         Some(entry) => {
             let outputs = planned.outputs.iter();
-            let files: Vec<Verified> = outputs
-                .map(|path| look_at_file(state.dir(), path, entry, made))
+            let files: Vec<FileVerdict> = outputs
+                .map(|path| check_file(state.dir(), path, entry, expected))
                 .collect();
             let worst = files.iter().map(|f| f.verdict).max();
             FrameVerdict {
                 files,
-                ..open(worst.unwrap_or(Verdict::Sound), None)
+                ..without_files(worst.unwrap_or(Verdict::Sound), None)
             }
         }
     }
 }
 
-/// Looks at the output `path` of a frame whose last word is `entry`.
-fn look_at_file(dir: &Path, path: &str, entry: &Entry, made: Made) -> Verified {
-    let (verdict, reason) = match found(dir, path, entry) {
+/// Checks the output `path` of a frame whose latest entry is `entry`.
+fn check_file(
+    dir: &Path,
+    path: &str,
+    entry: &LedgerEntry,
+    expected: &ExpectedOutput,
+) -> FileVerdict {
+    let (verdict, reason) = match find_file(dir, path, entry) {
         Err((verdict, reason)) => (verdict, Some(reason)),
-        Ok(file) => match guarded(|| decode(&file, made)) {
+        Ok(file) => match catch_panic(|| decode(&file, expected)) {
             Ok(()) => (Verdict::Sound, None),
-            Err(reason) => (Verdict::Damaged, Some(reason)),
+            Err(error) => (Verdict::Damaged, Some(error.reason(&file))),
         },
     };
-    Verified {
+    FileVerdict {
         path: path.to_owned(),
         verdict,
         reason,
     }
 }
 
-/// The file itself, if it is there and as long as it was.
-fn found(dir: &Path, path: &str, entry: &Entry) -> Result<PathBuf, (Verdict, String)> {
+/// The path of the file, if it exists and has the recorded length.
+fn find_file(dir: &Path, path: &str, entry: &LedgerEntry) -> Result<PathBuf, (Verdict, String)> {
     let Some(output) = entry.outputs.iter().find(|o| o.path == path) else {
-        let reason = "was not made under this name".to_owned();
+        let reason = "was not written under this name".to_owned();
         return Err((Verdict::Missing, reason));
     };
     let file = dir.join(path);
     let metadata = match fs::metadata(&file) {
         Ok(metadata) => metadata,
         Err(e) if e.kind() == io::ErrorKind::NotFound => {
-            return Err((Verdict::Missing, "is not there".to_owned()));
+            return Err((Verdict::Missing, "does not exist".to_owned()));
         }
         Err(e) => return Err((Verdict::Damaged, format!("cannot be read: {e}"))),
     };
     if !metadata.is_file() {
-        return Err((Verdict::Damaged, "is no regular file".to_owned()));
+        return Err((Verdict::Damaged, "is not a regular file".to_owned()));
     }
     if metadata.len() != output.len {
         let reason = format!("has {} bytes, {} were written", metadata.len(), output.len);
@@ -223,41 +237,53 @@ fn found(dir: &Path, path: &str, entry: &Entry) -> Result<PathBuf, (Verdict, Str
     Ok(file)
 }
 
+/// Why a file cannot be decoded.
+#[derive(Debug, thiserror::Error)]
+enum DecodeError {
+    #[error("cannot be read: {0}")]
+    Io(#[from] io::Error),
+    #[error(transparent)]
+    Image(#[from] ImageFault),
+    #[error(transparent)]
+    Native(#[from] FrameError),
+    #[error(transparent)]
+    Panic(#[from] Panic),
+}
+
+impl DecodeError {
+    /// The message without the path of the file, which is printed before it.
+    fn reason(&self, file: &Path) -> String {
+        let text = self.to_string();
+        let path = format!("{}: ", file.display());
+        text.strip_prefix(&path).unwrap_or(&text).to_owned()
+    }
+}
+
 /// Reads all of `file`.
-fn decode(file: &Path, made: Made) -> Result<(), String> {
-    let shape = match made {
-        Made::Frames => return decode_native(file),
-        Made::Images(shape) => shape,
+fn decode(file: &Path, expected: &ExpectedOutput) -> Result<(), DecodeError> {
+    let shape = match expected {
+        ExpectedOutput::Frames => return Ok(decode_native(file)?),
+        ExpectedOutput::Images(shape) => shape,
     };
-    let opened = File::open(file).map_err(|e| format!("cannot be read: {e}"))?;
-    let reader = BufReader::with_capacity(1 << 16, opened);
+    let reader = BufReader::with_capacity(1 << 16, File::open(file)?);
     let is_preview = file
         .extension()
         .is_some_and(|e| e.eq_ignore_ascii_case("png"));
     if is_preview {
-        verify_preview(reader, &shape)
+        verify_preview(reader, shape)?;
     } else {
-        verify_exr(reader, &shape)
+        verify_exr(reader, shape)?;
     }
-    .map_err(|fault| fault.to_string())
+    Ok(())
 }
 
-/// What `inspect --verify` looks at.
-fn decode_native(path: &Path) -> Result<(), String> {
-    let look = || {
-        let file = NativeFile::open(path, Access::Map)?;
-        let verified = file
-            .frame()
-            .and_then(|frame| frame.verify_all().map_err(|e| e.in_file(path)));
-        // That the file was changed meanwhile explains whatever was found.
-        file.check()?;
-        verified
-    };
-    look().map_err(|e| without_path(&e.to_string(), path))
-}
-
-/// The path stands before the reason already.
-fn without_path(text: &str, path: &Path) -> String {
-    let path = format!("{}: ", path.display());
-    text.strip_prefix(&path).unwrap_or(text).to_owned()
+/// The same check as `inspect --verify`.
+fn decode_native(path: &Path) -> Result<(), FrameError> {
+    let file = NativeFile::open(path, Access::Map)?;
+    let verified = file
+        .frame()
+        .and_then(|frame| frame.verify_all().map_err(|e| e.in_file(path)));
+    // A change of the file meanwhile explains any other error
+    file.check()?;
+    verified
 }

@@ -1,19 +1,19 @@
-//! Verdicts for people and for scripts.
+//! Verdicts as text and as JSON.
 
 use serde_json::{Value, json};
 
-use super::{FrameVerdict, Verdict, Verified};
+use super::{FileVerdict, FrameVerdict, Verdict};
+use crate::cli::job::list;
 use crate::cli::print::json_line;
-use crate::cli::work::list;
 
-/// All, with their names in JSON and what people are told.
+/// All verdicts with their names in JSON and in text.
 const VERDICTS: [(Verdict, &str, &str); 6] = [
     (Verdict::Sound, "sound", "sound"),
     (Verdict::Damaged, "damaged", "damaged"),
     (Verdict::Missing, "missing", "missing"),
     (Verdict::Length, "length", "of another length"),
-    (Verdict::Failed, "failed", "failed when tried"),
-    (Verdict::Pending, "pending", "not made yet"),
+    (Verdict::Failed, "failed", "failed"),
+    (Verdict::Pending, "pending", "pending"),
 ];
 
 impl Verdict {
@@ -29,7 +29,7 @@ impl FrameVerdict {
         if json {
             return vec![json_line(&self.to_json())];
         }
-        let line = |file: &Verified| {
+        let line = |file: &FileVerdict| {
             let reason = file.reason.as_deref().unwrap_or_default();
             let (frame, path) = (self.frame, &file.path);
             let verdict = file.verdict.name();
@@ -44,12 +44,12 @@ impl FrameVerdict {
         if let Some(reason) = &self.reason {
             all["reason"] = json!(reason);
         }
-        all["files"] = self.files.iter().map(Verified::to_json).collect();
+        all["files"] = self.files.iter().map(FileVerdict::to_json).collect();
         all
     }
 }
 
-impl Verified {
+impl FileVerdict {
     fn to_json(&self) -> Value {
         let mut all = json!({ "path": self.path, "status": self.verdict.name() });
         if let Some(reason) = &self.reason {
@@ -59,14 +59,14 @@ impl Verified {
     }
 }
 
-/// How many frames stand how, and which.
+/// The frames by verdict.
 pub(super) fn summary(verdicts: &[(i64, Verdict)]) -> Vec<String> {
     let mut lines = Vec::new();
-    for (wanted, _, told) in VERDICTS {
-        let these = verdicts.iter().filter(|(_, verdict)| *verdict == wanted);
+    for (shown, _, text) in VERDICTS {
+        let these = verdicts.iter().filter(|(_, verdict)| *verdict == shown);
         let frames: Vec<i64> = these.map(|(frame, _)| *frame).collect();
         if !frames.is_empty() {
-            lines.push(format!("{told:<18} {} ({})", frames.len(), list(&frames)));
+            lines.push(format!("{text:<18} {} ({})", frames.len(), list(&frames)));
         }
     }
     lines

@@ -6,7 +6,7 @@
 use serde_json::{Map, Value, json};
 
 use super::list::{Entries, Entry};
-use super::{ABOUT, Manifest, camera, work};
+use super::{ABOUT, Manifest, camera, environment, mesh, work};
 
 #[cfg(test)]
 mod tests;
@@ -22,6 +22,7 @@ pub fn job_schema() -> Value {
         let mut table = table(&entries, section);
         match section {
             "camera" => table["allOf"] = camera::conditions(),
+            "environment" => table["allOf"] = environment::conditions(),
             "job" => table["allOf"] = work::conditions(),
             _ => {}
         }
@@ -46,7 +47,10 @@ fn add_lists(properties: &mut Map<String, Value>, entries: &Entries) {
         let Some((list, _)) = section.rsplit_once('.') else {
             continue;
         };
-        let table = table(entries, section);
+        let mut table = table(entries, section);
+        if list == "mesh" {
+            table["allOf"] = mesh::conditions();
+        }
         match kinds.iter_mut().find(|(name, _)| *name == list) {
             Some((_, tables)) => tables.push(table),
             None => kinds.push((list, vec![table])),
@@ -96,9 +100,9 @@ fn table(entries: &Entries, section: &str) -> Value {
 }
 
 fn property(entry: &Entry) -> Value {
-    // The type of an item determines its keys.
+    // The type of an item of a list determines its keys.
     let mut schema = match entry.name() {
-        "type" => json!({ "const": json_of(entry.sample()) }),
+        "type" if entry.section.contains('.') => json!({ "const": json_of(entry.sample()) }),
         _ => entry.schema.clone(),
     };
     schema["description"] = json!(entry.comment());

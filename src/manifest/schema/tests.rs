@@ -1,4 +1,4 @@
-//! That schema and reader agree: on keys, defaults, words, and on which values will do.
+//! Schema and reader agree on keys, defaults, words and valid values.
 
 use std::collections::BTreeSet;
 
@@ -10,14 +10,16 @@ use crate::manifest::ManifestError;
 
 mod values;
 
-/// Something of everything, with what keys need of one another.
+/// A manifest with keys of all tables, which satisfies the dependencies between them.
 const EVERYTHING: &str = r#"
 input = { path = ["a", "b"], frames = 7, radius = { attribute = "d", scale = 0.5 }, up = "-y", verify = true }
 camera = { mode = "keys", key = [{ frame = 9, eye = [1, 2, 3], look_at = [0, 0, 0], fov = 30 }] }
-render = { surface = "smooth", ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
+render = { surface = "smooth", integrator = "path", bounces = 0, ground_pattern = "checker", ground_tile = 0.5, background = { bottom = [0, 0, 0], top = [1, 1, 1] }, ground = true, ground_height = -2, memory_limit = "1.5GiB" }
 surface = { normals = "field", smoothing = 1, exact = true, voxel = 0.5, smoothing_length = 2.5, threshold = 0.55, spray = true }
 material = { color = { attribute = "velocity", map = "red-blue", range = [-1, 1] }, absorption = [0.5, 1, 0], absorption_length = 3, fresnel = "exact" }
-light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }]
+light = [{ type = "directional", direction = [0, 0, -2] }, { type = "point", position = [1, 1, 1], falloff = "inverse-square" }, { type = "sun", direction = [0, 0, -2], size = 2 }, { type = "sphere", position = [1, 1, 1], radius = 2, visible = true }, { type = "rect", position = [1, 1, 1], direction = [0, 1, 0], width = 2, height = 3 }, { type = "disc", position = [1, 1, 1], direction = [0, 1, 0], radius = 2 }]
+mesh = [{ path = "tank.stl" }, { path = "w.##.ply", material = "glass", color = [1, 1, 0.5], roughness = 0, normals = "flat", faces = "back", scale = 0.001, translate = [1, 0, 0] }, { path = "b", holdout = true }]
+environment = { type = "image", image = "hall.exr", intensity = 2, rotation = -30, visible = true }
 output = { path = "x/%04d.EXR", channels = ["id"], fps = 24 }
 job = { threads = 3, isolate = true, memory_ceiling = 1073741824, stop_file = "../stop" }
 "#;
@@ -68,7 +70,7 @@ fn it_is_a_schema_of_draft_2020_12() {
 }
 
 #[test]
-fn what_the_program_writes_is_valid() {
+fn written_manifests_are_valid() {
     let plain = Manifest::new("data");
     both_take(&plain.to_commented_toml());
     both_take(EVERYTHING);
@@ -80,8 +82,8 @@ fn what_the_program_writes_is_valid() {
     both_take(&fixed.to_commented_toml());
 }
 
-/// Every table of the schema with a manifest that has it open at the end, so that a line goes into it.
-const TABLES: [(&str, &str); 15] = [
+/// Every table of the schema, with a manifest that ends in this table, so that a line can be appended to it.
+const TABLES: [(&str, &str); 25] = [
     ("", ""),
     ("/properties/input", "[input]\n"),
     ("/properties/camera", "[camera]\n"),
@@ -101,6 +103,24 @@ const TABLES: [(&str, &str); 15] = [
         "/properties/light/items/oneOf/1",
         "[[light]]\ntype = \"directional\"\n",
     ),
+    (
+        "/properties/light/items/oneOf/2",
+        "[[light]]\ntype = \"sun\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/3",
+        "[[light]]\ntype = \"sphere\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/4",
+        "[[light]]\ntype = \"rect\"\n",
+    ),
+    (
+        "/properties/light/items/oneOf/5",
+        "[[light]]\ntype = \"disc\"\n",
+    ),
+    ("/properties/mesh/items", "[[mesh]]\npath = \"a.stl\"\n"),
+    ("/properties/environment", "[environment]\n"),
     ("/properties/output", "[output]\n"),
     ("/properties/job", "[job]\n"),
     (
@@ -114,6 +134,22 @@ const TABLES: [(&str, &str); 15] = [
     (
         "/properties/render/properties/background/anyOf/2",
         "[render.background]\n",
+    ),
+    (
+        "/properties/render/properties/ground/anyOf/3",
+        "[render.ground]\n",
+    ),
+    (
+        "/properties/render/properties/caustics",
+        "[render.caustics]\n",
+    ),
+    (
+        "/properties/camera/properties/focus/anyOf/2",
+        "[camera.focus]\n",
+    ),
+    (
+        "/properties/environment/properties/sun",
+        "[environment.sun]\n",
     ),
 ];
 
@@ -154,13 +190,13 @@ fn comments_defaults_and_examples_are_those_of_init() {
         let property = schema.pointer(&at).expect(&at);
         assert_eq!(property["description"], entry.comment(), "{at}");
         let sample = json_of(entry.sample());
-        let wanted = match (&*entry.key, &entry.value) {
+        let expected = match (&*entry.key, &entry.value) {
             ("input.path", _) => (Value::Null, Value::Null),
             (_, Some(_)) => (sample, Value::Null),
             (_, None) => (Value::Null, json!([sample])),
         };
         let found = (&property["default"], &property["examples"]);
-        assert_eq!(found, (&wanted.0, &wanted.1), "{at}");
+        assert_eq!(found, (&expected.0, &expected.1), "{at}");
     }
     for (pointer, text) in TABLES {
         let about = &schema.pointer(pointer).expect(pointer)["description"];
@@ -168,7 +204,7 @@ fn comments_defaults_and_examples_are_those_of_init() {
     }
 }
 
-/// A table in which only the named keys are missing reads as if they had their defaults.
+/// Missing keys have the same defaults in the schema and in the reader.
 #[test]
 fn defaults_of_items_are_the_readers() {
     let schema = job_schema();
@@ -194,7 +230,7 @@ fn defaults_of_items_are_the_readers() {
 }
 
 #[test]
-fn what_is_needed_is_needed_by_both() {
+fn required_keys_agree() {
     let path = "input.path = \"data\"\n";
     both_refuse("");
     both_refuse("[input]\nup = \"y\"");
@@ -225,9 +261,9 @@ fn what_is_needed_is_needed_by_both() {
     }
 }
 
-/// All ways to say where the camera is.
+/// All combinations of keys that define the camera.
 #[test]
-fn keys_that_need_one_another() {
+fn key_dependencies_agree() {
     let modes = ["", "auto", "fixed", "turntable", "keys"];
     let has = [false, true];
     for mode in modes {

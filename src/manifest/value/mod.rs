@@ -3,8 +3,9 @@
 use serde_json::{Value as Json, json};
 use spherule_formats::is_control;
 
+use super::field::Field;
 use super::key::Key;
-use super::reader::Field;
+use super::nearest::nearest;
 
 mod numbers;
 mod text;
@@ -34,10 +35,14 @@ pub enum FlagKind {
     Seconds,
     /// Text; it may begin with a hyphen if `true`.
     Text(bool),
+    /// Text, or no value, which means this text.
+    SwitchOrText(&'static str),
     /// A number or a word.
     NumberOrText,
     /// Text, with commas between items.
     List,
+    /// Integers with commas between them.
+    Integers,
 }
 
 /// A type of values.
@@ -45,7 +50,7 @@ pub(super) trait Value: Sized {
     /// The kind of value of an option for it.
     const FLAG: FlagKind = FlagKind::Text(false);
 
-    /// Description with the range, as in "wants a number from 0 to 1".
+    /// Description with the range, as in "expected a number from 0 to 1".
     fn kind(key: &Key) -> String;
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault>;
@@ -64,6 +69,35 @@ pub(super) trait Value: Sized {
     /// All words that are values.
     fn words() -> Vec<&'static str> {
         Vec::new()
+    }
+}
+
+impl Field<'_> {
+    /// The value; reports a problem and returns None if it is invalid.
+    pub(super) fn value<T: Value>(&self, key: &Key) -> Option<T> {
+        let what = match T::parse(self, key) {
+            Ok(value) => return Some(value),
+            Err(Fault::Noted) => return None,
+            Err(Fault::Because(what)) => what,
+            Err(Fault::Unwanted) => {
+                let text = self.as_text().unwrap_or_default();
+                let hint = nearest(text, &T::words()).map(|n| format!("; did you mean {n}?"));
+                let (expected, hint) = (expected::<T>(key), hint.unwrap_or_default());
+                format!("expected {expected}, found {}{hint}", self.node.describe())
+            }
+        };
+        self.fail(&what);
+        None
+    }
+}
+
+/// Description of the expected value for messages.
+fn expected<T: Value>(key: &Key) -> String {
+    let kind = T::kind(key);
+    match key.word {
+        Some(word @ "all") => format!("\"{word}\" or {kind}"),
+        Some(word) => format!("{kind} or \"{word}\""),
+        None => kind,
     }
 }
 
@@ -118,9 +152,6 @@ macro_rules! named {
         }
 
         impl $name {
-            /// All values with their names.
-            pub const ALL: &[(Self, &'static str)] = &[$((Self::$variant, $text),)+];
-
             /// The name in a manifest.
             pub const fn name(self) -> &'static str {
                 match self {
@@ -171,7 +202,7 @@ impl<T: Named> Value for Vec<T> {
     const FLAG: FlagKind = FlagKind::List;
 
     fn kind(key: &Key) -> String {
-        format!("a list of {}, as {}", key.name, key.example)
+        format!("a list of {}, such as {}", key.name, key.example)
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
@@ -220,7 +251,7 @@ impl Value for bool {
     }
 }
 
-fn list(items: impl Iterator<Item = String>) -> String {
+pub(super) fn list(items: impl Iterator<Item = String>) -> String {
     format!("[{}]", items.collect::<Vec<_>>().join(", "))
 }
 

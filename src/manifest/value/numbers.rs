@@ -6,8 +6,8 @@ use glam::{DVec3, Vec3};
 use serde_json::{Value as Json, json};
 
 use super::{Fault, FlagKind, Value, list};
+use crate::manifest::field::{Field, narrow};
 use crate::manifest::key::Key;
-use crate::manifest::reader::{Field, narrow};
 
 impl Value for u32 {
     const FLAG: FlagKind = FlagKind::Integer;
@@ -157,8 +157,8 @@ impl Value for Duration {
 impl Value for DVec3 {
     fn kind(key: &Key) -> String {
         let kind = match key.is_direction {
-            true => "three numbers that are not all 0, as [0.0, 0.0, 1.0]",
-            false => "three numbers, as [0.0, 1.0, 2.0]",
+            true => "three numbers that are not all 0, such as [0.0, 0.0, 1.0]",
+            false => "three numbers, such as [0.0, 1.0, 2.0]",
         };
         kind.to_owned()
     }
@@ -189,7 +189,7 @@ impl Value for Vec3 {
             Some(_) => "[0.6, 0.9, 0.95]",
             None => "[0.6, 0.7, 0.9]",
         };
-        format!("three numbers{}, as {example}", key.from(0).range())
+        format!("three numbers{}, such as {example}", key.from(0).range())
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {

@@ -4,8 +4,8 @@ use serde_json::{Value as Json, json};
 use spherule_jobs::FrameRange;
 
 use super::{Fault, FlagKind, Value, list, quoted};
+use crate::manifest::field::Field;
 use crate::manifest::key::Key;
-use crate::manifest::reader::Field;
 use crate::metrics::Bytes;
 
 /// A name is text that is not blank.
@@ -35,7 +35,7 @@ impl Value for Vec<String> {
     const FLAG: FlagKind = FlagKind::List;
 
     fn kind(key: &Key) -> String {
-        format!("a list of names, as {}", key.example)
+        format!("a list of names, such as {}", key.example)
     }
 
     fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
@@ -58,7 +58,7 @@ impl Value for FrameRange {
     const FLAG: FlagKind = FlagKind::Text(true);
 
     fn kind(_: &Key) -> String {
-        "a frame range, as \"1-10\"".to_owned()
+        "a frame range, such as \"1-10\"".to_owned()
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {
@@ -88,7 +88,7 @@ impl Value for Bytes {
     const FLAG: FlagKind = FlagKind::Text(true);
 
     fn kind(_: &Key) -> String {
-        "a size above 0, as \"4GiB\", \"512MiB\" or a number of bytes".to_owned()
+        "a size above 0, such as \"4GiB\", \"512MiB\" or a number of bytes".to_owned()
     }
 
     fn parse(field: &Field<'_>, _: &Key) -> Result<Self, Fault> {

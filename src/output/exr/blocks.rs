@@ -1,7 +1,8 @@
-//! Packed blocks into a file, and a whole film packed on all threads that are idle.
+//! Writes packed blocks to a file, and packs the blocks of a whole film on all idle threads.
 //!
-//! The thread that writes also packs. Threads of the current pool help when they come to it: nothing waits for
-//! a pool that is busy tracing the next frame. A few bands at most are in memory as packed blocks.
+//! The writing thread also packs. Threads of the current pool help when they are idle, and the writing thread never
+//! waits for a pool that is busy with tracing the next frame. Only a few bands are in memory as packed blocks at a
+//! time.
 
 use std::any::Any;
 use std::collections::BTreeMap;
@@ -9,64 +10,38 @@ use std::io::{Seek, Write};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, RwLock};
 
-use exr::block::chunk::{Chunk, CompressedBlock, CompressedScanLineBlock};
-use exr::block::writer::{ChunksWriter, write_chunks_with};
-use exr::prelude::SmallVec;
-
 use super::OutputError;
+use super::file::ScanLineFile;
 use super::layout::ExrLayout;
 use super::pack::{PackBuffers, PackedBlock, pack_block};
 use crate::render::Film;
 
-/// Writes the file of `layout`, block by block as `blocks` gives them: all blocks of the image from the top.
-/// Returns [`super::EncodedExr::clamped`].
+/// Writes an image with `layout` to `file`, block by block. `blocks` are all blocks of the image, from top to bottom.
+/// Returns the number of clamped values, [`super::EncodedExr::clamped`].
 ///
 /// # Errors
-/// If a block could not be packed, one is missing, or `file` fails.
+/// If a block could not be packed, one is missing, or `file` cannot be written.
 pub fn write_blocks(
     file: &mut (impl Write + Seek),
     layout: &ExrLayout,
     blocks: impl IntoIterator<Item = Result<PackedBlock, OutputError>>,
 ) -> Result<u64, OutputError> {
     let mut clamped = 0;
-    // The writer knows errors of its own kind alone.
-    let mut failure = None;
-    let headers = SmallVec::from_iter([layout.header.clone()]);
-    let written = write_chunks_with(file, headers, true, |_, writer| {
-        let blocks = blocks.into_iter().map_while(|block| match block {
-            Ok(block) => Some(block),
-            Err(error) => {
-                failure = Some(error);
-                None
-            }
-        });
-        for (index, block) in blocks.enumerate() {
-            clamped += block.clamped;
-            writer.write_chunk(index, chunk(block))?;
-        }
-        Ok(())
-    });
-    match failure {
-        Some(error) => Err(error),
-        None => written.map(|()| clamped).map_err(OutputError::Exr),
+    let mut file = ScanLineFile::start(file, layout)?;
+    for block in blocks {
+        let block = block?;
+        clamped += block.clamped;
+        file.write(block)?;
     }
+    file.finish()?;
+    Ok(clamped)
 }
 
-fn chunk(block: PackedBlock) -> Chunk {
-    Chunk {
-        layer_index: 0,
-        compressed_block: CompressedBlock::ScanLine(CompressedScanLineBlock {
-            y_coordinate: i32::try_from(block.y).expect("images have at most 65536 rows"),
-            compressed_pixels_le: block.bytes,
-        }),
-    }
-}
-
-/// Writes `film` with the help of the current pool, and gives it back for another frame. The bytes are the same
-/// with any number of threads.
+/// Writes `film` with the help of the current pool. Returns it, so that another frame can reuse its memory, and the
+/// number of clamped values. The bytes do not depend on the number of threads.
 ///
 /// # Errors
-/// As [`write_blocks`].
+/// Same as [`write_blocks`].
 pub(super) fn write_film(
     film: Film,
     layout: ExrLayout,
@@ -74,7 +49,7 @@ pub(super) fn write_film(
 ) -> Result<(Film, u64), OutputError> {
     let job = Arc::new(PackJob::new(film, layout));
     let clamped = write_blocks(file, &job.layout, PackedInOrder::new(&job));
-    // Whoever comes to help from now on finds nothing to do.
+    // Take the film back; helpers that start later find nothing to do
     let film = job
         .film
         .write()
@@ -84,48 +59,48 @@ pub(super) fn write_film(
     clamped.map(|clamped| (film, clamped))
 }
 
-/// The blocks of one band, or why there are none.
+/// The blocks of one band, or the reason why it could not be packed.
 type PackedBand = Result<Vec<PackedBlock>, OutputError>;
 
-/// A film being packed, band by band.
+/// A film that is being packed, band by band.
 struct PackJob {
     layout: ExrLayout,
-    /// Until it is written.
+    /// None after [`write_film`] has taken the film back.
     film: RwLock<Option<Film>>,
-    bands: usize,
-    /// Bands that may be in hand or packed and not yet written.
-    most_in_hand: usize,
-    helpers: usize,
+    band_count: usize,
+    /// Maximum number of bands that are being packed, or packed and not written yet.
+    max_in_flight: usize,
+    max_helpers: usize,
     queue: Mutex<Queue>,
-    /// Tells that a helper has packed a band.
-    is_packed: Condvar,
+    /// Notified when a helper has packed a band.
+    band_packed: Condvar,
 }
 
 #[derive(Default)]
 struct Queue {
-    /// The next band to be packed.
-    next: usize,
-    /// The next band to be written.
-    wanted: usize,
-    /// Packed, not yet written; or what a helper panicked with.
+    /// The next band to pack.
+    next_pack: usize,
+    /// The next band to write.
+    next_write: usize,
+    /// Bands that are packed and not written yet, or the payload of a helper's panic.
     packed: BTreeMap<usize, Result<PackedBand, Box<dyn Any + Send>>>,
-    /// Those of helpers, as many as there were at once.
+    /// Buffers of helpers, one for each that has worked at the same time.
     buffers: Vec<PackBuffers>,
-    /// Helpers called that have not gone again; of a busy pool, those that have not come yet too.
-    helpers: usize,
+    /// Number of helpers that were spawned and have not ended. In a busy pool, some of them have not started yet.
+    helper_count: usize,
 }
 
 impl PackJob {
     fn new(film: Film, layout: ExrLayout) -> Self {
         let threads = rayon::current_num_threads();
         Self {
-            bands: film.height.div_ceil(layout.rows_per_band()) as usize,
-            most_in_hand: threads + 2,
-            helpers: threads - 1,
+            band_count: film.height.div_ceil(layout.rows_per_band()) as usize,
+            max_in_flight: threads + 2,
+            max_helpers: threads - 1,
             layout,
             film: RwLock::new(Some(film)),
             queue: Mutex::default(),
-            is_packed: Condvar::new(),
+            band_packed: Condvar::new(),
         }
     }
 
@@ -133,17 +108,17 @@ impl PackJob {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes the next band to pack, if there is one and room for it.
-    fn take(&self, queue: &mut Queue) -> Option<usize> {
-        let band = queue.next;
-        let is_room = band < self.bands.min(queue.wanted + self.most_in_hand);
-        is_room.then(|| {
-            queue.next += 1;
+    /// Claims the next band to pack; None if there is none or too many bands are in flight.
+    fn claim_band(&self, queue: &mut Queue) -> Option<usize> {
+        let band = queue.next_pack;
+        let may_pack = band < self.band_count.min(queue.next_write + self.max_in_flight);
+        may_pack.then(|| {
+            queue.next_pack += 1;
             band
         })
     }
 
-    /// Packs a band; None if the film is written or given up.
+    /// Packs a band; None if the film has been taken back, because it is written or writing has failed.
     fn pack(&self, band: usize, buffers: &mut PackBuffers) -> Option<PackedBand> {
         let film = self.film.read().unwrap_or_else(PoisonError::into_inner);
         let rows = self.layout.rows_per_band();
@@ -157,11 +132,11 @@ impl PackJob {
         )
     }
 
-    /// Packs a band, if there is one to take. One only: a thread that waits for others that trace gets here too,
-    /// and is soon wanted again.
+    /// Packs at most one band. Only one, because a thread may also get here while it waits for tracing threads, and
+    /// should soon continue with tracing.
     fn help(&self) {
         let mut queue = self.queue();
-        if let Some(band) = self.take(&mut queue) {
+        if let Some(band) = self.claim_band(&mut queue) {
             let mut buffers = queue.buffers.pop().unwrap_or_default();
             drop(queue);
             let packed = catch_unwind(AssertUnwindSafe(|| self.pack(band, &mut buffers)));
@@ -169,30 +144,32 @@ impl PackJob {
             queue.buffers.push(buffers);
             if let Some(packed) = packed.transpose() {
                 queue.packed.insert(band, packed);
-                self.is_packed.notify_all();
+                self.band_packed.notify_all();
             }
         }
-        queue.helpers -= 1;
+        queue.helper_count -= 1;
     }
 
-    /// Calls as many helpers as there is work for.
-    fn call_helpers(self: &Arc<Self>, queue: &mut Queue) {
-        let end = self.bands.min(queue.wanted + self.most_in_hand);
-        // One band is for who calls.
-        let useful = end.saturating_sub(queue.next + 1).min(self.helpers);
-        while queue.helpers < useful {
-            queue.helpers += 1;
+    /// Spawns as many helpers as there are bands for them.
+    fn spawn_helpers(self: &Arc<Self>, queue: &mut Queue) {
+        let end = self.band_count.min(queue.next_write + self.max_in_flight);
+        // The calling thread packs one band itself
+        let useful = end
+            .saturating_sub(queue.next_pack + 1)
+            .min(self.max_helpers);
+        while queue.helper_count < useful {
+            queue.helper_count += 1;
             let job = Arc::clone(self);
             rayon::spawn(move || job.help());
         }
     }
 }
 
-/// All blocks of a film from the top, packed here where no helper has.
+/// Iterates over all blocks of a film from top to bottom. Packs those that no helper has claimed.
 struct PackedInOrder<'a> {
     job: &'a Arc<PackJob>,
     buffers: PackBuffers,
-    /// The rest of the band that is being written.
+    /// The remaining blocks of the band that is being written.
     band: std::vec::IntoIter<PackedBlock>,
 }
 
@@ -208,25 +185,27 @@ impl<'a> PackedInOrder<'a> {
     fn next_band(&mut self) -> Option<PackedBand> {
         let job = self.job;
         let mut queue = job.queue();
-        while queue.wanted < job.bands {
-            let wanted = queue.wanted;
-            if let Some(packed) = queue.packed.remove(&wanted) {
-                queue.wanted += 1;
-                job.call_helpers(&mut queue);
+        while queue.next_write < job.band_count {
+            // Return the next band if it is packed
+            let next = queue.next_write;
+            if let Some(packed) = queue.packed.remove(&next) {
+                queue.next_write += 1;
+                job.spawn_helpers(&mut queue);
                 return Some(packed.unwrap_or_else(|panic| resume_unwind(panic)));
             }
-            queue = match job.take(&mut queue) {
+            // Otherwise pack a band, or wait for one
+            queue = match job.claim_band(&mut queue) {
                 Some(band) => {
-                    job.call_helpers(&mut queue);
+                    job.spawn_helpers(&mut queue);
                     drop(queue);
                     let packed = job.pack(band, &mut self.buffers)?;
                     let mut queue = job.queue();
                     queue.packed.insert(band, Ok(packed));
                     queue
                 }
-                // Whoever has it works on it.
+                // A helper is packing it
                 None => job
-                    .is_packed
+                    .band_packed
                     .wait(queue)
                     .unwrap_or_else(PoisonError::into_inner),
             };

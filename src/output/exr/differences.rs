@@ -1,84 +1,80 @@
-//! The bytes that EXR's ZIP hands to its compressor, made line by line as the lines come.
+//! The predictor of EXR's ZIP compression, applied line by line: reorders the bytes of a block and takes differences.
 //!
-//! ZIP of OpenEXR ("Technical Introduction to OpenEXR", and `ImfZip.cpp` of the reference library): the bytes of
-//! little-endian samples, row by row and in each row plane by plane, are parted into those at even and those at
-//! odd places; each byte becomes its difference to the one before, plus 128.
+//! This follows the "Technical Introduction to OpenEXR" and `ImfZip.cpp` of the reference library. A block has the
+//! bytes of little-endian samples, row by row, and plane by plane in each row. The bytes at even positions are moved
+//! before those at odd positions. Then each byte is replaced by its difference from the previous byte, plus 128.
 
 use crate::math::{Supported, lane_kernel};
 
-/// What a byte that equals the one before becomes.
-const NO_DIFFERENCE: u8 = 128;
+/// Added to all differences: the result for a byte that equals the previous one.
+const BIAS: u8 = 128;
 
-/// A block whose lines come one after the other.
+/// The differences of a block, to which lines are added one after the other.
 pub(super) struct Differences<'a> {
-    /// Of bytes at even places, and of those at odd ones.
+    /// Differences of the bytes at even positions.
     even: &'a mut [u8],
+    /// Differences of the bytes at odd positions.
     odd: &'a mut [u8],
-    /// Pairs so far.
+    /// Number of pairs of bytes so far.
     count: usize,
-    /// The last of them.
-    before: [u8; 2],
+    /// The last pair.
+    previous: [u8; 2],
     level: Supported,
 }
 
 impl<'a> Differences<'a> {
-    /// Of a block with as many bytes as `into`, which is an even number: no sample has an odd one.
-    pub(super) fn new(into: &'a mut [u8], level: Supported) -> Self {
-        let (even, odd) = into.split_at_mut(into.len() / 2);
+    /// Differences of a block, written to `out`, which is as long as the block. The length is even, because every
+    /// sample has an even number of bytes.
+    pub(super) fn new(out: &'a mut [u8], level: Supported) -> Self {
+        let (even, odd) = out.split_at_mut(out.len() / 2);
         Self {
             even,
             odd,
             count: 0,
-            // The very first byte stays as it is.
-            before: [NO_DIFFERENCE; 2],
+            // With this value, the first byte of the block does not change
+            previous: [BIAS; 2],
             level,
         }
     }
 
-    /// Takes in the next bytes of the block.
+    /// Adds the next bytes of the block.
     pub(super) fn push(&mut self, line: &[u8]) {
         let (pairs, _) = line.as_chunks::<2>();
-        let places = self.count..self.count + pairs.len();
-        let (even, odd) = (&mut self.even[places.clone()], &mut self.odd[places]);
+        let positions = self.count..self.count + pairs.len();
+        let (even, odd) = (&mut self.even[positions.clone()], &mut self.odd[positions]);
         let ([first, ..], [.., last]) = (pairs, pairs) else {
             return;
         };
-        [even[0], odd[0]] = difference(*first, self.before);
-        differ(self.level, pairs, &mut even[1..], &mut odd[1..]);
+        [even[0], odd[0]] = difference(*first, self.previous);
+        differences(self.level, pairs, &mut even[1..], &mut odd[1..]);
         self.count += pairs.len();
-        self.before = *last;
+        self.previous = *last;
     }
 
-    /// Ends the block: the first byte at an odd place comes after the last one at an even place.
-    pub(super) fn end(self) {
+    /// Completes the block: the first byte at an odd position follows the last one at an even position.
+    pub(super) fn finish(self) {
         if let Some(first) = self.odd.first_mut() {
-            *first = first
-                .wrapping_sub(self.before[0])
-                .wrapping_add(NO_DIFFERENCE);
+            *first = first.wrapping_sub(self.previous[0]).wrapping_add(BIAS);
         }
     }
 }
 
 #[inline(always)]
-fn difference(pair: [u8; 2], before: [u8; 2]) -> [u8; 2] {
-    let byte = |place: usize| {
-        pair[place]
-            .wrapping_sub(before[place])
-            .wrapping_add(NO_DIFFERENCE)
-    };
+fn difference(pair: [u8; 2], previous: [u8; 2]) -> [u8; 2] {
+    let byte = |index: usize| pair[index].wrapping_sub(previous[index]).wrapping_add(BIAS);
     [byte(0), byte(1)]
 }
 
 lane_kernel! {
-    /// The differences of all `pairs` but the first.
-    fn differ(pairs: &[[u8; 2]], even: &mut [u8], odd: &mut [u8]) = differ_body;
+    /// The differences of all `pairs` except the first.
+    fn differences(pairs: &[[u8; 2]], even: &mut [u8], odd: &mut [u8]) = differences_body;
 }
 
 #[inline(always)]
-fn differ_body(pairs: &[[u8; 2]], even: &mut [u8], odd: &mut [u8]) {
+fn differences_body(pairs: &[[u8; 2]], even: &mut [u8], odd: &mut [u8]) {
     let neighbours = pairs.iter().zip(&pairs[1..]);
-    for ((even, odd), (before, pair)) in even.iter_mut().zip(odd).zip(neighbours) {
-        [*even, *odd] = difference(*pair, *before);
+    for ((even, odd), (previous, pair)) in even.iter_mut().zip(odd).zip(neighbours) {
+        [*even, *odd] = difference(*pair, *previous);
     }
 }
 
@@ -87,20 +83,20 @@ mod tests {
     use super::*;
     use crate::math::SimdLevel;
 
-    /// As `ImfZip.cpp` does it, in two passes.
-    fn by_the_book(bytes: &[u8]) -> Vec<u8> {
+    /// The algorithm of `ImfZip.cpp`, in two passes.
+    fn reference(bytes: &[u8]) -> Vec<u8> {
         let even = bytes.iter().step_by(2);
-        let parted: Vec<u8> = even
+        let reordered: Vec<u8> = even
             .chain(bytes.iter().skip(1).step_by(2))
             .copied()
             .collect();
-        let others = parted.windows(2);
+        let others = reordered.windows(2);
         let others = others.map(|pair| pair[1].wrapping_sub(pair[0]).wrapping_add(128));
-        parted.iter().take(1).copied().chain(others).collect()
+        reordered.iter().take(1).copied().chain(others).collect()
     }
 
     #[test]
-    fn lines_give_what_the_whole_block_does() {
+    fn line_predictor_equals_block_predictor() {
         let bytes: Vec<u8> = (0..4000_u32)
             .map(|at| (at * at / 7).to_le_bytes()[0])
             .collect();
@@ -120,9 +116,9 @@ mod tests {
                     block.push(line);
                     rest = others;
                 }
-                block.end();
+                block.finish();
                 assert!(
-                    differences == by_the_book(&bytes[..length]),
+                    differences == reference(&bytes[..length]),
                     "{level:?} {lengths:?}"
                 );
             }

@@ -1,30 +1,32 @@
-//! How an image is laid out in its file: its header, its planes, and its blocks of rows.
+//! The layout of an image in its file: header, planes, and blocks of rows.
 
 use exr::image::write::layers::WritableLayers;
 use exr::meta::header::Header;
 use exr::prelude::{
     AnyChannel, AnyChannels, Blocks, Compression as Codec, Encoding, FlatSamples, ImageAttributes,
-    IntegerBounds, Layer, LineOrder, SampleType,
+    IntegerBounds, Layer, LineOrder, SampleType, Vec2,
 };
 
 use super::planes::{Plane, planes_in_file};
-use super::{Compression, ExrOptions, OutputError, attributes};
-use crate::render::{Channels, Film, FilmRows};
+use super::{Compression, ExrOptions, OutputError, TextAttribute, attributes};
+use crate::render::{Channels, DataWindow, Film, FilmRows};
 
-/// Rows of a band where blocks have no more: those of the renderer's tiles.
+/// Minimum number of rows in a band: the height of the renderer's tiles.
 const BAND_ROWS: u32 = 16;
 
-/// What all blocks of a file have in common.
+/// The layout of an image file, which all of its blocks share.
 #[derive(Debug, Clone)]
 pub struct ExrLayout {
     pub(super) header: Header,
     pub(super) compression: Compression,
-    /// In the order of the file.
+    /// The planes in the order of the file.
     pub(super) planes: Vec<Plane>,
+    /// Attributes after those of `header`, in the order of the file.
+    pub(super) texts: Vec<TextAttribute>,
 }
 
 impl ExrLayout {
-    /// For images of `width` x `height` pixels with `channels`.
+    /// The layout of images of `width` x `height` pixels with `channels`.
     ///
     /// # Errors
     /// If an attribute cannot be stored.
@@ -34,16 +36,17 @@ impl ExrLayout {
         channels: Channels,
         options: &ExrOptions,
     ) -> Result<Self, OutputError> {
-        let planes = planes_in_file(channels);
-        // The header takes names and types alone, so the samples may stay away.
+        let planes = planes_in_file(channels, &options.attribute_planes);
+        // Describe the channels; the header needs only names and types, so the samples may be empty
         let described = planes.iter().map(|plane| {
             let samples = match plane.sample_type() {
                 SampleType::F16 => FlatSamples::F16(Vec::new()),
                 SampleType::F32 => FlatSamples::F32(Vec::new()),
                 SampleType::U32 => FlatSamples::U32(Vec::new()),
             };
-            AnyChannel::new(plane.name, samples)
+            AnyChannel::new(&*plane.name, samples)
         });
+        // Make the header
         let encoding = Encoding {
             compression: options.compression.codec(),
             blocks: Blocks::ScanLines,
@@ -51,17 +54,24 @@ impl ExrLayout {
         };
         let size = (width as usize, height as usize);
         let described = AnyChannels::sort(described.collect());
-        let layer = Layer::new(size, attributes(options)?, encoding, described);
-        let window = IntegerBounds::from_dimensions(size);
-        let header = layer.infer_headers(&ImageAttributes::new(window)).remove(0);
+        // Place it in the image
+        let DataWindow { left, top, image } =
+            options.window.unwrap_or(DataWindow::whole(width, height));
+        let mut attributes = attributes(options)?;
+        attributes.layer_position = Vec2(left, top);
+        let layer = Layer::new(size, attributes, encoding, described);
+        let display = IntegerBounds::from_dimensions((image[0] as usize, image[1] as usize));
+        let image = ImageAttributes::new(display);
+        let header = layer.infer_headers(&image).remove(0);
         Ok(Self {
             header,
             compression: options.compression,
             planes,
+            texts: options.texts.clone(),
         })
     }
 
-    /// For images like `film`.
+    /// The layout of images with the size and the channels of `film`.
     ///
     /// # Errors
     /// If an attribute cannot be stored.
@@ -69,25 +79,30 @@ impl ExrLayout {
         Self::new(film.width, film.height, film.channels(), options)
     }
 
-    /// Rows of a block: 1, 16 or 32. The last block of an image may have fewer.
+    /// Row of the image in which the film begins.
+    pub(super) fn top(&self) -> i32 {
+        self.header.own_attributes.layer_position.y()
+    }
+
+    /// Number of rows in a block: 1, 16 or 32. The last block of an image may have fewer.
     pub fn rows_per_block(&self) -> u32 {
         let rows = self.compression.codec().scan_lines_per_block();
         u32::try_from(rows).expect("blocks have at most 256 rows")
     }
 
-    /// Rows of a band: whole blocks, and enough of them to be worth a thread's while.
+    /// Number of rows in a band, the unit of work of a thread: one or more whole blocks.
     pub fn rows_per_band(&self) -> u32 {
         self.rows_per_block().max(BAND_ROWS)
     }
 
-    /// The blocks of `band`, which must begin where a block does and end where one does.
+    /// The blocks of `band`, which must begin and end at the border of a block.
     pub fn blocks<'a>(&self, band: FilmRows<'a>) -> impl Iterator<Item = FilmRows<'a>> + use<'a> {
         let rows = self.rows_per_block();
         let tops = (band.top..band.top + band.height).step_by(rows as usize);
         tops.map(move |top| band.part(top, rows))
     }
 
-    /// Bytes of all samples in `rows` rows.
+    /// Number of bytes of all samples in `rows` rows.
     pub(super) fn bytes(&self, rows: u32) -> usize {
         self.header.layer_size.x() * rows as usize * self.header.channels.bytes_per_pixel
     }

@@ -1,4 +1,4 @@
-//! Samples of one plane in one row, as a file has them.
+//! Converts one row of a plane to the samples of the file.
 
 use bytemuck::{cast_slice, cast_slice_mut};
 use glam::Vec3;
@@ -8,48 +8,56 @@ use half::slice::{HalfBitsSliceExt, HalfFloatSliceExt};
 use super::planes::Source;
 use crate::render::FilmRows;
 
-/// Largest finite half.
+/// Largest finite half-float.
 const HALF_MAX: f32 = 65_504.0;
 
-/// Room for one line, and how many of its values half could not hold.
+/// Memory for one line, and the number of values that half-floats cannot represent.
 #[derive(Debug, Default)]
 pub(super) struct LineBuffer {
     floats: Vec<f32>,
     words: Vec<u32>,
-    /// Colour values beyond [`HALF_MAX`] or NaN in all lines so far.
+    /// Number of colour values that were NaN or beyond [`HALF_MAX`], in all lines so far.
     pub(super) clamped: u64,
 }
 
 impl LineBuffer {
-    /// The samples of `source` in row `row` of `rows`, little-endian.
+    /// The samples of `source` in row `row` of `rows`, as little-endian bytes.
     pub(super) fn line(&mut self, rows: &FilmRows, row: usize, source: Source) -> &[u8] {
         let width = rows.width as usize;
         let range = row * width..(row + 1) * width;
         self.words.resize(width, 0);
-        if let Source::Color(component) = source {
-            return self.halves(&rows.color[range], component);
+        match source {
+            Source::Color(component) => return self.halves(&rows.color[range], component),
+            Source::LayerColor(i) => return self.layer_halves(layer(rows, row), rows.floats, i),
+            _ => {}
         }
         let axis = |plane: Option<&[Vec3]>, axis, words: &mut [u32]| {
-            let vectors = &plane.expect(PLANE_IS_THERE)[range.clone()];
+            let vectors = &plane.expect(HAS_PLANE)[range.clone()];
             copy_axis(cast_slice(vectors), axis, words);
         };
         let words = &mut self.words[..];
         match source {
-            Source::Color(_) => unreachable!("done above"),
+            Source::Color(_) | Source::LayerColor(_) => unreachable!("done above"),
+            Source::Layer(i) | Source::ParticleLayer(i) => {
+                for (word, floats) in words.iter_mut().zip(layer(rows, row).chunks(rows.floats)) {
+                    *word = floats[i].to_bits().to_le();
+                }
+            }
             Source::Normal(component) => axis(rows.normal, component, words),
             Source::Position(component) => axis(rows.position, component, words),
             Source::Velocity(component) => axis(rows.velocity, component, words),
             Source::Albedo(component) => axis(rows.albedo, component, words),
             Source::Depth => {
-                let depth = &rows.depth.expect(PLANE_IS_THERE)[range];
+                let depth = &rows.depth.expect(HAS_PLANE)[range];
                 copy(depth, words, |z| z.to_bits());
             }
-            Source::Id => copy(&rows.id.expect(PLANE_IS_THERE)[range], words, |id| id),
+            Source::Id => copy(&rows.id.expect(HAS_PLANE)[range], words, |id| id),
         }
         cast_slice(&self.words)
     }
 
-    /// The nearest halves, or the nearest finite ones, counted. All machines round alike: to nearest, ties to even.
+    /// Converts a colour component to half-floats: to nearest, ties to even, the same on every machine. Clamps values
+    /// to the finite range and counts those it has changed.
     fn halves(&mut self, colors: &[[f32; 4]], component: usize) -> &[u8] {
         self.floats.resize(colors.len(), 0.0);
         let floats = &mut self.floats[..];
@@ -60,9 +68,28 @@ impl LineBuffer {
             _ => clamp_component::<3>(colors, floats),
         };
         self.clamped += u64::from(clamped);
-        let bits: &mut [u16] = &mut cast_slice_mut(&mut self.words)[..colors.len()];
+        self.converted()
+    }
+
+    /// Converts float `i` of the layers of each pixel as a colour.
+    fn layer_halves(&mut self, layers: &[f32], floats: usize, i: usize) -> &[u8] {
+        self.floats.clear();
+        self.floats
+            .extend(layers.chunks(floats).map(|pixel| pixel[i]));
+        for value in &mut self.floats {
+            let fits = value.abs() <= HALF_MAX;
+            self.clamped += u64::from(!fits);
+            let limited = value.clamp(-HALF_MAX, HALF_MAX);
+            *value = if value.is_nan() { 0.0 } else { limited };
+        }
+        self.converted()
+    }
+
+    /// The floats of the line as half-floats.
+    fn converted(&mut self) -> &[u8] {
+        let bits: &mut [u16] = &mut cast_slice_mut(&mut self.words)[..self.floats.len()];
         let halves: &mut [f16] = bits.reinterpret_cast_mut();
-        halves.convert_from_f32_slice(floats);
+        halves.convert_from_f32_slice(&self.floats);
         for bits in bits.iter_mut() {
             *bits = bits.to_le();
         }
@@ -70,9 +97,15 @@ impl LineBuffer {
     }
 }
 
-const PLANE_IS_THERE: &str = "films have the planes of the layout that was made for them";
+/// The layers of row `row` of `rows`.
+fn layer<'a>(rows: &FilmRows<'a>, row: usize) -> &'a [f32] {
+    let width = rows.width as usize * rows.floats;
+    &rows.layers.expect(HAS_PLANE)[row * width..(row + 1) * width]
+}
 
-/// The bits of `values` as words whose bytes are in the order of the file.
+const HAS_PLANE: &str = "films have the planes of the layout that was made for them";
+
+/// Copies the bits of `values` to `words`, with the bytes in the order of the file.
 fn copy<T: Copy>(values: &[T], words: &mut [u32], bits: impl Fn(T) -> u32) {
     for (word, value) in words.iter_mut().zip(values) {
         *word = bits(*value).to_le();
@@ -87,8 +120,8 @@ fn copy_axis(vectors: &[[f32; 3]], axis: usize, words: &mut [u32]) {
     }
 }
 
-/// Component `C` of `colors`, kept within what half can hold; NaN becomes 0. Returns how many values changed.
-/// Without branches, so that it vectorises.
+/// Copies component `C` of `colors`, clamped to the finite range of half-floats; NaN becomes 0. Returns the number of
+/// values that changed. The loop has no branches, so that the compiler vectorises it.
 fn clamp_component<const C: usize>(colors: &[[f32; 4]], floats: &mut [f32]) -> u32 {
     let mut clamped = 0;
     for (float, color) in floats.iter_mut().zip(colors) {
@@ -105,7 +138,7 @@ fn clamp_component<const C: usize>(colors: &[[f32; 4]], floats: &mut [f32]) -> u
 mod tests {
     use super::*;
 
-    /// Halves of `values` by the buffer, whose rounding may be the machine's.
+    /// `values` as half-floats, converted by the buffer, which may use instructions of the machine.
     fn converted(values: &[f32]) -> (Vec<u16>, u64) {
         let colors: Vec<[f32; 4]> = values.iter().map(|v| [*v, 0.0, 0.0, 0.0]).collect();
         let mut buffer = LineBuffer::default();
@@ -119,7 +152,7 @@ mod tests {
 
     #[test]
     fn halves_are_rounded_as_the_portable_conversion_does() {
-        // Every half, the middle to the next, and what lies just beside: where rounding decides.
+        // Every half-float, the midpoint to the next one, and the values just next to both, where rounding decides
         let mut values = Vec::new();
         for bits in 0..0x7bff_u16 {
             let (low, high) = (
@@ -146,7 +179,7 @@ mod tests {
     }
 
     #[test]
-    fn what_half_cannot_hold_is_counted() {
+    fn values_outside_the_range_of_half_floats_are_counted() {
         let values = [
             HALF_MAX.next_up(),
             f32::NEG_INFINITY,

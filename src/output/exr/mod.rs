@@ -1,9 +1,9 @@
 //! OpenEXR files: one part, planar channels, scanlines.
 //!
-//! `R G B A` are half, data channels float, `id.I` is uint. Blocks of rows are packed here and become a file by
-//! the crate `exr`. With scanlines in increasing order and at most one custom attribute (several would be
-//! written in random order) a film always gives the same bytes, however many threads pack. Nothing here looks
-//! at the clock.
+//! Colours are half-floats, the data channels are floats, `id.I` is uint. This module packs blocks of rows (see
+//! [`pack_block`]), and writes the file with attributes from the crate `exr`. A film always gives the same bytes,
+//! whatever the number of threads: scanlines are in increasing order, the crate writes at most one custom attribute (it
+//! would write several in random order; [`file`] writes the others), and nothing depends on the clock.
 
 use std::io::{self, Cursor, Seek, Write};
 
@@ -11,11 +11,12 @@ use exr::prelude::{AttributeValue, LayerAttributes, Text};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
-use crate::render::Film;
+use crate::render::{DataWindow, Film};
 
 mod blocks;
 mod deflate;
 mod differences;
+mod file;
 mod layout;
 mod lines;
 mod pack;
@@ -24,28 +25,29 @@ pub(super) mod planes;
 pub use blocks::write_blocks;
 pub use layout::ExrLayout;
 pub use pack::{PackBuffers, PackedBlock, pack_block};
+pub use planes::{ambiguous_name, attribute_planes};
 
-/// Longest attribute name the format has room for.
+/// Maximum length of an attribute name in the format, bytes.
 const NAME_MAX: usize = 255;
 
-/// How an EXR file is compressed; all of these are lossless.
+/// Compression of an EXR file. All methods are lossless.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Compression {
-    /// Not at all.
+    /// No compression.
     None,
-    /// Run lengths.
+    /// Run-length encoding.
     Rle,
-    /// Deflate over 16 rows.
+    /// Deflate, in blocks of 16 rows.
     #[default]
     Zip,
-    /// Deflate row by row: larger, but a viewer gets at single rows.
+    /// Deflate, row by row: larger files, but viewers can read single rows.
     Zips,
     /// Wavelets: good for grainy images.
     Piz,
 }
 
-/// The file's one attribute that the standard does not know.
+/// An attribute of the file that is not in the OpenEXR standard.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CustomAttribute {
     /// Name, at most 255 bytes.
@@ -54,19 +56,34 @@ pub struct CustomAttribute {
     pub json: String,
 }
 
-/// What goes into an EXR file beside the film.
+/// An attribute of type `string`.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TextAttribute {
+    /// Name, 1 to 31 bytes of ASCII.
+    pub name: String,
+    /// The value.
+    pub text: String,
+}
+
+/// Settings of an EXR file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ExrOptions {
     /// Compression of all channels.
     pub compression: Compression,
-    /// `framesPerSecond` as numerator and denominator.
+    /// Data window and display window; by default both are the size of the film.
+    pub window: Option<DataWindow>,
+    /// Attribute `framesPerSecond`, as numerator and denominator.
     pub frames_per_second: Option<(i32, u32)>,
-    /// `worldToCamera`, from [`crate::scene::Camera::world_to_camera`].
+    /// Attribute `worldToCamera`, from [`crate::scene::Camera::world_to_camera`].
     pub world_to_camera: Option<[f32; 16]>,
-    /// `comments`.
+    /// Attribute `comments`.
     pub comments: Option<String>,
-    /// One more attribute.
+    /// A custom attribute.
     pub custom: Option<CustomAttribute>,
+    /// Further attributes, in the order of the file.
+    pub texts: Vec<TextAttribute>,
+    /// Names of the planes of attribute channels, as many as the film has.
+    pub attribute_planes: Vec<String>,
 }
 
 /// An encoded image.
@@ -74,35 +91,35 @@ pub struct ExrOptions {
 pub struct EncodedExr {
     /// The file.
     pub bytes: Vec<u8>,
-    /// Values of `R G B A` that half cannot hold: beyond 65504 (written as that), or NaN (written as
-    /// 0).
+    /// Number of values of `R G B A` that half-floats cannot represent: beyond 65504 (written as 65504), or NaN
+    /// (written as 0).
     pub clamped: u64,
 }
 
-/// Why an image cannot be encoded.
+/// Reasons why an image cannot be encoded.
 #[derive(Debug, Error)]
 pub enum OutputError {
     /// The custom attribute cannot be stored.
     #[error("EXR attribute {name:?} cannot be stored: {why}")]
     Attribute {
-        /// Which one.
+        /// Name of the attribute.
         name: String,
         /// What is wrong with it.
         why: &'static str,
     },
-    /// The EXR encoder refused.
+    /// The EXR encoder failed.
     #[error("the image cannot be encoded as EXR: {0}")]
     Exr(#[source] exr::error::Error),
-    /// The PNG encoder refused.
+    /// The PNG encoder failed.
     #[error("the preview cannot be encoded as PNG: {0}")]
     Png(#[source] image::ImageError),
 }
 
 impl OutputError {
-    /// What the system said, if the file could not be written; else the error itself.
+    /// The error of the operating system, if the file could not be written.
     ///
     /// # Errors
-    /// The encoder is to blame.
+    /// The error itself, if it has another cause.
     pub fn into_io(self) -> Result<io::Error, Self> {
         match self {
             Self::Exr(exr::error::Error::Io(error)) => Ok(error),
@@ -114,7 +131,7 @@ impl OutputError {
 /// Encodes `film` as an OpenEXR file in memory.
 ///
 /// # Errors
-/// If an attribute cannot be stored or the encoder refuses the image.
+/// If an attribute cannot be stored or the encoder fails.
 pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, OutputError> {
     let mut file = Cursor::new(Vec::new());
     let (_, clamped) = write_exr(film.clone(), options, &mut file)?;
@@ -124,11 +141,12 @@ pub fn encode_exr(film: &Film, options: &ExrOptions) -> Result<EncodedExr, Outpu
     })
 }
 
-/// Writes `film` as an OpenEXR file, block by block: the file is never in memory as a whole. Idle threads of the
-/// current pool help. Returns the film, whose planes can serve another image, and [`EncodedExr::clamped`].
+/// Writes `film` as an OpenEXR file, block by block, so that the file is never in memory as a whole. Idle threads of
+/// the current pool help. Returns the film, so that its planes can be reused for another image, and
+/// [`EncodedExr::clamped`].
 ///
 /// # Errors
-/// If an attribute cannot be stored, the encoder refuses the image, or `file` does.
+/// If an attribute cannot be stored, the encoder fails, or `file` cannot be written.
 pub fn write_exr(
     film: Film,
     options: &ExrOptions,
@@ -164,7 +182,7 @@ fn attributes(options: &ExrOptions) -> Result<LayerAttributes, OutputError> {
     Ok(attributes)
 }
 
-/// Texts are UTF-8 in the file; `exr` itself would write Latin-1.
+/// A text attribute in UTF-8; the conversion of the crate `exr` would write Latin-1.
 fn text(value: &str) -> Text {
     Text::from_slice_unchecked(value.as_bytes())
 }

@@ -1,7 +1,7 @@
-//! One block of rows into the bytes that its file has for it.
+//! Packs a block of rows: converts it to the bytes of the file.
 //!
-//! ZIP is [`Differences`] of the samples' bytes, compressed by [`Deflater`]. Bytes depend on samples and layout
-//! alone: every block starts a new stream.
+//! For ZIP, [`Differences`] of the bytes of the samples are compressed by [`Deflater`]. Every block is a new stream, so
+//! its bytes depend only on the samples and the layout.
 
 use exr::math::Vec2;
 use exr::prelude::IntegerBounds;
@@ -15,18 +15,18 @@ use super::{Compression, OutputError};
 use crate::math::Supported;
 use crate::render::FilmRows;
 
-/// A block as it is written.
+/// A block in the form in which it is written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct PackedBlock {
-    /// Its first row.
+    /// First row.
     pub y: u32,
-    /// Its bytes: compressed, or plain if that takes no more.
+    /// The compressed bytes, or the uncompressed bytes if compression does not shorten them.
     pub bytes: Vec<u8>,
-    /// Values of `R G B A` that half cannot hold; see [`super::EncodedExr::clamped`].
+    /// Number of values of `R G B A` that were clamped; see [`super::EncodedExr::clamped`].
     pub clamped: u64,
 }
 
-/// Memory for packing, to be used again for the next block.
+/// Memory for packing, which is reused for the next block.
 #[derive(Debug, Default)]
 pub struct PackBuffers {
     line: LineBuffer,
@@ -35,19 +35,19 @@ pub struct PackBuffers {
 }
 
 impl PackBuffers {
-    /// Bytes that the buffers take at most, once they have packed a block of `samples` bytes.
+    /// Maximum size of the buffers in bytes, after they have packed a block with `samples` bytes of samples.
     pub fn predicted_bytes(samples: u64) -> u64 {
         samples + Deflater::predicted_bytes(samples)
     }
 }
 
-/// Packs the block `rows`, as [`ExrLayout::blocks`] gives it.
+/// Packs the block `rows`, one of [`ExrLayout::blocks`].
 ///
 /// # Errors
-/// If the codec refuses the samples.
+/// If the codec of the crate `exr` fails.
 ///
 /// # Panics
-/// If `rows` are of a film with other planes than those of `layout`.
+/// If the film of `rows` lacks planes of `layout`.
 pub fn pack_block(
     rows: &FilmRows,
     layout: &ExrLayout,
@@ -58,13 +58,13 @@ pub fn pack_block(
         Compression::None => plain(rows, layout, &mut buffers.line),
         Compression::Zip | Compression::Zips => match zip(rows, layout, buffers) {
             Some(stream) => stream.to_vec(),
-            // What does not shrink is stored as it is: the length tells.
+            // Store the block uncompressed if compression does not shorten it; readers recognise this by its length
             None => {
                 buffers.line.clamped = 0;
                 plain(rows, layout, &mut buffers.line)
             }
         },
-        Compression::Rle | Compression::Piz => by_codec(rows, layout, &mut buffers.line)?,
+        Compression::Rle | Compression::Piz => compress_with_exr(rows, layout, &mut buffers.line)?,
     };
     Ok(PackedBlock {
         y: rows.top,
@@ -73,25 +73,25 @@ pub fn pack_block(
     })
 }
 
-/// Gives the samples of `rows` to `take`, line by line in the order of the file: where in the block the line
-/// begins, its bytes, and those of a sample.
+/// Calls `visit` with the samples of `rows`, line by line in the order of the file. Its arguments are the offset of the
+/// line in the block, the bytes of the line, and the number of bytes per sample.
 fn for_each_line(
     rows: &FilmRows,
     layout: &ExrLayout,
     buffer: &mut LineBuffer,
-    mut take: impl FnMut(usize, &[u8], usize),
+    mut visit: impl FnMut(usize, &[u8], usize),
 ) {
-    let mut at = 0;
+    let mut offset = 0;
     for row in 0..rows.height as usize {
         for plane in &layout.planes {
             let line = buffer.line(rows, row, plane.source);
-            take(at, line, plane.sample_type().bytes_per_sample());
-            at += line.len();
+            visit(offset, line, plane.sample_type().bytes_per_sample());
+            offset += line.len();
         }
     }
 }
 
-/// The samples as they are, little-endian.
+/// The uncompressed samples, little-endian.
 fn plain(rows: &FilmRows, layout: &ExrLayout, buffer: &mut LineBuffer) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(layout.bytes(rows.height));
     for_each_line(rows, layout, buffer, |_, line, _| {
@@ -100,24 +100,25 @@ fn plain(rows: &FilmRows, layout: &ExrLayout, buffer: &mut LineBuffer) -> Vec<u8
     bytes
 }
 
-/// As the crate `exr` compresses, which takes samples in the machine's order of bytes.
-fn by_codec(
+/// Compresses a block with the crate `exr`, which expects samples in the byte order of the machine.
+fn compress_with_exr(
     rows: &FilmRows,
     layout: &ExrLayout,
     buffer: &mut LineBuffer,
 ) -> Result<Vec<u8>, OutputError> {
     let mut bytes = Vec::with_capacity(layout.bytes(rows.height));
-    for_each_line(rows, layout, buffer, |at, line, sample| {
+    for_each_line(rows, layout, buffer, |offset, line, sample_len| {
         bytes.extend_from_slice(line);
         if cfg!(target_endian = "big") {
-            bytes[at..]
-                .chunks_exact_mut(sample)
+            bytes[offset..]
+                .chunks_exact_mut(sample_len)
                 .for_each(<[u8]>::reverse);
         }
     });
     let top = i32::try_from(rows.top).expect("images have at most 65536 rows");
     let size = Vec2(rows.width as usize, rows.height as usize);
-    let section = IntegerBounds::new(Vec2(0, top), size);
+    let left = layout.header.own_attributes.layer_position.x();
+    let section = IntegerBounds::new(Vec2(left, layout.top() + top), size);
     let codec = layout.compression.codec();
     let packed = codec.compress_image_section_to_le(&layout.header, bytes, section);
     packed.map_err(OutputError::Exr)
@@ -133,16 +134,19 @@ fn zip<'b>(rows: &FilmRows, layout: &ExrLayout, buffers: &'b mut PackBuffers) ->
     differences.resize(layout.bytes(rows.height), 0);
     let mut block = Differences::new(differences, Supported::default());
     for_each_line(rows, layout, line, |_, line, _| block.push(line));
-    block.end();
+    block.finish();
     deflater.compress(differences, layout.pieces(rows.height))
 }
 
 impl ExrLayout {
-    /// The stretches of alike planes among the differences of a block of `rows` rows.
+    /// The pieces of the differences of a block of `rows` rows: stretches of similar planes, first of the bytes at even
+    /// positions, then of those at odd positions.
     fn pieces(&self, rows: u32) -> impl Iterator<Item = Piece> {
         let width = self.header.layer_size.x();
-        // What a particle has is the same in the row above, which is the half of a row away.
+        // A particle mostly has the same values in the row above. They are half the bytes of a row away, because even
+        // and odd bytes are separate.
         let is_row_above_in_reach = rows > 1 && self.bytes(1) / 2 <= WINDOW;
+        // Group adjacent planes of the same kind
         let groups = self.planes.chunk_by(|a, b| a.kind() == b.kind());
         let groups: Vec<(PlaneKind, usize)> = groups
             .map(|group| {
@@ -152,13 +156,14 @@ impl ExrLayout {
                 (group[0].kind(), bytes.sum::<usize>() * width / 2)
             })
             .collect();
+        // One piece for each group in each row
         let pieces = move |is_odd: bool| {
             let row = groups.clone().into_iter().map(move |(kind, length)| Piece {
                 length,
                 is_searched: match kind {
                     PlaneKind::Color | PlaneKind::Normal => false,
-                    // Their exponents hardly change, so that the differences to and from them come in pairs.
-                    PlaneKind::Place => is_odd,
+                    // Exponents hardly change, so the differences to and from them repeat in pairs
+                    PlaneKind::Position => is_odd,
                     PlaneKind::Particle => is_row_above_in_reach,
                 },
             });

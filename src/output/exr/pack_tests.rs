@@ -1,4 +1,4 @@
-//! What is packed here against the codec and the writer of the crate `exr`, to the bit.
+//! Compares packed blocks with the codec and the writer of the crate `exr`, to the bit.
 
 use std::io::{self, Cursor, Seek, Write};
 use std::sync::mpsc;
@@ -15,7 +15,7 @@ use super::super::{ExrOptions, attributes, encode_exr, write_blocks, write_exr};
 use super::*;
 use crate::render::{Channels, Film};
 
-/// Numbers that follow one another without a pattern (splitmix64).
+/// Pseudorandom numbers (splitmix64).
 struct Numbers(u64);
 
 impl Numbers {
@@ -26,7 +26,7 @@ impl Numbers {
         z ^ (z >> 31)
     }
 
-    /// Any bits there are, infinite values and all kinds of NaN among them.
+    /// Any bits, including infinite values and all kinds of NaN.
     fn wild(&mut self) -> f32 {
         match self.next() % 16 {
             0 => f32::NAN,
@@ -43,7 +43,7 @@ impl Numbers {
     }
 }
 
-/// A film without any pattern in its lower half, so that its blocks do not shrink.
+/// A film with random values in its lower half, so that compression does not shorten the blocks there.
 fn wild_film(width: u32, height: u32, channels: Channels) -> Film {
     let mut numbers = Numbers(u64::from(width) << 32 | u64::from(height));
     let mut film = Film::new(width, height, channels);
@@ -66,10 +66,14 @@ fn wild_film(width: u32, height: u32, channels: Channels) -> Film {
     if let Some(plane) = &mut film.id {
         plane[half..].fill_with(|| (numbers.next() >> 32) as u32);
     }
+    if let Some(plane) = &mut film.layers {
+        let half = plane.len() / 2;
+        plane[half..].fill_with(|| numbers.wild());
+    }
     film
 }
 
-/// All samples of `film` from `source`; colours one by one, by the portable conversion.
+/// All samples of `film` from `source`. Colours are converted one by one, by the portable conversion.
 fn samples(film: &Film, source: Source) -> FlatSamples {
     let floats = |plane: &Option<Vec<Vec3>>, axis| {
         let vectors = plane.as_ref().unwrap().iter();
@@ -87,7 +91,16 @@ fn samples(film: &Film, source: Source) -> FlatSamples {
         Source::Velocity(axis) => floats(&film.velocity, axis),
         Source::Albedo(axis) => floats(&film.albedo, axis),
         Source::Id => FlatSamples::U32(film.id.clone().unwrap()),
+        Source::LayerColor(i) => FlatSamples::F16(layer(film, i).map(half).collect()),
+        Source::Layer(i) | Source::ParticleLayer(i) => FlatSamples::F32(layer(film, i).collect()),
     }
+}
+
+/// Float `i` of the layers of each pixel.
+fn layer(film: &Film, i: usize) -> impl Iterator<Item = f32> {
+    let floats = film.channels.layers.floats();
+    let layers = film.layers.as_ref().unwrap();
+    layers.iter().copied().skip(i).step_by(floats)
 }
 
 fn bits(samples: &FlatSamples) -> Vec<u32> {
@@ -98,11 +111,11 @@ fn bits(samples: &FlatSamples) -> Vec<u32> {
     }
 }
 
-/// The file that the crate `exr` makes by itself.
-fn by_the_crate(film: &Film, options: &ExrOptions) -> Vec<u8> {
+/// The file that the crate `exr` writes on its own.
+fn written_by_exr(film: &Film, options: &ExrOptions) -> Vec<u8> {
     let size = (film.width as usize, film.height as usize);
-    let planes = planes_in_file(film.channels()).into_iter();
-    let list = planes.map(|plane| AnyChannel::new(plane.name, samples(film, plane.source)));
+    let planes = planes_in_file(film.channels(), &[]).into_iter();
+    let list = planes.map(|plane| AnyChannel::new(&*plane.name, samples(film, plane.source)));
     let encoding = Encoding {
         compression: options.compression.codec(),
         blocks: Blocks::ScanLines,
@@ -138,20 +151,20 @@ fn check(film: &Film, compression: Compression) {
         ..ExrOptions::default()
     };
     let file = encode_exr(film, &options).unwrap().bytes;
-    let theirs = by_the_crate(film, &options);
+    let reference = written_by_exr(film, &options);
     let size = (film.width, film.height);
     if !matches!(compression, Compression::Zip | Compression::Zips) {
-        assert!(file == theirs, "{compression:?} {size:?}");
+        assert!(file == reference, "{compression:?} {size:?}");
     }
-    let wanted: Vec<_> = planes_in_file(film.channels())
+    let expected: Vec<_> = planes_in_file(film.channels(), &[])
         .iter()
-        .map(|plane| (plane.name.to_owned(), bits(&samples(film, plane.source))))
+        .map(|plane| (plane.name.to_string(), bits(&samples(film, plane.source))))
         .collect();
-    assert!(decoded(&file) == wanted, "{compression:?} {size:?}");
+    assert!(decoded(&file) == expected, "{compression:?} {size:?}");
 }
 
 #[test]
-fn any_film_reads_back_to_the_bit_and_as_the_crate_writes_it() {
+fn films_round_trip_and_match_the_exr_crate() {
     for (width, height) in [(1, 1), (17, 33), (1, 50), (50, 1), (40, 16), (31, 64)] {
         for compression in COMPRESSIONS {
             check(&wild_film(width, height, Channels::ALL), compression);
@@ -166,19 +179,31 @@ fn any_film_reads_back_to_the_bit_and_as_the_crate_writes_it() {
             velocity: bits & 8 != 0,
             albedo: bits & 16 != 0,
             id: bits & 32 != 0,
+            ..Channels::COLOR
         };
         check(&wild_film(9, 20, channels), Compression::Zip);
     }
 }
 
 #[test]
-fn wide_rows_read_back() {
+fn layers_round_trip() {
+    for compression in COMPRESSIONS {
+        let names = ["lights", "noisy", "shadow", "motion", "cryptomatte"];
+        let channels = Channels::from_names(names).unwrap();
+        check(&wild_film(17, 33, channels), compression);
+        let channels = Channels::from_names(["shadow", "crypto_part"]).unwrap();
+        check(&wild_film(5, 20, channels), compression);
+    }
+}
+
+#[test]
+fn wide_rows_round_trip() {
     check(&wild_film(3000, 17, Channels::ALL), Compression::Zip);
     check(&wild_film(40_000, 2, Channels::ALL), Compression::Zip);
 }
 
 #[test]
-fn pieces_are_kinds_of_planes() {
+fn pieces_follow_the_kinds_of_planes() {
     let layout =
         |width, channels| ExrLayout::new(width, 40, channels, &ExrOptions::default()).unwrap();
     let lengths = |layout: &ExrLayout, rows| -> Vec<(usize, bool)> {
@@ -189,14 +214,14 @@ fn pieces_are_kinds_of_planes() {
     };
     let all = layout(10, Channels::ALL);
     // A B G, N, P, R, V, Z, albedo and id.
-    let row = |places, particles| {
+    let row = |positions, particles| {
         [
             (30, false),
             (60, false),
-            (60, places),
+            (60, positions),
             (10, false),
             (60, particles),
-            (20, places),
+            (20, positions),
             (80, particles),
         ]
     };
@@ -208,13 +233,13 @@ fn pieces_are_kinds_of_planes() {
     ];
     assert_eq!(lengths(&all, 2), rows.concat());
     assert_eq!(4 * 320, all.bytes(2));
-    // There is no row above.
+    // A block of one row has no row above
     assert_eq!(
         lengths(&all, 1),
         [row(false, false), row(true, false)].concat()
     );
     assert_eq!(lengths(&layout(10, Channels::COLOR), 1), [(40, false); 2]);
-    // The row above is out of reach.
+    // In wide images, the row above is out of reach
     let wide = layout(1025, Channels::ALL);
     assert!(wide.bytes(1) / 2 > WINDOW);
     assert!(!lengths(&wide, 2)[6].1);
@@ -226,7 +251,7 @@ fn blocks_that_do_not_shrink_are_stored_plain() {
     let mut numbers = Numbers(7);
     let mut film = Film::new(50, 32, Channels::COLOR);
     for color in &mut film.color[50 * 16..] {
-        // All finite halves.
+        // Only finite half-floats
         *color = std::array::from_fn(|_| {
             let bits = (numbers.next() >> 48) as u16;
             f16::from_bits((bits % 0x7c00) | (bits & 0x8000)).to_f32()
@@ -247,7 +272,7 @@ fn blocks_that_do_not_shrink_are_stored_plain() {
     check(&film, Compression::Zip);
 }
 
-/// FNV-1a, for a hash that no crate can change.
+/// FNV-1a, written out so that no update of a crate can change it.
 fn fnv(bytes: &[u8]) -> u64 {
     let start = 0xcbf2_9ce4_8422_2325_u64;
     bytes.iter().fold(start, |hash, byte| {
@@ -255,9 +280,9 @@ fn fnv(bytes: &[u8]) -> u64 {
     })
 }
 
-/// Blocks of a smooth picture. Whatever the machine can do, their bytes are these.
+/// The bytes of a smooth picture do not depend on the instruction sets of the machine.
 #[test]
-fn the_bytes_are_those_of_any_machine() {
+fn the_bytes_are_the_same_on_every_machine() {
     let hash = |channels| {
         let mut film = Film::new(150, 40, channels);
         for (at, color) in (0_u16..).zip(&mut film.color) {
@@ -280,9 +305,9 @@ fn the_bytes_are_those_of_any_machine() {
 }
 
 #[test]
-fn the_film_comes_back_and_a_busy_pool_is_not_waited_for() {
+fn the_film_is_returned_without_waiting_for_a_busy_pool() {
     let film = wild_film(40, 200, Channels::ALL);
-    let wanted = encode_exr(&film, &ExrOptions::default()).unwrap().bytes;
+    let expected = encode_exr(&film, &ExrOptions::default()).unwrap().bytes;
     let pool = rayon::ThreadPoolBuilder::new().num_threads(2);
     let (file, returned) = pool.build().unwrap().install(|| {
         let (free, busy) = mpsc::channel::<()>();
@@ -297,18 +322,18 @@ fn the_film_comes_back_and_a_busy_pool_is_not_waited_for() {
         drop(free);
         (file.into_inner(), returned)
     });
-    assert!(file == wanted);
+    assert!(file == expected);
     assert_eq!(returned.id, film.id);
 }
 
-/// A file that takes so many bytes and no more.
-struct Full {
+/// A file that accepts only `room` bytes.
+struct LimitedFile {
     file: Cursor<Vec<u8>>,
     room: u64,
     kind: io::ErrorKind,
 }
 
-impl Write for Full {
+impl Write for LimitedFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         if self.file.position() + bytes.len() as u64 > self.room {
             return Err(self.kind.into());
@@ -321,14 +346,14 @@ impl Write for Full {
     }
 }
 
-impl Seek for Full {
+impl Seek for LimitedFile {
     fn seek(&mut self, to: io::SeekFrom) -> io::Result<u64> {
         self.file.seek(to)
     }
 }
 
 #[test]
-fn a_file_that_takes_no_more_is_an_error_of_the_system() {
+fn a_full_disk_gives_the_error_of_the_operating_system() {
     let film = wild_film(64, 100, Channels::COLOR);
     let length = encode_exr(&film, &ExrOptions::default())
         .unwrap()
@@ -336,7 +361,7 @@ fn a_file_that_takes_no_more_is_an_error_of_the_system() {
         .len() as u64;
     for kind in [io::ErrorKind::StorageFull, io::ErrorKind::BrokenPipe] {
         for room in [0, 100, 500, length / 2, length - 1] {
-            let mut file = Full {
+            let mut file = LimitedFile {
                 file: Cursor::new(Vec::new()),
                 room,
                 kind,

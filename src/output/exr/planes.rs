@@ -1,15 +1,18 @@
-//! Which planes a file has, and where in a film their samples are.
+//! The planes of a file, and the location of their samples in a film.
+
+use std::borrow::Cow;
 
 use exr::meta::attribute::SampleType;
 
 use crate::render::Channels;
+use crate::render::layers::Layers;
 
 /// One channel of a file.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq, Eq)]
 pub(in crate::output) struct Plane {
-    /// Its name in the file.
-    pub(in crate::output) name: &'static str,
-    /// Where its samples come from.
+    /// Name in the file.
+    pub(in crate::output) name: Cow<'static, str>,
+    /// Location of the samples in a film.
     pub(super) source: Source,
 }
 
@@ -23,53 +26,66 @@ pub(super) enum Source {
     Velocity(usize),
     Albedo(usize),
     Id,
+    /// A float of the layers, as a colour.
+    LayerColor(usize),
+    /// A float of the layers that changes from pixel to pixel.
+    Layer(usize),
+    /// A float of the layers that all pixels of a particle share.
+    ParticleLayer(usize),
 }
 
-/// Planes whose samples look alike to a compressor.
+/// Kinds of planes by the statistics of their samples, for compression.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum PlaneKind {
-    /// Halves that change from pixel to pixel.
+    /// Half-floats that change from pixel to pixel.
     Color,
-    /// Floats that do, and their exponents with them.
+    /// Floats that change from pixel to pixel, with changing exponents.
     Normal,
-    /// Floats whose exponents stay the same: where the place is that a pixel shows.
-    Place,
-    /// What all pixels of a particle share.
+    /// Floats that change from pixel to pixel, mostly with the same exponent: depths and positions.
+    Position,
+    /// Values that all pixels of a particle share.
     Particle,
 }
 
 impl Plane {
-    const fn new(name: &'static str, source: Source) -> Self {
+    fn new(name: impl Into<Cow<'static, str>>, source: Source) -> Self {
+        let name = name.into();
         Self { name, source }
     }
 
-    /// What its samples are like.
+    /// Statistics of the samples.
     pub(super) const fn kind(&self) -> PlaneKind {
         match self.source {
-            Source::Color(_) => PlaneKind::Color,
-            Source::Normal(_) => PlaneKind::Normal,
-            Source::Depth | Source::Position(_) => PlaneKind::Place,
-            Source::Velocity(_) | Source::Albedo(_) | Source::Id => PlaneKind::Particle,
+            Source::Color(_) | Source::LayerColor(_) => PlaneKind::Color,
+            Source::Normal(_) | Source::Layer(_) => PlaneKind::Normal,
+            Source::Depth | Source::Position(_) => PlaneKind::Position,
+            Source::Velocity(_) | Source::Albedo(_) | Source::Id | Source::ParticleLayer(_) => {
+                PlaneKind::Particle
+            }
         }
     }
 
-    /// Colours are half: a display has no use for more. Data keep all of their bits.
+    /// Type of the samples. Colours are half-floats, which is sufficient for displays. Data keep all of their bits.
     pub(in crate::output) const fn sample_type(&self) -> SampleType {
         match self.source {
-            Source::Color(_) => SampleType::F16,
+            Source::Color(_) | Source::LayerColor(_) => SampleType::F16,
             Source::Id => SampleType::U32,
             _ => SampleType::F32,
         }
     }
 }
 
-/// The planes of a file with `channels`, in the order that a user would list them.
-pub(in crate::output) fn planes(channels: Channels) -> Vec<Plane> {
+/// The planes of a file with `channels`, in the order of the channel names in the manual. `attributes`: the names of
+/// the planes of attributes.
+pub(in crate::output) fn planes(channels: Channels, attributes: &[String]) -> Vec<Plane> {
     let color = vectors(["R", "G", "B", "A"], Source::Color);
     let mut all = color.to_vec();
     all.extend(channels.depth.then(|| Plane::new("Z", Source::Depth)));
-    let axes = |has: bool, names: [&'static str; 3], source| {
-        has.then(|| vectors(names, source)).into_iter().flatten()
+    let axes = |is_present: bool, names: [&'static str; 3], source| {
+        is_present
+            .then(|| vectors(names, source))
+            .into_iter()
+            .flatten()
     };
     let [n, p, v] = [
         ["N.X", "N.Y", "N.Z"],
@@ -82,16 +98,73 @@ pub(in crate::output) fn planes(channels: Channels) -> Vec<Plane> {
     all.extend(axes(channels.velocity, v, Source::Velocity));
     all.extend(axes(channels.albedo, albedo, Source::Albedo));
     all.extend(channels.id.then(|| Plane::new("id.I", Source::Id)));
+    all.extend(layers(&channels.layers, attributes));
     all
+}
+
+/// The planes of layers.
+fn layers(layers: &Layers, attributes: &[String]) -> Vec<Plane> {
+    let mut all = Vec::new();
+    // Colours
+    let lights = layers.lights.iter();
+    let lights = lights.map(|class| (class.name(), layers.light_at(class).unwrap_or_default()));
+    for (name, at) in lights.chain([("noisy", layers.noisy_at())]) {
+        let planes = at.zip(["R", "G", "B"]);
+        all.extend(
+            planes.map(|(i, axis)| Plane::new(format!("{name}.{axis}"), Source::LayerColor(i))),
+        );
+    }
+    // Data of surfaces and particles
+    all.extend(
+        layers
+            .shadow_at()
+            .map(|i| Plane::new("shadow", Source::Layer(i))),
+    );
+    let motion = layers.motion_at().zip(["motion.U", "motion.V"]);
+    all.extend(motion.map(|(i, name)| Plane::new(name, Source::Layer(i))));
+    let named = layers.attributes_at().zip(attributes);
+    all.extend(named.map(|(i, name)| Plane::new(name.clone(), Source::ParticleLayer(i))));
+    // Cryptomatte: two objects with their coverage in each layer of four channels
+    for kind in layers.mattes.iter() {
+        for (rank, i) in layers.matte_at(kind).unwrap_or_default().enumerate() {
+            let axis = ["R", "G", "B", "A"][rank % 4];
+            let name = format!("{}{:02}.{axis}", kind.name(), rank / 4);
+            let source = match rank % 2 {
+                0 => Source::ParticleLayer(i),
+                _ => Source::Layer(i),
+            };
+            all.push(Plane::new(name, source));
+        }
+    }
+    all
+}
+
+/// The names of the planes of an attribute.
+pub fn attribute_planes(name: &str, components: usize) -> Vec<String> {
+    match components {
+        1 => vec![name.to_owned()],
+        2..=4 => (0..components)
+            .map(|c| format!("{name}.{}", ["X", "Y", "Z", "W"][c]))
+            .collect(),
+        _ => (0..components).map(|c| format!("{name}.{c}")).collect(),
+    }
 }
 
 fn vectors<const N: usize>(names: [&'static str; N], source: fn(usize) -> Source) -> [Plane; N] {
     std::array::from_fn(|component| Plane::new(names[component], source(component)))
 }
 
-/// The same in the order of the file: by name, byte by byte.
-pub(super) fn planes_in_file(channels: Channels) -> Vec<Plane> {
-    let mut all = planes(channels);
-    all.sort_unstable_by_key(|plane| plane.name);
+/// A name that several planes of a file with `channels` have.
+pub fn ambiguous_name(channels: Channels, attributes: &[String]) -> Option<String> {
+    let all = planes_in_file(channels, attributes);
+    let mut pairs = all.windows(2);
+    let found = pairs.find(|pair| pair[0].name == pair[1].name)?;
+    Some(found[0].name.to_string())
+}
+
+/// The planes of a file with `channels`, in the order of the file: by name, compared byte by byte.
+pub(super) fn planes_in_file(channels: Channels, attributes: &[String]) -> Vec<Plane> {
+    let mut all = planes(channels, attributes);
+    all.sort_unstable_by(|a, b| a.name.cmp(&b.name));
     all
 }

@@ -1,10 +1,14 @@
-use exr::prelude::{Blocks, Encoding, FlatSamples, LineOrder, ReadChannels, ReadLayers, f16, read};
+use exr::meta::MetaData;
+use exr::prelude::{
+    Blocks, Encoding, FlatSamples, IntegerBounds, LineOrder, ReadChannels, ReadLayers, Vec2, f16,
+    read,
+};
 use glam::Vec3;
 
 use super::*;
 use crate::render::Channels;
 
-/// All there are.
+/// All compression methods.
 pub(super) const COMPRESSIONS: [Compression; 5] = [
     Compression::None,
     Compression::Rle,
@@ -13,7 +17,7 @@ pub(super) const COMPRESSIONS: [Compression; 5] = [
     Compression::Piz,
 ];
 
-/// A film whose every value tells where it belongs.
+/// A film whose values depend on pixel and channel, so that misplaced samples are found.
 fn film(width: u32, height: u32, channels: Channels) -> Film {
     let mut film = Film::new(width, height, channels);
     let value = |i: usize| i as f32 * 0.25;
@@ -57,7 +61,7 @@ fn options() -> ExrOptions {
     }
 }
 
-/// Channels as written, in file order, and the layer's attributes.
+/// The channels of a file in its order, the attributes of the layer, and the encoding.
 fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encoding) {
     let image = read()
         .no_deep_data()
@@ -74,7 +78,7 @@ fn decode(bytes: &[u8]) -> (Vec<(String, FlatSamples)>, LayerAttributes, Encodin
 }
 
 #[test]
-fn reads_back_with_types_and_values() {
+fn round_trips_with_types_and_values() {
     let film = film(37, 21, Channels::ALL);
     for compression in COMPRESSIONS {
         let options = ExrOptions {
@@ -85,11 +89,11 @@ fn reads_back_with_types_and_values() {
         assert_eq!(encoded.clamped, 0);
         let (channels, attributes, encoding) = decode(&encoded.bytes);
         let names: Vec<&str> = channels.iter().map(|(name, _)| name.as_str()).collect();
-        let wanted = [
+        let expected = [
             "A", "B", "G", "N.X", "N.Y", "N.Z", "P.X", "P.Y", "P.Z", "R", "V.X", "V.Y", "V.Z", "Z",
             "albedo.B", "albedo.G", "albedo.R", "id.I",
         ];
-        assert_eq!(names, wanted);
+        assert_eq!(names, expected);
         for (name, samples) in &channels {
             check_channel(&film, name, samples);
         }
@@ -100,6 +104,35 @@ fn reads_back_with_types_and_values() {
     }
 }
 
+#[test]
+fn windows_are_those_of_the_options() {
+    let film = film(37, 21, Channels::ALL);
+    for compression in COMPRESSIONS {
+        for [left, top] in [[100, 3], [-7, -20]] {
+            let window = DataWindow {
+                left,
+                top,
+                image: [160, 90],
+            };
+            let options = ExrOptions {
+                compression,
+                window: Some(window),
+                ..options()
+            };
+            let bytes = encode_exr(&film, &options).unwrap().bytes;
+            let meta = MetaData::read_from_buffered(Cursor::new(&bytes), true).unwrap();
+            let header = &meta.headers[0];
+            let data = IntegerBounds::new(Vec2(left, top), Vec2(37, 21));
+            assert_eq!(header.data_window(), data);
+            let display = IntegerBounds::from_dimensions((160, 90));
+            assert_eq!(header.shared_attributes.display_window, display);
+            for (name, samples) in &decode(&bytes).0 {
+                check_channel(&film, name, samples);
+            }
+        }
+    }
+}
+
 #[track_caller]
 fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
     let color = |c: usize| film.color.iter().map(|v| f16::from_f32(v[c])).collect();
@@ -107,7 +140,7 @@ fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
         let plane = plane.as_ref().unwrap();
         FlatSamples::F32(plane.iter().map(|v| v[a]).collect())
     };
-    let wanted = match name {
+    let expected = match name {
         "R" => FlatSamples::F16(color(0)),
         "G" => FlatSamples::F16(color(1)),
         "B" => FlatSamples::F16(color(2)),
@@ -128,7 +161,7 @@ fn check_channel(film: &Film, name: &str, samples: &FlatSamples) {
         "albedo.B" => axis(&film.albedo, 2),
         _ => panic!("unexpected channel {name}"),
     };
-    assert_eq!(*samples, wanted, "{name}");
+    assert_eq!(*samples, expected, "{name}");
 }
 
 #[track_caller]
@@ -146,7 +179,7 @@ fn check_attributes(attributes: &LayerAttributes) {
 }
 
 #[test]
-fn colour_alone_needs_no_options() {
+fn colours_without_options_are_encoded() {
     let encoded = encode_exr(&film(3, 2, Channels::COLOR), &ExrOptions::default()).unwrap();
     let (channels, attributes, _) = decode(&encoded.bytes);
     assert_eq!(channels.len(), 4);
@@ -154,7 +187,7 @@ fn colour_alone_needs_no_options() {
 }
 
 #[test]
-fn the_same_bytes_every_time_and_on_any_threads() {
+fn bytes_do_not_depend_on_threads() {
     let film = film(200, 300, Channels::ALL);
     for compression in COMPRESSIONS {
         let options = ExrOptions {
@@ -172,7 +205,7 @@ fn the_same_bytes_every_time_and_on_any_threads() {
 }
 
 #[test]
-fn what_half_cannot_hold_is_clamped_and_counted() {
+fn values_outside_the_range_of_half_floats_are_clamped_and_counted() {
     let mut film = film(2, 2, Channels::COLOR);
     film.color[0] = [65_504.0, 65_505.0, f32::INFINITY, 1.0];
     film.color[1] = [-1e9, f32::NAN, 0.0, 1.0];
@@ -191,7 +224,7 @@ fn what_half_cannot_hold_is_clamped_and_counted() {
 }
 
 #[test]
-fn texts_may_be_empty_long_or_in_any_script() {
+fn texts_may_be_empty_long_or_not_ascii() {
     for json in [
         String::new(),
         "\u{6c34}\u{e9}".to_owned(),
@@ -216,7 +249,7 @@ fn texts_may_be_empty_long_or_in_any_script() {
 }
 
 #[test]
-fn attributes_that_do_not_fit_are_refused() {
+fn oversized_attributes_are_rejected() {
     let film = film(1, 1, Channels::COLOR);
     let with = |name: &str, json: &str| ExrOptions {
         custom: Some(CustomAttribute {

@@ -2,28 +2,44 @@
 
 use glam::Vec3;
 
-use super::light::{Light, LightSamples};
-use crate::math::{Lanes3, Supported, splat, splat3};
+use super::light::{Beam, Light, LightSamples};
+use crate::math::{Lanes, Lanes3, Supported, splat, splat3};
 
 /// A light with parallel rays.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct DirectionalLight {
     /// Unit vector towards the light.
     pub(super) to_light: Vec3,
-    pub(super) radiance: Vec3,
+    /// On surfaces that face the light.
+    pub(super) irradiance: Vec3,
     pub(super) casts_shadow: bool,
 }
 
 impl Light for DirectionalLight {
-    fn sample_li(&self, _simd: Supported, start: &Lanes3, samples: &mut LightSamples) {
+    fn sample_li(
+        &self,
+        _simd: Supported,
+        start: &Lanes3,
+        _u: &[Lanes; 2],
+        samples: &mut LightSamples,
+    ) {
         samples.rays.origin = *start;
         samples.rays.direction = splat3(self.to_light);
         samples.rays.t_min = splat(0.0);
         samples.rays.t_max = splat(f32::INFINITY);
-        samples.radiance = splat3(self.radiance);
+        samples.radiance = splat3(self.irradiance);
+        samples.pdf = splat(f32::INFINITY);
     }
 
     fn casts_shadow(&self) -> bool {
         self.casts_shadow
+    }
+
+    fn beam(&self) -> Option<Beam> {
+        self.casts_shadow.then_some(Beam {
+            to_light: self.to_light,
+            cap: 0.0,
+            irradiance: self.irradiance,
+        })
     }
 }

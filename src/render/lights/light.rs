@@ -1,15 +1,71 @@
 //! The interface between lights and integrators.
 
-use crate::math::{Lanes3, Supported};
+use glam::Vec3;
+
+use crate::math::{Lanes, Lanes3, Supported, splat};
 use crate::ray::RayPacket;
+use crate::render::shading::in_cone;
 
 /// A light.
 pub(in crate::render) trait Light: Sync {
-    /// Samples the unoccluded light at `start`, the shading points of a packet.
-    fn sample_li(&self, simd: Supported, start: &Lanes3, samples: &mut LightSamples);
+    /// Samples the unoccluded light at `start`, the shading points of a packet. The numbers `u` are in 0..1; a light
+    /// without extent does not need them.
+    fn sample_li(
+        &self,
+        simd: Supported,
+        start: &Lanes3,
+        u: &[Lanes; 2],
+        samples: &mut LightSamples,
+    );
 
     /// Whether other objects occlude the light. A light without shadows needs no shadow rays.
-    fn casts_shadow(&self) -> bool;
+    fn casts_shadow(&self) -> bool {
+        true
+    }
+
+    /// Whether rays can hit the light.
+    fn has_extent(&self) -> bool {
+        false
+    }
+
+    /// The light as parallel rays, if it is infinitely far away and casts shadows: it emits photons.
+    fn beam(&self) -> Option<Beam> {
+        None
+    }
+
+    /// Whether the camera sees the light.
+    fn is_visible(&self) -> bool {
+        false
+    }
+
+    /// Intersects rays with a light that has an extent.
+    fn intersect(&self, simd: Supported, rays: &RayPacket, emission: &mut Emission) {
+        let _ = (simd, rays);
+        emission.lanes = 0;
+    }
+}
+
+/// Light from infinitely far away.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(in crate::render) struct Beam {
+    /// Unit vector towards its centre.
+    pub(in crate::render) to_light: Vec3,
+    /// 1 minus the cosine of half the apparent diameter.
+    pub(in crate::render) cap: f32,
+    /// On surfaces that face the light, linear RGB.
+    pub(in crate::render) irradiance: Vec3,
+}
+
+impl Beam {
+    /// A unit vector towards the light; `u` is uniform in the unit square.
+    pub(in crate::render) fn direction(&self, u: [f32; 2]) -> Vec3 {
+        in_cone(self.to_light.to_array(), self.cap, u).into()
+    }
+
+    /// Tangent of half the apparent diameter.
+    pub(in crate::render) fn spread(&self) -> f32 {
+        (self.cap * (2.0 - self.cap)).sqrt() / (1.0 - self.cap)
+    }
 }
 
 /// A sample of a light for each shading point of a packet.
@@ -21,6 +77,34 @@ pub(in crate::render) struct LightSamples {
     /// Radiance that arrives along each ray; after `Material::reflect`, the radiance that arrives at the sample of
     /// the image.
     pub(in crate::render) radiance: Lanes3,
+    /// Probability density of each direction, per steradian; infinite for lights without extent, whose `radiance` is
+    /// the irradiance on a surface that faces them. Only used by path tracing.
+    pub(in crate::render) pdf: Lanes,
     /// Lanes that the light reaches.
     pub(in crate::render) lanes: u32,
+}
+
+/// The intersections of rays with a light.
+#[derive(Debug, Clone)]
+#[repr(C, align(64))]
+pub(in crate::render) struct Emission {
+    /// Distance along each ray; infinite for lights that are infinitely far away.
+    pub(in crate::render) t: Lanes,
+    /// Probability density with which the light samples the direction of the ray, per steradian.
+    pub(in crate::render) pdf: Lanes,
+    /// Radiance of the light, linear RGB, the same in all lanes.
+    pub(in crate::render) radiance: Vec3,
+    /// Lanes of rays that hit the light.
+    pub(in crate::render) lanes: u32,
+}
+
+impl Default for Emission {
+    fn default() -> Self {
+        Self {
+            t: splat(0.0),
+            pdf: splat(0.0),
+            radiance: Vec3::ZERO,
+            lanes: 0,
+        }
+    }
 }

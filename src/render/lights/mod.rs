@@ -2,15 +2,28 @@
 //!
 //! To add a kind of light, add a file here and a line in [`light_of`].
 
+use glam::Vec3;
+
+use super::shading::tangents;
 use crate::scene::{self, LightKind};
 
 mod directional;
+mod environment;
 mod light;
+mod panel;
 mod point;
+mod sphere;
+mod sun;
+#[cfg(test)]
+mod tests;
 
 use directional::DirectionalLight;
-pub(super) use light::{Light, LightSamples};
+pub(super) use environment::{environment_along, sample_directions, sample_environment};
+pub(super) use light::{Beam, Emission, Light, LightSamples};
+use panel::{Outline, PanelLight};
 use point::PointLight;
+use sphere::SphereLight;
+use sun::SunLight;
 
 /// The light for a `light` of the scene.
 pub(super) fn light_of(light: &scene::Light) -> Box<dyn Light> {
@@ -23,8 +36,49 @@ pub(super) fn light_of(light: &scene::Light) -> Box<dyn Light> {
         }),
         LightKind::Directional { to_light } => Box::new(DirectionalLight {
             to_light,
-            radiance: light.radiance,
+            irradiance: light.radiance,
             casts_shadow: light.casts_shadow,
         }),
+        LightKind::Sun {
+            to_light,
+            half_angle,
+        } => Box::new(SunLight::new(
+            to_light,
+            half_angle,
+            light.radiance,
+            light.is_visible,
+        )),
+        LightKind::Sphere { center, radius } => Box::new(SphereLight {
+            center,
+            radius,
+            radiance: light.radiance,
+            is_visible: light.is_visible,
+        }),
+        LightKind::Rectangle { center, axes, half } => Box::new(PanelLight {
+            outline: Outline::Rectangle,
+            center,
+            axes,
+            half,
+            radiance: light.radiance,
+            is_visible: light.is_visible,
+        }),
+        LightKind::Disc {
+            center,
+            normal,
+            radius,
+        } => Box::new(PanelLight {
+            outline: Outline::Ellipse,
+            center,
+            axes: disc_axes(normal),
+            half: [radius; 2],
+            radiance: light.radiance,
+            is_visible: light.is_visible,
+        }),
     }
+}
+
+/// Axes of a disc with unit `normal`.
+fn disc_axes(normal: Vec3) -> [Vec3; 3] {
+    let [across, along] = tangents(normal.to_array());
+    [across.into(), along.into(), normal]
 }

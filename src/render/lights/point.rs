@@ -8,7 +8,7 @@
 use glam::Vec3;
 
 use super::light::{Light, LightSamples};
-use crate::math::{LANES, Lanes3, Supported, lane_kernel};
+use crate::math::{LANES, Lanes, Lanes3, Supported, lane_kernel};
 use crate::scene::Falloff;
 
 /// A light without extent.
@@ -21,7 +21,13 @@ pub(super) struct PointLight {
 }
 
 impl Light for PointLight {
-    fn sample_li(&self, simd: Supported, start: &Lanes3, samples: &mut LightSamples) {
+    fn sample_li(
+        &self,
+        simd: Supported,
+        start: &Lanes3,
+        _u: &[Lanes; 2],
+        samples: &mut LightSamples,
+    ) {
         sample_point_light(simd, self, start, samples);
     }
 
@@ -54,6 +60,7 @@ fn sample_point_light_body(light: &PointLight, start: &Lanes3, samples: &mut Lig
         }
         samples.rays.t_min[l] = 0.0;
         samples.rays.t_max[l] = distance;
+        samples.pdf[l] = f32::INFINITY;
     }
 }
 
@@ -64,10 +71,10 @@ lane_kernel! {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::math::{lane3, splat3};
+    use crate::math::{lane3, splat, splat3};
 
     #[test]
-    fn a_point_light_keeps_or_loses_strength() {
+    fn point_light_falloff() {
         let sample = |falloff, start| {
             let light = PointLight {
                 position: Vec3::new(1.0, 0.0, 4.0),
@@ -76,7 +83,8 @@ mod tests {
                 casts_shadow: true,
             };
             let mut samples = LightSamples::default();
-            light.sample_li(Supported::default(), &splat3(start), &mut samples);
+            let u = [splat(0.0); 2];
+            light.sample_li(Supported::default(), &splat3(start), &u, &mut samples);
             let rays = &samples.rays;
             (
                 lane3(&rays.direction, 3),

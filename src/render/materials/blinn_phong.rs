@@ -65,7 +65,7 @@ fn reflect_lights_body(
 lane_kernel! {
     /// Converts the radiance that arrives from a light to the radiance reflected along `rays`, times `throughput`.
     /// Shadow rays of lanes that are not lit end before they start.
-    pub(super) fn reflect_lights(
+    pub(in crate::render) fn reflect_lights(
         material: &WhittedMaterial,
         rays: &RayPacket,
         points: &ShadingPoints,

@@ -3,7 +3,6 @@
 //! To add a material, add a file here and a line in [`materials_of`].
 
 use crate::scene::{Scene, ground};
-use crate::surface::MaterialId;
 
 mod blinn_phong;
 mod dielectric;
@@ -13,6 +12,7 @@ mod points;
 mod two_sided;
 mod whitted;
 
+pub(super) use blinn_phong::reflect_lights;
 pub(super) use dielectric::{Dielectric, attenuate, cross_straight, leaving};
 use interface::Interface;
 pub(super) use material::Material;
@@ -23,12 +23,10 @@ pub(super) use whitted::WhittedMaterial;
 /// Highlights of clear bodies below this fraction of the light count as dark.
 const MIN_HIGHLIGHT: f32 = 1.0 / 4096.0;
 
-/// The materials of `scene` by [`MaterialId`]. `is_connected`: the particles bound one body.
-pub(super) fn materials_of(
-    scene: &Scene,
-    is_connected: bool,
-) -> [Box<dyn Material>; MaterialId::COUNT] {
-    let matte = || {
+/// The materials of `scene` by [`MaterialId`](crate::surface::MaterialId). `is_connected`: the particles bound one
+/// body. Ground, spray and meshes are matte.
+pub(super) fn materials_of(scene: &Scene, is_connected: bool) -> Vec<Box<dyn Material>> {
+    let matte = || -> Box<dyn Material> {
         let constants =
             WhittedMaterial::matte(ground::AMBIENT, ground::DIFFUSE, scene.ambient_light);
         Box::new(TwoSided(constants))
@@ -42,5 +40,6 @@ pub(super) fn materials_of(
     } else {
         Box::new(TwoSided(constants))
     };
-    [particles, matte(), matte()]
+    let others = (0..2 + scene.meshes.len()).map(|_| matte());
+    std::iter::once(particles).chain(others).collect()
 }

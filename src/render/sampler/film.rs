@@ -3,6 +3,7 @@
 //! The points of a pixel come from a table of correlated multi-jittered sets, selected by a hash of the pixel: as
 //! well distributed as a separate set for every pixel, at a fraction of the cost.
 
+use super::filter::{FilterTable, PixelFilter};
 use super::hash::mix;
 use super::multi_jitter::MultiJitter;
 
@@ -23,22 +24,30 @@ pub struct FilmSampler {
 }
 
 impl FilmSampler {
-    /// A sampler with `samples` points per pixel (at least one).
+    /// A sampler with `samples` points per pixel (at least one), all inside it.
     pub fn new(samples: u32) -> Self {
+        Self::with_filter(samples, PixelFilter::BOX)
+    }
+
+    /// A sampler with `samples` points per pixel (at least one), distributed like `filter` around its centre.
+    pub fn with_filter(samples: u32, filter: PixelFilter) -> Self {
+        let table = (filter != PixelFilter::BOX && samples > 1).then(|| FilterTable::new(filter));
+        let place = |u: f32| table.as_ref().map_or(u, |table| 0.5 + table.position(u));
         let mut sets = MultiJitter::new(samples);
         let samples = samples.max(1) as usize;
         let count = (TABLE_POINTS / samples).clamp(MIN_SETS, MAX_SETS);
         let (mut x, mut y) = (Vec::new(), Vec::new());
         for set in (0_u64..).take(count) {
             sets.for_each(set, |point| {
-                x.push(point.x);
-                y.push(point.y);
+                x.push(place(point.x));
+                y.push(place(point.y));
             });
         }
         Self { samples, x, y }
     }
 
-    /// The points of pixel `(x, y)`, with coordinates in 0..1. A single point is the centre of the pixel.
+    /// The points of pixel `(x, y)`, with coordinates in 0..1, or around that with a filter that is wider than the
+    /// pixel. A single point is the centre of the pixel.
     pub fn points(&self, x: u32, y: u32) -> (&[f32], &[f32]) {
         let sets = self.x.len() / self.samples;
         let hash = mix(u64::from(y) << 32 | u64::from(x)) >> 32;
@@ -53,9 +62,10 @@ mod tests {
     use std::collections::HashSet;
 
     use super::*;
+    use crate::render::sampler::FilterKind;
 
     #[test]
-    fn pixels_take_whole_sets_and_many_of_them() {
+    fn pixels_use_complete_sample_sets() {
         for samples in [1, 3, 16, 4096] {
             let sampler = FilmSampler::new(samples);
             let mut sets = HashSet::new();
@@ -72,5 +82,27 @@ mod tests {
             assert!(samples == 1 || sets.len() > 12, "{samples}: {}", sets.len());
         }
         assert_eq!(FilmSampler::new(1).points(3, 4), (&[0.5][..], &[0.5][..]));
+    }
+
+    #[test]
+    fn filters_spread_samples_around_the_pixel() {
+        let filter = PixelFilter {
+            kind: FilterKind::Gaussian,
+            width: 3.0,
+        };
+        let centre = FilmSampler::with_filter(1, filter);
+        assert_eq!(centre.points(3, 4), (&[0.5][..], &[0.5][..]));
+        let sampler = FilmSampler::with_filter(64, filter);
+        let (mut square, mut reach) = (0.0, 0.0_f32);
+        for pixel in 0..256 {
+            let (x, y) = sampler.points(pixel, 0);
+            for offset in x.iter().chain(y).map(|at| at - 0.5) {
+                square += offset * offset / (2.0 * 64.0 * 256.0);
+                reach = reach.max(offset.abs());
+            }
+        }
+        // The variance of a normal distribution that is cut off at two standard deviations of 3/4
+        assert!((square - 0.773_7 * 0.562_5).abs() < 0.005, "{square}");
+        assert!(reach > 1.3 && reach <= 1.5, "{reach}");
     }
 }

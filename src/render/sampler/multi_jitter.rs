@@ -50,7 +50,7 @@ impl MultiJitter {
             // Jitter the point in its cell
             let column = self.column_order[index % columns] as f32;
             let row = self.row_order[index / columns] as f32;
-            // In x, every sample has a fine stratum of its own: the part of a column that belongs to its row.
+            // In x, every sample has a separate fine stratum: the part of a column that belongs to its row.
             let x = (column + (row + self.random.unit()) / rows as f32) / columns as f32;
             let y = (sample as f32 + self.random.unit()) / self.samples as f32;
             each(Vec2::new(x, y).min(Vec2::splat(1.0 - 0.5 * f32::EPSILON)));
@@ -153,10 +153,10 @@ mod tests {
         for side in [2, 4, 8] {
             let cells = points(side * side, 3);
             let cell = |p: &Vec2| (stratum(p.x, side), stratum(p.y, side));
-            let mut seen: Vec<_> = cells.iter().map(cell).collect();
-            seen.sort_unstable();
-            seen.dedup();
-            assert_eq!(seen.len(), cells.len());
+            let mut occupied: Vec<_> = cells.iter().map(cell).collect();
+            occupied.sort_unstable();
+            occupied.dedup();
+            assert_eq!(occupied.len(), cells.len());
         }
     }
 

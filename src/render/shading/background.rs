@@ -5,6 +5,7 @@ use glam::Vec3;
 use crate::math::functions::asin;
 use crate::math::{LANES, Lanes3, lane_kernel, splat};
 use crate::scene::Background;
+use crate::scene::background::{STUDIO_BOTTOM, STUDIO_TOP};
 
 /// A background in a form for packets: a gradient from `bottom` to `top` along `up`.
 #[derive(Debug, Clone, Copy)]
@@ -27,6 +28,12 @@ impl From<&Background> for BackgroundLanes {
             Background::Gradient { bottom, top, up } => Self {
                 bottom,
                 top,
+                up,
+                is_constant: false,
+            },
+            Background::Studio { up } => Self {
+                bottom: STUDIO_BOTTOM,
+                top: STUDIO_TOP,
                 up,
                 is_constant: false,
             },

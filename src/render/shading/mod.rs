@@ -5,9 +5,13 @@
 //! not multiplied by zero.
 
 mod arithmetic;
+mod backdrop;
 mod background;
 mod camera;
+mod frame;
 
 pub(super) use arithmetic::{add, product, scale};
+pub(super) use backdrop::add_backdrop;
 pub(super) use background::{BackgroundLanes, add_background};
-pub(super) use camera::{CameraLanes, camera_rays, depths};
+pub(super) use camera::{CameraLanes, camera_rays, depths, lens_rays};
+pub(super) use frame::{disc, in_cone, tangents, to_world};

@@ -20,16 +20,16 @@ const HEADS: [&str; 18] = [
     "surface\ns",
     "trace\ns",
     "encode\ns",
-    "all stages\ns",
-    "rays\nmillions",
+    "total\ns",
+    "rays\nM",
     "rays\nM/s",
-    "anonymous\nMiB",
-    "file\nMiB",
-    "bytes a\nparticle",
-    "tree peak\nMiB",
-    "particles\ndropped",
-    "radii\nclamped",
-    "pixels\nclamped",
+    "anonymous peak\nMiB",
+    "file-backed peak\nMiB",
+    "tree bytes\nper particle",
+    "build peak\nMiB",
+    "dropped\nparticles",
+    "clamped\nradii",
+    "clamped\npixels",
 ];
 
 impl JobReport {
@@ -40,7 +40,7 @@ impl JobReport {
         if total == 0 {
             return;
         }
-        page.section("failed", "Failed");
+        page.section("failed", "Failed frames");
         page.warning(&match total {
             1 => "1 frame failed.".to_owned(),
             total => format!("{total} frames failed."),
@@ -50,12 +50,12 @@ impl JobReport {
             table.bad_row([
                 frame.number.to_string(),
                 frame.image.clone().unwrap_or_default(),
-                shortened(frame.reason.as_deref().unwrap_or("not told"), MOST_TEXT),
+                shortened(frame.reason.as_deref().unwrap_or("not recorded"), MOST_TEXT),
             ]);
         }
         page.table(&table);
         if total > MOST_FAILURES {
-            let note = format!("These are the first {MOST_FAILURES}; all are in");
+            let note = format!("The first {MOST_FAILURES} are listed; all are in");
             page.link(&note, super::JSON_FILE);
         }
     }
@@ -83,9 +83,10 @@ impl JobReport {
             .filter(|frame| frame.status != Status::Pending)
             .collect();
         if tried.is_empty() {
-            page.text("No frame has been tried yet.");
+            page.text("No frame has been attempted yet.");
             return;
         }
+        // Choose frames at equal distances, to limit the size of the page
         let mut table = Table::new("all-frames", &HEADS);
         let chosen = evenly(tried.len(), MOST_FRAMES);
         let all = chosen.len() == tried.len();
@@ -98,12 +99,12 @@ impl JobReport {
             }
         }
         page.text(
-            "Times are wall-clock; neighbouring frames overlap. Memory is that of the process, the \
-             largest seen from the beginning of its run to this frame.",
+            "Times are wall-clock; neighbouring frames overlap. Memory peaks are those of the process, from \
+             the start of its run to this frame.",
         );
         if !all {
             let tried = count(tried.len() as u64);
-            let note = format!("{MOST_FRAMES} of {tried} frames, evenly chosen; all are in");
+            let note = format!("{MOST_FRAMES} of {tried} frames, evenly spaced; all are in");
             page.link(&note, super::JSON_FILE);
         }
         page.table(&table);
@@ -152,7 +153,7 @@ mod tests {
     use super::evenly;
 
     #[test]
-    fn a_choice_has_both_ends() {
+    fn even_selection_includes_both_ends() {
         assert_eq!(evenly(3, 5), [0, 1, 2]);
         assert_eq!(evenly(9, 3), [0, 4, 8]);
         assert_eq!(evenly(0, 3), [0usize; 0]);

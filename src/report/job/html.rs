@@ -19,17 +19,17 @@ impl JobReport {
         self.put_failures(&mut page);
         page.section("totals", "Totals");
         page.key_values(&self.totals_list());
-        page.section("plots", "Over the sequence");
+        page.section("plots", "Plots by frame");
         if self.done().next().is_some() {
             page.plots(&self.plots());
         } else {
-            page.text("No frame is done yet.");
+            page.text("No frame is finished yet.");
         }
         self.put_slowest(&mut page);
         self.put_tree(&mut page);
         self.put_frames(&mut page);
         self.put_settings(&mut page);
-        page.link("All numbers, for scripts:", super::JSON_FILE);
+        page.link("All values as JSON:", super::JSON_FILE);
         page.html()
     }
 
@@ -45,14 +45,14 @@ impl JobReport {
     fn progress(&self) -> Vec<(&'static str, String)> {
         let done = self.with_status(Status::Done).len();
         let mut list = vec![("Frames", format!("{done} of {} done", self.frames.len()))];
-        for (name, status) in [("Failed", Status::Failed), ("Still to do", Status::Pending)] {
+        for (name, status) in [("Failed", Status::Failed), ("Pending", Status::Pending)] {
             let frames = self.with_status(status);
             if !frames.is_empty() {
                 list.push((name, format!("{}: {}", frames.len(), list_of(&frames))));
             }
         }
         list.push((
-            "Reported on",
+            "Report written on",
             format!(
                 "{} threads, {}, {} {}, spherule {}",
                 self.machine.threads,
@@ -71,15 +71,16 @@ impl JobReport {
         let rays = &totals.rays;
         let mut list = vec![
             ("Particles drawn", count(totals.particles)),
-            ("Wall-clock time of the frames done", duration(seconds.wall)),
-            ("Reading", duration(seconds.read)),
-            ("Building", duration(seconds.build)),
+            ("Wall-clock time of finished frames", duration(seconds.wall)),
+            ("Read", duration(seconds.read)),
+            ("Build", duration(seconds.build)),
             ("Surface", duration(seconds.surface)),
-            ("Tracing", duration(seconds.trace)),
-            ("Encoding and writing", duration(seconds.encode)),
+            ("Trace", duration(seconds.trace)),
+            ("Denoise", duration(seconds.denoise)),
+            ("Encode and write", duration(seconds.encode)),
             ("Rays", count(rays.total())),
             (
-                "Primary, shadow, reflected, refracted",
+                "Primary, shadow, reflection, refraction rays",
                 [rays.primary, rays.shadow, rays.reflection, rays.refraction]
                     .map(count)
                     .join(", "),
@@ -87,20 +88,20 @@ impl JobReport {
         ];
         if let Some(rate) = totals.rays_per_second() {
             list.push((
-                "Rays a second while tracing",
+                "Rays per second of tracing",
                 format!("{} million", short(rate / 1e6)),
             ));
         }
         list.extend([
-            ("Peak memory, anonymous", bytes(totals.rss.anonymous_peak)),
-            ("Peak memory, file-backed", bytes(totals.rss.file_peak)),
-            ("Peak of all resident memory", bytes(totals.rss.total_peak)),
+            ("Peak anonymous memory", bytes(totals.rss.anonymous_peak)),
+            ("Peak file-backed memory", bytes(totals.rss.file_peak)),
+            ("Peak resident memory", bytes(totals.rss.total_peak)),
             (
-                "Particles dropped (not finite or too far away)",
+                "Dropped particles (not finite, or too far away)",
                 count(totals.dropped),
             ),
-            ("Radii clamped (too small)", count(totals.clamped_radii)),
-            ("Pixels clamped (too bright)", count(totals.clamped_pixels)),
+            ("Clamped radii (too small)", count(totals.clamped_radii)),
+            ("Clamped pixels (too bright)", count(totals.clamped_pixels)),
         ]);
         list
     }
@@ -112,14 +113,15 @@ impl JobReport {
             return;
         };
         let build = &report.build;
+        // Properties of the tree and its memory
         page.section(
             "build",
-            &format!("Tree of the slowest frame, {}", frame.number),
+            &format!("Tree of the slowest frame ({})", frame.number),
         );
         page.key_values(&[
             ("Structure", build.structure.clone()),
-            ("Order of the particles", build.order.clone()),
-            ("Instruction set of the rays", build.simd.clone()),
+            ("Particle order", build.order.clone()),
+            ("Instruction set for tracing", build.simd.clone()),
             ("Nodes", count(build.nodes)),
             ("Leaves", count(build.leaves)),
             ("Depth", build.depth.to_string()),
@@ -129,18 +131,19 @@ impl JobReport {
             ("Surface", bytes(report.bytes.surface)),
             ("Attributes", bytes(report.bytes.attributes)),
             (
-                "Of these in anonymous memory, in the mapped file",
+                "Total in anonymous memory, in the mapped file",
                 [report.bytes.anonymous(), report.bytes.file.total()]
                     .map(bytes)
                     .join(", "),
             ),
             (
-                "Of these for a particle, beside the thesis's program",
+                "Total per particle, in anonymous memory, in the mapped file",
                 per_particle(report),
             ),
-            ("Scratch while building", bytes(report.bytes.scratch)),
-            ("Peak while building", bytes(report.bytes.build_peak)),
+            ("Build scratch memory", bytes(report.bytes.scratch)),
+            ("Build peak memory", bytes(report.bytes.build_peak)),
         ]);
+        // Times of the phases of the build
         let table = phases(report);
         if !table.is_empty() {
             page.table(&table);
@@ -161,7 +164,7 @@ impl JobReport {
 
 /// Seconds by phase, and their percentage of the total.
 fn phases(report: &FrameReport) -> Table {
-    let mut table = Table::new("build-phases", &["phase", "seconds", "part, %"]);
+    let mut table = Table::new("build-phases", &["phase", "time, s", "share, %"]);
     for (name, seconds) in &report.build.phases {
         let part = 100.0 * seconds / report.seconds.build;
         table.row([name.clone(), time(*seconds), short(part)]);
@@ -180,7 +183,7 @@ fn per_particle(report: &FrameReport) -> String {
     let each = |bytes: u64| short(bytes as f64 / report.particles.max(1) as f64);
     let held = [report.bytes.anonymous(), report.bytes.file.total()].map(each);
     format!(
-        "{} B (thesis: about {} B)",
+        "{} B (program of the thesis: about {} B)",
         held.join(", "),
         THESIS_BYTES_PER_PARTICLE
     )

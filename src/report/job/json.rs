@@ -52,7 +52,7 @@ impl JobReport {
 }
 
 impl JobFrame {
-    /// What the ledger says, and what follows from it.
+    /// The entry of the ledger, with the values derived from it.
     fn to_json(&self) -> Value {
         let mut json = json!({
             "frame": self.number,

@@ -18,7 +18,7 @@ use std::io;
 use std::path::Path;
 
 use serde_json::Value;
-use spherule_jobs::{Entry, FrameState, JobState, PlannedFrame, publish, read_regular_text};
+use spherule_jobs::{FrameState, JobState, LedgerEntry, PlannedFrame, publish, read_regular_text};
 
 use super::frame::FrameReport;
 use crate::accel::simd::SimdLevel;
@@ -157,7 +157,7 @@ impl JobFrame {
         )
     }
 
-    fn of(number: i64, image: Option<String>, status: Status, entry: Option<&Entry>) -> Self {
+    fn of(number: i64, image: Option<String>, status: Status, entry: Option<&LedgerEntry>) -> Self {
         let details = entry.map_or(Value::Null, |entry| entry.details.value());
         let report = serde_json::from_value(details.clone()).ok();
         Self {

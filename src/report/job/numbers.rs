@@ -95,7 +95,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn as_people_write_them() {
+    fn numbers_are_formatted() {
         assert_eq!(
             [0, 999, 1000, 12_345_678].map(count),
             ["0", "999", "1\u{202f}000", "12\u{202f}345\u{202f}678"]

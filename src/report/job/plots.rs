@@ -17,6 +17,7 @@ fn curve<'a>(name: &str, value: impl Fn(&FrameReport) -> f64 + 'a) -> Curve<'a> 
 impl JobReport {
     /// All plots, with gaps for frames that are not finished.
     pub(super) fn plots(&self) -> Vec<Plot> {
+        // Collect the curves
         let stages = vec![
             curve("read", |r| r.seconds.read),
             curve("build", |r| r.seconds.build),
@@ -27,7 +28,7 @@ impl JobReport {
         let memory = vec![
             curve("anonymous", |r| float(r.rss.anonymous_peak) / MIB),
             curve("file-backed", |r| float(r.rss.file_peak) / MIB),
-            curve("all resident", |r| float(r.rss.total_peak) / MIB),
+            curve("total resident", |r| float(r.rss.total_peak) / MIB),
         ];
         let rays = vec![curve("all rays", |r| {
             r.rays_per_second().map_or(f64::NAN, |rate| rate / 1e6)
@@ -39,18 +40,18 @@ impl JobReport {
         vec![
             self.times("plot-stages", "Time by stage", stages),
             self.times("plot-build", "Build time by phase", self.phases()),
-            self.plot("plot-rays", "Rays", "rays traced, millions a second", rays),
-            self.plot("plot-particles", "Particles", "particles drawn", particles),
+            self.plot("plot-rays", "Ray throughput", "rays, M/s", rays),
+            self.plot("plot-particles", "Particles", "particles", particles),
             self.plot(
                 "plot-memory",
                 "Peak memory of the process",
-                "memory, MiB",
+                "peak memory, MiB",
                 memory,
             ),
             self.plot(
                 "plot-bytes",
-                "Memory for a particle",
-                "bytes a particle",
+                "Tree memory per particle",
+                "bytes per particle",
                 per_particle,
             ),
         ]
@@ -114,7 +115,7 @@ impl JobReport {
             .collect();
         if !rest.is_empty() {
             let sum = move |report: &FrameReport| rest.iter().map(|name| of(name, report)).sum();
-            curves.push(curve("all others", sum));
+            curves.push(curve("others", sum));
         }
         curves
     }

@@ -1,4 +1,4 @@
-//! Reports of awkward jobs.
+//! Reports of unusual jobs.
 
 use serde_json::json;
 
@@ -15,6 +15,7 @@ fn done(number: i64, particles: u64) -> JobFrame {
             build: 0.375,
             surface: 0.125,
             trace: 1.0 + 0.25 * n,
+            denoise: 0.0,
             encode: 0.125,
             wall: 2.0,
         },
@@ -45,7 +46,7 @@ fn of(number: i64, status: Status, reason: Option<&str>, details: Value) -> JobF
         "seq": 1, "time_ms": 1, "frame": number, "status": status.name(), "reason": reason,
         "details": details,
     });
-    let entry: Entry = serde_json::from_value(entry).expect("an entry");
+    let entry: LedgerEntry = serde_json::from_value(entry).expect("an entry");
     JobFrame::of(
         number,
         Some(format!("f.{number}.exr")),
@@ -109,7 +110,7 @@ fn derived_numbers_and_totals() {
 }
 
 #[test]
-fn a_page_with_everything() {
+fn page_contains_all_sections() {
     let frames = vec![
         done(1, 100),
         failed(2, "f_2.vtk: cut off"),
@@ -134,7 +135,7 @@ fn a_page_with_everything() {
 }
 
 #[test]
-fn frames_without_particles_have_no_bytes_for_each() {
+fn frames_without_particles_have_no_bytes_per_particle() {
     let report = report(vec![done(1, 0)]);
     assert_eq!(
         report.to_json()["frames"][0]["bytes"]["per_particle"],
@@ -142,13 +143,9 @@ fn frames_without_particles_have_no_bytes_for_each() {
     );
     let html = report.to_html();
     let bytes = section(&html, "plots")
-        .split("Memory for a particle")
+        .split("Tree memory per particle")
         .nth(1);
-    assert!(
-        bytes
-            .expect("the figure")
-            .contains("There are no values to plot")
-    );
+    assert!(bytes.expect("the figure").contains("No values to plot"));
     assert_eq!(rows(section(&html, "frames")), 1);
 }
 
@@ -163,10 +160,10 @@ fn jobs_without_done_frames() {
         let report = report(frames);
         assert_eq!(report.to_json()["slowest"], json!([]));
         let html = report.to_html();
-        assert!(section(&html, "plots").contains("No frame is done yet"));
+        assert!(section(&html, "plots").contains("No frame is finished yet"));
         assert!(!html.contains("id=\"build\"") && !html.contains("NaN"));
         if failures == 0 {
-            assert!(section(&html, "frames").contains("No frame has been tried yet"));
+            assert!(section(&html, "frames").contains("No frame has been attempted yet"));
             assert!(!html.contains("id=\"failed\""));
         } else {
             assert_eq!(rows(section(&html, "failed")), 2);
@@ -176,7 +173,7 @@ fn jobs_without_done_frames() {
 }
 
 #[test]
-fn hostile_names_stay_text() {
+fn hostile_names_are_escaped() {
     let hostile = "in/<img src=x onerror=alert(1)>\"'&\u{202e}.vtk: cut off";
     let mut frame = failed(1, hostile);
     frame.image = Some(hostile.to_owned());
@@ -212,5 +209,5 @@ fn many_phases_share_the_last_colour() {
     let html = report(vec![frame]).to_html();
     let plots = section(&html, "plots");
     assert!(plots.contains("<title>phase 5</title>") && !plots.contains("<title>phase 6</title>"));
-    assert!(plots.contains("<title>all others</title>"));
+    assert!(plots.contains("<title>others</title>"));
 }

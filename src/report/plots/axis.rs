@@ -75,15 +75,15 @@ impl Axis {
         }
     }
 
-    /// The axis over positions from `low` to `high`, both finite, with about `wanted` ticks.
-    pub(super) fn span(&self, low: f64, high: f64, wanted: f64) -> Span {
+    /// The axis over positions from `low` to `high`, both finite, with about `tick_count` ticks.
+    pub(super) fn span(&self, low: f64, high: f64, tick_count: f64) -> Span {
         match self.scale {
-            Scale::Linear => self.linear_span(low, high, wanted),
-            Scale::Log => log_span(low, high, wanted),
+            Scale::Linear => self.linear_span(low, high, tick_count),
+            Scale::Log => log_span(low, high, tick_count),
         }
     }
 
-    fn linear_span(&self, mut low: f64, mut high: f64, wanted: f64) -> Span {
+    fn linear_span(&self, mut low: f64, mut high: f64, tick_count: f64) -> Span {
         if self.from_zero {
             low = low.min(0.0);
             high = high.max(0.0);
@@ -99,7 +99,7 @@ impl Axis {
             (low, high) = (low - half, high + half);
         }
         // Choose the distance between ticks
-        let mut step = nice_step((high - low) / wanted);
+        let mut step = nice_step((high - low) / tick_count);
         if self.whole {
             step = step.max(1.0);
         }
@@ -223,7 +223,7 @@ fn minus(text: &str) -> String {
 }
 
 /// The range extended to the next 1, 2 or 5 times a power of ten; ticks at these, or only at powers.
-fn log_span(low: f64, high: f64, wanted: f64) -> Span {
+fn log_span(low: f64, high: f64, tick_count: f64) -> Span {
     const SLACK: f64 = 1e-9;
     // Steps of about a third of a decade: 3k, 3k+1, 3k+2 are 1, 2 and 5 times 10^k
     let place = |step: f64| {
@@ -253,7 +253,7 @@ fn log_span(low: f64, high: f64, wanted: f64) -> Span {
     }
     // Place the ticks
     let decades = (last - first) / 3.0;
-    let every = (decades / wanted).ceil().max(1.0);
+    let every = (decades / tick_count).ceil().max(1.0);
     // Do not mix notations such as 10000 and 1e5.
     let is_plain = low >= -4.0 && high < 5.0;
     let mut ticks = Vec::new();

@@ -47,7 +47,7 @@ fn ticks_are_round_numbers() {
 }
 
 #[test]
-fn decades_or_their_parts() {
+fn log_ticks_are_decades_or_1_2_5_steps() {
     let axis = Axis::log("n");
     assert_eq!(
         labels(&axis, 1e5, 1e7),
@@ -63,7 +63,7 @@ fn decades_or_their_parts() {
 }
 
 #[test]
-fn awkward_ranges_still_make_an_axis() {
+fn unusual_ranges_have_distinct_ticks() {
     for axis in [
         Axis::linear("v"),
         Axis::linear("v").from_zero(),
@@ -82,7 +82,7 @@ fn awkward_ranges_still_make_an_axis() {
 }
 
 #[test]
-fn what_has_no_place() {
+fn values_off_the_axis() {
     let axis = Axis::log("n");
     for value in [0.0, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
         assert!(axis.place(value).is_nan(), "{value}");

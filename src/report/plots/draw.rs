@@ -32,7 +32,7 @@ pub(super) fn svg_of(plot: &Plot, series: &[Drawn]) -> String {
         "<svg class=\"plot\" id=\"{id}\" viewBox=\"0 0 {WIDTH} {HEIGHT}\" role=\"img\" \
          aria-labelledby=\"{id}-title\" xmlns=\"http://www.w3.org/2000/svg\" \
          font-family=\"system-ui,sans-serif\" font-size=\"{FONT}\" fill=\"#1b1b1b\">\n\
-         <title id=\"{id}-title\">{}: {} against {}</title>\n",
+         <title id=\"{id}-title\">{}: {} by {}</title>\n",
         escaped(&plot.title),
         escaped(plot.y.title()),
         escaped(plot.x.title()),

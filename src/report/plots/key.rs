@@ -86,6 +86,7 @@ pub(super) const MARKER_RADIUS: i32 = 28;
 pub(super) fn legend(series: &[Drawn]) -> String {
     let mut html = "<ul class=\"legend\">\n".to_owned();
     for drawn in series {
+        // Draw a short line with a marker in its middle, in the style of the series
         let mut key = group(drawn.hue, "key");
         if drawn.line != Line::None {
             key += part(drawn.line, false);

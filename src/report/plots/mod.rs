@@ -116,8 +116,7 @@ impl Plot {
         let left_out = self.count_off_log_axis();
         if left_out > 0 {
             notes = format!(
-                "<p class=\"note\">{left_out} {} left out: nothing up to zero has a place on a \
-                 logarithmic axis.</p>\n",
+                "<p class=\"note\">{left_out} {} omitted: a logarithmic axis shows only values above zero.</p>\n",
                 if left_out == 1 {
                     "value is"
                 } else {
@@ -127,7 +126,7 @@ impl Plot {
         }
         // Draw plot and legend
         let body = if drawn.is_empty() {
-            "<p class=\"empty\">There are no values to plot.</p>\n".to_owned()
+            "<p class=\"empty\">No values to plot.</p>\n".to_owned()
         } else {
             draw::svg_of(self, &drawn) + &key::legend(&drawn)
         };

@@ -1,4 +1,4 @@
-//! Plots of awkward data, and what their text must hold.
+//! Plots of unusual data, and checks of their text.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn line(values: &[f64]) -> Series {
     Series::new("values", points.collect::<Vec<_>>())
 }
 
-/// All numbers in the attributes that place things.
+/// Checks that all numbers in attributes of positions and sizes are finite and inside the plot.
 #[track_caller]
 fn check_geometry(html: &str) {
     assert!(!html.contains("NaN") && !html.contains("inf"), "{html}");
@@ -39,7 +39,7 @@ fn check_geometry(html: &str) {
     }
 }
 
-/// Lines drawn for series and markers.
+/// Numbers of lines and of markers.
 fn drawn(html: &str) -> (usize, usize) {
     let svg = html.split("</svg>").next().expect("a first part");
     let series = svg.split("<g class=\"series").skip(1);
@@ -52,7 +52,7 @@ fn drawn(html: &str) -> (usize, usize) {
 }
 
 #[test]
-fn same_data_same_text() {
+fn same_data_give_the_same_text() {
     let make = || {
         plot(vec![
             line(&[1.0, 2.0, 1.5]),
@@ -65,7 +65,7 @@ fn same_data_same_text() {
     check_geometry(&html);
     assert_eq!(drawn(&html), (2, 6));
     assert!(html.contains("id=\"p\"") && html.contains("viewBox=\"0 0 440 270\""));
-    assert!(html.contains("<title id=\"p-title\">A plot: time, s against frame</title>"));
+    assert!(html.contains("<title id=\"p-title\">A plot: time, s by frame</title>"));
     assert!(html.contains("hue-0") && html.contains("hue-1") && html.contains("stroke-dasharray"));
 }
 
@@ -104,7 +104,7 @@ fn heights_are_in_proportion() {
 }
 
 #[test]
-fn gaps_stay_gaps() {
+fn missing_values_leave_gaps() {
     let html = plot(vec![line(&[
         1.0,
         2.0,
@@ -116,12 +116,12 @@ fn gaps_stay_gaps() {
     ])])
     .figure();
     check_geometry(&html);
-    // Two lines, and the lone point between the gaps as a marker.
+    // Two lines, and a marker for the isolated point between the gaps.
     assert_eq!(drawn(&html), (2, 5));
 }
 
 #[test]
-fn awkward_data_make_a_plot() {
+fn unusual_ranges_are_plotted() {
     for values in [
         &[1.0][..],
         &[0.0],
@@ -138,7 +138,7 @@ fn awkward_data_make_a_plot() {
 }
 
 #[test]
-fn nothing_to_draw_is_said() {
+fn empty_plots_have_a_message() {
     for series in [
         vec![],
         vec![line(&[])],
@@ -146,22 +146,22 @@ fn nothing_to_draw_is_said() {
     ] {
         let html = plot(series).figure();
         assert!(
-            html.contains("There are no values to plot") && !html.contains("<svg"),
+            html.contains("No values to plot") && !html.contains("<svg"),
             "{html}"
         );
     }
 }
 
 #[test]
-fn zero_on_a_logarithmic_axis_is_left_out_and_told() {
+fn values_up_to_zero_are_omitted_from_a_log_axis() {
     let axes = || (Axis::linear("frame"), Axis::log("bytes"));
     let html = plot_on(axes(), vec![line(&[10.0, 0.0, 1000.0, -1.0, 1e5])]).figure();
     check_geometry(&html);
     assert_eq!(drawn(&html), (0, 3));
-    assert!(html.contains("2 values are left out"));
+    assert!(html.contains("2 values are omitted"));
     let html = plot_on(axes(), vec![line(&[0.0])]).figure();
     assert!(
-        html.contains("no values to plot") && html.contains("1 value is left out"),
+        html.contains("No values to plot") && html.contains("1 value is omitted"),
         "{html}"
     );
 }

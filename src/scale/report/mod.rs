@@ -165,7 +165,7 @@ pub struct Conversion {
 
 /// Mean and spread of a series.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub struct Spread {
     pub mean: f64,
     /// Standard deviation of the sample; None of a single value.
@@ -207,7 +207,7 @@ pub struct PerParticle {
 /// Rays per second by purpose. The kinds of rays are interleaved within an image, so the rates add up to the total,
 /// and do not show how fast one kind alone would be.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "the names say all")]
+#[expect(missing_docs, reason = "the names are self-explanatory")]
 pub struct RayRates {
     pub primary: f64,
     pub shadow: f64,

@@ -15,26 +15,28 @@ pub fn html(report: &ScaleReport) -> String {
         "{MADE_BY}: frame rate, build time and memory by particle count"
     ));
     introduce(&mut page, report);
-    page.section("plots", "Against the particle count");
+    page.section("plots", "Plots by particle count");
     page.text(
-        "An image's time is one over the mean rate, which is what is known of the thesis. Bytes a \
-         particle are those of the tree, in memory or in the mapped file, not of the process; the \
-         thesis's are of its process.",
+        "The image time is the inverse of the mean rate, because the thesis reports only rates. Bytes per \
+         particle are those of the tree, in memory or in the mapped file; for the thesis, those of the whole \
+         process.",
     );
     page.plots(&plots(report));
+    // Frame rates, one table per motion
     for motion in &report.settings.motions {
         let heading = format!("Images per second: {motion}");
         page.section(&format!("rate-{motion}"), &heading);
         page.text(
-            "Mean over the images of a cell, in brackets the standard deviation: the spread over \
-             the camera's way, not an error.",
+            "Mean over the images of a cell (standard deviation in parentheses). The deviation is the \
+             spread along the camera path, not a measurement error.",
         );
         page.table(&rates(report, *motion));
     }
+    // Build time and memory, with the values of the thesis
     page.section("build", "Build time, s");
     page.text(
-        "Median of the builds of a cell, and of its motions. The thesis says about 2.5 s for lbvh \
-         and kdtree, more than 80 s for sbvh.",
+        "Median over camera motions of the median over builds. The thesis reports about 2.5 s for lbvh and \
+         kdtree, and more than 80 s for sbvh.",
     );
     page.table(&figures(
         report,
@@ -42,11 +44,10 @@ pub fn html(report: &ScaleReport) -> String {
         table::build_seconds,
         &thesis::BUILD_SECONDS,
     ));
-    page.section("memory", "Peak memory, MB");
+    page.section("memory", "Peak memory, MiB");
     page.text(
-        "Everything that the process has had resident at once (VmHWM), the program itself \
-         included, in units of 1024 x 1024 bytes, which the thesis's MB are too. The thesis's \
-         figures are of its own program on a graphics card.",
+        "Peak resident memory of the process (VmHWM), including the program itself. The thesis also counts \
+         in units of 1024 x 1024 bytes; its values are for its own program on a graphics card.",
     );
     page.table(&figures(
         report,
@@ -55,12 +56,13 @@ pub fn html(report: &ScaleReport) -> String {
         &thesis::PEAK_MIB,
     ));
     put_parts(&mut page, report);
+    // All measurements, folded
     page.section("cells", "All cells");
-    page.fold("Every cell, with its rays and its memory by purpose");
+    page.fold("All measurements by cell");
     page.table(&cells(report));
     page.end_fold();
-    page.link("The same for programs:", JSON);
-    page.link("And for spreadsheets:", CSV);
+    page.link("All values as JSON:", JSON);
+    page.link("All values as CSV:", CSV);
     page.html()
 }
 
@@ -68,10 +70,10 @@ pub fn html(report: &ScaleReport) -> String {
 fn put_parts(page: &mut Page, report: &ScaleReport) {
     page.section("parts", "Memory by part");
     page.text(&format!(
-        "In {}. Positions include radii. What lies in a mapped file is no anonymous memory: pages are \
-         read when rays come to them, and the system may drop them. The peaks are the highest RssAnon and \
-         RssFile, looked at every few milliseconds while loading and building and after each image. The \
-         thesis's figure is that of its whole process.",
+        "{}. Positions include radii. Pages of a mapped file are not anonymous memory: they are read when \
+         rays reach them, and the system may drop them. The peaks are the largest values of RssAnon and RssFile, \
+         sampled every few milliseconds during loading and building, and after each image. The value of the \
+         thesis is for its whole process.",
         parts::NOTE
     ));
     put_rows(page, "parts-table", &parts::HEADS, parts::rows(report));
@@ -79,8 +81,9 @@ fn put_parts(page: &mut Page, report: &ScaleReport) {
     if !conversions.is_empty() {
         page.section("conversions", "Native frames");
         page.text(
-            "Particles traced in place were written to a native frame first, once for all motions, in a \
-             process of its own; compact positions are kept within 0.02 radius. Times do not count above.",
+            "Particles that are traced in place were first written to a native frame, once for all motions, in \
+             a separate process. The error of compact positions is at most 0.02 radii. The times above do not \
+             include the conversion.",
         );
         put_rows(
             page,
@@ -101,9 +104,9 @@ fn put_rows(page: &mut Page, id: &str, heads: &[&str], rows: Vec<Vec<String>>) {
 
 fn introduce(page: &mut Page, report: &ScaleReport) {
     page.key_values(&[
-        ("measured", table::subject(report)),
-        ("on", table::conditions(report)),
-        ("the thesis measured on", thesis::MACHINE.to_owned()),
+        ("Experiment", table::subject(report)),
+        ("Machine", table::conditions(report)),
+        ("Machine of the thesis", thesis::MACHINE.to_owned()),
     ]);
     for (cell, reason) in report.failed() {
         page.warning(&format!("failed: {}: {reason}", table::cell_name(cell)));
@@ -111,14 +114,14 @@ fn introduce(page: &mut Page, report: &ScaleReport) {
     let missing = report.planned.saturating_sub(report.cells.len());
     if missing > 0 {
         page.warning(&format!(
-            "{missing} of {} cells were not measured: the run goes on or was interrupted",
+            "{missing} of {} cells were not measured: the run is in progress or was interrupted",
             report.planned
         ));
     }
     page.text(
-        "Rotation takes the camera once around the particles; translation straight along its view, \
-         from twice the distance to the point looked at, to it and as far again beyond; both does \
-         both at once. Every cell ran in a process of its own.",
+        "Rotation: the camera circles the particles once. Translation: the camera moves straight along its \
+         view direction, from twice its distance to the target point, through that point, to the same distance \
+         beyond. Both: both motions at the same time. Each cell ran in a separate process.",
     );
 }
 
@@ -221,15 +224,15 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
             report,
             "plot-memory",
             "Peak memory of the process",
-            "memory, MB",
+            "peak memory, MiB",
             |r, n, c| Some(r.peak_bytes(n, c)? as f64 / MIB),
             &thesis::PEAK_MIB,
         ),
         plot(
             report,
             "plot-bytes",
-            "Positions and structure",
-            "bytes a particle",
+            "Bytes per particle: positions and structure",
+            "bytes per particle",
             |r, n, c| {
                 let share = measured(r, n, c, None)?.bytes_per_particle?;
                 Some(share.positions + share.structure)
@@ -237,6 +240,7 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
             &thesis::BYTES_PER_PARTICLE,
         ),
     ];
+    // Image times, one plot per motion
     for &motion in &report.settings.motions {
         let theirs: Vec<thesis::Figure> = thesis::RATES
             .iter()
@@ -250,7 +254,7 @@ fn plots(report: &ScaleReport) -> Vec<Plot> {
         all.push(plot(
             report,
             &format!("plot-image-{motion}"),
-            &format!("Time of an image: {motion}"),
+            &format!("Image time: {motion}"),
             "time, ms",
             |r, n, c| {
                 let rate = measured(r, n, c, Some(motion))?.images_per_second.mean;
@@ -320,19 +324,19 @@ const CELL_HEADS: [&str; 18] = [
     "positions",
     "motion",
     "images",
-    "images a second",
-    "fewest",
-    "most",
-    "first build, s",
-    "build, s",
-    "Mrays a second",
-    "primary",
-    "shadow",
-    "reflection",
-    "refraction",
-    "peak, MB",
-    "anonymous, MB",
-    "files, MB",
+    "images/s\nmean (sd)",
+    "images/s\nmin",
+    "images/s\nmax",
+    "first build\ns",
+    "median build\ns",
+    "all rays\nM/s",
+    "primary\nM/s",
+    "shadow\nM/s",
+    "reflection\nM/s",
+    "refraction\nM/s",
+    "resident peak\nMiB",
+    "anonymous peak\nMiB",
+    "file-backed peak\nMiB",
 ];
 
 fn cells(report: &ScaleReport) -> Table {

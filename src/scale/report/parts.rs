@@ -7,32 +7,32 @@ use super::{FAILED, MIB, MISSING};
 /// Headings of the table of bytes.
 pub(super) const HEADS: [&str; 11] = [
     "particles",
-    "tree",
+    "structure",
     "positions",
     "attributes",
     "nodes",
-    "together",
-    "in memory",
-    "in the file",
+    "total",
+    "anonymous",
+    "mapped",
     "scratch",
-    "peak anonymous, MB",
-    "peak mapped, MB",
+    "peak anonymous, MiB",
+    "peak mapped, MiB",
 ];
 
 /// Headings of the table of conversions.
 pub(super) const CONVERSION_HEADS: [&str; 7] = [
     "particles",
-    "tree",
-    "particles made, s",
-    "converted, s",
-    "file, MB",
-    "largest error, of the radius",
-    "peak anonymous, MB",
+    "structure",
+    "load, s",
+    "conversion, s",
+    "file, MiB",
+    "max error, radii",
+    "peak anonymous, MiB",
 ];
 
 /// Explanation of the columns of bytes.
-pub(super) const NOTE: &str = "bytes a particle while tracing (positions to in the file) and while building \
-    (scratch); peaks of the process as seen, with images and the program itself";
+pub(super) const NOTE: &str = "bytes per particle during tracing (positions to mapped) and during the build (scratch); \
+    sampled peaks of the process, including images and the program itself";
 
 /// The rows of the table of bytes; the last one is that of the thesis.
 pub(super) fn rows(report: &ScaleReport) -> Vec<Vec<String>> {
@@ -40,7 +40,7 @@ pub(super) fn rows(report: &ScaleReport) -> Vec<Vec<String>> {
     if report.settings.input.is_none() {
         let mut theirs = vec![MISSING.to_owned(); HEADS.len()];
         theirs[0] = thesis::RATE_PARTICLES.to_string();
-        theirs[1] = "the thesis, about".to_owned();
+        theirs[1] = "thesis (about)".to_owned();
         theirs[5] = format!("{:.0}", thesis::BYTES_PER_PARTICLE[0].value);
         rows.push(theirs);
     }

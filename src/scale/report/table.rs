@@ -12,12 +12,14 @@ use crate::scale::{Budget, Motion};
 /// All tables with their headings.
 pub fn text(report: &ScaleReport) -> String {
     let mut text = format!("{}\n{}\n", subject(report), conditions(report));
+    // Frame rates, one table per motion
     for motion in &report.settings.motions {
         let heading = format!("Images per second, {motion}: mean (standard deviation)");
         put(&mut text, report, &heading, |particles, column| {
             rate(report, particles, column, *motion)
         });
     }
+    // Build time and memory
     let heading = "Build time, s: median";
     put(&mut text, report, heading, |particles, column| {
         summed(
@@ -27,15 +29,16 @@ pub fn text(report: &ScaleReport) -> String {
             build_seconds(report, particles, column),
         )
     });
-    let heading = "Peak memory of the process, MB (1024 x 1024 bytes)";
+    let heading = "Peak memory of the process, MiB";
     put(&mut text, report, heading, |particles, column| {
         summed(report, particles, column, peak(report, particles, column))
     });
-    let heading = "Bytes a particle: positions and structure";
+    let heading = "Bytes per particle: positions and structure";
     put(&mut text, report, heading, |particles, column| {
         summed(report, particles, column, bytes(report, particles, column))
     });
     put_parts(&mut text, report);
+    // List failed and missing cells
     for (cell, reason) in report.failed() {
         let reason = escape_controls(reason);
         let _ = write!(text, "\nfailed: {}: {reason}", cell_name(cell));
@@ -58,7 +61,7 @@ pub fn text(report: &ScaleReport) -> String {
 pub fn subject(report: &ScaleReport) -> String {
     let s = &report.settings;
     let what = s.input.as_ref().map_or_else(
-        || "the thesis's box".to_owned(),
+        || "box of the thesis".to_owned(),
         |i| {
             let path = escape_controls(&i.path);
             format!("{path}, frame {} ({} particles)", i.frame, i.particles)
@@ -69,7 +72,7 @@ pub fn subject(report: &ScaleReport) -> String {
         Budget::Images(images) => format!("{images} images"),
     };
     format!(
-        "{what}; {}x{}, samples {}, depth {}, {budget} a cell",
+        "{what}; {}x{}, samples per pixel {}, depth {}, {budget} per cell",
         s.width, s.height, s.samples, s.max_depth
     )
 }
@@ -77,7 +80,7 @@ pub fn subject(report: &ScaleReport) -> String {
 /// Description of the machine and software.
 pub fn conditions(report: &ScaleReport) -> String {
     format!(
-        "{}; {} in use; spherule {}",
+        "{}; {} threads used; spherule {}",
         report.machine, report.settings.threads, report.machine.spherule
     )
 }
@@ -128,7 +131,7 @@ fn put_parts(text: &mut String, report: &ScaleReport) {
     let conversions = parts::conversions(report);
     if !conversions.is_empty() {
         let rows = with_heads(&parts::CONVERSION_HEADS, conversions);
-        put_rows(text, "Native frames, made once for all motions", &rows);
+        put_rows(text, "Native frames: converted once for all motions", &rows);
     }
 }
 
@@ -216,7 +219,7 @@ fn short(value: f64) -> String {
 /// The measurements of a cell in one line.
 pub fn line(measured: &CellMeasurement) -> String {
     format!(
-        "build {:.4} s, {} images/s in {} images, peak {:.1} MB",
+        "build {:.4} s, {} images/s in {} images, peak {:.1} MiB",
         measured.build_seconds.median,
         spread(&measured.images_per_second),
         measured.images,

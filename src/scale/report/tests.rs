@@ -1,4 +1,4 @@
-//! Reports made by hand, and what tables and files must say of them.
+//! Constructed reports, with the expected tables and files.
 
 use super::*;
 use crate::report::frame::{FileBytes, FrameBytes};
@@ -29,8 +29,7 @@ fn measurement(rate: f64, build: f64, peak: u64) -> CellMeasurement {
     }
 }
 
-/// Two counts, one structure, all motions; the second count's last motion has failed and its first
-/// was not reached.
+/// Two counts, one structure, all motions. Of the second count, the last motion failed and the first is missing.
 fn report() -> ScaleReport {
     let cell = |particles, motion, outcome| CellReport {
         particles,
@@ -75,9 +74,9 @@ fn report() -> ScaleReport {
 }
 
 #[test]
-fn spread_is_the_samples() {
+fn spread_uses_the_sample_standard_deviation() {
     let spread = Spread::of(&[2.0, 4.0, 4.0, 4.0, 5.0, 5.0, 7.0, 9.0]);
-    // Sum of squares 32 over 7.
+    // The sum of squared deviations is 32, of 8 samples.
     assert_eq!(spread.sd, Some((32.0_f64 / 7.0).sqrt()));
     assert_eq!((spread.mean, spread.min, spread.max), (5.0, 2.0, 9.0));
     assert_eq!(Spread::of(&[3.0]).sd, None);
@@ -88,7 +87,7 @@ fn spread_is_the_samples() {
 }
 
 #[test]
-fn tables_are_laid_out_like_the_thesis_s() {
+fn tables_have_the_layout_of_the_thesis() {
     let text = table::text(&report());
     let lines: Vec<&str> = text.lines().collect();
     let after = |heading: &str| {
@@ -107,16 +106,16 @@ fn tables_are_laid_out_like_the_thesis_s() {
     let both = after("Images per second, both");
     assert_eq!(both[1], "       1000   2000 (1.00)");
     assert_eq!(both[2], "   10000000        failed");
-    // The median over motions, of medians.
+    // The median over motions of their medians.
     assert_eq!(after("Build time")[1], "       1000   0.500");
     assert_eq!(after("Build time")[2], "   10000000   9.000");
     assert_eq!(after("Peak memory")[1], "       1000    120.0");
-    assert_eq!(after("Bytes a particle")[1], "       1000   12.60");
+    assert_eq!(after("Bytes per particle")[1], "       1000   12.60");
     assert!(text.contains("failed: 10000000 particles, lbvh in memory, both: out of memory"));
     assert!(text.contains("interrupted: 1 of 6 cells were not measured"));
 }
 
-/// As [`report`], with its last count in a q10 file too, whose cells have 4 bytes of positions there.
+/// Same as [`report`], and the last count also in a q10 file, with 4 bytes of positions per particle.
 fn report_in_place() -> ScaleReport {
     let mut report = report();
     report.settings.structures.push("kdtree".to_owned());
@@ -155,10 +154,10 @@ fn report_in_place() -> ScaleReport {
 }
 
 #[test]
-fn memory_by_part_tells_the_file_from_memory() {
+fn memory_by_part_separates_mapped_from_anonymous() {
     let report = report_in_place();
     let titles: Vec<String> = report.columns().into_iter().map(|c| c.title).collect();
-    // No other structure is traced in place.
+    // Other structures cannot be traced in place.
     assert_eq!(titles, ["lbvh", "kdtree", "kdtree, q10 file"]);
     let rows = parts::rows(&report);
     let row = |title: &str| rows.iter().rfind(|row| row[1] == title).expect("a row");
@@ -172,9 +171,9 @@ fn memory_by_part_tells_the_file_from_memory() {
         rows[0][2..8],
         ["12.00", "0.00", "0.60", "12.60", "12.60", "0.00"]
     );
-    // Nothing was measured there.
+    // That count has no measurements.
     assert!(row("kdtree")[2..].iter().all(|cell| cell == MISSING));
-    assert_eq!(row("the thesis, about")[5], "350");
+    assert_eq!(row("thesis (about)")[5], "350");
     assert!(rows.iter().all(|row| row.len() == parts::HEADS.len()));
     assert_eq!(
         parts::conversions(&report),
@@ -196,7 +195,7 @@ fn memory_by_part_tells_the_file_from_memory() {
 }
 
 #[test]
-fn a_figure_that_there_cannot_be_is_no_failure() {
+fn undefined_values_are_not_failures() {
     let mut report = report();
     report.settings.particles = vec![0];
     let CellOutcome::Done(measured) = &mut report.cells[0].outcome else {
@@ -206,19 +205,19 @@ fn a_figure_that_there_cannot_be_is_no_failure() {
     report.cells.truncate(1);
     report.cells[0].particles = 0;
     let text = table::text(&report);
-    let (_, bytes) = text.split_once("Bytes a particle").unwrap();
+    let (_, bytes) = text.split_once("Bytes per particle").unwrap();
     assert!(!bytes.contains("failed"), "{text}");
-    // Nothing but failures is one.
+    // A row with failures only is marked as failed.
     report.cells[0].outcome = CellOutcome::Failed {
         reason: "it was late".to_owned(),
     };
     let text = table::text(&report);
-    let (_, bytes) = text.split_once("Bytes a particle").unwrap();
+    let (_, bytes) = text.split_once("Bytes per particle").unwrap();
     assert!(bytes.contains("failed"), "{text}");
 }
 
 #[test]
-fn json_comes_back() {
+fn json_round_trips() {
     let report = report_in_place();
     let json = serde_json::json!(report);
     assert_eq!(json["made_by"], MADE_BY);
@@ -230,11 +229,11 @@ fn json_comes_back() {
 }
 
 #[test]
-fn csv_has_a_row_a_cell_and_quotes() {
+fn csv_has_one_row_per_cell_and_quotes_text() {
     let text = csv::text(&report());
     let columns = csv::header().split(',').count();
     let rows: Vec<&str> = text.lines().collect();
-    // The last reason has a line break.
+    // The last reason contains a line break.
     assert_eq!(rows.len(), 1 + 5 + 1);
     for row in &rows[..5] {
         assert_eq!(row.split(',').count(), columns, "{row}");
@@ -245,7 +244,7 @@ fn csv_has_a_row_a_cell_and_quotes() {
 }
 
 #[test]
-fn the_page_has_everything_beside_the_thesis() {
+fn page_compares_all_measurements_with_the_thesis() {
     let html = page::html(&report());
     for id in [
         "plot-build",
@@ -278,7 +277,7 @@ fn the_page_has_everything_beside_the_thesis() {
 }
 
 #[test]
-fn our_own_files_are_told_from_others() {
+fn own_files_are_distinguished_from_others() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     assert_eq!(files::foreign(dir), None);

@@ -31,7 +31,7 @@ fn x(path: &CameraPath, frame: i64) -> f64 {
 }
 
 #[test]
-fn two_keys_are_left_and_reached_softly() {
+fn two_keys_ease_in_and_out() {
     let path = through(&[(10, 2.0), (20, 6.0)]);
     assert_eq!((x(&path, 10), x(&path, 20)), (2.0, 6.0));
     assert_eq!(x(&path, 15), 4.0);
@@ -47,7 +47,7 @@ fn two_keys_are_left_and_reached_softly() {
 }
 
 #[test]
-fn even_steps_are_passed_at_an_even_pace_between_the_ends() {
+fn equal_steps_have_constant_speed_between_the_ends() {
     let path = through(&[(0, 0.0), (10, 1.0), (20, 2.0), (30, 3.0)]);
     for frame in 10..=20 {
         let even = f64::from(i32::try_from(frame).unwrap()) / 10.0;
@@ -80,7 +80,7 @@ fn one_key_is_a_view() {
 }
 
 #[test]
-fn keys_that_make_no_path() {
+fn invalid_keys() {
     let twice = vec![key(3, [1.0; 3]), key(1, [1.0; 3]), key(3, [2.0; 3])];
     assert_eq!(CameraPath::through(Vec::new()), Err(PathError::NoKeys));
     assert_eq!(CameraPath::through(twice), Err(PathError::SameFrame(3)));
@@ -102,7 +102,7 @@ fn keys_at_the_ends_of_frame_numbers() {
 }
 
 #[test]
-fn up_turns_and_keeps_its_length() {
+fn up_vector_rotates_at_constant_length() {
     let mut keys = vec![key(0, [9.0, 0.0, 0.0]), key(4, [9.0, 0.0, 0.0])];
     keys[0].view.up = DVec3::new(0.0, 0.0, 8.0);
     keys[1].view.up = DVec3::new(0.0, 0.5, 0.0);
@@ -127,7 +127,7 @@ fn an_up_that_passes_through_zero_is_zero() {
 }
 
 #[test]
-fn what_lies_around_a_frame() {
+fn neighbouring_keys_of_a_frame() {
     let CameraPath::Keys(path) = through(&[(5, 0.0), (8, 1.0)]) else {
         panic!("no keys");
     };
@@ -156,7 +156,7 @@ fn points() -> impl Strategy<Value = Vec<(i64, f64)>> {
 
 proptest! {
     #[test]
-    fn keys_are_met_and_never_overshot(
+    fn keys_are_reached_without_overshoot(
         points in prop::collection::btree_map(any::<i64>(), number(), 1..8),
         tries in prop::collection::vec(any::<i64>(), 16),
     ) {
@@ -194,7 +194,7 @@ proptest! {
 
     /// The steps before and after a key are equal, except for the curvature over a millionth of the segment.
     #[test]
-    fn the_pace_does_not_jump(points in points()) {
+    fn speed_is_continuous(points in points()) {
         let path = through(&points);
         let largest = points.iter().fold(0.0_f64, |a, p| a.max(p.1.abs()));
         for (frame, value) in &points {

@@ -44,7 +44,7 @@ fn frame_0_of_a_turntable_is_at_its_azimuth() {
 }
 
 #[test]
-fn far_frames_turn_as_near_ones() {
+fn distant_frame_numbers_rotate_alike() {
     let framing = Framing::three_quarter(DVec3::Y, 1.5);
     let path = CameraPath::turntable(&BOX, &framing, 0.703125);
     for frame in [0, 1, -77, 300] {
@@ -70,11 +70,11 @@ fn project(view: &CameraView, aspect: f64, point: DVec3) -> DVec2 {
     let forward = (view.look_at - view.eye).normalize();
     let right = forward.cross(view.up).normalize();
     let up = right.cross(forward);
-    let seen = point - view.eye;
-    let depth = seen.dot(forward);
+    let offset = point - view.eye;
+    let depth = offset.dot(forward);
     assert!(depth > 0.0, "{point} is behind the camera");
     let half = (0.5 * view.fov.to_radians()).tan();
-    DVec2::new(seen.dot(right) / aspect, seen.dot(up)) / (depth * half)
+    DVec2::new(offset.dot(right) / aspect, offset.dot(up)) / (depth * half)
 }
 
 /// The outermost position of a corner in all pictures of a turn.
@@ -90,7 +90,7 @@ fn outermost(path: &CameraPath, bounds: &Bounds, aspect: f64, frames: i64) -> f6
 }
 
 #[test]
-fn a_turntable_comes_as_near_as_it_can() {
+fn turntable_distance_is_minimal() {
     for up in [DVec3::X, DVec3::Y, DVec3::Z, DVec3::new(1.0, 2.0, 3.0)] {
         for (elevation, aspect) in [(20.0, 1.5), (-35.0, 0.5), (80.0, 1.0), (0.0, 4.0)] {
             let framing = Framing {
@@ -106,7 +106,7 @@ fn a_turntable_comes_as_near_as_it_can() {
 }
 
 #[test]
-fn a_turntable_around_a_point_or_a_line_has_a_view() {
+fn turntable_around_a_point_or_a_line_is_valid() {
     for (min, max) in [
         (DVec3::ZERO, DVec3::ZERO),
         (DVec3::splat(1e7), DVec3::splat(1e7)),

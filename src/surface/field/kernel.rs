@@ -28,12 +28,12 @@ mod tests {
     fn is_the_spline() {
         for i in 0..=240 {
             let q = i as f32 / 200.0;
-            let wanted = match q {
+            let expected = match q {
                 q if q <= 0.5 => 6.0 * (q * q * q - q * q) + 1.0,
                 q if q <= 1.0 => 2.0 * (1.0 - q).powi(3),
                 _ => 0.0,
             };
-            assert!((weight(q) - wanted).abs() < 1e-6, "{q}");
+            assert!((weight(q) - expected).abs() < 1e-6, "{q}");
             let step = 1e-3;
             let difference = (weight(q + step) - weight(q - step)) / (2.0 * step);
             assert!((slope(q) - difference).abs() < 2e-3, "{q}");

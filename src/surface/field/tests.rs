@@ -59,7 +59,7 @@ fn is_the_sum_over_all_particles() {
 }
 
 #[test]
-fn a_particle_alone_is_whole_in_its_middle() {
+fn isolated_particle_has_full_density_at_its_centre() {
     let field = FieldParticles::new(&[Vec3::new(1e3, 5.0, -7.0)], 4.0);
     let sample = field.sample(Vec3::new(1e3, 5.0, -7.0));
     assert_eq!((sample.value, sample.gradient), (1.0, Vec3::ZERO));
@@ -70,7 +70,7 @@ fn a_particle_alone_is_whole_in_its_middle() {
 }
 
 #[test]
-fn particles_in_one_place_are_no_more_than_their_number() {
+fn coincident_particles_have_bounded_density() {
     let centers = vec![Vec3::ONE; 50_000];
     let field = FieldParticles::new(&centers, 1.0);
     assert!(field.volumes().iter().all(|v| *v == 1.0 / 64.0));
@@ -79,7 +79,7 @@ fn particles_in_one_place_are_no_more_than_their_number() {
 }
 
 #[test]
-fn escaped_particles_cost_nothing_or_are_left_out() {
+fn escaped_particles_are_cheap_or_dropped() {
     let mut centers = cloud(2000, 3, 30.0);
     centers.push(Vec3::new(4e5, -4e5, 4e5));
     let field = FieldParticles::new(&centers, 4.0);

@@ -8,7 +8,7 @@ const SUPPORT: f32 = 4.0;
 
 /// The shading normals at the hits of `rays` on spheres of radius 1 at `centers`, which must be the same for every
 /// structure.
-fn seen(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
+fn normals_at(centers: &[Vec3], rays: &[Ray]) -> Vec<Vec3> {
     let mut all = Structure::ALL.map(|structure| {
         let mut builder = TreeBuilder::new();
         let spheres = Spheres {
@@ -44,7 +44,7 @@ fn a_flat_surface_of_spheres_faces_one_way() {
     let rays: Vec<Ray> = (0..200_i16)
         .map(|i| downwards(8.0 + 0.03 * f32::from(i), 9.0 + 0.9 * f32::from(i).sin()))
         .collect();
-    let normals = seen(&centers, &rays);
+    let normals = normals_at(&centers, &rays);
     let worst = normals.iter().map(|normal| normal.z).fold(1.0, f32::min);
     assert!(worst > 0.99, "{worst}");
     assert!(normals.iter().all(|n| (n.length() - 1.0).abs() < 1e-5));
@@ -54,7 +54,7 @@ fn a_flat_surface_of_spheres_faces_one_way() {
 fn sheets_face_both_ways() {
     let centers = lattice([12, 12, 1], 2.0);
     let up = Ray::new(Vec3::new(10.3, 10.4, -50.0), Vec3::Z);
-    let [above, below] = seen(&centers, &[downwards(10.3, 10.4), up])[..] else {
+    let [above, below] = normals_at(&centers, &[downwards(10.3, 10.4), up])[..] else {
         panic!("two rays");
     };
     assert!(above.z > 0.95 && below.z < -0.95, "{above} {below}");
@@ -77,7 +77,7 @@ fn a_ball_of_spheres_is_round() {
             Ray::new(away.normalize() * 60.0, -away.normalize())
         })
         .collect();
-    let normals = seen(&centers, &rays);
+    let normals = normals_at(&centers, &rays);
     let cosines = rays
         .iter()
         .zip(&normals)
@@ -87,10 +87,10 @@ fn a_ball_of_spheres_is_round() {
 }
 
 #[test]
-fn lonely_spheres_keep_their_own_normals() {
+fn isolated_spheres_have_sphere_normals() {
     let centers = [Vec3::ZERO, Vec3::new(100.0, 0.0, 0.0)];
     let ray = downwards(0.6, 0.0);
-    let normal = seen(&centers, &[ray])[0];
+    let normal = normals_at(&centers, &[ray])[0];
     assert!(
         (normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-5,
         "{normal}"
@@ -99,12 +99,12 @@ fn lonely_spheres_keep_their_own_normals() {
 
 #[test]
 fn coincident_spheres_have_a_normal() {
-    let normal = seen(&[Vec3::ZERO; 300], &[downwards(0.6, 0.0)])[0];
+    let normal = normals_at(&[Vec3::ZERO; 300], &[downwards(0.6, 0.0)])[0];
     assert!(
         (normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-3,
         "{normal}"
     );
-    let normal = seen(&[Vec3::ZERO; 5000], &[downwards(0.6, 0.0)])[0];
+    let normal = normals_at(&[Vec3::ZERO; 5000], &[downwards(0.6, 0.0)])[0];
     assert!(
         (normal - Vec3::new(0.6, 0.0, 0.8)).length() < 1e-5,
         "{normal}"
@@ -112,7 +112,7 @@ fn coincident_spheres_have_a_normal() {
 }
 
 #[test]
-fn components_are_those_of_a_known_matrix() {
+fn principal_components_of_a_known_matrix() {
     // Rotated by 45 degrees about z: the smallest component is along x + y.
     let least = least_component(&SymmetricMatrix([2.0, 2.0, 5.0, -1.0, 0.0, 0.0])).expect("one");
     let along = DVec3::new(1.0, 1.0, 0.0).normalize();
@@ -126,10 +126,10 @@ fn components_are_those_of_a_known_matrix() {
 }
 
 #[test]
-fn normals_stay_on_the_side_that_is_seen() {
+fn normals_face_the_visible_side() {
     let direction = -Vec3::Z;
-    let seen = towards_viewer(Vec3::new(0.8, 0.0, -0.6), Vec3::Z, direction);
-    assert!(seen.z > 0.0 && seen.x > 0.99);
+    let normal = towards_viewer(Vec3::new(0.8, 0.0, -0.6), Vec3::Z, direction);
+    assert!(normal.z > 0.0 && normal.x > 0.99);
     let from_inside = towards_viewer(Vec3::Z, -Vec3::Z, direction);
     assert!(from_inside.z < 0.0 || from_inside == -Vec3::Z);
 }

@@ -1,7 +1,5 @@
 //! Builds bricks from particles.
 
-use std::time::Duration;
-
 use glam::Vec3;
 use rayon::prelude::*;
 use spherule_formats::order::index_u32;
@@ -12,9 +10,8 @@ use super::blur::{Around, Blur, BrickField, Part, taps};
 use super::brick::{Brick, BrickKind, CODES, SAMPLES};
 use super::layout::Layout;
 use super::raw::{Codes, Gather, RawBrick};
-use super::tree::{Block, BrickTree, Node};
+use super::tree::{Block, BrickNode, BrickTree};
 use crate::accel::simd::{ArrayLanes, ArrayTask};
-use crate::accel::{Phase, PhaseClock};
 use crate::metrics::Bytes;
 use crate::surface::SurfaceSettings;
 use crate::surface::field::FieldParticles;
@@ -49,12 +46,6 @@ pub enum SmoothError {
 /// Cost of building a surface.
 #[derive(Debug, Clone, Default)]
 pub struct SmoothReport {
-    /// Wall-clock time.
-    pub total: Duration,
-    /// Wall-clock time by phase, in order.
-    pub phases: Vec<Phase>,
-    /// Number of bricks that the surface passes through.
-    pub bricks: u64,
     /// Bytes of the grid, and of the particles that are kept for attributes or exact intersections.
     pub bytes: u64,
     /// Peak memory of the build in bytes, including `bytes`.
@@ -82,7 +73,6 @@ pub(super) fn build(
     keep: bool,
     left: Option<u64>,
 ) -> Result<(Built, SmoothReport), SmoothError> {
-    let mut clock = PhaseClock::new();
     let layout = Layout::new(settings, radius);
     let count = centers.len() as u64;
     let check_memory = |need: u64| match left {
@@ -99,10 +89,8 @@ pub(super) fn build(
     let keep = keep || settings.exact;
     check_memory(count * if keep { 24 } else { 20 })?;
     let mut field = FieldParticles::sorted(centers, layout.support, keep);
-    clock.lap("sort");
     // Select the bricks that the surface may pass through
     let plan = Plan::of(field.bins(), &layout);
-    clock.lap("plan");
     let need = MemoryNeed::of(&plan);
     check_memory(field.byte_len() + 4 * count + need.total())?;
     let sorted_bytes = field.byte_len() + plan.byte_len();
@@ -117,7 +105,6 @@ pub(super) fn build(
         }
         field.find_volumes(|bin| needed[bin]);
     }
-    clock.lap("volumes");
     // Sample the field, then assemble bricks and their tree
     let work = Work {
         field: &field,
@@ -126,18 +113,12 @@ pub(super) fn build(
         lanes: ArrayLanes::default(),
     };
     let raw = work.raw();
-    clock.lap("field");
     let (blocks, bricks) = work.bricks(&raw);
     let raw_bytes = raw.byte_len();
     drop(raw);
     let tree = BrickTree::new(&blocks, bricks, layout.voxel, layout.threshold * CODES);
-    clock.lap("bricks");
     // Report the cost of the build
-    let phases = clock.finish();
     let report = SmoothReport {
-        total: phases.iter().map(|phase| phase.time).sum(),
-        phases,
-        bricks: tree.bricks.len() as u64,
         bytes: tree.byte_len() + if keep { field.byte_len() } else { 0 },
         peak_bytes: sorted_bytes
             .max(field.byte_len() + plan.byte_len() + raw_bytes + tree.byte_len()),
@@ -378,7 +359,7 @@ impl ArrayTask for MakeBlock<'_> {
                 BrickKind::Outside => {}
             }
         }
-        let node = Node {
+        let node = BrickNode {
             children,
             inside,
             first: 0,

@@ -234,12 +234,12 @@ mod tests {
     fn finds_the_root_of_a_cubic() {
         // x y z along the diagonal is s^3.
         let c = corners(|p| 40_000.0 * p.x * p.y * p.z);
-        for wanted in [0.1_f32, 0.5, 0.93] {
-            let threshold = 40_000.0 * wanted.powi(3);
+        for expected in [0.1_f32, 0.5, 0.93] {
+            let threshold = 40_000.0 * expected.powi(3);
             let s = first_crossing(&c, Vec3::ZERO, Vec3::ONE, threshold, 1.0).unwrap();
-            assert!((s - wanted).abs() < 2e-3, "{s} {wanted}");
+            assert!((s - expected).abs() < 2e-3, "{s} {expected}");
             let back = first_crossing(&c, Vec3::ONE, Vec3::ZERO, threshold, -1.0).unwrap();
-            assert!((1.0 - back - wanted).abs() < 2e-3, "{back} {wanted}");
+            assert!((1.0 - back - expected).abs() < 2e-3, "{back} {expected}");
         }
         assert_eq!(
             first_crossing(&c, Vec3::ZERO, Vec3::ONE, 50_000.0, 1.0),
@@ -248,7 +248,7 @@ mod tests {
     }
 
     #[test]
-    fn finds_what_is_thinner_than_a_step() {
+    fn finds_sheets_thinner_than_a_step() {
         // x (1 - y) from (0, 0) to (1, 1) is s (1 - s), largest in the middle.
         let c = corners(|p| 40_000.0 * p.x * (1.0 - p.y));
         let (from, to) = (Vec3::ZERO, Vec3::new(1.0, 1.0, 0.0));
@@ -259,7 +259,7 @@ mod tests {
     }
 
     #[test]
-    fn begins_beyond() {
+    fn interval_starts_behind_the_surface() {
         let c = corners(|p| 1000.0 * p.x);
         let (a, b) = (Vec3::new(0.75, 0.5, 0.5), Vec3::new(1.0, 0.5, 0.5));
         assert_eq!(first_crossing(&c, a, b, 500.0, 1.0), Some(0.0));

@@ -1,7 +1,7 @@
 use glam::{DVec3, Vec3};
 
 use super::*;
-use crate::math::SimdLevel;
+use crate::accel::simd::tested_levels::tested_levels;
 use crate::surface::SurfaceKind;
 
 const RADIUS: f32 = 0.5;
@@ -147,7 +147,7 @@ fn exact_places_and_normals_are_those_of_the_field() {
 }
 
 #[test]
-fn a_fine_grid_comes_to_the_field_by_itself() {
+fn fine_grid_converges_to_the_field() {
     for (name, centers) in bodies() {
         let settings = SurfaceSettings {
             voxel: 0.25,
@@ -221,12 +221,12 @@ fn sides_are_those_of_the_field() {
         let (value, _) = exact_field(&centers, point.as_dvec3());
         // Skip points where the resolution of the grid may matter.
         if (value - 0.6).abs() > 0.15 {
-            let wanted = if value > 0.6 {
+            let expected = if value > 0.6 {
                 Side::Inside
             } else {
                 Side::Outside
             };
-            assert_eq!(grid.surface().side_of(point), wanted, "{point}: {value}");
+            assert_eq!(grid.surface().side_of(point), expected, "{point}: {value}");
         }
     }
 }
@@ -255,7 +255,7 @@ fn order_and_threads_change_nothing() {
 }
 
 #[test]
-fn does_not_swim() {
+fn grid_is_fixed_in_world_space() {
     // Move everything by whole bricks, and by distances that do not change the rounding.
     let centers: Vec<Vec3> = filled(4, |p| p.length() < 3.5)
         .iter()
@@ -280,7 +280,7 @@ fn does_not_swim() {
 }
 
 #[test]
-fn little_and_strange_input_makes_a_surface_or_none() {
+fn unusual_input_gives_a_surface_or_none() {
     let ray = Ray::new(Vec3::new(0.0, 0.0, 9.0), Vec3::NEG_Z);
     let build = |centers: &[Vec3], settings: &SurfaceSettings| {
         let mut grid = SmoothGrid::default();
@@ -291,7 +291,7 @@ fn little_and_strange_input_makes_a_surface_or_none() {
     };
     let default = settings(0.75, false);
     let (hit, report) = build(&[], &default);
-    assert_eq!((hit, report.bricks, report.is_empty), (None, 0, false));
+    assert_eq!((hit, report.bytes, report.is_empty), (None, 0, false));
     let (hit, _) = build(&[Vec3::ZERO], &default);
     // An isolated particle is a ball of about 1.3 radii, whatever the smoothing.
     assert!((hit.expect("a drop").t - (9.0 - 1.3 * RADIUS)).abs() < 0.15 * RADIUS);
@@ -318,7 +318,7 @@ fn little_and_strange_input_makes_a_surface_or_none() {
 }
 
 #[test]
-fn a_grid_that_does_not_fit_is_refused() {
+fn grid_beyond_memory_is_rejected() {
     let lonely: Vec<Vec3> = filled(6, |_| true).iter().map(|c| 40.0 * c).collect();
     let mut grid = SmoothGrid::default();
     let refused = grid.build(
@@ -333,7 +333,7 @@ fn a_grid_that_does_not_fit_is_refused() {
 }
 
 #[test]
-fn smoothing_takes_bumps_away() {
+fn smoothing_removes_bumps() {
     let centers = filled(6, |p| p.abs().max_element() < 6.1);
     let roughness = |smoothing: f32| {
         let grid = grid(&centers, &settings(smoothing, false));
@@ -392,7 +392,7 @@ fn shells(count: u8) -> Vec<Vec3> {
 }
 
 #[test]
-fn a_ball_of_particles_bends_light_as_a_ball_of_glass() {
+fn ball_of_particles_refracts_as_a_glass_ball() {
     let grid = grid(&shells(12), &settings(1.0, false));
     let surface = grid.surface();
     // The size of the ball, measured by rays through its centre, agrees with the volume of the particles.
@@ -418,14 +418,18 @@ fn a_ball_of_particles_bends_light_as_a_ball_of_glass() {
             inside.expect("into glass"),
         );
         let leaves = surface.crossing(&inside, Side::Inside).expect("a way out");
-        let (Some(out), Some(wanted)) = (
+        let (Some(out), Some(expected)) = (
             crate::scene::material::refract(inside.direction, -leaves.normal, ior),
             bent_by_ball(&ray, radius, f64::from(ior)),
         ) else {
             continue;
         };
-        degrees.push(wanted.angle_between(out.as_dvec3()).to_degrees());
-        straight.push(wanted.angle_between(ray.direction.as_dvec3()).to_degrees());
+        degrees.push(expected.angle_between(out.as_dvec3()).to_degrees());
+        straight.push(
+            expected
+                .angle_between(ray.direction.as_dvec3())
+                .to_degrees(),
+        );
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
     assert!(degrees.len() > 380);
@@ -451,10 +455,10 @@ fn packets(count: usize) -> Vec<(RayPacket, u32)> {
 }
 
 #[test]
-fn packets_find_what_single_rays_find() {
+fn packets_match_single_rays() {
     let (_, centers) = bodies().remove(3);
     let grid = grid(&centers, &settings(0.75, false));
-    for level in SimdLevel::ALL {
+    for level in tested_levels() {
         let surface = SmoothSurface {
             built: &grid.built,
             simd: Supported::or_best(level),
@@ -512,7 +516,7 @@ fn crossings_are_where_the_side_changes() {
 }
 
 #[test]
-fn rays_that_are_no_numbers_meet_nothing_and_change_no_others() {
+fn nan_rays_hit_nothing_and_do_not_affect_others() {
     let (_, centers) = bodies().remove(3);
     let grid = grid(&centers, &settings(0.75, false));
     let surface = grid.surface();
@@ -531,8 +535,8 @@ fn rays_that_are_no_numbers_meet_nothing_and_change_no_others() {
                 let mut sound = packet;
                 surface.intersect(&mut sound, Coherence::Coherent, inside, &mut of_sound);
                 for (lane, (a, b)) in of_all.all(16).iter().zip(of_sound.all(16)).enumerate() {
-                    let wanted = if lanes.contains(&lane) { None } else { b };
-                    assert_eq!(*a, wanted, "{poison} {axis} {lane}");
+                    let expected = if lanes.contains(&lane) { None } else { b };
+                    assert_eq!(*a, expected, "{poison} {axis} {lane}");
                 }
             }
         }

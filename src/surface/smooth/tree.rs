@@ -16,7 +16,7 @@ pub(super) const MAX_LEVELS: u32 = 12;
 
 /// A node with 64 cells.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Node {
+pub(super) struct BrickNode {
     /// Cells with a child: one bit each, x fastest, then y, then z.
     pub(super) children: u64,
     /// Cells without a child that are inside.
@@ -25,7 +25,7 @@ pub(super) struct Node {
     pub(super) first: u32,
 }
 
-impl Node {
+impl BrickNode {
     #[inline(always)]
     pub(super) fn child(&self, cell: u32) -> u32 {
         let before = self.children & ((1_u64 << cell) - 1);
@@ -39,25 +39,25 @@ enum Cell {
     /// Uniformly inside.
     Inside,
     /// Subdivided.
-    Node(Node),
+    BrickNode(BrickNode),
 }
 
 impl Cell {
-    fn of(node: Node) -> Self {
+    fn of(node: BrickNode) -> Self {
         if node.inside == !0 {
             Self::Inside
         } else {
-            Self::Node(node)
+            Self::BrickNode(node)
         }
     }
 
-    fn node(self) -> Node {
+    fn node(self) -> BrickNode {
         match self {
-            Self::Inside => Node {
+            Self::Inside => BrickNode {
                 inside: !0,
-                ..Node::default()
+                ..BrickNode::default()
             },
-            Self::Node(node) => node,
+            Self::BrickNode(node) => node,
         }
     }
 }
@@ -68,13 +68,13 @@ pub(super) struct Block {
     /// Position in blocks.
     pub(super) position: [i32; 3],
     /// The node of the block; its children are bricks.
-    pub(super) node: Node,
+    pub(super) node: BrickNode,
 }
 
 /// A sparse tree of bricks, see the module.
 #[derive(Debug, Default)]
 pub(super) struct BrickTree {
-    pub(super) nodes: Vec<Node>,
+    pub(super) nodes: Vec<BrickNode>,
     pub(super) root: u32,
     /// Number of node levels.
     pub(super) levels: u32,
@@ -145,15 +145,15 @@ impl BrickTree {
         let siblings = cells.chunk_by(|(a, _), (b, _)| a >> 6 == b >> 6);
         siblings
             .map(|siblings| {
-                let mut parent = Node {
+                let mut parent = BrickNode {
                     first: index_u32(self.nodes.len()),
-                    ..Node::default()
+                    ..BrickNode::default()
                 };
                 for (key, cell) in siblings {
                     let bit = 1 << (key & 63);
                     match cell {
                         Cell::Inside => parent.inside |= bit,
-                        Cell::Node(node) => {
+                        Cell::BrickNode(node) => {
                             parent.children |= bit;
                             self.nodes.push(*node);
                         }
@@ -165,7 +165,7 @@ impl BrickTree {
     }
 
     /// Extends the box by the bricks of a node at a position in blocks.
-    fn enclose(&mut self, position: Vec3A, node: &Node) {
+    fn enclose(&mut self, position: Vec3A, node: &BrickNode) {
         let cells = node.children | node.inside;
         for cell in (0..64).filter(|cell| cells >> cell & 1 == 1) {
             let part = corner([cell & 3, cell >> 2 & 3, cell >> 4]);

@@ -10,7 +10,7 @@ fn one_frame() -> Workshop {
 }
 
 #[test]
-fn typing_errors_get_the_nearest_word() {
+fn misspelled_values_have_suggestions() {
     let workshop = one_frame();
     refused(
         &workshop,
@@ -38,7 +38,7 @@ fn typing_errors_get_the_nearest_word() {
         &workshop,
         &["--accelerator", "lbhv"],
         &[
-            "--accelerator: render.accelerator: wants one of ",
+            "--accelerator: render.accelerator: expected one of ",
             "did you mean lbvh?",
         ],
     );
@@ -51,22 +51,25 @@ fn typing_errors_get_the_nearest_word() {
         &workshop,
         &["--surface", "smoth"],
         &[
-            "--surface: render.surface: wants one of spheres, union, smooth",
+            "--surface: render.surface: expected one of spheres, union, smooth",
             "did you mean smooth?",
         ],
     );
     not_rendered(
         &workshop,
         &["--look", "watr"],
-        &["--look watr: there is no such look", "did you mean water?"],
+        &[
+            "--look: expected one of water, studio, paper, whitted, found \"watr\"",
+            "did you mean water?",
+        ],
     );
     refused(&workshop, &["render"], &["<INPUT>"]);
 }
 
 #[test]
-fn surfaces_that_make_no_sense_are_refused() {
+fn contradictory_surface_options_are_rejected() {
     let workshop = one_frame();
-    for (options, wanted) in [
+    for (options, expected) in [
         (
             ["--exact-surface", "--surface=union"],
             "surface.exact: is for the smooth surface alone",
@@ -77,115 +80,118 @@ fn surfaces_that_make_no_sense_are_refused() {
         ),
         (
             ["--smoothing", "1.5"],
-            "--smoothing: surface.smoothing: wants a number from 0 to 1",
+            "--smoothing: surface.smoothing: expected a number from 0 to 1",
         ),
     ] {
-        not_rendered(&workshop, &options, &[wanted]);
+        not_rendered(&workshop, &options, &[expected]);
     }
 }
 
 #[test]
 fn numbers_have_ranges() {
     let workshop = one_frame();
-    for (options, wanted) in [
+    for (options, expected) in [
         (
             ["--width", "-5"],
-            "--width: image.width: wants a whole number from 1 to 65536, not -5",
+            "--width: image.width: expected a whole number from 1 to 65536, found -5",
         ),
         (
             ["--width", "0"],
-            "image.width: wants a whole number from 1 to 65536, not 0",
+            "image.width: expected a whole number from 1 to 65536, found 0",
         ),
-        (["--width", "65537"], "from 1 to 65536, not 65537"),
+        (["--width", "65537"], "from 1 to 65536, found 65537"),
         (
             ["--height", "-1"],
-            "--height: image.height: wants a whole number from 1 to 65536",
+            "--height: image.height: expected a whole number from 1 to 65536",
         ),
-        (["--height", "99999999999"], "not 99999999999"),
+        (["--height", "99999999999"], "found 99999999999"),
         (
             ["--samples", "0"],
-            "--samples: image.samples: wants a whole number from 1 to 4096, not 0",
+            "--samples: image.samples: expected a whole number from 1 to 4096, found 0",
         ),
         (
             ["--samples", "-4"],
-            "image.samples: wants a whole number from 1 to 4096, not -4",
+            "image.samples: expected a whole number from 1 to 4096, found -4",
         ),
         (
             ["--max-depth", "0"],
-            "render.max_depth: wants a whole number from 1 to 64, not 0",
+            "render.max_depth: expected a whole number from 1 to 64, found 0",
         ),
         (
             ["--max-depth", "-3"],
-            "render.max_depth: wants a whole number from 1 to 64, not -3",
+            "render.max_depth: expected a whole number from 1 to 64, found -3",
         ),
         (
             ["--radius", "0"],
-            "--radius: input.radius: wants a length above 0",
+            "--radius: input.radius: expected a length above 0",
         ),
-        (["--radius", "-0.1"], "input.radius: wants a length above 0"),
-        (["--radius", "nan"], "not NaN"),
-        (["--radius", "inf"], "not inf"),
-        (["--radius", "thick"], "not the text \"thick\""),
+        (
+            ["--radius", "-0.1"],
+            "input.radius: expected a length above 0",
+        ),
+        (["--radius", "nan"], "found NaN"),
+        (["--radius", "inf"], "found inf"),
+        (["--radius", "thick"], "found the text \"thick\""),
         (
             ["--set", "camera.fov=0"],
-            "--set camera.fov=0: camera.fov: wants degrees between 0 and 180, not 0",
+            "--set camera.fov=0: camera.fov: expected degrees between 0 and 180, found 0",
         ),
         (
             ["--set", "camera.fov=180"],
-            "camera.fov: wants degrees between 0 and 180, not 180",
+            "camera.fov: expected degrees between 0 and 180, found 180",
         ),
         (
             ["--set", "material.ior=nan"],
-            "--set material.ior=nan: material.ior: wants a number above 0, not NaN",
+            "--set material.ior=nan: material.ior: expected a number above 0, found NaN",
         ),
         (
             ["--set", "material.diffuse=inf"],
-            "material.diffuse: wants a number from 0, not inf",
+            "material.diffuse: expected a number from 0, found inf",
         ),
         (
             ["--set", "material.reflection=1.5"],
-            "material.reflection: wants a number from 0 to 1",
+            "material.reflection: expected a number from 0 to 1",
         ),
         (
             ["--set", "camera.eye=[nan,0,0]"],
-            "camera.eye: wants three numbers",
+            "camera.eye: expected three numbers",
         ),
         (
             ["--set", "camera.eye=[1,2]"],
-            "camera.eye: wants three numbers",
+            "camera.eye: expected three numbers",
         ),
         (
             ["--set", "camera.up=[0,0,0]"],
-            "camera.up: wants three numbers that are not all 0",
+            "camera.up: expected three numbers that are not all 0",
         ),
         (
             ["--set", "image.width"],
-            "--set image.width: no `=`, as in render.max_depth=5",
+            "--set image.width: no `=` (example: render.max_depth=5)",
         ),
         (
             ["--set", "image=7"],
-            "--set image=7: image: wants a table, not 7",
+            "--set image=7: image: expected a table, found 7",
         ),
         (
             ["--width", "4k"],
-            "invalid value '4k' for '--width <WIDTH>': wants a number of pixels, as in --width 3840",
+            "invalid value '4k' for '--width <WIDTH>': expected a number of pixels, such as 3840",
         ),
-        (["--samples", "many"], "wants a whole number, as in 16"),
-        (["--idle", "1h"], "wants seconds as a number"),
+        (["--samples", "many"], "expected a whole number, such as 16"),
+        (["--idle", "1h"], "expected a number of seconds"),
         (
             ["--threads", "2000"],
-            "--threads: job.threads: wants \"all\" or a whole number from 1 to 1024, not 2000",
+            "--threads: job.threads: expected \"all\" or a whole number from 1 to 1024, found 2000",
         ),
         (["--threads", "0"], "--threads"),
         (["--threads", "many"], "--threads"),
-        (["--up", "w"], "--up: input.up: wants one of x, y, z"),
+        (["--up", "w"], "--up: input.up: expected one of x, y, z"),
     ] {
-        not_rendered(&workshop, &options, &[wanted]);
+        not_rendered(&workshop, &options, &[expected]);
     }
 }
 
 #[test]
-fn all_that_is_wrong_is_told_at_once() {
+fn all_invalid_options_are_reported_at_once() {
     let workshop = one_frame();
     not_rendered(
         &workshop,
@@ -206,15 +212,15 @@ fn all_that_is_wrong_is_told_at_once() {
 }
 
 #[test]
-fn cameras_that_see_nothing() {
+fn invalid_cameras() {
     let workshop = one_frame();
-    let camera = |eye: &str, look_at: &str, up: &str, wanted: &str| {
+    let camera = |eye: &str, look_at: &str, up: &str, expected: &str| {
         let set = [eye, look_at, up].map(|s| format!("camera.{s}"));
         let mut options = Vec::new();
         for set in &set {
             options.extend(["--set", set]);
         }
-        not_rendered(&workshop, &options, &[wanted]);
+        not_rendered(&workshop, &options, &[expected]);
     };
     camera(
         "eye=[1,2,3]",
@@ -249,10 +255,10 @@ fn cameras_that_see_nothing() {
 fn frame_ranges() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=3);
-    for (range, wanted) in [
+    for (range, expected) in [
         (
             "900",
-            "input.frames: 900 has none of the frames that there are: 1-3",
+            "input.frames: 900 contains none of the frames of the input: 1-3",
         ),
         (
             "3-",
@@ -262,24 +268,24 @@ fn frame_ranges() {
         ("one", "`one`: character 1"),
         ("1-3x0", "`1-3x0`"),
     ] {
-        not_rendered(&workshop, &["--frames", range], &[wanted]);
+        not_rendered(&workshop, &["--frames", range], &[expected]);
     }
 }
 
 #[test]
-fn colours_by_what_is_not_there() {
+fn missing_colour_attribute() {
     let workshop = one_frame();
     not_rendered(
         &workshop,
         &["--color-by", "nosuch"],
         &[
-            "material.color.attribute: no attribute `nosuch` in any frame looked at; there are `density`, `id`, `velocity`",
+            "material.color.attribute: no attribute `nosuch` in the sampled frames; available: `density`, `id`, `velocity`",
         ],
     );
     not_rendered(
         &workshop,
         &["--set", "input.radius={ attribute = \"size\" }"],
-        &["input.radius: no attribute `size` in any frame looked at; there are `density`"],
+        &["input.radius: no attribute `size` in the sampled frames; available: `density`"],
     );
     let plain = "input.path = \"in\"\nmaterial.color = [1, 0, 0]\n";
     std::fs::write(workshop.join("plain.toml"), plain).expect("a file");
@@ -291,12 +297,12 @@ fn colours_by_what_is_not_there() {
     not_rendered(
         &workshop,
         &["--color-by", "velocity", "--range", "3", "3"],
-        &["material.color.range: wants two rising numbers"],
+        &["material.color.range: expected two rising numbers"],
     );
 }
 
 #[test]
-fn a_map_goes_with_the_colour_that_is_there() {
+fn map_applies_to_the_existing_colour() {
     let workshop = one_frame();
     let kept = |key: &str| {
         let text = std::fs::read_to_string(workshop.join("out/job.toml")).expect("a manifest");
@@ -307,7 +313,7 @@ fn a_map_goes_with_the_colour_that_is_there() {
     workshop
         .render(&["--map", "turbo"])
         .expect(0)
-        .tells("colour by `velocity`");
+        .prints("colour by `velocity`");
     assert!(kept("color = ").starts_with("color = { map = \"turbo\" }"));
     let plain = workshop.render_to("plain", &[]).expect(0);
     drop(plain);
@@ -345,14 +351,14 @@ fn a_map_goes_with_the_colour_that_is_there() {
     refused(
         &workshop,
         &bare,
-        &["material.color: no attribute `velocity` in any frame looked at"],
+        &["material.color: no attribute `velocity` in the sampled frames"],
     );
 }
 
 #[test]
 fn patterns_and_ranges_of_any_size() {
     let workshop = one_frame();
-    for (pattern, wanted) in [
+    for (pattern, expected) in [
         (
             "#".repeat(70_000),
             "more than 32 digits for the frame number",
@@ -364,7 +370,7 @@ fn patterns_and_ranges_of_any_size() {
         ),
     ] {
         let output = format!("out/f.{pattern}.exr");
-        refused(&workshop, &["render", "in", "-o", &output], &[wanted]);
+        refused(&workshop, &["render", "in", "-o", &output], &[expected]);
     }
     for pattern in [
         "#".repeat(70_000),
@@ -378,12 +384,12 @@ fn patterns_and_ranges_of_any_size() {
             &["no file name fits this pattern"],
         );
     }
-    for (range, wanted) in [
+    for (range, expected) in [
         ("1-99999999999999999999", "does not fit in 64 bits"),
         ("1-10x99999999999999999999", "does not fit in 64 bits"),
-        ("0-9000000000000000000x7", "has none of the frames"),
+        ("0-9000000000000000000x7", "contains none of the frames"),
     ] {
-        not_rendered(&workshop, &["--frames", range], &[wanted]);
+        not_rendered(&workshop, &["--frames", range], &[expected]);
     }
 }
 
@@ -422,12 +428,12 @@ fn frame_numbers_at_both_ends() {
 }
 
 #[test]
-fn threads_are_as_many_as_are_of_use() {
+fn thread_count_is_limited() {
     let workshop = one_frame();
     workshop
         .render(&["--threads", "1000"])
         .expect(0)
-        .tells("note: --threads 1000: ");
+        .prints("note: --threads 1000: ");
     for command in [
         &["verify", "out"][..],
         &["convert", "in", "-o", "native"],
@@ -435,12 +441,12 @@ fn threads_are_as_many_as_are_of_use() {
     ] {
         let arguments = [command, &["--threads", "2000"]].concat();
         let ran = workshop.run(&arguments).expect(2);
-        ran.tells("2000 is not in 1..=1024");
+        ran.prints("2000 is not in 1..=1024");
     }
 }
 
 #[test]
-fn a_manifest_that_is_not_there_gets_the_help_of_a_directory() {
+fn missing_manifest_lists_the_directory() {
     let workshop = one_frame();
     std::fs::write(workshop.join("dam.toml"), "input.path = \"in\"\n").expect("a file");
     for arguments in [
@@ -460,14 +466,14 @@ fn a_manifest_that_is_not_there_gets_the_help_of_a_directory() {
 #[test]
 fn conversions_write_directories() {
     let workshop = one_frame();
-    for (output, wanted) in [
+    for (output, expected) in [
         (
             "x.vtk",
-            "x.vtk: is a file's name: convert writes native frames (.spf) alone",
+            "x.vtk: has the extension of another format: convert writes only native frames (.spf)",
         ),
-        ("x.csv.gz", "name a directory, as in -o x"),
+        ("x.csv.gz", "give a directory, as in -o x"),
     ] {
-        refused(&workshop, &["convert", "in", "-o", output], &[wanted]);
+        refused(&workshop, &["convert", "in", "-o", output], &[expected]);
         assert!(!workshop.join(output).exists());
     }
     workshop.run(&["convert", "in", "-o", "v1.2"]).expect(0);

@@ -42,7 +42,7 @@ fn frames_without_particles_show_the_background() {
     let ran = workshop
         .render(&BACKGROUND)
         .expect(0)
-        .tells("3 frames, up to 0 particles");
+        .prints("3 frames, up to 0 particles");
     assert_eq!(ran.rendered(), [1, 2, 3]);
     assert!(!ran.errors().contains("radius"), "{}", ran.errors());
     let pixels = pixels(&workshop, "out/f.0002.exr");
@@ -51,7 +51,7 @@ fn frames_without_particles_show_the_background() {
 }
 
 #[test]
-fn an_empty_frame_among_others_is_a_frame() {
+fn empty_frame_in_a_sequence_is_rendered() {
     let workshop = Workshop::new();
     for (frame, count) in [(1, 2000), (2, 0), (3, 2000)] {
         npy(
@@ -83,7 +83,8 @@ fn a_single_particle_is_in_the_middle() {
         &workshop,
         &[],
         &[
-            "input.radius: the frames bring none, and particles that are few, in one place or far apart do not tell it; give a length with --radius",
+            "input.radius: the frames contain no radius, and it cannot be estimated from so few, coincident or \
+             distant particles; give a length with --radius",
         ],
     );
     workshop
@@ -95,7 +96,7 @@ fn a_single_particle_is_in_the_middle() {
 }
 
 #[test]
-fn particles_all_in_one_place_need_a_radius_and_then_render() {
+fn coincident_particles_render_with_a_radius() {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("in")).expect("a directory");
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::ONE; 500]).expect("a file");
@@ -104,7 +105,7 @@ fn particles_all_in_one_place_need_a_radius_and_then_render() {
 }
 
 #[test]
-fn particles_that_are_no_numbers_are_left_out_and_counted() {
+fn nan_particles_are_dropped_and_counted() {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("in")).expect("a directory");
     let mut centers: Vec<Vec3> = (0u8..200).map(|i| Vec3::splat(f32::from(i))).collect();
@@ -114,16 +115,16 @@ fn particles_that_are_no_numbers_are_left_out_and_counted() {
     workshop
         .render(&[])
         .expect(0)
-        .tells("frame 1: 2 particles left out");
+        .prints("frame 1: 2 particles left out");
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::NAN; 9]).expect("a file");
     workshop
         .render(&["--force"])
         .expect(0)
-        .tells("frame 1: 9 particles left out");
+        .prints("frame 1: 9 particles left out");
 }
 
 #[test]
-fn a_sequence_of_broken_files_cannot_start() {
+fn sequence_of_damaged_files_cannot_start() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=2);
     for frame in 1..=2 {
@@ -139,7 +140,7 @@ fn a_sequence_of_broken_files_cannot_start() {
 }
 
 #[test]
-fn a_file_that_breaks_off_is_perhaps_still_being_written() {
+fn truncated_file_may_still_be_growing() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=3);
     let file = workshop.join("in/f_3.bgeo");
@@ -149,7 +150,7 @@ fn a_file_that_breaks_off_is_perhaps_still_being_written() {
         let ran = workshop
             .render(&[])
             .expect(1)
-            .tells("error: frame 3: in/f_3.bgeo: ");
+            .prints("error: frame 3: in/f_3.bgeo: ");
         assert!(ran.errors().contains("failed: 3"));
         if length > 1 {
             assert!(

@@ -9,14 +9,18 @@ use super::refused;
 use crate::harness::{SMALL, Workshop, dam_break, npy};
 
 #[track_caller]
-fn no_sequence(workshop: &Workshop, input: &str, wanted: &[&str]) {
-    refused(workshop, &["render", input, "-o", "out/f.####.exr"], wanted);
+fn no_sequence(workshop: &Workshop, input: &str, expected: &[&str]) {
+    refused(
+        workshop,
+        &["render", input, "-o", "out/f.####.exr"],
+        expected,
+    );
     assert!(!workshop.join("out").exists());
-    refused(workshop, &["init", input], &wanted[..1]);
+    refused(workshop, &["init", input], &expected[..1]);
 }
 
 #[test]
-fn what_is_not_there_is_named() {
+fn missing_paths_are_named() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=3);
     no_sequence(
@@ -42,7 +46,7 @@ fn what_is_not_there_is_named() {
 }
 
 #[test]
-fn inspect_goes_on_after_what_is_not_there() {
+fn inspect_continues_after_a_missing_path() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 2]);
     let arguments = ["nowhere/f_#.bgeo", "in/f_7.bgeo", "in/f_#.bgeo"];
@@ -67,13 +71,13 @@ fn inspect_goes_on_after_what_is_not_there() {
     let ran = workshop
         .run(&[&["inspect"], &arguments[..]].concat())
         .expect(1)
-        .tells("error: nowhere")
-        .tells("error: in/f_7.bgeo: ");
+        .prints("error: nowhere")
+        .prints("error: in/f_7.bgeo: ");
     assert_eq!(ran.text().matches("10422 particles").count(), 2);
 }
 
 #[test]
-fn directories_without_particles_say_what_they_have() {
+fn directories_without_particles_list_their_content() {
     let workshop = Workshop::new();
     fs::create_dir(workshop.join("empty")).expect("a directory");
     no_sequence(
@@ -97,14 +101,14 @@ fn directories_without_particles_say_what_they_have() {
 }
 
 #[test]
-fn unknown_formats_are_told_by_their_beginning() {
+fn unknown_formats_show_the_first_bytes() {
     let workshop = Workshop::new();
-    let render = |file: &str, wanted: &[&str]| {
-        refused(&workshop, &["render", file, "-o", "out/f.exr"], wanted);
+    let render = |file: &str, expected: &[&str]| {
+        refused(&workshop, &["render", file, "-o", "out/f.exr"], expected);
         assert!(!workshop.join("out").exists());
         let error = workshop.run(&["inspect", file]).expect(1).errors();
         assert!(
-            wanted[1..].iter().all(|text| error.contains(text)),
+            expected[1..].iter().all(|text| error.contains(text)),
             "{error}"
         );
     };
@@ -130,7 +134,7 @@ fn unknown_formats_are_told_by_their_beginning() {
 }
 
 #[test]
-fn two_sequences_in_a_directory_have_to_be_told_apart() {
+fn two_sequences_in_a_directory_need_a_pattern() {
     let workshop = Workshop::new();
     for (name, frames) in [("fluid", 1..4), ("snow", 50..55)] {
         for frame in frames {
@@ -162,13 +166,13 @@ fn two_sequences_in_a_directory_have_to_be_told_apart() {
 }
 
 #[test]
-fn a_manifest_stands_alone() {
+fn manifest_excludes_other_inputs() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     fs::write(workshop.join("job.toml"), "[input]\npath = \"in\"\n").expect("a file");
     refused(
         &workshop,
         &["render", "job.toml", "in"],
-        &["job.toml: a manifest stands alone; its input.path names the particles"],
+        &["job.toml: a manifest must be the only input; its input.path names the particles"],
     );
 }

@@ -6,11 +6,11 @@ use super::refused;
 use crate::harness::{Workshop, dam_break};
 
 #[track_caller]
-fn wrong(text: &str, wanted: &[&str]) {
+fn wrong(text: &str, expected: &[&str]) {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     fs::write(workshop.join("my.toml"), text).expect("a file");
-    refused(&workshop, &["render", "my.toml"], wanted);
+    refused(&workshop, &["render", "my.toml"], expected);
     let left = fs::read_dir(workshop.path())
         .expect("the directory")
         .count();
@@ -42,26 +42,26 @@ fn wrong_types_have_line_and_column() {
     wrong(
         "[input]\npath = \"in\"\n[image]\nwidth = \"wide\"\nheight = 1.5\n",
         &[
-            "error: my.toml: line 4, column 9: image.width: wants a whole number from 1 to 65536, not the text \"wide\"",
-            "error: my.toml: line 5, column 10: image.height: wants a whole number",
+            "error: my.toml: line 4, column 9: image.width: expected a whole number from 1 to 65536, found the text \"wide\"",
+            "error: my.toml: line 5, column 10: image.height: expected a whole number",
         ],
     );
     wrong(
         "[input]\npath = \"in\"\n[camera]\neye = 3\nlook_at = [0, 0, 0]\n",
-        &["my.toml: line 4, column 7: camera.eye: wants three numbers"],
+        &["my.toml: line 4, column 7: camera.eye: expected three numbers"],
     );
     wrong(
         "[input]\npath = 7\n",
-        &["my.toml: line 2, column 8: input.path: wants a name in quotes, not 7"],
+        &["my.toml: line 2, column 8: input.path: expected a name in quotes, found 7"],
     );
     wrong(
         "image = 3\n[input]\npath = \"in\"\n",
-        &["line 1, column 9: image: wants a table"],
+        &["line 1, column 9: image: expected a table"],
     );
 }
 
 #[test]
-fn what_is_missing_is_named() {
+fn missing_keys_are_named() {
     wrong(
         "",
         &[
@@ -81,7 +81,7 @@ fn what_is_missing_is_named() {
 }
 
 #[test]
-fn what_is_no_toml_has_a_place() {
+fn toml_errors_have_a_location() {
     wrong("[input]\npath = [\n", &["my.toml: line 2, column "]);
     wrong(
         "[input]\npath = \"a\"\npath = \"b\"\n",
@@ -98,7 +98,7 @@ fn keys_of_the_camera_have_line_and_column() {
         &job(&[key, "look_at = [9, 0, 0]\nfov = 0\n"].concat()),
         &[
             "my.toml: line 6, column 1: camera.key.0.look_at: is where the eye is; they must differ",
-            "my.toml: line 7, column 7: camera.key.0.fov: wants degrees between 0 and 180, not 0",
+            "my.toml: line 7, column 7: camera.key.0.fov: expected degrees between 0 and 180, found 0",
         ],
     );
     wrong(
@@ -125,7 +125,7 @@ fn keys_of_the_camera_have_line_and_column() {
 }
 
 #[test]
-fn a_manifest_that_is_no_text_or_no_file() {
+fn manifest_that_is_not_text_or_not_a_file() {
     let workshop = Workshop::new();
     fs::write(workshop.join("bytes.toml"), [0xff, 0xfe, 0, 9]).expect("a file");
     refused(

@@ -18,28 +18,28 @@ mod surface;
 
 /// Runs what cannot start; the messages must have these texts.
 #[track_caller]
-fn refused(workshop: &Workshop, arguments: &[&str], wanted: &[&str]) -> Ran {
+fn refused(workshop: &Workshop, arguments: &[&str], expected: &[&str]) -> Ran {
     let ran = workshop.run(arguments).expect(2);
     let errors = ran.errors();
-    for text in wanted {
+    for text in expected {
         assert!(errors.contains(text), "nothing of `{text}` in:\n{errors}");
     }
     assert!(ran.text().is_empty(), "{}", ran.text());
     assert!(!errors.contains("panicked"), "{errors}");
-    let mut told = HashSet::new();
+    let mut lines = HashSet::new();
     for line in errors.lines().filter(|l| l.starts_with("error: ")) {
-        assert!(told.insert(line), "told twice:\n{errors}");
+        assert!(lines.insert(line), "printed twice:\n{errors}");
         assert!(!line.ends_with('.'), "{line}");
     }
-    assert!(!told.is_empty(), "{errors}");
+    assert!(!lines.is_empty(), "{errors}");
     ran
 }
 
 /// The same for `render in` with these options; nothing may be left behind.
 #[track_caller]
-fn not_rendered(workshop: &Workshop, options: &[&str], wanted: &[&str]) {
+fn not_rendered(workshop: &Workshop, options: &[&str], expected: &[&str]) {
     let render = ["render", "in", "-o", "out/f.####.exr"];
-    refused(workshop, &[&render, options].concat(), wanted);
+    refused(workshop, &[&render, options].concat(), expected);
     assert!(
         !workshop.join("out").exists(),
         "a refused job leaves nothing"

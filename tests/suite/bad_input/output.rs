@@ -16,12 +16,12 @@ fn three_frames() -> Workshop {
 }
 
 #[track_caller]
-fn not_there(workshop: &Workshop, pattern: &str, wanted: &[&str]) {
+fn not_there(workshop: &Workshop, pattern: &str, expected: &[&str]) {
     let before = fs::read_dir(workshop.path())
         .expect("the directory")
         .count();
     let arguments = [&["render", "in", "-o", pattern][..], &SMALL].concat();
-    refused(workshop, &arguments, wanted);
+    refused(workshop, &arguments, expected);
     let after = fs::read_dir(workshop.path())
         .expect("the directory")
         .count();
@@ -29,13 +29,13 @@ fn not_there(workshop: &Workshop, pattern: &str, wanted: &[&str]) {
 }
 
 #[test]
-fn names_that_will_not_do() {
+fn invalid_output_names() {
     let workshop = three_frames();
     not_there(
         &workshop,
         "out/f.exr",
         &[
-            "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into it",
+            "output.path: out/f.exr for 3 frames: several frames would get the same name; put #### into the name",
         ],
     );
     // One of those chosen will do if only one is there.
@@ -48,22 +48,22 @@ fn names_that_will_not_do() {
     workshop
         .run(&[&several("3-9")[..], &SMALL].concat())
         .expect(0)
-        .tells("1 of 1 frames done");
+        .prints("1 of 1 frames done");
     assert!(workshop.join("one/f.exr").is_file());
     fs::remove_dir_all(workshop.join("one")).expect("the job");
-    let ending = "--output: output.path: must end in .exr, as in out/frame.####.exr";
+    let ending = "--output: output.path: must end in .exr (example: out/frame.####.exr)";
     for pattern in ["out/f.####.png", "out/", "out", "", "out/f.####"] {
         not_there(&workshop, pattern, &[ending]);
     }
     not_there(
         &workshop,
         "out/%q.exr",
-        &["output.path: `%q.exr` is no frame number; use #### or %04d"],
+        &["output.path: invalid frame number `%q.exr`; use #### or %04d"],
     );
     not_there(
         &workshop,
         "out/##.##.exr",
-        &["output.path: has room for two numbers"],
+        &["output.path: has places for two numbers"],
     );
     not_there(
         &workshop,
@@ -79,7 +79,7 @@ fn one_frame_needs_no_number_in_its_name() {
     let arguments = [&one[..], &SMALL].concat();
     let check = [&["check"], &arguments[1..]].concat();
     workshop.run(&check).expect(0);
-    workshop.run(&arguments).expect(0).tells("1 of 1 frames");
+    workshop.run(&arguments).expect(0).prints("1 of 1 frames");
     // The picture is that of the whole sequence.
     let all = [&["render", "in", "-o", "all/f.####.exr"][..], &SMALL].concat();
     workshop.run(&all).expect(0);
@@ -90,7 +90,7 @@ fn one_frame_needs_no_number_in_its_name() {
     workshop
         .run(&arguments)
         .expect(0)
-        .tells("1 of 1 frames are done already");
+        .prints("1 of 1 frames are done already");
     workshop.run(&["render", "one/job.toml"]).expect(0);
     // Another frame would take the place of the first.
     let mut other = arguments.clone();
@@ -107,10 +107,10 @@ fn one_frame_needs_no_number_in_its_name() {
     assert!(made == image("one/f.exr"));
     for frames in ["1-2", "all"] {
         let several = ["render", "in", "-o", "two/f.exr", "--frames", frames];
-        refused(&workshop, &several, &["put #### into it"]);
+        refused(&workshop, &several, &["put #### into the name"]);
     }
     let follow = ["render", "in", "-o", "two/f.exr", "--follow"];
-    refused(&workshop, &follow, &["put #### into it"]);
+    refused(&workshop, &follow, &["put #### into the name"]);
 }
 
 #[test]
@@ -124,23 +124,24 @@ fn one_converted_frame_has_the_name_it_was_given() {
     refused(
         &workshop,
         &one,
-        &["one.spf: is one name for 3 frames", "--frames"],
+        &["one.spf: one file name for 3 frames", "--frames"],
     );
 }
 
 #[test]
-fn a_file_in_the_place_of_the_directory() {
+fn file_in_place_of_the_directory() {
     let workshop = three_frames();
     fs::write(workshop.join("out"), "a file").expect("a file");
-    let wanted = "out: is a file where a directory for the images should be; choose another output";
-    not_there(&workshop, "out/f.####.exr", &[wanted]);
-    not_there(&workshop, "out/deep/er/f.####.exr", &[wanted]);
+    let expected =
+        "out: is a file, but a directory for the images is needed; choose another output";
+    not_there(&workshop, "out/f.####.exr", &[expected]);
+    not_there(&workshop, "out/deep/er/f.####.exr", &[expected]);
     assert_eq!(fs::read(workshop.join("out")).expect("a file"), b"a file");
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_place_where_even_root_may_not_write() {
+fn unwritable_file_system() {
     let workshop = three_frames();
     not_there(&workshop, "/proc/nope/f.####.exr", &["error: /proc/nope: "]);
 }
@@ -186,7 +187,7 @@ fn as_plain_user(command: Command) -> Option<Command> {
 
 #[cfg(target_os = "linux")]
 #[test]
-#[expect(clippy::print_stderr, reason = "a test that is left out says so")]
+#[expect(clippy::print_stderr, reason = "a skipped test is reported")]
 fn a_directory_that_is_closed_while_a_job_runs() {
     use std::os::unix::fs::PermissionsExt;
     let workshop = Workshop::new();
@@ -213,11 +214,14 @@ fn a_directory_that_is_closed_while_a_job_runs() {
         let mut running = Running::new(command);
         assert!(running.wait_for_line("] frame 1:"));
         open(0o555);
-        let (told, status) = running.end();
+        let (errors, status) = running.end();
         open(0o777);
-        assert_eq!(status.code(), Some(1), "{told}");
-        assert!(told.contains("cannot be written") && told.contains("check its permissions"));
-        assert!(!told.contains("failed:"), "no frame is at fault: {told}");
+        assert_eq!(status.code(), Some(1), "{errors}");
+        assert!(errors.contains("cannot be written") && errors.contains("check its permissions"));
+        assert!(
+            !errors.contains("failed:"),
+            "no frame is at fault: {errors}"
+        );
         workshop.run(&arguments).expect(0);
         assert!(images(&out) == images(&workshop.join("whole")));
         no_leftovers(&out);
@@ -227,7 +231,7 @@ fn a_directory_that_is_closed_while_a_job_runs() {
 }
 
 #[test]
-fn a_manifest_of_somebody_else_is_not_overwritten() {
+fn existing_manifest_is_not_overwritten() {
     let workshop = three_frames();
     fs::create_dir(workshop.join("out")).expect("a directory");
     let theirs = "# not spherule's\nbuild = true\n";
@@ -235,8 +239,8 @@ fn a_manifest_of_somebody_else_is_not_overwritten() {
     let ran = workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.toml: is in the way of this job's own manifest")
-        .tells("choose another output directory, or move it away");
+        .prints("out/job.toml: this job would write its manifest here")
+        .prints("choose another output directory, or move the file away");
     assert!(ran.rendered().is_empty());
     workshop.render(&["--force"]).expect(2);
     let left = files(&workshop.join("out"));

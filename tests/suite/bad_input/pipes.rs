@@ -9,7 +9,7 @@ use glam::Vec3;
 use crate::harness::{SMALL, Workshop, dam_break, images, npy};
 
 #[test]
-fn a_reader_that_has_seen_enough_is_no_error() {
+fn closed_pipe_is_not_an_error() {
     let workshop = Workshop::new();
     // More than a pipe holds, so that the program does notice.
     for frame in 0..500 {
@@ -39,9 +39,9 @@ fn a_reader_that_has_seen_enough_is_no_error() {
     }
 }
 
-/// A job does not end because nobody reads what it says.
+/// A job does not end because nobody reads its messages.
 #[test]
-fn a_job_goes_on_without_anybody_to_tell() {
+fn job_continues_without_standard_error() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), 1..=4);
     for progress in ["plain", "json", "openjd"] {

@@ -36,7 +36,11 @@ fn pipes_as_manifests() {
     fs::create_dir(workshop.join("out")).expect("a directory");
     pipe(&workshop.join("out/job.toml"));
     let render = ["render", "in", "-o", "out/f.####.exr"];
-    refused(&workshop, &render, &["out/job.toml: is in the way"]);
+    refused(
+        &workshop,
+        &render,
+        &["out/job.toml: this job would write its manifest here"],
+    );
     // A manifest without an end.
     let endless = fs::File::create(workshop.join("long.toml")).expect("a file");
     endless.set_len(1 << 40).expect("a hole");

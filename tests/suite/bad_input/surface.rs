@@ -31,26 +31,34 @@ fn no_particles_one_and_many_in_one_place() {
 
     write::npy::write(&workshop.join("in/f_1.npy"), &[Vec3::ONE]).expect("a file");
     fs::remove_dir_all(workshop.join("out")).expect("the images");
-    not_rendered(&workshop, &SMOOTH, &["input.radius: the frames bring none"]);
+    not_rendered(
+        &workshop,
+        &SMOOTH,
+        &["input.radius: the frames contain no radius"],
+    );
     smooth(&workshop, &["--radius", "0.1"]).expect(0);
     assert!(!is_empty(&workshop, 1));
 
     let many = vec![Vec3::ONE; 100_000];
     write::npy::write(&workshop.join("in/f_1.npy"), &many).expect("a file");
     fs::remove_dir_all(workshop.join("out")).expect("the images");
-    not_rendered(&workshop, &SMOOTH, &["input.radius: the frames bring none"]);
+    not_rendered(
+        &workshop,
+        &SMOOTH,
+        &["input.radius: the frames contain no radius"],
+    );
     smooth(&workshop, &["--radius", "0.1"]).expect(0);
     assert!(!is_empty(&workshop, 1));
 }
 
 #[test]
-fn a_threshold_that_nothing_reaches_is_an_empty_image() {
+fn unreachable_threshold_gives_an_empty_image() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     smooth(&workshop, &["--set", "surface.threshold=4"])
         .expect(0)
-        .tells("the smooth surface is empty: with radius")
-        .tells("surface.threshold = 4");
+        .prints("the smooth surface is empty: with radius")
+        .prints("surface.threshold = 4");
     assert!(is_empty(&workshop, 1));
 }
 
@@ -76,8 +84,8 @@ fn radii_that_vary_a_thousandfold() {
     write::vtk::write(&workshop.join("in/f_1.vtk"), &centers, &[radius]).expect("a file");
     smooth(&workshop, &[])
         .expect(0)
-        .tells("radii differ; a smooth surface has one for all, here their median")
-        .tells("(--radius gives another)");
+        .prints("radii differ; a smooth surface has one for all, here their median")
+        .prints("(input.radius sets another)");
     let options = [&["--surface", "union", "--force"][..], &BACKGROUND].concat();
     let ran = workshop.render(&options).expect(0);
     assert!(!ran.errors().contains("radii differ"), "{}", ran.errors());
@@ -85,11 +93,11 @@ fn radii_that_vary_a_thousandfold() {
 }
 
 #[test]
-fn surfaces_that_there_are_not() {
+fn unknown_surfaces() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     not_rendered(&workshop, &["--surface", "smoth"], &["smoth", "smooth"]);
     let voxel = [&SMOOTH[..], &["--set", "surface.voxel=0"]].concat();
-    let wanted = "surface.voxel: wants a number of particle radii from 0.25 to 4";
-    not_rendered(&workshop, &voxel, &[wanted]);
+    let expected = "surface.voxel: expected a number of particle radii from 0.25 to 4";
+    not_rendered(&workshop, &voxel, &[expected]);
 }

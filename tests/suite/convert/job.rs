@@ -18,15 +18,15 @@ fn five_frames() -> Workshop {
 }
 
 #[test]
-fn the_same_command_again_does_nothing() {
+fn repeated_command_does_nothing() {
     let shop = five_frames();
-    let ran = convert(&shop, &Q16).expect(0).tells("5 of 5 frames done");
+    let ran = convert(&shop, &Q16).expect(0).prints("5 of 5 frames done");
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
     let out = shop.join("out");
     let before = stamps(&out);
     // The frames, plan and ledger.
     assert_eq!(before.len(), 5 + 2);
-    // The usual bound, said; what does not change the frames.
+    // The default bound given explicitly, and options that do not change the frames.
     for options in [
         &Q16[..],
         &["--encoding", "q16", "--max-error", "0.02"],
@@ -34,7 +34,7 @@ fn the_same_command_again_does_nothing() {
         &["--encoding", "q16", "--attributes", "*:keep"],
     ] {
         let ran = convert(&shop, options).expect(0);
-        let ran = ran.tells("5 of 5 frames are done already");
+        let ran = ran.prints("5 of 5 frames are done already");
         assert!(ran.rendered().is_empty());
         assert_eq!(stamps(&out), before, "{options:?}");
     }
@@ -42,15 +42,15 @@ fn the_same_command_again_does_nothing() {
     fs::rename(&out, shop.join("moved")).expect("a rename");
     shop.run(&[&["convert", "in", "-o", "moved"][..], &Q16].concat())
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
 }
 
 #[test]
-fn changed_settings_are_refused_with_old_and_new_value() {
+fn changed_settings_are_rejected_with_both_values() {
     let shop = five_frames();
     convert(&shop, &Q16).expect(0);
     let before = stamps(&shop.join("out"));
-    for (options, told) in [
+    for (options, message) in [
         (&["--encoding", "q10"][..], "encoding: q16 -> q10;"),
         (
             &["--encoding", "q16", "--max-error", "0.1"],
@@ -67,18 +67,18 @@ fn changed_settings_are_refused_with_old_and_new_value() {
     ] {
         let ran = convert(&shop, options)
             .expect(2)
-            .tells("out: settings have changed since this job began: ")
-            .tells(told)
-            .tells("--force starts over, --keep-done keeps what is there");
+            .prints("out: settings have changed since this job began: ")
+            .prints(message)
+            .prints("--force starts over, --keep-done keeps what is there");
         let errors = ran.errors();
-        let told_errors = errors.lines().filter(|line| line.starts_with("error:"));
-        assert_eq!(told_errors.count(), 1, "{errors}");
+        let error_lines = errors.lines().filter(|line| line.starts_with("error:"));
+        assert_eq!(error_lines.count(), 1, "{errors}");
         assert_eq!(stamps(&shop.join("out")), before, "{options:?}");
     }
 }
 
 #[test]
-fn force_starts_over_and_keep_done_keeps_what_is_there() {
+fn force_starts_over_and_keep_done_continues() {
     let shop = five_frames();
     convert(&shop, &[&Q16[..], &["--frames", "1-3"]].concat()).expect(0);
     let old = natives(&shop.join("out"));
@@ -105,13 +105,13 @@ fn force_starts_over_and_keep_done_keeps_what_is_there() {
 }
 
 #[test]
-fn a_rewritten_input_is_refused_by_name() {
+fn changed_input_is_rejected_by_name() {
     let shop = five_frames();
     convert(&shop, &Q16).expect(0);
     fs::copy(shop.join("in/f_5.bgeo"), shop.join("in/f_2.bgeo")).expect("a copy");
     convert(&shop, &Q16)
         .expect(2)
-        .tells("inputs of finished frames have changed: frame 2: in/f_2.bgeo: ");
+        .prints("inputs of finished frames have changed: frame 2: in/f_2.bgeo: ");
     let ran = convert(&shop, &[&Q16[..], &["--keep-done"]].concat()).expect(0);
     assert!(ran.rendered().is_empty());
 }
@@ -133,7 +133,7 @@ fn appended_frames_are_converted_as_the_first_ones_were() {
     // Alone it would have another origin and another radius.
     npy(&shop.join("in/f_3.npy"), 9000, 3, 3.0 * far);
     let ran = convert(&shop, &Q16).expect(0);
-    let ran = ran.tells("2 of 3 frames are done already");
+    let ran = ran.prints("2 of 3 frames are done already");
     assert_eq!(ran.rendered(), [3]);
     assert_eq!(resolved(), settled);
     let radius = |file: &str| number(&inspected(&shop, file)["radius"]);
@@ -153,18 +153,18 @@ fn one_damaged_frame_costs_one_frame() {
     fs::write(&file, &good[..good.len() / 2]).expect("a file");
     let ran = convert(&shop, &Q16)
         .expect(1)
-        .tells("error: frame 3: in/f_3.bgeo: byte ")
-        .tells("4 of 5 frames done")
-        .tells("failed: 3");
+        .prints("error: frame 3: in/f_3.bgeo: byte ")
+        .prints("4 of 5 frames done")
+        .prints("failed: 3");
     assert_eq!(ran.rendered(), [1, 2, 4, 5]);
     assert_eq!(ran.errors().matches("error:").count(), 1);
     assert_eq!(natives(&shop.join("out")).len(), 4);
 
     let before = stamps(&shop.join("out"));
-    let ran = convert(&shop, &Q16).expect(1).tells("failed: 3");
+    let ran = convert(&shop, &Q16).expect(1).prints("failed: 3");
     assert!(ran.rendered().is_empty());
     fs::write(&file, &good).expect("a file");
-    let ran = convert(&shop, &Q16).expect(0).tells("5 of 5 frames done");
+    let ran = convert(&shop, &Q16).expect(0).prints("5 of 5 frames done");
     assert_eq!(ran.rendered(), [3]);
     let after = stamps(&shop.join("out"));
     for (name, stamp) in before.iter().filter(|(name, _)| name.ends_with(".spf")) {
@@ -173,7 +173,7 @@ fn one_damaged_frame_costs_one_frame() {
 }
 
 #[test]
-fn lost_and_shortened_frames_are_made_again() {
+fn lost_and_truncated_frames_are_redone() {
     let shop = five_frames();
     convert(&shop, &Q16).expect(0);
     let whole = natives(&shop.join("out"));
@@ -186,7 +186,7 @@ fn lost_and_shortened_frames_are_made_again() {
 }
 
 #[test]
-fn frames_are_converted_as_asked_for() {
+fn conversion_options_take_effect() {
     let shop = five_frames();
     for (range, frames) in [("3-4", &[3, 4][..]), ("5,1", &[5, 1]), ("1-9", &[2])] {
         let ran = convert(&shop, &["--frames", range]).expect(0);

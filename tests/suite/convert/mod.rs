@@ -15,7 +15,7 @@ fn convert(shop: &Workshop, options: &[&str]) -> Ran {
     shop.run(&[&["convert", "in", "-o", "out"], options].concat())
 }
 
-/// What `inspect --json` says of the file.
+/// The output of `inspect --json` for the file.
 fn inspected(shop: &Workshop, file: &str) -> Value {
     let ran = shop.run(&["inspect", "--json", file]).expect(0);
     serde_json::from_str(&ran.text()).expect("one line of JSON")
@@ -26,7 +26,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn native_frames_hold_what_the_foreign_ones_did() {
+fn native_frames_contain_the_source_data() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     for (encoding, options) in [
@@ -35,7 +35,7 @@ fn native_frames_hold_what_the_foreign_ones_did() {
         ("q10", &["--encoding", "q10", "--max-error", "0.05"][..]),
     ] {
         let arguments = [&["convert", "in", "-o", encoding][..], options].concat();
-        shop.run(&arguments).expect(0).tells("2 of 2 frames");
+        shop.run(&arguments).expect(0).prints("2 of 2 frames");
         for frame in 1..=2 {
             let from = inspected(&shop, &format!("in/f_{frame}.bgeo"));
             let to = inspected(&shop, &format!("{encoding}/frame.000{frame}.spf"));

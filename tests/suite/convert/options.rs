@@ -1,4 +1,4 @@
-//! What can be said to `spherule convert`, and what cannot be meant.
+//! Options of `spherule convert`, and combinations that are rejected.
 
 use std::fs;
 
@@ -15,7 +15,7 @@ fn names(shop: &Workshop, file: &str) -> Vec<String> {
 }
 
 #[test]
-fn attributes_are_left_out_by_name_or_all_but_some() {
+fn attributes_are_omitted_by_name_or_wildcard() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), [1]);
     convert(&shop, &[]).expect(0);
@@ -39,8 +39,8 @@ fn attributes_are_left_out_by_name_or_all_but_some() {
     }
     convert(&shop, &["--attributes", "pressure:off", "--force"])
         .expect(2)
-        .tells("--attributes: no frame has `pressure`; there are ")
-        .tells("`density`");
+        .prints("--attributes: no frame has `pressure`; there are ")
+        .prints("`density`");
 }
 
 #[test]
@@ -55,20 +55,20 @@ fn attributes_are_stored_in_fewer_bits() {
         convert(&shop, &["--attributes", choices, "--force"]).expect(0);
         let object = inspected(&shop, "out/frame.0001.spf");
         let list = object["native"]["attributes"].as_array().expect("a list");
-        for (name, wanted) in ["id", "density", "velocity"].into_iter().zip(stored) {
+        for (name, expected) in ["id", "density", "velocity"].into_iter().zip(stored) {
             let found = list.iter().find(|a| a["name"] == name);
             let found = found.map_or("", |a| a["stored"].as_str().expect("a name"));
-            assert_eq!(found, wanted, "{choices}: {name}");
+            assert_eq!(found, expected, "{choices}: {name}");
         }
     }
     convert(&shop, &["--attributes", "id:f16", "--force"])
         .expect(1)
-        .tells("attribute id holds ids");
+        .prints("attribute id holds ids");
 }
 
 /// Native frames are in another order than their files.
 #[test]
-fn places_in_the_file_are_kept_as_ids_if_asked() {
+fn file_indices_are_stored_as_ids_on_request() {
     let shop = Workshop::new();
     npy(&shop.join("in/f_1.npy"), 3000, 1, glam::Vec3::ZERO);
     convert(&shop, &[]).expect(0);
@@ -85,11 +85,11 @@ fn places_in_the_file_are_kept_as_ids_if_asked() {
 }
 
 #[test]
-fn what_cannot_be_meant_is_refused() {
+fn contradictory_options_are_rejected() {
     let shop = Workshop::new();
     shop.run(&["convert", "nothing", "-o", "x"]).expect(2);
     dam_break(&shop.join("in"), 1..=1);
-    for (options, told) in [
+    for (options, message) in [
         (&["--encoding", "q11"][..], "f32, q16, q10"),
         (&["--max-error", "-1"], "-1"),
         (&["--attributes", "velocity"], "write NAME:HOW"),
@@ -98,27 +98,27 @@ fn what_cannot_be_meant_is_refused() {
             &["--no-attributes", "--attributes", "a:off"],
             "cannot be used with",
         ),
-        (&["--memory", "much"], "is no size"),
+        (&["--memory", "much"], "expected a size, such as 4GiB"),
         (
             &["--frames", "7-9"],
-            "--frames: 7-9 has none of the frames that there are: 1",
+            "--frames: 7-9 contains none of the frames of the input: 1",
         ),
         (&["--frames", "x"], "--frames"),
         (&["--force", "--keep-done"], "cannot be used with"),
     ] {
-        convert(&shop, options).expect(2).tells(told);
+        convert(&shop, options).expect(2).prints(message);
         assert!(!shop.join("out").exists(), "{options:?}");
     }
 }
 
 #[test]
-fn a_directory_of_something_else_is_refused() {
+fn foreign_output_directory_is_rejected() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     fs::write(shop.join("out"), "a file").expect("a file");
     convert(&shop, &[])
         .expect(2)
-        .tells("out: is a file where a directory for the frames should be");
+        .prints("out: is a file, but a directory for the frames is needed");
     fs::remove_file(shop.join("out")).expect("a file");
 
     // A job that renders, and the other way round.
@@ -126,12 +126,12 @@ fn a_directory_of_something_else_is_refused() {
     let before = files(&shop.join("out"));
     convert(&shop, &[])
         .expect(2)
-        .tells("out: holds a job of `render`, not of `convert`; choose another directory");
+        .prints("out: contains a job of `render`, not of `convert`; choose another directory");
     assert!(files(&shop.join("out")) == before);
     shop.run(&["convert", "in", "-o", "native"]).expect(0);
     shop.render_to("native", &[])
         .expect(2)
-        .tells("native: holds a job of `convert`, not of `render`");
+        .prints("native: contains a job of `convert`, not of `render`");
 
     // Frames are not converted onto themselves.
     let before = natives(&shop.join("native"));
@@ -139,22 +139,22 @@ fn a_directory_of_something_else_is_refused() {
     fs::remove_file(ledger_path(&shop.join("native"))).expect("the ledger");
     shop.run(&["convert", "native", "-o", "native"])
         .expect(2)
-        .tells("native/frame.0001.spf: would be overwritten by its own conversion");
+        .prints("native/frame.0001.spf: the conversion would overwrite its own input");
     assert!(natives(&shop.join("native")) == before);
 }
 
 #[cfg(target_os = "linux")]
 #[test]
-fn a_place_where_even_root_may_not_write() {
+fn unwritable_file_system() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=1);
     shop.run(&["convert", "in", "-o", "/proc/nope/frames"])
         .expect(2)
-        .tells("error: /proc/nope");
+        .prints("error: /proc/nope");
 }
 
 #[test]
-fn progress_is_told_as_it_is_asked_for() {
+fn progress_modes() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=2);
     let text = convert(&shop, &["--progress", "json"]).expect(0).text();

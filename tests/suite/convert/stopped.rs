@@ -22,7 +22,7 @@ enum Moment {
     Writing,
     /// Once it has made so many frames; the ledger may not know of the last.
     Frames(usize),
-    /// Once it has told of a frame.
+    /// After its first message about a frame.
     Told,
 }
 
@@ -33,13 +33,13 @@ fn wait(running: &mut Running, moment: Moment, shop: &Workshop) -> bool {
     match moment {
         Moment::Plan => running.wait_until(|| out.join("job.plan.json").exists()),
         Moment::Writing => running.wait_until(|| files(&out).keys().any(is_part)),
-        Moment::Frames(wanted) => running.wait_until(|| natives(&out).len() >= before + wanted),
+        Moment::Frames(expected) => running.wait_until(|| natives(&out).len() >= before + expected),
         Moment::Told => running.wait_for_line("] frame "),
     }
 }
 
 #[test]
-fn killed_again_and_again_the_result_is_that_of_an_unbroken_run() {
+fn repeated_kills_give_the_uninterrupted_result() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=FRAMES);
     let mut unbroken = Q10;
@@ -60,11 +60,11 @@ fn killed_again_and_again_the_result_is_that_of_an_unbroken_run() {
         let mut running = shop.start(&Q10);
         wait(&mut running, moment, &shop);
         running.kill();
-        let (told, status) = running.end();
+        let (errors, status) = running.end();
         match status.code() {
             None => kills += 1,
             // It was faster; there is no other way to end.
-            code => assert_eq!(code, Some(0), "{moment:?}: {told}"),
+            code => assert_eq!(code, Some(0), "{moment:?}: {errors}"),
         }
         let made = natives(&shop.join("out"));
         for (name, bytes) in &made {
@@ -92,7 +92,7 @@ fn large_frame() -> Workshop {
 }
 
 #[test]
-fn term_and_interrupt_end_with_75_after_the_frame_in_hand() {
+fn term_and_interrupt_exit_75_after_the_current_frame() {
     let shop = Workshop::new();
     dam_break(&shop.join("in"), 1..=FRAMES);
     for signal in ["TERM", "INT"] {
@@ -101,15 +101,15 @@ fn term_and_interrupt_end_with_75_after_the_frame_in_hand() {
             let mut running = shop.start(&Q10);
             assert!(running.wait_for_line("] frame 1:"));
             running.signal(signal);
-            let (told, status) = running.end();
+            let (errors, status) = running.end();
             if status.code() == Some(0) {
                 return false;
             }
-            assert_eq!(status.code(), Some(75), "{told}");
+            assert_eq!(status.code(), Some(75), "{errors}");
             let done = ledger(&shop.join("out")).lines.len();
-            assert!((1..FRAMES).contains(&done), "{told}");
-            assert!(told.contains(&format!("{done} of {FRAMES} frames done")));
-            assert!(!told.contains("error:") && !told.contains("failed:"));
+            assert!((1..FRAMES).contains(&done), "{errors}");
+            assert!(errors.contains(&format!("{done} of {FRAMES} frames done")));
+            assert!(!errors.contains("error:") && !errors.contains("failed:"));
             assert_eq!(natives(&shop.join("out")).len(), done);
             no_leftovers(&shop.join("out"));
             let ran = shop.run(&Q10).expect(0);
@@ -126,36 +126,39 @@ fn a_second_term_stops_at_once() {
     let in_hand = (0..TRIES).any(|_| {
         let mut running = shop.start(&Q10);
         // Told last before the first frame is begun.
-        assert!(running.wait_for_line("half the usual distance"));
+        assert!(running.wait_for_line("half the typical distance"));
         running.signal("TERM");
-        let asked = running.wait_for_line("stopping after the frame in hand");
+        let is_stopping = running.wait_for_line("stopping after the frames in progress");
         running.signal("TERM");
-        let (told, status) = running.end();
+        let (errors, status) = running.end();
         if status.code() == Some(0) {
             fs::remove_dir_all(shop.join("out")).expect("a directory");
             return false;
         }
-        assert_eq!(status.code(), Some(75), "{told}");
+        assert_eq!(status.code(), Some(75), "{errors}");
         assert!(natives(&shop.join("out")).is_empty());
-        // Without a frame in hand, the first one has sufficed.
-        asked && told.contains("stopped; the same command goes on from here")
+        let left = files(&shop.join("out"));
+        let is_part = |name: &String| name.ends_with(".part");
+        assert!(!left.keys().any(is_part), "{:?}", left.keys());
+        // Without a frame in progress the first signal is enough
+        is_stopping && errors.contains("stopped; the same command continues")
     });
-    assert!(in_hand, "there never was a frame in hand");
+    assert!(in_hand, "no frame was ever in progress");
     assert!(ledger(&shop.join("out")).lines.is_empty());
 }
 
 #[test]
-fn a_second_process_takes_over_from_one_that_dies() {
+fn second_process_takes_over_from_a_killed_one() {
     let shop = large_frame();
     let mut running = shop.start(&Q10);
-    assert!(running.wait_for_line("half the usual distance"));
+    assert!(running.wait_for_line("half the typical distance"));
     let mut second = shop.start(&Q10);
-    let waits = second.wait_for_line("which process");
+    let waits = second.wait_for_line("is working on it");
     running.kill();
     running.end();
-    let (told, status) = second.end();
-    assert_eq!(status.code(), Some(0), "{told}");
-    assert!(waits, "{told}");
+    let (errors, status) = second.end();
+    assert_eq!(status.code(), Some(0), "{errors}");
+    assert!(waits, "{errors}");
     assert_eq!(natives(&shop.join("out")).len(), 1);
     no_leftovers(&shop.join("out"));
 }
@@ -170,7 +173,7 @@ fn a_frame_that_cannot_be_written_costs_one_frame() {
     let whole = natives(&shop.join("out"));
     fs::remove_dir_all(shop.join("out")).expect("a directory");
     let smallest = whole.values().map(Vec::len).min().expect("frames");
-    // In blocks of 512 bytes; the signal that tells of it is let pass.
+    // In blocks of 512 bytes; the signal about the limit is ignored.
     let script = format!(
         "trap '' XFSZ; ulimit -f {}; exec \"$@\"",
         (smallest - 1) / 512

@@ -111,7 +111,7 @@ fn samples() -> Vec<(PathBuf, Vec<u8>)> {
 const CASES: u32 = 48;
 
 #[test]
-fn harmed_samples_do_not_panic() {
+fn mutated_samples_do_not_panic() {
     let config = ProptestConfig {
         cases: CASES,
         failure_persistence: None,

@@ -66,7 +66,7 @@ fn read_all(path: &Path, file: Result<FrameFile, FrameError>) -> Result<(u64, u6
 }
 
 #[test]
-fn every_file_gives_its_named_error() {
+fn every_damaged_file_gives_its_expected_error() {
     let made = make::files();
     if std::env::var_os("SPHERULE_BLESS").is_some() {
         for (name, bytes) in &made {
@@ -110,7 +110,7 @@ fn every_file_gives_its_named_error() {
 /// counts ask for.
 #[test]
 #[cfg(target_os = "linux")]
-fn the_program_tells_every_error_within_little_memory() {
+fn program_reports_every_error_in_bounded_memory() {
     let table = table();
     let workshop = Workshop::new();
     let program = workshop.command(&[]);
@@ -139,12 +139,12 @@ fn the_program_tells_every_error_within_little_memory() {
     for ((name, expected), object) in table.iter().zip(&objects) {
         assert_eq!(object["file"], name.as_str());
         if let Some(counts) = expected.strip_prefix("reads ") {
-            let told = format!("{} kept {} dropped", object["count"], object["dropped"]);
-            assert_eq!(told, counts, "{name}");
+            let message = format!("{} kept {} dropped", object["count"], object["dropped"]);
+            assert_eq!(message, counts, "{name}");
         } else {
-            let told = object["error"].as_str().expect("a message");
-            assert!(told.starts_with(&format!("{name}: ")), "{told}");
-            assert!(told.contains(expected), "{told}");
+            let message = object["error"].as_str().expect("a message");
+            assert!(message.starts_with(&format!("{name}: ")), "{message}");
+            assert!(message.contains(expected), "{message}");
             assert_eq!(
                 object.as_object().map(serde_json::Map::len),
                 Some(2),
@@ -156,7 +156,7 @@ fn the_program_tells_every_error_within_little_memory() {
 
 /// For people the same goes to standard error, and nothing to standard output.
 #[test]
-fn the_program_tells_people_too() {
+fn program_prints_errors_as_text() {
     let (name, expected) = table()
         .into_iter()
         .find(|(_, e)| !e.starts_with("reads"))
@@ -167,9 +167,12 @@ fn the_program_tells_people_too() {
         .output()
         .expect("the program starts");
     assert_eq!(output.status.code(), Some(1));
-    let told = String::from_utf8_lossy(&output.stderr);
-    assert!(told.starts_with(&format!("error: {name}: ")), "{told}");
-    assert!(told.contains(&expected), "{told}");
-    assert_eq!(told.lines().count(), 1, "{told}");
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert!(
+        message.starts_with(&format!("error: {name}: ")),
+        "{message}"
+    );
+    assert!(message.contains(&expected), "{message}");
+    assert_eq!(message.lines().count(), 1, "{message}");
     assert!(output.stdout.is_empty());
 }

@@ -1,4 +1,4 @@
-//! Jobs as work for clusters and render farms: what the scripts say. `.ci/slurm` and `.ci/openjd` run them on
+//! Exported jobs for clusters and render farms: the content of the scripts. `.ci/slurm` and `.ci/openjd` run them on
 //! engines.
 
 use std::fs;

@@ -43,7 +43,7 @@ fn all_frames_are_in_the_template() {
 }
 
 #[test]
-fn paths_are_declared_as_they_are_seen_from_the_template() {
+fn paths_are_relative_to_the_template() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1, 2]);
     let defaults = |found: &Value| {
@@ -61,7 +61,7 @@ fn paths_are_declared_as_they_are_seen_from_the_template() {
     assert_eq!(flows[0], ["PATH", "FILE", "IN"]);
     assert_eq!(flows[1], ["PATH", "DIRECTORY", "IN"]);
     assert_eq!(flows[2], ["PATH", "DIRECTORY", "OUT"]);
-    // What is not below the template has no default, and the way to say it is told.
+    // Paths outside the template have no default; a note names the option.
     fs::create_dir(workshop.join("elsewhere")).expect("a directory");
     let (found, ran) = template(&workshop, "elsewhere/t.json", &["data/job.toml"]);
     assert_eq!(defaults(&found), [Value::Null, Value::Null, Value::Null]);
@@ -71,13 +71,13 @@ fn paths_are_declared_as_they_are_seen_from_the_template() {
         ("InputDir", "in"),
         ("OutDir", "out"),
     ] {
-        let said = ran.errors();
-        let option = said
+        let errors = ran.errors();
+        let option = errors
             .split(" -p ")
             .find(|o| o.starts_with(&format!("'{name}=")));
         let path = place.join("data").join(path);
-        let told = option.unwrap_or_else(|| panic!("no {name} in {said}"));
-        assert!(told.contains(&path.display().to_string()), "{told}");
+        let message = option.unwrap_or_else(|| panic!("no {name} in {errors}"));
+        assert!(message.contains(&path.display().to_string()), "{message}");
     }
     // By the manifest beside the images, the images are where the manifest is.
     workshop.run(&["render", "data/job.toml"]).expect(0);
@@ -124,7 +124,7 @@ fn tasks_call_render() {
 }
 
 #[test]
-fn people_get_yaml() {
+fn default_output_is_yaml() {
     let workshop = Workshop::new();
     job(&workshop, "it's \"so\": {x}, y", &[1, 2]);
     let manifest = "it's \"so\": {x}, y/job.toml";

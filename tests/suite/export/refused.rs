@@ -3,17 +3,21 @@ use std::fs;
 use super::job;
 use crate::harness::Workshop;
 
-/// No engine gets a text; the message has `wanted`, and nothing is written.
+/// No engine gets a text; the message has `expected`, and nothing is written.
 #[track_caller]
-fn refused(workshop: &Workshop, arguments: &[&str], wanted: &str) {
+fn refused(workshop: &Workshop, arguments: &[&str], expected: &str) {
     for engine in ["slurm", "openjd"] {
-        only(workshop, &[&["export", engine], arguments].concat(), wanted);
+        only(
+            workshop,
+            &[&["export", engine], arguments].concat(),
+            expected,
+        );
     }
 }
 
 #[track_caller]
-fn only(workshop: &Workshop, arguments: &[&str], wanted: &str) {
-    let ran = workshop.run(arguments).expect(2).tells(wanted);
+fn only(workshop: &Workshop, arguments: &[&str], expected: &str) {
+    let ran = workshop.run(arguments).expect(2).prints(expected);
     assert!(ran.text().is_empty() && !ran.errors().contains("panicked"));
     assert!(!workshop.join("new.yaml").exists() && !workshop.join("data/slurm-logs").exists());
 }
@@ -30,15 +34,19 @@ fn jobs_that_cannot_be_exported() {
     refused(
         &workshop,
         &with(&["--frames", "7-9"]),
-        "none of the frames that there are: 1-3",
+        "none of the frames of the input: 1-3",
     );
     refused(&workshop, &with(&["--frames", "1-"]), "--frames");
     refused(
         &workshop,
         &with(&["--mem", "16"]),
-        "write the unit, as in 4GiB",
+        "expected at least 16.0 MiB, with a unit, such as 4GiB",
     );
-    refused(&workshop, &with(&["--mem", "lots"]), "is no size");
+    refused(
+        &workshop,
+        &with(&["--mem", "lots"]),
+        "expected a size, such as 4GiB",
+    );
     refused(&workshop, &with(&["--chunk", "0"]), "--chunk");
     refused(&workshop, &with(&["--cpus", "0"]), "--cpus");
     let text = fs::read_to_string(&manifest).expect("a manifest");
@@ -49,14 +57,14 @@ fn jobs_that_cannot_be_exported() {
 }
 
 #[test]
-fn what_engines_cannot_take() {
+fn unsupported_job_features() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1]);
-    let slurm = |options: &[&str], wanted: &str| {
+    let slurm = |options: &[&str], expected: &str| {
         let arguments = ["export", "slurm", "data/job.toml", "-o", "new.yaml"];
-        only(&workshop, &[&arguments, options].concat(), wanted);
+        only(&workshop, &[&arguments, options].concat(), expected);
     };
-    slurm(&["--time", "2h"], "is no time limit");
+    slurm(&["--time", "2h"], "invalid time limit");
     slurm(
         &["--time", "2:00"],
         "a time limit of 00:02:00 leaves no time",
@@ -70,14 +78,14 @@ fn what_engines_cannot_take() {
     only(
         &workshop,
         &openjd,
-        "new.txt: engines know a template by its name",
+        "new.txt: engines recognise a template by its name",
     );
     job(&workshop, "100%", &[1]);
     let openjd = ["export", "openjd", "100%/job.toml"];
     only(&workshop, &openjd, "rename the directory");
     job(&workshop, "a{{b", &[1]);
     let openjd = ["export", "openjd", "a{{b/job.toml"];
-    only(&workshop, &openjd, "begins an expression");
+    only(&workshop, &openjd, "starts an expression");
 }
 
 #[test]
@@ -88,7 +96,7 @@ fn the_manifest_is_not_overwritten() {
     for to in ["data/job.toml", "data/../data/job.toml"] {
         let arguments = ["export", "slurm", "data/job.toml", "-o", to];
         let ran = workshop.run(&arguments).expect(2);
-        let _ = ran.tells("is the manifest itself");
+        let _ = ran.prints("is the manifest itself");
     }
     assert_eq!(
         fs::read(workshop.join("data/job.toml")).expect("a manifest"),

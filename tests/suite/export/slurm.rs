@@ -54,8 +54,36 @@ fn every_frame_is_in_one_task() {
     }
 }
 
+/// Options of the program in the script, which are on the lines that call it or set its arguments.
+fn options(script: &str) -> Vec<&str> {
+    let is_call = |line: &&str| line.contains("set -- ") || line.contains("exec \"$program\"");
+    let words = script
+        .lines()
+        .filter(is_call)
+        .flat_map(str::split_whitespace);
+    words
+        .filter(|word| word.len() > 2 && word.starts_with("--"))
+        .collect()
+}
+
 #[test]
-fn frames_are_those_of_the_manifest_or_asked_for() {
+fn tasks_use_options_that_render_has() {
+    let workshop = Workshop::new();
+    job(&workshop, "data", &FRAMES);
+    let script = export(&workshop, &["data/job.toml", "--mem", "4GiB"])
+        .expect(0)
+        .text();
+    let help = workshop.run(&["render", "--help"]).expect(0).text();
+    let used = options(&script);
+    assert_eq!(used, ["--frames", "--threads", "--memory-limit", "--grace"]);
+    let known: Vec<&str> = help.split_whitespace().collect();
+    for option in used {
+        assert!(known.contains(&option), "{option}");
+    }
+}
+
+#[test]
+fn frames_come_from_the_manifest_or_the_option() {
     let workshop = Workshop::new();
     job(&workshop, "data", &FRAMES);
     let tasks = |options: &[&str]| {
@@ -92,29 +120,29 @@ fn tasks_are_few_enough_for_an_array() {
         &["data/job.toml", "--max-tasks", "3", "--chunk", "2"],
     )
     .expect(0);
-    let ran = ran.tells("3 tasks of 5 frames, as 2 would make 7 tasks");
+    let ran = ran.prints("3 tasks of 5 frames, because 2 would give 7 tasks");
     assert_eq!(chunks(&ran.text()).concat(), FRAMES);
     assert!(
         ran.text()
-            .contains("# 5 frames a task, as 2 would make 7 tasks")
+            .contains("# 5 frames per task, because 2 would give 7 tasks")
     );
-    // Nobody said how many.
+    // Without an option for the count.
     let ran = export(&workshop, &["data/job.toml"]).expect(0);
     assert_eq!(chunks(&ran.text()).len(), FRAMES.len());
 }
 
 #[test]
-fn a_script_comes_with_a_place_for_its_logs() {
+fn script_creates_the_log_directory() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1, 2]);
     let logs = workshop.join("data/slurm-logs");
     let ran = export(&workshop, &["data/job.toml"]).expect(0);
     assert!(!logs.exists(), "what only prints makes nothing");
-    let ran = ran.tells("mkdir -p '");
+    let ran = ran.prints("mkdir -p '");
     let options = ["data/job.toml", "-o", "array.sh"];
     export(&workshop, &options)
         .expect(0)
-        .tells("sbatch array.sh");
+        .prints("sbatch array.sh");
     assert!(logs.is_dir());
     let script = fs::read_to_string(workshop.join("array.sh")).expect("a script");
     assert_eq!(script, ran.text());
@@ -125,14 +153,14 @@ fn a_script_comes_with_a_place_for_its_logs() {
 }
 
 #[test]
-fn what_is_asked_of_the_cluster() {
+fn requested_resources() {
     let workshop = Workshop::new();
     job(&workshop, "data", &[1, 2]);
-    let has = |options: &[&str], wanted: &[&str]| {
+    let has = |options: &[&str], expected: &[&str]| {
         let options = [&["data/job.toml"], options].concat();
         let script = export(&workshop, &options).expect(0).text();
         sound(&script);
-        for line in wanted {
+        for line in expected {
             let line = format!("#SBATCH --{line}");
             assert!(script.lines().any(|l| l == line), "no {line} in\n{script}");
         }
@@ -199,7 +227,7 @@ fn run(script: &str, task: usize) -> Output {
 }
 
 #[test]
-fn tasks_make_what_one_run_makes() {
+fn tasks_give_the_same_files_as_one_run() {
     let workshop = Workshop::new();
     job(&workshop, ODD, &FRAMES);
     let manifest = format!("{ODD}/job.toml");

@@ -10,20 +10,26 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::AtomicBool;
 
-use spherule::accel::TreeBuilder;
 use spherule::accel::simd::SimdLevel;
-use spherule::accel::{BuildSettings, SphereRadius, Spheres};
+use spherule::accel::view::TreeView;
+use spherule::accel::{BuildSettings, SphereRadius, Spheres, TreeBuilder};
 use spherule::output::{ExrOptions, encode_exr};
 use spherule::render::{Film, ParticleShading, render};
+use spherule::surface::smooth::SmoothGrid;
 use spherule::surface::spheres::SphereSurface;
+use spherule::surface::union::UnionSurface;
+use spherule::surface::{NormalKind, PcaNormals, ShadingNormals, Shape, SurfaceKind};
 
 use crate::picture::{Picture, Plane};
+use crate::simd::tested_levels;
 
 mod compare;
 mod scenes;
+mod stills;
 
 use compare::{LIMITS, differences};
 use scenes::Shot;
+use stills::Still;
 
 const BLESS: &str = "SPHERULE_BLESS";
 
@@ -44,12 +50,34 @@ fn trace(shot: &Shot, simd: SimdLevel) -> Film {
         colors: shot.colors.as_colors(),
         ids: shot.ids.as_deref(),
         velocities: shot.velocities.as_deref(),
+        parts: None,
+        attributes: &[],
     };
-    let surface = SphereSurface::new(builder.tree().view());
+    let mut grid = SmoothGrid::default();
+    let surface = surface(shot, builder.tree().view(), &mut grid);
     let never = AtomicBool::new(false);
     let (film, _) =
-        render(&[&surface], &shot.scene, &source, &shot.settings, &never).expect("a film");
+        render(&[&*surface], &shot.scene, &source, &shot.settings, &never).expect("a film");
     film
+}
+
+/// What rays hit. Every instruction set gives the same bits on a smooth surface, which is not traced in `tree`.
+fn surface<'a>(shot: &Shot, tree: TreeView<'a>, grid: &'a mut SmoothGrid) -> Box<dyn Shape + 'a> {
+    let normals = match shot.surface.normals {
+        NormalKind::Pca => {
+            ShadingNormals::Pca(PcaNormals::new(2.0 * shot.surface.smoothing_length))
+        }
+        _ => ShadingNormals::Sphere,
+    };
+    match shot.surface.kind {
+        SurfaceKind::Spheres => Box::new(SphereSurface::new(tree).with_normals(normals)),
+        SurfaceKind::Union => Box::new(UnionSurface::new(tree).with_normals(normals)),
+        SurfaceKind::Smooth => {
+            let built = grid.build(&shot.centers, shot.radii[0], &shot.surface, true, None);
+            assert!(!built.expect("it fits").is_empty);
+            Box::new(grid.surface())
+        }
+    }
 }
 
 /// As it stands in a file, so that both sides were rounded to half alike.
@@ -66,35 +94,57 @@ fn golden(name: &str) -> PathBuf {
 
 /// Compares the shot `name`, traced with every instruction set of this machine.
 #[track_caller]
-fn check(name: &str, shot: &Shot) {
-    let path = golden(name);
-    if env::var_os(BLESS).is_some() {
-        let best = encode(&trace(shot, SimdLevel::best()));
-        fs::write(&path, best).expect("a golden image");
+fn check_shot(name: &str, shot: &Shot) {
+    bless(name, || encode(&trace(shot, SimdLevel::best())));
+    for simd in tested_levels() {
+        check(name, simd.name(), &encode(&trace(shot, simd)));
     }
-    let expected = Picture::open(&path);
-    for simd in SimdLevel::ALL.into_iter().filter(|l| l.is_supported()) {
-        let actual = Picture::decode(&encode(&trace(shot, simd)));
-        let differing = differences(&expected, &actual, &LIMITS);
-        if !differing.is_empty() {
-            let told: Vec<String> = differing.iter().map(ToString::to_string).collect();
-            let folder = compare::write_failure(name, &expected, &actual, &differing);
-            panic!(
-                "{name} ({}) is not the golden image:\n{}\nsee {}; {BLESS}=1 takes the new one",
-                simd.name(),
-                told.join("\n"),
-                folder.display()
-            );
-        }
+}
+
+/// Compares the picture `name` that the program makes of a sample.
+#[track_caller]
+fn check_still(name: &str, still: &Still) {
+    let image = still.render();
+    bless(name, || image.clone());
+    check(name, "the program", &image);
+}
+
+/// Makes `image` the golden one if that is asked for.
+fn bless(name: &str, image: impl FnOnce() -> Vec<u8>) {
+    if env::var_os(BLESS).is_some() {
+        fs::write(golden(name), image()).expect("a golden image");
+    }
+}
+
+/// Compares `image` with the golden one; `origin` is what made it.
+#[track_caller]
+fn check(name: &str, origin: &str, image: &[u8]) {
+    let (expected, actual) = (Picture::open(&golden(name)), Picture::decode(image));
+    let differing = differences(&expected, &actual, &LIMITS);
+    if !differing.is_empty() {
+        let messages: Vec<String> = differing.iter().map(ToString::to_string).collect();
+        let folder = compare::write_failure(name, &expected, &actual, &differing);
+        panic!(
+            "{name} ({origin}) is not the golden image:\n{}\nsee {}; {BLESS}=1 takes the new one",
+            messages.join("\n"),
+            folder.display()
+        );
     }
 }
 
 macro_rules! shots {
-    ($($name:ident),* $(,)?) => {
+    (traced: $($shot:ident)*; rendered: $($still:ident)*;) => {
         $(
             #[test]
-            fn $name() {
-                check(stringify!($name), &scenes::$name());
+            fn $shot() {
+                check_shot(stringify!($shot), &scenes::$shot());
+            }
+        )*
+
+        $(
+            #[test]
+            fn $still() {
+                check_still(stringify!($still), &stills::$still());
             }
         )*
 
@@ -105,32 +155,41 @@ macro_rules! shots {
             for entry in entries {
                 let path = entry.expect("an entry").path();
                 let stem = path.file_stem().unwrap_or_default().to_string_lossy().into_owned();
-                assert!([$(stringify!($name)),*].contains(&stem.as_str()), "{}", path.display());
+                let known = [$(stringify!($shot),)* $(stringify!($still),)*];
+                assert!(known.contains(&stem.as_str()), "{}", path.display());
             }
         }
     };
 }
 
 shots! {
-    shadow,
-    reflection,
-    refraction,
-    total_reflection,
-    shadow_through_glass,
-    viridis,
-    turbo,
-    radius_per_particle,
-    ground,
-    gradient_background,
-    inverse_square_light,
-    directional_lights,
-    data_channels,
-    transparent_background,
+    traced:
+    shadow
+    reflection
+    refraction
+    total_reflection
+    shadow_through_glass
+    viridis
+    turbo
+    radius_per_particle
+    ground
+    gradient_background
+    inverse_square_light
+    directional_lights
+    data_channels
+    transparent_background
+    union
+    smooth
+    pca_normals
+    studio;
+    rendered:
+    spray
+    water;
 }
 
-/// The limits must let nothing through that can be seen, and say where it is.
+/// The limits must detect every visible difference and report its position.
 #[test]
-fn a_changed_image_is_noticed() {
+fn changed_image_is_detected() {
     let good = Picture::decode(&encode(&trace(&scenes::data_channels(), SimdLevel::best())));
     assert!(differences(&good, &good, &LIMITS).is_empty());
     let with = |channel: &str, pixels: usize, change: fn(f32) -> f32| {

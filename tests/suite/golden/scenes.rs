@@ -6,6 +6,13 @@ use spherule::scene::{
     Background, Bounds, Camera, CameraView, ColorMap, Falloff, Fresnel, Ground, Light, Material,
     Scene,
 };
+use spherule::surface::{NormalKind, SurfaceKind, SurfaceSettings};
+
+mod bodies;
+mod studio;
+
+pub(super) use bodies::{pca_normals, smooth, union};
+pub(super) use studio::studio;
 
 const WIDTH: u32 = 96;
 const HEIGHT: u32 = 54;
@@ -34,6 +41,19 @@ const MATT: Material = Material {
     transmission: 0.0,
     fresnel: Fresnel::Schlick,
     extinction: Vec3::ZERO,
+    finish: spherule::scene::Finish::Matte,
+};
+
+/// Each particle a ball of its own; a smooth surface has voxels of a particle radius. Spelled out, too.
+const SPHERES: SurfaceSettings = SurfaceSettings {
+    kind: SurfaceKind::Spheres,
+    normals: NormalKind::Sphere,
+    smoothing: 0.75,
+    exact: false,
+    voxel: 1.0,
+    smoothing_length: 2.0,
+    threshold: 0.6,
+    spray: false,
 };
 
 /// Owned colours.
@@ -59,6 +79,7 @@ pub(super) struct Shot {
     pub(super) colors: Paint,
     pub(super) ids: Option<Vec<u32>>,
     pub(super) velocities: Option<Vec<Vec3>>,
+    pub(super) surface: SurfaceSettings,
     pub(super) scene: Scene,
     pub(super) settings: RenderSettings,
 }
@@ -79,14 +100,12 @@ impl Shot {
             radii: vec![radius],
             ids: None,
             velocities: None,
+            surface: SPHERES,
             scene: Scene {
-                origin: DVec3::ZERO,
-                camera: Camera::new(&view, aspect, DVec3::ZERO).expect("a camera"),
                 lights: vec![sun(Vec3::new(0.4, 0.7, -1.0), 0.9)],
-                ambient_light: Vec3::ONE,
                 material: MATT,
                 background: Background::Constant(Vec3::new(0.02, 0.03, 0.05)),
-                ground: None,
+                ..Scene::new(Camera::new(&view, aspect, DVec3::ZERO).expect("a camera"))
             },
             settings: RenderSettings {
                 samples: 4,
@@ -95,6 +114,12 @@ impl Shot {
                 ..RenderSettings::new(WIDTH, HEIGHT)
             },
         }
+    }
+
+    /// Of another size and the same shape.
+    fn sized(mut self, width: u32) -> Self {
+        (self.settings.width, self.settings.height) = (width, width * HEIGHT / WIDTH);
+        self
     }
 
     /// With one colour each.
@@ -229,7 +254,9 @@ fn floor(height: f32) -> Ground {
         center: Vec3::Z * height,
         fade_start: 4.0,
         fade_end: 12.0,
-        checker: None,
+        pattern: spherule::scene::ground::Pattern::Plain,
+        particles: [Vec3::splat(-2.0), Vec3::splat(2.0)],
+        shadow_catcher: None,
     }
 }
 

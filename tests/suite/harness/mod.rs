@@ -95,7 +95,7 @@ impl Ran {
 
     /// Fails the test unless standard error has `text`.
     #[track_caller]
-    pub(crate) fn tells(self, text: &str) -> Self {
+    pub(crate) fn prints(self, text: &str) -> Self {
         assert!(
             self.errors().contains(text),
             "nothing of `{text}` in:\n{}",

@@ -54,7 +54,7 @@ pub(crate) struct Ledger {
 }
 
 impl Ledger {
-    /// Names and lengths of the files that lines say are done.
+    /// Names and lengths of finished files in the lines.
     pub(crate) fn done(&self) -> Vec<(String, u64)> {
         let outputs = |line: &Value| line["outputs"].as_array().cloned().unwrap_or_default();
         self.lines
@@ -85,7 +85,7 @@ pub(crate) fn ledger_path(dir: &Path) -> PathBuf {
     paths[0].clone()
 }
 
-/// What all ledgers in `dir` say, one after the other.
+/// The content of all ledgers in `dir`.
 pub(crate) fn ledger(dir: &Path) -> Ledger {
     let mut ledger = Ledger {
         lines: Vec::new(),

@@ -1,14 +1,20 @@
-//! A program that is still running: waiting for what it says or writes, and signals to it.
+//! A running program: waits for its messages or files, and sends signals to it.
 
 use std::io::{BufRead, BufReader, Read};
-use std::process::{Child, ChildStderr, Command, ExitStatus, Stdio};
+use std::process::{Child, Command, ExitStatus, Stdio};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
 use std::thread;
+use std::time::{Duration, Instant};
+
+/// Longest wait for a line, a file or the end. Only a program that hangs reaches it.
+const DEADLINE: Duration = Duration::from_secs(600);
 
 /// Killed when dropped.
 pub(crate) struct Running {
     child: Child,
-    errors: BufReader<ChildStderr>,
-    told: String,
+    /// Standard error, line by line.
+    lines: Receiver<String>,
+    stderr: String,
 }
 
 impl Running {
@@ -20,31 +26,45 @@ impl Running {
             .spawn()
             .expect("the program starts");
         let errors = child.stderr.take().expect("it is piped");
+        let (sender, lines) = channel();
+        thread::spawn(move || send_lines(errors, &sender));
         Self {
             child,
-            errors: BufReader::new(errors),
-            told: String::new(),
+            lines,
+            stderr: String::new(),
         }
     }
 
     /// Waits for a line on standard error that has `text`; false if the program ends before.
     pub(crate) fn wait_for_line(&mut self, text: &str) -> bool {
-        let mut line = String::new();
-        while self.errors.read_line(&mut line).is_ok_and(|n| n > 0) {
-            let found = line.contains(text);
-            self.told.push_str(&line);
-            line.clear();
-            if found {
+        let deadline = Instant::now() + DEADLINE;
+        while let Some(line) = self.next_line(deadline) {
+            if line.contains(text) {
                 return true;
             }
         }
         false
     }
 
+    /// The next line on standard error; None at its end.
+    fn next_line(&mut self, deadline: Instant) -> Option<String> {
+        let left = deadline.saturating_duration_since(Instant::now());
+        match self.lines.recv_timeout(left) {
+            Ok(line) => {
+                self.stderr.push_str(&line);
+                Some(line)
+            }
+            Err(RecvTimeoutError::Disconnected) => None,
+            Err(RecvTimeoutError::Timeout) => panic!("it hangs after:\n{}", self.stderr),
+        }
+    }
+
     /// Waits until `holds`, at the latest until the program ends. Looks without pause: the moment
     /// counts.
     pub(crate) fn wait_until(&mut self, holds: impl Fn() -> bool) -> bool {
+        let deadline = Instant::now() + DEADLINE;
         loop {
+            assert!(Instant::now() < deadline, "it hangs: {}", self.stderr);
             if holds() {
                 return true;
             }
@@ -74,13 +94,12 @@ impl Running {
         let _ = self.child.kill();
     }
 
-    /// Waits for the end; what it said, and how it ended.
+    /// Waits for the end; returns standard error and the exit status.
     pub(crate) fn end(mut self) -> (String, ExitStatus) {
-        let mut rest = Vec::new();
-        let _ = self.errors.read_to_end(&mut rest);
-        self.told.push_str(&String::from_utf8_lossy(&rest));
+        let deadline = Instant::now() + DEADLINE;
+        while self.next_line(deadline).is_some() {}
         let status = self.child.wait().expect("it ends");
-        (std::mem::take(&mut self.told), status)
+        (std::mem::take(&mut self.stderr), status)
     }
 }
 
@@ -88,5 +107,19 @@ impl Drop for Running {
     fn drop(&mut self) {
         let _ = self.child.kill();
         let _ = self.child.wait();
+    }
+}
+
+fn send_lines(errors: impl Read, lines: &Sender<String>) {
+    let mut errors = BufReader::new(errors);
+    let mut line = Vec::new();
+    while errors.read_until(b'\n', &mut line).is_ok_and(|n| n > 0) {
+        if lines
+            .send(String::from_utf8_lossy(&line).into_owned())
+            .is_err()
+        {
+            return;
+        }
+        line.clear();
     }
 }

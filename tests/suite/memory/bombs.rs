@@ -80,8 +80,8 @@ fn a_bomb_costs_one_frame() {
         let ran = limited(&workshop, &[&render[..], &SMALL, &AWAY, options].concat());
         let ran = ran
             .expect(1)
-            .tells("f_2.csv.gz: its numbers in memory are larger than")
-            .tells("failed: 2");
+            .prints("f_2.csv.gz: its numbers in memory are larger than")
+            .prints("failed: 2");
         assert_eq!(ran.rendered(), [1, 3], "{options:?}");
         let lines = ledger(&workshop.join("out")).lines;
         let failed = lines.iter().filter(|l| l["status"] == "failed");
@@ -97,10 +97,10 @@ fn check_and_inspect_name_a_bomb() {
     let ran = limited(&workshop, &[&check[..], &SMALL, &AWAY].concat());
     assert!(matches!(ran.code(), Some(0 | 1)), "{}", ran.errors());
     let ran = limited(&workshop, &["inspect", "in"]).expect(1);
-    let told = ran.text() + &ran.errors();
+    let output = ran.text() + &ran.errors();
     assert!(
-        told.contains("f_2.csv.gz") && told.contains("larger than"),
-        "{told}"
+        output.contains("f_2.csv.gz") && output.contains("larger than"),
+        "{output}"
     );
 }
 
@@ -111,7 +111,7 @@ fn wide_rows(prefix: &str) -> String {
 }
 
 #[test]
-fn packed_text_is_never_in_memory_as_a_whole() {
+fn compressed_text_is_streamed() {
     let count = 400_000;
     let ply = format!(
         "ply\nformat ascii 1.0\nelement vertex {count}\nproperty float x\nproperty float y\n\
@@ -151,8 +151,8 @@ fn the_memory_of_a_conversion_bounds_reading() {
     let convert = ["convert", "in", "-o", "out", "--radius", "0.1"];
     let ran = workshop.run(&[&convert[..], &["--memory", "10MiB"]].concat());
     ran.expect(1)
-        .tells("f_1.csv: its numbers in memory are larger than")
-        .tells("raise --memory");
+        .prints("f_1.csv: its numbers in memory are larger than")
+        .prints("raise --memory");
     assert!(workshop.join("out/frame.0002.spf").exists());
     let ran = workshop.run(&[&convert[..], &["--memory", "64MiB"]].concat());
     ran.expect(0);

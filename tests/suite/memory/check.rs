@@ -1,4 +1,4 @@
-//! `check` tells what `render` would do, and touches nothing.
+//! `check` predicts what `render` would do, and changes nothing.
 
 use std::fs;
 
@@ -19,7 +19,7 @@ fn frames() -> Workshop {
 }
 
 #[test]
-fn a_new_job_is_told_and_not_begun() {
+fn check_describes_a_new_job_without_starting_it() {
     let workshop = frames();
     let ran = check(&workshop, &["--json"]).expect(0);
     assert!(!workshop.join("out").exists(), "nothing is touched");
@@ -62,7 +62,7 @@ fn a_new_job_is_told_and_not_begun() {
 }
 
 #[test]
-fn a_job_that_has_begun_stays_as_it_is() {
+fn check_does_not_change_a_started_job() {
     let workshop = frames();
     let bad = workshop.join("in/f_2.bgeo");
     let good = fs::read(&bad).expect("a frame");
@@ -71,50 +71,50 @@ fn a_job_that_has_begun_stays_as_it_is() {
     let out = workshop.join("out");
     let before = (files(&out), stamps(&out));
     let ran = check(&workshop, &["--json"]).expect(0);
-    let told = answer(&ran);
-    assert_eq!(told["frames"]["done"], json!([1, 3]));
-    assert_eq!(told["frames"]["failed"], json!([2]));
-    assert_eq!(told["frames"]["to_do"], json!([2]));
+    let json = answer(&ran);
+    assert_eq!(json["frames"]["done"], json!([1, 3]));
+    assert_eq!(json["frames"]["failed"], json!([2]));
+    assert_eq!(json["frames"]["to_do"], json!([2]));
     // As the manifest too.
     let ran = workshop.run(&["check", "out/job.toml", "--json"]).expect(0);
-    assert_eq!(answer(&ran)["frames"], told["frames"]);
+    assert_eq!(answer(&ran)["frames"], json["frames"]);
     check(&workshop, &["--max-depth", "5"])
         .expect(2)
-        .tells("error: ")
-        .tells("render.max_depth: 3 -> 5");
+        .prints("error: ")
+        .prints("render.max_depth: 3 -> 5");
     check(&workshop, &["--max-depth", "5", "--force"]).expect(0);
     check(&workshop, &["--max-depth", "5", "--keep-done"]).expect(0);
     assert_eq!(before, (files(&out), stamps(&out)));
 }
 
 #[test]
-fn all_done_needs_no_time() {
+fn finished_job_needs_no_time() {
     let workshop = frames();
     workshop.render(&[]).expect(0);
-    let told = answer(&check(&workshop, &["--json"]).expect(0));
-    assert_eq!(told["frames"]["to_do"], json!([]));
-    assert_eq!(told["frames"]["done"], json!([1, 2, 3]));
-    assert_eq!(told["time"]["estimate"], json!(null));
+    let json = answer(&check(&workshop, &["--json"]).expect(0));
+    assert_eq!(json["frames"]["to_do"], json!([]));
+    assert_eq!(json["frames"]["done"], json!([1, 2, 3]));
+    assert_eq!(json["time"]["estimate"], json!(null));
 }
 
 #[test]
-fn what_would_make_render_refuse_is_named() {
+fn check_names_reasons_why_render_fails() {
     let workshop = frames();
     check(&workshop, &["--memory-limit", "1MiB"])
         .expect(2)
-        .tells("error: no frame fits into memory");
+        .prints("error: no frame fits into memory");
     fs::write(workshop.join("out"), "a file").expect("a file");
     check(&workshop, &[])
         .expect(2)
-        .tells("out: is a file where a directory for the images should be");
+        .prints("out: is a file, but a directory for the images is needed");
     fs::remove_file(workshop.join("out")).expect("the file");
     fs::create_dir(workshop.join("out")).expect("a directory");
     fs::write(workshop.join("out/job.toml"), "theirs = true\n").expect("a file");
     let ran = check(&workshop, &["--json"])
         .expect(2)
-        .tells("out/job.toml: is in the way of this job's own manifest");
-    let told = answer(&ran);
-    assert_eq!(told["problems"].as_array().map(Vec::len), Some(1));
+        .prints("out/job.toml: this job would write its manifest here");
+    let json = answer(&ran);
+    assert_eq!(json["problems"].as_array().map(Vec::len), Some(1));
     assert_eq!(files(&workshop.join("out")).len(), 1);
 }
 
@@ -130,7 +130,7 @@ fn a_directory_without_permission() {
     if fs::write(out.join("probe"), "").is_err() {
         check(&workshop, &[])
             .expect(2)
-            .tells("cannot be written")
-            .tells("check its permissions");
+            .prints("cannot be written")
+            .prints("check its permissions");
     }
 }

@@ -20,7 +20,7 @@ fn within(workshop: &Workshop, mib: u32, arguments: &[&str]) -> Ran {
 }
 
 #[test]
-fn a_frame_larger_than_memory_is_made() {
+fn generates_frames_larger_than_memory() {
     let workshop = Workshop::new();
     let make = |memory: &str| {
         let arguments = ["generate", "block", "--particles", "5e6", "-o", "a.spf"];
@@ -29,7 +29,7 @@ fn a_frame_larger_than_memory_is_made() {
     };
     // All of them at once need some 170 MB: so the limit is one.
     assert_ne!(make("2GiB").code(), Some(0));
-    make("64MiB").expect(0).tells("put aside");
+    make("64MiB").expect(0).prints("temporary files");
     let file = NativeFile::open(&workshop.join("a.spf"), Access::Map).expect("whole");
     let frame = file.frame().expect("unchanged");
     frame.verify().expect("undamaged");
@@ -38,14 +38,14 @@ fn a_frame_larger_than_memory_is_made() {
 }
 
 #[test]
-fn a_signal_ends_it_and_nothing_is_left() {
+fn signal_leaves_no_files() {
     let workshop = Workshop::new();
     let arguments = ["generate", "box", "--particles", "1e8", "-o", "a.npy"];
     let mut running = workshop.start(&arguments);
     let entries = || std::fs::read_dir(workshop.path()).map_or(0, Iterator::count);
     assert!(running.wait_until(|| entries() > 0));
     running.signal("TERM");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(75), "{told}");
+    let (errors, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{errors}");
     assert_eq!(entries(), 0);
 }

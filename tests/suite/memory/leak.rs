@@ -46,7 +46,7 @@ fn growth(values: &[f64]) -> f64 {
 }
 
 #[test]
-fn one_step_is_no_growth() {
+fn one_step_is_not_growth() {
     let frames = 0..150;
     let leak: Vec<f64> = frames.clone().map(|f| 3.0 * f64::from(f)).collect();
     assert_eq!(growth(&leak), 3.0);

@@ -14,15 +14,15 @@ fn one_heavy() -> Workshop {
 }
 
 #[test]
-fn what_cannot_fit_is_not_begun() {
+fn frames_beyond_memory_are_not_started() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 1000, false);
     vtk(&workshop.join("in/f_2.vtk"), 1000, false);
     let ran = workshop.render(&["--memory-limit", "1MiB"]).expect(2);
     let ran = ran
-        .tells("no frame fits into memory: frame 1: it needs about")
-        .tells("render.memory_limit is 1.00 MiB")
-        .tells("raise the limit");
+        .prints("no frame fits into memory: frame 1: it needs about")
+        .prints("render.memory_limit is 1.00 MiB")
+        .prints("raise the limit");
     assert!(ran.errors().contains("images"), "{}", ran.errors());
     assert!(
         !workshop.join("out").exists(),
@@ -40,7 +40,7 @@ fn what_cannot_fit_is_not_begun() {
     workshop
         .run(&images)
         .expect(2)
-        .tells("make the image smaller or ask for fewer channels");
+        .prints("make the image smaller or ask for fewer channels");
     assert!(
         !workshop.join("out").exists(),
         "a refused job leaves nothing"
@@ -48,14 +48,13 @@ fn what_cannot_fit_is_not_begun() {
 }
 
 #[test]
-fn sizes_that_are_none() {
+fn invalid_sizes() {
     let workshop = Workshop::new();
     vtk(&workshop.join("in/f_1.vtk"), 10, false);
     for size in ["0", "", "-5", "much", "4 gallons", "1e3"] {
-        workshop
-            .render(&["--memory-limit", size])
-            .expect(2)
-            .tells("--memory-limit: render.memory_limit: wants a size above 0, as \"4GiB\"");
+        workshop.render(&["--memory-limit", size]).expect(2).prints(
+            "--memory-limit: render.memory_limit: expected a size above 0, such as \"4GiB\"",
+        );
     }
     for size in ["2GiB", "2G", "2048m", "2147483648"] {
         workshop.render(&["--memory-limit", size]).expect(0);
@@ -71,7 +70,7 @@ fn one_heavy_frame_costs_one_frame() {
     let ran = workshop
         .render(&["--memory-limit", "16MiB"])
         .expect(1)
-        .tells("frame 2: it needs about");
+        .prints("frame 2: it needs about");
     assert_eq!(ran.rendered(), [1, 3]);
     let lines = ledger(&workshop.join("out")).lines;
     let failed = lines.iter().find(|l| l["status"] == "failed");
@@ -83,7 +82,7 @@ fn one_heavy_frame_costs_one_frame() {
 }
 
 #[test]
-fn frames_go_one_at_a_time_where_that_fits() {
+fn frames_run_one_at_a_time_if_two_do_not_fit() {
     let workshop = Workshop::new();
     for frame in 1..=3 {
         vtk(&workshop.join(format!("in/f_{frame}.vtk")), 1000, false);
@@ -98,7 +97,7 @@ fn frames_go_one_at_a_time_where_that_fits() {
     run("free", &[]).expect(0);
     run("tight", &["--memory-limit", "65MiB"])
         .expect(0)
-        .tells("one frame at a time, to take less memory");
+        .prints("one frame at a time, to reduce memory");
     assert_eq!(
         images(&workshop.join("free")),
         images(&workshop.join("tight"))
@@ -106,7 +105,7 @@ fn frames_go_one_at_a_time_where_that_fits() {
 }
 
 #[test]
-fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
+fn grid_beyond_memory_is_rejected_with_its_radius() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1]);
     let smooth = ["--surface", "smooth", "--set=output.preview=false"];
@@ -114,20 +113,20 @@ fn a_grid_that_does_not_fit_is_refused_by_its_radius() {
     let tiny = ["--radius", "0.0001", "--memory-limit", "40MiB"];
     let ran = workshop.render(&[&smooth[..], &tiny].concat()).expect(1);
     assert_eq!(ran.rendered(), [0_i64; 0]);
-    ran.tells(
+    ran.prints(
         "frame 1: the smooth surface of 10422 particles of radius 0.0001 in voxels of 0.0001 needs",
     )
-    .tells("is the radius right? Else give larger voxels (surface.voxel) or more memory");
+    .prints("is the radius right? Else give larger voxels (surface.voxel) or more memory");
     // What fits is rendered, on the same directory.
     let right = ["--radius", "0.02", "--memory-limit", "40MiB", "--force"];
     let ran = workshop.render(&[&smooth[..], &right].concat()).expect(0);
     assert_eq!(ran.rendered(), [1]);
-    // What is foreseen not to fit says as much of the surface.
+    // A predicted excess reports the memory of the surface.
     let tight = ["--radius", "0.02", "--memory-limit", "5MiB", "--force"];
     workshop
         .render(&[&smooth[..], &tight].concat())
         .expect(2)
-        .tells("no frame fits into memory: frame 1: it needs about")
-        .tells(" for a smooth surface of particles of radius 0.02 in voxels of 0.02, render.memory_limit is")
-        .tells("give larger voxels (surface.voxel), or raise the limit");
+        .prints("no frame fits into memory: frame 1: it needs about")
+        .prints(" for a smooth surface of particles of radius 0.02 in voxels of 0.02, render.memory_limit is")
+        .prints("give larger voxels (surface.voxel), or raise the limit");
 }

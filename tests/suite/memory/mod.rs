@@ -1,4 +1,4 @@
-//! Memory: predicted as measured, kept within a limit, and given back; and what `check` says of it.
+//! Memory: predictions match measurements, limits hold, memory is freed, and `check` reports it.
 
 use std::fs;
 use std::path::Path;
@@ -38,7 +38,7 @@ fn particles(count: usize) -> Vec<Vec3> {
     fill_box(&BoxSettings::thesis(count, 1))
 }
 
-/// A legacy VTK file of them, with a velocity and an id if wanted.
+/// A legacy VTK file of them, with a velocity and an id on request.
 fn vtk(path: &Path, count: usize, with_attributes: bool) {
     fs::create_dir_all(path.parent().expect("a file in a directory")).expect("a directory");
     let velocity = Attribute {
@@ -59,7 +59,7 @@ fn vtk(path: &Path, count: usize, with_attributes: bool) {
     write::vtk::write(path, &particles(count), &attributes).expect("a file");
 }
 
-/// What `check --json` says.
+/// The output of `check --json`.
 #[track_caller]
 fn answer(ran: &Ran) -> Value {
     serde_json::from_str(&ran.text()).unwrap_or_else(|e| panic!("{e}: {}", ran.text()))

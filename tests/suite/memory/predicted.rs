@@ -205,7 +205,7 @@ fn every_structure() {
 }
 
 #[test]
-fn every_way_to_store_particles() {
+fn every_particle_encoding() {
     const COUNT: usize = 400_000;
     compare(
         "csv",
@@ -224,7 +224,7 @@ fn every_way_to_store_particles() {
 }
 
 #[test]
-fn every_way_to_write_text() {
+fn every_text_format() {
     const COUNT: usize = 400_000;
     compare(
         "lammpstrj.gz",
@@ -243,7 +243,7 @@ fn every_way_to_write_text() {
 }
 
 #[test]
-fn one_medium_takes_what_spheres_take() {
+fn union_uses_the_memory_of_spheres() {
     let options = [&SMALL[..], &["--surface", "union"]].concat();
     compare("npy", |path| block(path, 500_000), &options);
 }
@@ -256,7 +256,7 @@ fn assert_enough((predicted, measured): (f64, f64)) {
 }
 
 #[test]
-fn a_smooth_surface_takes_no_more_than_predicted() {
+fn smooth_surface_stays_within_the_prediction() {
     let smooth = ["--surface", "smooth", "--radius", "0.01"];
     let options = [&SMALL[..], &smooth].concat();
     assert_enough(peaks("npy", |path| block(path, 200_000), &options));

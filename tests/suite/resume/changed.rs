@@ -22,13 +22,13 @@ fn five_frames() -> Workshop {
 #[test]
 fn the_same_command_again_does_nothing() {
     let workshop = five_frames();
-    workshop.render(&[]).expect(0).tells("5 of 5 frames done");
+    workshop.render(&[]).expect(0).prints("5 of 5 frames done");
     let out = workshop.join("out");
     let before = stamps(&out);
     // Two images a frame; manifest and its schema, plan, ledger and two reports.
     assert_eq!(before.len(), 2 * 5 + 6);
     let nothing = |ran: Ran| {
-        let ran = ran.expect(0).tells("5 of 5 frames are done already");
+        let ran = ran.expect(0).prints("5 of 5 frames are done already");
         assert!(ran.rendered().is_empty());
     };
     nothing(workshop.render(&[]));
@@ -61,11 +61,11 @@ fn the_directory_may_be_moved() {
     workshop
         .run(&["render", "moved/job.toml"])
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
     workshop
         .render_to("moved", &[])
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
     assert!(!workshop.join("out").exists());
 }
 
@@ -79,7 +79,7 @@ fn images_may_go_through_a_link() {
     workshop
         .run(&["render", "out/job.toml"])
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
     workshop
         .render_to("out/../beside", &["--frames", "1"])
         .expect(0);
@@ -94,8 +94,8 @@ fn changed_settings_are_refused_with_old_and_new_value() {
     let refused = workshop
         .render(&["--max-depth", "2", "--set", "material.ior=1.5"])
         .expect(2)
-        .tells("out: settings have changed since this job began: render.max_depth: 3 -> 2; material.ior: 1.33 -> 1.5;")
-        .tells("--force starts over, --keep-done keeps what is there");
+        .prints("out: settings have changed since this job began: render.max_depth: 3 -> 2; material.ior: 1.33 -> 1.5;")
+        .prints("--force starts over, --keep-done keeps what is there");
     assert_eq!(refused.errors().matches("error:").count(), 1);
     assert_eq!(stamps(&workshop.join("out")), before);
 
@@ -105,16 +105,16 @@ fn changed_settings_are_refused_with_old_and_new_value() {
     workshop
         .run(&["render", "out/job.toml"])
         .expect(2)
-        .tells("render.max_depth: 3 -> 4");
+        .prints("render.max_depth: 3 -> 4");
 }
 
 #[test]
 fn force_starts_over() {
     let workshop = five_frames();
     workshop.render(&[]).expect(0);
-    workshop.render_to("fresh", &["--max-depth", "1"]).expect(0);
+    workshop.render_to("fresh", &["--bounces", "0"]).expect(0);
     let old = images(&workshop.join("out"));
-    let ran = workshop.render(&["--max-depth", "1", "--force"]).expect(0);
+    let ran = workshop.render(&["--bounces", "0", "--force"]).expect(0);
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
     let new = images(&workshop.join("out"));
     assert!(new != old && new == images(&workshop.join("fresh")));
@@ -122,11 +122,11 @@ fn force_starts_over() {
     workshop
         .render(&[])
         .expect(2)
-        .tells("render.max_depth: 1 -> 3");
+        .prints("render.bounces: 0 -> 6");
     workshop
-        .render(&["--max-depth", "1"])
+        .render(&["--bounces", "0"])
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
 }
 
 #[test]
@@ -137,12 +137,12 @@ fn force_does_not_forget_a_job_for_one_that_cannot_be() {
     workshop
         .render(&["--force", "--color-by", "nosuch"])
         .expect(2)
-        .tells("nosuch");
+        .prints("nosuch");
     assert_eq!(stamps(&workshop.join("out")), before);
     workshop
         .render(&[])
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
 }
 
 #[test]
@@ -159,18 +159,18 @@ fn keep_done_keeps_what_is_there_and_does_the_rest_anew() {
     let mixed = images(&workshop.join("out"));
     assert_eq!(mixed.len(), 10);
     for (name, bytes) in &mixed {
-        let wanted = old.get(name).or_else(|| fresh.get(name));
-        assert!(wanted == Some(bytes), "{name}");
+        let expected = old.get(name).or_else(|| fresh.get(name));
+        assert!(expected == Some(bytes), "{name}");
     }
     // From now on the new setting is the job's.
     workshop
         .render(&["--max-depth", "1"])
         .expect(0)
-        .tells("5 of 5 frames are done already");
+        .prints("5 of 5 frames are done already");
     workshop
         .render(&[])
         .expect(2)
-        .tells("render.max_depth: 1 -> 3");
+        .prints("render.max_depth: 1 -> 3");
 }
 
 #[test]
@@ -198,7 +198,7 @@ fn options_on_the_job_s_own_manifest_become_part_of_it() {
     let ran = own(&["--keep-done", "-o", &output]).expect(0);
     assert_eq!(ran.rendered(), [1, 2, 3, 4, 5]);
     assert!(manifest().contains("path = \"g.####.exr\""));
-    own(&[]).expect(0).tells("5 of 5 frames are done already");
+    own(&[]).expect(0).prints("5 of 5 frames are done already");
 }
 
 /// No command changes what a user has written, or written into.
@@ -218,15 +218,16 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
     own(&["--width", "90"]).expect(2);
     for option in ["--force", "--keep-done"] {
         let width = if option == "--force" { "80" } else { "90" };
-        let told = "out/job.toml: not written by spherule, or edited since, so it stays as it is";
+        let messages =
+            "out/job.toml: not written by spherule, or edited since, so it is not changed";
         own(&["--frames", "2", "--width", width, option])
             .expect(0)
-            .tells(told);
+            .prints(messages);
         assert!(stays(), "{option}");
     }
     // Nor from elsewhere.
     let ran = workshop.render(&["--frames", "1", "--force"]).expect(0);
-    assert!(stays() && !ran.errors().contains("stays as it is"));
+    assert!(stays() && !ran.errors().contains("not changed"));
     workshop.render(&["--max-depth", "1", "--force"]).expect(0);
     workshop.render(&["--max-depth", "1"]).expect(0);
     assert!(stays());
@@ -235,7 +236,7 @@ fn a_manifest_that_a_user_wrote_stays_as_it_is() {
     workshop
         .run(&export)
         .expect(2)
-        .tells("out/job.toml: is a manifest already");
+        .prints("out/job.toml: is a manifest already");
     assert!(stays());
 }
 
@@ -245,7 +246,7 @@ fn force_and_keep_done_exclude_each_other() {
     workshop
         .render(&["--force", "--keep-done"])
         .expect(2)
-        .tells("cannot be used with");
+        .prints("cannot be used with");
     assert!(!workshop.join("out").exists());
 }
 
@@ -257,12 +258,12 @@ fn a_rewritten_input_is_refused_by_name() {
     workshop
         .render(&[])
         .expect(2)
-        .tells("inputs of finished frames have changed: frame 2: in/f_2.bgeo: ");
+        .prints("inputs of finished frames have changed: frame 2: in/f_2.bgeo: ");
     // Other frames are not concerned.
     workshop
         .render(&["--frames", "3-5"])
         .expect(0)
-        .tells("3 of 3 frames are done already");
+        .prints("3 of 3 frames are done already");
     let ran = workshop.render(&["--keep-done"]).expect(0);
     assert!(ran.rendered().is_empty());
 }

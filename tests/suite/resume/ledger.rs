@@ -39,9 +39,9 @@ fn a_damaged_line_is_named_and_nothing_is_touched() {
     let ran = workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.ledger.")
-        .tells(".jsonl: line 2: not a ledger entry")
-        .tells("remove that line to do its frame again, or start over with --force");
+        .prints("out/job.ledger.")
+        .prints(".jsonl: line 2: not a ledger entry")
+        .prints("remove that line to repeat its frame, or start over with --force");
     assert_eq!(ran.errors().matches("error:").count(), 1);
     assert_eq!(stamps(&workshop.join("out")), before);
 
@@ -63,19 +63,19 @@ fn a_damaged_or_missing_plan_is_no_fresh_start() {
     workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.plan.json: this is no readable plan")
-        .tells("--force");
+        .prints("out/job.plan.json: not a readable plan")
+        .prints("--force");
     fs::remove_file(&plan).expect("a plan");
     workshop
         .render(&[])
         .expect(2)
-        .tells("the ledger has lines but job.plan.json is missing")
-        .tells("--force");
+        .prints("the ledger has lines but job.plan.json is missing")
+        .prints("--force");
     fs::write(&plan, &text).expect("a file");
     workshop
         .render(&[])
         .expect(0)
-        .tells("3 of 3 frames are done already");
+        .prints("3 of 3 frames are done already");
     let mut after = stamps(&workshop.join("out"));
     after.insert("job.plan.json".to_owned(), before["job.plan.json"]);
     assert_eq!(after, before);
@@ -104,8 +104,8 @@ fn one_damaged_byte_of_the_plan_is_no_other_camera() {
     workshop
         .render(&[])
         .expect(2)
-        .tells("out/job.plan.json: the plan does not match its checksum")
-        .tells("restore it, or start over with --force");
+        .prints("out/job.plan.json: the plan does not match its checksum")
+        .prints("restore it, or start over with --force");
     assert_eq!(stamps(&workshop.join("out")), before);
     fs::write(&plan, text).expect("a file");
     assert_eq!(workshop.render(&[]).expect(0).rendered(), [3]);

@@ -50,16 +50,16 @@ fn another_simulation_does_not_join_a_job() {
     ] {
         let ran = render(&workshop, input, options)
             .expect(2)
-            .tells("out: this job was made from other files (")
-            .tells("in/f_1.bgeo, now ")
-            .tells("; choose another output, or start over with --force");
+            .prints("out: this job was made from other files (")
+            .prints("in/f_1.bgeo, now ")
+            .prints("; choose another output, or start over with --force");
         assert!(ran.rendered().is_empty());
     }
     let check = ["check", "other", "-o", "out/f.####.exr"];
     workshop
         .run(&[&check[..], &SMALL].concat())
         .expect(2)
-        .tells("out: this job was made from other files (");
+        .prints("out: this job was made from other files (");
     assert!(files(&workshop.join("out")) == before);
     let ran = render(&workshop, "other", &["--force"]).expect(0);
     assert_eq!(ran.rendered(), [4, 5, 6]);
@@ -69,7 +69,7 @@ fn another_simulation_does_not_join_a_job() {
 
 /// The same word for two places is no same place.
 #[test]
-fn relative_paths_are_told_apart_by_where_they_begin() {
+fn relative_paths_are_reported_apart_by_where_they_begin() {
     let workshop = Workshop::new();
     dam_break(&workshop.join("a/dump"), 1..=2);
     later_frames(&workshop, "b/dump", 3);
@@ -82,7 +82,7 @@ fn relative_paths_are_told_apart_by_where_they_begin() {
     render("a").expect(0);
     render("b")
         .expect(2)
-        .tells("a/dump/f_1.bgeo, now dump/f_3.bgeo");
+        .prints("a/dump/f_1.bgeo, now dump/f_3.bgeo");
 }
 
 #[test]
@@ -97,7 +97,7 @@ fn another_pattern_in_the_same_directory_is_another_input() {
     }
     render(&workshop, "in/g_#.bgeo", &[])
         .expect(2)
-        .tells("keep what is there with --keep-done");
+        .prints("keep what is there with --keep-done");
     let ran = render(&workshop, "in/g_#.bgeo", &["--keep-done"]).expect(0);
     assert_eq!(ran.rendered(), [3, 4]);
 }
@@ -111,7 +111,7 @@ fn moved_data_with_the_same_contents_go_on() {
     later_frames(&workshop, "archive", 4);
     let ran = render(&workshop, "archive", &[])
         .expect(0)
-        .tells("2 of 6 frames are done already");
+        .prints("2 of 6 frames are done already");
     assert_eq!(ran.rendered(), [3, 4, 5, 6]);
     let ran = render(&workshop, "archive/f_#.bgeo", &[]).expect(0);
     assert!(ran.rendered().is_empty());
@@ -126,7 +126,7 @@ fn a_conversion_belongs_to_one_input_too() {
     workshop
         .run(&["convert", "other", "-o", "out"])
         .expect(2)
-        .tells("out: this job was made from other files (");
+        .prints("out: this job was made from other files (");
     workshop
         .run(&["convert", "other", "-o", "out", "--force"])
         .expect(0);
@@ -149,16 +149,16 @@ fn files_that_no_job_made_are_not_replaced() {
         ] {
             render(&workshop, "in", options)
                 .expect(2)
-                .tells(&format!(
-                    "out/{name}: there already, and not made by this job; "
+                .prints(&format!(
+                    "out/{name}: already exists and was not written by this job; "
                 ))
-                .tells("or replace it with --force");
+                .prints("or replace it with --force");
         }
         let check = ["check", "in", "-o", "out/f.####.exr"];
         workshop
             .run(&[&check[..], &SMALL].concat())
             .expect(2)
-            .tells(&format!("out/{name}: there already"));
+            .prints(&format!("out/{name}: already exists"));
         let left = files(&workshop.join("out"));
         assert_eq!(left.len(), 1, "{:?}", left.keys());
         assert_eq!(left[name], b"mine");
@@ -178,11 +178,11 @@ fn nor_are_files_in_the_way_of_frames_that_come_later() {
     // The previews are new to the job.
     render(&workshop, "in", &["--keep-done"])
         .expect(2)
-        .tells("out/f.0001.png: there already");
+        .prints("out/f.0001.png: already exists");
     dam_break(&workshop.join("in"), 3..=3);
     render(&workshop, "in", &["--set", "output.preview=false"])
         .expect(2)
-        .tells("out/f.0003.exr: there already");
+        .prints("out/f.0003.exr: already exists");
     fs::remove_file(workshop.join("out/f.0003.exr")).expect("a file");
     let ran = render(&workshop, "in", &["--set", "output.preview=false"]).expect(0);
     assert_eq!(ran.rendered(), [3]);
@@ -216,7 +216,7 @@ fn native_frames_that_no_job_made_are_not_replaced() {
     workshop
         .run(&["convert", "in", "-o", "out"])
         .expect(2)
-        .tells("out/frame.0002.spf: there already");
+        .prints("out/frame.0002.spf: already exists");
     assert_eq!(files(&workshop.join("out")).len(), 1);
     workshop
         .run(&["convert", "in", "-o", "out", "--force"])

@@ -53,7 +53,7 @@ fn goes_on(name: &str, options: &[&str]) {
     let ran = workshop
         .render(options)
         .expect(0)
-        .tells("1 of 2 frames are done already");
+        .prints("1 of 2 frames are done already");
     assert_eq!(ran.rendered(), [2]);
     assert_eq!(plan(&workshop), before);
     // Also by the manifest that lies there now.
@@ -75,7 +75,7 @@ fn colours_by_an_attribute_go_on() {
     older("colored")
         .render(&["--color-by", "density", "--map", "turbo"])
         .expect(2)
-        .tells("material.color: { attribute = \"density\", map = \"viridis\" } -> { attribute = ");
+        .prints("material.color: { attribute = \"density\", map = \"viridis\" } -> { attribute = ");
 }
 
 #[test]
@@ -86,18 +86,18 @@ fn unions_that_were_called_medium_go_on() {
     older("medium")
         .render(&["--surface", "medium", "--force"])
         .expect(0)
-        .tells("--surface: render.surface: \"medium\" is now called \"union\"; the old name still works");
+        .prints("--surface: render.surface: \"medium\" is now called \"union\"; the old name still works");
     older("medium")
         .render(&["--surface", "smooth"])
         .expect(2)
-        .tells("render.surface: \"medium\" -> \"smooth\"");
+        .prints("render.surface: \"medium\" -> \"smooth\"");
 }
 
 #[test]
 fn glass_that_would_look_otherwise_is_refused() {
     const GLASS: [&str; 2] = ["--set", "material.transmission=1"];
     let refused = older("glass").render(&GLASS).expect(2);
-    refused.tells(
+    refused.prints(
         "settings have changed since this job began: render.min_weight: (not set) -> 0.0009765625;",
     );
     // It followed both branches always.
@@ -108,5 +108,5 @@ fn glass_that_would_look_otherwise_is_refused() {
     older("plain")
         .render(&GLASS)
         .expect(2)
-        .tells("material.transmission: 0.0 -> 1.0");
+        .prints("material.transmission: 0.0 -> 1.0");
 }

@@ -21,9 +21,9 @@ fn keys(value: &Value) -> Vec<&str> {
 }
 
 #[track_caller]
-fn has(value: &Value, wanted: &[&str]) {
+fn has(value: &Value, expected: &[&str]) {
     let keys = keys(value);
-    for key in wanted {
+    for key in expected {
         assert!(keys.contains(key), "no `{key}` among {keys:?}");
     }
 }
@@ -106,7 +106,7 @@ fn a_job_with_failures_only_has_a_page_that_names_them() {
     fs::write(&file, &fs::read(&file).expect("a frame")[..100]).expect("a file");
     workshop.render(&[]).expect(1);
     let shown = page(&workshop);
-    assert!(shown.contains("0 of 1 done") && shown.contains("No frame is done yet"));
+    assert!(shown.contains("0 of 1 done") && shown.contains("No frame is finished yet"));
     assert!(shown.contains("in/f_1.bgeo"), "{shown}");
 }
 
@@ -170,12 +170,12 @@ fn progress_for_programs_tells_each_frame() {
         .lines()
         .map(|line| serde_json::from_str(line).expect("JSON"))
         .collect();
-    let told: Vec<(i64, &str)> = lines
+    let messages: Vec<(i64, &str)> = lines
         .iter()
         .filter_map(|l| Some((l["frame"].as_i64()?, l["event"].as_str()?)))
         .collect();
     assert_eq!(
-        told,
+        messages,
         [(1, "frame_done"), (2, "frame_failed"), (3, "frame_done")]
     );
 

@@ -1,5 +1,4 @@
-//! Several workers at one job: each frame is made once, by whomever, and what comes of it is what one
-//! worker makes.
+//! Several workers on one job: each frame is rendered once, and the result is that of one worker.
 
 use std::fs;
 
@@ -29,9 +28,9 @@ fn workers_started_at_once_make_each_frame_once() {
     let workshop = with_whole();
     let team: Vec<_> = (0..4).map(|_| workshop.start(&arguments(&[]))).collect();
     for running in team {
-        let (told, status) = running.end();
-        assert_eq!(status.code(), Some(0), "{told}");
-        assert!(told.contains("12 of 12 frames done"), "{told}");
+        let (messages, status) = running.end();
+        assert_eq!(status.code(), Some(0), "{messages}");
+        assert!(messages.contains("12 of 12 frames done"), "{messages}");
     }
     let out = workshop.join("out");
     no_leftovers(&out);
@@ -64,7 +63,7 @@ fn parts_are_disjoint_and_together_everything() {
     workshop
         .run(&arguments(&["--shard", "6/5"]))
         .expect(2)
-        .tells("from 1 to the number of parts");
+        .prints("from 1 to the number of parts");
 }
 
 #[test]
@@ -82,29 +81,29 @@ fn ranges_of_one_manifest_leave_the_manifest_as_it_is() {
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
 }
 
-/// A worker whose machine went down cannot be asked whether it lives.
+/// The liveness of a worker on another machine is known only from its heartbeats.
 #[test]
-fn a_silent_worker_elsewhere_is_waited_for_and_then_replaced() {
+fn frames_of_an_unresponsive_worker_are_taken_over() {
     let workshop = with_whole();
     let work = workshop.join("out/job.work");
     fs::create_dir_all(&work).expect("a directory");
-    let card = r#"{"worker":"far-7-00","process":{"token":"far-7-00","host":"far","machine":"gone","pid":7,"start":9},"since_ms":1}"#;
-    fs::write(work.join("far-7-00.worker"), format!("{card}\n")).expect("a file");
+    let record = r#"{"worker":"far-7-00","process":{"token":"far-7-00","host":"far","machine":"gone","pid":7,"start":9},"since_ms":1}"#;
+    fs::write(work.join("far-7-00.worker"), format!("{record}\n")).expect("a file");
     fs::hard_link(work.join("far-7-00.worker"), work.join("frame.2.0")).expect("a link");
     fs::write(workshop.join("out/.f.0002.exr.far-7-00.3.part"), "half").expect("a file");
     let ran = workshop
         .run(&arguments(&["--takeover-after", "1"]))
         .expect(0)
-        .tells("waiting for frame 2, which process 7 on far has in hand");
+        .prints("waiting for frame 2: process 7 on far is working on it");
     assert_eq!(ran.rendered().last(), Some(&2));
     assert!(images(&workshop.join("out")) == images(&workshop.join("whole")));
-    // With what it was writing.
+    // Its temporary files are removed too
     no_leftovers(&workshop.join("out"));
 }
 
-/// All that has the job's files in hand may vanish under a worker.
+/// The directory with the worker records may be removed while a worker is active.
 #[test]
-fn a_worker_that_was_taken_for_dead_stops_and_may_join_again() {
+fn a_worker_that_was_declared_dead_stops_and_may_rejoin() {
     let workshop = with_whole();
     let slow = ["--samples", "64", "--width", "640", "--height", "360"];
     let arguments = [&["render", "in", "-o", "slow/f.####.exr"][..], &slow].concat();
@@ -112,11 +111,11 @@ fn a_worker_that_was_taken_for_dead_stops_and_may_join_again() {
     let mut running = workshop.start(&arguments);
     assert!(running.wait_for_line("] frame 1:"));
     fs::remove_dir_all(workshop.join("slow/job.work")).expect("a directory");
-    let (told, status) = running.end();
-    assert_eq!(status.code(), Some(75), "{told}");
+    let (messages, status) = running.end();
+    assert_eq!(status.code(), Some(75), "{messages}");
     assert!(
-        told.contains("taken it for dead; the same command joins again"),
-        "{told}"
+        messages.contains("its frames were reassigned; the same command rejoins"),
+        "{messages}"
     );
     assert!(!ledger(&workshop.join("slow")).lines.is_empty());
 }

@@ -14,8 +14,27 @@ const RICH: [&str; 8] = [
     "--channels=RGBA,Z,N,id,P,V,albedo",
 ];
 
+/// Path tracing: many light paths a sample, and a shadow catcher.
+const STUDIO: [&str; 6] = [
+    "--samples",
+    "4",
+    "--look",
+    "studio",
+    "--set",
+    "output.transparent=true",
+];
+
 #[test]
 fn any_number_of_threads_makes_the_same_images() {
+    same_on_any_threads(&RICH);
+}
+
+#[test]
+fn any_number_of_threads_traces_the_same_paths() {
+    same_on_any_threads(&STUDIO);
+}
+
+fn same_on_any_threads(options: &[&str]) {
     let workshop = Workshop::new();
     dam_break(&workshop.join("in"), [1, 5, 9]);
     let mut first = None;
@@ -32,7 +51,13 @@ fn any_number_of_threads_makes_the_same_images() {
             // Each option may be given once, so small images come by `--set` here.
             let pattern = format!("{out}/f.####.exr");
             let size = ["--width", "64", "--height", "36"];
-            let arguments = [&["render", "in", "-o", &pattern][..], &size, &RICH, threads].concat();
+            let arguments = [
+                &["render", "in", "-o", &pattern][..],
+                &size,
+                options,
+                threads,
+            ]
+            .concat();
             let ran = workshop.run(&arguments).expect(0);
             assert_eq!(ran.rendered(), [1, 5, 9]);
             let made = images(&workshop.join(&out));

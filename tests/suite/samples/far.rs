@@ -90,7 +90,7 @@ fn pictures_are_those_of_the_same_particles_at_zero() {
         let ran = workshop.run(&[&arguments[..], &more].concat()).expect(0);
         (Picture::open(&workshop.join(output)), ran.errors())
     };
-    let (far, told) = render("far.npy", "far/f.exr");
+    let (far, errors) = render("far.npy", "far/f.exr");
     let (near, _) = render("near.npy", "near/f.exr");
 
     let origin: Vec<f64> =
@@ -98,7 +98,7 @@ fn pictures_are_those_of_the_same_particles_at_zero() {
             .expect("a point");
     let origin = DVec3::from_slice(&origin);
     assert!((origin - OFFSET).length() < 0.1, "{origin}");
-    assert!(told.contains(&format!("origin {origin}")), "{told}");
+    assert!(errors.contains(&format!("origin {origin}")), "{errors}");
     assert_eq!(
         near.facts.as_ref().expect("facts")["origin"],
         serde_json::json!([0.0, 0.0, 0.0])

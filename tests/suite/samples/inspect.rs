@@ -173,7 +173,7 @@ fn a_file_of_several_steps_gives_an_object_each() {
 fn a_pattern_gives_its_sequence_with_frames_without_particles() {
     let pattern = sample("emitter_sph").join("ParticleData_Fluid_#.bgeo");
     let objects = inspect(&[pattern.display().to_string()], 0);
-    let told: Vec<(i64, u64)> = objects
+    let found: Vec<(i64, u64)> = objects
         .iter()
         .map(|o| {
             (
@@ -183,7 +183,7 @@ fn a_pattern_gives_its_sequence_with_frames_without_particles() {
         })
         .collect();
     assert_eq!(
-        told,
+        found,
         [(1, 0), (2, 0), (3, 90), (4, 300), (5, 480), (10, 1410)]
     );
     for object in &objects {

@@ -37,7 +37,7 @@ fn number(value: &Value) -> f64 {
 }
 
 #[test]
-fn the_index_is_told_and_the_parts_make_the_file() {
+fn index_is_printed_and_parts_add_up() {
     for encoding in ["f32", "q16", "q10"] {
         let shop = converted(&["--encoding", encoding]);
         let object = inspected(&shop, &[]);
@@ -103,7 +103,7 @@ fn the_index_is_told_and_the_parts_make_the_file() {
 }
 
 #[test]
-fn verify_finds_what_reading_does_not() {
+fn verify_detects_damage_that_reading_does_not() {
     let shop = converted(&["--encoding", "q16"]);
     assert_eq!(inspected(&shop, &["--verify"])["verified"], true);
     let text = shop.run(&["inspect", "--verify", FILE]).expect(0).text();
@@ -133,8 +133,8 @@ fn verify_finds_what_reading_does_not() {
     harm(padding);
     shop.run(&["inspect", FILE]).expect(0);
     let ran = shop.run(&["inspect", "--verify", FILE]).expect(1);
-    let told = format!("error: {FILE}: byte {padding}: between the sections are numbers");
-    let ran = ran.tells(&told).tells("convert again");
+    let message = format!("error: {FILE}: byte {padding}: between the sections are numbers");
+    let ran = ran.prints(&message).prints("convert again");
     assert!(ran.text().is_empty());
     // Nor is it overlooked when the frame is packed.
     let mut packed = GzEncoder::new(Vec::new(), Compression::fast());
@@ -146,7 +146,7 @@ fn verify_finds_what_reading_does_not() {
     assert!(ran.text().contains("bytes per particle"));
     shop.run(&["inspect", "--verify", "packed.spf.gz"])
         .expect(1)
-        .tells("error: packed.spf.gz: byte ");
+        .prints("error: packed.spf.gz: byte ");
     // In a section: all of a small frame is read and compared.
     for section in &sections {
         let at = whole(&section["offset"]);
@@ -154,14 +154,14 @@ fn verify_finds_what_reading_does_not() {
         for options in [&["inspect", FILE][..], &["inspect", "--verify", FILE]] {
             shop.run(options)
                 .expect(1)
-                .tells(&format!("error: {FILE}: byte {at}: "))
-                .tells("are damaged: the checksum differs; convert again");
+                .prints(&format!("error: {FILE}: byte {at}: "))
+                .prints("are damaged: the checksum differs; convert again");
         }
     }
 }
 
 #[test]
-fn large_frames_are_looked_at_by_a_sample() {
+fn large_frames_are_sampled() {
     let shop = Workshop::new();
     let count = 4_000_001;
     let particles = count.to_string();
@@ -194,12 +194,12 @@ fn large_frames_are_looked_at_by_a_sample() {
     bytes[64 + 192 * 3 + 7] ^= 0x7f;
     fs::write(shop.join("a.spf"), bytes).expect("a file");
     assert_eq!(json(&[])["bounds"], object["bounds"]);
-    inspect(&["--verify"]).expect(1).tells(
+    inspect(&["--verify"]).expect(1).prints(
         "error: a.spf: byte 64: the positions are damaged: the checksum differs; convert again",
     );
 }
 
-/// Foreign files are read whole anyway; that it is asked for is told.
+/// Foreign files are read whole anyway; that it is asked for is messages.
 #[test]
 fn verify_reads_other_formats() {
     let shop = Workshop::new();
@@ -213,5 +213,5 @@ fn verify_reads_other_formats() {
     fs::write(shop.join("a.xyz"), "2\n\nA 0 0 0\nA 0 x 0\n").expect("a file");
     shop.run(&["inspect", "--verify", "a.xyz"])
         .expect(1)
-        .tells("error: a.xyz: byte ");
+        .prints("error: a.xyz: byte ");
 }

@@ -10,7 +10,7 @@ use crate::harness::sample;
 enum Is {
     /// Particles, and the corners of their box to six digits.
     Particles(u64, [f64; 3], [f64; 3]),
-    /// Refused with a message that says this.
+    /// Rejected with this message.
     Refused(&'static str),
 }
 use Is::{Particles, Refused};

@@ -1,4 +1,4 @@
-//! Sample sequences: found, ordered, gaps told, every frame read, and rendered.
+//! Sample sequences: found, ordered, gaps reported, every frame read and rendered.
 
 use std::fs;
 
@@ -60,7 +60,7 @@ fn check(path: &str, expected: &[(i64, usize)], notes: &[&str]) {
 }
 
 #[test]
-fn an_emitter_starts_without_particles() {
+fn emitter_starts_without_particles() {
     let expected = [(1, 0), (2, 0), (3, 90), (4, 300), (5, 480), (10, 1410)];
     let note = "frame numbers go up by 1, but jump from 5 to 10";
     check("emitter_sph/ParticleData_Fluid_#.bgeo", &expected, &[note]);
@@ -126,9 +126,9 @@ fn fluid_and_obstacle_are_parts_of_one_step() {
     let merged = sequence.load_raw(0).expect("both parts");
     let part = merged.attributes.iter().find(|a| a.name == PART_ATTRIBUTE);
     let part = part.expect("an attribute that tells the parts apart");
-    let of = |wanted: f64| {
+    let of = |value: f64| {
         (0..part.count())
-            .filter(|i| part.data.get_f64(*i) == wanted)
+            .filter(|i| part.data.get_f64(*i) == value)
             .count()
     };
     assert_eq!((of(0.0), of(1.0)), (2880, 36));
@@ -152,7 +152,7 @@ fn fluid_and_obstacle_are_parts_of_one_step() {
 }
 
 #[test]
-fn a_part_can_be_picked_on_the_command_line() {
+fn part_can_be_selected_on_the_command_line() {
     let workshop = Workshop::new();
     let input = sample("pysph/dam_break_3d_*_#.vtu").display().to_string();
     let size = ["--width", "48", "--height", "27", "--samples", "1"];
@@ -165,27 +165,27 @@ fn a_part_can_be_picked_on_the_command_line() {
     workshop
         .run(&[&arguments[..], &size, &["--force"]].concat())
         .expect(0)
-        .tells("each step has the parts fluid, obstacle; used: obstacle");
+        .prints("each step has the parts fluid, obstacle; used: obstacle");
     let arguments = ["render", &input, "-o", "g.exr", "--parts", "wall"];
     workshop
         .run(&arguments)
         .expect(2)
-        .tells("no part is called `wall`; the parts are fluid, obstacle");
+        .prints("no part is called `wall`; the parts are fluid, obstacle");
     workshop
         .run(&["inspect", &input])
         .expect(0)
-        .tells("each step has the parts fluid, obstacle");
+        .prints("each step has the parts fluid, obstacle");
 }
 
 #[test]
-fn what_a_file_has_beside_its_particles_is_told() {
+fn file_metadata_is_reported() {
     let workshop = Workshop::new();
     let text = "2\nLattice=\"9 0 0 0 9 0 0 0 9\" pbc=\"T T T\" Properties=species:S:1:pos:R:3\nO 0 0 0\nH 1 0 0\n";
     fs::write(workshop.join("water.xyz"), text).expect("a file");
     let cell = "periodic boundaries (T T T) is not used";
     let names = "\"H\" = 1, \"O\" = 8";
-    let told = workshop.run(&["inspect", "water.xyz"]).expect(0).text();
-    assert!(told.contains(cell) && told.contains(names), "{told}");
+    let text = workshop.run(&["inspect", "water.xyz"]).expect(0).text();
+    assert!(text.contains(cell) && text.contains(names), "{text}");
     let size = ["--width", "48", "--height", "27", "--samples", "1"];
     let arguments = [
         "render",
@@ -198,13 +198,13 @@ fn what_a_file_has_beside_its_particles_is_told() {
     workshop
         .run(&[&arguments[..], &size].concat())
         .expect(0)
-        .tells(cell)
-        .tells(names)
-        .tells("colour by `element`, seen from 1 to 8");
+        .prints(cell)
+        .prints(names)
+        .prints("colour by `element`, range 1 to 8");
 }
 
 #[test]
-fn ids_are_found_under_the_names_of_their_tools() {
+fn ids_are_found_under_tool_specific_names() {
     let workshop = Workshop::new();
     let ids = |file: &str| {
         let input = sample(file).display().to_string();
@@ -232,7 +232,7 @@ fn ids_are_found_under_the_names_of_their_tools() {
 /// Colour by speed is only what `auto` chooses: a frame without velocities is drawn all the same,
 /// unless they were asked for.
 #[test]
-fn a_frame_may_lack_what_nobody_asked_for() {
+fn frames_may_lack_unused_attributes() {
     let workshop = Workshop::new();
     let positions: Vec<Vec3> = (0..20_u8).map(|i| Vec3::X * f32::from(i)).collect();
     let velocity = Attribute {

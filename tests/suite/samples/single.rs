@@ -183,7 +183,7 @@ fn every_file_is_listed() {
 }
 
 #[test]
-fn all_files_hold_the_same_particles() {
+fn all_files_contain_the_same_particles() {
     let truth = Truth::new();
     for (name, holds) in FILES {
         let path = sample(&format!("{DIRECTORY}/{name}"));

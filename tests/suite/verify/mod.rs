@@ -29,14 +29,14 @@ fn objects(ran: &Ran) -> Vec<Value> {
 }
 
 #[test]
-fn a_sound_job_by_its_directory_or_a_manifest() {
+fn intact_job_by_directory_or_manifest() {
     let workshop = rendered("all");
     let before = stamps(&workshop.join("out"));
     for job in ["out", "out/job.toml"] {
         let ran = workshop.run(&["verify", job]).expect(0);
         assert_eq!(ran.text(), "sound              3 (1-3)\n");
     }
-    // The user's own manifest says where the images are.
+    // The manifest of the user contains the directory of the images.
     let mine = "input.path = \"../in\"\noutput.path = \"../out/f.####.exr\"\n";
     fs::create_dir(workshop.join("mine")).expect("a directory");
     fs::write(workshop.join("mine/my.toml"), mine).expect("a file");
@@ -52,12 +52,12 @@ fn a_sound_job_by_its_directory_or_a_manifest() {
 }
 
 #[test]
-fn frames_that_are_not_made_yet_are_no_fault() {
+fn pending_frames_are_not_faults() {
     let workshop = rendered("2");
     let ran = workshop.run(&["verify", "out"]).expect(0);
     assert_eq!(
         ran.text(),
-        "sound              1 (2)\nnot made yet       2 (1,3)\n"
+        "sound              1 (2)\npending            2 (1,3)\n"
     );
     let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
     let states: Vec<Value> = objects(&ran).iter().map(|o| o["status"].clone()).collect();
@@ -82,7 +82,7 @@ fn each_fault_is_named() {
         lines[0].starts_with("frame 1: f.0001.exr: damaged: cannot be decoded: "),
         "{text}"
     );
-    assert_eq!(lines[1], "frame 2: f.0002.png: missing: is not there");
+    assert_eq!(lines[1], "frame 2: f.0002.png: missing: does not exist");
     let longer = format!(
         "frame 3: f.0003.exr: length: has {} bytes, {written} were written",
         written + 1
@@ -101,11 +101,11 @@ fn each_fault_is_named() {
     assert_eq!(objects.len(), 1);
     assert_eq!(objects[0]["status"], "missing");
     assert_eq!(objects[0]["files"][0]["status"], "sound");
-    assert_eq!(objects[0]["files"][1]["reason"], "is not there");
+    assert_eq!(objects[0]["files"][1]["reason"], "does not exist");
 }
 
 #[test]
-fn a_damaged_preview_is_found_too() {
+fn damaged_preview_is_detected() {
     let workshop = rendered("1");
     flip(&workshop.join("out/f.0001.png"));
     let ran = workshop.run(&["verify", "out"]).expect(1);
@@ -120,7 +120,7 @@ fn a_picture_of_another_job_is_damage() {
     let from = workshop.join("other/f.0001.exr");
     let to = workshop.join("out/f.0001.exr");
     let length = fs::metadata(&to).expect("a file").len();
-    // Padded to the length of what was there: only its header tells.
+    // Padded to the original length: only the header shows the damage.
     let mut bytes = fs::read(from).expect("a file");
     bytes.resize(usize::try_from(length).expect("it is short"), 0);
     fs::write(&to, bytes).expect("a file");
@@ -133,7 +133,7 @@ fn a_picture_of_another_job_is_damage() {
 }
 
 #[test]
-fn native_frames_are_looked_at_as_inspect_does() {
+fn native_frames_are_verified_as_by_inspect() {
     let workshop = Workshop::new();
     for frame in 1..=2 {
         let path = workshop.join(format!("in/p_{frame}.npy"));
@@ -150,32 +150,32 @@ fn native_frames_are_looked_at_as_inspect_does() {
     let inspected = workshop.run(&["inspect", "--verify", "frames/frame.0002.spf"]);
     let reason = inspected.errors();
     let reason = reason.split("frame.0002.spf: ").nth(1).expect("a reason");
-    let wanted = format!("frame 2: frame.0002.spf: damaged: {reason}");
-    assert!(text.starts_with(&wanted), "{text}\n{wanted}");
+    let expected = format!("frame 2: frame.0002.spf: damaged: {reason}");
+    assert!(text.starts_with(&expected), "{text}\n{expected}");
 }
 
 #[test]
-fn where_there_is_no_job() {
+fn directory_without_a_job() {
     let workshop = rendered("1");
     let refused = |arguments: &[&str], what: &str| {
         let ran = workshop.run(&[&["verify"][..], arguments].concat());
-        ran.expect(2).tells(what);
+        ran.expect(2).prints(what);
     };
     refused(&["in"], "in: no job here (no job.plan.json)");
     refused(&["none"], "none: no job here");
     refused(&["none.toml"], "none.toml: ");
     refused(
         &["out", "--frames", "9"],
-        "--frames: 9 has none of the job's frames: 1-3",
+        "--frames: 9 contains none of the job's frames: 1-3",
     );
     fs::write(workshop.join("bad.toml"), "[inptu]\n").expect("a file");
     refused(&["bad.toml"], "did you mean `input`?");
     fs::write(workshop.join("out/job.plan.json"), "{").expect("a file");
-    refused(&["out"], "job.plan.json: this is no readable plan");
+    refused(&["out"], "job.plan.json: not a readable plan");
 }
 
 #[test]
-fn damaged_frames_are_made_anew_when_asked_for() {
+fn damaged_frames_are_redone_on_request() {
     let workshop = rendered("all");
     let out = workshop.join("out");
     let good = images(&out);
@@ -187,7 +187,7 @@ fn damaged_frames_are_made_anew_when_asked_for() {
     let damaged = images(&out);
     let ran = workshop.run(&["verify", "out", "--requeue-bad"]);
     ran.expect(1)
-        .tells("set back: 1,3; the next run of the job makes them anew");
+        .prints("requeued: 1,3; the next run of the job repeats them");
     assert_eq!(images(&out), damaged);
     let ran = workshop.run(&["verify", "out", "--json"]).expect(0);
     let first = &objects(&ran)[0];

@@ -7,7 +7,7 @@ use crate::native::MappedFile;
 use crate::read::columns::{ParticleLayout, StridedColumn};
 use crate::{FrameError, ParseError};
 
-/// Particles of a mapped file.
+/// The particles of a mapped file.
 #[derive(Debug)]
 pub(super) struct ColumnSource {
     file: MappedFile,
@@ -17,7 +17,7 @@ pub(super) struct ColumnSource {
 }
 
 impl ColumnSource {
-    /// The particles of `file`, in which `layout` was found and into which it fits.
+    /// The particles of `file`. `layout` describes it and fits into it.
     pub(super) fn new(file: MappedFile, layout: ParticleLayout) -> Self {
         let attribute = |column: &StridedColumn| SourceAttribute {
             name: column.name.clone(),
@@ -32,7 +32,7 @@ impl ColumnSource {
         }
     }
 
-    /// The index of the first of `count` particles from `first` on.
+    /// The index of particle `first`, if `count` particles follow.
     fn place(&self, first: u64, count: usize) -> Result<usize, FrameError> {
         let place = usize::try_from(first).ok();
         let fits = |place: &usize| {

@@ -1,4 +1,4 @@
-//! Files of other programs as sources of particles that are never in memory as a whole.
+//! Files of other programs as sources of particles that need not fit into memory.
 //!
 //! The reader of the format decides which files qualify: their numbers must have fixed strides in the file itself.
 //! Text, compressed files and files of several steps are read into memory by [`crate::FrameFile`] instead.
@@ -29,13 +29,13 @@ pub fn open_source(path: &Path) -> Result<Option<Box<dyn ParticleSource>>, Frame
         return Ok(None);
     }
     let layout = layout_of(file.bytes(), path);
-    // Zeros for bytes that are gone must not be reported as a fault of the file.
+    // Missing bytes read as zeros; report the changed file, not the zeros.
     file.check()?;
     let layout = layout.map_err(|e| e.in_file(path))?;
     Ok(layout.map(|layout| Box::new(ColumnSource::new(file, layout)) as Box<dyn ParticleSource>))
 }
 
-/// Where the particles of the file `bytes`, called `path`, are, if all are at fixed steps in it.
+/// The layout of the particles in `bytes`, the contents of `path`; `None` if some numbers have no fixed stride.
 fn layout_of(bytes: &[u8], path: &Path) -> Result<Option<ParticleLayout>, ParseError> {
     let layout = Format::detect(bytes, path)?.reader().layout(bytes)?;
     if let Some(layout) = &layout {

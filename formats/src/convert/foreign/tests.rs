@@ -1,4 +1,4 @@
-//! A mapped source has the same particles as the reader.
+//! A mapped source has the same particles as the reader of its format.
 
 mod damage;
 mod made;
@@ -12,7 +12,7 @@ use super::*;
 use crate::attribute::with_values;
 use crate::{FrameFile, RawParticles};
 
-/// The files under a folder of the repository's `tests`.
+/// The files in a folder of the repository's `tests`.
 fn files_under(folder: &str) -> Vec<PathBuf> {
     let root = format!("{}/../tests/{folder}", env!("CARGO_MANIFEST_DIR"));
     let mut folders = vec![PathBuf::from(root)];
@@ -35,20 +35,22 @@ fn read_whole(path: &Path) -> Result<RawParticles, FrameError> {
     FrameFile::open(path)?.read(0)
 }
 
-/// Compares a source with what the reader found, in runs of `run` particles.
+/// Compares a source with the result of the reader, in runs of `run` particles.
 #[track_caller]
 fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
     let count = raw.positions.len();
+    // Compare the positions
     for first in (0..count).step_by(run) {
         let mut positions = vec![DVec3::NAN; run.min(count - first)];
-        let asked = source.read_positions(first as u64, &mut positions);
-        asked.expect("these particles are there");
+        let read = source.read_positions(first as u64, &mut positions);
+        read.expect("these particles are there");
         for (i, position) in positions.iter().enumerate() {
             let bits = |p: DVec3| p.to_array().map(f64::to_bits);
             let expected = raw.positions.get(first + i);
             assert_eq!(bits(*position), bits(expected), "{position} {expected}");
         }
     }
+    // Compare the attributes
     for (number, attribute) in raw.attributes.iter().enumerate() {
         let all: Vec<u8> = with_values!(&attribute.data, values => {
             values.iter().flat_map(|value| value.to_le_bytes()).collect()
@@ -56,14 +58,14 @@ fn same_in_runs(source: &dyn ParticleSource, raw: &RawParticles, run: usize) {
         let width = source.attributes()[number].width();
         for (at, expected) in all.chunks(run * width).enumerate() {
             let mut values = vec![0x55; expected.len()];
-            let asked = source.read_values(number, (at * run) as u64, &mut values);
-            asked.expect("these values are there");
+            let read = source.read_values(number, (at * run) as u64, &mut values);
+            read.expect("these values are there");
             assert!(values == expected, "{} from {}", attribute.name, at * run);
         }
     }
 }
 
-/// Compares a source with its reader.
+/// Compares a source with the reader of its format.
 #[track_caller]
 fn same(source: &dyn ParticleSource, raw: &RawParticles) {
     assert_eq!(source.count(), raw.positions.len() as u64);
@@ -71,11 +73,11 @@ fn same(source: &dyn ParticleSource, raw: &RawParticles) {
     assert_eq!(source.step(), raw.step);
     let described = |a: &crate::Attribute| (a.name.clone(), a.components, a.data.scalar_type());
     let expected: Vec<_> = raw.attributes.iter().map(described).collect();
-    let told = source.attributes().iter();
-    let told: Vec<_> = told
+    let found = source.attributes().iter();
+    let found: Vec<_> = found
         .map(|a| (a.name.clone(), a.components, a.scalar))
         .collect();
-    assert_eq!(told, expected);
+    assert_eq!(found, expected);
     for run in [1009, 4097, 100_003] {
         same_in_runs(source, raw, run);
     }
@@ -118,7 +120,7 @@ fn samples_stream_as_they_are_read() {
 }
 
 #[test]
-fn what_cannot_stream_is_left_to_the_readers() {
+fn unsupported_layouts_fall_back_to_the_readers() {
     for name in [
         "ascii.ply",
         "legacy_ascii.vtk",
@@ -137,7 +139,7 @@ fn what_cannot_stream_is_left_to_the_readers() {
 }
 
 #[test]
-fn a_run_beyond_the_end_is_refused() {
+fn run_beyond_the_end_is_rejected() {
     let path = format!(
         "{}/../tests/data/single_frames/le.ply",
         env!("CARGO_MANIFEST_DIR")

@@ -1,4 +1,4 @@
-//! A block of water with waves, made as it is read: particles as a simulation has them, in any number.
+//! A generated block of water with waves: particles as in a simulation, in any number.
 
 use std::f64::consts::TAU;
 use std::path::Path;
@@ -11,27 +11,28 @@ use crate::ScalarType;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::generate::{splitmix64, unit};
 
-/// A block of particles on a grid that is a little in disorder, about 4 : 2 : 1, under a wavy surface.
+/// A block of particles on a slightly perturbed grid, about 4 : 2 : 1, under a wavy surface.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BlockSettings {
-    /// Particles.
+    /// Number of particles.
     pub count: u64,
-    /// State of the generator of the disorder at the start.
+    /// Seed of the perturbation.
     pub seed: u64,
-    /// Radius, half the spacing of the grid; without one the block is about 1 high.
+    /// Radius, half the spacing of the grid, scene units. Without a radius, the block is about 1 unit high.
     pub radius: Option<f32>,
     /// Whether particles have a velocity.
     pub has_velocity: bool,
 }
 
-/// Particles of [`BlockSettings`]: slabs along x, in each columns along y, in each particles from below.
+/// Particles of [`BlockSettings`]: slabs along x, columns along y in each slab, and particles from bottom to
+/// top in each column.
 #[derive(Debug)]
 pub struct BlockSource {
     settings: BlockSettings,
     spacing: f64,
     /// Columns of a slab.
     columns: u64,
-    /// First particle and height, in particles, of each slab.
+    /// First particle of each slab, and its height in particles.
     slabs: Vec<Slab>,
     attributes: Vec<SourceAttribute>,
 }
@@ -42,13 +43,13 @@ struct Slab {
     height: u64,
 }
 
-/// Largest distance of particles from their grid positions, in spacings.
+/// Largest distance of particles from their grid positions along an axis, in grid spacings.
 const DISORDER: f32 = 0.2;
 
 impl BlockSource {
     /// The block of `settings`.
     pub fn new(settings: BlockSettings) -> Self {
-        // Height of a block of 4 : 2 : 1, in spacings.
+        // Height of a block of 4 : 2 : 1, in grid spacings.
         let high = (settings.count as f64 / 8.0).cbrt();
         let spacing = match settings.radius {
             Some(radius) => 2.0 * f64::from(radius),
@@ -56,6 +57,7 @@ impl BlockSource {
             None => 1.0,
         };
         let columns = whole(2.0 * high);
+        // Lay out slabs under the wave until all particles have a place
         let mut slabs = Vec::new();
         let mut first = 0;
         while first < settings.count {
@@ -89,7 +91,7 @@ impl BlockSource {
         (0.5 * self.spacing) as f32
     }
 
-    /// Calls `see` with `len` particles from `first` on.
+    /// Calls `see` with `len` particles from index `first`.
     fn for_each(&self, first: u64, len: usize, mut see: impl FnMut(Vec3)) {
         let mut number = self.slabs.partition_point(|slab| slab.first <= first);
         let mut place = first;
@@ -128,7 +130,7 @@ impl BlockSource {
         ((grid + noise) * self.spacing).as_vec3()
     }
 
-    /// A wave that runs along x, of about one height a unit of time.
+    /// The velocity of a wave along x, of about one block height per unit of time.
     fn velocity(&self, position: Vec3) -> Vec3 {
         let high = self.spacing * (self.settings.count as f64 / 8.0).cbrt();
         let place = position.as_dvec3() / high.max(f64::MIN_POSITIVE);

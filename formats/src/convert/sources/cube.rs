@@ -1,4 +1,4 @@
-//! The box that is filled evenly at random, made as it is read.
+//! A generated box with a uniform random distribution of particles.
 
 use std::path::Path;
 
@@ -17,7 +17,7 @@ pub struct BoxSource {
 }
 
 impl BoxSource {
-    /// The particles of `settings`, which may have a radius.
+    /// The particles of `settings`, with an optional common radius.
     pub const fn new(settings: BoxSettings, radius: Option<f32>) -> Self {
         Self { settings, radius }
     }
@@ -45,7 +45,7 @@ impl ParticleSource for BoxSource {
     }
 
     fn read_values(&self, _attribute: usize, _first: u64, to: &mut [u8]) -> Result<(), FrameError> {
-        // There are none to ask for.
+        // The source has no attributes.
         to.fill(0);
         Ok(())
     }

@@ -1,4 +1,4 @@
-//! Sources of particles: what is in memory already, mapped native frames, and generators.
+//! Sources of particles: particles in memory, mapped native frames, and generators.
 
 mod block;
 mod cube;
@@ -16,7 +16,7 @@ use std::path::Path;
 
 use crate::FrameError;
 
-/// The indices `first` and following, `len` of them, of `count`.
+/// The range of `len` indices from `first`, if all are below `count`.
 fn places(path: &Path, first: u64, len: usize, count: u64) -> Result<Range<usize>, FrameError> {
     let end = first.checked_add(len as u64).filter(|end| *end <= count);
     let range = end.and_then(|end| Some(usize::try_from(first).ok()?..usize::try_from(end).ok()?));

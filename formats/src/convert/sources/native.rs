@@ -1,4 +1,4 @@
-//! A native frame as a source: other encodings of the same particles, without having them in memory.
+//! A native frame as a source, to encode the same particles differently without loading all of them into memory.
 
 use glam::DVec3;
 
@@ -27,6 +27,7 @@ impl<'a> NativeSource<'a> {
         let frame = file.frame()?;
         let leaves = frame.leaves().map_err(|e| e.in_file(file.path()))?;
         let index = frame.index();
+        // List the attributes in the types that they decode to
         let attribute = |a: &crate::native::layout::AttributeIndex| SourceAttribute {
             name: a.name.clone(),
             components: a.components as usize,
@@ -36,6 +37,7 @@ impl<'a> NativeSource<'a> {
             },
         };
         let mut attributes: Vec<SourceAttribute> = index.attributes.iter().map(attribute).collect();
+        // Add the radii, if no attribute has their name
         let is_named = |a: &SourceAttribute| a.name.eq_ignore_ascii_case(RADIUS);
         if matches!(index.radius, RadiusIndex::PerParticle(_)) && !attributes.iter().any(is_named) {
             attributes.push(SourceAttribute {

@@ -1,4 +1,4 @@
-//! Particles in memory, as readers leave them.
+//! Particles in memory, as the readers return them.
 
 use std::io;
 use std::path::{Path, PathBuf};
@@ -10,7 +10,7 @@ use crate::attribute::with_values;
 use crate::convert::{ParticleSource, SourceAttribute};
 use crate::{Attribute, FrameError, Positions, RawParticles};
 
-/// A step that was read as a whole.
+/// A step that is completely in memory.
 #[derive(Debug)]
 pub struct RawSource<'a> {
     path: PathBuf,
@@ -19,10 +19,10 @@ pub struct RawSource<'a> {
 }
 
 impl<'a> RawSource<'a> {
-    /// `raw`, which was read from `path`.
+    /// The particles of `raw`; `path` is the file that they were read from.
     ///
     /// # Errors
-    /// If an attribute does not have its components for each particle.
+    /// If an attribute does not have all of its components for each particle.
     pub fn new(path: &Path, raw: &'a RawParticles) -> Result<Self, FrameError> {
         let count = raw.positions.len();
         let fits = |a: &&Attribute| {

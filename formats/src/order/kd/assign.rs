@@ -1,4 +1,4 @@
-//! The upper cuts made exact: one pass over all particles, then the few that it left undecided.
+//! Makes the upper cuts exact: one pass over all particles decides most of them, and the rest is decided afterwards.
 
 use std::sync::atomic::{AtomicU16, Ordering};
 
@@ -9,23 +9,23 @@ use super::item::{KeyedParticle, key};
 use super::plan::{CutPlan, MedianBracket, Side, descend};
 use crate::order::index_u32;
 
-/// Fewest particles that a task is made for.
+/// Smallest number of particles in a task.
 const TASK_LEN: usize = 16 * 1024;
-/// The same for particles that a cut has to decide.
+/// Smallest number of undecided particles in a task.
 const UNDECIDED_TASK_LEN: usize = 2048;
 
-/// Which cell each particle is in.
+/// The cell of each particle.
 #[derive(Debug)]
 pub(super) struct CellAssignment {
-    /// By particle; empty when there is but one cell.
+    /// The cell of each particle; empty if there is only one cell.
     cells: Vec<AtomicU16>,
     pub(super) cell_count: usize,
-    /// Most bytes held beside the particles, here and for the plan.
+    /// Peak bytes held beside the particles, here and for the plan.
     pub(super) bytes: u64,
 }
 
 impl CellAssignment {
-    /// The cell of the particle with that index.
+    /// The cell of the particle with this index.
     #[inline(always)]
     pub(super) fn cell(&self, index: usize) -> usize {
         self.cells
@@ -34,7 +34,7 @@ impl CellAssignment {
     }
 }
 
-/// Cuts all of `centers` as planned.
+/// Assigns all of `centers` to the cells of `plan`.
 pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> CellAssignment {
     let cell_count = plan.brackets.len() + 1;
     if cell_count == 1 {
@@ -59,14 +59,15 @@ pub(super) fn assign(centers: &[Vec3], mut plan: CutPlan) -> CellAssignment {
     }
 }
 
-/// The medians of these cuts are not in their brackets.
+/// The cuts whose medians are outside their brackets.
 #[derive(Debug, Clone, PartialEq, Eq)]
 struct BracketMiss {
     cuts: Vec<usize>,
 }
 
-/// Writes the cell of every particle. Returns the bytes needed for the undecided ones.
+/// Writes the cell of each particle. Returns the bytes that the undecided particles needed.
 fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usize, BracketMiss> {
+    // Pass over the particles in parallel
     let parts = 4 * rayon::current_num_threads();
     let chunk_len = centers.len().div_ceil(parts).max(TASK_LEN);
     let chunks: Vec<PassCounts> = centers
@@ -75,12 +76,14 @@ fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usiz
         .enumerate()
         .map(|(chunk, (centers, cells))| pass(chunk * chunk_len, centers, cells, plan))
         .collect();
+    // Add up the counts of the chunks
     let mut counts = vec![0; plan.brackets.len() + 1];
     for chunk in &chunks {
         for (count, more) in counts.iter_mut().zip(&chunk.counts) {
             *count += *more as usize;
         }
     }
+    // Join the undecided particles of each cut, in order
     let mut undecided: Vec<Vec<u32>> = (0..plan.brackets.len())
         .into_par_iter()
         .map(|cut| {
@@ -92,6 +95,7 @@ fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usiz
     let held: usize = chunks.iter().map(|c| capacity(&c.undecided)).sum();
     let bytes = (held + capacity(&undecided)) * size_of::<u32>();
     drop(chunks);
+    // Decide them
     let whole = CutSubtree {
         first_cut: 0,
         brackets: &plan.brackets,
@@ -104,11 +108,11 @@ fn cut_all(centers: &[Vec3], plan: &CutPlan, cells: &[AtomicU16]) -> Result<usiz
     Ok(bytes)
 }
 
-/// Result of a pass over some particles.
+/// The result of a pass over some particles.
 struct PassCounts {
     /// Particles in each cell.
     counts: Vec<u32>,
-    /// By cut, the particles that it has to decide.
+    /// The undecided particles of each cut.
     undecided: Vec<Vec<u32>>,
 }
 
@@ -150,37 +154,39 @@ fn cell_u16(cell: usize) -> u16 {
     cell as u16
 }
 
-/// A cut and all below it.
+/// A cut and all cuts below it.
 struct CutSubtree<'a> {
-    /// Number of the cut in the plan.
+    /// Index of the cut in the plan.
     first_cut: usize,
     brackets: &'a [MedianBracket],
     middles: &'a [usize],
-    /// By cut, the particles that it has to decide.
+    /// The undecided particles of each cut.
     undecided: &'a mut [Vec<u32>],
-    /// Number of the lowest cell.
+    /// Index of the lowest cell.
     first_cell: usize,
-    /// Particles decided to be in each cell.
+    /// The number of particles already decided for each cell.
     counts: &'a mut [usize],
 }
 
 impl<'a> CutSubtree<'a> {
-    /// Decides all particles that are left.
+    /// Decides all undecided particles.
     fn decide(self, centers: &[Vec3], cells: &[AtomicU16]) -> Result<(), BracketMiss> {
         let (Some(bracket), Some(middle)) = (self.brackets.first(), self.middles.first()) else {
             return Ok(());
         };
         if !bracket.is_cut() {
-            // Then there is none below either.
+            // There are no cuts below either.
             return Ok(());
         }
         let cut = self.first_cut;
         let axis = bracket.axis();
+        // Check that the median is among the undecided particles
         let own = std::mem::take(&mut self.undecided[0]);
         let (mut low, mut high) = self.halves();
         let Some(rank) = middle.checked_sub(low.len()).filter(|r| *r <= own.len()) else {
             return Err(BracketMiss { cuts: vec![cut] });
         };
+        // Split them at the median
         let mut items: Vec<KeyedParticle> = own
             .par_iter()
             .with_min_len(UNDECIDED_TASK_LEN)
@@ -193,6 +199,7 @@ impl<'a> CutSubtree<'a> {
         low.take(&items[..rank], cells);
         high.take(&items[rank..], cells);
         drop(items);
+        // Decide the cuts below
         let (a, b) = rayon::join(
             || low.decide(centers, cells),
             || high.decide(centers, cells),
@@ -206,7 +213,7 @@ impl<'a> CutSubtree<'a> {
         }
     }
 
-    /// What is below the cut and above it.
+    /// The subtrees below the cut: the low side and the high side.
     fn halves(self) -> (Self, Self) {
         let half = self.brackets.len() / 2;
         let (undecided_low, undecided_high) = self.undecided[1..].split_at_mut(half);
@@ -230,13 +237,13 @@ impl<'a> CutSubtree<'a> {
         (low, high)
     }
 
-    /// Particles in it, decided or not.
+    /// Number of particles in the subtree, decided and undecided.
     fn len(&self) -> usize {
         let undecided: usize = self.undecided.iter().map(Vec::len).sum();
         self.counts.iter().sum::<usize>() + undecided
     }
 
-    /// Takes in particles that the cut above has decided.
+    /// Adds particles that the cut above has decided.
     fn take(&mut self, items: &[KeyedParticle], cells: &[AtomicU16]) {
         let ways: Vec<Side> = items
             .par_iter()
@@ -294,7 +301,7 @@ mod tests {
     }
 
     #[test]
-    fn a_bracket_without_its_median_is_given_up() {
+    fn bracket_without_the_median_is_discarded() {
         let points = points();
         let expected = cells(&assign(&points, CutPlan::from_sample(&points)));
         let mut plan = CutPlan::from_sample(&points);

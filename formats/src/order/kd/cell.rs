@@ -1,14 +1,14 @@
-//! The lower cuts: one cell inside the cache, by one thread.
+//! The lower cuts: one thread cuts a cell that fits into the cache.
 //!
-//! Each cut moves the particles from one buffer into the other, keeping their order on both sides:
-//! equal coordinates therefore go by index without any index being looked at.
+//! Each cut moves the particles from one buffer into the other and keeps their order on both sides. Equal
+//! coordinates are therefore ordered by index although no index is compared.
 
 use glam::Vec3;
 
 use super::item::{KeyedParticle, widest};
 use super::middle_of;
 
-/// Memory of one thread for cutting cells.
+/// The buffers of one thread.
 #[derive(Default)]
 pub(super) struct CellScratch {
     items: Vec<KeyedParticle>,
@@ -17,7 +17,7 @@ pub(super) struct CellScratch {
 }
 
 impl CellScratch {
-    /// Brings a cell, whose particles are in index order, into k-d order.
+    /// Brings a cell, whose particles must be in index order, into k-d order.
     pub(super) fn sort(&mut self, points: &mut [Vec3], indices: &mut [u32]) {
         self.items.clear();
         if indices.is_empty() {
@@ -40,7 +40,7 @@ impl CellScratch {
     }
 }
 
-/// Cuts `items` down to blocks and writes them out.
+/// Cuts `items` into blocks and writes the blocks.
 fn cut(
     items: &mut [KeyedParticle],
     spare: &mut [KeyedParticle],
@@ -52,7 +52,9 @@ fn cut(
     if middle == 0 {
         return write(items, points, indices);
     }
+    // Partition the particles at the median
     part(items, spare, keys, widest_axis(items), middle);
+    // Cut both sides, with the buffers exchanged
     let (items_low, items_high) = items.split_at_mut(middle);
     let (spare_low, spare_high) = spare.split_at_mut(middle);
     let (keys_low, keys_high) = keys.split_at_mut(middle);
@@ -80,7 +82,7 @@ fn widest_axis(items: &[KeyedParticle]) -> usize {
     widest(max - min)
 }
 
-/// Brings the `middle` lowest of `items` along `axis` to the front of `to`, the others after them.
+/// Moves the `middle` lowest of `items` along `axis` to the front of `to`, and the others behind them.
 fn part(
     items: &[KeyedParticle],
     to: &mut [KeyedParticle],
@@ -88,13 +90,15 @@ fn part(
     axis: usize,
     middle: usize,
 ) {
+    // Find the pivot
     for (key, item) in keys.iter_mut().zip(items) {
         *key = item.place(axis);
     }
     let (below, pivot, _) = keys.select_nth_unstable(middle);
     let pivot = *pivot;
-    // As many of those that equal the pivot go to the front as there is room.
+    // The front has room for this many particles that equal the pivot.
     let mut room = middle - below.iter().filter(|key| **key < pivot).count();
+    // Distribute the particles without branches
     let (mut low, mut high) = (0, middle);
     for item in items {
         let key = item.place(axis);

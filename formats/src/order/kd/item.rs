@@ -1,8 +1,8 @@
-//! A particle on its way through the cuts, and the total order that it is cut by.
+//! The record that the cuts move for each particle, and the total order of the cuts.
 
 use glam::Vec3;
 
-/// Position and a number that distinguishes equal positions: 16 bytes, moved as one.
+/// A position, and a number that distinguishes equal positions: 16 bytes, moved as one value.
 #[derive(Debug, Clone, Copy, Default)]
 #[repr(C, align(16))]
 pub(super) struct KeyedParticle {
@@ -28,13 +28,13 @@ impl KeyedParticle {
         self.number
     }
 
-    /// The coordinate as an integer.
+    /// The coordinate as an integer that orders the same.
     #[inline(always)]
     pub(super) fn place(&self, axis: usize) -> i32 {
         order_bits(self.center[axis])
     }
 
-    /// The coordinate, then the number.
+    /// The coordinate, then the number, as one integer.
     #[inline(always)]
     pub(super) fn key(&self, axis: usize) -> i64 {
         key(self.center[axis], self.number)
@@ -47,7 +47,8 @@ pub(super) fn key(coordinate: f32, number: u32) -> i64 {
     (i64::from(order_bits(coordinate)) << 32) | i64::from(number)
 }
 
-/// An integer that orders as `f32::total_cmp` does, with one zero: coincident particles are equal.
+/// An integer that orders like `f32::total_cmp`, except that both zeros are equal: coincident particles have
+/// equal keys.
 #[inline(always)]
 fn order_bits(value: f32) -> i32 {
     // The sum of -0 and 0 is 0.
@@ -55,7 +56,7 @@ fn order_bits(value: f32) -> i32 {
     bits ^ ((bits >> 31) & i32::MAX)
 }
 
-/// The axis along which `extent` is largest; the first of equal ones.
+/// The axis of the largest component of `extent`; the first of equal ones.
 pub(super) fn widest(extent: Vec3) -> usize {
     let [x, y, z] = extent.to_array();
     if x >= y && x >= z {

@@ -1,9 +1,7 @@
-//! The upper cuts as far as a sample knows them: which axis, and between which two particles the
-//! median must lie.
+//! The upper cuts, as far as a sample determines them: the axis, and a bracket of keys that contains the median.
 //!
-//! The rank of a value in a sample of m particles gives its rank among all within a few times
-//! sqrt(m)/2 (as in the selection of Floyd & Rivest 1975). Everything outside of that bracket is
-//! decided by one comparison.
+//! The rank of a value in a sample of m particles gives its rank among all particles within a few times sqrt(m)/2 (as
+//! in the selection of Floyd & Rivest 1975). One comparison decides every particle outside of the bracket.
 
 use glam::Vec3;
 use rayon::prelude::*;
@@ -12,24 +10,23 @@ use super::item::{KeyedParticle, widest};
 use super::middle_of;
 use crate::order::index_u32;
 
-/// Particles in a cell that is left to `cell.rs`: both of its buffers fit an L2 cache.
+/// Particles in a cell that `cell.rs` cuts; both of its buffers fit into an L2 cache.
 pub const CELL_LEN: usize = 32 * 1024;
-/// Cuts above one another at most: their leaves are numbered in 16 bits.
+/// Largest depth of the cuts: the leaves are numbered in 16 bits.
 const MAX_DEPTH: u32 = 15;
-/// One of so many particles is in the sample.
+/// One particle out of this many is in the sample.
 const STRIDE: usize = 12;
-/// Most particles of the sample that one median is looked for in.
+/// Largest number of sampled particles that a median is selected from.
 const SELECT_LEN: usize = 256 * 1024;
-/// Most particles of the sample that an axis is chosen by.
+/// Largest number of sampled particles that an axis is chosen from.
 const AXIS_LEN: usize = 512;
-/// Width of a bracket to either side, standard deviations of the rank. They leave room for the cuts
-/// above, whose places are guesses too: at 3.5 builds over 10^7 particles took several passes, at
-/// 4.5 a single one.
+/// Half the width of a bracket, standard deviations of the rank. The value leaves room for the cuts above, whose
+/// places are estimates too: with 3.5, builds over 10^7 particles took several passes, with 4.5 a single one.
 const DEVIATIONS: f64 = 4.5;
-/// A task for less than this costs more than it saves.
+/// Below this length, a parallel task costs more than it saves.
 const PARALLEL_LEN: usize = 4096;
 
-/// The possible keys of a median: particles with keys from `low` on, up to `width` above it, are undecided.
+/// The possible keys of a median: particles with keys from `low` up to `low + width` (exclusive) are undecided.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct MedianBracket {
     low: i64,
@@ -40,26 +37,26 @@ pub(super) struct MedianBracket {
 /// The side of a cut that a particle is on.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Side {
-    /// In the cell with that number.
+    /// The particle is in the cell with this index.
     Cell(usize),
-    /// The cut with that number has to decide.
+    /// The particle is undecided at the cut with this index.
     Undecided(usize),
 }
 
 impl MedianBracket {
-    /// No cut: everything is low.
+    /// No cut: all particles are low.
     const NONE: Self = Self {
         low: i64::MAX,
         width: 0,
         axis: 0,
     };
 
-    /// Nothing is known.
+    /// A bracket that contains all keys.
     fn everything(axis: u32) -> Self {
         Self::between(i64::MIN, i64::MAX, axis)
     }
 
-    /// Undecided from `low` on to below `high`.
+    /// A bracket that contains the keys from `low` up to `high` (exclusive).
     pub(super) fn between(low: i64, high: i64, axis: u32) -> Self {
         Self {
             low,
@@ -78,8 +75,8 @@ impl MedianBracket {
     }
 }
 
-/// Follows the cuts in `brackets`, a whole binary tree in preorder, as far as they are sure. `keys`
-/// are the particle's along each axis.
+/// Follows the cuts in `brackets`, a complete binary tree in preorder, until a cut is undecided. `keys` are the
+/// keys of the particle along each axis.
 #[inline(always)]
 pub(super) fn descend(brackets: &[MedianBracket], keys: [i64; 4]) -> Side {
     let (mut cut, mut cell) = (0, 0);
@@ -91,8 +88,8 @@ pub(super) fn descend(brackets: &[MedianBracket], keys: [i64; 4]) -> Side {
             return Side::Undecided(cut);
         }
         let is_high = key >= bracket.low;
-        // By a shift and not by a condition, which would become a branch that is mispredicted every
-        // other time: half is under 2^15, so the shift leaves all of it or nothing.
+        // A shift, because a condition would become a branch that is mispredicted every other time. `half` is
+        // under 2^15, so that the shift leaves all of it or nothing.
         cut += 1 + ((half - 1) >> (usize::from(!is_high) << 4));
         cell = 2 * cell + usize::from(is_high);
         half >>= 1;
@@ -100,19 +97,19 @@ pub(super) fn descend(brackets: &[MedianBracket], keys: [i64; 4]) -> Side {
     Side::Cell(cell)
 }
 
-/// The upper cuts: a whole binary tree in preorder, with cuts that are none where cells are small
-/// enough already.
+/// The upper cuts: a complete binary tree in preorder, with empty cuts where cells are small enough already.
 #[derive(Debug)]
 pub(super) struct CutPlan {
     pub(super) brackets: Vec<MedianBracket>,
-    /// How many particles are below each cut.
+    /// The number of particles below each cut.
     pub(super) middles: Vec<usize>,
-    /// Bytes that were needed to find them.
+    /// Bytes that were needed to find the cuts.
     pub(super) bytes: usize,
 }
 
 impl CutPlan {
     pub(super) fn from_sample(centers: &[Vec3]) -> Self {
+        // Enlarge the cells until 16 bits can number them
         let mut cell_len = CELL_LEN;
         while depth_of(centers.len(), cell_len) > MAX_DEPTH {
             cell_len *= 2;
@@ -123,6 +120,7 @@ impl CutPlan {
             middles: vec![0; cuts],
             bytes: 0,
         };
+        // Bracket the medians by a sample
         if cuts > 0 {
             let mut sample = sample_of(centers);
             let mut spare = vec![KeyedParticle::default(); sample.len()];
@@ -137,7 +135,7 @@ impl CutPlan {
         plan
     }
 
-    /// Gives up the brackets of cuts whose medians are not in them.
+    /// Widens the brackets of these cuts, whose medians are outside, to all keys.
     pub(super) fn widen(&mut self, cuts: &[usize]) {
         for cut in cuts {
             let bracket = &mut self.brackets[*cut];
@@ -146,7 +144,7 @@ impl CutPlan {
     }
 }
 
-/// Cuts above one another until cells have `cell_len` particles at most.
+/// The depth of the cuts that leaves cells of at most `cell_len` particles.
 fn depth_of(len: usize, cell_len: usize) -> u32 {
     if len <= cell_len {
         return 0;
@@ -155,7 +153,7 @@ fn depth_of(len: usize, cell_len: usize) -> u32 {
     1 + depth_of(middle, cell_len).max(depth_of(len - middle, cell_len))
 }
 
-/// One particle of each run, at a place in the run that looks random: files are often ordered.
+/// One particle of each run, at a pseudo-random place in the run, because files are often ordered.
 fn sample_of(centers: &[Vec3]) -> Vec<KeyedParticle> {
     (0..centers.len() / STRIDE)
         .into_par_iter()
@@ -168,7 +166,7 @@ fn sample_of(centers: &[Vec3]) -> Vec<KeyedParticle> {
         .collect()
 }
 
-/// A cut and all below it.
+/// A cut and all cuts below it.
 struct BracketSubtree<'a> {
     brackets: &'a mut [MedianBracket],
     middles: &'a mut [usize],
@@ -187,6 +185,7 @@ impl BracketSubtree<'_> {
         let [own_middle, middles @ ..] = self.middles else {
             return;
         };
+        // Bracket the median along the widest axis
         let middle = middle_of(len);
         *own_middle = middle;
         let axis = widest_axis(sample);
@@ -194,6 +193,7 @@ impl BracketSubtree<'_> {
         (*bracket, guess) = bracket_for(sample, axis, middle as f64 / len as f64);
         let low_count = part(sample, spare, axis, guess);
 
+        // Continue on both sides of the estimated median
         let (sample_low, sample_high) = sample.split_at_mut(low_count);
         let (spare_low, spare_high) = spare.split_at_mut(low_count);
         let half = brackets.len() / 2;
@@ -217,8 +217,7 @@ impl BracketSubtree<'_> {
     }
 }
 
-/// The axis along which the bulk of the particles extends farthest: a few that escaped shall not
-/// decide.
+/// The axis with the largest extent of the bulk of the particles; a few outliers do not affect it.
 fn widest_axis(sample: &[KeyedParticle]) -> usize {
     let stride = sample.len().div_ceil(AXIS_LEN).max(1);
     let points: Vec<Vec3> = sample
@@ -238,11 +237,13 @@ fn widest_axis(sample: &[KeyedParticle]) -> usize {
     widest(extent.into())
 }
 
-/// The bracket of the particle that has `fraction` of all below it, and the best guess at its key.
+/// The bracket of the particle with `fraction` of all particles below it, and the best estimate of its key.
 fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianBracket, i64) {
     let axis_number = index_u32(axis);
+    // Select from a limited number of keys
     let stride = sample.len().div_ceil(SELECT_LEN).max(1);
     let mut keys: Vec<i64> = sample.iter().step_by(stride).map(|i| i.key(axis)).collect();
+    // Compute the rank and its uncertainty
     let count = keys.len() as f64;
     let deviation = (count * fraction * (1.0 - fraction)).sqrt();
     #[expect(
@@ -253,6 +254,7 @@ fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianB
     if rank >= keys.len() {
         return (MedianBracket::everything(axis_number), i64::MAX);
     }
+    // Select the estimate and the ends of the bracket
     let (below, guess, above) = keys.select_nth_unstable(rank);
     let low = match rank.checked_sub(spread) {
         Some(rank) => *below.select_nth_unstable(rank).1,
@@ -266,8 +268,8 @@ fn bracket_for(sample: &[KeyedParticle], axis: usize, fraction: f64) -> (MedianB
     (MedianBracket::between(low, high, axis_number), *guess)
 }
 
-/// Moves what is under `pivot` to the front of `to` and the others to its end; returns how many
-/// are in front.
+/// Moves the items below `pivot` to the front of `to` and the others to its end. Returns the number of items in
+/// front.
 fn part(items: &[KeyedParticle], to: &mut [KeyedParticle], axis: usize, pivot: i64) -> usize {
     let (mut low, mut high) = (0, items.len());
     for item in items {

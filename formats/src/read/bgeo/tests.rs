@@ -37,7 +37,7 @@ fn floats(numbers: &[f32]) -> Vec<u8> {
 }
 
 #[test]
-fn reads_what_partio_wrote() {
+fn reads_files_of_partio() {
     let particles = READER.one(&sample("public_partio/test.bgeo"));
     let expected: Vec<[f64; 3]> = [
         [0.0, 0.1, 0.2],
@@ -126,7 +126,7 @@ fn reads_the_splashsurf_dam_break() {
 }
 
 #[test]
-fn no_attributes_at_all_is_legal() {
+fn no_attributes_are_valid() {
     let particles = READER.one(&file(1, 0, &[], &floats(&[1.0, 2.0, 3.0, 1.0])));
     assert_eq!(coordinates(&particles.positions), [[1.0, 2.0, 3.0]]);
     assert!(particles.attributes.is_empty());
@@ -151,7 +151,7 @@ fn float_triples_and_vectors_are_alike() {
 }
 
 #[test]
-fn relatives_are_refused_by_name() {
+fn related_formats_are_rejected_by_name() {
     for (bytes, words) in [
         (&b"\x7fNSJb"[..], "binary json"),
         (b"scf1....", "blosc"),
@@ -172,7 +172,7 @@ fn relatives_are_refused_by_name() {
 }
 
 #[test]
-fn string_attributes_are_refused() {
+fn string_attributes_are_rejected() {
     let error = READER.error(&file(0, 1, &definition("s", 1, 2), &[]));
     assert!(
         error.to_string().contains("`s` is of type string"),
@@ -186,7 +186,7 @@ fn string_attributes_are_refused() {
 }
 
 #[test]
-fn absurd_counts_are_refused() {
+fn huge_counts_are_rejected() {
     let absurd_strings = {
         let mut bytes = definition("s", 1, 4);
         let end = bytes.len() - 4;
@@ -215,7 +215,7 @@ fn absurd_counts_are_refused() {
 }
 
 #[test]
-fn places_are_inside_files_that_end_in_their_header() {
+fn error_offsets_are_inside_truncated_files() {
     let one = file(1, 1, &definition("s", 1, 0), &[]);
     let none = file(1, 0, &[], &[]);
     for whole in [one, none] {
@@ -226,13 +226,13 @@ fn places_are_inside_files_that_end_in_their_header() {
 }
 
 #[test]
-fn names_of_the_file_do_not_reach_a_terminal() {
+fn names_from_the_file_are_escaped() {
     let error = READER.error(&file(0, 1, &definition("\u{1b}[2J\n", 1, 77), &[]));
     assert!(error.to_string().contains(r"`\u{1b}[2J\n`"), "{error}");
 }
 
 #[test]
-fn width_without_points_is_not_believed() {
+fn width_without_points_is_rejected() {
     let mut wide = definition("s", 0, 4);
     wide[3..5].copy_from_slice(&u16::MAX.to_be_bytes());
     wide.extend([0; 4]);

@@ -206,7 +206,7 @@ mod tests {
     }
 
     #[test]
-    fn positions_under_many_names() {
+    fn position_columns_have_many_names() {
         for names in [
             ["x", "y", "z"],
             ["X", "Y", "Z"],
@@ -230,7 +230,7 @@ mod tests {
     }
 
     #[test]
-    fn vectors_are_put_together() {
+    fn vector_components_are_joined() {
         let names = cleaned(&[
             "x",
             "y",

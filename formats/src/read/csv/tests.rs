@@ -69,7 +69,7 @@ fn plain_agrees_with_the_same_particles_raw() {
 }
 
 #[test]
-fn the_same_table_written_in_many_ways() {
+fn equivalent_tables_read_alike() {
     for text in [
         "x,y,z\n1,2,3\n4,5,6\n",
         "\u{feff}X;Y;Z\r\n1;2;3\r\n4;5;6\r\n",
@@ -99,7 +99,7 @@ fn the_same_table_written_in_many_ways() {
 }
 
 #[test]
-fn facts_before_the_names() {
+fn header_lines_before_the_names() {
     let text = "Part;Time [s];Np;Nbound;\n7;0.25;2;0;\n\nPos.x [m];Pos.y [m];Pos.z [m];Idp;\n1;2;3;8;\n4;5;6;9;\n";
     let particles = only(text);
     assert_eq!(f64_positions(&particles), TWO);
@@ -134,7 +134,7 @@ fn types_follow_the_values() {
 }
 
 #[test]
-fn positions_that_are_missing() {
+fn missing_positions() {
     let particles = only("x,y,z\n1,,3\n4,nan,6\n-1.#IND,inf,0\n");
     assert_eq!(particles.positions.len(), 3);
     assert!((0..3).all(|i| !particles.positions.get(i).is_finite()));
@@ -143,7 +143,7 @@ fn positions_that_are_missing() {
 }
 
 #[test]
-fn no_rows() {
+fn tables_without_rows() {
     for text in [
         "x,y,z,id\n",
         "x;y;z;id;",
@@ -172,7 +172,7 @@ fn thousands_of_columns() {
 }
 
 #[test]
-fn faults_have_names() {
+fn faults_are_described() {
     let cases = [
         ("", "byte 0: no row of 3 or more numbers"),
         ("hello\nworld\n", "byte 12: no row of 3 or more numbers"),
@@ -196,7 +196,7 @@ fn faults_have_names() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
-fn cut_files_are_no_panic() {
+fn truncated_files_do_not_panic() {
     for name in ["paraview", "dualsphysics", "plain"] {
         cut_everywhere(&sample(&format!("single_frames/{name}.csv")), steps, read);
     }
@@ -206,20 +206,20 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn damage_is_no_panic(mutations in mutations()) {
+    fn damaged_files_do_not_panic(mutations in mutations()) {
         let text = "Time;1\n\"Points:0\";\"Points:1\";Points:2;Vel.x [m];Vel.y;Vel.z;\n1;2,5;3;4;5;6;\n1;2;3;4;5;6;\n";
         read_all(&mutated(text.as_bytes(), &mutations), steps, read);
     }
 
     #[test]
-    fn noise_is_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), letters in letters()) {
+    fn random_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), letters in letters()) {
         read_all(&bytes, steps, read);
         read_all(&letters, steps, read);
         read_all(&[b"x,y,z\n", &*letters].concat(), steps, read);
     }
 
     #[test]
-    fn written_tables_come_back(
+    fn written_tables_round_trip(
         rows in prop::collection::vec((any::<i64>(), any::<[f64; 3]>(), any::<[f64; 2]>()), 0..30),
         separator in prop::sample::select(vec![",", ";", "\t", " ", " , ", ";  "]),
         end in prop::sample::select(vec!["\n", "\r\n"]),

@@ -304,14 +304,14 @@ impl<'a> TextInput<'a> {
         true
     }
 
-    /// Runs `look`, then returns to the current offset.
-    pub(in crate::read) fn ahead<T>(&mut self, look: impl FnOnce(&mut Self) -> T) -> T {
+    /// Runs `peek`, then returns to the current offset.
+    pub(in crate::read) fn ahead<T>(&mut self, peek: impl FnOnce(&mut Self) -> T) -> T {
         let at = self.at();
         self.pin = Some(at);
-        let seen = look(self);
+        let result = peek(self);
         self.pin = None;
         self.next = at - self.start;
-        seen
+        result
     }
 
     /// Whether the window may get more.

@@ -47,16 +47,16 @@ impl<'a> TextInput<'a> {
 
     /// A piece of up to `lines` lines.
     fn piece(&mut self, lines: usize) -> Option<LinePiece<'a>> {
-        let wanted = match &self.bytes {
+        let len = match &self.bytes {
             TextBytes::Whole(_) => WHOLE_PIECE,
             TextBytes::Stream(stream) => stream.piece,
         };
-        let there = self.want(wanted);
+        let there = self.want(len);
         if there == 0 {
             return None;
         }
-        let near = &self.rest()[..there.min(wanted)];
-        let mut cut = if there <= wanted && !self.can_load() {
+        let near = &self.rest()[..there.min(len)];
+        let mut cut = if there <= len && !self.can_load() {
             there
         } else if let Some(newline) = memrchr(b'\n', near) {
             newline + 1

@@ -7,7 +7,7 @@ use crate::names::{LAMMPS_CATEGORIES, LAMMPS_INTEGERS, LAMMPS_VECTORS};
 use crate::read::table::{NumberKind, TargetArray, TargetComponent, TextPolicy};
 use crate::read::text;
 
-/// Names of position columns, the wanted first, and whether they are fractions of the box.
+/// Names of position columns, the preferred ones first, and whether they are fractions of the box.
 /// Positions in the box come before unwrapped ones, which leave it.
 const POSITIONS: [([&str; 3], bool); 4] = [
     (["x", "y", "z"], false),

@@ -96,7 +96,7 @@ impl HeaderFault {
             Self::Wrong(error @ ParseError::Malformed { .. })
                 if !text.is_behind_newline() && text.is_file_end() =>
             {
-                error.retold(|what| format!("{what}: {CUT_SHORT}"))
+                error.map_message(|what| format!("{what}: {CUT_SHORT}"))
             }
             Self::Wrong(error) => error,
         }

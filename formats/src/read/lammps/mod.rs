@@ -95,7 +95,7 @@ impl Reader for Lammps {
 /// [`ParseError::TooLarge`] if the list of steps needs more than `budget`.
 fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, ParseError> {
     let mut steps: Vec<Step> = Vec::new();
-    let mut seen = SeenItems::default();
+    let mut items = StepItems::default();
     let mut pair = LinePair::default();
     check_start(text)?;
     let finder = memmem::Finder::new(ITEM);
@@ -104,14 +104,14 @@ fn steps(text: &mut TextInput<'_>, budget: MemoryBudget) -> Result<Vec<Step>, Pa
         pair.go_to_next(text);
         let line = text.rest();
         let item = DumpItem::of(line.get(..pair.end - at).unwrap_or(line));
-        if steps.is_empty() || seen.ends_before(item) {
+        if steps.is_empty() || items.ends_before(item) {
             if let Some(last) = steps.last_mut() {
                 last.end_at(at);
             }
             Step::push(&mut steps, at..at, budget)?;
-            seen = SeenItems::default();
+            items = StepItems::default();
         }
-        seen.note(item);
+        items.note(item);
         if let (Some(step), Some(value)) = (steps.last_mut(), pair.value) {
             match item {
                 DumpItem::TimeStep => step.number = value.integer,
@@ -249,14 +249,14 @@ impl LinePair {
     }
 }
 
-/// Header lines of a step that were seen so far.
+/// Header lines of the current step so far.
 #[derive(Debug, Default)]
-struct SeenItems {
+struct StepItems {
     step: bool,
     rows: bool,
 }
 
-impl SeenItems {
+impl StepItems {
     fn note(&mut self, item: DumpItem) {
         self.step |= item == DumpItem::TimeStep;
         self.rows |= matches!(item, DumpItem::Atoms | DumpItem::Foreign);

@@ -72,7 +72,7 @@ fn steps_of_one_file() {
 }
 
 #[test]
-fn a_dump_out_of_gzip() {
+fn dump_in_gzip() {
     let bytes = sample("lammps_drop/dump.drop.1200.lammps.gz");
     let steps = steps(&bytes).unwrap();
     let particles = read(&bytes, &steps[0]).unwrap();
@@ -134,7 +134,7 @@ fn tilted_boxes() {
 }
 
 #[test]
-fn positions_in_the_box_come_first() {
+fn wrapped_positions_have_precedence() {
     let columns = "zs ys xs zu yu xu z y x";
     let particles = only(&dump(BOX, columns, &["0 0 0 6 5 4 3 2 1"])).unwrap();
     assert_eq!(f64_positions(&particles), [DVec3::new(1., 2., 3.)]);
@@ -148,7 +148,7 @@ fn positions_in_the_box_come_first() {
 }
 
 #[test]
-fn columns_of_every_sort() {
+fn columns_of_every_type() {
     let columns =
         "element id mol type x y z fx fy fz radius vx vy f_ave[1] ix v_name typelabel note";
     let rows = [
@@ -249,7 +249,7 @@ fn units_time_blanks_and_line_ends() {
 }
 
 #[test]
-fn of_a_step_written_twice_the_last_stays() {
+fn last_copy_of_a_repeated_step_wins() {
     let step = |number: i64, x: i64| {
         dump(BOX, "x y z", &[&format!("{x} 0 0")]).replace("STEP\n0", &format!("STEP\n{number}"))
     };
@@ -276,7 +276,7 @@ fn of_a_step_written_twice_the_last_stays() {
 }
 
 #[test]
-fn a_last_step_cut_short() {
+fn truncated_last_step() {
     let bytes = sample("lammps_drop/drop_2frames.lammpstrj");
     let whole = steps(&bytes).unwrap();
     let second = whole[1].start();
@@ -310,7 +310,7 @@ fn a_last_step_cut_short() {
 }
 
 #[test]
-fn a_step_broken_off_inside_the_file() {
+fn truncated_step_inside_the_file() {
     let good = dump(BOX, "id x y z", &["1 1 2 3", "2 4 5 6"]);
     for broken in [
         "ITEM: TIMESTEP\n5\nITEM: NUMBER OF ATOMS\n9\nITEM: ATOMS id x y z\n1 1 2 3\n2 4 0.",
@@ -327,7 +327,7 @@ fn a_step_broken_off_inside_the_file() {
 }
 
 #[test]
-fn faults_have_names() {
+fn faults_are_described() {
     let cases = [
         (dump(BOX, "x y z", &["1 2"]), "line has 2 of 3 columns"),
         (dump(BOX, "x y z", &["1 2 3 4"]), "more than 3 columns"),
@@ -382,7 +382,7 @@ fn faults_have_names() {
 }
 
 #[test]
-fn absurd_counts_allocate_nothing() {
+fn huge_counts_allocate_nothing() {
     for count in [
         "9000000000000000000",
         "99999999999",
@@ -408,7 +408,7 @@ fn a_step_of_another_file_is_an_error() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
-fn cut_files_are_no_panic() {
+fn truncated_files_do_not_panic() {
     cut_everywhere(&sample("lammps_drop/drop_2frames.lammpstrj"), steps, read);
 }
 
@@ -416,21 +416,21 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn damage_is_no_panic(mutations in mutations()) {
+    fn damaged_files_do_not_panic(mutations in mutations()) {
         let text = dump(BOX, "id type xs ys zs vx vy vz", &["1 1 0 .5 1 1 2 3", "2 1 0 0 0 4 5 6"]);
         let two = [&*text, &text.replace("STEP\n0", "STEP\n8")].concat();
         read_all(&mutated(two.as_bytes(), &mutations), steps, read);
     }
 
     #[test]
-    fn noise_is_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), letters in letters()) {
+    fn random_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), letters in letters()) {
         read_all(&bytes, steps, read);
         read_all(&letters, steps, read);
         read_all(&[b"ITEM: TIMESTEP\n0\nITEM: NUMBER OF ATOMS\n1\nITEM: ATOMS x y z\n", &*letters].concat(), steps, read);
     }
 
     #[test]
-    fn written_steps_come_back(
+    fn written_steps_round_trip(
         frames in prop::collection::vec(
             prop::collection::vec((any::<i64>(), any::<[f32; 3]>(), any::<[f32; 3]>()), 0..20),
             1..4,

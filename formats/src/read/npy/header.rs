@@ -58,7 +58,7 @@ pub(super) fn length(bytes: &[u8]) -> Result<usize, ParseError> {
     if text > MAX_HEADER {
         return Err(ParseError::malformed(
             8,
-            format!("npy header of {text} bytes, at most {MAX_HEADER} are allowed"),
+            format!("npy header of {text} bytes; at most {MAX_HEADER} are allowed"),
         ));
     }
     Ok(start + text)

@@ -36,7 +36,7 @@ impl ArrayLayout {
                 Err(ParseError::malformed(
                     header.data,
                     format!(
-                        "{frames} time steps without particles, at most {MAX_EMPTY_FRAMES} are allowed"
+                        "{frames} time steps without particles; at most {MAX_EMPTY_FRAMES} are allowed"
                     ),
                 ))
             }

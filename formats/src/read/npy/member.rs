@@ -1,4 +1,4 @@
-//! One array in an NPZ: its header, and its bytes when they are wanted.
+//! One array in an NPZ: its header, and its bytes when they are needed.
 //!
 //! Sizes come from the central directory (numpy leaves placeholders in the local headers), and no
 //! member may inflate beyond the size stated there.
@@ -136,7 +136,7 @@ pub(super) fn in_member(error: ParseError, name: &str) -> ParseError {
         ParseError::Malformed { .. } => "in member",
         ParseError::Unsupported { .. } | ParseError::TooLarge { .. } => "npz member",
     };
-    error.retold(|what| format!("{begin} {name}: {what}"))
+    error.map_message(|what| format!("{begin} {name}: {what}"))
 }
 
 pub(super) fn zip_error(error: &ZipError, what: &str) -> ParseError {

@@ -5,6 +5,7 @@ use std::str::FromStr;
 use super::header::{Element, PlyHeader, Property, shorten};
 use crate::read::columns::{GrowingParticles, ParticleLayout};
 use crate::read::input::TextInput;
+use crate::read::text::words;
 use crate::{MemoryBudget, ParseError, RawParticles, ScalarType};
 
 /// Records that are decoded before they are appended to the arrays.
@@ -78,7 +79,10 @@ fn most_records(bytes: usize, element: &Element) -> usize {
 }
 
 /// Skips the lines of `element`.
-fn skip(text: &mut TextInput<'_>, element: &Element) -> Result<(), ParseError> {
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the file ends before.
+pub(super) fn skip(text: &mut TextInput<'_>, element: &Element) -> Result<(), ParseError> {
     if element.properties.is_empty() {
         return Ok(());
     }
@@ -88,8 +92,11 @@ fn skip(text: &mut TextInput<'_>, element: &Element) -> Result<(), ParseError> {
     Ok(())
 }
 
-/// The next line with something on it, and its offset.
-fn next_line<'t>(
+/// The next line with something on it, and its offset. It is for a record of `element`.
+///
+/// # Errors
+/// [`ParseError::Malformed`] at the end of the file.
+pub(super) fn next_line<'t>(
     text: &'t mut TextInput<'_>,
     element: &Element,
 ) -> Result<(usize, &'t [u8]), ParseError> {
@@ -123,16 +130,9 @@ fn pack_line(
     line: &[u8],
     element: &Element,
 ) -> Result<(), ParseError> {
-    let mut words = line
-        .split(u8::is_ascii_whitespace)
-        .filter(|word| !word.is_empty());
+    let mut words = words(line);
     for property in &element.properties {
-        let short = || {
-            ParseError::malformed(
-                at,
-                format!("line ends before {} of {}", property.name, element.name),
-            )
-        };
+        let short = || too_short(at, property, element);
         let word = words.next().ok_or_else(short)?;
         if property.length.is_none() {
             push_number(packed, word, property.scalar)
@@ -146,18 +146,30 @@ fn pack_line(
     }
     match words.next() {
         None => Ok(()),
-        Some(_) => Err(ParseError::malformed(
-            at,
-            format!(
-                "line has more values than the {} properties of {}",
-                element.properties.len(),
-                element.name
-            ),
-        )),
+        Some(_) => Err(too_long(at, element)),
     }
 }
 
-fn bad_word(at: usize, word: &[u8], property: &Property) -> ParseError {
+/// The error for a line that ends before `property`.
+pub(super) fn too_short(at: usize, property: &Property, element: &Element) -> ParseError {
+    let what = format!("line ends before {} of {}", property.name, element.name);
+    ParseError::malformed(at, what)
+}
+
+/// The error for a line that goes on after all properties.
+pub(super) fn too_long(at: usize, element: &Element) -> ParseError {
+    ParseError::malformed(
+        at,
+        format!(
+            "line has more values than the {} properties of {}",
+            element.properties.len(),
+            element.name
+        ),
+    )
+}
+
+/// The error for a word that is not a number of the type of `property`.
+pub(super) fn bad_word(at: usize, word: &[u8], property: &Property) -> ParseError {
     ParseError::malformed(
         at,
         format!(

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 
-use super::header::{Element, PlyEncoding, PlyHeader};
+use super::header::{Element, PlyEncoding, PlyHeader, Property};
 use crate::read::columns::check_room;
 use crate::{Endian, ParseError, ScalarType};
 
@@ -57,7 +57,10 @@ pub(super) fn vertex_records<'a>(
 }
 
 /// The byte after all records of `element`, which begin at `at`.
-fn skip(
+///
+/// # Errors
+/// [`ParseError::Malformed`] if the file ends before.
+pub(super) fn skip(
     bytes: &[u8],
     mut at: usize,
     element: &Element,
@@ -81,7 +84,7 @@ fn skip(
         return Ok(at + element.count * least);
     }
     for _ in 0..element.count {
-        at = walk(bytes, at, element, endian, |_| {})?;
+        at = walk(bytes, at, element, endian, |_| Ok(()))?;
     }
     Ok(at)
 }
@@ -95,51 +98,64 @@ fn pack(
 ) -> Result<Vec<u8>, ParseError> {
     let mut packed = Vec::with_capacity(vertices.count * vertices.scalar_bytes());
     for _ in 0..vertices.count {
-        at = walk(bytes, at, vertices, endian, |scalar| {
-            packed.extend_from_slice(scalar);
+        at = walk(bytes, at, vertices, endian, |values| {
+            if values.property.length.is_none() {
+                packed.extend_from_slice(values.bytes);
+            }
+            Ok(())
         })?;
     }
     Ok(packed)
 }
 
-/// Goes through one record, showing each scalar, and returns the byte after it.
-fn walk(
-    bytes: &[u8],
+/// The number of one property of a record, or the numbers of a list.
+pub(super) struct PropertyValues<'a> {
+    pub(super) property: &'a Property,
+    /// First byte of the numbers.
+    pub(super) at: usize,
+    pub(super) bytes: &'a [u8],
+}
+
+/// Goes through one record, showing each property, and returns the byte after it.
+///
+/// # Errors
+/// Those of `show`; [`ParseError::Malformed`] if the file ends within the record.
+pub(super) fn walk<'a>(
+    bytes: &'a [u8],
     mut at: usize,
-    element: &Element,
+    element: &'a Element,
     endian: Endian,
-    mut show: impl FnMut(&[u8]),
+    mut show: impl FnMut(PropertyValues<'a>) -> Result<(), ParseError>,
 ) -> Result<usize, ParseError> {
-    let cut =
-        |at: usize| ParseError::malformed(at, format!("file ends within element {}", element.name));
+    let take = |at: usize, len: usize| {
+        let found = bytes.get(at..).and_then(|rest| rest.get(..len));
+        let what = || format!("file ends within element {}", element.name);
+        found.ok_or_else(|| ParseError::malformed(at, what()))
+    };
     for property in &element.properties {
         let stored = property.length.unwrap_or(property.scalar);
-        let number = bytes
-            .get(at..)
-            .and_then(|rest| rest.get(..stored.size()))
-            .ok_or_else(|| cut(at))?;
+        let number = take(at, stored.size())?;
+        let mut values = PropertyValues {
+            property,
+            at,
+            bytes: number,
+        };
         if property.length.is_some() {
-            let items = list_length(number, stored, endian).ok_or_else(|| {
-                ParseError::malformed(
-                    at,
-                    format!("list {} has a negative or absurd length", property.name),
-                )
+            let items = unsigned(number, stored, endian).ok_or_else(|| {
+                let what = format!("list {} has a negative or absurd length", property.name);
+                ParseError::malformed(at, what)
             })?;
-            let list = items.checked_mul(property.scalar.size());
-            at = list
-                .and_then(|list| list.checked_add(at + stored.size()))
-                .filter(|end| *end <= bytes.len())
-                .ok_or_else(|| cut(at))?;
-        } else {
-            show(number);
-            at += stored.size();
+            values.at += number.len();
+            values.bytes = take(values.at, items.saturating_mul(property.scalar.size()))?;
         }
+        at = values.at + values.bytes.len();
+        show(values)?;
     }
     Ok(at)
 }
 
-/// Reads the item count, without allocating as `ScalarType::decode` would.
-fn list_length(number: &[u8], stored: ScalarType, endian: Endian) -> Option<usize> {
+/// Reads an item count or an index, without allocating as `ScalarType::decode` would.
+pub(super) fn unsigned(number: &[u8], stored: ScalarType, endian: Endian) -> Option<usize> {
     let mut wide = [0; 8];
     let used = wide.get_mut(..number.len())?;
     used.copy_from_slice(number);

@@ -1,14 +1,17 @@
 //! PLY point clouds: ascii and binary of both byte orders, any order of properties.
 //!
 //! `header` reads the text on top, `body` finds (or repacks) the vertex records, and the shared
-//! column reader decodes them. Meshes are refused: their vertices are a surface, not particles.
+//! column reader decodes them. Meshes are refused: their vertices are a surface, not particles. `mesh` reads those.
 //! Follows Greg Turk's 1994 description and what Blender, Open3D and `CloudCompare` write beyond it.
 
 mod ascii;
 mod body;
 mod header;
+mod mesh;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use self::mesh::read_mesh;
 
 use self::body::VertexRecords;
 use self::header::{Element, PlyEncoding, PlyHeader};

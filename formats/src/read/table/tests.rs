@@ -51,7 +51,7 @@ impl WholeText<'_> {
 const PIECE: usize = 1 << 20;
 
 #[test]
-fn fields_go_where_they_belong() {
+fn fields_are_assigned_by_name() {
     let bytes = b"7 3 1 2\n\n  8\t6 4 5 \r\n";
     let place = |target, component| Some(TargetComponent { target, component });
     let table = Table {
@@ -73,7 +73,7 @@ fn fields_go_where_they_belong() {
 }
 
 #[test]
-fn whole_numbers_give_way_to_fractions_and_text() {
+fn integers_widen_to_floats_and_text() {
     let whole = || scalar(NumberKind::WholeIfAll, TextPolicy::LeaveOut);
     let parse = |text: &str| {
         let mut values = columns(text.as_bytes(), WORDS, vec![whole()])
@@ -130,7 +130,7 @@ fn the_first_fault_is_reported() {
 }
 
 #[test]
-fn an_unfinished_last_line_is_called_so() {
+fn unfinished_last_line_is_described() {
     let two = || {
         vec![
             scalar(NumberKind::Real, TextPolicy::Fault),

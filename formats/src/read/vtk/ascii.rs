@@ -96,13 +96,16 @@ fn each_word(
 }
 
 fn too_few(at: usize, count: usize, left: usize) -> ParseError {
-    ParseError::malformed(at, format!("{count} numbers wanted, {left} bytes are left"))
+    ParseError::malformed(
+        at,
+        format!("expected {count} numbers, {left} bytes are left"),
+    )
 }
 
 fn ends_after(at: usize, done: usize, count: usize) -> ParseError {
     ParseError::malformed(
         at,
-        format!("{count} numbers wanted, the text ends after {done}"),
+        format!("expected {count} numbers, the text ends after {done}"),
     )
 }
 
@@ -228,7 +231,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn odd_spellings_are_numbers() {
+    fn unusual_notations_are_parsed() {
         let text = b"nan -inf -1.#IND 1.#INF -1.#INF00 -nan(ind) 1.5D+01 Infinity";
         let (data, end) = parse_values(text, 0, 8, ScalarType::F32).unwrap();
         let AttributeData::F32(v) = data else {
@@ -253,7 +256,7 @@ mod tests {
     }
 
     #[test]
-    fn counts_beyond_the_text_are_refused_at_once() {
+    fn counts_beyond_the_text_are_rejected_early() {
         assert!(parse_values(b"1 2 3", 0, usize::MAX, ScalarType::F64).is_err());
         assert!(parse_values(b"1  2 ", 0, 3, ScalarType::F64).is_err());
         assert!(skip_words(&mut TextInput::whole(b"1 2 3"), usize::MAX).is_err());

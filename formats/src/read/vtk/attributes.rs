@@ -186,7 +186,7 @@ mod tests {
     }
 
     #[test]
-    fn names_are_decoded_and_may_hold_blanks() {
+    fn names_are_decoded_and_may_contain_blanks() {
         assert_eq!(
             field_array(&line("vel%20x 3 10 float")).unwrap().name,
             "vel x"

@@ -4,7 +4,7 @@
 use crate::ParseError;
 use crate::read::input::TextInput;
 
-/// A keyword line of a sane file is shorter; a longer one means that we look at binary data.
+/// A keyword line of a sane file is shorter; a longer one means that we peek at binary data.
 const LONGEST_LINE: usize = 1 << 16;
 
 /// Reading position in the file.
@@ -48,9 +48,9 @@ impl<'c, 'a> LineCursor<'c, 'a> {
         self.text.take(count).then_some(())
     }
 
-    /// Runs `look`, then returns to the current offset.
-    pub(super) fn ahead<T>(&mut self, look: impl FnOnce(&mut LineCursor<'_, 'a>) -> T) -> T {
-        self.text.ahead(|text| look(&mut LineCursor { text }))
+    /// Runs `peek`, then returns to the current offset.
+    pub(super) fn ahead<T>(&mut self, peek: impl FnOnce(&mut LineCursor<'_, 'a>) -> T) -> T {
+        self.text.ahead(|text| peek(&mut LineCursor { text }))
     }
 
     /// Goes on to byte `at`.

@@ -3,14 +3,15 @@
 //!
 //! The file is walked line by line: a keyword line determines how many bytes of payload follow, exactly
 //! those are taken or skipped, so nothing is ever searched for inside binary data. Cells and cell
-//! data are stepped over: points without cells are particles too. Grids have no particles and are
-//! refused. Layout after "VTK File Formats" (the VTK user's guide) and after files of VTK 9,
+//! data are stepped over: points without cells are particles too. `mesh` takes the cells instead of the point data.
+//! Grids are refused. Layout after "VTK File Formats" (the VTK user's guide) and after files of VTK 9,
 //! SPlisHSPlasH and others.
 
 mod ascii;
 mod attributes;
 mod cursor;
 mod keywords;
+mod mesh;
 mod payload;
 mod positions;
 #[cfg(test)]
@@ -19,6 +20,7 @@ mod types;
 mod walk;
 
 pub(in crate::read) use ascii::parse_values;
+pub(crate) use mesh::read_mesh;
 pub(in crate::read) use positions::positions;
 
 use super::columns::{ParticleLayout, StridedColumn};

@@ -39,6 +39,15 @@ pub(super) enum ArrayNumbers {
 }
 
 impl ArrayNumbers {
+    /// Bytes that decoding allocates; none for numbers that are decoded already.
+    pub(super) const fn byte_len(&self) -> u64 {
+        match *self {
+            Self::Decoded(_) => 0,
+            Self::Binary { scalar, count, .. } => (count * scalar.size()) as u64,
+            Self::Bits { count, .. } => count as u64,
+        }
+    }
+
     /// The numbers themselves; `bytes` are the file in which they were found.
     ///
     /// # Errors

@@ -5,7 +5,7 @@ use glam::{DVec3, Vec3};
 
 use crate::{AttributeData, Positions};
 
-/// Groups `data` (three numbers a particle; a rest is dropped) into positions: single precision
+/// Groups `data` (three numbers per particle; a rest is dropped) into positions: single precision
 /// where that is exact (floats and integers of up to 16 bits), double for everything wider.
 pub(in crate::read) fn positions(data: AttributeData) -> Positions {
     match data {

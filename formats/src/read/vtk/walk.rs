@@ -41,11 +41,40 @@ pub(super) struct PointArray {
     pub(super) numbers: ArrayNumbers,
 }
 
+/// What the cells of a section are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CellSection {
+    Polygons,
+    Strips,
+    /// Of several types, which CELL_TYPES has.
+    Typed,
+}
+
+/// Cells, for those who read a mesh.
+pub(super) struct Cells {
+    pub(super) section: CellSection,
+    /// Their keyword line.
+    pub(super) at: usize,
+    /// Cells; with offsets one more.
+    pub(super) count: usize,
+    /// From version 5.0 on.
+    pub(super) offsets: Option<ArrayNumbers>,
+    /// Before version 5.0 with the number of vertices in front of each cell.
+    pub(super) connectivity: ArrayNumbers,
+}
+
+/// What a mesh has beside the points.
+#[derive(Default)]
+pub(super) struct MeshCells {
+    pub(super) sections: Vec<Cells>,
+    pub(super) types: Option<ArrayNumbers>,
+}
+
 /// The walk through the file and what it has found so far.
 pub(super) struct Walker<'c, 'a> {
     cursor: LineCursor<'c, 'a>,
     /// What numbers that are text may still take.
-    budget: MemoryBudget,
+    pub(super) budget: MemoryBudget,
     encoding: VtkEncoding,
     major: u32,
     section: ArrayOwner,
@@ -55,6 +84,8 @@ pub(super) struct Walker<'c, 'a> {
     pub(super) points: Option<Points>,
     pub(super) arrays: Vec<PointArray>,
     pub(super) time: Option<f64>,
+    /// For a mesh its cells, which are taken instead of the arrays.
+    pub(super) mesh: Option<MeshCells>,
 }
 
 impl<'c, 'a> Walker<'c, 'a> {
@@ -92,7 +123,14 @@ impl<'c, 'a> Walker<'c, 'a> {
             points: None,
             arrays: Vec::new(),
             time: None,
+            mesh: None,
         })
+    }
+
+    /// Takes the cells instead of the arrays.
+    pub(super) fn for_mesh(mut self) -> Self {
+        self.mesh = Some(MeshCells::default());
+        self
     }
 
     /// Whether numbers are text.
@@ -112,7 +150,15 @@ impl<'c, 'a> Walker<'c, 'a> {
                 }
                 b"CELL_TYPES" => {
                     let types = count(&line, line.words().get(1))?;
-                    self.skip(&line, "int", types)?;
+                    let taken = self.take_for_mesh(
+                        stored_type(line.at, b"int")?,
+                        types,
+                        &line.shown(),
+                        true,
+                    )?;
+                    if let (Some(mesh), Some(taken)) = (&mut self.mesh, taken) {
+                        mesh.types = Some(taken);
+                    }
                 }
                 b"POINT_DATA" => self.point_data(&line)?,
                 b"CELL_DATA" => {
@@ -142,7 +188,7 @@ impl<'c, 'a> Walker<'c, 'a> {
             b"STRUCTURED_POINTS" | b"STRUCTURED_GRID" | b"RECTILINEAR_GRID" | b"IMAGE_DATA"
             | b"FIELD" | b"TABLE" | b"TREE" | b"DIRECTED_GRAPH" | b"UNDIRECTED_GRAPH" => {
                 Err(ParseError::unsupported(format!(
-                    "DATASET {} holds no particles; write POLYDATA or UNSTRUCTURED_GRID",
+                    "DATASET {} is not read; write POLYDATA or UNSTRUCTURED_GRID",
                     shown(&kind)
                 )))
             }
@@ -192,28 +238,69 @@ impl<'c, 'a> Walker<'c, 'a> {
         let words = line.words();
         let first = count(line, words.get(1))?;
         let second = count(line, words.get(2))?;
-        if self.major < 5 || !self.next_is("OFFSETS") {
-            return self.skip(line, "int", second);
-        }
-        for (keyword, values) in [("OFFSETS", first), ("CONNECTIVITY", second)] {
-            let next = self.cursor.keyword_line()?;
-            let Some(next) = next.filter(|next| next.starts_with(keyword)) else {
-                return Err(ParseError::malformed(
-                    self.cursor.at(),
-                    format!("{keyword} is missing after `{}`", line.shown()),
-                ));
-            };
-            let words = next.words();
-            let name = words.get(1).copied().unwrap_or_default();
-            let stored = stored_type(next.at, name)?;
-            skip_values(&mut self.cursor, self.encoding, stored, values, keyword)?;
-            if self.next_is("METADATA") {
-                self.components = 1;
-                self.cursor.keyword_line()?;
-                self.metadata()?;
-            }
+        let section = cell_section(line);
+        let mut offsets = None;
+        let connectivity = if self.major < 5 || !self.next_is("OFFSETS") {
+            let stored = stored_type(line.at, b"int")?;
+            self.take_for_mesh(stored, second, &line.shown(), section.is_some())?
+        } else {
+            offsets = self.cell_array(line, "OFFSETS", first, section.is_some())?;
+            self.cell_array(line, "CONNECTIVITY", second, section.is_some())?
+        };
+        if let (Some(mesh), Some(section), Some(connectivity)) =
+            (&mut self.mesh, section, connectivity)
+        {
+            mesh.sections.push(Cells {
+                section,
+                at: line.at,
+                count: first,
+                offsets,
+                connectivity,
+            });
         }
         Ok(())
+    }
+
+    /// `OFFSETS` or `CONNECTIVITY` of the cells in `line`, with `values` numbers.
+    fn cell_array(
+        &mut self,
+        line: &VtkLine,
+        keyword: &str,
+        values: usize,
+        has_faces: bool,
+    ) -> Result<Option<ArrayNumbers>, ParseError> {
+        let next = self.cursor.keyword_line()?;
+        let Some(next) = next.filter(|next| next.starts_with(keyword)) else {
+            return Err(ParseError::malformed(
+                self.cursor.at(),
+                format!("{keyword} is missing after `{}`", line.shown()),
+            ));
+        };
+        let words = next.words();
+        let name = words.get(1).copied().unwrap_or_default();
+        let stored = stored_type(next.at, name)?;
+        let taken = self.take_for_mesh(stored, values, keyword, has_faces)?;
+        if self.next_is("METADATA") {
+            self.cursor.keyword_line()?;
+            self.metadata()?;
+        }
+        Ok(taken)
+    }
+
+    /// Takes `values` numbers of cells that have faces if a mesh is read, otherwise skips them.
+    fn take_for_mesh(
+        &mut self,
+        stored: VtkType,
+        values: usize,
+        what: &str,
+        has_faces: bool,
+    ) -> Result<Option<ArrayNumbers>, ParseError> {
+        self.components = 1;
+        if self.mesh.is_some() && has_faces {
+            return self.take(stored, values, what).map(Some);
+        }
+        skip_values(&mut self.cursor, self.encoding, stored, values, what)?;
+        Ok(None)
     }
 
     fn skip(&mut self, line: &VtkLine, name: &str, values: usize) -> Result<(), ParseError> {
@@ -324,7 +411,8 @@ impl<'c, 'a> Walker<'c, 'a> {
         self.components = components;
         let what = line.shown();
         let is_time = self.section == ArrayOwner::Dataset && values == 1 && is_time_name(&name);
-        if stored == VtkType::Text || components == 0 || !(is_ours || is_time) {
+        let is_wanted = self.mesh.is_none() && (is_ours || is_time);
+        if stored == VtkType::Text || components == 0 || !is_wanted {
             return skip_values(&mut self.cursor, self.encoding, stored, values, &what);
         }
         let numbers = self.take(stored, values, &what)?;
@@ -370,5 +458,15 @@ impl<'c, 'a> Walker<'c, 'a> {
     fn next_is(&mut self, keyword: &str) -> bool {
         let next = self.cursor.ahead(|cursor| cursor.keyword_line());
         matches!(next, Ok(Some(line)) if line.starts_with(keyword))
+    }
+}
+
+/// What the cells after `line` are; none for points and lines, which have no faces.
+fn cell_section(line: &VtkLine) -> Option<CellSection> {
+    match line.first_word().to_ascii_uppercase().as_slice() {
+        b"POLYGONS" => Some(CellSection::Polygons),
+        b"TRIANGLE_STRIPS" => Some(CellSection::Strips),
+        b"CELLS" => Some(CellSection::Typed),
+        _ => None,
     }
 }

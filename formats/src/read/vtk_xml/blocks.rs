@@ -12,7 +12,7 @@ use base64::alphabet;
 use base64::engine::{DecodePaddingMode, GeneralPurpose, GeneralPurposeConfig};
 use rayon::prelude::*;
 
-use super::compressor::Compressor;
+use super::compressor::{Compressor, DecompressError};
 use crate::{Endian, MemoryBudget, ParseError};
 
 /// Padding may be missing at the end of a run; bits beyond the last byte do not matter.
@@ -40,6 +40,18 @@ pub(super) enum ArrayFault {
     Damaged(String),
     /// It needs too much memory.
     TooLarge(ParseError),
+}
+
+impl ArrayFault {
+    fn too_short(need: usize, left: usize) -> Self {
+        Self::Damaged(format!("{need} bytes needed, {left} are left"))
+    }
+}
+
+impl From<DecompressError> for ArrayFault {
+    fn from(error: DecompressError) -> Self {
+        Self::Damaged(error.to_string())
+    }
 }
 
 impl From<String> for ArrayFault {
@@ -86,11 +98,11 @@ impl<'a> EncodedBytes<'a> {
     }
 
     /// The next `count` bytes, encoded as one run, and the source after them.
-    fn run(self, count: usize) -> Result<(Cow<'a, [u8]>, Self), String> {
+    fn run(self, count: usize) -> Result<(Cow<'a, [u8]>, Self), ArrayFault> {
         match self {
             Self::Raw(bytes) => match bytes.split_at_checked(count) {
                 Some((run, rest)) => Ok((Cow::Borrowed(run), Self::Raw(rest))),
-                None => Err(format!("{count} bytes needed, {} are left", bytes.len())),
+                None => Err(ArrayFault::too_short(count, bytes.len())),
             },
             Self::Base64(chars) => {
                 let (mut bytes, rest) = decode_run(chars, count)?;
@@ -101,7 +113,7 @@ impl<'a> EncodedBytes<'a> {
     }
 
     /// The length header of `header` bytes, and where its data are.
-    fn length_and_data(self, header: usize) -> Result<(Cow<'a, [u8]>, DataRun<'a>), String> {
+    fn length_and_data(self, header: usize) -> Result<(Cow<'a, [u8]>, DataRun<'a>), ArrayFault> {
         match self {
             Self::Raw(_) => {
                 let (length, behind) = self.run(header)?;
@@ -123,15 +135,15 @@ impl<'a> EncodedBytes<'a> {
 }
 
 /// Decodes the characters that hold `count` bytes, up to two bytes more; and what follows them.
-fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), String> {
-    let wanted = count.div_ceil(3).checked_mul(4);
-    let wanted = wanted.ok_or_else(|| format!("{count} bytes are too many"))?;
-    let (run, rest) = take_chars(chars, wanted);
+fn decode_run(chars: &[u8], count: usize) -> Result<(Vec<u8>, &[u8]), ArrayFault> {
+    let needed = count.div_ceil(3).checked_mul(4);
+    let needed = needed.ok_or_else(|| format!("{count} bytes are too many"))?;
+    let (run, rest) = take_chars(chars, needed);
     let bytes = BASE64
         .decode(run)
         .map_err(|error| format!("bad base64: {error}"))?;
     if bytes.len() < count {
-        return Err(format!("{count} bytes needed, {} are left", bytes.len()));
+        return Err(ArrayFault::too_short(count, bytes.len()));
     }
     Ok((bytes, rest))
 }
@@ -193,12 +205,12 @@ fn plain<'a>(
     source: EncodedBytes<'a>,
     encoding: ArrayEncoding,
     need: usize,
-) -> Result<Payload<'a>, String> {
+) -> Result<Payload<'a>, ArrayFault> {
     let header = encoding.header.size();
     let (length, data) = source.length_and_data(header)?;
     let stated = integers(&length, encoding).next().unwrap_or(0);
     if stated != need as u64 {
-        return Err(format!("{need} bytes needed, the header says {stated}"));
+        return Err(format!("{need} bytes needed, but the header has {stated}").into());
     }
     match data {
         DataRun::New(source) => source.run(need),
@@ -226,7 +238,7 @@ fn compressed<'a>(
         // Some writers leave out the other two integers then.
         return match need {
             0 => Ok((Cow::Borrowed(&[]), rest)),
-            _ => Err(format!("{need} bytes needed, there are no blocks").into()),
+            _ => Err(format!("{need} bytes needed, but there are no blocks").into()),
         };
     }
     let header = usize::try_from(blocks)
@@ -259,7 +271,7 @@ fn inflate<'a>(
         .and_then(|full| full.checked_add(last));
     if total != Some(need as u64) || last > block_size || block_size == 0 {
         return Err(format!(
-            "{need} bytes needed, the header says {full_blocks} blocks of {block_size} and one of \
+            "{need} bytes needed, but the header has {full_blocks} blocks of {block_size} and one of \
              {last}"
         )
         .into());

@@ -1,15 +1,30 @@
 //! The three compressors of VTK, one block at a time, into a buffer whose size the file states.
 
-use std::io::Read;
+use std::io::{self, Read};
 
 use flate2::{Decompress, FlushDecompress, Status};
 use lzma_rust2::XzReader;
 
-use super::document::short;
+use super::short;
 use crate::ParseError;
 
 /// Bytes that an LZMA decoder takes beside its dictionary: probabilities and a buffer.
 const XZ_DECODER: u64 = 128 << 10;
+
+/// Why a block cannot be decompressed.
+#[derive(Debug, thiserror::Error)]
+pub(super) enum DecompressError {
+    #[error("zlib: {0}")]
+    Zlib(#[from] flate2::DecompressError),
+    #[error("zlib stream is not {expected} bytes or is cut short")]
+    ZlibLength { expected: usize },
+    #[error("lz4: {0}")]
+    Lz4(#[from] lz4_flex::block::DecompressError),
+    #[error("xz: {0}")]
+    Xz(#[from] io::Error),
+    #[error("it holds {written} bytes or more, but its header has {expected}")]
+    Length { written: usize, expected: usize },
+}
 
 /// How blocks are compressed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -69,8 +84,8 @@ impl Compressor {
         block: &[u8],
         output: &mut [u8],
         memory: u64,
-    ) -> Result<(), String> {
-        let wanted = output.len();
+    ) -> Result<(), DecompressError> {
+        let expected = output.len();
         let written = match self {
             Self::Zlib => {
                 let mut zlib = Decompress::new(true);
@@ -79,30 +94,26 @@ impl Compressor {
                         usize::try_from(zlib.total_out()).unwrap_or(usize::MAX)
                     }
                     Ok(_) => {
-                        return Err(format!("zlib stream is not {wanted} bytes or is cut short"));
+                        return Err(DecompressError::ZlibLength { expected });
                     }
-                    Err(error) => return Err(format!("zlib: {error}")),
+                    Err(error) => return Err(error.into()),
                 }
             }
-            Self::Lz4 => lz4_flex::block::decompress_into(block, output)
-                .map_err(|error| format!("lz4: {error}"))?,
+            Self::Lz4 => lz4_flex::block::decompress_into(block, output)?,
             Self::Xz => {
                 let kib = memory.min(Self::MOST_MEMORY) >> 10;
                 let kib = u32::try_from(kib).unwrap_or(u32::MAX);
                 let mut xz = XzReader::new_mem_limit(block, false, kib);
-                xz.read_exact(output)
-                    .map_err(|error| format!("xz: {error}"))?;
+                xz.read_exact(output)?;
                 // Reading on to the end also verifies the checksum.
-                let beyond = xz.read(&mut [0]).map_err(|error| format!("xz: {error}"))?;
-                wanted + beyond
+                let beyond = xz.read(&mut [0])?;
+                expected + beyond
             }
         };
-        if written == wanted {
+        if written == expected {
             Ok(())
         } else {
-            Err(format!(
-                "it holds {written} bytes or more, its header says {wanted}"
-            ))
+            Err(DecompressError::Length { written, expected })
         }
     }
 }

@@ -12,6 +12,7 @@ use quick_xml::reader::Reader;
 
 use super::blocks::{ArrayEncoding, HeaderType};
 use super::compressor::Compressor;
+use super::short;
 use crate::{Endian, MemoryBudget, ParseError};
 
 /// The parsed XML.
@@ -29,6 +30,50 @@ pub(super) struct Piece<'a> {
     pub(super) points: usize,
     pub(super) coordinates: Option<DataArray<'a>>,
     pub(super) point_data: Vec<DataArray<'a>>,
+    /// Cells of each [`CellSection`], if a mesh is read.
+    pub(super) cell_counts: [usize; 3],
+    /// If a mesh is read.
+    pub(super) cells: Vec<CellGroup<'a>>,
+}
+
+/// `<Polys>`, `<Strips>` or `<Cells>` of a piece.
+#[derive(Debug)]
+pub(super) struct CellGroup<'a> {
+    /// Byte where its tag ends.
+    pub(super) at: usize,
+    pub(super) section: CellSection,
+    pub(super) arrays: Vec<DataArray<'a>>,
+}
+
+/// What the cells of a group are.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum CellSection {
+    Polygons,
+    Strips,
+    /// Of several types, which an array has.
+    Typed,
+}
+
+impl CellSection {
+    const ALL: [Self; 3] = [Self::Polygons, Self::Strips, Self::Typed];
+
+    /// The element that holds such cells.
+    pub(super) const fn element(self) -> &'static str {
+        match self {
+            Self::Polygons => "Polys",
+            Self::Strips => "Strips",
+            Self::Typed => "Cells",
+        }
+    }
+
+    /// The attribute of a piece with the number of such cells.
+    const fn count_attribute(self) -> &'static str {
+        match self {
+            Self::Polygons => "NumberOfPolys",
+            Self::Strips => "NumberOfStrips",
+            Self::Typed => "NumberOfCells",
+        }
+    }
 }
 
 /// One `<DataArray>`.
@@ -69,25 +114,31 @@ enum XmlElement {
     Piece,
     Points,
     PointData,
+    CellGroup,
     FieldData,
     DataArray,
     Other,
 }
 
-/// Where to stop parsing.
+/// What to parse.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum ParseEnd {
-    FirstPiece,
-    End,
+pub(super) enum XmlPart {
+    /// What is before the first piece.
+    Fields,
+    /// Points and point data.
+    Particles,
+    /// Points and cells.
+    Mesh,
 }
 
 impl<'a> XmlDocument<'a> {
     /// Parses `head`, the XML in front of the appended data. `is_cut` is true if appended data
     /// follow, so that open elements at the end are right.
-    pub(super) fn parse(head: &'a str, is_cut: bool, until: ParseEnd) -> Result<Self, ParseError> {
+    pub(super) fn parse(head: &'a str, is_cut: bool, part: XmlPart) -> Result<Self, ParseError> {
         let mut parser = XmlParser {
             document: None,
             path: Vec::new(),
+            part,
         };
         let mut reader = Reader::from_str(head);
         let mut is_closed = false;
@@ -97,7 +148,7 @@ impl<'a> XmlDocument<'a> {
             match event {
                 Ok(Event::Start(start)) => {
                     let tag = parser.open(&start, at)?;
-                    if tag == XmlElement::Piece && until == ParseEnd::FirstPiece {
+                    if tag == XmlElement::Piece && part == XmlPart::Fields {
                         break;
                     }
                     parser.path.push(tag);
@@ -130,6 +181,7 @@ impl<'a> XmlDocument<'a> {
 struct XmlParser<'a> {
     document: Option<XmlDocument<'a>>,
     path: Vec<XmlElement>,
+    part: XmlPart,
 }
 
 impl<'a> XmlParser<'a> {
@@ -159,18 +211,47 @@ impl<'a> XmlParser<'a> {
             (Some(XmlElement::Root), _) => XmlElement::Dataset,
             (Some(XmlElement::Dataset), "Piece") => XmlElement::Piece,
             (Some(XmlElement::Piece), "Points") => XmlElement::Points,
-            (Some(XmlElement::Piece), "PointData") => XmlElement::PointData,
+            (Some(XmlElement::Piece), "PointData") if self.part != XmlPart::Mesh => {
+                XmlElement::PointData
+            }
+            (Some(XmlElement::Piece), name) if cell_section(self.part, name).is_some() => {
+                XmlElement::CellGroup
+            }
             (
-                Some(XmlElement::Points | XmlElement::PointData | XmlElement::FieldData),
+                Some(
+                    XmlElement::Points
+                    | XmlElement::PointData
+                    | XmlElement::CellGroup
+                    | XmlElement::FieldData,
+                ),
                 "DataArray" | "Array",
             ) => XmlElement::DataArray,
             _ => XmlElement::Other,
         };
         if tag == XmlElement::Piece {
-            document.pieces.push(Piece {
+            let mut piece = Piece {
                 points: required_count(start, at, "NumberOfPoints")?,
                 coordinates: None,
                 point_data: Vec::new(),
+                cell_counts: [0; 3],
+                cells: Vec::new(),
+            };
+            if self.part == XmlPart::Mesh {
+                for section in CellSection::ALL {
+                    let count = optional_count(start, at, section.count_attribute())?;
+                    piece.cell_counts[section as usize] = count.unwrap_or(0);
+                }
+            }
+            document.pieces.push(piece);
+        }
+        if tag == XmlElement::CellGroup
+            && let (Some(section), Some(piece)) =
+                (cell_section(self.part, name), document.pieces.last_mut())
+        {
+            piece.cells.push(CellGroup {
+                at,
+                section,
+                arrays: Vec::new(),
             });
         }
         if tag == XmlElement::DataArray {
@@ -178,6 +259,11 @@ impl<'a> XmlParser<'a> {
             match (parent, document.pieces.last_mut()) {
                 (Some(XmlElement::FieldData), _) => document.fields.push(array),
                 (Some(XmlElement::PointData), Some(piece)) => piece.point_data.push(array),
+                (Some(XmlElement::CellGroup), Some(piece)) => {
+                    if let Some(group) = piece.cells.last_mut() {
+                        group.arrays.push(array);
+                    }
+                }
                 // The first array is the points, whatever its name.
                 (Some(XmlElement::Points), Some(piece)) if piece.coordinates.is_none() => {
                     piece.coordinates = Some(array);
@@ -200,6 +286,10 @@ impl<'a> XmlParser<'a> {
         let array = match (path.next(), document.pieces.last_mut()) {
             (Some(XmlElement::FieldData), _) => document.fields.last_mut(),
             (Some(XmlElement::PointData), Some(piece)) => piece.point_data.last_mut(),
+            (Some(XmlElement::CellGroup), Some(piece)) => {
+                let group = piece.cells.last_mut();
+                group.and_then(|group| group.arrays.last_mut())
+            }
             (Some(XmlElement::Points), Some(piece)) => piece.coordinates.as_mut(),
             _ => None,
         };
@@ -217,6 +307,12 @@ impl<'a> XmlParser<'a> {
             joined.push_str(&text);
         }
     }
+}
+
+/// The cells in the element `name` of a piece; `None` for points, lines and anything else, and unless a mesh is read.
+fn cell_section(part: XmlPart, name: &str) -> Option<CellSection> {
+    let mut sections = CellSection::ALL.into_iter();
+    sections.find(|section| part == XmlPart::Mesh && section.element() == name)
 }
 
 /// Checks the root element and reads how arrays are encoded.
@@ -240,8 +336,7 @@ fn root(start: &BytesStart<'_>, at: usize) -> Result<ArrayEncoding, ParseError> 
         }
         _ => {
             return Err(ParseError::unsupported(format!(
-                "VTKFile of type `{}` holds no particles; write UnstructuredGrid (.vtu) or \
-                 PolyData (.vtp)",
+                "VTKFile of type `{}` is not read; write UnstructuredGrid (.vtu) or PolyData (.vtp)",
                 short(&kind)
             )));
         }
@@ -330,12 +425,4 @@ fn required_count(start: &BytesStart<'_>, at: usize, name: &str) -> Result<usize
 
 fn bad_xml(at: usize, error: &dyn std::fmt::Display) -> ParseError {
     ParseError::malformed(at, format!("bad XML: {error}"))
-}
-
-/// A name from the file, short enough for a message.
-pub(super) fn short(name: &str) -> String {
-    name.chars()
-        .take(40)
-        .flat_map(char::escape_default)
-        .collect()
 }

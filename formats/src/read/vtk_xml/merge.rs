@@ -15,25 +15,34 @@ pub(super) fn positions(
 ) -> Result<Positions, ParseError> {
     let mut joined = Positions::F32(Vec::new());
     for piece in filled(document) {
-        let Some(array) = &piece.coordinates else {
-            return Err(ParseError::malformed(
-                0,
-                format!("a piece of {} points has no <Points>", piece.points),
-            ));
-        };
-        if array.components.is_some_and(|k| k != 3) {
-            return Err(ParseError::malformed(
-                array.at,
-                "points without 3 components",
-            ));
-        }
-        let count = value_count(array, piece.points, 3)?;
-        let Some(data) = values(array, document.encoding, appended, count)? else {
-            return Err(not_numeric(array));
-        };
-        joined = join_positions(joined, vtk::positions(data));
+        joined = join_positions(joined, piece_positions(document, piece, appended)?);
     }
     Ok(joined)
+}
+
+/// The positions of `piece`, one of those of `document`.
+pub(super) fn piece_positions(
+    document: &XmlDocument<'_>,
+    piece: &Piece<'_>,
+    appended: Option<Appended<'_>>,
+) -> Result<Positions, ParseError> {
+    let Some(array) = &piece.coordinates else {
+        return Err(ParseError::malformed(
+            0,
+            format!("a piece of {} points has no <Points>", piece.points),
+        ));
+    };
+    if array.components.is_some_and(|k| k != 3) {
+        return Err(ParseError::malformed(
+            array.at,
+            "points without 3 components",
+        ));
+    }
+    let count = value_count(array, piece.points, 3)?;
+    let Some(data) = values(array, document.encoding, appended, count)? else {
+        return Err(not_numeric(array));
+    };
+    Ok(vtk::positions(data))
 }
 
 fn join_positions(joined: Positions, more: Positions) -> Positions {
@@ -113,7 +122,7 @@ pub(super) fn attributes(
 }
 
 /// Pieces that hold particles; VTK drops the attributes of the others.
-fn filled<'d, 'a>(document: &'d XmlDocument<'a>) -> impl Iterator<Item = &'d Piece<'a>> {
+pub(super) fn filled<'d, 'a>(document: &'d XmlDocument<'a>) -> impl Iterator<Item = &'d Piece<'a>> {
     document.pieces.iter().filter(|piece| piece.points > 0)
 }
 
@@ -157,7 +166,8 @@ fn extend(data: &mut AttributeData, more: AttributeData) {
     }
 }
 
-fn not_numeric(array: &DataArray<'_>) -> ParseError {
+/// The error for an array of strings.
+pub(super) fn not_numeric(array: &DataArray<'_>) -> ParseError {
     ParseError::malformed(
         array.at,
         format!("type `{}` is not a number", super::short(&array.type_name)),

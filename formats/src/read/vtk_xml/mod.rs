@@ -2,7 +2,7 @@
 //! data, from any number of pieces, in every encoding that VTK, meshio and pyvisfile write.
 //!
 //! `document` reads the XML, `appended` finds the blob after it, `blocks` gets the bytes of
-//! an array out of either, `compressor` unpacks them, `merge` puts pieces together. Files that
+//! an array out of either, `compressor` unpacks them, `merge` puts pieces together, `mesh` reads cells. Files that
 //! only list other files (`.pvtu`, `.vtm`, `.pvd`) and grids are refused by name. Layout after "VTK
 //! File Formats" (the VTK user's guide) and after files of VTK 9, ParaView, meshio and PySPH.
 
@@ -11,9 +11,12 @@ mod blocks;
 mod compressor;
 mod document;
 mod merge;
+mod mesh;
 mod sniff;
 #[cfg(test)]
 mod tests;
+
+pub(crate) use mesh::read_mesh;
 
 use std::cell::Cell;
 
@@ -27,7 +30,7 @@ use crate::reader::{Confidence, FileExtent, Reader};
 use crate::{AttributeData, Endian, MemoryBudget, ParseError, RawParticles, ScalarType};
 use appended::Appended;
 use blocks::{ArrayEncoding, ArrayFault, EncodedBytes, payload};
-use document::{ArrayLocation, DataArray, ParseEnd, XmlDocument, short};
+use document::{ArrayLocation, DataArray, XmlDocument, XmlPart};
 
 /// XML VTK: `.vtu` and `.vtp`.
 pub const FORMAT: Format = Format::new(&XmlVtk);
@@ -55,7 +58,7 @@ impl Reader for XmlVtk {
     ) -> Result<Vec<Step>, ParseError> {
         let bytes = source.bytes();
         let mut step = Step::whole(bytes.len());
-        step.time = parse(bytes, ParseEnd::FirstPiece, |mut document, appended| {
+        step.time = parse(bytes, XmlPart::Fields, |mut document, appended| {
             document.encoding.decoders = budget;
             Ok(time(&document, appended))
         })
@@ -73,16 +76,20 @@ impl Reader for XmlVtk {
         _step: &Step,
         budget: MemoryBudget,
     ) -> Result<RawParticles, ParseError> {
-        parse(source.bytes(), ParseEnd::End, |mut document, appended| {
-            check_shares(&document, appended)?;
-            document.encoding.decoders = check_memory(&document, budget)?;
-            Ok(RawParticles {
-                positions: merge::positions(&document, appended)?,
-                attributes: merge::attributes(&document, appended)?,
-                time: time(&document, appended),
-                step: None,
-            })
-        })
+        parse(
+            source.bytes(),
+            XmlPart::Particles,
+            |mut document, appended| {
+                check_shares(&document, appended)?;
+                document.encoding.decoders = check_memory(&document, budget)?;
+                Ok(RawParticles {
+                    positions: merge::positions(&document, appended)?,
+                    attributes: merge::attributes(&document, appended)?,
+                    time: time(&document, appended),
+                    step: None,
+                })
+            },
+        )
     }
 
     fn unpacked_arrays_len(&self, head: &[u8], _file: FileExtent, particles: &RawParticles) -> u64 {
@@ -98,14 +105,14 @@ impl Reader for XmlVtk {
 /// Cuts the file, parses the XML in front and hands both parts on.
 fn parse<T>(
     bytes: &[u8],
-    until: ParseEnd,
+    part: XmlPart,
     then: impl FnOnce(XmlDocument<'_>, Option<Appended<'_>>) -> Result<T, ParseError>,
 ) -> Result<T, ParseError> {
     let cut = appended::find(bytes);
     let head = bytes.get(..cut.unwrap_or(bytes.len())).unwrap_or_default();
     // Names in another encoding than UTF-8 are no reason to refuse the numbers.
     let head = same_length(head);
-    let document = XmlDocument::parse(&head, cut.is_some(), until)?;
+    let document = XmlDocument::parse(&head, cut.is_some(), part)?;
     check_total(&document, bytes.len())?;
     let spent = Cell::new(0);
     let appended = cut.map(|tag| Appended::parse(bytes, tag, &spent));
@@ -113,13 +120,18 @@ fn parse<T>(
     then(document, appended)
 }
 
+/// The most bytes that `len` bytes of the file can stand for.
+fn most_bytes(document: &XmlDocument<'_>, len: usize) -> usize {
+    match document.encoding.compressor {
+        Some(compressor) => compressor.most_output(len),
+        None => len,
+    }
+}
+
 /// Rejects particle counts that no file of this length can hold; pieces that share their bytes
 /// would get past the check of each array.
 fn check_total(document: &XmlDocument<'_>, file: usize) -> Result<(), ParseError> {
-    let most = match document.encoding.compressor {
-        Some(compressor) => compressor.most_output(file),
-        None => file,
-    };
+    let most = most_bytes(document, file);
     let total = document
         .pieces
         .iter()
@@ -129,7 +141,7 @@ fn check_total(document: &XmlDocument<'_>, file: usize) -> Result<(), ParseError
         Some(bytes) if bytes <= most => Ok(()),
         _ => Err(ParseError::malformed(
             0,
-            format!("the pieces state more particles than a file of {file} bytes can hold"),
+            format!("the pieces state more points than a file of {file} bytes can hold"),
         )),
     }
 }
@@ -144,10 +156,7 @@ fn check_shares(
         return Ok(());
     };
     let len = appended.blob.len();
-    let most = match document.encoding.compressor {
-        Some(compressor) => compressor.most_output(len),
-        None => len,
-    };
+    let most = most_bytes(document, len);
     let mut need = 0_usize;
     for (array, bytes) in array_sizes(document) {
         if !matches!(array.place, ArrayLocation::Appended(_)) {
@@ -296,7 +305,7 @@ fn values(
     let (bytes, used) = payload(source, encoding, need).map_err(|why| match why {
         ArrayFault::Damaged(what) => fault(at, what),
         ArrayFault::TooLarge(error) => {
-            error.retold(|what| format!("array `{}`: {what}", short(&array.name)))
+            error.map_message(|what| format!("array `{}`: {what}", short(&array.name)))
         }
     })?;
     let is_appended = matches!(array.place, ArrayLocation::Appended(_));
@@ -323,4 +332,12 @@ fn value_count(
                 format!("{points} points of {components} components are too many"),
             )
         })
+}
+
+/// A name from the file, short enough for a message.
+fn short(name: &str) -> String {
+    name.chars()
+        .take(40)
+        .flat_map(char::escape_default)
+        .collect()
 }

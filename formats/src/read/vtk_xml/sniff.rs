@@ -29,9 +29,9 @@ pub(super) fn sniff(head: &[u8]) -> Result<Confidence, ParseError> {
             "a VTK multi-block index (.vtm), which only lists its blocks; give the blocks"
                 .to_owned()
         }
-        Some(kind) => format!(
-            "a VTK file of type {kind} holds no particles; save as UnstructuredGrid or PolyData"
-        ),
+        Some(kind) => {
+            format!("a VTK file of type {kind} is not read; save as UnstructuredGrid or PolyData")
+        }
     };
     Err(ParseError::unsupported(what))
 }

@@ -105,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn odd_comments_end() {
+    fn unusual_comments_end() {
         for comment in [
             "", "=", "= =", "a=", "\"", "a=\"b", "==a=1", "{", "a = ", "'", "\\",
         ] {
@@ -114,7 +114,7 @@ mod tests {
     }
 
     #[test]
-    fn a_comment_of_openings_is_walked_once() {
+    fn nested_comment_openings_take_linear_time() {
         // Looked through from each of them, these would take hours.
         for openings in ["{ ", "\" ", "a={ ", "[ ' "] {
             let comment = openings.repeat(1 << 20);

@@ -60,7 +60,7 @@ fn three_kinds() {
 }
 
 #[test]
-fn neither_of_them() {
+fn neither_dialect() {
     let both = kind(&[0; 25]).unwrap_err().to_string();
     assert!(both.contains("raw f32") && both.contains("text"), "{both}");
     for text in [
@@ -150,7 +150,7 @@ fn plain_columns_and_remarks() {
 }
 
 #[test]
-fn elements_and_species_are_numbers() {
+fn elements_and_species_become_numbers() {
     let plain = only(b"3\n\nO 0 0 0\nH 1 0 0\nwall 0 0 1\n");
     assert_eq!(whole(&plain, "element")[..2], [8, 1]);
     let text = "3\nLattice=\"9 0 0 0 9 0 0 0 9\" pbc=\"T T F\" Properties=id:I:1:species:S:1:pos:R:3\n\
@@ -185,7 +185,7 @@ fn frames_one_after_another() {
 }
 
 #[test]
-fn a_last_frame_cut_short() {
+fn truncated_last_frame() {
     let text = "1\n\nW 1 2 3\n2\n\nW 4 5 6\nW 7 8 9\n";
     for len in 12..text.len() - 2 {
         let cut = &text.as_bytes()[..len];
@@ -220,7 +220,7 @@ fn bare_points() {
 }
 
 #[test]
-fn faults_have_names() {
+fn faults_are_described() {
     let cases = [
         (
             "2\n\nW 1 2 3\n",
@@ -258,7 +258,7 @@ fn faults_have_names() {
 }
 
 #[test]
-fn absurd_counts_allocate_nothing() {
+fn huge_counts_allocate_nothing() {
     for count in ["99999999999", "9223372036854775807"] {
         let found = fault(&format!("{count}\n\nW 1 2 3\n"));
         assert!(found.contains("expected, 1 lines follow"), "{found}");
@@ -269,7 +269,7 @@ fn absurd_counts_allocate_nothing() {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
-fn cut_files_are_no_panic() {
+fn truncated_files_do_not_panic() {
     for name in ["raw", "mol", "ext"] {
         cut_everywhere(&sample(&format!("single_frames/{name}.xyz")), steps, read);
     }
@@ -279,21 +279,21 @@ proptest! {
     #![proptest_config(config())]
 
     #[test]
-    fn damage_is_no_panic(mutations in mutations()) {
+    fn damaged_files_do_not_panic(mutations in mutations()) {
         let text = "2\nProperties=species:S:1:pos:R:3:id:I:1 Time=1\nW 1 2 3 4\nW 5 6 7 8\n1\n\nH 1 2 3 4\n";
         read_all(&mutated(text.as_bytes(), &mutations), steps, read);
         read_all(&mutated(b"# x y z\n1 2 3\n4 5 6\n7,8,9\n", &mutations), steps, read);
     }
 
     #[test]
-    fn noise_is_no_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), letters in letters()) {
+    fn random_bytes_do_not_panic(bytes in prop::collection::vec(any::<u8>(), 0..300), letters in letters()) {
         read_all(&bytes, steps, read);
         read_all(&letters, steps, read);
         read_all(&[b"2\nProperties=pos:R:3:", &*letters].concat(), steps, read);
     }
 
     #[test]
-    fn written_frames_come_back(
+    fn written_frames_round_trip(
         frames in prop::collection::vec(
             prop::collection::vec((any::<i64>(), any::<[f64; 3]>()), 0..20),
             1..4,

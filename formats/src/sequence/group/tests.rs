@@ -46,7 +46,7 @@ fn unpadded_numbers_sort_as_numbers() {
 }
 
 #[test]
-fn a_varying_count_is_no_frame_number() {
+fn varying_count_is_not_the_frame_number() {
     let files = owned(&[
         "dam_break_frame_23_24389_particles.bgeo",
         "dam_break_frame_9_6859_particles.bgeo",
@@ -91,7 +91,7 @@ fn objects_of_one_model_become_parts() {
 }
 
 #[test]
-fn a_late_part_is_still_a_part() {
+fn parts_may_start_late() {
     let mut files: Vec<String> = (1..9).map(|i| format!("Fluid_{i}.vtk")).collect();
     files.extend((7..9).map(|i| format!("Oil_{i}.vtk")));
     let (group, _) = picked(&files);
@@ -102,7 +102,7 @@ fn a_late_part_is_still_a_part() {
 }
 
 #[test]
-fn few_strays_are_left_out_and_told() {
+fn few_stray_files_are_skipped_and_reported() {
     let mut files: Vec<String> = (0..10)
         .map(|i| format!("dump.drop.{}.lammps", i * 400))
         .collect();
@@ -120,7 +120,7 @@ fn few_strays_are_left_out_and_told() {
 }
 
 #[test]
-fn two_formats_are_told_with_their_patterns() {
+fn two_formats_are_reported_with_their_patterns() {
     let text = ambiguous(&["x_1.vtk", "x_2.vtk", "x_1.bgeo", "x_2.bgeo"]);
     assert!(
         text.contains("`x_#.bgeo` (2 frames)") && text.contains("`x_#.vtk` (2 frames)"),
@@ -169,7 +169,7 @@ fn the_same_frame_twice_is_an_error() {
 }
 
 #[test]
-fn listed_files_are_all_used() {
+fn all_listed_files_are_used() {
     let mut notes = Vec::new();
     let mut list = |files: &[&str]| {
         notes.clear();
@@ -184,7 +184,7 @@ fn listed_files_are_all_used() {
 }
 
 #[test]
-fn very_many_names_without_anything_in_common_are_grouped() {
+fn unrelated_names_are_grouped_in_linear_time() {
     // Compared each with each, these would take minutes.
     let letters = |mut i: usize| {
         let mut text = String::new();

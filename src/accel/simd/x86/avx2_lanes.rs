@@ -51,7 +51,7 @@ unsafe fn lane_mask(lanes: u32) -> __m256 {
     }
 }
 
-/// The least of eight lanes, none of which is NaN.
+/// Minimum of eight lanes, none of which is NaN.
 ///
 /// # Safety
 /// The machine of the caller has AVX2.

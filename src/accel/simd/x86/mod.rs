@@ -30,8 +30,8 @@ macro_rules! compiled {
                 task.run($kernel)
             }
             assert_eq!(proof.level(), $level);
-            // SAFETY: a `Supported` is only made for a level whose features the machine was found
-            // to have, and this one is for the level of these features.
+            // SAFETY: a `Supported` is constructed only if the machine has the features of its level, and this one
+            // has the level of these features.
             unsafe { with_features(task) }
         }
     };

@@ -1,8 +1,8 @@
-//! Many values for every key: what the schema takes the reader takes, and the other way round.
+//! Many values for every key: the schema accepts a value if and only if the reader accepts it.
 
 use super::*;
 
-/// Values of every kind, around every bound.
+/// Values of every type, around every bound.
 const VALUES: [&str; 100] = [
     "0",
     "1",
@@ -106,7 +106,7 @@ const VALUES: [&str; 100] = [
     "{ top = [0, 0, 0], bottom = [1, 1, 1], x = 1 }",
 ];
 
-/// Values for colours by an attribute alone.
+/// Values for colours that come from an attribute.
 const COLORS: [&str; 6] = [
     "{ attribute = \"v\", map = \"turbo\", range = [0, 1] }",
     "{ attribute = \"v\", map = \"trubo\" }",
@@ -116,27 +116,27 @@ const COLORS: [&str; 6] = [
     "{ map = \"turbo\" }",
 ];
 
-/// What the schema takes and the reader does not.
+/// Values that the schema accepts and the reader rejects.
 const BEYOND: [(&str, &str); 1] = [
     // A size must be above 0.
     ("render.memory_limit", "0B"),
 ];
 
-/// A manifest with everything that keys need beside them.
+/// A manifest with all keys that other keys depend on.
 const BASE: &str = r#"
 input = { path = "data" }
 camera = { mode = "fixed", eye = [5, 6, 7.5], look_at = [9, 9, 9.25], key = [{ frame = 0, eye = [5, 6, 7.5], look_at = [9, 9, 9.25] }] }
-light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }]
+light = [{ type = "point", position = [0, 0, 10] }, { type = "directional", direction = [0, 0, -1] }, { type = "sun", direction = [0, 0, -1] }, { type = "sphere", position = [0, 0, 10], radius = 1 }, { type = "rect", position = [0, 0, 10], direction = [0, 0, -1], width = 2, height = 1 }, { type = "disc", position = [0, 0, 10], direction = [0, 0, -1], radius = 1 }]
 job = { isolate = true }
 "#;
 
-/// All keys: those of tables, and those of the items of lists.
+/// All keys, of tables and of items of lists.
 fn keys() -> Vec<String> {
     let items = read(BASE).unwrap().entries();
     items.list().iter().map(|e| e.key.clone()).collect()
 }
 
-/// `value` laid over BASE under the dotted `key`.
+/// `BASE` with `value` for the dotted `key`.
 fn with(key: &str, value: &toml::Value) -> Table {
     let mut base: toml::Value = toml::Value::Table(BASE.parse().unwrap());
     let mut node = &mut base;
@@ -157,7 +157,7 @@ fn with(key: &str, value: &toml::Value) -> Table {
     }
 }
 
-/// Words that some key knows, and each with a slip.
+/// Collects the words that keys accept, and a misspelling of each.
 fn words_and_slips(schema: &Value, found: &mut BTreeSet<String>) {
     match schema {
         Value::Object(map) => {
@@ -175,13 +175,13 @@ fn words_and_slips(schema: &Value, found: &mut BTreeSet<String>) {
     }
 }
 
-/// A number without a fraction is whole to JSON, and none to TOML.
+/// A float without a fraction is an integer in JSON schema, but not in TOML.
 fn is_whole_float(value: &toml::Value) -> bool {
     matches!(value, toml::Value::Float(f) if f.fract() == 0.0)
 }
 
 #[test]
-fn both_take_and_refuse_the_same_values() {
+fn schema_and_reader_accept_the_same_values() {
     let (schema, validator) = (job_schema(), validator());
     let mut values: BTreeSet<String> = VALUES
         .iter()
@@ -199,9 +199,9 @@ fn both_take_and_refuse_the_same_values() {
             let valid = validator.is_valid(&serde_json::to_value(&table).unwrap());
             taken += usize::from(valid);
             if valid != read.is_ok() && !(valid && is_whole_float(&value)) {
-                let told =
+                let verdict =
                     read.map_or_else(|e| e.to_string(), |_| "the schema refuses it".to_owned());
-                differ.push(format!("{key} = {text}: {told}"));
+                differ.push(format!("{key} = {text}: {verdict}"));
             }
         }
         if taken == 0 {
@@ -211,9 +211,9 @@ fn both_take_and_refuse_the_same_values() {
     assert!(differ.is_empty(), "{}", differ.join("\n"));
 }
 
-/// Keeps the list of differences true.
+/// Checks that the list of differences is up to date.
 #[test]
-fn what_only_the_reader_knows() {
+fn checks_of_the_reader_alone() {
     for (key, value) in BEYOND {
         let table = with(key, &toml::Value::from(value));
         assert!(validator().is_valid(&serde_json::to_value(&table).unwrap()));

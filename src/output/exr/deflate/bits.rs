@@ -1,13 +1,13 @@
-//! Bits into bytes, the lowest first.
+//! Writes bits into bytes, least significant bit first.
 
-/// Writes numbers of a few bits behind the bytes of a vector.
+/// Appends numbers of a few bits to a vector of bytes.
 pub(super) struct BitWriter<'a> {
     bytes: &'a mut Vec<u8>,
-    /// Where the next byte goes: what lies beyond is room.
+    /// Position of the next byte. Bytes beyond it are reserved space.
     at: usize,
     /// Bits that are not in `bytes` yet.
     bits: u64,
-    /// How many.
+    /// Number of these bits.
     count: u32,
 }
 
@@ -22,27 +22,27 @@ impl<'a> BitWriter<'a> {
         }
     }
 
-    /// Whole bytes so far.
+    /// Number of complete bytes so far.
     pub(super) fn byte_len(&self) -> usize {
         self.at
     }
 
-    /// Makes room for so many further bits.
+    /// Reserves space for `bits` more bits.
     pub(super) fn reserve(&mut self, bits: u64) {
         let bytes = usize::try_from(bits / 8).expect("blocks fit into memory");
-        // Eight bytes are written at once, and some bits may wait.
+        // `flush` writes eight bytes at once, and up to seven bits may be pending
         self.bytes.resize(self.at + bytes + 16, 0);
     }
 
-    /// Appends the lowest `count` bits of `value`, which has no others. No more than 56 may be appended between calls
-    /// of [`Self::flush`].
+    /// Appends the lowest `count` bits of `value`; its other bits must be 0. At most 56 bits may be appended between
+    /// two calls of [`Self::flush`].
     #[inline(always)]
     pub(super) fn put(&mut self, value: u64, count: u32) {
         self.bits |= value << self.count;
         self.count += count;
     }
 
-    /// Moves whole bytes out; there must be room for them.
+    /// Moves complete bytes to the vector, which must have reserved space for them.
     #[inline(always)]
     pub(super) fn flush(&mut self) {
         self.bytes[self.at..self.at + 8].copy_from_slice(&self.bits.to_le_bytes());
@@ -52,7 +52,7 @@ impl<'a> BitWriter<'a> {
         self.count %= 8;
     }
 
-    /// Fills the last byte with zeros, and gives back the room.
+    /// Fills up the last byte with zero bits, and removes the reserved space.
     pub(super) fn align(&mut self) {
         self.reserve(0);
         self.count = self.count.next_multiple_of(8);
@@ -60,7 +60,7 @@ impl<'a> BitWriter<'a> {
         self.bytes.truncate(self.at);
     }
 
-    /// Appends whole bytes behind those that [`Self::align`] has made whole.
+    /// Appends whole bytes, after [`Self::align`].
     pub(super) fn extend(&mut self, bytes: &[u8]) {
         debug_assert_eq!(self.count, 0, "aligned before");
         self.bytes.truncate(self.at);

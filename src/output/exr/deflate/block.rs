@@ -1,4 +1,4 @@
-//! One block of a deflate stream: its codes, then its symbols; or its bytes as they are.
+//! Writes one block of a deflate stream: its Huffman codes and its symbols, or its bytes uncompressed.
 
 use super::bits::BitWriter;
 use super::entropy::Histogram;
@@ -9,23 +9,24 @@ use super::symbols::{
     length_bits,
 };
 
-/// Longest code of a literal or length: four fit into a register beside the bits of an unfinished byte.
-const LIMIT: usize = 14;
-/// Longest code of a code length.
-const HEADER_LIMIT: usize = 7;
-/// Symbols of the code for code lengths: lengths, a repetition, and two kinds of runs of zeros.
+/// Maximum length of the code of a literal or length, bits: four of them and the bits of an incomplete byte fit into a
+/// register.
+const MAX_SYMBOL_BITS: usize = 14;
+/// Maximum length of the code of a code length, bits.
+const MAX_HEADER_BITS: usize = 7;
+/// Number of symbols of the code for code lengths: the lengths 0 to 15, a repetition, and two kinds of runs of zeros.
 const LENGTH_CODES: usize = 19;
 const REPEAT: u8 = 16;
 const ZEROS: u8 = 17;
 const MANY_ZEROS: u8 = 18;
-/// The order in which their own lengths are written.
-const ORDER: [usize; LENGTH_CODES] = [
+/// The order in which the lengths of the codes for code lengths are written.
+const LENGTH_CODE_ORDER: [usize; LENGTH_CODES] = [
     16, 17, 18, 0, 8, 7, 9, 6, 10, 5, 11, 4, 12, 3, 13, 2, 14, 1, 15,
 ];
-/// Most bytes of a stored part.
-const STORED: usize = 0xffff;
+/// Maximum number of bytes in a stored block.
+const MAX_STORED: usize = 0xffff;
 
-/// Appends `data`, which is made of `sequences`, whose symbols `histogram` has counted.
+/// Appends `data` as a block. `sequences` describe all of it, and `histogram` has counted their symbols.
 pub(super) fn write_block(
     data: &[u8],
     sequences: &[Sequence],
@@ -35,15 +36,16 @@ pub(super) fn write_block(
 ) {
     let (mut symbols, mut distances) = (histogram.symbols, histogram.distances);
     symbols[END] = 1;
-    // A code needs two symbols.
+    // A Huffman code needs at least two symbols; add unused ones
     symbols[0] = symbols[0].max(u32::from(histogram.counts[0] == 0));
     let used = distances.iter().filter(|count| **count > 0).count();
     if used < 2 {
         distances[0] = distances[0].max(1);
         distances[1] = distances[1].max(1);
     }
+    // Make the codes, and store the data if that takes fewer bits
     let codes = Codes {
-        symbols: codes(&symbols, LIMIT),
+        symbols: codes(&symbols, MAX_SYMBOL_BITS),
         distances: codes(&distances, MAX_BITS),
     };
     let header = Header::of(&codes);
@@ -52,20 +54,21 @@ pub(super) fn write_block(
         write_stored(data, is_last, out);
         return;
     }
+    // Write the block with dynamic codes (type 2)
     out.reserve(bits);
     out.put(u64::from(is_last) | 2 << 1, 3);
     header.write(out);
     write_symbols(data, sequences, &codes, out);
 }
 
-/// The codes of a block.
+/// The Huffman codes of a block.
 struct Codes {
     symbols: [Code; SYMBOLS],
     distances: [Code; DISTANCES],
 }
 
 impl Codes {
-    /// Bits of all symbols and of what follows them.
+    /// Number of bits of all symbols, including their extra bits.
     fn bits(&self, symbols: &[u32; SYMBOLS], distances: &[u32; DISTANCES]) -> u64 {
         let bits = |counts: &[u32], codes: &[Code], extra_bits: fn(usize) -> u32| -> u64 {
             let all = counts.iter().zip(codes).enumerate();
@@ -79,50 +82,55 @@ impl Codes {
     }
 }
 
+/// Number of bits of `data` in stored blocks, each with a header of 5 bytes.
 fn stored_bits(data: &[u8]) -> u64 {
-    8 * (data.len() as u64 + 5 * data.len().div_ceil(STORED) as u64)
+    8 * (data.len() as u64 + 5 * data.len().div_ceil(MAX_STORED) as u64)
 }
 
 #[expect(
     clippy::cast_possible_truncation,
-    reason = "parts have at most 65535 bytes"
+    reason = "stored blocks have at most 65535 bytes"
 )]
 fn write_stored(data: &[u8], is_last: bool, out: &mut BitWriter) {
-    let parts = data.chunks(STORED);
-    let count = parts.len();
-    for (part, place) in parts.zip(1..) {
+    let chunks = data.chunks(MAX_STORED);
+    let count = chunks.len();
+    for (chunk, number) in chunks.zip(1..) {
         out.reserve(3);
-        out.put(u64::from(is_last && place == count), 3);
+        out.put(u64::from(is_last && number == count), 3);
         out.align();
-        let length = part.len() as u16;
+        let length = chunk.len() as u16;
         out.extend(&length.to_le_bytes());
         out.extend(&(!length).to_le_bytes());
-        out.extend(part);
+        out.extend(chunk);
     }
 }
 
-/// The codes of a block, as its header tells them (RFC 1951, section 3.2.7).
+/// The header of a block: the lengths of its codes (RFC 1951, section 3.2.7).
 struct Header {
-    /// Symbols and distances that have a length: none behind the last that occurs.
+    /// Number of symbols with a code length in the header: up to the last one that occurs.
     symbols: usize,
+    /// The same for distances.
     distances: usize,
+    /// All code lengths.
     lengths: Vec<LengthCode>,
+    /// The codes for code lengths.
     codes: [Code; LENGTH_CODES],
-    /// Of `codes`, in their order.
-    ordered: usize,
+    /// Number of `codes` in the header, in [`LENGTH_CODE_ORDER`].
+    code_count: usize,
 }
 
-/// Some code lengths.
+/// A symbol of the code for code lengths: one length, or several equal ones.
 #[derive(Clone, Copy)]
 struct LengthCode {
     symbol: u8,
-    /// How often, less the least number.
+    /// Number of repetitions minus the minimum of the symbol.
     extra: u8,
     extra_bits: u8,
 }
 
 impl Header {
     fn of(codes: &Codes) -> Self {
+        // Collect the lengths of the codes in use
         let used = |codes: &[Code], least: usize| {
             let last = codes.iter().rposition(|code| code.length > 0);
             least.max(last.map_or(0, |last| last + 1))
@@ -136,36 +144,40 @@ impl Header {
         for (length, code) in lengths.iter_mut().zip(all) {
             *length = code.length;
         }
+        // Shorten repetitions, and make the codes of what remains
         let lengths = length_codes(&lengths[..symbols + distances]);
         let mut counts = [0; LENGTH_CODES];
         for code in &lengths {
             counts[usize::from(code.symbol)] += 1;
         }
-        let codes = self::codes(&counts, HEADER_LIMIT);
-        let ordered = ORDER.iter().rposition(|symbol| codes[*symbol].length > 0);
+        let codes = self::codes(&counts, MAX_HEADER_BITS);
+        let last = LENGTH_CODE_ORDER
+            .iter()
+            .rposition(|symbol| codes[*symbol].length > 0);
         Self {
             symbols,
             distances,
             lengths,
             codes,
-            ordered: ordered.map_or(4, |last| 4.max(last + 1)),
+            code_count: last.map_or(4, |last| 4.max(last + 1)),
         }
     }
 
+    /// Number of bits of the header.
     fn bits(&self) -> u64 {
         let lengths = self.lengths.iter().map(|code| {
             let symbol = self.codes[usize::from(code.symbol)].length;
             u64::from(symbol + code.extra_bits)
         });
-        5 + 5 + 4 + 3 * self.ordered as u64 + lengths.sum::<u64>()
+        5 + 5 + 4 + 3 * self.code_count as u64 + lengths.sum::<u64>()
     }
 
     fn write(&self, out: &mut BitWriter) {
         out.put(self.symbols as u64 - 257, 5);
         out.put(self.distances as u64 - 1, 5);
-        out.put(self.ordered as u64 - 4, 4);
+        out.put(self.code_count as u64 - 4, 4);
         out.flush();
-        for symbol in &ORDER[..self.ordered] {
+        for symbol in &LENGTH_CODE_ORDER[..self.code_count] {
             out.put(u64::from(self.codes[*symbol].length), 3);
             out.flush();
         }
@@ -178,7 +190,7 @@ impl Header {
     }
 }
 
-/// Code lengths, with repetitions shortened.
+/// Code lengths as symbols, with one symbol for a repetition.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "a repetition has at most 138 lengths"
@@ -223,7 +235,7 @@ fn length_codes(lengths: &[u8]) -> Vec<LengthCode> {
     codes
 }
 
-/// Bits of a symbol and of what follows it, and how many.
+/// The bits of a symbol and of its extra bits, and their number.
 #[derive(Clone, Copy, Default)]
 struct Bits {
     bits: u32,
@@ -244,7 +256,7 @@ impl Bits {
         Self::of(codes[symbol]).and(u32::from(value.extra), extra_bits(symbol))
     }
 
-    /// With `count` further bits.
+    /// These bits, followed by `count` more.
     fn and(self, bits: u32, count: u32) -> Self {
         Self {
             bits: self.bits | bits << self.count,
@@ -281,7 +293,7 @@ fn write_symbols(data: &[u8], sequences: &[Sequence], codes: &Codes, out: &mut B
 fn write_literals(bytes: &[u8], literals: &[Bits; END], out: &mut BitWriter) {
     let (fours, rest) = bytes.as_chunks::<4>();
     for four in fours {
-        // Two pairs, so that less waits for one another.
+        // Join two pairs, to have shorter dependency chains
         let [a, b, c, d] = four.map(|byte| literals[usize::from(byte)]);
         let (first, second) = (a.and(b.bits, b.count), c.and(d.bits, d.count));
         out.put(u64::from(first.bits), first.count);

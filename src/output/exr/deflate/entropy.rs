@@ -1,15 +1,15 @@
-//! What symbols would cost with the best code for them.
+//! Estimates the number of bits of symbols with an optimal code, from their entropy.
 
 use super::matches::Sequence;
 use super::symbols::{DISTANCES, END, LENGTH_VALUES, SYMBOLS, distance_value};
 
-/// How often each symbol occurs.
+/// The number of occurrences of each symbol.
 #[derive(Debug, Clone)]
 pub(super) struct Histogram {
     /// Literals and lengths.
     pub(super) symbols: [u32; SYMBOLS],
     pub(super) distances: [u32; DISTANCES],
-    /// Of the former, then of the latter.
+    /// Total number of literals and lengths, and of distances.
     pub(super) counts: [u32; 2],
 }
 
@@ -24,10 +24,10 @@ impl Default for Histogram {
 }
 
 impl Histogram {
-    /// Of `sequences`, which begin at `start` of `data`.
+    /// Counts the symbols of `sequences`, which begin at `start` of `data`.
     pub(super) fn of(data: &[u8], start: usize, sequences: &[Sequence]) -> Self {
         let mut histogram = Self::default();
-        // Alike bytes often follow one another: a counter each, so that none waits for the one before.
+        // Four sets of counters: equal bytes often follow each other, and would have to wait for the same counter
         let mut literals = [[0_u32; END]; 4];
         let mut at = start;
         for sequence in sequences {
@@ -58,29 +58,28 @@ impl Histogram {
         histogram
     }
 
-    /// Takes in what `other` counted.
+    /// Adds the counts of `other`.
     pub(super) fn add(&mut self, other: &Self) {
         add(&mut self.symbols, &other.symbols);
         add(&mut self.distances, &other.distances);
         add(&mut self.counts, &other.counts);
     }
 
-    /// Bits of all symbols, about, without what follows them.
+    /// Approximate number of bits of all symbols, without their extra bits.
     pub(super) fn cost(&self) -> u64 {
         self.cost_with(&Self::default())
     }
 
-    /// The same with those of `other`.
+    /// The cost of the symbols of both histograms together.
     pub(super) fn cost_with(&self, other: &Self) -> u64 {
-        let together = |a: &[u32], b: &[u32]| -> u64 {
+        let sum = |a: &[u32], b: &[u32]| -> u64 {
             let both = a.iter().zip(b);
-            both.map(|(a, b)| information(a + b)).sum()
+            both.map(|(a, b)| count_log_count(a + b)).sum()
         };
-        // Shannon's measure: a symbol that occurs c times of n costs log n - log c bits each time.
-        let all = together(&self.counts, &other.counts);
-        let each =
-            together(&self.symbols, &other.symbols) + together(&self.distances, &other.distances);
-        (all - each) >> FRACTION
+        // Entropy: a symbol that occurs c times among n symbols costs log n - log c bits each time
+        let totals = sum(&self.counts, &other.counts);
+        let symbols = sum(&self.symbols, &other.symbols) + sum(&self.distances, &other.distances);
+        (totals - symbols) >> FRACTION
     }
 }
 
@@ -90,29 +89,29 @@ fn add(counters: &mut [u32], others: &[u32]) {
     }
 }
 
-/// Bits behind the binary point of a logarithm.
+/// Number of fractional bits of a logarithm.
 const FRACTION: u32 = 16;
-/// Numbers below 2 to the power of so many have a logarithm of their own.
+/// The table has the logarithms of the numbers below 2 to this power.
 const TABLE_BITS: u32 = 11;
 
-/// `count` times its binary logarithm.
+/// `count` times its binary logarithm, with [`FRACTION`] fractional bits.
 #[inline(always)]
-fn information(count: u32) -> u64 {
+fn count_log_count(count: u32) -> u64 {
     let shift = (u32::BITS - TABLE_BITS).saturating_sub(count.leading_zeros());
     let logarithm = LOGARITHMS[(count >> shift) as usize] + (shift << FRACTION);
     u64::from(count) * u64::from(logarithm)
 }
 
-/// Of 0, which is never asked for, it is 0.
+/// Binary logarithms; the entry of 0 is 0.
 static LOGARITHMS: [u32; 1 << TABLE_BITS] = logarithms();
 
-/// By repeated squaring, so that all machines have the same.
+/// Computes the table by repeated squaring of integers, so that it is the same on all machines.
 const fn logarithms() -> [u32; 1 << TABLE_BITS] {
     let mut table = [0; 1 << TABLE_BITS];
     let mut number = 1;
     while number < table.len() {
         let whole = number.ilog2();
-        // From 1 to 2, with 31 bits behind the point.
+        // A number from 1 to 2, with 31 fractional bits
         let mut power = (number as u64) << (31 - whole);
         let mut logarithm = whole;
         let mut digit = 0;
@@ -136,16 +135,16 @@ mod tests {
     use super::*;
 
     #[test]
-    fn logarithms_are_right() {
+    fn logarithms_are_accurate() {
         for count in (1..5000).chain([65_535, 65_536, 1 << 24, u32::MAX - 1]) {
-            let wanted = f64::from(count) * f64::from(count).log2();
-            let found = information(count) as f64 / f64::from(1 << FRACTION);
+            let expected = f64::from(count) * f64::from(count).log2();
+            let found = count_log_count(count) as f64 / f64::from(1 << FRACTION);
             assert!(
-                (found - wanted).abs() <= 0.0015 * f64::from(count),
+                (found - expected).abs() <= 0.0015 * f64::from(count),
                 "{count}"
             );
         }
-        assert_eq!(information(0), 0);
+        assert_eq!(count_log_count(0), 0);
     }
 
     #[test]

@@ -1,22 +1,22 @@
 //! Huffman codes of limited length.
 
-/// Longest code of deflate.
+/// Maximum length of a code in deflate, bits.
 pub(super) const MAX_BITS: usize = 15;
 
 /// The code of a symbol.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub(super) struct Code {
-    /// As written: the first bit is the lowest.
+    /// The bits in the order of the stream, the first one lowest.
     pub(super) bits: u16,
-    /// How many; 0 if the symbol does not occur.
+    /// Number of bits; 0 if the symbol does not occur.
     pub(super) length: u8,
 }
 
-/// The codes of `N` symbols that occur so often, none longer than `limit` bits. Two at least must occur.
+/// The codes of `N` symbols with these `counts`, of at most `limit` bits each. At least two symbols must occur.
 #[expect(clippy::cast_possible_truncation, reason = "lengths are at most 15")]
 pub(super) fn codes<const N: usize>(counts: &[u32; N], limit: usize) -> [Code; N] {
     let mut codes = [Code::default(); N];
-    // The rarest symbols first, and of those that are equally rare the lowest.
+    // Sort the symbols by count, and by symbol in a tie
     let mut sorted = [(0, 0); N];
     let mut used = 0;
     for (symbol, count) in (0_u16..).zip(counts) {
@@ -26,13 +26,14 @@ pub(super) fn codes<const N: usize>(counts: &[u32; N], limit: usize) -> [Code; N
     let sorted = &mut sorted[..used];
     debug_assert!(used >= 2, "a code for one symbol is not complete");
     sorted.sort_unstable();
+    // Compute the lengths of the codes
     let mut depths = [0; N];
     for (depth, (count, _)) in depths.iter_mut().zip(&*sorted) {
         *depth = *count;
     }
     code_lengths(&mut depths[..used]);
     let lengths = limited(&depths[..used], limit);
-    // The rarest have the longest codes.
+    // Give the longest codes to the rarest symbols
     let mut symbols = sorted.iter();
     for length in (1..=limit).rev() {
         for (_, symbol) in symbols.by_ref().take(lengths[length] as usize) {
@@ -43,15 +44,16 @@ pub(super) fn codes<const N: usize>(counts: &[u32; N], limit: usize) -> [Code; N
     codes
 }
 
-/// Turns counts in ascending order into the lengths of Huffman's code, in place: Moffat and Katajainen, "In-Place
-/// Calculation of Minimum-Redundancy Codes", 1995.
+/// Replaces counts in ascending order by the lengths of their Huffman codes, in place (Moffat and Katajainen, "In-Place
+/// Calculation of Minimum-Redundancy Codes", 1995).
 #[expect(
     clippy::cast_possible_truncation,
     reason = "there are fewer than 300 symbols"
 )]
 fn code_lengths(counts: &mut [u32]) {
     let used = counts.len();
-    // Join the two lightest again and again; a joined node keeps its weight until it is joined itself, then its parent.
+    // Repeatedly join the two lightest nodes. The entry of an internal node is its weight until it is joined itself,
+    // and then the index of its parent.
     let (mut root, mut leaf) = (0, 0);
     for next in 0..used - 1 {
         let mut lightest = |counts: &mut [u32]| {
@@ -69,42 +71,43 @@ fn code_lengths(counts: &mut [u32]) {
         let second = lightest(counts);
         counts[next] = first + second;
     }
-    // From parents to depths of joined nodes.
+    // Replace the parents of internal nodes by depths
     counts[used - 2] = 0;
     for node in (0..used - 2).rev() {
         counts[node] = counts[counts[node] as usize] + 1;
     }
-    // Leaves take what the joined nodes of each level leave.
+    // Replace the entries of leaves by depths: on each level, leaves take the positions that internal nodes leave
     let (mut node, mut next) = (used - 1, used);
-    let (mut room, mut depth) = (1, 0);
-    while room > 0 {
-        let mut joined = 0;
+    let (mut available, mut depth) = (1, 0);
+    while available > 0 {
+        let mut internal = 0;
         while node > 0 && counts[node - 1] == depth {
-            joined += 1;
+            internal += 1;
             node -= 1;
         }
-        for _ in joined..room {
+        for _ in internal..available {
             next -= 1;
             counts[next] = depth;
         }
-        room = 2 * joined;
+        available = 2 * internal;
         depth += 1;
     }
 }
 
-/// How many codes have each length, if none may be longer than `limit`.
+/// The number of codes of each length, if none may be longer than `limit`.
 fn limited(depths: &[u32], limit: usize) -> [u32; MAX_BITS + 1] {
     let mut lengths = [0_u32; MAX_BITS + 1];
     for depth in depths {
         lengths[limit.min(*depth as usize)] += 1;
     }
-    // What the codes take of the room for codes of the longest length.
-    let taken = |lengths: &[u32]| -> u32 {
+    // The Kraft sum of the codes, in units of a code with `limit` bits
+    let kraft_sum = |lengths: &[u32]| -> u32 {
         let of_length = (1..=limit).map(|length| lengths[length] << (limit - length));
         of_length.sum()
     };
-    // Each turn makes room for one more: a shorter code becomes two, one of which takes the place of a longest.
-    for _ in (1 << limit)..taken(&lengths) {
+    // Reduce the sum to 1, one unit at a time: split a shorter code into two that are one bit longer, and use one of
+    // them in place of a code with `limit` bits
+    for _ in (1 << limit)..kraft_sum(&lengths) {
         let shorter = (1..limit).rev().find(|length| lengths[*length] > 0);
         let shorter = shorter.expect("some code is shorter than the longest");
         lengths[shorter] -= 1;
@@ -114,7 +117,7 @@ fn limited(depths: &[u32], limit: usize) -> [u32; MAX_BITS + 1] {
     lengths
 }
 
-/// Numbers codes of one length one after the other (RFC 1951, section 3.2.2).
+/// Assigns consecutive numbers to the codes of each length (RFC 1951, section 3.2.2).
 #[expect(
     clippy::cast_possible_truncation,
     reason = "there are fewer than 300 symbols"
@@ -122,7 +125,7 @@ fn limited(depths: &[u32], limit: usize) -> [u32; MAX_BITS + 1] {
 fn number(codes: &mut [Code], lengths: &[u32; MAX_BITS + 1]) {
     let mut next = [0_u16; MAX_BITS + 1];
     for length in 1..=MAX_BITS {
-        // No code has length 0, so none is counted there.
+        // `lengths[0]` is 0, because every code has at least one bit
         next[length] = (next[length - 1] + lengths[length - 1] as u16) << 1;
     }
     for code in codes.iter_mut().filter(|code| code.length > 0) {
@@ -138,8 +141,8 @@ mod tests {
 
     use super::*;
 
-    /// Bits of all symbols by Huffman's own procedure.
-    fn least_bits(counts: &[u32]) -> u64 {
+    /// Number of bits of all symbols with Huffman's algorithm, without a limit.
+    fn min_bits(counts: &[u32]) -> u64 {
         let used = counts.iter().filter(|count| **count > 0);
         let mut weights: Vec<u64> = used.map(|count| u64::from(*count)).collect();
         let mut bits = 0;
@@ -155,25 +158,28 @@ mod tests {
     #[track_caller]
     fn check<const N: usize>(counts: &[u32; N], limit: usize) -> u64 {
         let codes = codes(counts, limit);
-        let mut room = 0;
+        let mut kraft_sum = 0;
         let mut bits = 0;
         for (code, count) in codes.iter().zip(counts) {
             assert_eq!(code.length > 0, *count > 0);
             assert!(usize::from(code.length) <= limit);
             if code.length > 0 {
-                room += 1_u64 << (limit - usize::from(code.length));
+                kraft_sum += 1_u64 << (limit - usize::from(code.length));
             }
             bits += u64::from(code.length) * u64::from(*count);
         }
-        // Complete.
-        assert_eq!(room, 1 << limit);
-        // No code begins as another: read as numbers from the first bit on, those of one length follow one another.
+        // The code is complete
+        assert_eq!(kraft_sum, 1 << limit);
+        // No code is a prefix of another: as numbers with the first bit highest, codes of one length are consecutive
         let mut sorted: Vec<&Code> = codes.iter().filter(|code| code.length > 0).collect();
-        let place = |code: &Code| code.bits.reverse_bits();
-        sorted.sort_by_key(|code| place(code));
+        let number = |code: &Code| code.bits.reverse_bits();
+        sorted.sort_by_key(|code| number(code));
         for pair in sorted.windows(2) {
             let width = 1_u32 << (16 - u32::from(pair[0].length));
-            assert_eq!(u32::from(place(pair[1])), u32::from(place(pair[0])) + width);
+            assert_eq!(
+                u32::from(number(pair[1])),
+                u32::from(number(pair[0])) + width
+            );
             assert!(pair[0].length <= pair[1].length);
         }
         bits
@@ -195,7 +201,7 @@ mod tests {
     }
 
     #[test]
-    fn deep_codes_are_cut() {
+    fn deep_codes_are_limited() {
         let mut counts = [0; 30];
         let (mut count, mut next) = (1, 1);
         for each in &mut counts {
@@ -205,7 +211,7 @@ mod tests {
         let all: u64 = counts.iter().map(|count| u64::from(*count)).sum();
         for limit in [5, 7, 14, 15] {
             let bits = check(&counts, limit);
-            assert!(bits >= least_bits(&counts) && bits <= all * limit as u64);
+            assert!(bits >= min_bits(&counts) && bits <= all * limit as u64);
         }
         assert_eq!(check(&[1; 128], 7), 7 * 128);
         assert_eq!(
@@ -218,15 +224,15 @@ mod tests {
         #[test]
         fn codes_are_complete_and_shortest(counts in prop::array::uniform32(0..2000_u32)) {
             let mut counts = counts;
-            // Some do not occur, two at least do.
+            // Some symbols do not occur, but at least two do
             for count in &mut counts {
                 *count = count.saturating_sub(500);
             }
             counts[3] += 1;
             counts[7] += 1;
-            // Deep trees need larger counts.
-            prop_assert_eq!(check(&counts, 15), least_bits(&counts));
-            prop_assert!(check(&counts, 6) >= least_bits(&counts));
+            // Uniformly distributed counts give no codes longer than 15 bits
+            prop_assert_eq!(check(&counts, 15), min_bits(&counts));
+            prop_assert!(check(&counts, 6) >= min_bits(&counts));
         }
     }
 }

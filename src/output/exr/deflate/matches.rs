@@ -1,38 +1,38 @@
-//! Data as literals and matches: bytes that repeat others before them.
+//! Divides data into literals and matches, which repeat earlier bytes.
 
 use std::ops::Range;
 
 use super::WINDOW;
 use super::symbols::MAX_LENGTH;
 
-/// Shorter matches are not worth their symbols.
+/// Minimum length of a match, bytes. Shorter ones would save nothing.
 const MIN_MATCH: usize = 4;
-/// What is compared at once.
-const LOOK: usize = 8;
+/// Number of bytes that are read at once.
+const WORD: usize = 8;
 
-/// Some literals, then bytes that repeat those `distance` before.
+/// Some literals, followed by a match: `length` bytes that equal those `distance` bytes earlier.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct Sequence {
     pub(super) literals: u32,
-    /// 0 if nothing repeats.
+    /// 0 if there is no match.
     pub(super) length: u16,
     pub(super) distance: u16,
 }
 
-/// A search for matches beside runs, which have distance 1 or 2.
-pub(super) trait Search {
-    /// Bytes from one look to the next.
+/// Finds matches in addition to runs, which are the matches with a distance of 1 or 2.
+pub(super) trait MatchFinder {
+    /// Number of bytes from one search position to the next.
     const STEP: usize;
 
-    /// The distance and the length of a match at `at` of `data`, before `end`.
+    /// The distance and the length of a match that starts at `at` in `data` and ends at or before `end`.
     fn find(&mut self, data: &[u8], at: usize, end: usize) -> Option<(usize, usize)>;
 }
 
-/// Finds no other matches.
-pub(super) struct RunsAlone;
+/// Finds no matches except runs.
+pub(super) struct RunsOnly;
 
-impl Search for RunsAlone {
-    /// Runs of five bytes are found, wherever they begin.
+impl MatchFinder for RunsOnly {
+    /// With this step, runs of at least five bytes are found wherever they begin.
     const STEP: usize = 2;
 
     #[inline(always)]
@@ -41,29 +41,29 @@ impl Search for RunsAlone {
     }
 }
 
-/// Finds the last position of the same four bytes.
+/// Finds the last position with the same four bytes.
 #[derive(Debug, Default)]
-pub(super) struct LastPlace {
-    /// Positions by hash of the four bytes. The bytes are compared, so any entry is safe.
-    places: Vec<u32>,
+pub(super) struct HashTable {
+    /// Last positions, by hash of four bytes. Any entry is safe, because the bytes are compared.
+    positions: Vec<u32>,
 }
 
-impl LastPlace {
-    /// So many entries.
+impl HashTable {
+    /// Binary logarithm of the number of entries.
     const BITS: u32 = 15;
-    /// Bytes of the table.
+    /// Size of the table in bytes.
     pub(super) const BYTES: usize = size_of::<u32>() << Self::BITS;
-    /// Bytes of a match that are not those two before: where there are fewer, a run costs less.
-    const MIN_NEW: usize = 4;
+    /// Minimum number of bytes in a match that differ from the byte two positions before. With fewer, runs cost less.
+    const MIN_NOT_IN_RUNS: usize = 4;
 
-    /// Forgets all positions, for other data.
+    /// Removes all positions, for other data.
     pub(super) fn clear(&mut self) {
-        self.places.clear();
-        self.places.resize(1 << Self::BITS, 0);
+        self.positions.clear();
+        self.positions.resize(1 << Self::BITS, 0);
     }
 }
 
-impl Search for LastPlace {
+impl MatchFinder for HashTable {
     const STEP: usize = 1;
 
     #[inline(always)]
@@ -72,46 +72,49 @@ impl Search for LastPlace {
         reason = "blocks have less than 4 GiB"
     )]
     fn find(&mut self, data: &[u8], at: usize, end: usize) -> Option<(usize, usize)> {
+        // Replace the entry of these four bytes; the multiplier is 2^32 divided by the golden ratio
         let four = first_four(eight_at(data, at - 2) >> 16);
-        // The multiplier is 2^32 divided by the golden ratio.
         let hash = four.wrapping_mul(0x9e37_79b1) >> (u32::BITS - Self::BITS);
-        let entry = &mut self.places[hash as usize];
-        let place = *entry as usize;
+        let entry = &mut self.positions[hash as usize];
+        let last = *entry as usize;
         *entry = at as u32;
-        let distance = at - place;
-        if distance > WINDOW || data[place..place + 4] != four.to_le_bytes() {
+        let distance = at - last;
+        if distance > WINDOW || data[last..last + 4] != four.to_le_bytes() {
             return None;
         }
+        // Reject matches that consist mostly of runs
         let length = match_length(data, at, distance, end);
-        let new = data[at..at + length].iter().zip(&data[at - 2..]);
-        let mut new = new.filter(|(byte, two_before)| byte != two_before);
-        new.nth(Self::MIN_NEW - 1).map(|_| (distance, length))
+        let pairs = data[at..at + length].iter().zip(&data[at - 2..]);
+        let mut not_in_runs = pairs.filter(|(byte, two_before)| byte != two_before);
+        let last_required = not_in_runs.nth(Self::MIN_NOT_IN_RUNS - 1);
+        last_required.map(|_| (distance, length))
     }
 }
 
-/// Appends the sequences of `range` of `data`, which together have its length.
-pub(super) fn find_sequences<S: Search>(
+/// Appends sequences that describe exactly `range` of `data`.
+pub(super) fn find_sequences<F: MatchFinder>(
     data: &[u8],
     range: Range<usize>,
-    search: &mut S,
+    finder: &mut F,
     sequences: &mut Vec<Sequence>,
 ) {
     let mut literals_start = range.start;
     let mut at = range.start.max(2);
-    // Each look takes in the two bytes before.
-    while at + MIN_MATCH <= range.end && at + LOOK - 2 <= data.len() {
+    // The word at each position includes the two bytes before it
+    while at + MIN_MATCH <= range.end && at + WORD - 2 <= data.len() {
+        // Find a run or another match
         let bytes = eight_at(data, at - 2);
         let [two_before, one_before, here] = [bytes, bytes >> 8, bytes >> 16].map(first_four);
         let (distance, length) = if here == two_before {
             let distance = if here == one_before { 1 } else { 2 };
             (distance, match_length(data, at, distance, range.end))
-        } else if let Some(found) = search.find(data, at, range.end) {
+        } else if let Some(found) = finder.find(data, at, range.end) {
             found
         } else {
-            at += S::STEP;
+            at += F::STEP;
             continue;
         };
-        // It may begin before the place looked at.
+        // Extend the match backwards
         let mut start = at;
         while start > literals_start.max(distance) && data[start - 1] == data[start - 1 - distance]
         {
@@ -126,11 +129,11 @@ pub(super) fn find_sequences<S: Search>(
     }
 }
 
-/// Bytes from `at` on, before `end`, that are those `distance` before.
+/// Number of bytes from `at` on, before `end`, that equal the bytes `distance` earlier.
 fn match_length(data: &[u8], at: usize, distance: usize, end: usize) -> usize {
     let (here, before) = (&data[at..end], &data[at - distance..end - distance]);
     let mut length = 0;
-    // Long runs are most of a picture's background.
+    // Compare long chunks first: most of a background is long runs
     let chunks = here.as_chunks::<32>().0.iter();
     for (chunk, chunk_before) in chunks.zip(before.as_chunks::<32>().0) {
         if chunk != chunk_before {
@@ -138,6 +141,7 @@ fn match_length(data: &[u8], at: usize, distance: usize, end: usize) -> usize {
         }
         length += chunk.len();
     }
+    // Compare the rest in words, then in bytes
     let (here, before) = (&here[length..], &before[length..]);
     let (eights, rest) = here.as_chunks::<8>();
     let (eights_before, rest_before) = before.as_chunks::<8>();
@@ -155,7 +159,7 @@ fn match_length(data: &[u8], at: usize, distance: usize, end: usize) -> usize {
     length + equal.count()
 }
 
-/// Literals and a match, in parts that deflate has symbols for.
+/// Appends literals and a match, divided into lengths that deflate can represent.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "blocks have less than 4 GiB, lengths and distances are limited"
@@ -165,7 +169,7 @@ fn push(sequences: &mut Vec<Sequence>, literals: usize, length: usize, distance:
     while left > 0 {
         let length = match left {
             ..=MAX_LENGTH => left,
-            // No rest that is too short.
+            // Leave no remainder that is too short for a match
             _ => MAX_LENGTH.min(left - MIN_MATCH),
         };
         sequences.push(Sequence {
@@ -178,7 +182,7 @@ fn push(sequences: &mut Vec<Sequence>, literals: usize, length: usize, distance:
     }
 }
 
-/// The literals at the end of a piece.
+/// Appends the literals at the end of a piece.
 #[expect(
     clippy::cast_possible_truncation,
     reason = "blocks have less than 4 GiB"

@@ -1,15 +1,15 @@
-//! Streams against another crate's inflate, and what they take.
+//! Decompresses streams with another crate, and checks their lengths.
 
 use std::io::Read;
 
 use flate2::read::ZlibDecoder;
 use proptest::prelude::*;
 
-use super::matches::Search;
+use super::matches::MatchFinder;
 use super::symbols::MAX_LENGTH;
 use super::*;
 
-/// Numbers that follow one another without a pattern (splitmix64).
+/// Pseudorandom bytes (splitmix64).
 fn noise(seed: u64) -> impl Iterator<Item = u8> {
     (seed << 32..).map(|at| {
         let z = at.wrapping_mul(0x9e37_79b9_7f4a_7c15);
@@ -19,7 +19,7 @@ fn noise(seed: u64) -> impl Iterator<Item = u8> {
     })
 }
 
-/// Compresses `data` in pieces that end at `ends` and at the last byte; every one of them is searched, or none.
+/// Compresses `data` in pieces that end at `ends` and at the last byte. Either all pieces are searched or none.
 fn compress(data: &[u8], ends: &[usize], is_searched: bool) -> Option<Vec<u8>> {
     let ends = ends.iter().copied().chain([data.len()]);
     let pieces = ends.scan(0, |start, end| {
@@ -30,7 +30,7 @@ fn compress(data: &[u8], ends: &[usize], is_searched: bool) -> Option<Vec<u8>> {
         })
     });
     let mut deflater = Deflater::default();
-    // What was in the memory before does not matter.
+    // Compress other data first: the previous content of the memory must not matter
     let piece = Piece {
         length: 500,
         is_searched: true,
@@ -42,14 +42,14 @@ fn compress(data: &[u8], ends: &[usize], is_searched: bool) -> Option<Vec<u8>> {
 
 fn inflated(stream: &[u8]) -> Vec<u8> {
     let mut data = Vec::new();
-    // Fails where codes are not complete, and on a wrong checksum.
+    // The decoder fails if a code is not complete or the checksum is wrong
     let mut decoder = ZlibDecoder::new(stream);
     decoder.read_to_end(&mut data).unwrap();
     assert_eq!(decoder.total_in(), stream.len() as u64);
     data
 }
 
-/// Bytes of the stream of `data`, if it is shorter, where runs alone are found, and where other matches are too.
+/// Length of the stream of `data`, if it is shorter than the data: with runs only, and with a search for other matches.
 #[track_caller]
 fn check(data: &[u8], ends: &[usize]) -> [Option<usize>; 2] {
     [false, true].map(|is_searched| {
@@ -60,14 +60,14 @@ fn check(data: &[u8], ends: &[usize]) -> [Option<usize>; 2] {
     })
 }
 
-/// The former alone.
+/// Length of the stream with runs only.
 #[track_caller]
 fn length(data: &[u8], ends: &[usize]) -> usize {
     check(data, ends)[0].expect("shorter than the data")
 }
 
 #[test]
-fn runs_of_every_length_and_distance_read_back() {
+fn runs_of_every_length_and_distance_round_trip() {
     let mut data: Vec<u8> = noise(1).take(5).collect();
     for length in (0..40)
         .chain(250..300)
@@ -81,7 +81,7 @@ fn runs_of_every_length_and_distance_read_back() {
     }
     let all: Vec<usize> = (0..data.len()).collect();
     let some: Vec<usize> = (0..data.len()).step_by(97).collect();
-    // A third of the data has period 3, which is none of the distances.
+    // A third of the data has period 3, which is not the distance of a run
     for ends in [&[][..], &some] {
         assert!(length(&data, ends) < data.len() / 2);
     }
@@ -89,7 +89,7 @@ fn runs_of_every_length_and_distance_read_back() {
 }
 
 #[test]
-fn few_and_alike_bytes_read_back() {
+fn few_and_equal_bytes_round_trip() {
     for length in 0..20 {
         check(&vec![128; length], &[]);
         check(&vec![0; length], &[length / 2]);
@@ -103,7 +103,7 @@ fn few_and_alike_bytes_read_back() {
 }
 
 #[test]
-fn noise_is_no_shorter() {
+fn noise_is_not_compressed() {
     for length in [0, 1, 2, 1000, 200_000] {
         let data: Vec<u8> = noise(3).take(length).collect();
         assert_eq!(
@@ -115,7 +115,7 @@ fn noise_is_no_shorter() {
 }
 
 #[test]
-fn noise_beside_runs_is_stored_in_parts() {
+fn noise_next_to_runs_is_stored_in_several_blocks() {
     let mut data: Vec<u8> = noise(4).take(200_000).collect();
     data.extend([5; 200_000]);
     data.extend(noise(5).take(70_000));
@@ -124,13 +124,13 @@ fn noise_beside_runs_is_stored_in_parts() {
     assert!((270_000..271_500).contains(&stream), "{stream}");
 }
 
-/// Counts that grow as Fibonacci's numbers do make the deepest codes.
+/// Counts that are Fibonacci numbers give the deepest codes.
 #[test]
-fn the_longest_codes_read_back() {
+fn longest_codes_round_trip() {
     let mut data = Vec::new();
     let (mut count, mut next) = (1, 1);
     for byte in 0..26_u8 {
-        // No runs: every other byte is another.
+        // Adjacent bytes differ, so there are no runs
         let pairs = std::iter::repeat_n([byte, 255 - byte % 2], count);
         data.extend(pairs.flatten());
         (count, next) = (next, count + next);
@@ -142,24 +142,24 @@ fn the_longest_codes_read_back() {
 }
 
 #[test]
-fn alike_pieces_share_a_block_and_others_do_not() {
+fn similar_pieces_share_a_block_and_different_ones_do_not() {
     let nibbles = |seed, add| noise(seed).map(move |byte| byte % 16 + add);
     let pieces = |add: u8| {
         let pieces = (0..20_u8).map(|piece| nibbles(piece.into(), add * (piece % 2)).take(3000));
         pieces.flatten().collect::<Vec<u8>>()
     };
     let ends: Vec<usize> = (1..20).map(|piece| 3000 * piece).collect();
-    let alike = length(&pieces(0), &ends);
-    let unlike = length(&pieces(100), &ends);
-    // Four bits each and one header; four bits and a header a piece.
-    assert!((30_000..30_700).contains(&alike), "{alike}");
-    assert!((30_700..32_000).contains(&unlike), "{unlike}");
+    let similar = length(&pieces(0), &ends);
+    let different = length(&pieces(100), &ends);
+    // Four bits per byte, with one header, or with a header per piece
+    assert!((30_000..30_700).contains(&similar), "{similar}");
+    assert!((30_700..32_000).contains(&different), "{different}");
     assert!(length(&pieces(100), &[]) > 37_000);
 }
 
 #[test]
 fn memory_for_sequences_is_bounded() {
-    // As many runs as there can be.
+    // As many runs as possible
     let data: Vec<u8> = noise(7).take(400_000).flat_map(|byte| [byte; 5]).collect();
     let mut deflater = Deflater::default();
     let piece = Piece {
@@ -169,21 +169,21 @@ fn memory_for_sequences_is_bounded() {
     let stream = deflater.compress(&data, [piece]).unwrap();
     assert!(inflated(stream) == data);
     let bytes = deflater.sequences.capacity() * size_of::<Sequence>();
-    assert!(bytes <= SEQUENCE_BYTES, "{bytes}");
-    assert_eq!(deflater.stream.capacity(), data.len() + ROOM);
+    assert!(bytes <= MAX_SEQUENCE_BYTES, "{bytes}");
+    assert_eq!(deflater.stream.capacity(), data.len() + EXTRA_CAPACITY);
 }
 
 #[track_caller]
-fn check_sequences<S: Search>(
+fn check_sequences<F: MatchFinder>(
     data: &[u8],
-    mut search: S,
+    mut finder: F,
     distances: std::ops::RangeInclusive<usize>,
 ) {
     let mut sequences = Vec::new();
     for ends in [0, 1, 2, 3, 700, 701, 5000, data.len()].windows(2) {
-        let known = sequences.len();
-        find_sequences(data, ends[0]..ends[1], &mut search, &mut sequences);
-        let lengths = sequences[known..].iter();
+        let first = sequences.len();
+        find_sequences(data, ends[0]..ends[1], &mut finder, &mut sequences);
+        let lengths = sequences[first..].iter();
         let lengths = lengths.map(|s| s.literals as usize + usize::from(s.length));
         assert_eq!(lengths.sum::<usize>(), ends[1] - ends[0]);
     }
@@ -193,8 +193,8 @@ fn check_sequences<S: Search>(
         let (length, distance) = (usize::from(sequence.length), usize::from(sequence.distance));
         assert!(length == 0 || (4..=MAX_LENGTH).contains(&length));
         assert!(distances.contains(&distance), "{distance}");
-        for place in at..at + length {
-            assert_eq!(data[place], data[place - distance]);
+        for index in at..at + length {
+            assert_eq!(data[index], data[index - distance]);
         }
         at += length;
     }
@@ -202,27 +202,27 @@ fn check_sequences<S: Search>(
 }
 
 #[test]
-fn sequences_are_the_data() {
+fn sequences_describe_the_data() {
     let bytes = noise(8).take(5000);
     let data: Vec<u8> = bytes.flat_map(|b| vec![b % 8; usize::from(b)]).collect();
-    let mut last_place = LastPlace::default();
-    last_place.clear();
-    check_sequences(&data, RunsAlone, 1..=2);
-    check_sequences(&data, last_place, 1..=WINDOW);
+    let mut hash_table = HashTable::default();
+    hash_table.clear();
+    check_sequences(&data, RunsOnly, 1..=2);
+    check_sequences(&data, hash_table, 1..=WINDOW);
 }
 
-/// A row of noise once more, and with a byte changed here and there, at distances near the window's end.
+/// A row of noise and its copy, with some bytes changed, at distances near the end of the window.
 #[test]
 fn matches_reach_as_far_as_the_window() {
     let matched = |distance: usize| {
         let row: Vec<u8> = noise(10).take(distance).collect();
-        let mut again = row.clone();
-        for byte in again.iter_mut().step_by(100) {
+        let mut copy = row.clone();
+        for byte in copy.iter_mut().step_by(100) {
             *byte = byte.wrapping_add(1);
         }
-        let data = [row, again].concat();
-        let [alone, searched] = check(&data, &[]);
-        assert_eq!(alone, None);
+        let data = [row, copy].concat();
+        let [runs_only, searched] = check(&data, &[]);
+        assert_eq!(runs_only, None);
         searched.is_some_and(|length| length < distance + distance / 10)
     };
     for distance in [5000, WINDOW - 1, WINDOW] {
@@ -233,25 +233,25 @@ fn matches_reach_as_far_as_the_window() {
 
 #[test]
 fn every_distance_has_its_symbol() {
-    let mut least = 1;
+    let mut first = 1;
     for symbol in 0..symbols::DISTANCES {
         let values = 1_usize << symbols::distance_bits(symbol);
         for extra in 0..values {
-            let value = symbols::distance_value(u16::try_from(least + extra).unwrap());
+            let value = symbols::distance_value(u16::try_from(first + extra).unwrap());
             assert_eq!(
                 (usize::from(value.symbol), usize::from(value.extra)),
                 (symbol, extra)
             );
         }
-        least += values;
+        first += values;
     }
-    assert_eq!(least, WINDOW + 1);
+    assert_eq!(first, WINDOW + 1);
 }
 
 proptest! {
-    /// Runs of any bytes and lengths, noise between them, cut anywhere.
+    /// Runs of any bytes and lengths with noise between them, divided anywhere into pieces.
     #[test]
-    fn any_data_read_back(
+    fn any_data_round_trip(
         parts in prop::collection::vec((any::<[u8; 2]>(), 0..700_usize, 0..9_usize), 1..60),
         cuts in prop::collection::vec(any::<prop::sample::Index>(), 0..40),
     ) {

@@ -1,4 +1,4 @@
-//! Files that are damaged, or change.
+//! Damaged files, and files that change while they are read.
 
 use proptest::prelude::*;
 use proptest::sample::Index;
@@ -6,24 +6,24 @@ use proptest::sample::Index;
 use super::*;
 
 #[test]
-fn damaged_files_get_the_error_of_their_reader() {
-    let mut told = 0;
+fn damaged_files_give_the_same_error_as_the_reader() {
+    let mut errors = 0;
     for path in files_under("damaged") {
         match (open_source(&path), read_whole(&path)) {
             (Ok(None), _) => {}
             (Ok(Some(source)), Ok(raw)) => same(&*source, &raw),
             (Err(error), Err(expected)) => {
                 assert_eq!(error.to_string(), expected.to_string());
-                told += 1;
+                errors += 1;
             }
             (Ok(Some(_)), Err(error)) => panic!("streamed, but not read: {error}"),
             (Err(error), Ok(_)) => panic!("read, but not streamed: {error}"),
         }
     }
-    assert!(told > 40, "{told}");
+    assert!(errors > 40, "{errors}");
 }
 
-/// Whatever the bytes are: what streams is what is read.
+/// For any bytes, the streamed particles equal those of the reader.
 fn streams_as_read(name: &str, bytes: &[u8]) {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join(name);
@@ -69,14 +69,14 @@ proptest! {
     }
 
     #[test]
-    fn files_cut_short_stream_as_they_are_read((name, bytes) in sample(), end in any::<Index>()) {
+    fn truncated_files_stream_as_they_are_read((name, bytes) in sample(), end in any::<Index>()) {
         streams_as_read(name, &bytes[..end.index(bytes.len())]);
     }
 }
 
 #[cfg(all(target_os = "linux", not(miri)))]
 #[test]
-fn a_file_cut_short_while_it_streams_is_found_out() {
+fn truncation_during_streaming_is_detected() {
     let dir = tempfile::tempdir().expect("a temporary directory");
     let path = dir.path().join("points.xyz");
     fs::write(&path, vec![0x80; 12 * 100_000]).expect("writable");

@@ -1,8 +1,8 @@
-//! Files made here, with what the samples lack: axes of unlike types, two axes, integers, times, bits.
+//! Generated files with cases that the sample files lack: axes of different types, two axes, integers, times, bits.
 
 use super::*;
 
-/// Streams `bytes` as a file called `name`; whether it could.
+/// Streams `bytes` as a file named `name`; returns whether that was possible.
 #[track_caller]
 fn streams(name: &str, bytes: &[u8]) -> bool {
     let dir = tempfile::tempdir().expect("a temporary directory");
@@ -16,7 +16,7 @@ fn streams(name: &str, bytes: &[u8]) -> bool {
     })
 }
 
-/// So many bytes that are no pattern.
+/// This many bytes without a pattern.
 fn noise(len: usize) -> Vec<u8> {
     let mut state = 1_u32;
     let mut next = || {
@@ -77,12 +77,12 @@ fn structures_with_odd_fields() {
 }
 
 #[test]
-fn arrays_of_several_steps_are_left_to_the_reader() {
+fn arrays_of_several_steps_fall_back_to_the_reader() {
     assert!(!streams("a.npy", &npy("'<f4'", "False", "(2, 10, 3)", 240)));
 }
 
 #[test]
-fn vertices_of_unlike_properties() {
+fn vertices_with_mixed_property_types() {
     for order in ["little", "big"] {
         let head = |list: &str| {
             format!(
@@ -98,7 +98,7 @@ fn vertices_of_unlike_properties() {
 }
 
 #[test]
-fn vertices_with_lists_are_left_to_the_reader() {
+fn vertices_with_lists_fall_back_to_the_reader() {
     let head = "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty float x\n\
                 property float y\nproperty float z\nproperty list uchar float w\nend_header\n";
     let body = vec![0; 2 * 13];
@@ -134,7 +134,7 @@ fn legacy_files_with_time_and_cells() {
 }
 
 #[test]
-fn legacy_files_with_bits_or_absurd_width_are_left_to_the_reader() {
+fn legacy_files_with_bits_or_huge_width_fall_back_to_the_reader() {
     let bits = [("POINT_DATA 8", 0), ("SCALARS on bit", 1)];
     assert!(!streams("a.vtk", &vtk("8 float", 96, &bits)));
     let wide = [("POINT_DATA 0", 0), ("FIELD f 1\nwide 60000 0 float", 0)];
@@ -142,7 +142,7 @@ fn legacy_files_with_bits_or_absurd_width_are_left_to_the_reader() {
 }
 
 #[test]
-fn homogeneous_coordinates_are_divided_out() {
+fn homogeneous_coordinates_are_divided_by_w() {
     const N: u32 = 5000;
     let mut file = b"BgeoV\0\0\0\x05".to_vec();
     for number in [N, 0, 0, 0, 2, 0, 0, 0] {

@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn archives_hold_the_same_particles() {
+fn archives_contain_the_same_particles() {
     let ply = crate::read::ply::FORMAT
         .read(&single("le.ply"), &Step::whole(0))
         .unwrap();
@@ -22,7 +22,7 @@ fn archives_hold_the_same_particles() {
 }
 
 #[test]
-fn pysph_archives_are_refused_by_name() {
+fn pysph_archives_are_rejected_by_name() {
     let bytes = sample("pysph/dam_break_3d_00300.npz");
     let error = READER.error(&bytes);
     assert!(matches!(error, ParseError::Unsupported { .. }));
@@ -36,7 +36,7 @@ fn pysph_archives_are_refused_by_name() {
 }
 
 #[test]
-fn pickles_are_refused_only_where_they_are_needed() {
+fn pickles_are_rejected_only_where_needed() {
     let pickle = || npy("'|O'", "(3,)", b"\x80\x04.");
     for bytes in [
         pickle(),
@@ -121,7 +121,7 @@ fn archives_find_their_positions() {
 }
 
 #[test]
-fn damaged_archives_are_refused() {
+fn damaged_archives_are_rejected() {
     for method in [CompressionMethod::Stored, CompressionMethod::Deflated] {
         let good = npz(
             &[("pos.npy", npy("'<f4'", "(30, 3)", &counting(90)))],
@@ -161,7 +161,7 @@ fn damaged_archives_are_refused() {
 }
 
 #[test]
-fn names_of_members_do_not_reach_a_terminal() {
+fn member_names_are_escaped() {
     let name = format!("\u{1b}[2J\n{}.npy", "x".repeat(5000));
     for array in [b"\x93NUMPY\x09".to_vec(), b"\x93NUMPY\x01".to_vec()] {
         let text = READER.error(&stored(&[(&name, array)])).to_string();

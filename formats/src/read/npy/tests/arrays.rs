@@ -3,7 +3,7 @@
 use super::*;
 
 #[test]
-fn all_single_arrays_hold_the_same_particles() {
+fn all_single_arrays_contain_the_same_particles() {
     let expected = READER.one(&single("pos.npy"));
     assert_eq!(expected.positions.len(), 1200);
     assert!(expected.attributes.is_empty());
@@ -31,7 +31,7 @@ fn all_single_arrays_hold_the_same_particles() {
 }
 
 #[test]
-fn shapes_are_understood() {
+fn array_shapes_are_recognised() {
     let rows = [[0.0, 1.0, 2.0], [3.0, 4.0, 5.0], [6.0, 7.0, 8.0]];
     for (shape, count, expected) in [
         ("(2, 3)", 6, vec![rows[0], rows[1]]),
@@ -87,7 +87,7 @@ fn shapes_are_understood() {
 }
 
 #[test]
-fn a_dimension_before_holds_time_steps() {
+fn leading_dimension_is_time() {
     let expected = [
         vec![[0.0, 1.0, 2.0], [3.0, 4.0, 5.0]],
         vec![[6.0, 7.0, 8.0], [9.0, 10.0, 11.0]],
@@ -128,7 +128,7 @@ fn a_dimension_before_holds_time_steps() {
     ]);
     check(&archive);
     let times: Vec<_> = steps(&archive).unwrap().iter().map(|s| s.time).collect();
-    // A (2,) array named times tells the steps; ids has one number a particle.
+    // A (2,) array named `times` belongs to the steps; `ids` has one number per particle.
     assert_eq!(times, [Some(1.5), Some(2.5)]);
     let second = &READER.all(&archive).unwrap()[1];
     assert_eq!(second.time, Some(2.5));
@@ -141,13 +141,13 @@ fn a_dimension_before_holds_time_steps() {
 }
 
 #[test]
-fn number_types_and_versions_are_understood() {
+fn number_types_and_versions_are_supported() {
     let one = |descr: &str, data: &[u8]| READER.one(&npy(descr, "(1, 3)", data)).positions;
-    let wanted = [[1.0, -2.0, 3.5]];
+    let expected = [[1.0, -2.0, 3.5]];
     let big: Vec<u8> = [1.0_f32, -2.0, 3.5].map(f32::to_be_bytes).concat();
-    assert_eq!(coordinates(&one("'>f4'", &big)), wanted);
+    assert_eq!(coordinates(&one("'>f4'", &big)), expected);
     let big: Vec<u8> = [1.0_f64, -2.0, 3.5].map(f64::to_be_bytes).concat();
-    assert_eq!(coordinates(&one("'>f8'", &big)), wanted);
+    assert_eq!(coordinates(&one("'>f8'", &big)), expected);
     let exact: Vec<u8> = [i64::from(i32::MAX), -1, 5].map(i64::to_le_bytes).concat();
     assert_eq!(
         coordinates(&one("'<i8'", &exact)),
@@ -248,7 +248,7 @@ fn strings_keep_their_escapes() {
 }
 
 #[test]
-fn places_count_bytes_and_not_characters() {
+fn error_offsets_are_in_bytes() {
     // Bytes above 127: one character each before version 3, of two bytes in memory.
     let place = |version: u8| {
         let text = format!("{{'{}': ?", "\u{e9}".repeat(20));
@@ -274,7 +274,7 @@ fn places_count_bytes_and_not_characters() {
 }
 
 #[test]
-fn names_of_the_file_do_not_reach_a_terminal() {
+fn names_from_the_file_are_escaped() {
     let dtype = r"[('a\n\x1b[2J', '<f4'), ('b', '<f4')]";
     let text = READER.error(&npy(dtype, "(1,)", &[0; 8])).to_string();
     assert!(text.contains(r"[a\n\u{1b}[2J, b]"), "{text}");

@@ -81,7 +81,7 @@ fn three() -> Vec<u8> {
 }
 
 #[test]
-fn truncation_is_refused() {
+fn truncation_is_rejected() {
     for name in [
         "pos.npy",
         "f64.npy",
@@ -96,7 +96,7 @@ fn truncation_is_refused() {
 }
 
 #[test]
-fn absurd_sizes_are_refused() {
+fn huge_sizes_are_rejected() {
     for shape in [
         "(2147483647, 3)",
         "(-1, 3)",
@@ -141,7 +141,7 @@ fn absurd_sizes_are_refused() {
 }
 
 #[test]
-fn broken_headers_are_named() {
+fn invalid_headers_are_described() {
     for (dictionary, words) in [
         ("[]", "not a dictionary"),
         ("{'shape': (1, 3), 'fortran_order': False}", "no descr"),

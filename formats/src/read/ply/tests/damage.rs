@@ -4,7 +4,7 @@ use super::*;
 
 #[test]
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
-fn truncation_is_refused() {
+fn truncation_is_rejected() {
     for name in ["ascii", "be", "color", "double", "le"] {
         let bytes = single(name);
         let header_end = PlyHeader::parse(&bytes).unwrap().body;
@@ -23,7 +23,7 @@ fn truncation_is_refused() {
 }
 
 #[test]
-fn absurd_counts_are_refused() {
+fn huge_counts_are_rejected() {
     for count in [
         "2147483647",
         "-1",
@@ -78,7 +78,7 @@ fn absurd_counts_are_refused() {
 }
 
 #[test]
-fn broken_text_is_named() {
+fn invalid_text_is_described() {
     for (bytes, words) in [
         (points("2", &[], "1.25 2 3\n4 5\n"), "line ends before z"),
         (
@@ -130,7 +130,7 @@ fn broken_text_is_named() {
 }
 
 #[test]
-fn names_of_the_file_do_not_reach_a_terminal() {
+fn names_from_the_file_are_escaped() {
     let bad = points("1", &["property uchar \u{1b}[2J"], "1 2 3 x\n");
     let text = READER.error(&bad).to_string();
     assert!(text.contains(r"\u{1b}[2J is `x`"), "{text}");

@@ -50,7 +50,7 @@ fn points(count: &str, more: &[&str], body: &str) -> Vec<u8> {
 }
 
 #[test]
-fn all_encodings_hold_the_same_particles() {
+fn all_encodings_contain_the_same_particles() {
     let expected = READER.one(&single("le"));
     assert_eq!(expected.positions.len(), 1200);
     assert_eq!(names(&expected), ["velocity", "id"]);
@@ -60,7 +60,7 @@ fn all_encodings_hold_the_same_particles() {
     ));
     assert_eq!(attribute(&expected, "velocity").components, 3);
     assert_eq!(READER.one(&single("be")), expected);
-    // Nine digits tell any two f32 apart, so even the text is exact.
+    // Nine digits distinguish any two f32, so even the text is exact.
     assert_eq!(READER.one(&single("ascii")), expected);
 
     let color = READER.one(&single("color"));
@@ -80,7 +80,7 @@ fn all_encodings_hold_the_same_particles() {
 }
 
 #[test]
-fn a_mesh_is_refused() {
+fn mesh_is_rejected() {
     let error = READER.error(&sample("public_splashsurf/cube_normals.ply"));
     assert_eq!(
         error,
@@ -138,7 +138,7 @@ fn properties_come_in_any_order_and_type() {
 }
 
 #[test]
-fn vector_parts_of_other_names_or_types_stay_apart() {
+fn unrelated_components_are_not_joined() {
     let particles = READER.one(&points(
         "1",
         &[
@@ -237,7 +237,7 @@ fn lists_before_and_within_vertices_are_skipped() {
 }
 
 #[test]
-fn line_ends_do_not_matter_but_the_first_data_byte_does() {
+fn line_ends_do_not_shift_the_data() {
     let body: Vec<u8> = [0x0a0d_0a0d_u32, 0x0d0a_0d0a, 0x0a0a_0a0a]
         .iter()
         .flat_map(|n| n.to_le_bytes())
@@ -260,7 +260,7 @@ fn line_ends_do_not_matter_but_the_first_data_byte_does() {
 }
 
 #[test]
-fn no_vertices_is_legal() {
+fn zero_vertices_are_valid() {
     let empty = READER.one(&points("0", &["property float vx"], ""));
     assert!(empty.positions.is_empty());
     assert_eq!(names(&empty), ["vx"]);

@@ -18,7 +18,7 @@ fn nasty_points(found: &RawParticles) {
 }
 
 #[test]
-fn payloads_may_spell_keywords() {
+fn payloads_may_contain_keywords() {
     let bytes = TestFile::new("4.1").three_points("POLYDATA").0;
     nasty_points(&good(&bytes));
     let found = good(
@@ -141,7 +141,7 @@ fn long_may_have_four_bytes() {
 }
 
 #[test]
-fn the_time_stands_before_the_points() {
+fn time_precedes_the_points() {
     let points = [[1.0, 2.0, 3.0]];
     let found = good(&modern(&points, &[4], &points));
     assert_eq!(found.time, Some(0.25));
@@ -172,7 +172,7 @@ fn ascii_is_free_form() {
 }
 
 #[test]
-fn a_field_may_state_more_arrays_than_it_has() {
+fn field_may_declare_too_many_arrays() {
     let made = || {
         TestFile::new("4.1")
             .three_points("POLYDATA")
@@ -186,7 +186,7 @@ fn a_field_may_state_more_arrays_than_it_has() {
 }
 
 #[test]
-fn no_points_at_all() {
+fn zero_points() {
     let none = good(
         b"# vtk DataFile Version 5.1\nvtk output\nBINARY\nDATASET POLYDATA\nPOINTS 0 float\n\n",
     );
@@ -196,7 +196,7 @@ fn no_points_at_all() {
 }
 
 #[test]
-fn what_holds_no_particles_is_refused_by_name() {
+fn data_sets_without_particles_are_rejected_by_name() {
     for kind in [
         "STRUCTURED_POINTS",
         "STRUCTURED_GRID",
@@ -215,7 +215,7 @@ fn what_holds_no_particles_is_refused_by_name() {
 }
 
 #[test]
-fn old_cells_may_stand_in_a_new_file() {
+fn old_cell_format_in_a_new_file() {
     let cells = vec![0_i32; 20_000];
     let found = good(
         &TestFile::new("5.1")

@@ -8,7 +8,7 @@ use crate::read::Step;
 use crate::{AttributeData, ParseError, Positions};
 
 #[test]
-fn absurd_counts_are_refused_without_allocation() {
+fn huge_counts_are_rejected_without_allocation() {
     for count in [
         "2147483648",
         "4294967296",
@@ -43,7 +43,7 @@ fn absurd_counts_are_refused_without_allocation() {
 }
 
 #[test]
-fn errors_tell_place_and_need() {
+fn errors_have_offset_and_required_size() {
     let (at, what) = malformed(
         &TestFile::new("4.1")
             .text("DATASET POLYDATA\nPOINTS 9 float\n")
@@ -87,7 +87,7 @@ fn check_cuts(bytes: &[u8], cuts: impl Iterator<Item = usize>) {
 }
 
 #[test]
-fn truncation_is_noticed() {
+fn truncation_is_detected() {
     let points: Vec<[f32; 3]> = (0..12).map(|i| [i as f32, 0.5, -1.0]).collect();
     let ids: Vec<u32> = (0..12).collect();
     for bytes in [

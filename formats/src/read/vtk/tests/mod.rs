@@ -69,7 +69,7 @@ fn names(found: &RawParticles) -> Vec<&str> {
 }
 
 #[test]
-fn every_variant_holds_the_same_particles() {
+fn every_variant_contains_the_same_particles() {
     let truth = good(&sample("single_frames/legacy_polydata-4.2.vtk"));
     assert_eq!(truth.positions.len(), 1200);
     let first = Vec3::new(0.320_935_13, 0.457_511_8, 0.111_691_66);
@@ -136,7 +136,7 @@ fn splashsurf_samples() {
 }
 
 #[test]
-fn an_emitter_begins_without_particles() {
+fn emitter_starts_without_particles() {
     let expected = ["id", "density", "velocity", "pressure_acceleration"];
     let none = good(&sample("emitter_sph/ParticleData_Fluid_1.vtk"));
     assert!(none.positions.is_empty());

@@ -98,7 +98,7 @@ fn one_double_piece_makes_all_double() {
 }
 
 #[test]
-fn lists_and_grids_are_refused_with_a_remedy() {
+fn lists_and_grids_are_rejected_with_a_remedy() {
     for (kind, remedy) in [
         ("PUnstructuredGrid", ".vtu"),
         ("PPolyData", ".vtp"),
@@ -124,7 +124,7 @@ fn lists_and_grids_are_refused_with_a_remedy() {
 }
 
 #[test]
-fn foreign_text_around_the_numbers_does_not_matter() {
+fn text_around_the_numbers_is_ignored() {
     let mut file = b"\xef\xbb\xbf<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>\r\n".to_vec();
     file.extend(
         b"<!DOCTYPE x>\r\n<VTKFile type='UnstructuredGrid' byte_order='LittleEndian'>\r\n\

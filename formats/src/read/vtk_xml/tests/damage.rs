@@ -10,7 +10,7 @@ use crate::{AttributeData, ParseError};
 
 #[test]
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
-fn absurd_counts_are_refused_without_allocation() {
+fn huge_counts_are_rejected_without_allocation() {
     for style in all_styles() {
         let file = made(style, &[3]);
         for count in [
@@ -36,7 +36,7 @@ fn absurd_counts_are_refused_without_allocation() {
 }
 
 #[test]
-fn lying_block_headers_are_refused() {
+fn inconsistent_block_headers_are_rejected() {
     let style = Style {
         pack: Pack::Zlib(1 << 15, true),
         ..Style::RAW
@@ -68,7 +68,7 @@ fn lying_block_headers_are_refused() {
 }
 
 #[test]
-fn compressed_bombs_are_refused() {
+fn compression_bombs_are_rejected() {
     // 64 KiB stored for what its header calls 12 bytes, and the other way round.
     let zeros = AttributeData::F32(vec![0.0; 1 << 14]);
     let style = Style {
@@ -89,7 +89,7 @@ fn compressed_bombs_are_refused() {
 }
 
 #[test]
-fn arrays_that_share_bytes_cannot_fill_the_memory() {
+fn arrays_that_share_bytes_count_against_the_budget() {
     let values = AttributeData::F32(vec![0.5; 300]);
     let style = Style::RAW;
     let file = Made::new(style)
@@ -118,7 +118,7 @@ fn arrays_that_share_bytes_cannot_fill_the_memory() {
 }
 
 #[test]
-fn places_are_those_of_the_file_whatever_its_names() {
+fn error_offsets_do_not_depend_on_names() {
     let name = [0xff; 1000];
     let file = [
         b"<VTKFile type='PolyData'><PolyData><Piece NumberOfPoints='1'><Points>\
@@ -166,7 +166,7 @@ fn check_cuts(bytes: &[u8], cuts: impl Iterator<Item = usize>) {
 
 #[test]
 #[cfg_attr(miri, ignore = "too many bytes for an interpreter")]
-fn truncation_is_noticed() {
+fn truncation_is_detected() {
     for place in [Where::Ascii, Where::Inline, Where::Base64, Where::Raw] {
         for pack in [Pack::Plain, Pack::Zlib(12, true)] {
             let file = made(

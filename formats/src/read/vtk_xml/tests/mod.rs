@@ -67,19 +67,19 @@ fn names(found: &RawParticles) -> Vec<&str> {
 }
 
 #[test]
-fn every_variant_holds_the_same_particles() {
+fn every_variant_contains_the_same_particles() {
     let legacy = sample("single_frames/legacy_polydata-4.2.vtk");
     let truth = crate::read::vtk::FORMAT
         .read(&legacy, &Step::whole(legacy.len()))
         .unwrap();
     let folder = format!("{}/../tests/data/single_frames", env!("CARGO_MANIFEST_DIR"));
-    let mut seen = 0;
+    let mut checked = 0;
     for entry in std::fs::read_dir(folder).unwrap() {
         let name = entry.unwrap().file_name().into_string().unwrap();
         if !name.ends_with(".vtu") && !name.ends_with(".vtp") {
             continue;
         }
-        seen += 1;
+        checked += 1;
         let found = good(&sample(&format!("single_frames/{name}")));
         let is_double = matches!(found.positions, Positions::F64(_));
         assert_eq!(is_double, name == "raw-zlib_u64_f64.vtu", "{name}");
@@ -104,7 +104,7 @@ fn every_variant_holds_the_same_particles() {
             }
         }
     }
-    assert_eq!(seen, 17);
+    assert_eq!(checked, 17);
 }
 
 #[test]
@@ -129,7 +129,7 @@ fn splashsurf_samples() {
 }
 
 #[test]
-fn pyvisfile_encodes_headers_apart() {
+fn headers_may_be_encoded_separately() {
     let fluid = good(&sample("pysph/dam_break_3d_fluid_00100.vtu"));
     assert_eq!(fluid.positions.len(), 2880);
     assert_eq!(names(&fluid), ["u", "v", "w", "rho", "p", "velocity"]);

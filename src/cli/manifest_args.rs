@@ -1,0 +1,174 @@
+//! Makes a manifest and its sequence from command-line arguments.
+
+use std::io;
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+use spherule_formats::sequence::SequenceError;
+
+use super::CliError;
+use super::key_flags::{KeyFlags, over};
+use super::numbers::number;
+use super::paths::{path_as_typed, text};
+use crate::job::JobManifest;
+use crate::manifest::{self, Look, Manifest, Override};
+
+/// Options that set keys of the manifest: `--set` for any key, and options for common keys.
+#[derive(Debug, Args)]
+pub(super) struct ManifestArgs {
+    /// A directory, a pattern (dump.#.vtk, frame_%04d.bgeo, *), files, or a manifest (.toml).
+    #[arg(required = true)]
+    pub(super) input: Vec<PathBuf>,
+
+    #[command(flatten)]
+    pub(super) keys: KeyFlags,
+
+    /// Preset for all settings that are not given explicitly: water, studio or paper.
+    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
+    pub(super) look: Option<String>,
+    /// Attribute to colour by [default: velocity, else the particles' own colours]
+    ///
+    /// Colours (Cd, color, rgb, bytes) are used unchanged unless --map or --range is given. Vectors are mapped by
+    /// their length.
+    #[arg(
+        long,
+        value_name = "ATTRIBUTE",
+        help_heading = "Look",
+        display_order = 0
+    )]
+    pub(super) color_by: Option<String>,
+    /// Colour map of the attribute [default: viridis]
+    ///
+    /// viridis, turbo, plasma, inferno, magma, cividis, red-blue or greys.
+    #[arg(long, value_name = "NAME", help_heading = "Look", display_order = 0)]
+    pub(super) map: Option<String>,
+    /// Values at the ends of the colour map [default: the range of the sequence]
+    #[arg(long, num_args = 2, value_names = ["LOW", "HIGH"], allow_negative_numbers = true, value_parser = number,
+        help_heading = "Look", display_order = 0)]
+    pub(super) range: Option<Vec<f64>>,
+    /// Triangle mesh next to the particles, such as a tank: STL, OBJ, PLY, VTK. May be repeated.
+    ///
+    /// A name with #### or %04d for the frame number is one mesh per frame. [[mesh]] in a manifest has more settings:
+    /// material, colour, unit.
+    #[arg(long, value_name = "FILE", help_heading = "Input", display_order = 0)]
+    pub(super) mesh: Vec<PathBuf>,
+    /// Any key of the manifest: --set render.ground_pattern=checker. May be repeated.
+    ///
+    /// `spherule init` prints all keys with their meaning.
+    #[arg(
+        long,
+        value_name = "KEY=VALUE",
+        help_heading = "Job",
+        display_order = 0
+    )]
+    pub(super) set: Vec<String>,
+}
+
+impl ManifestArgs {
+    /// Reads the manifest, or makes one from the arguments.
+    pub(super) fn manifest(&self) -> Result<JobManifest, CliError> {
+        let mut overrides = Vec::new();
+        let file = self.manifest_file()?;
+        let (text, base) = match &file {
+            Some(path) => {
+                let text = read_manifest(path)?;
+                (
+                    text,
+                    path.parent().map_or_else(PathBuf::new, Path::to_owned),
+                )
+            }
+            None => {
+                overrides.push(self.input_override()?);
+                (String::new(), PathBuf::new())
+            }
+        };
+        self.add_overrides(&mut overrides, file.is_some())?;
+        let shown = file
+            .clone()
+            .unwrap_or_else(|| PathBuf::from("command line"));
+        let (manifest, warnings) = Manifest::parse_with_warnings(&text, &shown, overrides)?;
+        for warning in warnings {
+            note!("{warning}");
+        }
+        let unchanged = file
+            .as_ref()
+            .and_then(|path| Manifest::parse(&text, path).ok());
+        Ok(JobManifest {
+            manifest,
+            base,
+            file,
+            unchanged,
+        })
+    }
+
+    fn manifest_file(&self) -> Result<Option<PathBuf>, CliError> {
+        match self.input.iter().find(|path| is_manifest(path)) {
+            None => Ok(None),
+            Some(path) if self.input.len() == 1 => Ok(Some(path.clone())),
+            Some(path) => Err(CliError::other(format!(
+                "{}: a manifest must be the only input; its input.path names the particles",
+                path.display()
+            ))),
+        }
+    }
+
+    fn input_override(&self) -> Result<Override, CliError> {
+        let paths = self
+            .input
+            .iter()
+            .map(|p| text(p))
+            .collect::<Result<Vec<_>, _>>()?;
+        let value = match <[String; 1]>::try_from(paths) {
+            Ok([one]) => toml::Value::from(one),
+            Err(many) => toml::Value::from(many),
+        };
+        over("input.path", value, "INPUT")
+    }
+
+    fn add_overrides(&self, list: &mut Vec<Override>, from_file: bool) -> Result<(), CliError> {
+        self.keys.add_overrides(list, from_file)?;
+        if let Some(attribute) = &self.color_by {
+            let mut table = toml::Table::new();
+            table.insert("attribute".to_owned(), attribute.clone().into());
+            list.push(over("material.color", table, "--color-by")?);
+        }
+        if let Some(map) = &self.map {
+            list.push(over("material.color.map", map.clone(), "--map")?);
+        }
+        if let Some(range) = &self.range {
+            list.push(over("material.color.range", range.clone(), "--range")?);
+        }
+        if let Some(look) = &self.look {
+            list.extend(
+                Look::named(look)
+                    .map_err(|e| CliError::other(format!("--look: {e}")))?
+                    .settings(&format!("--look {look}")),
+            );
+        }
+        for mesh in &self.mesh {
+            let mut table = toml::Table::new();
+            let path = path_as_typed(&text(mesh)?, from_file)?;
+            table.insert("path".to_owned(), path.into());
+            let append = Override::append("mesh", table, "--mesh");
+            list.push(append.map_err(|e| CliError::other(e.to_string()))?);
+        }
+        for assignment in &self.set {
+            list.push(Override::parse(assignment).map_err(|e| CliError::other(e.to_string()))?);
+        }
+        Ok(())
+    }
+}
+
+/// Reads the text of the manifest `path`.
+pub(super) fn read_manifest(path: &Path) -> Result<String, CliError> {
+    manifest::read_manifest(path).map_err(|error| match error.kind() {
+        io::ErrorKind::NotFound => SequenceError::missing(path).into(),
+        _ => CliError::io(path)(error),
+    })
+}
+
+/// Whether the file name is that of a manifest.
+pub(super) fn is_manifest(path: &Path) -> bool {
+    path.extension()
+        .is_some_and(|e| e.eq_ignore_ascii_case("toml"))
+}

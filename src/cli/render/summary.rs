@@ -1,0 +1,109 @@
+//! Messages of a render: the resolved settings, and progress.
+
+use serde_json::{Value, json};
+use spherule_formats::Sequence;
+
+use crate::cli::progress::ShowReport;
+use crate::pipeline::{self, RadiusRule, Setup};
+use crate::report::FrameReport;
+use crate::surface::SurfaceKind;
+use crate::survey::Survey;
+
+impl ShowReport for FrameReport {
+    fn summary(&self) -> String {
+        let s = &self.seconds;
+        let surface = match s.surface {
+            none if none < 5e-4 => String::new(),
+            seconds => format!("surface {seconds:.3} s, "),
+        };
+        format!(
+            "{} particles, {} built in {:.3} s, {surface}trace {:.2} s",
+            self.particles, self.build.structure, s.build, s.trace
+        )
+    }
+
+    fn facts(&self, output: String) -> Value {
+        json!({"image": output, "seconds": self.seconds})
+    }
+}
+
+/// Prints the resolved settings.
+pub(in crate::cli) fn print_summary(sequence: &Sequence, survey: &Survey, setup: &Setup) {
+    message!(
+        "{}, up to {}",
+        counted(sequence.frames().len(), "frame"),
+        counted(survey.most_particles, "particle")
+    );
+    if let Some(parts) = parts_text(sequence) {
+        message!("{parts}");
+    }
+    for remark in sequence.remarks() {
+        note!("{remark}");
+    }
+    if survey.most_particles == 0 {
+        return;
+    }
+    message!("{}", radius_text(setup, survey));
+    if let pipeline::ColorRule::Attribute { name, .. } = &setup.picture.color
+        && let Some(color) = &survey.color
+    {
+        message!(
+            "colour by `{name}`, range {} to {}",
+            short(color.low),
+            short(color.high)
+        );
+    }
+    if let (pipeline::ColorRule::Rgb { name, .. }, Some(rgb)) = (&setup.picture.color, &survey.rgb)
+    {
+        message!(
+            "colour by the RGB attribute `{name}` ({})",
+            rgb.encoding.name()
+        );
+    }
+    if survey.origin != glam::DVec3::ZERO {
+        message!("origin {}: the particles are far from zero", survey.origin);
+    }
+}
+
+/// The parts of a time step and the used ones, if there are several.
+pub(in crate::cli) fn parts_text(sequence: &Sequence) -> Option<String> {
+    let (all, kept) = (sequence.part_names(), sequence.kept_part_names());
+    if all.len() < 2 {
+        return None;
+    }
+    let used = match kept.len() == all.len() {
+        true => "; --parts selects some of them".to_owned(),
+        false => format!("; used: {}", kept.join(", ")),
+    };
+    Some(format!("each step has the parts {}{used}", all.join(", ")))
+}
+
+/// Describes the radius.
+pub(in crate::cli) fn radius_text(setup: &Setup, survey: &Survey) -> String {
+    match &setup.picture.radius {
+        RadiusRule::Common(radius) => format!("radius {radius}"),
+        RadiusRule::FileOr(_) if survey.has_radii => "radius from the files".to_owned(),
+        RadiusRule::FileOr(radius) => {
+            let radius = short(f64::from(*radius));
+            let why = match (setup.picture.surface.kind, survey.packed_radius) {
+                (SurfaceKind::Spheres, _) | (_, None) => "half the typical distance of neighbours",
+                (SurfaceKind::Union, _) => {
+                    "from the particle density, enlarged so that spheres overlap"
+                }
+                (SurfaceKind::Smooth, _) => "from the particle density",
+            };
+            format!("radius {radius}, {why} (--radius sets it)")
+        }
+        RadiusRule::Attribute { name, scale } => format!("radius {scale} x attribute `{name}`"),
+    }
+}
+
+/// Rounds to four digits.
+fn short(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
+}
+
+fn counted(count: usize, what: &str) -> String {
+    let plural = if count == 1 { "" } else { "s" };
+    format!("{count} {what}{plural}")
+}

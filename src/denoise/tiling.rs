@@ -1,0 +1,165 @@
+//! How a picture is divided into tiles.
+
+use glam::Vec3;
+
+use super::planes::STRIDE;
+use super::settings::PATCH_RADIUS;
+use crate::math::LANES;
+
+/// Neighbours on each side over which variances are averaged.
+pub(super) const NOISE_RADIUS: usize = 1;
+
+/// A rectangle of the image, in pixels.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) struct Rectangle {
+    pub(super) left: usize,
+    pub(super) top: usize,
+    pub(super) width: usize,
+    pub(super) height: usize,
+}
+
+/// Sizes that all tiles of an image have in common.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct TileLayout {
+    /// Pixels around a tile.
+    pub(super) margin: usize,
+    /// Number of pairs of pixels per row.
+    pub(super) pairs: usize,
+    /// Number of pixels per row that are compared: the patches of all pairs.
+    pub(super) compared: usize,
+}
+
+impl TileLayout {
+    /// For tiles of up to `width` columns, at most [`Self::max_width`].
+    pub(super) fn new(search: usize, width: usize) -> Self {
+        debug_assert!(width <= Self::max_width(search));
+        Self {
+            margin: Self::margin(search),
+            pairs: (width + search).next_multiple_of(LANES),
+            compared: (width + search + 2 * PATCH_RADIUS).next_multiple_of(LANES),
+        }
+    }
+
+    /// Pixels around a tile.
+    pub(super) const fn margin(search: usize) -> usize {
+        search + PATCH_RADIUS + NOISE_RADIUS
+    }
+
+    /// The largest width whose pixels, with those that they are compared with, fit into a row.
+    pub(super) const fn max_width(search: usize) -> usize {
+        let whole_groups = (STRIDE - 1 - Self::margin(search)) / LANES * LANES;
+        whole_groups - search - 2 * PATCH_RADIUS
+    }
+
+    /// The index of column `x` in a plane.
+    pub(super) fn column(&self, x: isize) -> usize {
+        self.index(x)
+    }
+
+    /// The index of row `y` in a tile.
+    pub(super) fn row(&self, y: isize) -> usize {
+        self.index(y)
+    }
+
+    fn index(&self, position: isize) -> usize {
+        let index = self.margin.checked_add_signed(position);
+        index.expect("positions lie within the margin")
+    }
+}
+
+/// The smallest length that divides `whole` into as many parts as parts of length `max` would.
+pub(super) fn equal_part(whole: usize, max: usize) -> usize {
+    whole.div_ceil(whole.div_ceil(max))
+}
+
+/// The place of a tile, and its rows.
+type TileRows<'a> = (Rectangle, Vec<&'a mut [Vec3]>);
+
+/// Splits a plane into tiles of up to `columns` x `rows` pixels.
+pub(super) fn tiles(
+    plane: &mut [Vec3],
+    width: usize,
+    columns: usize,
+    rows: usize,
+) -> Vec<TileRows<'_>> {
+    let count = width.div_ceil(columns) * plane.len().div_ceil(width * rows);
+    let mut all = Vec::with_capacity(count);
+    for (band, pixels) in plane.chunks_mut(width * rows).enumerate() {
+        let first = all.len();
+        let height = pixels.len() / width;
+        let place = |left: usize| Rectangle {
+            left,
+            top: band * rows,
+            width: columns.min(width - left),
+            height,
+        };
+        let lefts = (0..width).step_by(columns);
+        all.extend(lefts.map(|left| (place(left), Vec::with_capacity(height))));
+        for row in pixels.chunks_mut(width) {
+            for ((_, tile), piece) in all[first..].iter_mut().zip(row.chunks_mut(columns)) {
+                tile.push(piece);
+            }
+        }
+    }
+    all
+}
+
+/// Upper bound of the memory of [`tiles`] of an image, divided into equal parts of at most these lengths, bytes.
+pub(super) fn tiles_bytes(width: u32, height: u32, max_columns: usize, max_rows: usize) -> u64 {
+    let columns = u64::from(width).div_ceil(max_columns as u64);
+    let tiles = columns * u64::from(height).div_ceil(max_rows as u64);
+    let rows = columns * u64::from(height);
+    tiles * size_of::<TileRows<'_>>() as u64 + rows * size_of::<&[Vec3]>() as u64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn tiles_cover_a_plane_once() {
+        for ([width, height], [max_columns, max_rows]) in [
+            ([1_u32, 1_u32], [9, 9]),
+            ([7, 5], [3, 2]),
+            ([154, 64], [154, 64]),
+            ([155, 65], [154, 64]),
+        ] {
+            let predicted = tiles_bytes(width, height, max_columns, max_rows);
+            let (width, height) = (width as usize, height as usize);
+            let columns = equal_part(width, max_columns);
+            let rows = equal_part(height, max_rows);
+            let mut plane = vec![Vec3::ZERO; width * height];
+            let all = tiles(&mut plane, width, columns, rows);
+            let places = size_of_val(&all[..]);
+            let lines: usize = all.iter().map(|(_, rows)| size_of_val(&rows[..])).sum();
+            assert_eq!((places + lines) as u64, predicted, "{width}x{height}");
+            for (place, rows) in all {
+                assert_eq!(rows.len(), place.height);
+                for (y, row) in rows.into_iter().enumerate() {
+                    assert_eq!(row.len(), place.width);
+                    for (x, pixel) in row.iter_mut().enumerate() {
+                        *pixel += Vec3::new((place.left + x) as f32, (place.top + y) as f32, 1.0);
+                    }
+                }
+            }
+            for (i, pixel) in plane.iter().enumerate() {
+                let expected = Vec3::new((i % width) as f32, (i / width) as f32, 1.0);
+                assert_eq!(*pixel, expected, "{width}x{height}");
+            }
+        }
+    }
+
+    #[test]
+    fn rows_of_the_widest_tile_hold_all_that_is_compared() {
+        for search in 1..=16 {
+            let layout = TileLayout::new(search, TileLayout::max_width(search));
+            // Columns 0 and `STRIDE - 1` have no noise
+            let first = layout.column(-((search + PATCH_RADIUS) as isize));
+            assert_eq!(first, 1);
+            let end = layout.column(-(PATCH_RADIUS as isize)) + layout.compared;
+            assert!(end < STRIDE, "{search}: {end}");
+            assert!(layout.margin + layout.pairs <= STRIDE, "{search}");
+            assert!(layout.pairs + 2 * PATCH_RADIUS <= STRIDE, "{search}");
+        }
+    }
+}

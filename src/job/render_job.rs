@@ -1,0 +1,389 @@
+//! A render job before anything is written: manifest, directory, frames, and the setup of its images.
+
+use std::path::{Path, PathBuf};
+use std::sync::OnceLock;
+
+use serde_json::Value;
+use spherule_formats::Sequence;
+use spherule_jobs::{Fingerprint, FrameRequest, Job, JobRequest, Plan, ResumeMode};
+
+use super::manifest_file::{JobManifest, ManifestFile};
+use super::meshes::{self, JobMeshes};
+use super::selection::{frame_requests, frames_in, indices, select};
+use super::target::{check_output_dir, stored_survey};
+use super::{RunError, Shard, in_thread};
+use crate::hdr::{HdrError, read_radiance_map};
+use crate::manifest::{Manifest, named_place};
+use crate::metrics::memory::available;
+use crate::pipeline::{FrameSize, ImageTask, MemoryModel, Schedule, Setup};
+use crate::report::job::{HTML_FILE, JSON_FILE};
+use crate::resolve::{self, add_meshes, check_views, needs_environment_image, question};
+use crate::scene::RadianceMap;
+use crate::survey::Survey;
+
+/// A render job before anything is written.
+#[derive(Debug, Clone)]
+pub struct RenderJob {
+    /// With paths relative to the directory of the job.
+    manifest: Manifest,
+    manifest_file: ManifestFile,
+    /// The output path of the given manifest.
+    shown_output: PathBuf,
+    shard: Option<Shard>,
+    /// See [`RenderJob::environment_image`].
+    environment_image: OnceLock<Option<RadianceMap>>,
+    meshes: JobMeshes,
+}
+
+impl RenderJob {
+    /// A job with the frames of `sequence`. This run processes `shard`, or all frames.
+    ///
+    /// # Errors
+    /// The manifest selects no frames, or has one output for several frames.
+    pub fn new(
+        requested: JobManifest,
+        sequence: &Sequence,
+        shard: Option<Shard>,
+    ) -> Result<Self, RunError> {
+        let frames = frames_in(sequence, requested.manifest.input.frames.as_ref())?;
+        requested.manifest.check_frame_count(frames.len())?;
+        let shown_output = PathBuf::from(requested.manifest.output.path.as_str());
+        let (manifest_file, manifest) = ManifestFile::new(requested)?;
+        Ok(Self {
+            manifest,
+            manifest_file,
+            shown_output,
+            shard,
+            environment_image: OnceLock::new(),
+            meshes: JobMeshes::default(),
+        })
+    }
+
+    /// The job with the defaults of the version that began it, if a run in `mode` resumes one.
+    ///
+    /// # Errors
+    /// The plan of the existing job cannot be read.
+    pub fn resuming(mut self, mode: ResumeMode) -> Result<Self, RunError> {
+        if let Some(planned) = self.existing_plan(mode)? {
+            self.manifest.adopt_old_defaults(planned.settings());
+        }
+        Ok(self)
+    }
+
+    /// The manifest, with paths relative to [`RenderJob::dir`].
+    pub const fn manifest(&self) -> &Manifest {
+        &self.manifest
+    }
+
+    /// The directory of the images and of all files of the job, absolute.
+    pub fn dir(&self) -> &Path {
+        self.manifest_file.dir()
+    }
+
+    /// The output path of the given manifest.
+    pub fn shown_output(&self) -> &Path {
+        &self.shown_output
+    }
+
+    /// The frames of this run, done or not.
+    pub fn selected(&self, sequence: &Sequence) -> Vec<i64> {
+        select(sequence, self.manifest.input.frames.as_ref(), self.shard)
+    }
+
+    /// Checks the output directory: it must not be a file, or contain a job of another kind.
+    ///
+    /// # Errors
+    /// [`RunError::OutputIsFile`], [`RunError::OtherKind`], or the plan of the existing job cannot be read.
+    pub fn check_output_dir(&self, mode: ResumeMode) -> Result<(), RunError> {
+        check_output_dir(self.dir(), "images", None, mode)
+    }
+
+    /// Checks that a new job would not overwrite a `job.toml` that a user wrote for something else.
+    ///
+    /// # Errors
+    /// [`RunError::ForeignManifest`], or the directory cannot be read.
+    pub fn check_manifest_file(&self) -> Result<(), RunError> {
+        if self.manifest_file.is_free() || Job::exists(self.dir())? {
+            return Ok(());
+        }
+        let path = self.manifest_file.path();
+        Err(RunError::ForeignManifest { path })
+    }
+
+    /// Writes the manifest next to the images; returns notes for the user. A file that a user wrote or edited is not
+    /// changed. Overrides are added to the given manifest only in a `mode` that resolves automatic settings again.
+    pub(super) fn write_manifest(&self, mode: ResumeMode) -> Result<Vec<String>, RunError> {
+        let resolves_again = matches!(mode, ResumeMode::Force | ResumeMode::KeepDone);
+        self.manifest_file.write(&self.manifest, resolves_again)
+    }
+
+    fn image(&self, frame: i64) -> PathBuf {
+        self.dir().join(self.manifest.output.path.path_for(frame))
+    }
+
+    fn preview(&self, frame: i64) -> Option<PathBuf> {
+        let output = &self.manifest.output;
+        let path = || self.dir().join(output.path.preview_path_for(frame));
+        output.preview.then(path)
+    }
+
+    /// The request for the job.
+    ///
+    /// # Errors
+    /// The plan of the existing job cannot be read.
+    pub fn request(&self, sequence: &Sequence, mode: ResumeMode) -> Result<JobRequest, RunError> {
+        let outputs = |frame| {
+            let image = std::iter::once(self.image(frame));
+            image.chain(self.preview(frame)).collect()
+        };
+        Ok(JobRequest {
+            settings: self.settings(mode)?,
+            frames: self.frames_of_job(frame_requests(
+                sequence,
+                |frame| self.mesh_files(frame),
+                outputs,
+            )),
+            extra_outputs: [JSON_FILE, HTML_FILE]
+                .map(|name| self.dir().join(name))
+                .into(),
+            selection: Some(self.selected(sequence)),
+            mode: match mode {
+                // A running simulation may have paused in the middle of a file
+                ResumeMode::Resume if self.manifest.job.follow => ResumeMode::RequeueChanged,
+                mode => mode,
+            },
+            takeover_after: self.manifest.job.takeover_after,
+        })
+    }
+
+    /// The request that adds the frames `new` to an open job.
+    pub(super) fn request_for(
+        &self,
+        sequence: &Sequence,
+        new: &[i64],
+    ) -> Result<JobRequest, RunError> {
+        Ok(JobRequest {
+            selection: Some(new.to_vec()),
+            ..self.request(sequence, ResumeMode::Resume)?
+        })
+    }
+
+    fn existing_plan(&self, mode: ResumeMode) -> Result<Option<Plan>, RunError> {
+        Ok(match mode {
+            ResumeMode::Force => None,
+            _ => Job::read_plan(self.dir())?,
+        })
+    }
+
+    /// The settings of the images. Those with the same effect as in the existing plan are written as in the plan.
+    fn settings(&self, mode: ResumeMode) -> Result<Vec<(String, String)>, RunError> {
+        let mut settings = self.manifest.settings();
+        self.identify_files(&mut settings)?;
+        let Some(planned) = self.existing_plan(mode)? else {
+            return Ok(settings);
+        };
+        let has_rgb = planned.resolved().get("rgb").is_some_and(Value::is_object);
+        let mut as_planned = self
+            .manifest
+            .settings_as_planned(planned.settings(), has_rgb);
+        self.identify_files(&mut as_planned)?;
+        // Settings that are resolved again must be the new ones
+        let resolves_again =
+            mode == ResumeMode::KeepDone && !planned.changes_to(&as_planned).is_empty();
+        Ok(match resolves_again {
+            true => settings,
+            false => as_planned,
+        })
+    }
+
+    /// Replaces paths of files that all images depend on in `settings` by fingerprints: the files may be moved.
+    fn identify_files(&self, settings: &mut [(String, String)]) -> Result<(), RunError> {
+        self.identify_environment(settings)?;
+        meshes::identify(&self.manifest, self.dir(), settings)
+    }
+
+    /// The files of the meshes that only `frame` has.
+    fn mesh_files(&self, frame: i64) -> Vec<PathBuf> {
+        meshes::frame_files(&self.manifest, self.dir(), frame)
+    }
+
+    /// Replaces the path of the image of the environment in `settings` by its fingerprint: the image may be moved.
+    fn identify_environment(&self, settings: &mut [(String, String)]) -> Result<(), RunError> {
+        let path = self.environment_path();
+        let setting = settings
+            .iter_mut()
+            .find(|(key, _)| key == "environment.image");
+        if let (Some(path), Some((_, value))) = (path, setting) {
+            let found = Fingerprint::of_file(&path);
+            let found = found.map_err(|source| HdrError::Io {
+                path: path.clone(),
+                source,
+            })?;
+            *value = format!("blake3 {}", found.blake3);
+        }
+        Ok(())
+    }
+
+    /// The frames of the job: all of the sequence, or the selected one if the output has no number.
+    fn frames_of_job(&self, mut all: Vec<FrameRequest>) -> Vec<FrameRequest> {
+        let range = self.manifest.input.frames.as_ref();
+        if let Some(range) = range.filter(|_| !self.manifest.output.path.has_number()) {
+            all.retain(|frame| range.contains(frame.number));
+        }
+        all
+    }
+
+    /// Whether opening the job in this mode surveys the sequence, which reads some of its frames.
+    ///
+    /// # Errors
+    /// The plan of the existing job cannot be read.
+    pub fn needs_survey(&self, mode: ResumeMode) -> Result<bool, RunError> {
+        let Some(planned) = self.existing_plan(mode)? else {
+            return Ok(true);
+        };
+        let changes = || Ok::<_, RunError>(planned.changes_to(&self.settings(mode)?));
+        Ok(mode == ResumeMode::KeepDone && !changes()?.is_empty())
+    }
+
+    /// Opens the job. Surveys the sequence if that is necessary.
+    pub(super) fn open(&self, sequence: &Sequence, mode: ResumeMode) -> Result<Job, RunError> {
+        let request = self.request(sequence, mode)?;
+        // Start a new job, or discard an old one, only if its images are possible
+        let surveyed = match self.existing_plan(mode)? {
+            None => Some(self.survey_for_start(sequence)?),
+            Some(_) => None,
+        };
+        let resolve = |_: Option<&Value>| match surveyed {
+            Some(survey) => Ok(survey),
+            None => Ok::<_, RunError>(serde_json::to_value(self.survey(sequence)?.0)?),
+        };
+        Ok(Job::open(self.dir(), request, resolve)?)
+    }
+
+    fn survey_for_start(&self, sequence: &Sequence) -> Result<Value, RunError> {
+        let (survey, setup) = self.survey(sequence)?;
+        let mut tasks = self.tasks(sequence, &self.selected(sequence));
+        self.schedule(sequence, &setup, &mut tasks);
+        require_one_fits(&tasks)?;
+        Ok(serde_json::to_value(&survey)?)
+    }
+
+    /// Surveys the sequence, and resolves the automatic settings with it.
+    ///
+    /// # Errors
+    /// No frame can be read, or the settings and the particles do not go together.
+    pub fn survey(&self, sequence: &Sequence) -> Result<(Survey, Setup), RunError> {
+        let survey = in_thread(|| Survey::of(sequence, question(&self.manifest)))?;
+        let setup = self.setup(&survey, sequence)?;
+        Ok((survey, setup))
+    }
+
+    /// The setup, if the view is valid along the whole camera path.
+    fn setup(&self, survey: &Survey, sequence: &Sequence) -> Result<Setup, RunError> {
+        let frames = sequence.frames().iter().map(|frame| frame.number);
+        let map = self.environment_image()?;
+        let mut setup = resolve::setup(&self.manifest, survey, map)?;
+        let meshes = self.meshes.get(&self.manifest, self.dir(), survey)?;
+        add_meshes(&mut setup, &self.manifest, meshes);
+        check_views(&setup, frames)?;
+        Ok(setup)
+    }
+
+    /// The path of the image of the environment, if there is one.
+    fn environment_path(&self) -> Option<PathBuf> {
+        let path = self.manifest.environment.image.as_ref()?;
+        // The directory may not exist yet, so that the system cannot follow `..` from it
+        needs_environment_image(&self.manifest).then(|| named_place(&self.dir().join(path)))
+    }
+
+    /// The image of the environment, if there is one, in the resolution of environments. Its file is read once.
+    fn environment_image(&self) -> Result<Option<&RadianceMap>, RunError> {
+        if let Some(map) = self.environment_image.get() {
+            return Ok(map.as_ref());
+        }
+        let path = self.environment_path();
+        let map = path.map(|path| read_radiance_map(&path)).transpose()?;
+        let reduced = map.map(|map| map.reduced());
+        Ok(self.environment_image.get_or_init(|| reduced).as_ref())
+    }
+
+    /// Notes for the user on the image of the environment, and on meshes that have been read for a setup.
+    ///
+    /// # Errors
+    /// The image cannot be read.
+    pub fn scene_notes(&self) -> Result<Vec<String>, RunError> {
+        let negative = self.environment_image()?.map_or(0, RadianceMap::negative);
+        let note = |path: PathBuf| {
+            let path = path.display();
+            format!("{path}: {negative} pixels are negative, which counts as 0")
+        };
+        let path = self.environment_path().filter(|_| negative > 0);
+        Ok(path
+            .map(note)
+            .into_iter()
+            .chain(self.meshes.notes())
+            .collect())
+    }
+
+    /// The setup with the survey that is stored in the plan.
+    ///
+    /// # Errors
+    /// The plan has no valid survey, or the settings and the particles do not go together.
+    pub fn stored_setup(
+        &self,
+        resolved: &Value,
+        sequence: &Sequence,
+    ) -> Result<(Survey, Setup), RunError> {
+        let survey = stored_survey(resolved, self.dir())?;
+        let setup = self.setup(&survey, sequence)?;
+        Ok((survey, setup))
+    }
+
+    /// The images of `frames`.
+    pub fn tasks(&self, sequence: &Sequence, frames: &[i64]) -> Vec<ImageTask> {
+        indices(sequence, frames)
+            .map(|(frame, index)| ImageTask {
+                frame,
+                index,
+                image: self.image(frame),
+                preview: self.preview(frame),
+                meshes: self.mesh_files(frame),
+                refused: None,
+            })
+            .collect()
+    }
+
+    /// Decides whether frames overlap in memory. Tasks that exceed the limit are marked as refused.
+    pub fn schedule(
+        &self,
+        sequence: &Sequence,
+        setup: &Setup,
+        tasks: &mut [ImageTask],
+    ) -> Schedule {
+        let sizes: Vec<FrameSize> = tasks
+            .iter()
+            .map(|task| FrameSize::of_task(sequence, task, setup))
+            .collect();
+        let limit = self.manifest.render.memory_limit;
+        let mut schedule = MemoryModel::new(setup).schedule(&sizes, limit, available());
+        for (index, error) in schedule.too_large.drain(..) {
+            tasks[index].refused = Some(error);
+        }
+        schedule
+    }
+}
+
+/// Refuses a run in which no frame fits into memory.
+///
+/// # Errors
+/// [`RunError::NothingFits`].
+pub fn require_one_fits(tasks: &[ImageTask]) -> Result<(), RunError> {
+    let refused = tasks.iter().map(|t| Some((t.frame, t.refused.as_ref()?)));
+    match refused.collect::<Option<Vec<_>>>().as_deref() {
+        Some([(frame, error), ..]) => Err(RunError::NothingFits {
+            frame: *frame,
+            source: (*error).clone(),
+        }),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,125 @@
+//! `[environment]`: light from infinitely far away, for the path integrator.
+
+use glam::Vec3;
+use serde_json::{Value as Json, json};
+
+use super::key::{Affects, Key};
+use super::keys::{Keys, keys};
+use super::reader::Section;
+use super::sun::Sun;
+use super::value::named;
+
+named! {
+    /// Source of the radiance of the environment.
+    EnvironmentKind {
+        /// A soft key light, a fill light, a rim light and a dome, placed relative to the first view of the camera.
+        Studio = "studio",
+        /// A clear sky with its sun.
+        Sky = "sky",
+        /// An equirectangular image.
+        Image = "image",
+        /// The same radiance from every direction.
+        Constant = "constant",
+    }
+}
+
+pub(super) const ABOUT: &[&str] = &["Light from infinitely far away, for integrator = \"path\""];
+
+/// The comment of `type`.
+const TYPE: &str = "Source: studio (soft key light, fill, rim and dome) | sky | image | constant";
+
+/// `[environment]`
+#[derive(Debug, Clone, PartialEq)]
+pub struct Environment {
+    /// Source of the radiance.
+    pub kind: EnvironmentKind,
+    /// The sun of a sky.
+    pub sun: Sun,
+    /// Path of the image, if that is the source.
+    pub image: Option<String>,
+    /// Factor on the radiance, linear RGB.
+    pub color: Vec3,
+    /// Factor on the radiance.
+    pub intensity: f32,
+    /// Rotation around the up axis, counterclockwise as seen from above, degrees.
+    pub rotation: f64,
+    /// Whether camera rays see the environment instead of the background.
+    pub visible: bool,
+}
+
+impl Default for Environment {
+    fn default() -> Self {
+        Self {
+            kind: EnvironmentKind::Studio,
+            sun: Sun::DEFAULT,
+            image: None,
+            color: Vec3::ONE,
+            intensity: 1.0,
+            rotation: 0.0,
+            visible: false,
+        }
+    }
+}
+
+impl Environment {
+    pub(super) fn keys(&mut self, keys: &mut Keys<'_>) {
+        let key = Key::new("type", &[TYPE]).affects(Affects::PathTracing);
+        keys.key(key, &mut self.kind);
+        keys!(keys:
+            /// sky: position of the sun and its apparent diameter, degrees
+            ///
+            /// The elevation is above the horizon. The azimuth is 0 at the right of the first view of the camera, and
+            /// 90 on the viewer's side. A size of 0.53 is that of the sun as seen from the earth; a larger one has
+            /// softer shadows.
+            sun => self.sun, affects(Affects::PathTracing);
+            /// image: an equirectangular OpenEXR or Radiance HDR file
+            image => self.image, example("\"hall.exr\""), affects(Affects::PathTracing);
+            /// Factor on the radiance, linear RGB; the radiance of a constant environment
+            color => self.color, affects(Affects::PathTracing);
+            /// Factor on the radiance; 0 is no light
+            intensity => self.intensity, from(0), affects(Affects::PathTracing);
+            /// Rotation around the up axis, counterclockwise from above, degrees
+            ///
+            /// At 0, the centre of an image is where a camera with azimuth 0 looks. A studio and a sky turn relative to
+            /// the first view of the camera.
+            rotation => self.rotation, unit("degrees"), affects(Affects::PathTracing);
+            /// Whether the camera sees the environment instead of render.background
+            visible => self.visible, affects(Affects::PathTracing);
+        );
+        if let Some(section) = keys.reading() {
+            self.check(section);
+        }
+    }
+
+    /// Checks that an image is given where one is needed; without a type, an image is the source.
+    fn check(&mut self, section: &Section<'_>) {
+        if section.lacks("type") && self.image.is_some() {
+            self.kind = EnvironmentKind::Image;
+        }
+        match (self.kind, section.lacks("image")) {
+            (EnvironmentKind::Image, true) => {
+                section.missing("image", "type = \"image\" needs a file, as \"hall.exr\"");
+            }
+            (EnvironmentKind::Studio | EnvironmentKind::Sky | EnvironmentKind::Constant, false)
+                if section.has("type") =>
+            {
+                section.wrong("image", "is given, but only type = \"image\" uses it");
+            }
+            _ => {}
+        }
+    }
+}
+
+/// Dependencies between keys, as JSON schema.
+pub(super) fn conditions() -> Json {
+    json!([
+        {
+            "if": { "required": ["type"], "properties": { "type": { "const": "image" } } },
+            "then": { "required": ["image"] },
+        },
+        {
+            "if": { "required": ["type"], "properties": { "type": { "not": { "const": "image" } } } },
+            "then": { "properties": { "image": false } },
+        },
+    ])
+}

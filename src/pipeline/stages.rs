@@ -1,0 +1,222 @@
+//! The stages of a run, which pass frames on. See [`super::work`].
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, Sender, SyncSender};
+use std::time::Instant;
+
+use spherule_formats::sequence::Sequence;
+use spherule_jobs::{
+    ClaimedFrame, FinishedFrame, FrameFailure, FrameQueue, FrameRecorder, Interrupt, JobError,
+    Recorded, RunContext, catch_panic,
+};
+
+use super::encode::write_frame;
+use super::read_threads::ReadThreads;
+use super::{
+    FrameSize, ImageError, ImageTask, LoadedFrame, Setup, TracedFrame, load_frame, renderer_of,
+};
+use crate::metrics::MemoryPeaks;
+use crate::render::{Film, Stop};
+use crate::report::FrameReport;
+
+/// A frame between two stages, or the reason why it failed.
+pub(super) struct StagedFrame<T> {
+    pub(super) claimed: ClaimedFrame,
+    pub(super) result: Result<T, FrameFailure>,
+}
+
+/// The first stage.
+pub(super) struct ReadStage<'a> {
+    pub(super) setup: &'a Setup,
+    pub(super) sequence: &'a Sequence,
+    pub(super) tasks: &'a [ImageTask],
+    pub(super) threads: &'a ReadThreads,
+    pub(super) context: &'a RunContext<'a, FrameReport>,
+    pub(super) next: ToTrace,
+}
+
+impl ReadStage<'_> {
+    /// Runs on the thread of the first stage.
+    pub(super) fn run(&self, queue: &mut FrameQueue<'_>) -> Result<(), JobError> {
+        while let Some(claimed) = queue.next()? {
+            let task = &self.tasks[claimed.index];
+            self.context.report_stage(task.frame, "reading");
+            let loaded = catch_panic(|| self.load(task)).map(|mut frame| {
+                self.context.report_notes(frame.notes.drain(..));
+                frame
+            });
+            let result = loaded.map_err(|e| e.into_failure(task.frame));
+            if !self.next.send(StagedFrame { claimed, result }) {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn load(&self, task: &ImageTask) -> Result<LoadedFrame, ImageError> {
+        task.check()?;
+        let size = FrameSize::of_task(self.sequence, task, self.setup);
+        let load = || load_frame(self.setup, self.sequence, task);
+        Ok(self.threads.read(size.read_bytes(), load)?)
+    }
+}
+
+/// The channels from reading to tracing.
+pub(super) struct ToTrace {
+    pub(super) to_trace: SyncSender<StagedFrame<LoadedFrame>>,
+    /// Signals that there is memory for another frame.
+    pub(super) may_continue: Receiver<()>,
+}
+
+impl ToTrace {
+    /// Sends the frame and waits until there is memory for another. Returns false once a later stage has ended.
+    fn send(&self, frame: StagedFrame<LoadedFrame>) -> bool {
+        self.to_trace.send(frame).is_ok() && self.may_continue.recv().is_ok()
+    }
+}
+
+/// Runs `work` on a thread of the current pool, so that its time does not include the wait for a thread, and its
+/// parallel parts are not submitted from outside the pool each time.
+fn in_pool<T: Send>(work: impl FnOnce() -> T + Send) -> T {
+    rayon::scope(|_| work())
+}
+
+/// Stops tracing when frames can no longer be recorded, or when the interrupt says to stop now.
+pub(super) struct DropFrame<'a> {
+    pub(super) has_failed: &'a AtomicBool,
+    pub(super) interrupt: &'a Interrupt,
+}
+
+impl Stop for DropFrame<'_> {
+    fn is_raised(&self) -> bool {
+        self.has_failed.load(Ordering::Relaxed) || self.interrupt.stop_now()
+    }
+}
+
+/// The second stage.
+pub(super) struct TraceStage<'a> {
+    pub(super) setup: &'a Setup,
+    pub(super) context: &'a RunContext<'a, FrameReport>,
+    pub(super) stop: DropFrame<'a>,
+}
+
+impl TraceStage<'_> {
+    /// The neighbouring stages end when this one does, because it owns its ends of all channels.
+    pub(super) fn run(
+        &self,
+        loaded: Receiver<StagedFrame<LoadedFrame>>,
+        spare: Receiver<Film>,
+        is_built: Option<SyncSender<()>>,
+        next: SyncSender<StagedFrame<TracedFrame>>,
+    ) {
+        let mut tracer = renderer_of(self.setup.picture.renderer);
+        for StagedFrame { claimed, result } in loaded {
+            // Drop a frame that was read but not started when the interrupt was raised
+            if self.context.interrupt().is_raised() {
+                return;
+            }
+            let number = claimed.frame;
+            let failure = |error: ImageError| error.into_failure(number);
+            let built = result.and_then(|frame| {
+                self.context.report_stage(number, "tracing");
+                let build = || tracer.prepare(self.setup, frame);
+                catch_panic(|| Ok(in_pool(build)?)).map_err(failure)
+            });
+            if let Some(is_built) = &is_built {
+                // The reader may have ended
+                let _ = is_built.send(());
+            }
+            // Trace the image, in the planes of an earlier one
+            let traced = built.and_then(|mut frame| {
+                self.context.report_notes(frame.notes.drain(..));
+                if let Ok(film) = spare.try_recv() {
+                    tracer.recycle(film);
+                }
+                let trace = || tracer.render(self.setup, frame, &self.stop);
+                catch_panic(|| Ok(in_pool(trace)?)).map_err(failure)
+            });
+            if traced.is_err() {
+                if self.stop.is_raised() {
+                    return;
+                }
+                // The failure may have left the buffers in an inconsistent state
+                tracer = renderer_of(self.setup.picture.renderer);
+            }
+            if is_built.is_none() {
+                tracer = renderer_of(self.setup.picture.renderer);
+            }
+            let result = traced;
+            if next.send(StagedFrame { claimed, result }).is_err() {
+                return;
+            }
+        }
+    }
+}
+
+/// Channels to earlier stages, for use after an image is written. The receivers may have ended.
+pub(super) struct AfterWrite {
+    /// To the reader, without overlap: read the next frame.
+    pub(super) is_written: Option<SyncSender<()>>,
+    /// To the tracer: reuse the planes.
+    pub(super) films: Option<Sender<Film>>,
+}
+
+/// The third stage: writes images, and records frames.
+pub(super) struct WriteStage<'a> {
+    pub(super) setup: &'a Setup,
+    /// Whether the sequence maps its files.
+    pub(super) maps_files: bool,
+    pub(super) next: AfterWrite,
+}
+
+impl WriteStage<'_> {
+    pub(super) fn run(
+        &self,
+        traced: Receiver<StagedFrame<TracedFrame>>,
+        recorder: &mut FrameRecorder<'_, FrameReport>,
+    ) -> Result<(), JobError> {
+        let mut peaks = MemoryPeaks::default();
+        let mut image_before = Instant::now();
+        for StagedFrame { claimed, result } in traced {
+            let result = match result {
+                Ok(frame) => {
+                    recorder.context().report_stage(claimed.frame, "writing");
+                    recorder.check_claim(&claimed)?;
+                    self.write(frame, &mut peaks).map(|mut finished| {
+                        let wall = image_before.elapsed();
+                        image_before = Instant::now();
+                        finished.report.seconds.wall = wall.as_secs_f64();
+                        finished
+                    })
+                }
+                Err(failure) => Err(failure),
+            };
+            if recorder.record(claimed, result)? == Recorded::Stopped {
+                break;
+            }
+            if let Some(is_written) = &self.next.is_written {
+                let _ = is_written.send(());
+            }
+        }
+        Ok(())
+    }
+
+    /// Writes the image, and returns its planes to the tracer.
+    fn write(
+        &self,
+        frame: TracedFrame,
+        peaks: &mut MemoryPeaks,
+    ) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
+        let (number, outputs) = (frame.task.frame, frame.task.outputs());
+        if self.maps_files {
+            peaks.use_samples_only();
+        }
+        let write = || Ok(write_frame(self.setup, frame, peaks)?);
+        let (report, film) =
+            catch_panic(write).map_err(|error: ImageError| error.into_failure(number))?;
+        if let Some(films) = &self.next.films {
+            let _ = films.send(film);
+        }
+        Ok(FinishedFrame { outputs, report })
+    }
+}

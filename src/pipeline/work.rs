@@ -1,0 +1,124 @@
+//! The three stages of a run: while frame i is traced, frame i+1 is read and frame i-1 is encoded and written.
+//!
+//! One frame is in flight per stage, handed over without a queue, so memory is constant however long the sequence is.
+//! Reading waits until the tree of the previous frame is built: building takes little time, and releases the
+//! positions of that frame. Reading has threads of its own, so that it never waits for tracing. The planes of a
+//! written image are returned to the tracer. The last stage records every frame in the job, after its image.
+
+use std::panic;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{channel, sync_channel};
+use std::thread;
+
+use spherule_formats::sequence::Sequence;
+use spherule_jobs::{
+    ClaimedFrame, FinishedFrame, FrameFailure, FrameQueue, FrameRecorder, FrameWork, JobError,
+    RunContext,
+};
+
+use super::read_threads::ReadThreads;
+use super::stages::{AfterWrite, DropFrame, ReadStage, ToTrace, TraceStage, WriteStage};
+use super::{ImageTask, Overlap, Setup, make_image};
+use crate::report::FrameReport;
+
+/// Renders the frames of a job in this process.
+#[derive(Debug, Clone, Copy)]
+pub struct RenderWork<'a> {
+    /// Defines the images.
+    pub setup: &'a Setup,
+    /// The frames of the input.
+    pub sequence: &'a Sequence,
+    /// The images, in the order of the frames of the run.
+    pub tasks: &'a [ImageTask],
+    /// Whether several frames are in flight. Otherwise a frame is read only when the memory of the one before is
+    /// free.
+    pub overlap: Overlap,
+}
+
+impl FrameWork for RenderWork<'_> {
+    type Report = FrameReport;
+
+    fn process(
+        &self,
+        frame: &ClaimedFrame,
+        context: &RunContext<'_, FrameReport>,
+    ) -> Result<FinishedFrame<FrameReport>, FrameFailure> {
+        let task = &self.tasks[frame.index];
+        context.report_stage(task.frame, "rendering");
+        let report = make_image(self.setup, self.sequence, task, |n| context.report_note(n));
+        Ok(FinishedFrame {
+            outputs: task.outputs(),
+            report: report.map_err(|e| e.into_failure(task.frame))?,
+        })
+    }
+
+    fn process_all(
+        &self,
+        queue: &mut FrameQueue<'_>,
+        recorder: &mut FrameRecorder<'_, FrameReport>,
+    ) -> Result<(), JobError> {
+        let context = recorder.context();
+        let has_failed = AtomicBool::new(false);
+        let threads = ReadThreads::new();
+        let mut read = Ok(());
+        // Connect the stages; with capacity 0 a stage holds its result until the next stage is free
+        let (to_trace, loaded) = sync_channel(0);
+        let (to_write, traced) = sync_channel(0);
+        let (continue_reading, may_continue) = sync_channel(1);
+        let (films, spare) = channel();
+        // The next frame is read when the tree is built, or without overlap when the image is written
+        let (is_built, is_written, films) = match self.overlap {
+            Overlap::Stages => (Some(continue_reading), None, Some(films)),
+            Overlap::None => (None, Some(continue_reading), None),
+        };
+        let (starts, has_started) = sync_channel(0);
+        let reader = ReadStage {
+            setup: self.setup,
+            sequence: self.sequence,
+            tasks: self.tasks,
+            threads: &threads,
+            context,
+            next: ToTrace {
+                to_trace,
+                may_continue,
+            },
+        };
+        let outcome = &mut read;
+        let written = threads.scope(|first| {
+            first.spawn(move |_| {
+                let _ = starts.send(());
+                *outcome = reader.run(queue);
+            });
+            // The first new thread reuses the memory that the survey has freed
+            let _ = has_started.recv();
+            thread::scope(|scope| {
+                let writer_failed = &has_failed;
+                let writer = WriteStage {
+                    setup: self.setup,
+                    maps_files: self.sequence.maps_files(),
+                    next: AfterWrite { is_written, films },
+                };
+                let writer = scope.spawn(move || {
+                    let result = writer.run(traced, recorder);
+                    writer_failed.store(result.is_err(), Ordering::Relaxed);
+                    result
+                });
+                let stage = TraceStage {
+                    setup: self.setup,
+                    context,
+                    stop: DropFrame {
+                        has_failed: &has_failed,
+                        interrupt: context.interrupt(),
+                    },
+                };
+                stage.run(loaded, spare, is_built, to_write);
+                join_result(writer.join())
+            })
+        });
+        written.and(read)
+    }
+}
+
+fn join_result<T>(result: thread::Result<T>) -> T {
+    result.unwrap_or_else(|payload| panic::resume_unwind(payload))
+}

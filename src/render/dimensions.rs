@@ -1,0 +1,21 @@
+//! Numbers of the continuations of a path, and of the random numbers at its vertices.
+
+/// Continuations of a path.
+pub(super) const REFLECTED: u32 = 0;
+pub(super) const REFRACTED: u32 = 1;
+pub(super) const BOUNCED: u32 = 2;
+/// Not a continuation: the seed of the random numbers of the camera ray itself.
+pub(super) const CAMERA: u32 = 3;
+
+/// Dimensions of a path at one vertex: the choice between specular rays, the continuation of a long path, the
+/// direction of a diffuse reflection, and a direction towards the environment. Those of lights follow.
+pub(super) const BRANCH: u32 = 0;
+pub(super) const CONTINUATION: u32 = 1;
+pub(super) const BSDF: u32 = 2;
+pub(super) const ENVIRONMENT: u32 = 3;
+pub(super) const LIGHTS: u32 = 4;
+
+/// Dimension of a path segment: the choice between passing panes and being reflected. It is beyond those of lights.
+pub(super) const PANE: u32 = u32::MAX;
+/// Dimensions of a camera ray: its point on the lens.
+pub(super) const LENS: u32 = 0;

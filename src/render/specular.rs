@@ -1,0 +1,108 @@
+//! The scatter stage of transmissive and mirroring surfaces: the reflected and the refracted ray that leave a shading
+//! point.
+
+use super::{
+    context::{Interior, RenderContext},
+    dimensions::{REFLECTED, REFRACTED},
+    layers::LightClass,
+    materials::WhittedMaterial,
+    roulette::SplitRule,
+    scratch::PacketScratch,
+    shading::scale,
+    stream::{RayStreams, SegmentPacket},
+};
+use crate::math::{Lanes3, lane3, lanes_in};
+
+/// Path segments that end at specular surfaces.
+#[derive(Clone, Copy)]
+pub(super) struct SpecularHits<'a> {
+    pub(super) segments: &'a SegmentPacket,
+    pub(super) depth: u32,
+    /// Lanes at a specular surface.
+    pub(super) lanes: u32,
+    /// Lanes whose rays are not traced further, and see what is infinitely far away.
+    pub(super) last: u32,
+}
+
+/// Adds the radiance that rays in a direction with a throughput see infinitely far away, only for lanes in a mask.
+pub(super) type Escape<'a> = &'a dyn Fn(&Lanes3, &Lanes3, u32, &mut Lanes3);
+
+impl RenderContext<'_> {
+    /// Appends the rays that leave the shading points of `hits` to `next`.
+    pub(super) fn scatter(
+        &self,
+        material: &WhittedMaterial,
+        split: &SplitRule,
+        hits: SpecularHits<'_>,
+        packet: &mut PacketScratch,
+        next: &mut RayStreams,
+        escape: Escape<'_>,
+    ) {
+        // Choose which rays to trace
+        let SpecularHits { segments, last, .. } = hits;
+        if self.interior != Interior::Opaque {
+            self.split_weights(split, hits, packet);
+        }
+        let PacketScratch {
+            points,
+            throughput,
+            radiance,
+            split: lights,
+            ..
+        } = packet;
+        // Describe both rays: weight, stream, side and branch of the path
+        let (inside, other_side) = match self.interior {
+            Interior::Opaque | Interior::Spheres => (0, 0),
+            Interior::Body => (segments.inside, !segments.inside),
+        };
+        let reflected = (
+            material.reflection,
+            &mut points.reflected,
+            &mut next.reflected,
+            inside,
+            (REFLECTED, LightClass::Reflection),
+        );
+        let refracted = (
+            material.dielectric.transmission,
+            &mut points.refracted,
+            &mut next.refracted,
+            other_side,
+            (REFRACTED, LightClass::Refraction),
+        );
+        for (weight, rays, stream, inside, (branch, class)) in [reflected, refracted] {
+            if weight <= 0.0 {
+                continue;
+            }
+            // Append the rays with a weight to their stream
+            let has_weight = |l: usize| u32::from(rays.weight[l] > 0.0) << l;
+            let lanes = lanes_in(hits.lanes).fold(0, |lanes, lane| lanes | has_weight(lane));
+            scale(self.simd, throughput, &rays.weight, &mut rays.throughput);
+            if lanes & last != 0 {
+                escape(&rays.direction, &rays.throughput, lanes & last, radiance);
+                lights.take(class, radiance);
+            }
+            if lanes & !last != 0 {
+                stream.push(lanes & !last, rays, segments, inside, branch);
+            }
+        }
+    }
+
+    /// Chooses which of the two rays that leave the shading points of `hits` are traced, and their weights.
+    fn split_weights(&self, split: &SplitRule, hits: SpecularHits<'_>, packet: &mut PacketScratch) {
+        let segments = hits.segments;
+        let points = &mut packet.points;
+        let (reflected, refracted) = (&mut points.reflected.weight, &mut points.refracted.weight);
+        for lane in lanes_in(hits.lanes & !hits.last) {
+            let arriving = match segments.bounces[lane] {
+                0 => lane3(&packet.throughput, lane).max_element(),
+                // One ray only: the weights of paths that ended by chance are in those of the others
+                _ => 0.0,
+            };
+            let (path, sample) = (segments.path[lane], segments.sample[lane]);
+            let sample = sample % self.settings.samples;
+            let weights = [reflected[lane], refracted[lane]];
+            let weights = split.weights(weights, arriving, hits.depth, path, sample);
+            [reflected[lane], refracted[lane]] = weights;
+        }
+    }
+}

@@ -1,0 +1,126 @@
+//! The channels of the images, with the attributes among them.
+
+use spherule_formats::names;
+
+use super::{ResolveError, narrow, require_attribute};
+use crate::manifest::{Channel, Output};
+use crate::output::attribute_planes as planes_of;
+use crate::pipeline::{AttributeChannel, FrameStep, attribute_list};
+use crate::render::Channels;
+use crate::render::layers::MAX_ATTRIBUTE_FLOATS;
+use crate::survey::Survey;
+
+const KEY: &str = "output.channels";
+
+/// The longest name of an attribute with a channel, bytes.
+const MAX_NAME: usize = 200;
+
+/// The channels of `output`, and the attributes with channels.
+///
+/// # Errors
+/// An attribute does not exist or cannot be a channel, or there are no velocities for `motion`.
+pub(super) fn channels(
+    output: &Output,
+    survey: &Survey,
+) -> Result<(Channels, Vec<AttributeChannel>), ResolveError> {
+    let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
+    // Find the channels with fixed names
+    let is_named = |channel: &&Channel| matches!(channel, Channel::Named(_));
+    let names: Vec<_> = output
+        .channels
+        .iter()
+        .filter(is_named)
+        .map(Channel::name)
+        .collect();
+    let channels = Channels::from_names(names.iter().map(|name| &**name));
+    let mut channels = channels.map_err(|e| unsupported(e.to_string()))?;
+    channels.layers.mattes.set_levels(output.cryptomatte_levels);
+    // Find the attributes
+    let mut attributes = Vec::new();
+    for channel in &output.channels {
+        if let Channel::Attribute(name) = channel {
+            attributes.push(attribute(name, survey)?);
+        }
+    }
+    let names = attribute_planes(&attributes);
+    if names.len() > MAX_ATTRIBUTE_FLOATS {
+        return Err(unsupported(format!(
+            "the attributes have more than {MAX_ATTRIBUTE_FLOATS} components in total; leave some of them out"
+        )));
+    }
+    channels.layers.attributes = u8::try_from(names.len()).unwrap_or(u8::MAX);
+    if let Some(name) = crate::output::ambiguous_name(channels, &names) {
+        return Err(unsupported(format!(
+            "two channels of the file would be called {name}; leave one of them out"
+        )));
+    }
+    Ok((channels, attributes))
+}
+
+/// The attribute `name` of the frames.
+fn attribute(name: &str, survey: &Survey) -> Result<AttributeChannel, ResolveError> {
+    require_attribute(survey, KEY, name)?;
+    let unsupported = |what: &str| ResolveError::Unsupported {
+        key: KEY,
+        what: format!("attribute `{name}`: {what}"),
+    };
+    if name.len() > MAX_NAME || !name.bytes().all(|b| b.is_ascii_graphic() || b == b' ') {
+        return Err(unsupported(
+            "channels of OpenEXR files need short names in ASCII; rename the attribute",
+        ));
+    }
+    let index = survey
+        .attributes
+        .iter()
+        .position(|a| a.eq_ignore_ascii_case(name));
+    let components = index.and_then(|index| survey.components.get(index));
+    let components = components.copied().unwrap_or(1);
+    Ok(AttributeChannel {
+        name: name.to_owned(),
+        components: components.clamp(1, MAX_ATTRIBUTE_FLOATS + 1),
+    })
+}
+
+/// The step to the next frame, if there is a channel for motion.
+///
+/// # Errors
+/// There are no velocities, or the time between frames is unknown.
+pub(super) fn frame_step(
+    channels: &Channels,
+    output: &Output,
+    survey: &Survey,
+) -> Result<Option<FrameStep>, ResolveError> {
+    if !channels.layers.motion {
+        return Ok(None);
+    }
+    let unsupported = |what: String| ResolveError::Unsupported { key: KEY, what };
+    let is_velocity = |(name, components): (&String, &usize)| {
+        *components == 3
+            && names::VELOCITY
+                .iter()
+                .any(|known| name.eq_ignore_ascii_case(known))
+    };
+    let mut attributes = survey.attributes.iter().zip(&survey.components);
+    if survey.most_particles > 0 && !attributes.any(is_velocity) {
+        return Err(unsupported(format!(
+            "motion needs velocities, and the sampled frames have none; available: {}",
+            attribute_list(survey.attributes.iter().map(String::as_str))
+        )));
+    }
+    let time = output.frame_time.or(survey.frame_time);
+    let Some(time) = time.or_else(|| output.fps.map(f64::recip)) else {
+        return Err(unsupported(
+            "motion needs the time between frames, which the files do not contain; set output.frame_time".to_owned(),
+        ));
+    };
+    Ok(Some(FrameStep {
+        time: narrow(time),
+        numbers: survey.frame_numbers.unwrap_or(1),
+    }))
+}
+
+/// The names of the planes of `attributes` in a file.
+pub(super) fn attribute_planes(attributes: &[AttributeChannel]) -> Vec<String> {
+    let planes = attributes.iter().map(|a| planes_of(&a.name, a.components));
+    planes.flatten().collect()
+}

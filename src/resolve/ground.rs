@@ -1,0 +1,163 @@
+//! The ground under the particles.
+
+use glam::DVec3;
+
+use super::{ResolveError, narrow, surface};
+use crate::manifest::{GroundKind, GroundPattern, Manifest};
+use crate::render::IntegratorKind;
+use crate::scene::ground::Pattern;
+use crate::scene::{Bounds, Ground};
+use crate::surface::SurfaceKind;
+
+/// Default edge of a square on the ground as a fraction of the diagonal of the bounds: some squares can be counted
+/// through the particles, and none is only a few pixels wide.
+const TILE: f64 = 1.0 / 8.0;
+
+/// Where the ground is.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Floor<'a> {
+    /// Box of the particles.
+    pub(super) bounds: &'a Bounds,
+    /// Distance by which the particles reach beyond their centres.
+    pub(super) reach: f64,
+    pub(super) up: DVec3,
+    pub(super) origin: DVec3,
+    /// Whether particles lie on the lower side of the box at some time.
+    pub(super) has_layer: bool,
+}
+
+/// The ground of `render.ground`, if there is one.
+///
+/// # Errors
+/// It is a shadow catcher, but the integrator cannot use one.
+pub(super) fn ground(
+    manifest: &Manifest,
+    floor: &Floor<'_>,
+) -> Result<Option<Ground>, ResolveError> {
+    let render = &manifest.render;
+    let integrator = manifest.integrator();
+    let kind = match render.ground {
+        Some(ground) => ground.0,
+        // Without a floor, a shadow would fall on nothing
+        None if integrator == IntegratorKind::Path && floor.has_layer => GroundKind::ShadowCatcher,
+        None => GroundKind::None,
+    };
+    if kind == GroundKind::None {
+        return Ok(None);
+    }
+    let is_catcher = kind == GroundKind::ShadowCatcher;
+    if is_catcher && integrator == IntegratorKind::Whitted {
+        return Err(ResolveError::Unsupported {
+            key: "render.ground",
+            what: "render.integrator = \"whitted\" has no shadow catcher; choose \"path\" (--integrator path), or a \
+                   plain ground"
+                .to_owned(),
+        });
+    }
+    // Place it under the particles
+    let Floor {
+        bounds, up, origin, ..
+    } = *floor;
+    let mut ground = Ground::under(bounds, up.as_vec3(), origin);
+    if let Some(height) = render.ground_height {
+        let relative = narrow(height - origin.dot(up.normalize_or(DVec3::Z)));
+        ground.center += (relative - ground.height) * ground.up;
+        ground.height = relative;
+    } else if is_catcher || manifest.surface.kind != SurfaceKind::Spheres {
+        // Raise it to the lowest centres: between a body that only touched the ground and the ground itself would be
+        // a thin layer of air, which reflects all light at grazing angles. Spheres that only touched a shadow catcher
+        // would seem to float.
+        ground.raise(narrow(floor.reach));
+    }
+    if is_catcher {
+        let catcher = ground.into_shadow_catcher(bounds, render.ground_shadow);
+        return Ok(Some(catcher));
+    }
+    // Colour it
+    ground.color = render.ground_color;
+    let tile = || match render.ground_tile {
+        Some(tile) => narrow(tile),
+        None => surface::round(bounds.diagonal() * TILE),
+    };
+    ground.pattern = match (kind, render.ground_pattern) {
+        (GroundKind::Checker, _) | (_, GroundPattern::Checker) => Pattern::Checker { tile: tile() },
+        (_, GroundPattern::Sand) => Pattern::Sand { tile: tile() },
+        (_, GroundPattern::Plain) => Pattern::Plain,
+    };
+    Ok(Some(ground))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::manifest::GroundSetting;
+
+    const BOUNDS: Bounds = Bounds {
+        min: DVec3::new(-1.0, -2.0, 3.0),
+        max: DVec3::new(1.0, 2.0, 7.0),
+    };
+
+    fn of(
+        kind: GroundKind,
+        change: impl Fn(&mut Manifest),
+    ) -> Result<Option<Ground>, ResolveError> {
+        let mut manifest = Manifest::new("in");
+        manifest.render.ground = Some(GroundSetting(kind));
+        change(&mut manifest);
+        ground(&manifest, &floor(true))
+    }
+
+    fn floor(has_layer: bool) -> Floor<'static> {
+        Floor {
+            bounds: &BOUNDS,
+            reach: 0.25,
+            up: DVec3::Z,
+            origin: DVec3::ZERO,
+            has_layer,
+        }
+    }
+
+    #[test]
+    fn auto_is_a_shadow_catcher_of_paths_under_particles_on_a_floor() {
+        let auto = Manifest::new("in");
+        let found = |manifest: &Manifest, has_layer| ground(manifest, &floor(has_layer)).unwrap();
+        assert!(found(&auto, true).is_some_and(|ground| ground.shadow_catcher.is_some()));
+        assert_eq!(found(&auto, false), None);
+        let mut whitted = auto;
+        whitted.render.integrator = Some(IntegratorKind::Whitted);
+        assert_eq!(found(&whitted, true), None);
+    }
+
+    #[test]
+    fn each_kind_has_its_height_and_colour() {
+        assert_eq!(of(GroundKind::None, |_| {}).unwrap(), None);
+        let plain = of(GroundKind::Plain, |_| {}).unwrap().unwrap();
+        assert_eq!((plain.height, plain.pattern), (3.0, Pattern::Plain));
+        let checker = of(GroundKind::Checker, |_| {}).unwrap().unwrap();
+        assert!(matches!(checker.pattern, Pattern::Checker { .. }));
+        let pattern = |manifest: &mut Manifest| {
+            manifest.render.ground_pattern = GroundPattern::Checker;
+        };
+        assert_eq!(of(GroundKind::Plain, pattern).unwrap(), Some(checker));
+        // A shadow catcher goes through the lowest centres and fades from 2 to 8 diagonals, which are 6 long
+        let catcher = of(GroundKind::ShadowCatcher, |m| m.render.ground_shadow = 0.5);
+        let catcher = catcher.unwrap().unwrap();
+        assert_eq!((catcher.height, catcher.shadow_catcher), (3.25, Some(0.5)));
+        assert_eq!([catcher.fade_start, catcher.fade_end], [12.0, 48.0]);
+        let low = of(GroundKind::ShadowCatcher, |m| {
+            m.render.ground_height = Some(2.0)
+        });
+        assert_eq!(low.unwrap().unwrap().height, 2.0);
+    }
+
+    #[test]
+    fn whitted_has_no_shadow_catcher() {
+        let whitted =
+            |manifest: &mut Manifest| manifest.render.integrator = Some(IntegratorKind::Whitted);
+        let error = of(GroundKind::ShadowCatcher, whitted)
+            .unwrap_err()
+            .to_string();
+        assert!(error.starts_with("render.ground: ") && error.contains("--integrator path"));
+        assert!(of(GroundKind::Checker, whitted).unwrap().is_some());
+    }
+}

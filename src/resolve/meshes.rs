@@ -1,0 +1,82 @@
+//! The meshes next to the particles.
+
+use glam::Vec3;
+use spherule_formats::MemoryBudget;
+
+use crate::manifest::{self, Manifest, MeshShading};
+use crate::pipeline::{MeshSettings, PictureMesh, Setup};
+use crate::scene::mesh::DEFAULT_COLOR;
+use crate::scene::{Bounds, Finish, MeshFinish, MeshMaterial};
+use crate::surface::mesh::MeshNormals;
+use crate::survey::Survey;
+
+/// Edges of a greater angle are sharp, degrees.
+const CREASE_ANGLE: f32 = 40.0;
+
+/// Distance of the ground below a mesh, as a fraction of its size, so that rays do not hit both at once.
+const GROUND_GAP: f32 = 1e-4;
+
+/// How the files of the meshes of `manifest` become shapes. `budget` is for reading one of them.
+pub fn mesh_settings(
+    manifest: &Manifest,
+    survey: &Survey,
+    budget: MemoryBudget,
+) -> Vec<MeshSettings> {
+    let particles = Bounds {
+        min: survey.min,
+        max: survey.max,
+    };
+    let settings = |mesh: &manifest::Mesh| MeshSettings {
+        scale: mesh.scale,
+        translate: mesh.translate,
+        origin: survey.origin,
+        normals: match mesh.normals {
+            MeshShading::Smooth => MeshNormals::Smooth(CREASE_ANGLE.to_radians()),
+            MeshShading::Flat => MeshNormals::Flat,
+        },
+        faces: mesh.faces,
+        particle_extent: match survey.most_particles {
+            0 => 0.0,
+            _ => particles.diagonal(),
+        },
+        budget,
+    };
+    manifest.meshes.iter().map(settings).collect()
+}
+
+/// Adds the `meshes` of `manifest`, one for each of its entries, to the pictures of `setup`. Lowers an automatic ground
+/// below those that are the same in all frames.
+pub fn add_meshes(setup: &mut Setup, manifest: &Manifest, meshes: Vec<PictureMesh>) {
+    let scene = &mut setup.picture.scene;
+    scene.meshes = manifest.meshes.iter().map(material).collect();
+    if let Some(ground) = &mut scene.ground
+        && manifest.render.ground_height.is_none()
+    {
+        let trees = meshes.iter().filter_map(|mesh| mesh.tree.as_ref());
+        for [min, max] in trees.filter_map(|tree| tree.bounds()) {
+            let lowest = Vec3::select(ground.up.cmpgt(Vec3::ZERO), min, max).dot(ground.up);
+            let below = lowest - GROUND_GAP * (max - min).length();
+            if below < ground.height {
+                ground.raise(below - ground.height);
+            }
+        }
+    }
+    setup.picture.meshes = meshes;
+}
+
+fn material(mesh: &manifest::Mesh) -> MeshMaterial {
+    let roughness = mesh.roughness;
+    MeshMaterial {
+        color: mesh.color.unwrap_or(match mesh.material {
+            manifest::MeshMaterial::Glass => Vec3::ONE,
+            _ => DEFAULT_COLOR,
+        }),
+        finish: match mesh.material {
+            manifest::MeshMaterial::Matte => MeshFinish::Opaque(Finish::Matte),
+            manifest::MeshMaterial::Plastic => MeshFinish::Opaque(Finish::Plastic { roughness }),
+            manifest::MeshMaterial::Metal => MeshFinish::Opaque(Finish::Metal { roughness }),
+            manifest::MeshMaterial::Glass => MeshFinish::Pane,
+        },
+        is_holdout: mesh.holdout,
+    }
+}

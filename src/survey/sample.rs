@@ -1,0 +1,207 @@
+//! Samples one frame for the survey: all of it, or for large frames a part, with the rest taken from the index or
+//! read in runs.
+
+use glam::DVec3;
+use spherule_formats::convert::{SourceAttribute, open_source};
+use spherule_formats::native::layout::RadiusIndex;
+use spherule_formats::native::{Access, FrameIndex, NativeFile, NativeFrame};
+use spherule_formats::sequence::Sequence;
+use spherule_formats::{FrameError, ParseError, RawParticles};
+
+use super::packing::{self, Spacing};
+use super::robust::{NEIGHBOUR_QUERIES, median};
+use super::stream;
+use super::{FrameWeight, RadiusQuestion, id_of, velocity_of};
+
+/// Number of particles to sample in a native frame; smaller frames are read completely.
+const MAX_SAMPLE: usize = 1 << 17;
+
+/// Particle count above which a binary file of another format is sampled and not read into memory.
+const LARGE: u64 = 1 << 20;
+
+/// A sample of a frame.
+pub(super) struct FrameSample {
+    /// The particles, or an even selection of them.
+    pub(super) particles: RawParticles,
+    /// Particle count of the frame.
+    pub(super) count: usize,
+    /// Bounding box of all particles, if it is known.
+    pub(super) extremes: Option<(DVec3, DVec3)>,
+    /// The spacing of neighbours, if the sample is not sufficient to compute it.
+    pub(super) spacing: Option<Spacing>,
+    /// Origin of the coordinates in a native frame.
+    pub(super) origin: Option<DVec3>,
+    pub(super) weight: FrameWeight,
+}
+
+impl FrameSample {
+    /// Samples frame `index` of `sequence`. The spacing takes long to compute, so it is only computed if `question`
+    /// requires it.
+    pub(super) fn of(
+        sequence: &Sequence,
+        index: usize,
+        question: RadiusQuestion,
+    ) -> Result<Self, FrameError> {
+        match sequence.native_file(index) {
+            Some(path) => {
+                let file = NativeFile::open(path, Access::Map)?;
+                let sample =
+                    Self::of_native(&file, question.is_packed()).map_err(|e| e.in_file(path))?;
+                file.check()?;
+                Ok(sample)
+            }
+            None => match Self::of_large(sequence, index, question)? {
+                Some(sample) => Ok(sample),
+                None => Self::of_files(sequence, index),
+            },
+        }
+    }
+
+    /// Samples a binary file of many particles; None for other files.
+    fn of_large(
+        sequence: &Sequence,
+        index: usize,
+        question: RadiusQuestion,
+    ) -> Result<Option<Self>, FrameError> {
+        let Some(path) = sequence.lone_file(index) else {
+            return Ok(None);
+        };
+        let Some(source) = open_source(path)?.filter(|s| s.count() > LARGE) else {
+            return Ok(None);
+        };
+        // Read a sample, and stream over all particles for spacing and extremes
+        let particles = stream::sample(&*source, path, MAX_SAMPLE)?;
+        let is_radius = |a: &SourceAttribute| a.name.eq_ignore_ascii_case("radius");
+        let has_radii = source.attributes().iter().any(is_radius);
+        let spacing = match question.is_auto() && !has_radii {
+            true => stream::spacing(&*source, &particles.positions, question.is_packed())?,
+            false => None,
+        };
+        let extremes = stream::extremes(&*source)?;
+        source.check()?;
+        // Estimate the memory of the frame from its attributes
+        let stored = std::fs::metadata(path).map_or(0, |meta| meta.len());
+        let widths = source.attributes().iter().map(|a| a.width() as u64);
+        let count = source.count();
+        let attributes = count.saturating_mul(widths.sum());
+        // The length of the file shows whether positions are in double precision.
+        let is_double = stored >= attributes.saturating_add(count.saturating_mul(24));
+        let positions = count.saturating_mul(if is_double { 24 } else { 12 });
+        Ok(Some(Self {
+            weight: FrameWeight {
+                particles: count,
+                stored,
+                content: stored,
+                raw: positions.saturating_add(attributes),
+                positions,
+                files: 1,
+                own_radii: false,
+                ids: id_of(&particles.attributes).is_some(),
+                velocities: velocity_of(&particles.attributes).is_some(),
+                in_place: false,
+            },
+            count: usize::try_from(count).unwrap_or(usize::MAX),
+            extremes,
+            spacing,
+            origin: None,
+            particles,
+        }))
+    }
+
+    fn of_files(sequence: &Sequence, index: usize) -> Result<Self, FrameError> {
+        let loaded = sequence.load_measured(index)?;
+        let raw = &loaded.particles;
+        let weight = FrameWeight {
+            particles: raw.positions.len() as u64,
+            stored: loaded.all_bytes,
+            content: loaded.content_bytes,
+            raw: raw.byte_len(),
+            positions: raw.positions.byte_len(),
+            files: sequence.inputs(index).len() as u64,
+            // Determined later, after the radii have been extracted.
+            own_radii: false,
+            ids: id_of(&raw.attributes).is_some(),
+            velocities: velocity_of(&raw.attributes).is_some(),
+            in_place: false,
+        };
+        Ok(Self {
+            count: raw.positions.len(),
+            extremes: None,
+            spacing: None,
+            origin: None,
+            weight,
+            particles: loaded.particles,
+        })
+    }
+
+    fn of_native(file: &NativeFile, needs_packed: bool) -> Result<Self, ParseError> {
+        let frame = file.frame_unchecked();
+        let index = file.index();
+        let too_many = |_| ParseError::unsupported("more particles than this machine can count");
+        let count = usize::try_from(index.count).map_err(too_many)?;
+        let is_part = count > MAX_SAMPLE;
+        if !is_part {
+            // Small frames are verified completely: it takes little time, and damage might not show in percentiles.
+            frame.verify()?;
+        }
+        frame.verify_nodes()?;
+        let particles = frame.sample(MAX_SAMPLE)?;
+        let spacing = match index.radius {
+            RadiusIndex::None if is_part => stored_spacing(&frame, needs_packed)?,
+            _ => None,
+        };
+        let origin = DVec3::from_array(index.origin);
+        let corner = |c: [f32; 3]| glam::Vec3::from_array(c).as_dvec3() + origin;
+        Ok(Self {
+            weight: weight(file, &particles),
+            count,
+            extremes: is_part.then(|| (corner(index.min), corner(index.max))),
+            spacing,
+            origin: Some(origin),
+            particles,
+        })
+    }
+}
+
+/// The spacing of neighbours in a native frame.
+fn stored_spacing(
+    frame: &NativeFrame<'_>,
+    needs_packed: bool,
+) -> Result<Option<Spacing>, ParseError> {
+    let nearest = median(frame.neighbour_distances(NEIGHBOUR_QUERIES)?);
+    let Some(touching) = nearest.map(|d| 0.5 * d) else {
+        return Ok(None);
+    };
+    let packed = match needs_packed {
+        true => {
+            let counts = frame.neighbour_counts(NEIGHBOUR_QUERIES, packing::reach(touching))?;
+            packing::packed_radius(touching, counts)
+        }
+        false => None,
+    };
+    Ok(Some(Spacing { touching, packed }))
+}
+
+/// Size of a native frame as if it were read, because some settings require that.
+fn weight(file: &NativeFile, particles: &RawParticles) -> FrameWeight {
+    let index: &FrameIndex = file.index();
+    let positions = if index.origin == [0.0; 3] { 12 } else { 24 };
+    let attributes = index.attributes.iter().map(|a| a.section.len);
+    let radii = match index.radius {
+        RadiusIndex::None => 0,
+        RadiusIndex::Common(_) | RadiusIndex::PerParticle(_) => 4,
+    };
+    let positions = positions * index.count;
+    FrameWeight {
+        particles: index.count,
+        stored: file.byte_len(),
+        content: file.byte_len(),
+        raw: attributes.fold(positions + radii * index.count, u64::saturating_add),
+        positions,
+        files: 1,
+        own_radii: matches!(index.radius, RadiusIndex::PerParticle(_)),
+        ids: id_of(&particles.attributes).is_some(),
+        velocities: velocity_of(&particles.attributes).is_some(),
+        in_place: true,
+    }
+}
