@@ -59,7 +59,10 @@ fn colours_do_not_depend_on_the_channels_beside_them() {
     for (name, channels) in [("color.exr", "RGBA"), ("some.exr", "RGBA,Z,N,id")] {
         let some = of(name, channels);
         for plane in ["R", "G", "B", "A"] {
-            assert!(some.planes[plane] == all.planes[plane], "{channels}: {plane}");
+            assert!(
+                some.planes[plane] == all.planes[plane],
+                "{channels}: {plane}"
+            );
         }
     }
 }
