@@ -19,7 +19,7 @@ use crate::scene::{
 /// Rows of the bright cap around the zenith, of 256.
 const CAP_ROWS: usize = 9;
 
-/// A white floor of which the camera sees about 5 by 5.
+/// A white floor, seen from above. The image shows about 5 by 5 units of it.
 fn floor(environment: Environment) -> Scene {
     let mut scene = floor_from_above(environment, Vec3::ONE);
     let view = CameraView {

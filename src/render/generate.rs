@@ -5,7 +5,7 @@ use super::{
     context::{Interior, RenderContext},
     dimensions::{CAMERA, LENS},
     film::FilmTile,
-    sampler::PathSeed,
+    sampler::{PathSeed, get_2d_lanes},
     scratch::{Pixel, SampleGroup},
     settings::RenderSettings,
     shading::{camera_rays, lens_rays},
@@ -96,14 +96,16 @@ impl RenderContext<'_> {
     /// Points in the unit square for the lens, of the `len` samples of `group` from `first` on.
     fn lens_samples(&self, group: &SampleGroup, first: usize, len: usize) -> [Lanes; 2] {
         let samples = self.settings.samples as usize;
-        let mut u = [splat(0.5); 2];
-        for number in first..first + len {
-            let lane = number - first;
-            let seed = group.pixels[number / samples].path.child(CAMERA);
+        let (mut seeds, mut sample) = ([PathSeed::default(); LANES], [0; LANES]);
+        for lane in 0..len {
+            let number = first + lane;
+            seeds[lane] = group.pixels[number / samples].path.child(CAMERA);
             #[expect(clippy::cast_possible_truncation, reason = "at most 4096 samples")]
-            let sample = (number % samples) as u32;
-            [u[0][lane], u[1][lane]] = seed.get_2d(LENS, sample);
+            let index = (number % samples) as u32;
+            sample[lane] = index;
         }
+        let mut u = [splat(0.0); 2];
+        get_2d_lanes(self.simd, &seeds, LENS, &sample, &mut u);
         u
     }
 

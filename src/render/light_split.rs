@@ -59,7 +59,7 @@ impl LightSplit {
         self.sum = *radiance;
     }
 
-    /// Counts what was added to `radiance` since the last call as reflection, of which [`Self::diffuse`] is diffuse.
+    /// Divides what was added to `radiance` since the last call between diffuse and specular light, by [`Self::diffuse`].
     pub(super) fn take_reflected(&mut self, radiance: &Lanes3) {
         if !self.is_active {
             return;

@@ -15,7 +15,7 @@ use super::{
     dimensions::{BOUNCED, BSDF, CONTINUATION, ENVIRONMENT, LIGHTS},
     integrator::Integrator,
     layers::LightClass,
-    lights::{environment_along, sample_environment},
+    lights::{Light, environment_along, sample_environment},
     materials::{Material, materials_of},
     roulette::SplitRule,
     sampler::{get_1d_lanes, get_2d_lanes},
@@ -148,6 +148,27 @@ struct Surface<'a> {
     sample: [u32; LANES],
 }
 
+/// What is in the way of light samples.
+#[derive(Debug, Clone, Copy)]
+enum Occlusion {
+    /// Nothing: the light casts no shadows.
+    None,
+    /// Opaque surfaces; light passes transmissive ones in a straight line.
+    Straight,
+    /// All surfaces.
+    Opaque,
+}
+
+impl Occlusion {
+    /// What is in the way of a light source, whose light no path finds behind transmissive surfaces.
+    fn of(light: &dyn Light) -> Self {
+        match light.casts_shadow() {
+            true => Self::Straight,
+            false => Self::None,
+        }
+    }
+}
+
 /// Bit mask of the lanes for which `holds`.
 fn lanes_where(holds: impl Fn(usize) -> bool) -> u32 {
     (0..LANES).fold(0, |lanes, lane| lanes | u32::from(holds(lane)) << lane)
@@ -181,25 +202,21 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
         next: &mut RayStreams,
     ) {
-        let context = &self.context;
-        context.base_colors(true, packet);
-        let rays = &surface.segments.rays;
-        surface_points(
-            context.simd,
-            rays,
-            &packet.hits,
-            &packet.base,
-            &mut packet.surface,
-        );
-        scale(
-            context.simd,
-            &packet.throughput,
-            &packet.hits.opacity,
-            &mut packet.weight,
-        );
+        self.prepare_surface(surface, packet);
         self.add_environment_light(surface, packet);
         self.add_lights(surface, packet);
         self.bounce(surface, packet, next);
+    }
+
+    /// Computes the points of an opaque surface with their colours, and the weight of light from there.
+    fn prepare_surface(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        let (context, simd) = (&self.context, self.context.simd);
+        // Transmissive particles have no colour
+        context.base_colors(context.interior == Interior::Opaque, packet);
+        let (rays, points) = (&surface.segments.rays, &mut packet.surface);
+        surface_points(simd, rays, &packet.hits, &packet.base, points);
+        let opacity = &packet.hits.opacity;
+        scale(simd, &packet.throughput, opacity, &mut packet.weight);
     }
 
     /// Evaluates the BSDFs for the directions of the light samples.
@@ -222,19 +239,54 @@ impl PathIntegrator<'_> {
             return;
         };
         self.reflect_environment(environment, surface, lanes, packet);
-        self.add_direct(surface, packet);
+        self.add_direct(Occlusion::Opaque, surface, packet);
     }
 
-    /// Adds the direct light of samples to which transmissive surfaces are opaque.
-    fn add_direct(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
+    /// Adds the light of the light samples as direct light, also to the channels for light and shadow.
+    fn add_direct(&self, occlusion: Occlusion, surface: &Surface<'_>, packet: &mut PacketScratch) {
+        if packet.light.lanes == 0 {
+            return;
+        }
         self.divide_samples(surface, packet);
         let unoccluded = packet.unoccluded();
-        self.add_unoccluded(surface, packet);
-        packet.split.take_reflected(&packet.radiance);
+        let visible = self.add_visible(occlusion, surface, packet);
+        let PacketScratch {
+            split,
+            light,
+            radiance,
+            ..
+        } = packet;
+        split.take_reflected(radiance);
         if let Some((lanes, unoccluded)) = unoccluded {
-            let PacketScratch { split, light, .. } = packet;
-            split.add_direct(lanes, &unoccluded, light.lanes, &light.radiance);
+            split.add_direct(lanes, &unoccluded, visible, &light.radiance);
         }
+    }
+
+    /// Traces the shadow rays of the light samples, and adds the light that arrives. Returns the lanes that it reaches.
+    fn add_visible(
+        &self,
+        occlusion: Occlusion,
+        surface: &Surface<'_>,
+        packet: &mut PacketScratch,
+    ) -> u32 {
+        let (context, segments, depth) = (&self.context, surface.segments, surface.depth);
+        let PacketScratch {
+            light: samples,
+            crossings,
+            counts,
+            radiance,
+            ..
+        } = packet;
+        let visible = match occlusion {
+            Occlusion::None => samples.lanes,
+            Occlusion::Straight => {
+                context.trace_shadow_rays(segments, depth, samples, crossings, counts)
+            }
+            Occlusion::Opaque => context.unoccluded(segments, depth, samples, counts),
+        };
+        let simd = context.simd;
+        add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
+        visible
     }
 
     /// Samples a direction from the environment, and the light from there that `lanes` reflect: `packet.light`.
@@ -256,66 +308,13 @@ impl PathIntegrator<'_> {
         reflect_samples(simd, values, weight, true, lanes, &mut packet.light);
     }
 
-    /// Traces the shadow rays of light samples to which transmissive surfaces are opaque, and adds those that arrive.
-    fn add_unoccluded(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
-        let context = &self.context;
-        let (samples, counts) = (&mut packet.light, &mut packet.counts);
-        if samples.lanes == 0 {
-            return;
-        }
-        let lanes = context.unoccluded(surface.segments, surface.depth, samples, counts);
-        let radiance = &mut packet.radiance;
-        add(
-            context.simd,
-            &packet.light.radiance,
-            &Vec3::ONE,
-            lanes,
-            radiance,
-        );
-    }
-
     /// Adds the light of each light source.
     fn add_lights(&self, surface: &Surface<'_>, packet: &mut PacketScratch) {
         let context = &self.context;
         for (index, light) in context.lights.iter().enumerate() {
             let competes = light.has_extent() && self.rays_hit_lights();
             self.reflect_light(index, competes, surface, packet);
-            self.add_attenuated(light.casts_shadow(), surface, packet);
-        }
-    }
-
-    /// Traces the shadow rays of light samples if the light casts shadows, and adds what arrives.
-    fn add_attenuated(
-        &self,
-        casts_shadow: bool,
-        surface: &Surface<'_>,
-        packet: &mut PacketScratch,
-    ) {
-        let context = &self.context;
-        if packet.light.lanes == 0 {
-            return;
-        }
-        self.divide_samples(surface, packet);
-        let unoccluded = packet.unoccluded();
-        let PacketScratch {
-            light: samples,
-            crossings,
-            counts,
-            radiance,
-            split,
-            ..
-        } = packet;
-        let visible = if casts_shadow {
-            let (segments, depth) = (surface.segments, surface.depth);
-            context.trace_shadow_rays(segments, depth, samples, crossings, counts)
-        } else {
-            samples.lanes
-        };
-        let simd = context.simd;
-        add(simd, &samples.radiance, &Vec3::ONE, visible, radiance);
-        split.take_reflected(radiance);
-        if let Some((lanes, unoccluded)) = unoccluded {
-            split.add_direct(lanes, &unoccluded, visible, &samples.radiance);
+            self.add_direct(Occlusion::of(&**light), surface, packet);
         }
     }
 
@@ -402,7 +401,9 @@ impl PathIntegrator<'_> {
     fn add_last(&self, surface: &Surface<'_>, lanes: u32, packet: &mut PacketScratch) {
         if let Some(environment) = self.environment {
             self.aim_at_environment(environment, lanes, packet);
-            self.add_unoccluded(surface, packet);
+            if packet.light.lanes != 0 {
+                self.add_visible(Occlusion::Opaque, surface, packet);
+            }
         }
     }
 
@@ -468,19 +469,17 @@ impl PathIntegrator<'_> {
         packet: &mut PacketScratch,
         next: &mut RayStreams,
     ) {
-        let max = self.context.settings.max_depth;
-        let last = lanes & lanes_where(|l| depth >= max + segments.bounces[l]);
+        let last = lanes & self.last_specular(segments, depth);
         (self.context).reflect_at_panes(segments, lanes, last, packet, next);
-        // At the last specular surface, rays see the environment
-        if let Some(environment) = self.environment.filter(|_| last != 0) {
-            let PacketScratch {
-                points, radiance, ..
-            } = packet;
-            let (simd, rays) = (self.context.simd, &points.reflected);
-            let mut seen = [splat(0.0); 3];
-            let (along, weight) = (&rays.direction, &rays.throughput);
-            environment_along(simd, environment, along, &rays.pdf, weight, &mut seen);
-            add(simd, &seen, &Vec3::ONE, last, radiance);
+        if last != 0 {
+            let rays = &packet.points.reflected;
+            self.add_seen(
+                &rays.direction,
+                &rays.throughput,
+                last,
+                &mut packet.radiance,
+            );
+            packet.take_light(LightClass::Reflection);
         }
     }
 
@@ -497,14 +496,11 @@ impl PathIntegrator<'_> {
         let (rays, hits, inside) = (&segments.rays, &packet.hits, segments.inside);
         let interface = &self.interface;
         interface.shading_points(context.simd, rays, hits, inside, &mut packet.points);
-        // At the last specular surface, rays see the environment
-        let max = context.settings.max_depth;
-        let is_last = |l: usize| depth >= max + segments.bounces[l];
         let hits = SpecularHits {
             segments,
             depth,
             lanes,
-            last: lanes & lanes_where(is_last),
+            last: lanes & self.last_specular(segments, depth),
         };
         let constants = interface.constants();
         context.scatter(
@@ -513,13 +509,23 @@ impl PathIntegrator<'_> {
             hits,
             packet,
             next,
-            &|along, weight, lanes, sum| {
-                if let Some(environment) = self.environment {
-                    let (full, mut seen) = (splat(f32::INFINITY), [splat(0.0); 3]);
-                    environment_along(context.simd, environment, along, &full, weight, &mut seen);
-                    add(context.simd, &seen, &Vec3::ONE, lanes, sum);
-                }
-            },
+            &|along, weight, lanes, sum| self.add_seen(along, weight, lanes, sum),
         );
+    }
+
+    /// The lanes of rays that are not traced further at a specular surface: they see the environment.
+    fn last_specular(&self, segments: &SegmentPacket, depth: u32) -> u32 {
+        let max = self.context.settings.max_depth;
+        lanes_where(|l| depth >= max + segments.bounces[l])
+    }
+
+    /// Adds what specular rays in a direction with a throughput see of the environment, only for `lanes`.
+    fn add_seen(&self, along: &Lanes3, throughput: &Lanes3, lanes: u32, radiance: &mut Lanes3) {
+        if let Some(environment) = self.environment {
+            let simd = self.context.simd;
+            let (specular, mut seen) = (splat(f32::INFINITY), [splat(0.0); 3]);
+            environment_along(simd, environment, along, &specular, throughput, &mut seen);
+            add(simd, &seen, &Vec3::ONE, lanes, radiance);
+        }
     }
 }

@@ -116,6 +116,21 @@ fn light_channels_of_path_add_up() {
     let water = ["--look", "water"];
     let clear = ["diffuse", "reflection", "refraction", "background"];
     check(&workshop, &[&water[..], &PATH].concat(), &clear);
+    // The last ray of a path leaves a pane, and sees the environment
+    let ball = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/tests/data/meshes/sphere-binary.stl"
+    );
+    let pane = [
+        "--mesh",
+        ball,
+        "--set",
+        "mesh.0.material=glass",
+        "--max-depth",
+        "1",
+    ];
+    let classes = ["diffuse", "reflection", "background"];
+    check(&workshop, &[&studio[..], &MATTE, &pane].concat(), &classes);
     // Direct light only: the last ray of a path is a shadow ray
     let direct = ["--set", "render.bounces=0"];
     let classes = ["diffuse", "specular", "background"];

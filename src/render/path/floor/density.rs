@@ -9,7 +9,7 @@ use rayon::prelude::*;
 use super::{Map, Square, corners};
 
 /// Cells along an edge of the map.
-pub(super) const SIDE: usize = 1024;
+const SIDE: usize = 1024;
 
 /// Number of filters; each is twice as wide as the one before.
 const LEVELS: usize = 6;

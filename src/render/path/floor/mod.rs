@@ -10,15 +10,14 @@ use std::f32::consts::FRAC_1_PI;
 
 use glam::Vec3;
 
-use super::{PathIntegrator, Surface};
+use super::{Occlusion, PathIntegrator, Surface};
 use crate::math::{lane3, lanes_in, set_lane3, splat3};
 use crate::render::{
-    bsdf::surface_points,
     layers::LightClass,
     ray_counts::RayCounts,
     scratch::PacketScratch,
     settings::{IntegratorKind, RenderSettings},
-    shading::{add, scale},
+    shading::add,
     stop::Stop,
 };
 use crate::scene::{Ground, Scene};
@@ -96,7 +95,8 @@ impl Map {
     }
 }
 
-/// The four texels around a position from 0 to 1 in a map of `side` by `side` texels, with weights that add up to 1.
+/// The four texels around a position from 0 to 1 in a map of `side` by `side` texels, two or more, with weights that add
+/// up to 1.
 #[expect(
     clippy::cast_possible_truncation,
     clippy::cast_sign_loss,
@@ -106,16 +106,15 @@ fn corners(side: usize, position: [f32; 2]) -> [(usize, f32); 4] {
     let last = (side - 1) as f32;
     let [(x, right), (y, below)] = position.map(|p| {
         let texel = (p * side as f32 - 0.5).clamp(0.0, last);
-        let first = texel.floor().min((last - 1.0).max(0.0));
+        let first = texel.floor().min(last - 1.0);
         (first as usize, texel - first)
     });
-    let (next, down) = (usize::from(side > 1), if side > 1 { side } else { 0 });
     let texel = y * side + x;
     [
         (texel, (1.0 - right) * (1.0 - below)),
-        (texel + next, right * (1.0 - below)),
-        (texel + down, (1.0 - right) * below),
-        (texel + down + next, right * below),
+        (texel + 1, right * (1.0 - below)),
+        (texel + side, (1.0 - right) * below),
+        (texel + side + 1, right * below),
     ]
 }
 
@@ -173,12 +172,7 @@ impl<'a> PathIntegrator<'a> {
         surface: &Surface<'_>,
         packet: &mut PacketScratch,
     ) {
-        let (context, simd) = (&self.context, self.context.simd);
-        context.base_colors(true, packet);
-        let rays = &surface.segments.rays;
-        surface_points(simd, rays, &packet.hits, &packet.base, &mut packet.surface);
-        let opacity = &packet.hits.opacity;
-        scale(simd, &packet.throughput, opacity, &mut packet.weight);
+        self.prepare_surface(surface, packet);
         // Add the light of the maps
         let mut reflected = splat3(Vec3::ZERO);
         for lane in lanes_in(surface.lanes) {
@@ -186,13 +180,8 @@ impl<'a> PathIntegrator<'a> {
             let weight = lane3(&packet.weight, lane) * lane3(&packet.surface.albedo, lane);
             set_lane3(&mut reflected, lane, weight * floor.white(point));
         }
-        add(
-            simd,
-            &reflected,
-            &Vec3::ONE,
-            surface.lanes,
-            &mut packet.radiance,
-        );
+        let (simd, radiance) = (self.context.simd, &mut packet.radiance);
+        add(simd, &reflected, &Vec3::ONE, surface.lanes, radiance);
         packet.take_light(LightClass::Diffuse);
         self.add_straight_light(surface, packet);
     }
@@ -202,11 +191,11 @@ impl<'a> PathIntegrator<'a> {
         let context = &self.context;
         for (index, light) in context.lights.iter().enumerate() {
             self.reflect_light(index, false, surface, packet);
-            if light.beam().is_some() {
-                self.add_direct(surface, packet);
-            } else {
-                self.add_attenuated(light.casts_shadow(), surface, packet);
-            }
+            let occlusion = match light.beam() {
+                Some(_) => Occlusion::Opaque,
+                None => Occlusion::of(&**light),
+            };
+            self.add_direct(occlusion, surface, packet);
         }
     }
 }

@@ -5,7 +5,7 @@ use rayon::prelude::*;
 
 use super::super::{PathIntegrator, Surface};
 use super::{Map, Square};
-use crate::math::{LANES, lane3, splat, splat3};
+use crate::math::{LANES, first_lanes, lane3, splat, splat3};
 use crate::ray::Ray;
 use crate::render::{
     bsdf::surface_points,
@@ -81,7 +81,7 @@ fn trace_row(
     Some(((0..SIDE).map(texel).collect(), counts))
 }
 
-/// Short rays straight down to the texels of packet `number` of a row.
+/// Short rays straight down to the texel of packet `number` of a row.
 #[expect(clippy::cast_possible_truncation, reason = "maps are small")]
 fn aim(
     integrator: &PathIntegrator<'_>,
@@ -90,21 +90,20 @@ fn aim(
     number: usize,
     segments: &mut SegmentPacket,
 ) {
+    const { assert!(PATHS.is_multiple_of(LANES), "a packet has one texel") };
+    let texel = number * LANES / PATHS;
+    let center = square.point([texel, row].map(|i| (i as f32 + 0.5) / SIDE as f32));
+    let above = center + START * square.edge * square.normal;
     segments.rays.reset();
-    segments.inside = 0;
-    for lane in 0..LANES {
-        let sample = number * LANES + lane;
-        let texel = sample / PATHS;
-        let center = square.point([texel, row].map(|i| (i as f32 + 0.5) / SIDE as f32));
-        let above = center + START * square.edge * square.normal;
+    for _ in 0..LANES {
         segments.rays.push(&Ray::new(above, -square.normal));
-        segments.path[lane] = PathSeed::of_pixel((row * SIDE + texel) as u32, TEXELS);
-        segments.sample[lane] = sample as u32;
-        // The ground may cut through a body
-        let body = integrator.context.connected_particles();
-        let is_inside = body.is_some_and(|body| body.side_of(above) == Side::Inside);
-        segments.inside |= u32::from(is_inside) << lane;
     }
+    segments.path = [PathSeed::of_pixel((row * SIDE + texel) as u32, TEXELS); LANES];
+    segments.sample = std::array::from_fn(|lane| (number * LANES + lane) as u32);
+    // The ground may cut through a body
+    let body = integrator.context.connected_particles();
+    let is_inside = body.is_some_and(|body| body.side_of(above) == Side::Inside);
+    segments.inside = if is_inside { first_lanes(LANES) } else { 0 };
     segments.throughput = [splat(1.0); 3];
     segments.pdf = splat(f32::INFINITY);
     segments.bounces = [0; LANES];
