@@ -197,40 +197,6 @@ impl<T: Named> Value for T {
     }
 }
 
-/// At least one item, and no duplicates.
-impl<T: Named> Value for Vec<T> {
-    const FLAG: FlagKind = FlagKind::List;
-
-    fn kind(key: &Key) -> String {
-        format!("a list of {}, such as {}", key.name, key.example)
-    }
-
-    fn parse(field: &Field<'_>, key: &Key) -> Result<Self, Fault> {
-        let items = field.items().filter(|items| !items.is_empty());
-        let mut values = Self::new();
-        for item in items.ok_or(Fault::Unwanted)? {
-            let value = item.value::<T>(key).ok_or(Fault::Noted)?;
-            if values.contains(&value) {
-                item.fail(&format!(
-                    "{} is there twice",
-                    value.toml().trim_matches('"')
-                ));
-                return Err(Fault::Noted);
-            }
-            values.push(value);
-        }
-        Ok(values)
-    }
-
-    fn toml(&self) -> String {
-        list(self.iter().map(Value::toml))
-    }
-
-    fn schema(key: &Key) -> Json {
-        json!({ "type": "array", "items": T::schema(key), "minItems": 1, "uniqueItems": true })
-    }
-}
-
 impl Value for bool {
     const FLAG: FlagKind = FlagKind::Switch;
 
