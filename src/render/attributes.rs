@@ -1,12 +1,14 @@
 //! Attributes at intersections: base colours, and for camera rays coverage and the data channels of pixels.
 
+use std::cell::LazyCell;
+
 use glam::Vec3;
 
 use super::{
     aov::{DataSample, NO_ID},
     context::RenderContext,
     cryptomatte::{self, ObjectName},
-    film::{Channels, FilmTile},
+    film::FilmTile,
     layers::MatteKind,
     sample_layers::SampleLayers,
     scratch::{PacketScratch, Pixel},
@@ -96,11 +98,9 @@ impl RenderContext<'_> {
         packet: &mut PacketScratch,
         pixels: &mut [Pixel],
     ) {
-        if self.settings.planes() == Channels::COLOR || packet.hits.mask == 0 {
+        if !self.settings.planes().needs_nearest() || packet.hits.mask == 0 {
             return;
         }
-        // The data of reflections at panes are of what is behind
-        self.restore_behind(packet);
         // Compute the depths of all samples
         let mut z = splat(f32::INFINITY);
         depths(self.simd, &self.camera, rays, &packet.hits, &mut z);
@@ -144,19 +144,25 @@ impl RenderContext<'_> {
         number: usize,
         layers: &mut SampleLayers,
     ) {
-        for kind in layers.layers.mattes.iter() {
-            for lane in lanes_in(hits.mask) {
-                layers.set_object(kind, number, lane, self.object(kind, hits, lane));
+        let mattes = layers.layers.mattes;
+        if mattes.is_empty() {
+            return;
+        }
+        for lane in lanes_in(hits.mask) {
+            // On a liquid surface, this is a search
+            let particle = LazyCell::new(|| self.particle_at(hits, lane));
+            for kind in mattes.iter() {
+                let object = self.object(kind, hits.material[lane], || *particle);
+                layers.set_object(kind, number, lane, object);
             }
         }
     }
 
-    /// The object of `kind` at the intersection in `lane`.
-    fn object(&self, kind: MatteKind, hits: &Intersections, lane: usize) -> u32 {
-        let material = hits.material[lane];
+    /// The object of `kind` at an intersection with a surface of `material`, which belongs to `particle` if that has
+    /// particles.
+    fn object(&self, kind: MatteKind, material: MaterialId, particle: impl Fn() -> u32) -> u32 {
         let object = |name: ObjectName| cryptomatte::object_of(name.as_bytes());
         if material.is_of_particles() {
-            let particle = || self.particle_at(hits, lane);
             match kind {
                 MatteKind::Particle => {
                     return object(ObjectName::of_particle(self.source.id(particle())));

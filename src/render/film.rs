@@ -76,6 +76,11 @@ impl Channels {
         self.layers.mattes.contains(MatteKind::Part)
     }
 
+    /// Whether a channel is that of the nearest sample of a pixel.
+    pub const fn needs_nearest(&self) -> bool {
+        self.depth || self.normal || self.position || self.albedo || self.needs_nearest_particle()
+    }
+
     /// Whether the nearest sample of a pixel needs the index of its particle.
     pub const fn needs_nearest_particle(&self) -> bool {
         self.id || self.needs_velocities() || self.layers.attributes > 0

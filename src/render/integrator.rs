@@ -148,6 +148,8 @@ fn trace_camera_rays<I: Integrator + ?Sized>(
         // Store radiance, coverage and data channels of the samples
         group.radiance[number] = packet.radiance;
         group.coverage[number] = context.coverage(&packet.hits, &packet.coverage);
+        // The data of reflections at panes are of what is behind
+        context.restore_behind(packet);
         context.gather_data(&segments.rays, number * LANES, packet, &mut group.pixels);
         group.layers.store(number, &packet.split);
         context.gather_objects(&packet.hits, number, &mut group.layers);

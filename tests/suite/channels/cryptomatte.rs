@@ -78,15 +78,18 @@ fn layers(path: &Path) -> BTreeMap<String, Layer> {
     layers
 }
 
+/// Renders the frames in `in`.
+fn render(workshop: &Workshop, out: &str, options: &[&str]) {
+    let pattern = format!("{out}/f.####.exr");
+    let arguments = ["render", "in", "-o", &pattern];
+    workshop.run(&[&arguments, options].concat()).expect(0);
+}
+
 /// Renders frame 6 of the dam break.
 fn rendered(workshop: &Workshop, out: &str, options: &[&str]) {
     dam_break(&workshop.join("in"), 6..=6);
-    let pattern = format!("{out}/f.####.exr");
-    let arguments = ["render", "in", "-o", &pattern, "--samples", "16"];
-    let size = ["--width", "64", "--height", "36"];
-    workshop
-        .run(&[&arguments[..], &size, options].concat())
-        .expect(0);
+    let size = ["--width", "64", "--height", "36", "--samples", "16"];
+    render(workshop, out, &[&size, options].concat());
 }
 
 #[track_caller]
@@ -174,16 +177,9 @@ fn particles_have_the_names_of_their_ids_and_parts_those_of_their_attribute() {
     fs::create_dir_all(workshop.join("in")).expect("a directory");
     let csv = "x,y,z,id,type,radius\n0,0,0,70,2,0.5\n3,0,0,4000000000,5,0.5\n";
     fs::write(workshop.join("in/f.0001.csv"), csv).expect("a file");
-    let image = [
-        "render",
-        "in",
-        "-o",
-        "out/f.####.exr",
-        "--channels",
-        "cryptomatte,id",
-    ];
+    let channels = ["--channels", "cryptomatte,id"];
     let size = ["--width", "64", "--height", "36"];
-    workshop.run(&[&image[..], &size].concat()).expect(0);
+    render(&workshop, "out", &[&channels[..], &size].concat());
     let path = workshop.join("out/f.0001.exr");
     let layers = layers(&path);
     let names = |layer: &str| {
@@ -200,9 +196,7 @@ fn particles_have_the_names_of_their_ids_and_parts_those_of_their_attribute() {
     assert_eq!(names("crypto_material"), ["particles", "spray"]);
     // Where one particle covers the pixel, its id and its object agree
     let picture = Picture::open(&path);
-    let crate::picture::Plane::Uint(ids) = &picture.planes["id.I"] else {
-        panic!("ids are integers");
-    };
+    let ids = picture.integers("id.I");
     let manifest = layers["crypto_particle"].manifest.as_ref().unwrap();
     let parts = layers["crypto_part"].manifest.as_ref().unwrap();
     let mut checked = 0;
@@ -227,16 +221,9 @@ fn large_manifests_are_left_out() {
         3,
         glam::Vec3::ZERO,
     );
-    let image = [
-        "render",
-        "in",
-        "-o",
-        "out/f.####.exr",
-        "--channels",
-        "cryptomatte",
-    ];
+    let channels = ["--channels", "cryptomatte"];
     let size = ["--width", "16", "--height", "9", "--samples", "4"];
-    workshop.run(&[&image[..], &size].concat()).expect(0);
+    render(&workshop, "out", &[&channels[..], &size].concat());
     let layers = layers(&workshop.join("out/f.0001.exr"));
     assert!(layers["crypto_particle"].manifest.is_none());
     assert!(layers["crypto_material"].manifest.is_some());

@@ -3,7 +3,7 @@
 use std::fs;
 
 use crate::harness::Workshop;
-use crate::picture::{Picture, Plane};
+use crate::picture::Picture;
 
 const SIZE: [&str; 4] = ["--width", "64", "--height", "36"];
 
@@ -31,9 +31,7 @@ fn attributes_are_channels_of_their_names() {
     write(&workshop, &[TWO]);
     let channels = ["--channels", "id,attribute:density,attribute:velocity"];
     let picture = rendered(&workshop, "out", &[&SIZE[..], &channels].concat());
-    let Plane::Uint(ids) = &picture.planes["id.I"] else {
-        panic!("ids are integers");
-    };
+    let ids = picture.integers("id.I");
     let planes = ["density", "velocity.X", "velocity.Z"].map(|name| picture.floats(name));
     let mut found = [0; 3];
     for (pixel, id) in ids.iter().enumerate() {
