@@ -33,6 +33,7 @@ impl Run {
         // Refuse before the survey is announced; `RenderRun::open` checks again, for callers of the library
         job.check_output_dir(mode)?;
         job.check_manifest_file()?;
+        let job = job.resuming(mode)?;
         if job.needs_survey(mode)? {
             message!("surveying the sequence");
         }
