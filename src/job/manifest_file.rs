@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
+use spherule_formats::MemoryBudget;
 use spherule_formats::sequence::{Sequence, SequenceInput};
 use spherule_jobs::{publish, read_regular_text};
 
@@ -29,6 +30,14 @@ pub struct JobManifest {
     pub unchanged: Option<Manifest>,
 }
 
+/// Budget for reading one file in the job of `manifest`.
+pub(super) fn reading_budget(manifest: &Manifest) -> MemoryBudget {
+    read_budget(
+        manifest.render.memory_limit.map(|limit| limit.0),
+        manifest.job.memory_ceiling.map(|limit| limit.0),
+    )
+}
+
 impl JobManifest {
     /// A manifest that is not in a file. Its paths are relative to `base`.
     pub fn new(manifest: Manifest, base: impl Into<PathBuf>) -> Self {
@@ -47,10 +56,7 @@ impl JobManifest {
     pub fn open_sequence(&self) -> Result<Sequence, RunError> {
         let input = &self.manifest.input;
         let paths = input.path.iter().map(|p| self.base.join(p)).collect();
-        let budget = read_budget(
-            self.manifest.render.memory_limit.map(|limit| limit.0),
-            self.manifest.job.memory_ceiling.map(|limit| limit.0),
-        );
+        let budget = reading_budget(&self.manifest);
         let paths = SequenceInput::from_paths(paths);
         let mut sequence = in_thread(|| Sequence::open_within(&paths, budget))?;
         if let Some(parts) = &input.parts {

@@ -1,5 +1,6 @@
 //! The meshes of a job: which files they are, and those that all images share.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -8,9 +9,9 @@ use spherule_formats::FrameError;
 use spherule_jobs::Fingerprint;
 
 use super::RunError;
+use super::manifest_file::reading_budget;
 use crate::manifest::{Manifest, MeshPath, named_place};
 use crate::pipeline::{LoadedMesh, PictureMesh, load_mesh};
-use crate::reading::read_budget;
 use crate::resolve::mesh_settings;
 use crate::survey::Survey;
 
@@ -39,9 +40,10 @@ impl JobMeshes {
         dir: &Path,
         survey: &Survey,
     ) -> Result<Vec<PictureMesh>, RunError> {
-        let limit = manifest.render.memory_limit.map(|limit| limit.0);
-        let ceiling = manifest.job.memory_ceiling.map(|limit| limit.0);
-        let settings = mesh_settings(manifest, survey, read_budget(limit, ceiling));
+        if manifest.meshes.is_empty() {
+            return Ok(Vec::new());
+        }
+        let settings = mesh_settings(manifest, survey, reading_budget(manifest));
         // Read the files, unless they have been read for the same origin
         let load = || -> Result<_, RunError> {
             let mut meshes = Vec::with_capacity(settings.len());
@@ -95,24 +97,25 @@ pub(super) fn frame_files(manifest: &Manifest, dir: &Path, frame: i64) -> Vec<Pa
         .collect()
 }
 
-/// Replaces the paths of meshes that all images share in `settings` by their fingerprints. Those of a frame are among
-/// its inputs.
-pub(super) fn identify(
+/// Fingerprints of the meshes that all images share, by the keys of their paths. Those of a frame are among its inputs.
+pub(super) fn identities(
     manifest: &Manifest,
     dir: &Path,
-    settings: &mut [(String, String)],
-) -> Result<(), RunError> {
+) -> Result<Vec<(String, String)>, RunError> {
+    let mut identities = Vec::new();
     for (index, mesh) in manifest.meshes.iter().enumerate() {
-        let key = format!("mesh.{index}.path");
-        let setting = settings.iter_mut().find(|(name, _)| *name == key);
-        if let (Some(path), Some((_, value))) = (shared_file(&mesh.path, dir), setting) {
-            let found = Fingerprint::of_file(&path);
-            let found = found.map_err(|source| RunError::Mesh {
+        if let Some(path) = shared_file(&mesh.path, dir) {
+            let found = identity(&path).map_err(|source| RunError::Mesh {
                 index,
                 source: FrameError::io(&path, source).into(),
             })?;
-            *value = format!("blake3 {}", found.blake3);
+            identities.push((format!("mesh.{index}.path"), found));
         }
     }
-    Ok(())
+    Ok(identities)
+}
+
+/// The fingerprint of a file in the settings of a job.
+pub(super) fn identity(path: &Path) -> io::Result<String> {
+    Ok(format!("blake3 {}", Fingerprint::of_file(path)?.blake3))
 }

@@ -5,10 +5,10 @@ use std::sync::OnceLock;
 
 use serde_json::Value;
 use spherule_formats::Sequence;
-use spherule_jobs::{Fingerprint, FrameRequest, Job, JobRequest, Plan, ResumeMode};
+use spherule_jobs::{FrameRequest, Job, JobRequest, Plan, ResumeMode};
 
 use super::manifest_file::{JobManifest, ManifestFile};
-use super::meshes::{self, JobMeshes};
+use super::meshes::{self, JobMeshes, identity};
 use super::selection::{frame_requests, frames_in, indices, select};
 use super::target::{check_output_dir, stored_survey};
 use super::{RunError, Shard, in_thread};
@@ -178,7 +178,8 @@ impl RenderJob {
     /// The settings of the images. Those with the same effect as in the existing plan are written as in the plan.
     fn settings(&self, mode: ResumeMode) -> Result<Vec<(String, String)>, RunError> {
         let mut settings = self.manifest.settings();
-        self.identify_files(&mut settings)?;
+        let identities = self.file_identities()?;
+        identify(&mut settings, &identities);
         let Some(planned) = self.existing_plan(mode)? else {
             return Ok(settings);
         };
@@ -186,7 +187,7 @@ impl RenderJob {
         let mut as_planned = self
             .manifest
             .settings_as_planned(planned.settings(), has_rgb);
-        self.identify_files(&mut as_planned)?;
+        identify(&mut as_planned, &identities);
         // Settings that are resolved again must be the new ones
         let resolves_again =
             mode == ResumeMode::KeepDone && !planned.changes_to(&as_planned).is_empty();
@@ -196,32 +197,19 @@ impl RenderJob {
         })
     }
 
-    /// Replaces paths of files that all images depend on in `settings` by fingerprints: the files may be moved.
-    fn identify_files(&self, settings: &mut [(String, String)]) -> Result<(), RunError> {
-        self.identify_environment(settings)?;
-        meshes::identify(&self.manifest, self.dir(), settings)
+    /// Fingerprints of the files that all images depend on, by the keys of their paths: the files may be moved.
+    fn file_identities(&self) -> Result<Vec<(String, String)>, RunError> {
+        let mut identities = meshes::identities(&self.manifest, self.dir())?;
+        if let Some(path) = self.environment_path() {
+            let found = identity(&path).map_err(|source| HdrError::Io { path, source })?;
+            identities.push(("environment.image".to_owned(), found));
+        }
+        Ok(identities)
     }
 
     /// The files of the meshes that only `frame` has.
     fn mesh_files(&self, frame: i64) -> Vec<PathBuf> {
         meshes::frame_files(&self.manifest, self.dir(), frame)
-    }
-
-    /// Replaces the path of the image of the environment in `settings` by its fingerprint: the image may be moved.
-    fn identify_environment(&self, settings: &mut [(String, String)]) -> Result<(), RunError> {
-        let path = self.environment_path();
-        let setting = settings
-            .iter_mut()
-            .find(|(key, _)| key == "environment.image");
-        if let (Some(path), Some((_, value))) = (path, setting) {
-            let found = Fingerprint::of_file(&path);
-            let found = found.map_err(|source| HdrError::Io {
-                path: path.clone(),
-                source,
-            })?;
-            *value = format!("blake3 {}", found.blake3);
-        }
-        Ok(())
     }
 
     /// The frames of the job: all of the sequence, or the selected one if the output has no number.
@@ -385,5 +373,14 @@ pub fn require_one_fits(tasks: &[ImageTask]) -> Result<(), RunError> {
             source: (*error).clone(),
         }),
         _ => Ok(()),
+    }
+}
+
+/// Replaces the values of keys in `settings` by their `identities`.
+fn identify(settings: &mut [(String, String)], identities: &[(String, String)]) {
+    for (key, identity) in identities {
+        if let Some((_, value)) = settings.iter_mut().find(|(name, _)| name == key) {
+            value.clone_from(identity);
+        }
     }
 }

@@ -202,28 +202,26 @@ impl Names {
     fn of(setup: &Setup, file: &NativeFile) -> Result<Self, LoadError> {
         let frame = file.frame_unchecked();
         let attributes = frame.attributes();
+        let find = |name: &str, purpose, required| {
+            let found = frame.attribute(name).map(|a| a.name().to_owned());
+            if found.is_none() && required && file.index().count > 0 {
+                let path = file.path().display().to_string();
+                let has = attributes.iter().map(Named::name);
+                return Err(missing(name, purpose, &path, has));
+            }
+            Ok(found)
+        };
         let values = match &setup.picture.color {
             ColorRule::Constant(_) => None,
             ColorRule::Attribute { name, required, .. } | ColorRule::Rgb { name, required } => {
-                let found = frame.attribute(name).map(|a| a.name().to_owned());
-                if found.is_none() && *required && file.index().count > 0 {
-                    let path = file.path().display().to_string();
-                    let has = attributes.iter().map(Named::name);
-                    return Err(missing(name, "colour", &path, has));
-                }
-                found
+                find(name, "colour", *required)?
             }
         };
-        let mut with_channels = Vec::new();
-        for channel in &setup.picture.attributes {
-            let found = frame.attribute(&channel.name).map(|a| a.name().to_owned());
-            if found.is_none() && file.index().count > 0 {
-                let path = file.path().display().to_string();
-                let has = attributes.iter().map(Named::name);
-                return Err(missing(&channel.name, "a channel", &path, has));
-            }
-            with_channels.push((found, channel.components));
-        }
+        let with_channels = setup.picture.attributes.iter().map(|channel| {
+            let found = find(&channel.name, "a channel", true)?;
+            Ok((found, channel.components))
+        });
+        let with_channels = with_channels.collect::<Result<_, LoadError>>()?;
         let channels = setup.picture.render.channels;
         let name = |found: Option<&AttributeView>| found.map(|a| a.name().to_owned());
         Ok(Self {
