@@ -126,6 +126,8 @@ fn light_channels_of_path_add_up() {
         ball,
         "--set",
         "mesh.0.material=glass",
+        "--set",
+        "mesh.0.translate=[-2.0, 0.5, 1.0]",
         "--max-depth",
         "1",
     ];
